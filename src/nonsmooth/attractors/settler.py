@@ -82,11 +82,11 @@ class Settler:
     @property
     def compiled(self) -> LoopEngine | None:
         """The engine whose jobs run in one compiled call; None where they run one by one: modes that are made on the
-        way, phases that depend on the parameters, sections on a surface."""
+        way, what elements decide together, phases that depend on the parameters, sections on a surface."""
         engine = self.engine
-        if isinstance(engine, LinearEngine | SeriesEngine) and engine.phases is None and self.plan.indicator < 0:
-            return engine
-        return None
+        if not isinstance(engine, LinearEngine | SeriesEngine) or engine.traced.decider is not None:
+            return None
+        return engine if engine.phases is None and self.plan.indicator < 0 else None
 
     def load(self) -> None:
         """Compile or load the kernel now, before threads ask for it."""

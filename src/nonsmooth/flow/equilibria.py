@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import ComplexArray, FloatArray
+from nonsmooth.system.symbolic.traced import FOUND, TOGETHER
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
@@ -79,7 +80,7 @@ class ModeField:
         h = np.where(np.abs(h) <= edge, 0.0, h)
         found = np.full(len(self.traced.transitions), -np.inf)
         for k, jump in enumerate(self.traced.transitions):
-            if jump.source == self.mode and jump.rows:
+            if jump.source == self.mode and jump.rows and jump.kind not in (TOGETHER, FOUND):
                 rows = [row.sign * float(h[row.indicator]) for row in jump.rows]
                 found[k] = min((x for x in rows if x), default=0.0)
         return found

@@ -104,8 +104,14 @@ def apart(
 def settled(
     flow: VariationalFlow, values: FloatArray, start: tuple[int, FloatArray], first: tuple[int, FloatArray], t: float
 ) -> Jump | None:
-    """The transitions that lead at once from the start's (mode, z) to that in which the run begins."""
+    """The transitions that lead at once from the start's (mode, z) to that in which the run begins.
+
+    What elements decide together at a start needs none, but for an impact."""
     if start[0] == first[0]:
+        return None
+    if flow.traced.decider is not None:
+        if not (np.abs(start[1] - first[1]) <= 1e-10 * (flow.scale + np.abs(first[1]))).all():
+            raise ValueError("the run begins with an impact of several contacts: give a start just before or behind it")
         return None
     chains: list[tuple[int, ...]] = [()]
     while chains:

@@ -86,6 +86,12 @@ class VariationalFlow:
         self.n_out = n + n * n + n + n * a + rows * (2 + n + a)
         self._no_timing = np.zeros(a)
 
+    def catch_up(self) -> None:
+        """Take in the transitions to which questions of elements have led since (:mod:`.deciding`)."""
+        decider = self.traced.decider
+        if decider is not None and decider.known() is not self.traced:
+            self.__init__(decider.known(), self.active, self.scale[: self.n_u])  # type: ignore[misc]
+
     @classmethod
     def of(cls, system: System, active: Sequence[str] = ()) -> VariationalFlow:
         """The flow of a system's equations; made once for the same equations and names.

@@ -105,12 +105,13 @@ def describe(
     derived: Collection[str] = ()
     ranges: Sequence[tuple[sp.Expr, str]] = ()
     patterns: Any = None
+    made: Mapping[str, Any] = {}
     if elements:
         from nonsmooth.system.derived.combinations import assembled
 
         given = {
             "indicators": indicators, "transitions": transitions, "outputs": outputs, "memory": memory,
-            "symmetry": symmetry, "bands": bands,
+            "symmetry": symmetry, "bands": bands, "period": period,
         }  # fmt: skip
         now = {symbols.p[key]: parameter.value for key, parameter in known.items()}
         made = assembled(symbols, modes, elements, given, _scale(scale, units, name), now)
@@ -142,6 +143,8 @@ def describe(
         Domain(traced).check({key: parameter.value for key, parameter in known.items()})
     if patterns is not None:
         traced = patterns.bind(traced)
+    elif made.get("decider") is not None:
+        traced = made["decider"].decides(traced, made["kinds"], made["asked"])
     units_out = {key: unit for key, (_, unit) in shown.items()}
     return Description(
         name=name, states=units, parameters=known, memory=remembered,

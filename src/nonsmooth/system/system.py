@@ -189,6 +189,8 @@ class System:
 
         Where modes are made when they are first visited, the names of those visited so far."""
         traced = self._variant.traced
+        if traced.decider is not None:
+            return traced.decider.known()
         return traced if traced.patterns is None else traced.patterns.seen()
 
     @property

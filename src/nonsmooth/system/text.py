@@ -76,6 +76,9 @@ def _pieces(
 
 def _content(d: Description) -> dict[str, Any]:
     t, names = d.traced, d.symbol_names
+    elements = t.patterns or t.decider
+    if t.decider is not None:
+        t = t.decider.plain
 
     def text(expression: sp.Expr) -> str:
         return write_expression(expression, names)
@@ -105,7 +108,7 @@ def _content(d: Description) -> dict[str, Any]:
     modes = {}
     for mode, field, lacking in zip(t.mode_names, t.fields, t.lacking, strict=True):
         modes[mode] = {s: text(e) for s, e, gone in zip(t.state_names, field, lacking, strict=True) if not gone}
-    known = {} if t.patterns is None else t.patterns.described()
+    known = {} if elements is None else elements.described()
     content: dict[str, Any] = {
         "format": _FORMAT,
         "version": _VERSION,

@@ -16,6 +16,7 @@ from nonsmooth.continuation.problems.anchor import anchored
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.shooting import Solved
 from nonsmooth.continuation.problems.signature import AT_ONCE, Signature, Visit
+from nonsmooth.system.symbolic.traced import ASKED, FOUND, Traced
 
 __all__ = [
     "Change", "common_orbit", "common_point", "gained", "inserted", "is_tolerance", "past_the_section", "without",
@@ -49,12 +50,11 @@ def inserted(curve: Orbits, point: OrbitPoint) -> list[Change]:
     path, flow, values = point.path, curve.shooting.flow, point.solved.values
     place, k = path.touched
     traced = curve.shooting.system.traced
-    jump = traced.transitions[k]
     row = int(path.which[place, k] - curve.walk.net.row_start[k])
     t = float(path.place[place, k])
     begin = float(point.solved.times[place])
     z = flow.segments(values, [visits[place].mode], [begin], [t - begin], states[place][None, :]).z[0]
-    entry, indicator = flow.jump(values, k, t, z, row), jump.rows[row].indicator
+    indicator = traced.transitions[k].rows[row].indicator
 
     def change(new: list[Visit], after: list[FloatArray]) -> Change:
         signature = curve.shooting.signature.with_inserted(place, new)
@@ -62,17 +62,31 @@ def inserted(curve: Orbits, point: OrbitPoint) -> list[Change]:
         z_new = np.concatenate([states[: place + 1], np.array(after), states[place + 1 :]])
         return Change(signature, t_new, z_new, indicator, True, place, tuple(new), t)
 
-    first = Visit(jump.source, k, row)
-    if jump.target == jump.source:
-        return [change([first], [entry.z_after])]
     found = []
-    for k_back, back in enumerate(traced.transitions):
-        if back.source != jump.target or back.target != jump.source or back.at is not None:
+    for taken in _answers(traced, k):
+        jump, entry = traced.transitions[taken], flow.jump(values, taken, t, z, row)
+        first = Visit(jump.source, taken, row)
+        if jump.target == jump.source:
+            found.append(change([first], [entry.z_after]))
             continue
-        for r in (*range(len(back.rows)), AT_ONCE):
-            leave = flow.jump(values, k_back, t, entry.z_after, r)
-            found.append(change([first, Visit(jump.target, k_back, r)], [entry.z_after, leave.z_after]))
+        for k_back, back in enumerate(traced.transitions):
+            if back.source != jump.target or back.target != jump.source or back.at is not None:
+                continue
+            for r in (*range(len(back.rows)), AT_ONCE):
+                leave = flow.jump(values, k_back, t, entry.z_after, r)
+                found.append(change([first, Visit(jump.target, k_back, r)], [entry.z_after, leave.z_after]))
     return found
+
+
+def _answers(traced: Traced, k: int) -> list[int]:
+    """A transition; where it is a question, those to which it has led so far."""
+    jump = traced.transitions[k]
+    if jump.kind != ASKED:
+        return [k]
+    return [
+        j for j, other in enumerate(traced.transitions)
+        if other.kind == FOUND and other.source == jump.source and other.rows == jump.rows
+    ]  # fmt: skip
 
 
 def without(curve: Orbits, point: OrbitPoint, place: int, count: int) -> Change:

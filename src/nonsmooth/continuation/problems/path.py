@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.signature import AT_ONCE
+from nonsmooth.system.symbolic.traced import FOUND, TOGETHER
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.problems.shooting import Shooting, Solved
@@ -78,10 +79,8 @@ class Walk:
         n, m = len(traced.u), shooting.m + 1
         visits = shooting.signature.visits
         self.modes = shooting.modes
-        self.fired = np.array([v.transition for v in visits], dtype=np.int64)
-        self.fired_row = np.array(
-            [-1 if v.row < 0 else int(self.net.row_start[v.transition]) + v.row for v in visits], dtype=np.int64
-        )
+        both = [_in_net(traced, self.net, v.transition, v.row) for v in visits]
+        self.fired, self.fired_row = (np.array(part, dtype=np.int64) for part in zip(*both, strict=True))
         self.lacking = np.array(traced.lacking, dtype=np.int64).reshape(len(traced.mode_names), n)
         self.weight = system.scale_vector() * 1e-3
         rows = n + len(traced.indicators) + len(traced.outputs)
@@ -91,14 +90,19 @@ class Walk:
         )  # fmt: skip
         self.shape = (m, n_t)
         self.n = n
-        conditions = self.net.at < 0
+        conditions = (self.net.at < 0) & [jump.kind not in (TOGETHER, FOUND) for jump in traced.transitions]
         armed = [[traced.transitions[k].source == mode for k in range(n_t)] for mode in self.modes]
         self.armed = np.array(armed, dtype=bool).reshape(m, n_t)
         self.armed &= conditions[None, :]
         self.elsewhere = self.armed.copy()  # transitions that could fire at the end of a visit but do not
-        for i, k in enumerate(self.fired):
-            if k >= 0:
+        for i, (k, r) in enumerate(zip(self.fired, self.fired_row, strict=True)):
+            if k >= 0:  # what holds wherever this one does, and was declared behind it, is not taken
+                own = set(traced.transitions[k].rows)
                 self.elsewhere[i, k] = False
+                self.elsewhere[i, k:] &= [not (jump.rows and set(jump.rows) <= own) for jump in traced.transitions[k:]]
+            if traced.decider is not None and r >= 0:  # what several decide fires with what one does
+                self.elsewhere[i] &= [all(one.indicator != self.net.rows[r, 0] for one in jump.rows)
+                                      for jump in traced.transitions]  # fmt: skip
         self.conditional = np.flatnonzero(self.fired_row[:-1] >= 0)
         self.at_once = np.array([*shooting.at_once, False], dtype=bool)  # visits of no length
         fixed = [shooting.forced]
@@ -194,6 +198,17 @@ class Walk:
             if not found[i] <= distance:
                 found[i] = distance
         return found
+
+
+def _in_net(traced: Traced, net: Any, k: int, row: int) -> tuple[int, int]:
+    """A transition and the row of its condition that is zero, as the net has them: a question for its answer."""
+    jump = traced.transitions[k] if k >= 0 else None
+    if jump is not None and jump.kind == FOUND:
+        fired = jump.rows[max(row, 0)]
+        for j, other in enumerate(traced.transitions):
+            if other.source == jump.source and other.kind not in (TOGETHER, FOUND) and fired in other.rows:
+                return j, int(net.row_start[j]) + other.rows.index(fired) if row >= 0 else -1
+    return k, -1 if row < 0 else int(net.row_start[k]) + row
 
 
 @lru_cache(maxsize=32)

@@ -24,6 +24,7 @@ def visits_of(
     """Visits that end with the transitions of a log from ``first`` on, and the states (m, n_z) just after these.
 
     ``memory`` is that before the first of them. The row of each condition is the one that is zero."""
+    flow.catch_up()
     traced = flow.traced
     visits = []
     for i in range(first, len(log.crossing_transition)):

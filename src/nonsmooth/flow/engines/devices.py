@@ -79,8 +79,12 @@ def engine_on(device: Any, engine: Engine, plan: SectionPlan | None) -> Engine:
 
     The planar kernels of a GPU know two states and stroboscopic sections only: else the same flow goes there by the
     series kernels."""
-    if device == "cuda" and isinstance(engine, PatternEngine):
-        raise ValueError('modes that are made when they are visited are made by the processor: leave out device="cuda"')
+    decides = isinstance(engine, LoopEngine) and engine.traced.decider is not None
+    if device == "cuda" and (decides or isinstance(engine, PatternEngine)):
+        raise ValueError(
+            "what contacts and frictions decide together, and modes that are made when they are visited, are found by "
+            'the processor: leave out device="cuda"'
+        )
     if device != "cuda" or not isinstance(engine, LinearEngine):
         return engine
     if isinstance(engine, PlanarEngine) and (plan is None or plan.indicator < 0):

@@ -64,6 +64,9 @@ class LinearEngine(LoopEngine):
     def __post_init__(self) -> None:
         self.net = pack_net(self.traced)
 
+    def step_in(self, mode: int, system: Any) -> float:
+        return float(system[2].info[mode, 0])
+
     @property
     def is_plain(self) -> bool:
         """Return whether there is no memory and every mode has every state."""
@@ -106,6 +109,12 @@ class LinearEngine(LoopEngine):
 
     def given(self, tables: Tables) -> tuple[Any, Any, Any]:
         """The present thread's tables and work; the kernel keeps the tables of the last point in them."""
+        maps = max((j + 1 for j, jump in enumerate(self.traced.transitions) if jump.reset is not None), default=0)
+        if tables.form.ra.shape[1] < maps:  # some were found since
+            from nonsmooth.system.codegen.linear import linear_form
+
+            self.form = linear_form(self.traced) or self.form
+            tables.form = self.prepare(tables.points).form
         local = self._local
         if not hasattr(local, "work"):
             from nonsmooth.kernels.linear.layout import scratch

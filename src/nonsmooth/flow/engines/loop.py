@@ -14,11 +14,14 @@ import numpy as np
 from nonsmooth.flow.engines.engine import Chain, FloatArray, Log, SectionPlan, State
 from nonsmooth.flow.engines.march import March
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, RESET, TOUCHES
+from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, MODE, RESET, TIME, TOUCHES, WAITS
 from nonsmooth.kernels.hybrid.stopping import flag
+from nonsmooth.system.derived.deciding import begun, decide
 from nonsmooth.system.phases import phases, varying_phases
+from nonsmooth.system.symbolic.traced import ALONE, ASKED, FOUND, TOGETHER
 
 if TYPE_CHECKING:
+    from nonsmooth.system.derived.patterns import Rows
     from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 __all__ = ["DIVERGENCE", "LoopEngine", "pack_net"]
@@ -70,9 +73,44 @@ class LoopEngine(ABC):
         """Number of outputs whose extremes are kept."""
         return len(self.traced.outputs)
 
-    def go_on(self, tables: Any) -> bool:
-        """Give a run that has paused what it waits for; True where that exchanged model, tables or work."""
-        return False
+    def go_on(self, tables: Any, march: March, system: Any) -> bool:
+        """Give a run that has paused what it waits for; True where that exchanged model, tables or work.
+
+        What elements decide together is asked here (:mod:`nonsmooth.system.derived.deciding`)."""
+        waits = int(system[3].tally[WAITS]) - 1
+        if waits < 0 or self.traced.decider is None:
+            return False
+        taken = self._answer(waits, tables, march, system)
+        if taken >= len(self.net.transitions):
+            self.traced = self.traced.decider.known()
+            self.net = pack_net(self.traced)
+        return taken >= len(system[1].transitions)
+
+    def _answer(self, waits: int, tables: Any, march: March, system: Any) -> int:
+        """Say where a transition that is asked leads, and which one is taken; -1 at a start."""
+        decider, i, local, work = self.traced.decider, int(march.orders[0]), self._threads, system[3]
+        assert decider is not None and march.state is not None
+        begins = work.tally[BEGUN] == 0
+        if getattr(local, "asked", None) != (id(tables), i):
+            local.asked, local.rows = (id(tables), i), decider.rows(decider.form.evaluate(tables.points[i : i + 1]), 0)
+        rows: Rows = local.rows
+        w = rows.augmented(march.state.u if begins else work.w[: rows.n], float(work.memo[TIME]))
+        mode = int(work.tally[MODE])
+        pattern = decider.visited[mode]
+        if begins:
+            found = begun(rows, decider.mode, pattern, w)
+            march.state.counters[:2], march.state.u[:] = (decider.number(found.pattern), 1), found.states
+            return -1
+        found = decide(rows, decider.mode, pattern, w, self.step_in(mode, system))
+        if not found.struck:
+            work.w[: rows.n] = found.states
+        taken = decider.found(waits, decider.number(found.pattern), found.struck)
+        work.tally[WAITS] = taken + 1
+        return taken
+
+    def step_in(self, mode: int, system: Any) -> float:
+        """A time in which states change as much as they do from one step to the next."""
+        return 0.0
 
     @cached_property
     def phases(self) -> Callable[[Any], FloatArray] | None:
@@ -139,14 +177,14 @@ class LoopEngine(ABC):
     def _run(self, march: March, tables: Any, indicator: int = -1) -> tuple[int, Any]:
         """March until the goal is reached or a log is full; Ctrl-C comes in between. Returns the code, and the work."""
         system = self.system(tables, int(march.orders[0]), indicator)
-        system[3].tally[BEGUN] = 0
+        system[3].tally[BEGUN] = system[3].tally[WAITS] = 0
         return self._go_on(march, tables, indicator, system)
 
     def _go_on(self, march: March, tables: Any, indicator: int, system: Any) -> tuple[int, Any]:
         code = codes.PAUSED
         while code == codes.PAUSED:
             code = march.run(system)
-            if self.go_on(tables):
+            if self.go_on(tables, march, system):
                 system = self.system(tables, int(march.orders[0]), indicator)
             _end_if_not_wanted()
         return code, system
@@ -252,25 +290,33 @@ def pack_net(traced: Traced) -> Any:
     Phases that depend on the parameters are zero here; see :meth:`LoopEngine.net_of`."""
     from nonsmooth.kernels.hybrid.records import Net
 
-    integer = np.int64
+    integer, jumps, modes = np.int64, traced.transitions, range(len(traced.mode_names))
     transitions = np.array(
         [
-            (t.target, _change(traced, t), DEAD_END if traced.ends(t) else t.contact, j)
-            for j, t in enumerate(traced.transitions)
+            (
+                -1 if t.kind in (ASKED, TOGETHER) else t.target, _change(traced, t),
+                DEAD_END if traced.ends(t) else t.contact, j, t.kind == ALONE,
+            )
+            for j, t in enumerate(jumps)
         ],
         dtype=integer,
-    ).reshape(-1, 4)  # fmt: skip
-    rows = [(r.indicator, r.sign, r.strict) for t in traced.transitions for r in t.rows]
-    row_start = np.cumsum([0] + [len(t.rows) for t in traced.transitions], dtype=integer)
-    leaving = [
-        [j for j, t in enumerate(traced.transitions) if t.source == mode] for mode in range(len(traced.mode_names))
-    ]
+    ).reshape(-1, 5)  # fmt: skip
+    rows = [(r.indicator, r.sign, r.strict) for t in jumps for r in t.rows if t.kind not in (TOGETHER, FOUND)]
+    row_start = np.cumsum([0] + [0 if t.kind in (TOGETHER, FOUND) else len(t.rows) for t in jumps], dtype=integer)
+    leaving = [[j for j, t in enumerate(jumps) if t.source == m and t.kind not in (TOGETHER, FOUND)] for m in modes]
     mode_start = np.cumsum([0] + [len(one) for one in leaving], dtype=integer)
     mode_list = np.array([j for one in leaving for j in one], dtype=integer)
     both = np.array([*rows, (0, 1, 1), (0, -1, 1)], dtype=integer).reshape(-1, 3)
     changed = np.zeros((len(transitions), len(traced.u) + len(traced.m) + 1), dtype=integer)
-    for j, t in enumerate(traced.transitions):
+    for j, t in enumerate(jumps):
         moved = [i for i, e in enumerate(t.reset or ()) if e != traced.u[i]]
         moved += [len(traced.u) + i for i, _ in t.writes]
         changed[j, : len(moved) + 1] = [len(moved), *moved]
-    return Net(transitions, both, row_start, mode_start, mode_list, phases(traced), changed)
+    asked = {t.source: j for j, t in enumerate(jumps) if t.kind == TOGETHER}
+    meets = [[row.indicator for row in jumps[asked[m]].rows] if m in asked else [] for m in modes]
+    return Net(
+        transitions, both, row_start, mode_start, mode_list, phases(traced), changed,
+        np.array([f for one in meets for f in one], dtype=integer),
+        np.cumsum([0] + [len(one) for one in meets], dtype=integer),
+        np.array([asked.get(m, -1) for m in modes], dtype=integer),
+    )  # fmt: skip

@@ -24,6 +24,7 @@ class March:
         from nonsmooth.kernels.hybrid.records import N_ORDERS, N_REALS
 
         self.module, self.limit = module, limit
+        self.state: State | None = None  # that goes on
         self.system = Block(module.SYSTEM, module.put_system)
         self.call, self.kept, self.log, self.growth = call_block(), kept_block(), log_block(), growth_block()
         self.orders, self.reals = np.zeros(N_ORDERS, dtype=np.int64), np.zeros(N_REALS)
@@ -67,4 +68,5 @@ class March:
     def _ask(self, state: State, starts: FloatArray) -> None:
         from nonsmooth.kernels.hybrid.records import Call
 
+        self.state = state
         self.call.put(Call(self.orders, self.reals, self.limit, starts, state.motion()))

@@ -8,22 +8,27 @@ they come; what leaves the engine has the numbers that all points share.
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from nonsmooth.flow.engines.engine import Chain, FloatArray, IntArray, Log, SectionPlan, State
 from nonsmooth.flow.engines.linear import table_bytes
 from nonsmooth.flow.engines.loop import LoopEngine
+from nonsmooth.flow.engines.march import March
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.kernels.hybrid.places import RESET, WAITS
+from nonsmooth.kernels.hybrid.places import BEGUN, MODE, RESET, TIME, WAITS
 from nonsmooth.results.memory import free_memory, room_for
+from nonsmooth.system.derived.deciding import begun, decide
+from nonsmooth.system.symbolic.traced import ALONE, ASKED, FOUND, TOGETHER
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearTables
     from nonsmooth.system.derived.assembly import Pattern
+    from nonsmooth.system.derived.elements.element import Condition
     from nonsmooth.system.derived.patterns import Patterns
     from nonsmooth.system.symbolic.traced import Traced
 
@@ -71,8 +76,8 @@ class PatternEngine(LoopEngine):
         """None: an extremum of each condition of each element, in a hundred states, would fill the memory."""
         return 0
 
-    def go_on(self, tables: Any) -> bool:
-        tables.complete()
+    def go_on(self, tables: Any, march: March, system: Any) -> bool:
+        tables.complete(march, system[3])
         return True
 
     def chain(
@@ -112,6 +117,16 @@ class PatternEngine(LoopEngine):
         return found
 
 
+class Lead(NamedTuple):
+    """Where a transition leads, from which mode, by the conditions of which element."""
+
+    source: int
+    target: Pattern
+    element: str
+    rows: tuple[tuple[int, int, int], ...]
+    kind: str  # ASKED, TOGETHER, FOUND, or ""
+
+
 class PatternTables:
     """The tables of one parameter point: those of the patterns that were visited there, and room for more."""
 
@@ -131,15 +146,18 @@ class PatternTables:
         self.own_outputs = self._outputs(tables.linear, i)
         self.index: dict[Pattern, int] = {}
         self.numbers: list[int] = []  # of the patterns here among all that were visited
-        self.possible: dict[Pattern, bool] = {}
         self.waiting: dict[Pattern, list[int]] = {}
-        self.leads: list[tuple[int, Pattern, str, tuple[tuple[int, int], ...]]] = []  # of each transition
+        self.leads: list[Lead] = []  # of each transition
+        self.lists: list[list[int]] = []  # transitions out of each mode
+        self.together: list[int] = []  # the transition of each mode that is asked where several elements meet
+        self.meets: list[list[int]] = []  # the conditions of each mode that are looked at then
+        self.answers: dict[tuple[int, int, tuple[int, ...]], int] = {}
         self.maps: list[FloatArray] = [self.rows.identity()]
         self.known_maps: dict[bytes, int] = {self.maps[0].tobytes(): 0}
-        self.transitions: IntArray = np.zeros((0, 4), dtype=np.int64)
+        self.transitions: IntArray = np.zeros((0, 5), dtype=np.int64)
         self.conditions: IntArray = np.zeros((0, 3), dtype=np.int64)
         self.lengths: list[int] = []  # conditions of each transition
-        self.starts: list[int] = [0]  # the first transition of each mode
+        self.form: Any = None
         self.own: Any = None
         self.work: Any = None
         self.capacity = 0
@@ -159,10 +177,7 @@ class PatternTables:
 
     def enter(self, state: State) -> None:
         """Put the number of the pattern here in place of the one that all points share."""
-        pattern = self.patterns.visited[int(state.counters[0])]
-        if pattern not in self.index:
-            self.add(pattern)
-        state.counters[0] = self.index[pattern]
+        state.counters[0] = self.place(self.patterns.visited[int(state.counters[0])])
 
     def leave(self, state: State) -> None:
         """The reverse of :meth:`enter`."""
@@ -172,16 +187,50 @@ class PatternTables:
         """The numbers that all points share of the transitions here."""
         every = np.zeros(len(self.leads), dtype=np.int64)
         for t in np.unique(taken):
-            source, target, element, rows = self.leads[t]
-            ends = self.numbers[source], self.numbers[self.index[target]]
-            every[t] = self.patterns.transition(*ends, element, rows)
+            lead = self.leads[t]
+            ends = self.numbers[lead.source], self.numbers[self.index[lead.target]]
+            every[t] = self.patterns.transition(*ends, lead.element, lead.rows)
         return every[taken]
 
-    def complete(self) -> None:
-        """Make the mode for which a run waits."""
-        waits = int(self.work.tally[WAITS]) - 1
-        if waits >= 0 and self.transitions[waits, 0] < 0:
-            self.add(self.leads[waits][1])
+    def complete(self, march: March, work: Any) -> None:
+        """Make the mode for which a run waits, or say where what it has asked leads."""
+        waits = int(work.tally[WAITS]) - 1
+        if waits < 0:
+            return
+        lead, rows, mode = self.leads[waits], self.rows, self.patterns.mode
+        if not lead.kind:
+            if self.transitions[waits, 0] < 0:
+                self.add(lead.target)
+            return
+        state, begins = march.state, work.tally[BEGUN] == 0
+        assert state is not None
+        w = rows.augmented(state.u if begins else work.w[: rows.n], float(work.memo[TIME]))
+        pattern = self.patterns.visited[self.numbers[int(work.tally[MODE])]]
+        if begins:
+            found = begun(rows, mode, pattern, w)
+            state.counters[0], state.counters[1], state.u[:] = self.place(found.pattern), 1, found.states
+            return
+        found = decide(rows, mode, pattern, w, float(self.own.info[int(work.tally[MODE]), 0]))
+        if not found.struck:
+            work.w[: rows.n] = found.states
+        struck = tuple(k for k, _ in found.struck)
+        key = waits, self.place(found.pattern), struck
+        if key not in self.answers:
+            self.answers[key] = len(self.leads)
+            number = self._map(rows.impact(struck, mode)) if struck else 0
+            contact = bool(struck) or self.numbers[lead.source] == 0
+            way = (key[1], RESET if struck else 0, int(contact), number, 0)
+            self.transitions = np.concatenate([self.transitions, np.array([way], dtype=np.int64)])
+            self.leads.append(Lead(lead.source, found.pattern, lead.element, lead.rows, FOUND))
+            self.lengths.append(0)
+            self.form, self.net = self.form._replace(**self._maps()), self._net()
+        work.tally[WAITS] = self.answers[key] + 1
+
+    def place(self, pattern: Pattern) -> int:
+        """The number of a pattern here; it is made where it is new."""
+        if pattern not in self.index:
+            self.add(pattern)
+        return self.index[pattern]
 
     # The tables
 
@@ -194,41 +243,57 @@ class PatternTables:
         flow, forces = rows.flow(mode, pattern)
         conditions = np.zeros((len(self.slots), flow.shape[1]))
         conditions[:, rows.n] = np.nan  # one that is not asked for in this pattern takes no part in extremes
-        ways, lengths, armed = [], [], []
+        ways, armed = [], []
+        first = len(self.leads)
+
+        def lead(target: Pattern, element: str, given: Sequence[Condition], kind: str, change: Any = None) -> None:
+            these = []
+            for one in given:
+                name = f"{element}_{one.name}"
+                slot = self.slots[name if name in self.slots else one.name]
+                conditions[slot] = one.value.values
+                these.append((slot, one.sign, int(one.strict)))
+            to = -1 if kind in (ASKED, TOGETHER) else self.index.get(target, -1)
+            if to < 0 and kind in ("", ALONE):
+                self.waiting.setdefault(target, []).append(len(self.leads))
+            contact = change is not None or self.numbers[here] == 0
+            number = 0 if change is None else self._map(change)
+            ways.append((to, 0 if change is None else RESET, int(contact), number, int(kind == ALONE)))
+            self.leads.append(Lead(here, target, element, tuple(these), "" if kind == ALONE else kind))
+            self.lengths.append(len(these))
+            armed.extend(these)
+
         for k, part in enumerate(rows.parts):
             for way in rows.leaving(k, mode, pattern):
+                if way.phase is None:
+                    lead(pattern, part.name, way.conditions, ASKED)
+                    continue
                 target = rows.place(k, mode, pattern).put(way.phase).pattern
-                if not self._may_be(target):
-                    continue  # more contacts than can be held by forces of their own
-                these = []
-                for one in way.conditions:
-                    slot = self.slots[f"{part.name}_{one.name}"]
-                    conditions[slot] = one.value.values
-                    these.append((slot, one.sign))
-                t = len(self.leads)
-                self.leads.append((here, target, part.name, tuple(these)))
-                to = self.index.get(target, -1)
-                if to < 0:
-                    self.waiting.setdefault(target, []).append(t)
-                contact = way.states is not None or self.numbers[here] == 0
-                change = 0 if way.states is None else RESET
-                ways.append((to, change, int(contact), 0 if way.states is None else self._map(way.states)))
-                lengths.append(len(these))
-                armed += [(slot, sign, 1) for slot, sign in these]
+                lead(target, part.name, way.conditions, ALONE if part.element.held else "", way.states)
+        self.lists.append([*range(first, len(self.leads))])
+        self.together.append(len(self.leads))
+        ways.append((-1, 0, 0, 0, 0))
+        self.leads.append(Lead(here, pattern, "", (), TOGETHER))
+        self.lengths.append(0)
+        self.meets.append(self._meetings(pattern, conditions))
         rows.forget()
-        self.transitions = np.concatenate([self.transitions, np.array(ways, dtype=np.int64).reshape(-1, 4)])
+        self.transitions = np.concatenate([self.transitions, np.array(ways, dtype=np.int64).reshape(-1, 5)])
         self.conditions = np.concatenate([self.conditions, np.array(armed, dtype=np.int64).reshape(-1, 3)])
-        self.lengths += lengths
-        self.starts.append(len(self.leads))
         for t in self.waiting.pop(pattern, []):
             self.transitions[t, 0] = here
         self._stand(flow, conditions, self._output_rows(forces))
         self.net = self._net()
 
-    def _may_be(self, pattern: Pattern) -> bool:
-        if pattern not in self.possible:
-            self.possible[pattern] = self.rows.may_hold(self.rows.held(pattern), self.patterns.mode)
-        return self.possible[pattern]
+    def _meetings(self, pattern: Pattern, conditions: FloatArray) -> list[int]:
+        """The conditions at which elements meet what they may be held by."""
+        rows, found = self.rows, []
+        for k in range(len(rows.parts)):
+            here = rows.place(k, self.patterns.mode, pattern)
+            for ways in here.element.meeting(here) if here.phase not in here.element.held else ():
+                slot = self.slots[f"{here.name}_{ways[0].name}"]
+                conditions[slot] = ways[0].value.values
+                found.append(slot)
+        return found
 
     def _map(self, states: FloatArray) -> int:
         """The number of a map among those of the form; equal ones are kept once."""
@@ -279,23 +344,17 @@ class PatternTables:
         from nonsmooth.kernels.hybrid.records import Form
 
         n = self.rows.n
-        maps = np.array(self.maps)[None]
-
-        def parts(rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-            cut = rows[..., :n], rows[..., n], rows[..., n + 1 :: 2], rows[..., n + 2 :: 2]
-            a, b, c, s = (np.ascontiguousarray(part) for part in cut)
-            return a, b, c, s
-
-        def turned(waves: FloatArray) -> FloatArray:
-            return np.ascontiguousarray(np.swapaxes(waves, -1, -2))
-
-        a, b, c, s = parts(flow[None, None])
-        ra, rb, rc, rs = parts(maps)
+        a, b, c, s = _parts(flow[None, None], n)
         return Form(
-            a, b, turned(c), turned(s), self.multiples, self.omega, self.period,
-            *parts(conditions[None]), *parts(outputs[None, :, None]), ra, rb, turned(rc), turned(rs),
-            np.zeros((0, n), dtype=np.int64),
+            a, b, _turned(c), _turned(s), self.multiples, self.omega, self.period,
+            *_parts(conditions[None], n), *_parts(outputs[None, :, None], n), **self._maps(),
+            lacking=np.zeros((0, n), dtype=np.int64),
         )  # fmt: skip
+
+    def _maps(self) -> dict[str, FloatArray]:
+        """The maps of all transitions, as fields of a form."""
+        a, b, c, s = _parts(np.array(self.maps)[None], self.rows.n)
+        return {"ra": a, "rb": b, "rc": _turned(c), "rs": _turned(s)}
 
     def _net(self) -> Any:
         """The transition table of the patterns that stand."""
@@ -309,5 +368,24 @@ class PatternTables:
         whole = np.int64
         return Net(
             self.transitions, np.concatenate([self.conditions, SECTION]), np.cumsum([0, *self.lengths], dtype=whole),
-            np.array(self.starts, dtype=whole), np.arange(count, dtype=whole), np.full(count, -1.0), changed,
+            *_joined(self.lists), np.full(count, -1.0), changed, *_joined(self.meets)[::-1],
+            np.array(self.together, dtype=whole),
         )  # fmt: skip
+
+
+def _joined(lists: list[list[int]]) -> tuple[IntArray, IntArray]:
+    """Where each list begins, and all of them in one."""
+    every = [one for some in lists for one in some]
+    return np.cumsum([0, *map(len, lists)], dtype=np.int64), np.array(every, dtype=np.int64)
+
+
+def _parts(rows: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Rows over (u, 1, cos, sin, ...) in parts: of the states, constants, cosines, sines."""
+    cut = rows[..., :n], rows[..., n], rows[..., n + 1 :: 2], rows[..., n + 2 :: 2]
+    a, b, c, s = (np.ascontiguousarray(part) for part in cut)
+    return a, b, c, s
+
+
+def _turned(waves: FloatArray) -> FloatArray:
+    """With the harmonics before the rows."""
+    return np.ascontiguousarray(np.swapaxes(waves, -1, -2))

@@ -41,6 +41,7 @@ def cuda_linear_module(
     sizes = {
         "HARMONICS": harmonics, "N_MODES": modes, "N_INDICATORS": indicators, "N_OUTPUTS": outputs,
         "N_TRANSITIONS": transitions, "N_ROWS": rows, "LOGS": 0, "GROWS": 2 if observer == "growth" else 0,
+        "MAY_WAIT": 0,
     }  # fmt: skip
     text = with_numbers(joined((*STEPPER, *OBSERVERS[observer])), sizes)
     name = "_".join(map(str, (harmonics, modes, indicators, outputs, transitions, rows)))

@@ -165,7 +165,8 @@ def advance(jobs, rows, point, norms, plan, settings, place, counts, way, out):
         points_kept[:, :, N_U + 1],
         status[j : j + 1],
     )  # fmt: skip
-    net = Net(TRANSITIONS, ROWS, ROW_START, MODE_START, MODE_LIST, AT, TRANSITIONS)  # series ask nothing of the last
+    none = MODE_LIST  # series ask nothing of the last ones
+    net = Net(TRANSITIONS, ROWS, ROW_START, MODE_START, MODE_LIST, AT, TRANSITIONS, none, none, none)
     code = march(0, form, net, at, goal, motion, Seen(seen, (), ()), (), work)
     status[j] = code
     if code != PAUSED:

@@ -43,7 +43,7 @@ def cuda_series_source(model: str, sizes: Mapping[str, int], tables: Mapping[str
         line = f"{', '.join(names)} = {', '.join(str(int(sizes[name])) for name in names)}"
         text, found = re.subn(rf"^{', '.join(names)} = [\d, ]+$", line, text, flags=re.MULTILINE)
         assert found == 1, names
-    text = with_numbers(text, {"N_STATES": tables["LACKING"].shape[1], "LOGS": 0, "GROWS": 0})
+    text = with_numbers(text, {"N_STATES": tables["LACKING"].shape[1], "LOGS": 0, "GROWS": 0, "MAY_WAIT": 0})
     for name, table in tables.items():
         line = f"{name} = np.array({table.tolist()!r}, dtype=np.{table.dtype}).reshape({table.shape})"
         text, found = re.subn(rf"^{name} = np\.array.*$", line, text, flags=re.MULTILINE)

@@ -8,7 +8,8 @@ this file. Everything else is here: start rule, transitions of one instant in de
 limits on chatter, the clock.
 
 All that a run knows beside its arrays stands in ``work.tally`` and ``work.memo``: it may pause and go on. It pauses
-also before a transition into a mode whose tables do not stand yet (its target is -1): the next call goes on with it.
+also before a transition into a mode whose tables do not stand yet, and before one that is asked (its target is -1):
+whoever calls says where it leads, and the next call goes on with it.
 """
 
 from nonsmooth.kernels.compile.cache import inline, once
@@ -47,12 +48,12 @@ from nonsmooth.kernels.hybrid.places import (
     WAITS,
 )
 
-MAY_WAIT = 0  # 1 where modes are made when they are first visited: what never happens costs nothing
+MAY_WAIT = 1  # 0 where nothing is made or asked on the way, as on a GPU: what never happens costs nothing
 
 
 @inline
 def waiting(work):
-    """The transition that waits for the tables of its mode, or -1."""
+    """The transition that waits for the tables of its mode or, being asked, for an answer; or -1."""
     return work.tally[WAITS] - 1 if MAY_WAIT != 0 else -1
 
 
@@ -70,8 +71,11 @@ def settle(i, form, net, tables, work):
     """Start rule: transitions that hold already are taken, each mode at most once; so is an impact that begins there.
 
     Returns a status: BEYOND_STOP where one with a reset holds and the start does not lie on its surface; PAUSED where
-    one waits for the tables of its mode."""
+    one waits for the tables of its mode, or what the elements of a system do at a start is asked."""
     tally, visited = work.tally, work.visited
+    if MAY_WAIT != 0 and net.together[tally[MODE]] >= 0:
+        tally[WAITS] = net.together[tally[MODE]] + 1
+        return PAUSED
     for k in range(visited.shape[0]):
         visited[k] = 0
     visited[tally[MODE]] = 1
@@ -148,6 +152,8 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
     mode, code, fired = tally[MODE], OK, tally[FIRED]
     jumps = tally[TAKEN] if MAY_WAIT != 0 else 0
     if jumps == 0:
+        if MAY_WAIT != 0 and net.transitions[t, 4] != 0 and meets_another(mode, fired, net, tables, work):
+            t = net.together[mode]
         tally[SOURCE], tally[FIRST] = mode, t
         approach(mode, fired, goal, seen, tables, work)
     while t >= 0:

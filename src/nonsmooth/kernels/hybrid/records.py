@@ -69,14 +69,17 @@ class Tables(NamedTuple):
 class Net(NamedTuple):
     """The transition table of a linear system."""
 
-    transitions: Any  # (transitions, 4): target (-1: its tables do not stand yet), what it changes (0,
-    # ``places.RESET``, ...), contact or ``DEAD_END``, its map among those of the form
+    transitions: Any  # (transitions, 5): target (-1: its tables do not stand yet, or it is asked), what it changes (0,
+    # ``places.RESET``, ...), contact or ``DEAD_END``, its map among those of the form, 1 where it decides alone
     rows: Any  # (rows + 2, 3): functional, sign, strict; the last two belong to the section (rising, falling)
     row_start: Any  # (transitions + 1,)
     mode_start: Any  # (modes + 1,)
     mode_list: Any  # outgoing transitions of each mode in declared order
     at: Any  # (transitions,) phase of a transition at a time, or -1
     changed: Any  # (maps, n + 1) how many states a map changes, and which
+    meets: Any  # (functionals) that are asked for together with others where they vanish, those of each mode in turn
+    meets_start: Any  # (modes + 1,)
+    together: Any  # (modes,) the transition that is asked then, or -1
 
 
 class Work(NamedTuple):
@@ -275,7 +278,7 @@ FORM = type_of(
     Form, _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4, _i2
 )  # fmt: skip
 TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2, _i[:, :, :, ::1], _f3, _i[:, :, ::1])
-NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1, _i2)
+NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1, _i2, _i1, _i1, _i1)
 WORK = type_of(Work, *[_f1] * 8, _f2, _f2, _f1, _f1, *[_i1] * 6, _f1)
 GENERATED = type_of(Generated, _i1, _f2, _f1, _i2, _i1, _f1, _f1, _f, _f, *[_i] * 7)
 SERIES_WORK = type_of(

@@ -13,7 +13,7 @@ from nonsmooth.kernels.compile.pointers import stored
 from nonsmooth.kernels.hybrid.blocks import call_at, growth_at, kept_at, log_at
 from nonsmooth.kernels.hybrid.codes import LOG_FULL, NOT_GUARANTEED, OK, PAUSED
 from nonsmooth.kernels.hybrid.loop import leave, march
-from nonsmooth.kernels.hybrid.places import BEGUN, LOGGED, NO_END, RETURNS_OF_SECTION
+from nonsmooth.kernels.hybrid.places import BEGUN, LOGGED, NO_END, RETURNS_OF_SECTION, WAITS
 from nonsmooth.kernels.hybrid.record import last_samples
 from nonsmooth.kernels.hybrid.records import (
     AFTER,
@@ -86,7 +86,7 @@ def run(system, call, kept, log, growth):
     )  # fmt: skip
     goal = Goal(kind, orders[TRANSIENT], orders[KEEP], reals[UNTIL], reals[UNIT], limit, orders[PATIENCE_LEFT])
     for i in range(orders[BEGIN], orders[END]):
-        if work.tally[BEGUN] == 0 and kind == RETURNS_OF_SECTION:
+        if work.tally[BEGUN] == 0 and work.tally[WAITS] == 0 and kind == RETURNS_OF_SECTION:
             place_start(i, form, section, starts, motion)
         code = march(i, form, net, section, goal, motion, seen, tables, work)
         if code == PAUSED or code == LOG_FULL:

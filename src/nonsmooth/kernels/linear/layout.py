@@ -26,7 +26,7 @@ def scratch(
 
     ``apart``: each table by itself, which takes memory only where it is written."""
     n, m, n_f = states, states + 1 + 2 * harmonics, n_indicators + states + n_outputs
-    planar = is_planar(states, harmonics)
+    planar = is_planar(states, harmonics) and not apart  # modes that are made on the way have the other module's
     filled = n if planar else -(-n // LANES) * LANES
 
     def whole(*shape: int) -> Any:

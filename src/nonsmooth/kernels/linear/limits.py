@@ -3,16 +3,27 @@
 from math import fabs
 
 from nonsmooth.kernels.compile.cache import device, inline, once
-from nonsmooth.kernels.hybrid.places import LONGEST_STEP
+from nonsmooth.kernels.hybrid.places import LONGEST_STEP, TIME
 from nonsmooth.kernels.linear.sums import at, dot
 from nonsmooth.kernels.linear.tables import STATES, sizes_at, states_of, width_of
 from nonsmooth.kernels.linear.values import EPS, rounding, slope_of, value_of
 
+TOGETHER = 1e-11 / (16.0 * EPS)  # in units of rounding: of one instant
 
-@inline
-def flat(tables, mode, f, w):
-    """Return whether the slope of functional f is zero within rounding at w."""
-    return fabs(slope_of(tables, mode, f, w)) <= rounding(tables, mode, f, width_of(tables.field), w)
+
+@device
+def flat(tables, mode, f, work):
+    """Return whether the slope of functional f is zero within rounding at w, and of the step that led there."""
+    n, m, w = states_of(tables.field), width_of(tables.field), work.w
+    slope = fabs(slope_of(tables, mode, f, w))
+    near = rounding(tables, mode, f, m, w)
+    if slope > near and slope < 1e-9:
+        bend = 0.0
+        for j in range(m):
+            bend += fabs(tables.tay[mode, f, j, 2]) * (fabs(w[j]) if j <= n else 1.0)
+        step = tables.info[mode, 0] if m > n + 1 else min(tables.info[mode, 0], work.memo[TIME])
+        near += 8.0 * EPS * step * bend
+    return slope <= near
 
 
 @device
@@ -59,7 +70,7 @@ def mark_zeros(tables, work, mode):
             continue
         if value <= rounding(tables, mode, f, 0, w) + 0.25 * step * rounding(tables, mode, f, m, w):
             zero[f] = 1
-        if zero[f] != 0 and flat(tables, mode, f, w):
+        if zero[f] != 0 and flat(tables, mode, f, work):
             zero[f], _ = vanishing(tables, mode, f, w)
 
 
@@ -69,7 +80,7 @@ def sign_after(tables, work, mode, f):
     w, zero = work.w, work.zero
     if f >= zero.shape[0] or zero[f] == 0:
         return 1 if value_of(tables, mode, f, w) > 0.0 else -1
-    if not flat(tables, mode, f, w):
+    if not flat(tables, mode, f, work):
         return 1 if slope_of(tables, mode, f, w) > 0.0 else -1
     _, sign = vanishing(tables, mode, f, w)
     return sign
@@ -88,6 +99,20 @@ def holds(t, mode, tables, net, work):
             holds = False
             break
     return holds
+
+
+@once
+def meets_another(mode, fired, net, tables, work):
+    """Return whether another functional vanishes at the present instant that is asked for with the one that fired."""
+    found, w, m, step = False, work.w, width_of(tables.field), tables.info[mode, 0]
+    for k in range(net.meets_start[mode], net.meets_start[mode + 1]):
+        f = net.meets[k]
+        if f != fired:
+            near = rounding(tables, mode, f, 0, w) + 0.25 * step * rounding(tables, mode, f, m, w)
+            if fabs(value_of(tables, mode, f, w)) <= TOGETHER * near:
+                found = True
+                break
+    return found
 
 
 @once
@@ -152,6 +177,6 @@ def take(i, t, fired, form, tables, net, work):
     mark_zeros(tables, work, mode)
     if fired >= 0:
         zero[fired] = 1
-        if flat(tables, mode, fired, w):
+        if flat(tables, mode, fired, work):
             zero[fired], _ = vanishing(tables, mode, fired, w)
     return mode

@@ -27,11 +27,8 @@ def is_planar(states: int, harmonics: int) -> bool:
 
 @cache
 def linear_module(planar: bool = False) -> ModuleType:
-    """The module with ``run``: for two states, all in every mode, with one harmonic; else for any number of them.
-
-    Only the latter may wait for modes that are made when they are first visited."""
-    numbers = {"STATES": 2, "MAY_WAIT": 0} if planar else {"STATES": 0, "MAY_WAIT": 1}
-    text = with_numbers(joined((*STEPPER, *OBSERVERS)), numbers)
+    """The module with ``run``: for two states, all in every mode, with one harmonic; else for any number of them."""
+    text = with_numbers(joined((*STEPPER, *OBSERVERS)), {"STATES": 2 if planar else 0})
     return load_module(text, "linear_planar" if planar else "linear")
 
 

@@ -18,6 +18,7 @@ from nonsmooth.kernels.linear.values import NODE, at_ends, bound_at, dense, turn
 
 STEPPER = FORM, TABLES, WORK  # the types of this stepper's records: model, tables, work
 
+AT_ONCE = 1e-13  # of a node spacing: rounding of a root
 SAME = 1e-9  # of a node spacing: the section is met by the transition that is so close
 
 
@@ -223,6 +224,9 @@ def leg(i, form, net, section, goal, tables, work, r_max, ready, first):
         tau = search(tables, work, mode, rows, lo, hi, sense * found[SIDE] > 0, best)
         if sense != 0 and fired >= 0 and functional == section.indicator and best - tau < SAME * tables.info[mode, 1]:
             continue  # the transition there passes the section
+        if fired >= 0 and sense == 0 and begins_with(rows, lo, hi, net.row_start[fired]):
+            if tau >= best - AT_ONCE * tables.info[mode, 1]:  # the same root: what was declared first comes first
+                continue
         if tau >= 0.0 and (tau < best or (fired < 0 and crossed == 0 and tau <= best)):
             best = tau
             fired = t
@@ -239,8 +243,8 @@ def leg(i, form, net, section, goal, tables, work, r_max, ready, first):
 
 @once
 def time_scale(i, since, form, tables, work):
-    """The time beside which crossings are close to each other."""
-    return tables.info[work.tally[MODE], 0]
+    """The time beside which crossings are close to each other: a step, no longer than the period or all time so far."""
+    return min(tables.info[work.tally[MODE], 0], form.period[i] if form.period[i] < NO_END else work.memo[TIME] + since)
 
 
 @once

@@ -23,6 +23,7 @@ from nonsmooth.kernels.series.taylor import copied, dense_states, end_states, fi
 
 STEPPER = GENERATED, types.Tuple(()), SERIES_WORK  # the types of this stepper's records: model, tables, work
 
+TOGETHER = 1e-11  # of its scale: an indicator so near to zero vanishes at the instant of another
 ON_SURFACE = 1e-13  # of its scale: an indicator that stays smaller over a step has not left its surface
 
 # --------------------------------------------------------------------------------------------------------------
@@ -129,6 +130,18 @@ def take(i, t, fired, form, tables, net, work):
     for j in range(work.rise.shape[0]):
         work.rise[j] = 0
     return mode
+
+
+@once
+def meets_another(mode, fired, net, tables, work):
+    """Return whether another indicator vanishes at the present instant that is asked for with the one that fired."""
+    found = False
+    for k in range(net.meets_start[mode], net.meets_start[mode + 1]):
+        f = net.meets[k]
+        if f != fired and fabs(work.vals[f]) <= TOGETHER * work.scale[f]:
+            found = True
+            break
+    return found
 
 
 @once

@@ -18,15 +18,21 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
 from typing import Any
 
+import numpy as np
+
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.elements import Element
-from nonsmooth.system.derived.elements.element import Leaving
+from nonsmooth.system.derived.elements.element import Condition, Leaving
 
 __all__ = ["Assembler", "Part", "Pattern", "Place"]
 
 Pattern = tuple[int, ...]  # the phase of each element
+DEPENDENT, INDEPENDENT = 1e-13, 1e-7  # what is left of a unit row when those before are taken away
 
 
 @dataclass(frozen=True)
@@ -44,6 +50,7 @@ class Assembler(ABC):
 
     parts: list[Part]
     struck: bool  # the system has resets of its own, which turn speeds
+    asks: bool = False  # what several elements decide together is asked at each instant (``deciding``)
 
     # The calculus
 
@@ -72,6 +79,10 @@ class Assembler(ABC):
         """States moved onto the zero of an expression, the shortest way."""
 
     @abstractmethod
+    def behind(self, expression: Any, states: Any) -> Any:
+        """An expression behind an impulse, by the states before it."""
+
+    @abstractmethod
     def identity(self) -> Any:
         """The states themselves."""
 
@@ -82,6 +93,14 @@ class Assembler(ABC):
     @abstractmethod
     def regular(self, matrix: list[list[Any]]) -> bool:
         """Return whether a matrix of effects can be inverted."""
+
+    @abstractmethod
+    def slopes(self, expression: Any) -> FloatArray:
+        """The derivatives of an expression in the states, as numbers; those that depend on states are NaN."""
+
+    @abstractmethod
+    def pushes(self, part: Part) -> FloatArray:
+        """The direction of an element as numbers, at the present values of the parameters."""
 
     @abstractmethod
     def vanishes(self, expression: Any) -> bool:
@@ -133,8 +152,51 @@ class Assembler(ABC):
         return [[self.across(self.rate(i, mode), self.parts[j]) for j in some] for i in some]
 
     def may_hold(self, some: Sequence[int], mode: str) -> bool:
-        """Return whether the rates of some elements can be held at zero each by its own force."""
-        return not some or self.regular(self.effects(some, mode))
+        """Return whether the rates of some elements can be held at zero each by its own force, or by all together."""
+        return not some or self.asks or self.regular(self.effects(some, mode))
+
+    def coupled(self, i: int, j: int, mode: str) -> bool:
+        """Return whether a force of one of two elements changes the rate of the other at once."""
+        key = min(i, j), max(i, j)
+        if key not in self._coupled:
+            one, other = ((self.rate(a, mode), self.parts[b]) for a, b in (key, key[::-1]))
+            self._coupled[key] = not (self.vanishes(self.across(*one)) and self.vanishes(self.across(*other)))
+        return self._coupled[key]
+
+    @cached_property
+    def _coupled(self) -> dict[tuple[int, int], bool]:
+        return {}
+
+    def together(self, k: int, mode: str, pattern: Pattern) -> list[int]:
+        """The element and those of the held ones whose forces depend on its own."""
+        found, held = [k], [j for j in self.held(pattern) if j != k]
+        for i in found:
+            found += [j for j in held if j not in found and self.coupled(i, j, mode)]
+        return sorted(found)
+
+    def basis(self, held: Sequence[int], mode: str) -> tuple[list[int], FloatArray]:
+        """Held elements whose rates are independent, and the forces of all of them as sums of those."""
+        rows = np.array([self.slopes(self.rate(k, mode)) for k in held])
+        rows = rows / np.linalg.norm(rows, axis=1)[:, None]
+        chosen: list[int] = []
+        for i in sorted(range(len(held)), key=lambda i: not self.parts[held[i]].element.bears):  # those with a place
+            row = rows[i]
+            before = rows[chosen]
+            off = row - before.T @ np.linalg.lstsq(before.T, row, rcond=None)[0] if chosen else row
+            length = float(np.linalg.norm(off))
+            if length > INDEPENDENT:
+                chosen.append(i)
+            elif length > DEPENDENT:
+                names = ", ".join(repr(self.parts[k].name) for k in held)
+                raise SystemDefinitionError(
+                    f"elements {names}: whether their rates are independent of each other cannot be told (a part of "
+                    f"{length:.1e} is left of one); write their at= or on= so that equal directions are equal"
+                )
+        if len(chosen) == len(held):
+            return list(held), np.eye(len(held))
+        ways = np.array([self.pushes(self.parts[k]) for k in held])
+        sums = np.linalg.lstsq(ways[chosen].T, ways.T, rcond=None)[0].T
+        return [held[i] for i in chosen], np.where(np.abs(sums) < INDEPENDENT * np.abs(sums).max(), 0.0, sums)
 
     def flow(self, mode: str, pattern: Pattern) -> tuple[Any, dict[int, Any]]:
         """The field of a combination of phases, and the force of each element in it."""
@@ -145,13 +207,40 @@ class Assembler(ABC):
             forces[here.k] = here.part.element.force(here)
             f = self.moved(f, here.part, forces[here.k])
         if held:
-            matrix = self.effects(held, mode)
-            needed = self.solved(matrix, [-self.along(self.rate(k, mode), f) for k in held])
-            back = self.solved(matrix, [self.parts[k].element.pull(self.place(k, mode, pattern)) for k in held])
-            for k, force, extra in zip(held, needed, back, strict=True):
-                forces[k] = force
+            chosen, sums = self.basis(held, mode) if self.asks else (held, np.zeros((0, 0)))
+            matrix = self.effects(chosen, mode)
+            needed = self.solved(matrix, [-self.along(self.rate(k, mode), f) for k in chosen])
+            back = self.solved(matrix, [self.parts[k].element.pull(self.place(k, mode, pattern)) for k in chosen])
+            for k, force, extra in zip(chosen, needed, back, strict=True):
                 f = self.moved(f, self.parts[k], force + extra)
+            if len(chosen) == len(held):
+                forces |= dict(zip(held, needed, strict=True))
+            else:
+                for k, of in zip(held, np.linalg.pinv(sums.T), strict=True):  # of least norm
+                    forces[k] = sum((float(share) * force for share, force in zip(of, needed, strict=True) if share), 0)
         return f, {k: forces[k] for k in sorted(forces)}
+
+    def asked(self, k: int, mode: str, pattern: Pattern) -> list[Leaving]:
+        """The instants at which what an element and others that are held do next is asked (:mod:`.deciding`)."""
+        here = self.place(k, mode, pattern)
+        if k not in self.held(pattern):
+            return [Leaving(None, conditions) for conditions in here.element.meeting(here)]
+        group = self.together(k, mode, pattern)
+        if k != group[0]:
+            return []
+        sums = self.basis(group, mode)[1]
+        forces = self.flow(mode, pattern)[1]
+        most = {j: self.parts[j].element.most(self.place(j, mode, pattern)) for j in group}
+        usual = ("over", "under", "opens")
+        names = [f"{self.parts[j].name}_{name}" for j in group for name in self.parts[j].element.conditions]
+        names.sort(key=lambda name: not name.endswith(usual))
+        found: list[Leaving] = []
+        for edge in _edges(sums, [most[j] is None for j in group]):
+            reach = [(float(part), j) for part, j in zip(sums @ edge, group, strict=True) if part]
+            beyond = sum((part * forces[j] for part, j in reach), 0)
+            beyond -= sum((abs(part) * most[j] for part, j in reach if most[j] is not None), 0)
+            found.append(Leaving(None, [Condition(beyond, 1, names.pop(0))]))
+        return found
 
     def impulse(self, k: int, factor: Any, held: Sequence[int], mode: str) -> Any:
         """States behind an impulse of element k that takes its rate to -factor times it; what is held bears a part."""
@@ -161,9 +250,42 @@ class Assembler(ABC):
             after = self.moved(after, self.parts[j], amount)
         return self.tidy(after)
 
+    def impact(self, contacts: Sequence[int], mode: str) -> Any:
+        """States behind an impact of several contacts that bear an impulse, each by its own restitution.
+
+        Of those that keep their rate at zero, as at rest, the rate is zero before it as well."""
+        wanted = [-(1 + self.law(k, "restitution")) * self.rate(k, mode) for k in contacts]
+        after = self.identity()
+        for k, amount in zip(contacts, self.solved(self.effects(contacts, mode), wanted), strict=True):
+            after = self.moved(after, self.parts[k], amount)
+        return self.tidy(after)
+
     def leaving(self, k: int, mode: str, pattern: Pattern) -> list[Leaving]:
-        """The ways of element k out of its phase."""
+        """The ways of element k out of its phase; those that it decides with others have none behind it."""
+        if self.asks and self.parts[k].element.held and len(self.together(k, mode, pattern)) > 1:
+            return self.asked(k, mode, pattern)
         return self.parts[k].element.leaving(self.place(k, mode, pattern))
+
+
+def _edges(sums: FloatArray, one_sided: Sequence[bool]) -> list[FloatArray]:
+    """The directions in which forces that hold together can be too weak; ``one_sided`` ones push only.
+
+    Forces within bounds add up to a body whose faces lie along all but one of its independent edges."""
+    size = sums.shape[1]
+    found: list[FloatArray] = []
+    for some in combinations(range(len(sums)), size - 1):
+        edges = sums[list(some)]
+        if size > 1 and np.linalg.matrix_rank(edges, tol=1e-9) < size - 1:
+            continue
+        normal = np.linalg.svd(edges)[2][-1] if size > 1 else np.ones(1)
+        normal = np.where(np.abs(normal) < 1e-12, 0.0, normal)
+        normal /= np.abs(normal).max()
+        for side in (normal, -normal):
+            reach = sums @ side
+            if (reach[list(one_sided)] > 1e-9).any() or any(np.allclose(side, other, atol=1e-9) for other in found):
+                continue
+            found.append(side)
+    return found
 
 
 @dataclass(frozen=True)
@@ -242,6 +364,10 @@ class Place:
     def struck(self, factor: Any, held: Sequence[int]) -> Any:
         """States behind an impulse of the element, see :meth:`Assembler.impulse`."""
         return self.make.impulse(self.k, factor, held, self.mode)
+
+    def behind(self, expression: Any, states: Any) -> Any:
+        """An expression behind an impulse, by the states before it."""
+        return self.make.behind(expression, states)
 
     def back_on(self, states: Any) -> Any:
         """States moved onto the surface of the contact, the shortest way."""

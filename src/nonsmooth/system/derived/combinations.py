@@ -10,10 +10,12 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import sympy as sp
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
 from nonsmooth.system.derived.elements import Element
@@ -21,8 +23,12 @@ from nonsmooth.system.derived.elements.element import Condition, Law
 from nonsmooth.system.mode import Mode
 from nonsmooth.system.names import unknown
 from nonsmooth.system.symbolic.scalar import Scalar, to_expression
+from nonsmooth.system.symbolic.traced import ALONE, ASKED, TOGETHER
 from nonsmooth.system.symbolic.tracing import Symbols, call_scalar, call_vector
 from nonsmooth.system.transition import Surface, Transition
+
+if TYPE_CHECKING:
+    from nonsmooth.system.derived.patterns import Patterns
 
 __all__ = ["SPEED", "assembled", "element_names"]
 
@@ -124,6 +130,9 @@ class Expressions(Assembler):
         length = sp.Add(*[slope**2 for slope in slopes])
         return self.tidy([x - expression * s / length for x, s in zip(states, slopes, strict=True)])
 
+    def behind(self, expression: sp.Expr, states: Sequence[sp.Expr]) -> sp.Expr:
+        return sp.sympify(expression).subs(dict(zip(self.u, states, strict=True)), simultaneous=True)
+
     def solved(self, matrix: list[list[sp.Expr]], right: list[Any]) -> list[sp.Expr]:
         found = list(sp.Matrix(matrix).LUsolve(sp.Matrix(right)))
         return [sp.cancel(value) for value in found] if len(found) > 1 else found
@@ -166,6 +175,17 @@ class Expressions(Assembler):
             self._flows[key] = [sp.expand(entry) for entry in field], expanded
         return self._flows[key]
 
+    def slopes(self, expression: sp.Expr) -> FloatArray:
+        return self._numbers([sp.diff(expression, symbol) for symbol in self.u])
+
+    def pushes(self, part: Part) -> FloatArray:
+        return self._numbers([part.direction.get(i, sp.Integer(0)) for i in range(len(self.u))])
+
+    def _numbers(self, expressions: Sequence[Any]) -> FloatArray:
+        """Their values at the present parameters; NaN where they depend on more."""
+        found = (sp.sympify(one).subs(self.values) for one in expressions)
+        return np.array([float(one) if not one.free_symbols else np.nan for one in found])
+
     # What a user would have written
 
     def ranges(self, mode: str) -> list[tuple[sp.Expr, str]]:
@@ -177,17 +197,17 @@ class Expressions(Assembler):
     def condition(self, rows: Sequence[Condition], owner: str) -> str:
         """The text of a condition; its expressions become indicators, equal ones of an element the same."""
         words = []
-        for expression, sign, name in rows:
+        for expression, sign, name, strict in rows:
             indicator = sp.expand(expression)
             key = owner, indicator
             if key not in self._known:
-                unique, n = f"{owner}_{name}", 1
+                unique, n = f"{owner}_{name}" if owner else name, 1
                 while unique in self.indicators:
                     n += 1
-                    unique = f"{owner}_{name}_{n}"
+                    unique = f"{owner}_{name}_{n}" if owner else f"{name}_{n}"
                 self._known[key] = unique
                 self.indicators[unique] = indicator
-            words.append(f"{self._known[key]} {'>' if sign > 0 else '<'} 0")
+            words.append(f"{self._known[key]} {'>' if sign > 0 else '<'}{'' if strict else '='} 0")
         return " and ".join(words)
 
 
@@ -243,6 +263,7 @@ def assembled(
     number = len(base) * int(sp.prod(counts))
     if number > MOST:
         return _opened(make, parts, base, given)
+    decider = _decider(make, base, given)
     every = product(base, product(*[range(count) for count in counts]))
     pairs = [pair for pair in every if make.may_hold(make.held(pair[1]), pair[0])]
 
@@ -253,6 +274,8 @@ def assembled(
     fields: dict[str, Any] = {}
     forces: dict[str, dict[str, Any]] = {part.name: {} for part in make.parts}
     transitions: list[Transition | Surface] = []
+    kinds: list[str] = []  # of the transitions
+    asked: list[tuple[str, str, str]] = []  # mode, kind, condition
     for mode, pattern in pairs:
         here = name(mode, pattern)
         f, found = make.flow(mode, pattern)
@@ -261,12 +284,19 @@ def assembled(
             forces[part.name][here] = _returns(found[k])
         for k, part in enumerate(make.parts):
             for way in make.leaving(k, mode, pattern):
+                if way.phase is None:
+                    owner = "" if k in make.held(pattern) else part.name
+                    asked.append((here, ASKED, make.condition(way.conditions, owner)))
+                    continue
                 there = make.place(k, mode, pattern).put(way.phase).pattern
                 if (mode, there) not in pairs:
                     continue  # more contacts than can be held by forces of their own
                 reset = None if way.states is None else _returns(way.states)
                 when = make.condition(way.conditions, part.name)
                 transitions.append(Transition(here, name(mode, there), when=when, reset=reset))
+                kinds.append(ALONE if make.asks and part.element.held else "")
+        if make.asks:
+            asked.append((here, TOGETHER, _meetings(make, mode, pattern)))
         for item in given["transitions"]:
             if isinstance(item, Surface) and item.below == mode:
                 ends = name(item.below, pattern), name(item.above, pattern)
@@ -284,8 +314,40 @@ def assembled(
         "modes": fields, "transitions": transitions,
         "indicators": {**(given["indicators"] or {}), **{key: _returns(g) for key, g in make.indicators.items()}},
         "outputs": {**outputs, **{f"{key}_force": (table, "") for key, table in forces.items()}},
-        "ranges": make.ranges(next(iter(base))),
+        "ranges": make.ranges(next(iter(base))), "kinds": kinds, "asked": asked,
+        "decider": None if decider is None else decider.numbered([pattern for _, pattern in pairs]),
     }  # fmt: skip
+
+
+def _meetings(make: Expressions, mode: str, pattern: Pattern) -> str:
+    """The condition whose parts vanish where an element that is not held meets its own."""
+    held = make.held(pattern)
+    rows = []
+    for k, part in enumerate(make.parts):
+        if part.element.held and k not in held:
+            rows += [make.condition(ways[:1], part.name) for ways in part.element.meeting(make.place(k, mode, pattern))]
+    return " and ".join(rows)
+
+
+def _decider(make: Expressions, base: Mapping[str, Any], given: Mapping[str, Any]) -> Patterns | None:
+    """What elements that hold each other decide together; None where no two do, or where it is not known how to.
+
+    It is known where everything is affine, in a system with one mode and nothing else that changes it."""
+    from nonsmooth.system.derived.patterns import Patterns
+
+    mode = next(iter(base))
+    bearing = [k for k, part in enumerate(make.parts) if part.element.held]
+    if len(base) > 1 or any(given[key] for key in ("transitions", "memory", "symmetry", "bands")):
+        return None
+    if not any(make.coupled(i, j, mode) for i in bearing for j in bearing if i < j):
+        return None
+    if any(np.isnan([*make.slopes(make.rate(k, mode)), *make.pushes(make.parts[k])]).any() for k in bearing):
+        return None
+    found = Patterns(make, mode)
+    if not found.is_affine(given["period"]):
+        return None
+    make.asks = True
+    return found
 
 
 def _opened(
@@ -294,6 +356,7 @@ def _opened(
     """The system without its elements, with all that these need as indicators: modes are made when they are visited."""
     from nonsmooth.system.derived.patterns import Patterns
 
+    make.asks = True
     if len(base) > 1 or any(given[key] for key in ("transitions", "indicators", "memory", "symmetry", "bands")):
         raise SystemDefinitionError(
             f"{len(parts)} elements have more than {MOST} combinations of phases, which are not written out but made "

@@ -20,9 +20,12 @@ import sympy as sp
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.condition import read_condition
 from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
+from nonsmooth.system.symbolic.period import forcing_period
+from nonsmooth.system.symbolic.traced import FOUND, Traced, TracedTransition
 from nonsmooth.system.symbolic.traced import Row as Condition
-from nonsmooth.system.symbolic.traced import Traced, TracedTransition
+from nonsmooth.system.symbolic.tracing import call_scalar
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearForm, LinearTables
@@ -89,7 +92,7 @@ class Rows(Assembler):
     def __init__(self, patterns: Patterns, tables: LinearTables, i: int) -> None:
         self.n, harmonics = tables.A.shape[-1], tables.c.shape[-2]
         self.rates = tables.omega[i] * np.array(patterns.form.multiples, dtype=float)
-        self.struck, self.scale = False, patterns.scale
+        self.struck, self.scale, self.asks = False, patterns.scale, True
         self.field = np.zeros((self.n, self.n + 1 + 2 * harmonics))
         self._fill(self.field, tables.A[i, 0], tables.b[i, 0], tables.c[i, 0].T, tables.s[i, 0].T)
         every = np.zeros((len(tables.ib[i]), self.field.shape[1]))
@@ -102,6 +105,11 @@ class Rows(Assembler):
     def _fill(self, into: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray, s: FloatArray) -> None:
         n = self.n
         into[:, :n], into[:, n], into[:, n + 1 :: 2], into[:, n + 2 :: 2] = a, b, c, s
+
+    def augmented(self, u: FloatArray, time: float) -> FloatArray:
+        """w of states at a time."""
+        angles = self.rates * time
+        return np.concatenate([u, [1.0], np.stack([np.cos(angles), np.sin(angles)], axis=-1).ravel()])
 
     def _part(self, k: int, name: str, patterns: Patterns) -> Part:
         direction = np.zeros(self.n)
@@ -143,6 +151,11 @@ class Rows(Assembler):
         slopes = expression.values[: self.n]
         return states - np.outer(slopes / (slopes @ slopes), expression.values)
 
+    def behind(self, expression: Row, states: FloatArray) -> Row:
+        values = expression.values[: self.n] @ states
+        values[self.n :] += expression.values[self.n :]
+        return Row(values, self.n)
+
     def solved(self, matrix: list[list[float]], right: list[Any]) -> list[Row]:
         rows = [one.values if isinstance(one, Row) else np.zeros(self.field.shape[1]) for one in right]
         return [Row(values, self.n) for values in np.linalg.solve(np.array(matrix), np.array(rows))]
@@ -152,6 +165,12 @@ class Rows(Assembler):
         if not (sizes > 0).all():
             return False
         return bool(np.linalg.svd(np.array(matrix) / np.outer(sizes, sizes), compute_uv=False)[-1] > REGULAR)
+
+    def slopes(self, expression: Row) -> FloatArray:
+        return expression.values[: self.n]
+
+    def pushes(self, part: Part) -> FloatArray:
+        return np.asarray(part.direction)
 
     def vanishes(self, expression: Any) -> bool:
         return not (expression.values.any() if isinstance(expression, Row) else expression)
@@ -191,6 +210,8 @@ class Patterns:
     at: dict[tuple[int, str, int | None], int] = field(default_factory=dict)
     visited: list[Pattern] = field(default_factory=list)
     jumps: list[TracedTransition] = field(default_factory=list)
+    own: tuple[tuple[str, ...], tuple[sp.Expr, ...]] = ((), ())  # names and expressions of the user's indicators
+    written: Traced | None = None  # the system with all its combinations of phases, where they are written out
     equations: Traced = field(init=False)  # without elements; the expressions are its indicators
 
     def __post_init__(self) -> None:
@@ -204,7 +225,7 @@ class Patterns:
                 self._keep((k, name, side), self.make.law(k, name, side))
         self._lock = threading.Lock()
         self._known: dict[Pattern, int] = {}
-        self._jumped: dict[tuple[int, int, str], int] = {}
+        self._jumped: dict[Any, int] = {}
         self.number(self._first())
 
     def _first(self) -> Pattern:
@@ -246,6 +267,73 @@ class Patterns:
         """Names of the elements' forces."""
         return tuple(f"{name}_force" for name in self.elements)
 
+    def is_affine(self, period: Any) -> bool:
+        """Return whether all that the elements need is affine in the states with harmonics in time."""
+        from nonsmooth.system.codegen.linear import linear_form
+
+        symbols, fields = self.make.symbols, (tuple(self.make.base(self.mode)),)
+        known = set(symbols.p.values())
+        if period is None:
+            period = forcing_period((*fields[0], *self.expressions), symbols.t, known)
+        elif callable(period):
+            period = call_scalar(period, (symbols.parameters(),), "`period`")
+        self.equations = Traced(
+            name="", t=symbols.t, u=self.make.u, p=tuple(symbols.p.values()), m=(), state_names=tuple(symbols.u),
+            parameter_names=tuple(symbols.p), memory_names=(), mode_names=(self.mode,),
+            indicator_names=tuple(self.labels), output_names=(), fields=fields,
+            lacking=((False,) * len(self.make.u),), indicators=tuple(self.expressions), transitions=(), outputs=(),
+            period=None if period is None else sp.sympify(period),
+        )  # fmt: skip
+        form = linear_form(self.equations)
+        return form is not None and form.affine_indicators
+
+    def numbered(self, patterns: Sequence[Pattern]) -> Patterns:
+        """The same with these patterns as the first ones."""
+        self.visited, self._known = list(patterns), {pattern: k for k, pattern in enumerate(patterns)}
+        return self
+
+    def decides(self, traced: Traced, kinds: Sequence[str], asked: Sequence[tuple[str, str, str]]) -> Traced:
+        """The system with all its combinations written out, with the questions (mode, kind, condition) behind its
+        transitions, which have these ``kinds``."""
+        jumps = [replace(jump, kind=kind) for jump, kind in zip(traced.transitions, kinds, strict=True)]
+        numbers = {name: i for i, name in enumerate(traced.indicator_names)}
+        count = len(traced.indicator_names) - len(self.make.indicators)
+        self.own = traced.indicator_names[:count], traced.indicators[:count]
+        for name, kind, text in asked:
+            here = traced.mode_names.index(name)
+            signs = read_condition(text, traced.indicator_names, name) if text else ()
+            rows = tuple(Condition(numbers[one], sign, strict) for one, sign, strict in signs)
+            jumps.append(TracedTransition(here, here, rows, label=name, kind=kind))
+        own = len(traced.output_names) - len(self.elements)
+        self.equations = replace(
+            self.equations, name=traced.name, period=traced.period, output_names=traced.output_names[:own],
+            outputs=tuple((row[0],) for row in traced.outputs[:own]),
+        )  # fmt: skip
+        self.written = replace(traced, transitions=tuple(jumps), decider=self)
+        return self.written
+
+    def known(self) -> Traced:
+        """The system written out, with all that was found so far."""
+        assert self.written is not None
+        return self.written
+
+    def found(self, asked: int, target: int, struck: tuple[tuple[int, float], ...]) -> int:
+        """The number of the transition to which a question has led: to a mode, by an impact of some elements."""
+        with self._lock:
+            key = asked, target, tuple(k for k, _ in struck)
+            written = self.known()
+            if key not in self._jumped:
+                question, names = written.transitions[asked], written.mode_names
+                reset = None if not struck else tuple(self.make.impact([k for k, _ in struck], self.mode))
+                self._jumped[key] = len(written.transitions)
+                jump = TracedTransition(
+                    question.source, target, question.rows, reset=reset, kind=FOUND,
+                    contact=bool(struck) or question.source == 0,
+                    label=f"{names[question.source]} -> {names[target]}",
+                )  # fmt: skip
+                self.written = replace(written, transitions=(*written.transitions, jump))
+            return self._jumped[key]
+
     def bind(self, traced: Traced) -> Traced:
         """The equations, which from here on know their patterns."""
         self.equations = traced
@@ -254,7 +342,7 @@ class Patterns:
     @cached_property
     def plain(self) -> Traced:
         """The equations without elements."""
-        return replace(self.equations, indicators=(), indicator_names=())
+        return replace(self.equations, indicators=self.own[1], indicator_names=self.own[0])
 
     @cached_property
     def form(self) -> LinearForm:
@@ -282,13 +370,13 @@ class Patterns:
                 self.visited.append(pattern)
             return self._known[pattern]
 
-    def transition(self, source: int, target: int, element: str, rows: Sequence[tuple[int, int]]) -> int:
+    def transition(self, source: int, target: int, element: str, rows: Sequence[tuple[int, int, int]]) -> int:
         """The number of a transition between numbered patterns."""
         with self._lock:
             key = source, target, f"{element} {rows}"
             if key not in self._jumped:
                 names = self.name(self.visited[source]), self.name(self.visited[target])
-                conditions = tuple(Condition(indicator, sign) for indicator, sign in rows)
+                conditions = tuple(Condition(indicator, sign, bool(strict)) for indicator, sign, strict in rows)
                 self._jumped[key] = len(self.jumps)
                 self.jumps.append(TracedTransition(source, target, conditions, label=" -> ".join(names)))
             return self._jumped[key]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
+from nonsmooth.system.symbolic.traced import ALONE, Row, Traced, TracedTransition
 
 __all__ = ["without_sticking"]
 
@@ -20,6 +20,9 @@ def without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]]
 
     A mode sticks to h = 0 between P and Q where a transition from P when h rises and one from Q when h falls lead to
     it. There P and Q change into each other then, whatever else is asked for today."""
+    if traced.decider is not None:  # what is asked of elements that hold each other
+        jumps_left = tuple(jump for jump in traced.transitions if jump.kind in ("", ALONE))
+        traced = replace(traced, transitions=jumps_left, decider=None)
     rising: dict[tuple[int, int], dict[int, int]] = {}  # (mode, indicator) -> sign of the row -> source
     for jump in traced.transitions:
         if jump.reset is not None and jump.source != jump.target:
@@ -64,6 +67,12 @@ def _equal_friction(traced: Traced, mode: int, h: int, ends: Mapping[int, int]) 
         f"{traced.name!r} cannot be smoothed between {names[ends[1]]!r} and {names[ends[-1]]!r}: the friction that "
         f"holds in {names[mode]!r} is not the kinetic one, and a band has no other; make them equal"
     )
+    rates = {
+        sp.expand(sum(surface.diff(u) * f for u, f in zip(traced.u, traced.fields[end], strict=True)))
+        for end in ends.values()
+    }
+    if len(rates) == 1:  # a place, whose rate no force changes at once: a preloaded spring
+        return []
     found = []
     for jump in traced.transitions:
         if jump.source != mode or jump.target not in ends.values() or len(jump.rows) != 1:

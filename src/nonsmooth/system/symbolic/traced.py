@@ -14,8 +14,9 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.derived.patterns import Patterns
 
-__all__ = ["NOT_UNIQUE", "Row", "Traced", "TracedTransition"]
+__all__ = ["ALONE", "ASKED", "FOUND", "NOT_UNIQUE", "TOGETHER", "Row", "Traced", "TracedTransition"]
 
+ALONE, ASKED, TOGETHER, FOUND = "alone", "asked", "together", "found"  # kinds of transitions of elements
 NOT_UNIQUE = "_not_unique"  # ends the name of a derived mode from which motion has no unique way on
 
 
@@ -40,6 +41,9 @@ class TracedTransition:
     or an expression of the parameters); one of the two is empty. ``reset`` has one expression per state, or is None
     (identity). ``writes`` are (memory index, expression) pairs, evaluated with the state just before the jump.
     ``contact`` marks the transitions counted as contacts: those with a reset, and those that leave the first mode.
+    ``kind`` is that of a transition of elements: ``ALONE`` where one decides by itself what it does next, ``ASKED``
+    where several do so together (where it leads is found when it happens), ``TOGETHER`` what is asked where those of
+    the rows vanish together with another; ``FOUND`` where such a question has led: it never fires by its rows.
     """
 
     source: int
@@ -50,6 +54,7 @@ class TracedTransition:
     writes: tuple[tuple[int, Expr], ...] = ()
     contact: bool = False
     label: str = ""
+    kind: str = ""
 
 
 @dataclass(frozen=True)
@@ -80,6 +85,7 @@ class Traced:
     period: Expr | None
     along: tuple[frozenset[int], ...] = ()
     patterns: Patterns | None = field(default=None, compare=False, repr=False)  # modes are made when they are visited
+    decider: Patterns | None = field(default=None, compare=False, repr=False)  # what elements decide together
 
     @property
     def is_map(self) -> bool:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.elements.element import CREEP, SMALL, Condition, Element, Law, Leaving
 
@@ -52,6 +54,7 @@ class Coulomb(Element):
         "speed", "speed_above", "speed_below", "over", "under", "turned_forward", "turned_back",
     )  # fmt: skip
     held: ClassVar[tuple[str, ...]] = ("stick",)
+    sides: ClassVar[tuple[str, str]] = ("forward", "back")
 
     def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
         return v - law(self.belt)
@@ -86,6 +89,17 @@ class Coulomb(Element):
             )
         return other.element.force(other)
 
+    def most(self, here: Place) -> Any:
+        """The greatest force that holds."""
+        static = here.law("friction", 0) if self.static is None else here.law("static")
+        return static * self.pressure(here)
+
+    def lies(self, where: float, rate: float, slow: float) -> int:
+        return int(np.sign(rate))
+
+    def meeting(self, here: Place) -> list[list[Condition]]:
+        return [[Condition(here.where, -1 if here.phase == "forward" else 1, "speed")]]
+
     def bearing(self, here: Place) -> list[int]:
         return [j for j in here.held() if here.moves(j)]
 
@@ -93,8 +107,7 @@ class Coulomb(Element):
         v, stuck = here.where, here.put("stick")
         if not here.may_hold(stuck.held()):
             return []  # what rests and sticks leaves it no way to move
-        static = here.law("friction", 0) if self.static is None else here.law("static")
-        hold, most = stuck.holding(), static * self.pressure(here)
+        hold, most = stuck.holding(), self.most(here)
         over, under = hold - most, hold + most
         if here.phase == "stick":
             off = SMALL * here.size(v)
@@ -110,12 +123,13 @@ class Coulomb(Element):
         within = [Condition(over, -1, "over"), Condition(under, 1, "under")]
         torn = Condition(over, 1, "over") if here.phase == "forward" else Condition(under, -1, "under")
         still = here.struck(0, self.bearing(here))
+        tie = Leaving("stick", [stopped], still)  # a load as large as the friction, to all orders: it holds
         if not here.is_struck():
-            return [Leaving("stick", [stopped, *within], still), Leaving(other, [stopped, torn])]
+            return [Leaving("stick", [stopped, *within], still), Leaving(other, [stopped, torn]), tie]
         # An impact turns the speed round at once, and no finite force can stop it then.
         off = -sign * CREEP * here.size(v)
         slow, turned = (Condition(v + off, one * sign, f"turned_{here.phase}") for one in (-1, 1))
         return [
             Leaving("stick", [stopped, slow, *within], still), Leaving(other, [stopped, torn]),
-            Leaving(other, [turned]),
+            Leaving(other, [turned]), Leaving("stick", [stopped, slow], still),
         ]  # fmt: skip

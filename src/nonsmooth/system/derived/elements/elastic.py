@@ -6,7 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from nonsmooth.system.derived.elements.element import Condition, Contact, Element, Law, Leaving
+import numpy as np
+
+from nonsmooth.system.derived.elements.element import SLOW, Condition, Contact, Element, Law, Leaving
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Place
@@ -106,6 +108,8 @@ class Backlash(Displaced):
 class PreloadedSpring(Displaced):
     r"""A spring with preload P and stiffness k: F = -P - k s for s > 0, P - k s for s < 0.
 
+    Where s = 0 is crossed slower than 1e-5 of the scale of its rate and the load stays within P, it holds s = 0.
+
     Parameters
     ----------
     displacement : callable
@@ -118,17 +122,35 @@ class PreloadedSpring(Displaced):
     preload: Law = 0.0
     stiffness: Law = 0.0
 
-    phases: ClassVar[tuple[str, ...]] = ("above", "below")
+    phases: ClassVar[tuple[str, ...]] = ("above", "below", "held")
     laws: ClassVar[tuple[str, ...]] = ("preload", "stiffness")
-    conditions: ClassVar[tuple[str, ...]] = ("side",)
+    conditions: ClassVar[tuple[str, ...]] = ("over", "under", "side", "fast")
+    held: ClassVar[tuple[str, ...]] = ("held",)
+    sides: ClassVar[tuple[str, str]] = ("above", "below")
 
     def force(self, here: Place) -> Any:
         side = 1 if here.phase == "above" else -1
         return -side * here.law("preload") - here.law("stiffness") * here.where
 
+    def most(self, here: Place) -> Any:
+        return here.law("preload")
+
+    def meeting(self, here: Place) -> list[list[Condition]]:
+        return [[Condition(here.where, -1 if here.phase == "above" else 1, "side")]]
+
+    def lies(self, where: float, rate: float, slow: float) -> int:
+        return int(np.sign(where) if where else np.sign(rate) if abs(rate) > slow else 0)
+
     def leaving(self, here: Place) -> list[Leaving]:
+        hold, most = here.put("held").holding(), self.most(here)
+        over, under = Condition(hold - most, 1, "over"), Condition(hold + most, -1, "under")
+        if here.phase == "held":
+            return [Leaving("below", [over]), Leaving("above", [under])]
         to, sign = ("below", -1) if here.phase == "above" else ("above", 1)
-        return [Leaving(to, [Condition(here.where, sign, "side")])]
+        side, rate = Condition(here.where, sign, "side"), here.rate()
+        fast = Condition(rate - sign * SLOW * here.size(rate), sign, "fast")
+        crossed = [Leaving(to, [side, one]) for one in (fast, over, under)]
+        return [*crossed, Leaving("held", [side], here.struck(0, []))]
 
 
 def damped(here: Place) -> Any:

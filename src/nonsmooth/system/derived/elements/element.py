@@ -18,25 +18,29 @@ from nonsmooth.errors import SystemDefinitionError, shortened
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Place
 
-__all__ = ["CREEP", "SMALL", "Condition", "Contact", "Element", "Law", "Leaving"]
+__all__ = ["CREEP", "SLOW", "SMALL", "Condition", "Contact", "Element", "Law", "Leaving"]
 
 SMALL = 1e-4  # of the states' scale: what a rate or a gap that is held at zero may be off where a run begins
 CREEP = 1e-7  # of the same: the speed of approach below which impacts are not followed
+SLOW = 1e-5  # of the same: the speed at which a preloaded spring still takes hold
 Law = float | str | Callable[..., Any]
 
 
 class Condition(NamedTuple):
-    """``sign * value > 0``, and the name by which logs call it behind the element's."""
+    """``sign * value > 0``, and the name by which logs call it behind the element's; one that is not ``strict`` holds
+    as well where the value and all its derivatives are zero."""
 
     value: Any
     sign: int
     name: str
+    strict: bool = True
 
 
 class Leaving(NamedTuple):
-    """A way out of a phase: the phase behind it, the conditions that must all hold, the states behind it."""
+    """A way out of a phase: the phase behind it (None: it is asked, :mod:`nonsmooth.system.derived.deciding`), the
+    conditions that must all hold, the states behind it."""
 
-    phase: str
+    phase: str | None
     conditions: list[Condition]
     states: Any = None  # None: as they were
 
@@ -63,6 +67,7 @@ class Element(ABC):
     laws: ClassVar[tuple[str, ...]] = ()  # its arguments that are numbers, parameters or functions
     conditions: ClassVar[tuple[str, ...]] = ()  # names of the conditions on its ways out
     held: ClassVar[tuple[str, ...]] = ()  # the phases in which its force is that of a constraint
+    sides: ClassVar[tuple[str, str]] = ("", "")  # the phases in which it lets go, its rate rising or falling
     strikes: ClassVar[bool] = False  # its impacts turn speeds at once
     bears: ClassVar[bool] = False  # while it is held it bears its part of an impulse
     presses: ClassVar[bool] = False  # its law is a normal force for friction
@@ -107,6 +112,18 @@ class Element(ABC):
         """The term that brings a state back onto the surface, which rounding leaves; zero there (Baumgarte 1972)."""
         kappa = here.size(here.rate()) / here.size(here.where)
         return -2 * kappa * here.rate() - kappa**2 * here.where
+
+    def most(self, here: Place) -> Any:
+        """The greatest force of its constraint, either way; None where it pushes only."""
+        return None
+
+    def lies(self, where: float, rate: float, slow: float) -> int:
+        """Which of its ``sides`` it is on, 1 or -1, by its place and its rate; 0 where it may hold."""
+        return 0
+
+    def meeting(self, here: Place) -> list[list[Condition]]:
+        """The conditions, of each way in, at which what it does next is asked where it is not held."""
+        return []
 
     def bearing(self, here: Place) -> list[int]:
         """Of what is held, the elements that take part in its own impulse."""

@@ -78,13 +78,20 @@ class Stop(Contact):
         sentence = f"restitution of element {here.name!r} lies between 0 and 1"
         return [(e, sentence), (1 - e, sentence)]
 
+    def meeting(self, here: Place) -> list[list[Condition]]:
+        return [[Condition(here.where, -1, "gap"), Condition(here.rate(), -1, "closing")]]
+
     def bearing(self, here: Place) -> list[int]:
         """Those that it would pull open part instead; friction is finite and lets go of what it held."""
         return [j for j in here.held() if here.other(j).element.bears and here.effect_on(j) < 0]
 
+    def pulled(self, here: Place, held: list[int]) -> Any:
+        """The derivative of its rate without its force, where the approach has ended."""
+        return here.behind(here.free(), here.struck(0, held))
+
     def leaving(self, here: Place) -> list[Leaving]:
-        pull = here.free()  # the acceleration without its force
         if here.phase == "rest":
+            pull = self.pulled(here, [])
             off = SMALL * here.size(here.where)
             return [
                 Leaving("open", [Condition(pull, 1, "opens")]),
@@ -99,14 +106,18 @@ class Stop(Contact):
         closed = Condition(here.where, -1, "gap")
         if not self.rest:
             return [Leaving("open", [closed], rebound)]
-        still = here.struck(0, held)
+        still, pull = here.struck(0, held), self.pulled(here, held)
         closing = [closed, Condition(w, -1, "closing")]
         presses, lifts = Condition(pull, -1, "opens"), Condition(pull, 1, "opens")
         if here.vanishes(restitution):
-            return [Leaving("rest", [*closing, presses], still), Leaving("open", [*closing, lifts], still)]
-        slow = w + (self.creep if self.creep is not None else CREEP * here.size(w))
+            return [
+                Leaving("rest", [*closing, presses], still), Leaving("open", [*closing, lifts], still),
+                Leaving("rest", closing, still),  # neither, to all orders: it holds
+            ]
+        speed = w + (self.creep if self.creep is not None else CREEP * here.size(w))
+        slow = [*closing, Condition(speed, 1, "slow")]
         return [
-            Leaving("open", [closed, Condition(slow, -1, "slow")], rebound),
-            Leaving("rest", [*closing, Condition(slow, 1, "slow"), presses], still),
-            Leaving("open", [*closing, Condition(slow, 1, "slow"), lifts], rebound),
+            Leaving("open", [closed, Condition(speed, -1, "slow")], rebound),
+            Leaving("rest", [*slow, presses], still), Leaving("open", [*slow, lifts], rebound),
+            Leaving("rest", slow, still),
         ]
