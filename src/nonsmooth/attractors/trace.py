@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import Chain, Engine, FloatArray, IntArray, SectionPlan, State
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, SectionPlan, State
+from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.phases import phases, varying_phases
 
@@ -77,15 +78,15 @@ def trace(
     keep: int, width: int,
 ) -> Trace:  # fmt: skip
     """Run on from a place on the section."""
-    traced, tables = system.traced, engine.prepare(point)
+    tables = engine.prepare(point)
     period = period_of(tables)
     state = state_at(system, place, mode, plan.phase * period if plan.indicator < 0 else 0.0, period)
     begin = state.clock[0] + (state.clock[1] * period if period < np.inf else 0.0)
-    out = Chain.empty(1, keep, len(traced.u), len(traced.indicators), len(traced.outputs))
+    out = engine.kept(1, keep)
     engine.chain(tables, 0, 1, state, None, replace(plan, extremes=False), transient, keep, out)
     if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
         none = np.zeros(0)
-        return Trace(np.zeros((0, len(traced.u))), np.zeros(0, dtype=np.int64), none, place, mode)
+        return Trace(np.zeros((0, len(system.states))), np.zeros(0, dtype=np.int64), none, place, mode)
     return Trace(
         out.section[0], out.section_mode[0], out.section_time[0] - begin, place_of(state, width),
         int(state.counters[0]),

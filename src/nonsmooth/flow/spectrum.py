@@ -20,8 +20,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.flow.engines.engine import Engine, FloatArray, Log, State
+from nonsmooth.flow.engines.engine import FloatArray, Log, State
 from nonsmooth.flow.engines.linear import LinearEngine
+from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.series import SeriesEngine, order_for
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
+from nonsmooth.flow.engines.engine import SectionPlan, State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.kernels.hybrid import codes
 
@@ -45,7 +45,6 @@ class SectionMap:
         self.engine = engine_for(system, rtol=RTOL)
         self.tables = self.engine.prepare(np.tile(system.parameter_vector(), (CHUNK, 1)))
         self.plan = SectionPlan(extremes=False)
-        self.shape = (len(size), len(system.indicators), len(system.outputs))
 
     def at_phase(self, x: FloatArray, phase: float) -> FloatArray:
         """The scaled points x (m, n) of phase 0 at a later phase of the same period."""
@@ -65,7 +64,7 @@ class SectionMap:
             if not safe.any():
                 continue
             given = np.ascontiguousarray(part[safe])
-            out = Chain.empty(len(given), 1, *self.shape)
+            out = self.engine.kept(len(given), 1)
             state = State(given[0].copy(), self.system.memory_vector())
             self.engine.chain(self.tables, 0, len(given), state, given, plan, returns - 1, 1, out)
             good = np.isin(out.status, (codes.OK, codes.NOT_GUARANTEED))

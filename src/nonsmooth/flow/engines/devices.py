@@ -7,9 +7,9 @@ import os
 from typing import Any
 
 from nonsmooth.errors import not_installed
-from nonsmooth.flow.engines.engine import Engine, SectionPlan
+from nonsmooth.flow.engines.engine import SectionPlan
 from nonsmooth.flow.engines.linear import LinearEngine, PlanarEngine
-from nonsmooth.flow.engines.loop import LoopEngine
+from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.patterns import PatternEngine
 from nonsmooth.flow.engines.series import SeriesEngine
 
@@ -114,7 +114,7 @@ def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, 
     """
     if check_device(device) == "cpu":
         return False
-    if isinstance(engine, LoopEngine) and engine.phases is not None:
+    if engine.phases is not None:
         raise ValueError(
             f'{verb} with device="cuda" takes transitions at fixed phases; here `at` depends on the parameters: use '
             'device="cpu"'

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, IntArray
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept
 
-__all__ = ["States", "batches", "launch"]
+__all__ = ["States", "batches", "kept_on", "launch"]
 
 
 @dataclass
@@ -53,6 +53,15 @@ def batches(points: FloatArray, rows: IntArray, size: int) -> Iterator[tuple[sli
         some = slice(first, first + size)
         needed, own = np.unique(rows[some], return_inverse=True)
         yield some, points[needed], own.astype(np.int64)
+
+
+def kept_on(cuda: Any, n: int, keep: int, states: int, rows: int) -> Kept:
+    """Room on the GPU for ``keep`` section points of each of n trajectories."""
+    array, whole = cuda.device_array, np.int64
+    return Kept(
+        array((n, keep, states)), array((n, rows)), array((n, rows)), array(n, whole), array(n, whole), array(n),
+        array((n, keep)), array((n, keep), whole), array(n, whole),
+    )  # fmt: skip
 
 
 def launch(entry: Any, threads: int, jobs: Any, *arguments: Any) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import Chain, FloatArray, SectionPlan, State
+from nonsmooth.flow.engines.engine import FloatArray, Kept, SectionPlan, State
 from nonsmooth.kernels.hybrid.places import GROW, LOGGED, PATIENCE, RETURNS_OF_SECTION
 
 __all__ = ["March"]
@@ -30,16 +30,16 @@ class March:
 
     def returns(
         self, first: int, last: int, state: State, starts: FloatArray | None, plan: SectionPlan, transient: int,
-        keep: int, out: Chain,
+        keep: int, out: Kept,
     ) -> None:  # fmt: skip
-        """Ask for section returns of some points; see :class:`nonsmooth.flow.engines.engine.Engine`."""
+        """Ask for section returns of some points; see :class:`nonsmooth.flow.engines.loop.Engine`."""
         self.orders[:] = (
             first, last, RETURNS_OF_SECTION, transient, keep, PATIENCE, plan.indicator, plan.rising, plan.mode,
-            plan.after, plan.every, plan.extremes,
+            plan.after, plan.every, plan.extremes, -1,
         )  # fmt: skip
         phase = plan.phase if plan.indicator < 0 else -1.0
         self.reals[:] = 0.0, 0.0, phase, min(plan.t_max, 1e300)
-        self.kept.put(out.record())
+        self.kept.put(out)
         self._ask(state, _NO_STARTS if starts is None else starts)
 
     def logged(self, state: State, until: float) -> None:
@@ -62,7 +62,7 @@ class March:
 
     def _anywhere(self, i: int, kind: int, keep: int) -> None:
         """A run that knows no section."""
-        self.orders[:] = i, i + 1, kind, 0, keep, PATIENCE, -1, 0, -1, 0, 1, 0
+        self.orders[:] = i, i + 1, kind, 0, keep, PATIENCE, -1, 0, -1, 0, 1, 0, -1
 
     def _ask(self, state: State, starts: FloatArray) -> None:
         from nonsmooth.kernels.hybrid.records import Call

@@ -8,15 +8,15 @@ they come; what leaves the engine has the numbers that all points share.
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import Chain, FloatArray, IntArray, Log, SectionPlan, State
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Log, SectionPlan, State
 from nonsmooth.flow.engines.linear import table_bytes
-from nonsmooth.flow.engines.loop import LoopEngine
+from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.places import RESET, WAITS
 from nonsmooth.results.memory import free_memory, room_for
@@ -44,7 +44,7 @@ class Points:
 
 
 @dataclass
-class PatternEngine(LoopEngine):
+class PatternEngine(Engine):
     """``Engine`` over ``kernels.linear`` for a system whose patterns are made when they are visited."""
 
     traced: Traced
@@ -67,6 +67,16 @@ class PatternEngine(LoopEngine):
     def net_of(self, tables: Any, i: int) -> Any:
         return tables.net
 
+    own_systems = True
+
+    def enter(self, tables: Points, i: int, state: State) -> tuple[PatternTables, int]:
+        here = self._at(tables, i)
+        here.enter(state)
+        return here, 0
+
+    def leave(self, here: PatternTables, state: State) -> None:
+        here.leave(state)
+
     def touches_of_a_leg(self) -> int:
         """None: an extremum of each condition of each element, in a hundred states, would fill the memory."""
         return 0
@@ -77,12 +87,11 @@ class PatternEngine(LoopEngine):
 
     def chain(
         self, tables: Points, first: int, last: int, state: State, starts: FloatArray | None,
-        plan: SectionPlan, transient: int, keep: int, out: Chain,
+        plan: SectionPlan, transient: int, keep: int, out: Kept,
     ) -> None:  # fmt: skip
         for i in range(first, last):
-            here = self._at(tables, i)
-            here.enter(state)
-            one = Chain(*[getattr(out, part.name)[i : i + 1] for part in fields(Chain)])
+            here, _ = self.enter(tables, i, state)
+            one = Kept(*[part[i : i + 1] for part in out])
             own = None if starts is None else starts[i : i + 1]
             super().chain(here, 0, 1, state, own, plan, transient, keep, one)
             here.leave(state)
@@ -94,8 +103,7 @@ class PatternEngine(LoopEngine):
         """None: a pattern that is met for the first time changes the memory."""
 
     def record(self, tables: Points, state: State, until: float, samples: FloatArray, room: Any = None) -> Log:
-        here = self._at(tables, 0)
-        here.enter(state)
+        here, _ = self.enter(tables, 0, state)
         log = super().record(here, state, until, samples)
         here.leave(state)
         numbers = np.array(here.numbers, dtype=np.int64)

@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 from numba import types
 
+from nonsmooth.kernels.hybrid.kept import Kept
+
 __all__ = [
     "CALL", "FORM", "GENERATED", "GOAL", "GROWTH", "KEPT", "LOG", "MOTION", "NET", "SECTION", "SEEN", "SERIES_WORK",
     "TABLES", "WORK",
@@ -193,24 +195,6 @@ class Goal(NamedTuple):
     patience: Any  # steps after which it pauses, to be called again
 
 
-class Kept(NamedTuple):
-    """The kept values of P points of a sweep (see ``flow.engines.engine.Chain``)."""
-
-    section: Any  # (P, keep, n)
-    maximum: Any  # (P, n)
-    minimum: Any
-    i_max: Any  # (P, indicators)
-    i_min: Any
-    o_max: Any  # (P, outputs)
-    o_min: Any
-    crossings: Any  # (P,)
-    contacts: Any
-    elapsed: Any
-    section_time: Any  # (P, keep)
-    section_mode: Any
-    status: Any  # (P,)
-
-
 class Log(NamedTuple):
     """The record of one trajectory; logs of crossings and touches grow on demand."""
 
@@ -266,9 +250,9 @@ class Call(NamedTuple):
 
 
 # Places in ``Call.orders`` and ``Call.reals``.
-BEGIN, END, KIND, TRANSIENT, KEEP, PATIENCE_LEFT, INDICATOR, RISING, OF_MODE, AFTER, EVERY, EXTREMES = range(12)
+BEGIN, END, KIND, TRANSIENT, KEEP, PATIENCE_LEFT, INDICATOR, RISING, OF_MODE, AFTER, EVERY, EXTREMES, ROW = range(13)
 UNTIL, UNIT, PHASE, T_MAX = range(4)
-N_ORDERS, N_REALS = 12, 4
+N_ORDERS, N_REALS = 13, 4
 
 
 FORM = type_of(
@@ -286,7 +270,7 @@ MOTION = type_of(Motion, _f1, _f1, _f1, _i1)
 SECTION = type_of(Section, *[_i] * 6, _f, _f)
 GOAL = type_of(Goal, _i, _i, _i, _f, _f, _f1, _i)
 CALL = type_of(Call, _i1, _f1, _f1, _f2, MOTION)
-KEPT = type_of(Kept, _f3, *[_f2] * 6, _i1, _i1, _f1, _f2, _i2, _i1)
+KEPT = type_of(Kept, _f3, _f2, _f2, _i1, _i1, _f1, _f2, _i2, _i1)
 LOG = type_of(Log, _f1, _f2, _f2, _i1, _i1, _f1, _i1, _f2, _f2, _f2, _f1, _i1, _f2, _f1, _i)
 GROWTH = type_of(Growth, _f1, _f2, _f2, _f1, _f1, _f2, _f2, _f2, _f2, _f1, _f1)
 SEEN = type_of(Seen, KEPT, LOG, GROWTH)
