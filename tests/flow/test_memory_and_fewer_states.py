@@ -7,7 +7,7 @@ import pytest
 from random_systems import Template, draw, growing
 
 import nonsmooth as ns
-from nonsmooth.flow.engines.engine import SectionPlan, State
+from nonsmooth.flow.engines.engine import Section, State
 from nonsmooth.flow.engines.linear import LinearEngine, PlanarEngine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.engines.series import SeriesEngine
@@ -58,7 +58,7 @@ def test_runs_and_sweeps_as_by_the_series_of_the_same_flow(template) -> None:
             logs.append(engine.record(tables, state, duration, samples))
             ends.append(np.concatenate([state.u, state.memory, state.clock[:1]]))
             out = engine.kept(1, 3)
-            engine.chain(tables, 0, 1, state, None, SectionPlan(), 2, 3, out)
+            engine.chain(tables, 0, 1, state, None, Section(), 2, 3, out)
             chains.append((out, np.concatenate([state.u, state.memory])))
         ours, theirs = logs
         assert ours.status == theirs.status == 0
@@ -135,7 +135,7 @@ def test_a_lacking_state_has_no_value_and_no_part_in_extremes() -> None:
     assert np.isfinite(run.u.sel(state="v").values[~stuck]).all()
     state = State(np.array([0.0, 7.0]), np.zeros(0))  # a speed that the first mode does not have
     out = engine.kept(1, 3)
-    engine.chain(engine.prepare(belt.parameter_vector()[None, :]), 0, 1, state, None, SectionPlan(), 0, 3, out)
+    engine.chain(engine.prepare(belt.parameter_vector()[None, :]), 0, 1, state, None, Section(), 0, 3, out)
     speed = np.hypot(0.5, 0.2)  # of the arc about the spring's equilibrium
     np.testing.assert_allclose([out.low[0, 1], out.high[0, 1]], [-speed, 0.2], rtol=0, atol=1e-13)
     np.testing.assert_allclose(out.high[0, 2 + 1], 7.0 - 0.2, rtol=0, atol=1e-13)

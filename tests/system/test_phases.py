@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engines.engine import SectionPlan, State
+from nonsmooth.flow.engines.engine import Section, State
 from nonsmooth.flow.engines.methods import engine_for
 
 
@@ -43,7 +43,7 @@ def test_points_of_one_call_have_their_own_phases():
     engine = engine_for(system)
     tables = engine.prepare(system.parameter_points({"duty": DUTIES}))
     out, state = engine.kept(len(DUTIES), 1), State(np.zeros(1), np.zeros(0))
-    engine.chain(tables, 0, len(DUTIES), state, np.zeros((len(DUTIES), 1)), SectionPlan(), 40, 1, out)
+    engine.chain(tables, 0, len(DUTIES), state, np.zeros((len(DUTIES), 1)), Section(), 40, 1, out)
     assert out.section.ravel() == pytest.approx([steady(duty) for duty in DUTIES], rel=1e-12)
 
 

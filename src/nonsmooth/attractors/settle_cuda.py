@@ -14,7 +14,7 @@ import numpy as np
 
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.flow.engines.devices import batch_size
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, SectionPlan
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Section
 from nonsmooth.flow.engines.launches import States, batches
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.linear_cuda import SLICE, PlanarOnGpu
@@ -152,7 +152,7 @@ class Rounds:
         return found.judged(jobs)
 
 
-def _on_gpu(engine: Engine, points: FloatArray, plan: SectionPlan) -> Any:
+def _on_gpu(engine: Engine, points: FloatArray, plan: Section) -> Any:
     """Parameter points of an engine on the GPU."""
     if isinstance(engine, PlanarEngine):
         return PlanarOnGpu(engine, points, plan)

@@ -19,7 +19,7 @@ from nonsmooth.attractors.settle import tolerance_of
 from nonsmooth.attractors.settle_cuda import separate_on_gpu, settle_on_gpu
 from nonsmooth.attractors.settled import LEAST, ROUNDED, Settled, least_sizes
 from nonsmooth.attractors.trace import Trace, mode_at, trace
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, SectionPlan
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Section
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.results.memory import room_for
@@ -52,7 +52,7 @@ class Settler:
 
     system: System
     engine: Engine
-    plan: SectionPlan
+    plan: Section
     transient: int
     keep: int
     max_period: int
@@ -129,7 +129,7 @@ class Settler:
             return settle_on_gpu(self, points, rows, starts, modes, begin, attempts)
         # true extremes are dear: where returns are one period each, one more gives the motion's size
         beyond = int(self.plan.indicator < 0 and not self.engine.own_systems)
-        plan = replace(self.plan, extremes=not beyond)
+        plan = self.plan._replace(extremes=not beyond)
         mapper = Mapper(replace(self, plan=plan), self.engine.prepare(points), rows, starts, modes, begin)
         mapper.settle(self.rules(attempts, beyond), int(carried), self.extremes or not beyond)(len(rows))
         return mapper.settled()
@@ -198,9 +198,9 @@ class Settler:
         if self.device == "cuda" and self.width == len(self.system.traced.u) + len(self.system.traced.m):
             status = separate_on_gpu(self, *jobs, size, offsets, sums)
         else:
-            plan = replace(self.plan, extremes=False, every=1)
+            plan = self.plan._replace(extremes=False, every=1)
             if plan.indicator >= 0 and self.system.traced.period is not None:
-                plan = SectionPlan(extremes=False)  # once per period, at the phase that a place has
+                plan = Section(extremes=False)  # once per period, at the phase that a place has
             quiet = replace(self, plan=plan, keep=1, max_period=1)
             mapper = Mapper(quiet, self.engine.prepare(points), rows, starts, modes, self.section_phase)
             status = mapper.separate(*jobs[4:], size, offsets, sums)

@@ -7,12 +7,12 @@ in all). A plain start has the states only.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, SectionPlan, State
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Section, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.phases import phases, varying_phases
@@ -74,7 +74,7 @@ def place_of(state: State, width: int) -> FloatArray:
 
 
 def trace(
-    system: System, engine: Engine, plan: SectionPlan, point: FloatArray, place: FloatArray, mode: int, transient: int,
+    system: System, engine: Engine, plan: Section, point: FloatArray, place: FloatArray, mode: int, transient: int,
     keep: int, width: int,
 ) -> Trace:  # fmt: skip
     """Run on from a place on the section."""
@@ -83,7 +83,7 @@ def trace(
     state = state_at(system, place, mode, plan.phase * period if plan.indicator < 0 else 0.0, period)
     begin = state.clock[0] + (state.clock[1] * period if period < np.inf else 0.0)
     out = engine.kept(1, keep)
-    engine.chain(tables, 0, 1, state, None, replace(plan, extremes=False), transient, keep, out)
+    engine.chain(tables, 0, 1, state, None, plan._replace(extremes=False), transient, keep, out)
     if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
         none = np.zeros(0)
         return Trace(np.zeros((0, len(system.states))), np.zeros(0, dtype=np.int64), none, place, mode)

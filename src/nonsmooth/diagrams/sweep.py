@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -169,7 +168,7 @@ def sweep(
             )["section"].transpose(..., "state").values  # fmt: skip
         edges = bin_edges(system, ranges, n_bins, coarse)
     settler = Settler(
-        system, engine, replace(plan, extremes=extremes), transient, keep, max_period if judge else 0, False, rtol=rtol
+        system, engine, plan._replace(extremes=extremes), transient, keep, max_period if judge else 0, False, rtol=rtol
     )
     slots = {(d, k): Slot(settler, len(points), edges) for d in range(len(directions)) for k in range(len(starts))}
     options = {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,7 +74,7 @@ def poincare(
     check_options(system, expert, poincare)
     n, transient = whole_number(n, "n", 1), whole_number(transient, "transient", 0)
     section, plan = section_plan(system, section)
-    plan = replace(plan, extremes=False)
+    plan = plan._replace(extremes=False)
     starts = start_states(system, start)
     if plan.indicator >= 0:
         refuse_resting(system, starts, system.parameter_vector()[None, :], "poincare")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.signature import Signature, Visit
 from nonsmooth.continuation.problems.visits import visits_of
-from nonsmooth.flow.engines.engine import SectionPlan, State
+from nonsmooth.flow.engines.engine import Section, State
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 
@@ -65,7 +65,7 @@ def settle_forced(system: System, engine: Engine, state: State, transient: int, 
         nonlocal left
         some = min(max(1, round(piece)), left)
         if some:
-            engine.chain(tables, 0, 1, state, None, SectionPlan(), some - 1, 1, passed)
+            engine.chain(tables, 0, 1, state, None, Section(), some - 1, 1, passed)
             left -= some
         return int(passed.status[0]) in (codes.OK, codes.NOT_GUARANTEED)
 
@@ -74,7 +74,7 @@ def settle_forced(system: System, engine: Engine, state: State, transient: int, 
         state, left, passed.status[0] = begun, transient, codes.OK
     out = engine.kept(1, keep)
     if passed.status[0] in (codes.OK, codes.NOT_GUARANTEED):
-        engine.chain(tables, 0, 1, state, None, SectionPlan(), left, keep, out)
+        engine.chain(tables, 0, 1, state, None, Section(), left, keep, out)
     else:
         out.status[0] = passed.status[0]
     search.look()

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.kernels.hybrid.kept import Kept
+from nonsmooth.kernels.hybrid.kept import Kept, Section
 
-__all__ = ["Kept", "Log", "SectionPlan", "State"]
+__all__ = ["Kept", "Log", "Section", "State"]
 
 IntArray = NDArray[np.int64]
 
@@ -54,22 +54,6 @@ class State:
 
     def copy(self) -> State:
         return State(self.u.copy(), self.memory.copy(), self.clock.copy(), self.counters.copy(), self.settled)
-
-
-@dataclass(frozen=True)
-class SectionPlan:
-    """A section in integers. Stroboscopic: ``indicator`` = -1 and ``phase`` (0..1). Poincare: the indicator's
-    index, ``rising`` +1 / -1 / 0 (both), ``mode`` index or -1 (any), ``after`` 1 (limit after a transition
-    at the same instant) or 0 (before), ``every`` k-th return, ``t_max`` the longest wait for one return."""
-
-    phase: float = 0.0
-    indicator: int = -1
-    rising: int = 1
-    mode: int = -1
-    after: int = 1
-    every: int = 1
-    t_max: float = np.inf
-    extremes: bool = True  # False: extremes are not wanted, an engine may leave them out
 
 
 @dataclass

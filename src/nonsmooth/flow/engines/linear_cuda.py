@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, SectionPlan
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Section
 from nonsmooth.flow.engines.launches import States, kept_on, launch
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.loop import DIVERGENCE
@@ -25,13 +25,13 @@ class PlanarOnGpu:
     ----------
     engine : PlanarEngine
     points : array (P, n_parameters)
-    plan : SectionPlan
+    plan : Section
         A stroboscopic section.
     """
 
     n, n_memory = 2, 0
 
-    def __init__(self, engine: PlanarEngine, points: FloatArray, plan: SectionPlan) -> None:
+    def __init__(self, engine: PlanarEngine, points: FloatArray, plan: Section) -> None:
         from nonsmooth.kernels.cuda.module import cuda_linear_module
         from nonsmooth.kernels.cuda.target import THREADS, cuda
         from nonsmooth.kernels.linear.layout import scratch

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, Kept, Log, SectionPlan, State
+from nonsmooth.flow.engines.engine import FloatArray, Kept, Log, Section, State
 from nonsmooth.flow.engines.march import March
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, RESET, TOUCHES
@@ -135,7 +135,7 @@ class Engine(ABC):
 
     def chain(
         self, tables: Any, first: int, last: int, state: State, starts: FloatArray | None,
-        plan: SectionPlan, transient: int, keep: int, out: Kept,
+        plan: Section, transient: int, keep: int, out: Kept,
     ) -> None:  # fmt: skip
         """Points ``first <= i < last``: run ``transient`` section returns, then ``keep`` more into ``out``.
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, Kept, SectionPlan, State
+from nonsmooth.flow.engines.engine import FloatArray, Kept, Section, State
 from nonsmooth.kernels.hybrid.places import GROW, LOGGED, PATIENCE, RETURNS_OF_SECTION
 
 __all__ = ["March"]
@@ -29,7 +29,7 @@ class March:
         self.orders, self.reals = np.zeros(N_ORDERS, dtype=np.int64), np.zeros(N_REALS)
 
     def returns(
-        self, first: int, last: int, state: State, starts: FloatArray | None, plan: SectionPlan, transient: int,
+        self, first: int, last: int, state: State, starts: FloatArray | None, plan: Section, transient: int,
         keep: int, out: Kept,
     ) -> None:  # fmt: skip
         """Ask for section returns of some points; see :class:`nonsmooth.flow.engines.loop.Engine`."""

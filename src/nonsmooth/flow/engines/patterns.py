@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Log, SectionPlan, State
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Log, Section, State
 from nonsmooth.flow.engines.linear import table_bytes
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.kernels.hybrid import codes
@@ -87,7 +87,7 @@ class PatternEngine(Engine):
 
     def chain(
         self, tables: Points, first: int, last: int, state: State, starts: FloatArray | None,
-        plan: SectionPlan, transient: int, keep: int, out: Kept,
+        plan: Section, transient: int, keep: int, out: Kept,
     ) -> None:  # fmt: skip
         for i in range(first, last):
             here, _ = self.enter(tables, i, state)

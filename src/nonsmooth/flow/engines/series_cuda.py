@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, SectionPlan
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Section
 from nonsmooth.flow.engines.launches import States, kept_on, launch
 from nonsmooth.flow.engines.series import SeriesEngine
 from nonsmooth.flow.engines.series_tables import Tables
@@ -51,10 +51,10 @@ class SeriesOnGpu:
     engine : SeriesEngine
         ``"taylor"`` with crossings located.
     points : array (P, n_parameters)
-    plan : SectionPlan
+    plan : Section
     """
 
-    def __init__(self, engine: SeriesEngine, points: FloatArray, plan: SectionPlan) -> None:
+    def __init__(self, engine: SeriesEngine, points: FloatArray, plan: Section) -> None:
         from nonsmooth.kernels.cuda.target import THREADS, cuda
 
         tables = engine.prepare(points)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from nonsmooth.attractors.mapper import Mapper
 from nonsmooth.attractors.settle import longest_period
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.attractors.settler import Settler
-from nonsmooth.flow.engines.engine import Kept, SectionPlan, State
+from nonsmooth.flow.engines.engine import Kept, Section, State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.sections import Stroboscopic, section_plan
@@ -80,7 +80,7 @@ class Motions:
         )  # fmt: skip
         self.tables = self.engine.prepare(self.points)
 
-    def _plan(self, phase: float) -> SectionPlan:
+    def _plan(self, phase: float) -> Section:
         return section_plan(self.system, Stroboscopic(phase))[1]
 
     def _state(self, start: Any = None) -> State:
@@ -145,7 +145,7 @@ class Motions:
         """Successive points of the section at ``phase``: (n, states); those of a periodic motion come round again."""
         count = attractor.period_number or n
         out = self.engine.kept(1, count)
-        plan = replace(self._plan(phase), extremes=False)
+        plan = self._plan(phase)._replace(extremes=False)
         start = attractor.point[None, :]
         self.engine.chain(self._alone(i), 0, 1, self._state(start[0]), start, plan, 0, count, out)
         if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):

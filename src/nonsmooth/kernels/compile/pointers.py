@@ -24,8 +24,6 @@ from llvmlite import ir
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-__all__ = ["Block", "addresses", "function_at", "stored"]
-
 _DISABLED = bool(numba.config.DISABLE_JIT)
 
 

@@ -9,10 +9,10 @@ of the next launch, and a launch stays short.
 from nonsmooth.kernels.cuda.tables import tabled
 from nonsmooth.kernels.cuda.target import cuda, device, entry
 from nonsmooth.kernels.hybrid.codes import OK
-from nonsmooth.kernels.hybrid.kept import Kept
+from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.hybrid.loop import leave, march
 from nonsmooth.kernels.hybrid.places import BEGUN, RETURNS_OF_SECTION
-from nonsmooth.kernels.hybrid.records import Goal, Motion, Net, Section, Seen
+from nonsmooth.kernels.hybrid.records import Goal, Motion, Net, Seen
 from nonsmooth.kernels.hybrid.sections import window_of
 from nonsmooth.kernels.linear.extremes import finish
 
@@ -21,7 +21,7 @@ from nonsmooth.kernels.linear.extremes import finish
 def go(motion, form, net, phase, limit, plan, transient, keep, out, scratch):
     """Run the one parameter row on from a motion, which is left where it ends. Returns the status."""
     tables, work = scratch
-    section = Section(plan[0], plan[1], plan[2], plan[3], plan[4], plan[5], phase, 1e300)
+    section = Section(phase, plan[0], plan[1], plan[2], plan[3], plan[4], 1e300, plan[5])
     goal = Goal(RETURNS_OF_SECTION, transient, keep, 0.0, 0.0, limit, 1 << 62)
     code = march(0, form, net, section, goal, motion, Seen(out, (), ()), tables, work)
     work.tally[BEGUN] = 0

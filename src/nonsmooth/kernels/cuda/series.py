@@ -14,10 +14,10 @@ from numba import float64, int64
 
 from nonsmooth.kernels.cuda.target import cuda, entry, local, once
 from nonsmooth.kernels.hybrid.codes import PAUSED
-from nonsmooth.kernels.hybrid.kept import Kept
+from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.hybrid.loop import leave, march
 from nonsmooth.kernels.hybrid.places import BEGUN, RETURNS_OF_SECTION
-from nonsmooth.kernels.hybrid.records import Generated, Goal, Motion, Net, Section, Seen, SeriesWork
+from nonsmooth.kernels.hybrid.records import Generated, Goal, Motion, Net, Seen, SeriesWork
 from nonsmooth.kernels.hybrid.sections import window_of
 from nonsmooth.kernels.series.places import N_SERIES_MEMO, N_SERIES_TALLY, OPEN_STEP, READY, ZERO_ROW
 from nonsmooth.kernels.series.polynomial import stack_size
@@ -154,7 +154,7 @@ def advance(jobs, rows, point, norms, plan, settings, place, counts, way, betwee
         periods, own[:, :N_PARAMETERS], periods[i : i + 1], LACKING, KINDS, norms[0], norms[1],
         settings[0], settings[1], ORDER, 1, CHECKED, CORNERS, N_GUARDS, N_INDICATORS, N_OUTPUTS,
     )  # fmt: skip
-    at = Section(plan[0], plan[1], plan[2], plan[3], plan[4], 1, settings[2] if plan[0] < 0 else -1.0, settings[3])
+    at = Section(settings[2] if plan[0] < 0 else -1.0, plan[0], plan[1], plan[2], plan[3], plan[4], settings[3], 1)
     returns = transient[min(j, transient.shape[0] - 1)], keep[min(j, keep.shape[0] - 1)]
     goal = Goal(RETURNS_OF_SECTION, returns[0], returns[1], 0.0, 0.0, norms[2], pause)
     motion = Motion(u[j], memory[j, :N_MEMORY], clock[j], counters[j])

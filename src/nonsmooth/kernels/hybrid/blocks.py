@@ -10,8 +10,6 @@ from nonsmooth.kernels.compile.cache import kernel
 from nonsmooth.kernels.compile.pointers import Block, stored
 from nonsmooth.kernels.hybrid.records import CALL, GROWTH, KEPT, LOG
 
-__all__ = ["call_at", "call_block", "growth_at", "growth_block", "kept_at", "kept_block", "log_at", "log_block"]
-
 _put_call, call_at = stored(CALL)
 _put_kept, kept_at = stored(KEPT)
 _put_log, log_at = stored(LOG)

@@ -1,10 +1,24 @@
-"""The kept section points of some runs: the record that kernels fill and Python reads."""
+"""A section, and the kept points of some runs there: records of the kernels and of Python alike."""
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
+
+
+class Section(NamedTuple):
+    """The section whose returns are counted, and how long one is waited for."""
+
+    phase: float = 0.0  # of the forcing, in periods
+    indicator: int = -1  # that is zero there; -1: a phase
+    rising: int = 1  # direction 1, -1, or 0 for both
+    mode: int = -1  # -1: any
+    after: int = 1  # 1: the state after a transition on the section, 0: before it
+    every: int = 1  # so many passes are one return
+    t_max: float = inf
+    extremes: int = 1  # wanted in the kept window; 0: an engine may leave them out
 
 
 class Kept(NamedTuple):

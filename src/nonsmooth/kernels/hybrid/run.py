@@ -12,6 +12,7 @@ from nonsmooth.kernels.compile.cache import kernel, once
 from nonsmooth.kernels.compile.pointers import stored
 from nonsmooth.kernels.hybrid.blocks import call_at, growth_at, kept_at, log_at
 from nonsmooth.kernels.hybrid.codes import LOG_FULL, NOT_GUARANTEED, OK, PAUSED
+from nonsmooth.kernels.hybrid.kept import Section
 from nonsmooth.kernels.hybrid.loop import leave, march
 from nonsmooth.kernels.hybrid.places import BEGUN, LOGGED, NO_END, RETURNS_OF_SECTION
 from nonsmooth.kernels.hybrid.record import last_samples
@@ -35,7 +36,6 @@ from nonsmooth.kernels.hybrid.records import (
     UNIT,
     UNTIL,
     Goal,
-    Section,
     Seen,
 )
 from nonsmooth.kernels.hybrid.sections import window_of
@@ -82,8 +82,8 @@ def run(system, call, kept, log, growth):
     orders, reals, limit, starts, motion = call_at(call)
     kind, code = orders[KIND], OK
     section = Section(
-        orders[INDICATOR], orders[RISING], orders[OF_MODE], orders[AFTER], orders[EVERY], orders[EXTREMES],
-        reals[PHASE], reals[T_MAX],
+        reals[PHASE], orders[INDICATOR], orders[RISING], orders[OF_MODE], orders[AFTER], orders[EVERY], reals[T_MAX],
+        orders[EXTREMES],
     )  # fmt: skip
     goal = Goal(kind, orders[TRANSIENT], orders[KEEP], reals[UNTIL], reals[UNIT], limit, orders[PATIENCE_LEFT])
     for i in range(orders[BEGIN], orders[END]):

@@ -19,8 +19,6 @@ from nonsmooth.kernels.series.polynomial import (
 from nonsmooth.kernels.series.step import METHOD
 from nonsmooth.kernels.series.taylor import dense_states
 
-__all__ = ["finish", "include", "log_touches", "widen"]
-
 
 @once
 def widen(a, b, form, tables, work, kept):
