@@ -115,15 +115,16 @@ class Mapper:
     def _bound(self, tables: Any, row: int) -> Any:
         """The record of the engine's march for the compiled loops (``kernels.judging.driver.Runs``)."""
         from nonsmooth.kernels.compile.cache import compiled
-        from nonsmooth.kernels.compile.pointers import addresses
-        from nonsmooth.kernels.hybrid.blocks import call_block, kept_block
+        from nonsmooth.kernels.compile.pointers import Block, addresses
+        from nonsmooth.kernels.hybrid import blocks, records
         from nonsmooth.kernels.judging.driver import Runs
 
         march, plan, (one, other) = self.march, self.settler.plan, self.states
         march.returns(0, 0, one, None, plan, 0, 0, self.kept)
         first, work = march.call.record, self._system(tables, row)[3]
         second = first._replace(motion=other.motion())
-        self.blocks = call_block(), kept_block(), kept_block()
+        kept = [Block(records.KEPT, blocks.put_kept) for _ in self.rooms]
+        self.blocks = Block(records.CALL, blocks.put_call), *kept
         found = [
             march.system.address, march.log.address, march.growth.address, march.kept.address, march.call.address,
             *(block.put(record) for block, record in zip(self.blocks, (second, *self.rooms), strict=True)),

@@ -18,10 +18,11 @@ from nonsmooth.attractors.mapper import Mapper
 from nonsmooth.attractors.settle import tolerance_of
 from nonsmooth.attractors.settle_cuda import separate_on_gpu, settle_on_gpu
 from nonsmooth.attractors.settled import LEAST, ROUNDED, Settled, least_sizes
-from nonsmooth.attractors.trace import Trace, mode_at, trace
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, Section
+from nonsmooth.attractors.trace import Trace, mode_at
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Section, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.phases import varying_phases
 
@@ -164,7 +165,20 @@ class Settler:
 
     def trace(self, point: FloatArray, place: FloatArray, mode: int, transient: int, keep: int) -> Trace:
         """Section points of one run at one parameter point (1, n_parameters), from a place on the section."""
-        return trace(self.system, self.engine, self.plan, point, place, mode, transient, keep, self.width)
+        system, tables, n = self.system, self.engine.prepare(point), len(self.system.states)
+        period, whole, strobed = float(tables.period[0]), n + len(system.traced.m), self.plan.indicator < 0
+        state = State(place[:n].copy(), place[n:whole].copy() if len(place) >= whole else system.memory_vector())
+        state.counters[0] = mode
+        if period < np.inf:
+            state.clock[2] = period
+            state.clock[0] = place[-1] if len(place) > whole else self.plan.phase * period if strobed else 0.0
+        begin, out = state.clock[0], self.engine.kept(1, keep)
+        self.engine.chain(tables, 0, 1, state, None, self.plan._replace(extremes=False), transient, keep, out)
+        if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
+            none = np.zeros(0)
+            return Trace(np.zeros((0, n)), np.zeros(0, dtype=np.int64), none, place, mode)
+        end = np.concatenate([state.u, state.memory, state.clock[:1]])[: self.width]
+        return Trace(out.section[0], out.section_mode[0], out.section_time[0] - begin, end, int(state.counters[0]))
 
     def exponents(
         self, points: FloatArray, rows: Any, starts: FloatArray, modes: Any, n_returns: int, maximum: FloatArray,

@@ -20,13 +20,13 @@ class March:
 
     def __init__(self, module: ModuleType, limit: FloatArray) -> None:
         from nonsmooth.kernels.compile.pointers import Block
-        from nonsmooth.kernels.hybrid.blocks import call_block, growth_block, kept_block, log_block
-        from nonsmooth.kernels.hybrid.records import N_ORDERS, N_REALS
+        from nonsmooth.kernels.hybrid import blocks, records
 
         self.module, self.limit = module, limit
         self.system = Block(module.SYSTEM, module.put_system)
-        self.call, self.kept, self.log, self.growth = call_block(), kept_block(), log_block(), growth_block()
-        self.orders, self.reals = np.zeros(N_ORDERS, dtype=np.int64), np.zeros(N_REALS)
+        self.call, self.kept = Block(records.CALL, blocks.put_call), Block(records.KEPT, blocks.put_kept)
+        self.log, self.growth = Block(records.LOG, blocks.put_log), Block(records.GROWTH, blocks.put_growth)
+        self.orders, self.reals = np.zeros(records.N_ORDERS, dtype=np.int64), np.zeros(records.N_REALS)
 
     def returns(
         self, first: int, last: int, state: State, starts: FloatArray | None, plan: Section, transient: int,
