@@ -150,10 +150,11 @@ class Engine(ABC):
         if carry:
             state.keep_phase(float(tables.period[first]), plan.phase if plan.indicator < 0 else -1.0)
             state.clock[2] = 0.0  # for the kernel: done, take the time as it stands
-        begun = None if starts is None else _with_memory(starts, state.memory)
+        if starts is not None:  # every start begins with the memory that is given
+            starts = np.ascontiguousarray(np.hstack([starts, np.tile(state.memory, (len(starts), 1))]), dtype=float)
         state.counters[1] = int(carry and state.settled)
         march = self.march()
-        march.returns(first, last, state, begun, plan, transient, keep, out)
+        march.returns(first, last, state, starts, plan, transient, keep, out)
         self._run(march, tables, plan.indicator)
         if carry:
             state.settled = True
@@ -215,11 +216,6 @@ class Engine(ABC):
             sample_u, sample_memory, sample_mode, sample_segment, times, transitions, before, after, memory,
             touch_times, indicators, touch_u, clearances, int(code),
         )  # fmt: skip
-
-
-def _with_memory(starts: FloatArray, memory: FloatArray) -> FloatArray:
-    """States and memory side by side: every start begins with the memory that is given."""
-    return np.ascontiguousarray(np.hstack([starts, np.tile(memory, (len(starts), 1))]), dtype=float)
 
 
 def end_if_not_wanted() -> None:
