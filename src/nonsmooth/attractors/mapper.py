@@ -74,13 +74,13 @@ class Mapper:
         """Return the results of the jobs."""
         return self.found.judged(self.jobs)
 
-    def separate(self, returns: int, batch: int, size: FloatArray, offsets: FloatArray, sums: FloatArray) -> IntArray:
+    def separate(self, returns: int, batch: int, sizes: FloatArray, offsets: FloatArray, sums: FloatArray) -> IntArray:
         """Take the growth of neighbours of the jobs into their sums (``kernels.judging.exponent``); their statuses."""
         from nonsmooth.kernels.judging.driver import separate_many
 
         status = np.zeros(len(self.rows), dtype=np.int64)
         self._run(
-            lambda runs: separate_many(self.starts, returns, batch, size, runs, self.at, offsets, sums, status),
+            lambda runs: separate_many(self.starts, returns, batch, sizes, runs, self.at, offsets, sums, status),
             len(status),
         )
         return status

@@ -221,7 +221,7 @@ def _into(chain: Kept, some: slice, kept: Kept, gpu: Any) -> None:
 
 def separate_on_gpu(
     settler: Settler, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, returns: int, batch: int,
-    size: FloatArray, offsets: FloatArray, sums: FloatArray,
+    sizes: FloatArray, offsets: FloatArray, sums: FloatArray,
 ) -> IntArray:  # fmt: skip
     """Growth of neighbours of jobs, taken into their sums (``kernels.judging.exponent``); their statuses."""
     plan, status = settler.plan, np.zeros(len(rows), dtype=np.int64)
@@ -230,22 +230,22 @@ def separate_on_gpu(
         gpu = _on_gpu(settler.engine, own, plan)
         states = _states_at(gpu, starts[some], settler.system.memory_vector(), own_rows, modes[some],
                             plan.phase if plan.indicator < 0 else 0.0)  # fmt: skip
-        on_gpu = [gpu.cuda.to_device(np.ascontiguousarray(part[some])) for part in (offsets, sums, status)]
-        separate(gpu, states, returns, batch, gpu.cuda.to_device(size), *on_gpu)
-        sums[some], status[some] = (part.copy_to_host() for part in on_gpu[1:])
+        on_gpu = [gpu.cuda.to_device(np.ascontiguousarray(part[some])) for part in (sizes, offsets, sums, status)]
+        separate(gpu, states, returns, batch, *on_gpu)
+        sums[some], status[some] = (part.copy_to_host() for part in on_gpu[2:])
     return status
 
 
 def _separate_in_threads(
-    gpu: PlanarOnGpu, states: States, returns: int, batch: int, size: Any, offsets: Any, sums: Any, status: Any
+    gpu: PlanarOnGpu, states: States, returns: int, batch: int, sizes: Any, offsets: Any, sums: Any, status: Any
 ) -> None:
     """Each thread follows its job and the neighbour over some returns."""
     jobs = np.arange(len(states.rows))
     for begin in range(0, returns, SLICE // 2):
         gpu.launch(
             gpu.module.neighbours, jobs, states.rows, gpu.tables, gpu.net, states.place(),
-            (begin, min(begin + SLICE // 2, returns), batch), size, (offsets, sums), gpu.plans[0], gpu.phase, gpu.limit,
-            status,
+            (begin, min(begin + SLICE // 2, returns), batch), sizes, (offsets, sums), gpu.plans[0], gpu.phase,
+            gpu.limit, status,
         )  # fmt: skip
         jobs = jobs[status.copy_to_host()[jobs] == codes.OK]
         if not len(jobs):
@@ -253,7 +253,7 @@ def _separate_in_threads(
 
 
 def _separate_in_rounds(
-    gpu: SeriesOnGpu, states: States, returns: int, batch: int, size: Any, offsets: Any, sums: Any, status: Any
+    gpu: SeriesOnGpu, states: States, returns: int, batch: int, sizes: Any, offsets: Any, sums: Any, status: Any
 ) -> None:
     """Both are run to their next return, one after the other."""
     jobs = every = np.arange(len(states.rows))
@@ -271,6 +271,6 @@ def _separate_in_rounds(
         if not len(jobs):
             break
         gpu.launch(
-            gpu.module.separated, jobs, n, batch, gpu.cuda.to_device(first), states.u, others.u, size, offsets, sums
+            gpu.module.separated, jobs, n, batch, gpu.cuda.to_device(first), states.u, others.u, sizes, offsets, sums
         )
     status.copy_to_device(np.where(np.isin(every, jobs), codes.OK, out.status.copy_to_host()))

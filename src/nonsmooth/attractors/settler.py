@@ -19,7 +19,7 @@ from nonsmooth.attractors.settle import tolerance_of
 from nonsmooth.attractors.settle_cuda import separate_on_gpu, settle_on_gpu
 from nonsmooth.attractors.settled import LEAST, ROUNDED, Settled, least_sizes
 from nonsmooth.attractors.trace import Trace, mode_at
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, Section, State
+from nonsmooth.flow.engines.engine import FloatArray, Section, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.kernels.hybrid import codes
@@ -189,35 +189,25 @@ class Settler:
         Two neighbours over ``n_returns`` returns, put back to a small distance after each, in units of the motion's
         size by its extremes (J, n); NaN where one failed.
         """
+        from nonsmooth.kernels.judging.exponent import BATCHES, DISTANCE, RATE_SUMS
+
         points = np.ascontiguousarray(points, dtype=float)
         rows = np.ascontiguousarray(rows, dtype=np.int64)
         starts = np.ascontiguousarray(starts, dtype=float)
         modes = np.array(modes, dtype=np.int64)
         sizes = separation_sizes(maximum, minimum, self.system.scale_vector())
-        largest, error = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
-        for size in np.unique(sizes, axis=0):
-            jobs = np.flatnonzero((sizes == size).all(axis=1))
-            largest[jobs], error[jobs] = self._parted(points, rows[jobs], starts[jobs], modes[jobs], n_returns, size)
-        return largest, error
-
-    def _parted(
-        self, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, n_returns: int, size: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Exponents of jobs whose motions are of one size."""
-        from nonsmooth.kernels.judging.exponent import BATCHES, DISTANCE, RATE_SUMS
-
         batch = n_returns // BATCHES
-        offsets, sums = np.tile(DISTANCE * size, (len(rows), 1)), np.zeros((len(rows), RATE_SUMS))
+        offsets, sums = DISTANCE * sizes, np.zeros((len(rows), RATE_SUMS))
         jobs = points, rows, starts, modes, batch // 4 + BATCHES * batch, batch
         if self.device == "cuda" and self.width == len(self.system.traced.u) + len(self.system.traced.m):
-            status = separate_on_gpu(self, *jobs, size, offsets, sums)
+            status = separate_on_gpu(self, *jobs, sizes, offsets, sums)
         else:
             plan = self.plan._replace(extremes=False, every=1)
             if plan.indicator >= 0 and self.system.traced.period is not None:
                 plan = Section(extremes=False)  # once per period, at the phase that a place has
             quiet = replace(self, plan=plan, keep=1, max_period=1)
             mapper = Mapper(quiet, self.engine.prepare(points), rows, starts, modes, self.section_phase)
-            status = mapper.separate(*jobs[4:], size, offsets, sums)
+            status = mapper.separate(*jobs[4:], sizes, offsets, sums)
         return rates(sums, status)
 
 

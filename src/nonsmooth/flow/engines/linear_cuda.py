@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Section
-from nonsmooth.flow.engines.launches import States, kept_on, launch
+from nonsmooth.flow.engines.launches import OnGpu, States
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.loop import DIVERGENCE
 from nonsmooth.kernels.hybrid import codes
@@ -18,7 +18,7 @@ __all__ = ["SLICE", "PlanarOnGpu"]
 SLICE = 256  # section returns of one launch, at most: below a second also on a small GPU
 
 
-class PlanarOnGpu:
+class PlanarOnGpu(OnGpu):
     """A planar engine's parameter points on the GPU, and the runs from there.
 
     Parameters
@@ -39,6 +39,7 @@ class PlanarOnGpu:
         tables = engine.prepare(points)
         n_modes, n_indicators, n_outputs, n_rows = tables.sizes
         self.sizes = max(n_indicators, 1), max(n_outputs, 1)
+        self.rows = 2 + sum(self.sizes)
         self.void = [] if n_indicators else [self.n]  # a row of no indicator: no array is empty there
         harmonics = len(tables.form.multiples)
         shape = harmonics, n_modes, *self.sizes, max(len(engine.net.transitions), 1), n_rows
@@ -54,14 +55,6 @@ class PlanarOnGpu:
         self.limit = cuda.to_device(DIVERGENCE * engine.scale)
         self.plans = [cuda.to_device(np.array([-1, 1, -1, 1, 1, extremes], dtype=np.int64)) for extremes in (0, 1)]
         self.periods = cuda.to_device(self.period)
-
-    def launch(self, entry: Any, jobs: IntArray, *arguments: Any) -> None:
-        """One thread for each job; waits for nothing."""
-        launch(entry, self.threads, self.cuda.to_device(jobs), *arguments)
-
-    def buffers(self, n: int, keep: int) -> Kept:
-        """Room for ``keep`` section points of each of n trajectories."""
-        return kept_on(self.cuda, n, keep, 2, 2 + sum(self.sizes))
 
     def extremes(self, found: FloatArray) -> FloatArray:
         """Extremes (N, rows) of states, indicators and outputs, from what stands in :class:`Kept`."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Section
-from nonsmooth.flow.engines.launches import States, kept_on, launch
+from nonsmooth.flow.engines.launches import OnGpu, States
 from nonsmooth.flow.engines.series import SeriesEngine
 from nonsmooth.flow.engines.series_tables import Tables
 from nonsmooth.kernels.hybrid import codes
@@ -43,7 +43,7 @@ def _filled(array: Any, shape: tuple[int, ...]) -> Any:
     return array if array.size else np.zeros(shape, dtype=array.dtype)
 
 
-class SeriesOnGpu:
+class SeriesOnGpu(OnGpu):
     """An engine's parameter points on the GPU, and the runs from there to a section.
 
     Parameters
@@ -74,14 +74,6 @@ class SeriesOnGpu:
             cuda.to_device(np.array([plan.indicator, plan.rising, plan.mode, plan.after, plan.every], dtype=np.int64)),
             cuda.to_device(np.array([engine.rtol, step, phase, min(plan.t_max, 1e300)])),
         )
-
-    def launch(self, entry: Any, jobs: IntArray, *arguments: Any) -> None:
-        """One thread for each job; waits for nothing."""
-        launch(entry, self.threads, self.cuda.to_device(jobs), *arguments)
-
-    def buffers(self, n: int, keep: int) -> Kept:
-        """Room for ``keep`` section points of each of n trajectories."""
-        return kept_on(self.cuda, n, max(keep, 1), self.n, self.rows)
 
     def extremes(self, found: FloatArray) -> FloatArray:
         """Extremes (N, rows) of states, indicators and outputs, from what stands in :class:`Kept`."""

@@ -32,7 +32,7 @@ def single():
 
 
 @entry
-def neighbours(jobs, rows, point, net, place, span, size, pair, plan, phase, limit, status):
+def neighbours(jobs, rows, point, net, place, span, sizes, pair, plan, phase, limit, status):
     """Returns begin <= n < end of each job and its neighbour (``span``: begin, end, batch): see ``exponent``."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
@@ -59,5 +59,5 @@ def neighbours(jobs, rows, point, net, place, span, size, pair, plan, phase, lim
                 break
         if code != OK:
             break
-        separate(n, batch, linear.period[0], motion.u, moved.u, size, offsets[j], sums[j])
+        separate(n, batch, linear.period[0], motion.u, moved.u, sizes[j], offsets[j], sums[j])
     status[j] = code

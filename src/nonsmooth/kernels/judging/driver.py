@@ -237,8 +237,8 @@ def settle_many(starts, phase, carried, extremes, rules, jobs, runs, at, work, r
     return OK
 
 
-@kernel(types.int64(STARTS, _i, _i, _f1, RUNS, _i1, _f2, _f2, _i1))
-def separate_many(starts, returns, batch, size, runs, at, offsets, sums, status):
+@kernel(types.int64(STARTS, _i, _i, _f2, RUNS, _i1, _f2, _f2, _i1))
+def separate_many(starts, returns, batch, sizes, runs, at, offsets, sums, status):
     """Growth of the distance of two neighbours over ``returns`` section returns, taken into sums[j], for each job.
 
     Job j begins at places[j] at phases[j] in the mode modes[j], its neighbour beside it by offsets[j]. Where the place
@@ -258,7 +258,7 @@ def separate_many(starts, returns, batch, size, runs, at, offsets, sums, status)
             at[CODE], stage = 0, OWN
         if stage == OWN and runs.tally[BEGUN] == 0:
             copy(runs)
-            for k in range(size.shape[0]):
+            for k in range(sizes.shape[1]):
                 beside.u[k] += offsets[j, k]
         at[STAGE] = stage
         code = go(i, stage >= OTHER, 0, 0, 0, 0, 1, 1 if stage == OWN and at[CODE] > 0 else 0, runs)
@@ -276,7 +276,7 @@ def separate_many(starts, returns, batch, size, runs, at, offsets, sums, status)
         if stage == OTHER and runs.kept.elapsed[0] < 0.5 * elapsed[0]:
             at[STAGE] = OTHER + 1
             continue
-        separate(at[CODE], batch, elapsed[0], motion.u, beside.u, size, offsets[j], sums[j])
+        separate(at[CODE], batch, elapsed[0], motion.u, beside.u, sizes[j], offsets[j], sums[j])
         at[CODE] += 1
         at[STAGE] = OWN
         if at[CODE] == returns:
