@@ -35,8 +35,8 @@ class Mapper:
     """
 
     def __init__(
-        self, settler: Settler, tables: Any, rows: IntArray, places: FloatArray, modes: IntArray, begin: float,
-        kept: Kept | None = None, into: IntArray | None = None,
+        self, settler: Settler, tables: Any, rows: IntArray, places: FloatArray, modes: IntArray | None = None,
+        begin: float = 0.0, kept: Kept | None = None, into: IntArray | None = None,
     ) -> None:  # fmt: skip
         from nonsmooth.kernels.judging.judge import ROUNDS
 
@@ -45,7 +45,8 @@ class Mapper:
         self.engine, self.tables, self.settler, self.memory, self.rows = engine, tables, settler, memory, rows
         self.kept = engine.kept(1, settler.keep) if kept is None else kept
         none = np.zeros(len(rows), dtype=np.int64)
-        self.starts = rows.copy(), places, np.full(len(rows), begin), modes.copy(), none if into is None else into
+        modes = none.copy() if modes is None else modes.copy()
+        self.starts = rows.copy(), places, np.full(len(rows), begin), modes, none if into is None else into
         self.rooms = engine.kept(1, passes), engine.kept(1, 1 if plan.indicator < 0 else ROUNDS * passes + 2)
         self.states = [State(np.zeros(len(engine.scale)), memory.copy()) for _ in range(2)]
         self.at = np.zeros(5, dtype=np.int64)

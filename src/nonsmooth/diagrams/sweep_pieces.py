@@ -37,9 +37,8 @@ class Slot:
     def march(self, tables: Any, order: Sequence[int], start: FloatArray, carried: bool, report: Report) -> None:
         """Run some parameter values from a start, the state carried from each to the next or not."""
         rows, n = np.array(order, dtype=np.int64), len(order)
-        mode = np.zeros(n, dtype=np.int64)
-        one = (self.kept, rows) if self.counter is None else ()
-        mapper = Mapper(self.settler, tables, rows, np.tile(start, (n, 1)), mode, 0.0, *one)
+        room: dict[str, Any] = {"kept": self.kept, "into": rows} if self.counter is None else {}
+        mapper = Mapper(self.settler, tables, rows, np.tile(start, (n, 1)), **room)
         run = mapper.settle(self.settler.rules(), 2 * carried, False)
         for j, i in enumerate(order):
             if report.stop.is_set():

@@ -78,34 +78,30 @@ class Motions:
             self.system, self.engine, self._plan(phase), transient, keep, longest_period(keep, max_period), False,
             rtol=options.get("rtol"),
         )  # fmt: skip
-        self.tables = self.engine.prepare(self.points)
 
     def _plan(self, phase: float) -> Section:
         return section_plan(self.system, Stroboscopic(phase))[1]
 
-    def _state(self, start: Any = None) -> State:
-        u = np.zeros(len(self.system.states)) if start is None else np.array(start, dtype=np.float64)
-        return State(u, self.system.memory_vector())
+    def _state(self, start: FloatArray) -> State:
+        return State(start.copy(), self.system.memory_vector())
 
     def _alone(self, i: int) -> Any:
         return self.engine.prepare(self.points[i : i + 1])
 
     def carried(self, order: Iterable[int]) -> tuple[FloatArray, NDArray[np.int64]]:
         """Section points and period numbers of all systems, the state carried from one to the next, from rest."""
-        rows = np.array([*order], dtype=np.int64)
-        kept, found = self._settled(rows, np.zeros((len(rows), len(self.system.states))), 2)
-        periods = np.zeros(len(self.periods), dtype=np.int64)
-        sections = np.full((len(self.periods), *kept.section.shape[1:]), np.nan)
+        rows, periods = np.array([*order], dtype=np.int64), np.zeros(len(self.periods), dtype=np.int64)
+        sections = self.engine.kept(len(periods), self.settler.keep).section
+        kept, found = self._settled(rows, np.zeros((len(rows), sections.shape[2])), 2)
         periods[rows], good = found.period_number, usable(found.status)
         sections[rows[good]] = kept.section[good]
         return sections[..., self.places], periods
 
     def _settled(self, rows: NDArray[np.int64], starts: FloatArray, carried: int) -> tuple[Kept, Settled]:
         """The kept returns of jobs, and what is known of them."""
-        n = len(rows)
-        kept, none = self.engine.kept(n, self.settler.keep), np.zeros(n, dtype=np.int64)
-        mapper = Mapper(self.settler, self.tables, rows, starts, none, 0.0, kept, np.arange(n))
-        mapper.settle(self.settler.rules(), carried, False)(n)
+        kept, into = self.engine.kept(len(rows), self.settler.keep), np.arange(len(rows))
+        mapper = Mapper(self.settler, self.engine.prepare(self.points), rows, starts, kept=kept, into=into)
+        mapper.settle(self.settler.rules(), carried, False)(len(rows))
         return kept, mapper.settled()
 
     def attractors(self, i: int, starts: Any) -> list[Attractor]:
