@@ -62,7 +62,7 @@ def function_at(function_type: Any) -> Any:
 def stored(kind: Any) -> tuple[Any, Any]:
     """Functions for use inside kernels that write a record of this type to an address, and read it there."""
     if _DISABLED:
-        return lambda address, record: address.append(record), lambda address: address[-1]
+        return lambda address, record: address.append(record), lambda address: address[-1] if address else None
 
     @intrinsic
     def put(typing_context: Any, address: Any, record: Any) -> Any:
