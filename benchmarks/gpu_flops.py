@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 import nonsmooth as ns
-from nonsmooth.flow.engines.engine import Chain
 from nonsmooth.flow.engines.methods import engine_for
 from work import TABLE_1
 
@@ -60,15 +59,14 @@ def operations(system: ns.System, returns: int) -> int:
     module = tables.module
     for plain in (math.cos, math.sin, math.fabs, math.sqrt):
         setattr(module, plain.__name__, lambda x, f=plain: Counted(f(x)))
-    sizes = len(system.states), len(system.indicators), tables.sizes[2]
-    out = Chain.empty(1, 1, *sizes)
+    out = engine.kept(1, 1)
     rows = engine.net[1].copy()
     Counted.done = 0
     module.chain(
         0, 1, 0, counted(np.zeros((1, 2))), *(counted(np.zeros(n)) for n in (2, 3)), [0, -1, 0, 0],
         *map(counted, tables.linear), *(counted(part) for part in (engine.net[0], rows, *engine.net[2:])),
         0.0, [-1, 1, -1, 1, 1, 0], 1e300, returns - 1, 1, counted(1e9 * engine.scale),
-        *(counted(part) if part.ndim else part for part in vars(out).values()),
+        *(counted(part) if part.ndim else part for part in out),
         *(counted(part) for part in module.scratch(*tables.sizes)),
     )  # fmt: skip
     return Counted.done

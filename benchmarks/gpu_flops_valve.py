@@ -14,7 +14,7 @@ import numpy as np
 
 import nonsmooth as ns
 from gpu_flops import Counted, counted
-from nonsmooth.flow.engines.engine import Chain, State
+from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.sections import section_plan
 from nonsmooth.kernels.series import crossing, places, polynomial, taylor, trust
@@ -61,7 +61,7 @@ def main() -> None:
         tables = engine.prepare(system.parameter_vector()[None, :])
         found, totals = counting(engine), []
         for returns in (TRANSIENT, TRANSIENT + RETURNS):
-            out, state = Chain.empty(1, 1, 3, 2, 0), State(np.array(START), np.zeros(0))
+            out, state = engine.kept(1, 1), State(np.array(START), np.zeros(0))
             Counted.done = 0
             engine.chain(tables, 0, 1, state, None, plan, returns - 1, 1, out)
             totals.append((Counted.done, int(found["work"].tally[places.STEPS])))

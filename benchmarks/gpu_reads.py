@@ -15,7 +15,6 @@ import numpy as np
 
 import nonsmooth as ns
 from gpu_flops import PLANES
-from nonsmooth.flow.engines.engine import Chain
 from nonsmooth.flow.engines.methods import engine_for
 from work import TABLE_1
 
@@ -52,13 +51,13 @@ def counts(system: ns.System, returns: int) -> Counter[str]:
     """Of one run from rest, its tables included."""
     engine: Any = engine_for(system)
     tables = engine.prepare(system.parameter_vector()[None, :])
-    out = Chain.empty(1, 1, len(system.states), len(system.indicators), tables.sizes[2])
+    out = engine.kept(1, 1)
     work = tables.module.scratch(*tables.sizes)
     scratch = [counting(part, "tables" if k < TABLES else "rest") for k, part in enumerate(work)]
     COUNT.clear()
     tables.module.chain(
         0, 1, 0, np.zeros((1, 2)), np.zeros(2), np.zeros(3), np.array([0, -1, 0, 0]), *tables.linear, *engine.net,
-        0.0, np.array([-1, 1, -1, 1, 1, 0]), 1e300, returns - 1, 1, 1e9 * engine.scale, *vars(out).values(), *scratch,
+        0.0, np.array([-1, 1, -1, 1, 1, 0]), 1e300, returns - 1, 1, 1e9 * engine.scale, *out, *scratch,
     )  # fmt: skip
     return Counter(COUNT)
 

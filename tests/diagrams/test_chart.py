@@ -1,4 +1,4 @@
-"""`chart` against closed forms, the logistic map, sweeps and the uncompiled path."""
+"""`chart` against closed forms, the logistic map and sweeps."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.attractors.mapper import Mapper
 from nonsmooth.attractors.settled import Settled
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.diagrams.chart import chart
@@ -101,8 +102,8 @@ def test_bits_do_not_depend_on_threads(support: ns.System) -> None:
         assert one.identical(two)
 
 
-def test_compiled_and_uncompiled_judgement_agree() -> None:
-    """Two loops around the same rules: every period, status and count equal, extremes to rounding."""
+def test_sizes_by_one_return_and_by_all_kept_ones_agree() -> None:
+    """As a chart asks and as a sweep does: every period, status and count equal, extremes to rounding."""
     system = ns.models.discontinuous_support(omega=11.15)
     rng = np.random.default_rng(11)
     n = 120
@@ -110,7 +111,9 @@ def test_compiled_and_uncompiled_judgement_agree() -> None:
     _, plan = section_plan(system, None)
     settler = Settler(system, engine_for(system), plan, 400, 60, 16, stop_early=False)
     fast = settler.run(points, np.arange(n), np.zeros((n, 2)))
-    slow = settler._run_one_by_one(points, np.arange(n), np.zeros((n, 2)), False, np.zeros(n, int), 0.0, 3)
+    mapper = Mapper(settler, settler.engine.prepare(points), np.arange(n), np.zeros((n, 2)), np.zeros(n, int), 0.0)
+    mapper.settle(settler.rules(), 0, True)(n)
+    slow = mapper.settled()
     assert len(set(fast.period_number)) > 4 and 0 in fast.period_number
     assert (fast.period_number == slow.period_number).all() and (fast.status == slow.status).all()
     periodic = fast.period_number > 0
@@ -149,7 +152,6 @@ def test_states_that_only_follow_add_their_own_multipliers() -> None:
         system = oscillator_at_a_wall(filtered=filtered)
         points, rows = system.parameter_points({"F": F, "w": w}), np.arange(len(F))
         settler = Settler(system, engine_for(system), section_plan(system, None)[1], 2000, 40, 16)
-        assert settler.compiled is not None  # in one compiled call
         runs = settler.run(points, rows, np.zeros((len(F), len(system.states))))
         found.append((runs, *settler.exponents(points, rows, runs.last, runs.mode, 240, runs.maximum, runs.minimum)))
     (two, largest, _), (three, other, _) = found

@@ -56,7 +56,7 @@ def test_edges_belong_to_bins_as_in_numpy_and_nothing_is_lost() -> None:
     edges = np.array([np.linspace(-0.3, 0.7, 11)])
     x = np.concatenate([rng.uniform(-0.5, 1.0, 500), edges[0], np.nextafter(edges[0], -1), [np.nan]])
     counter = Counter(1, edges)
-    counter.count(x.reshape(1, -1, 1), 0, 0)
+    counter.count(x.reshape(1, -1, 1), 0)
     np.testing.assert_array_equal(counter.counts[0, 0], np.histogram(x[:-1], edges[0])[0])
     assert counter.counts.sum() + counter.outside.sum() == len(x)
 

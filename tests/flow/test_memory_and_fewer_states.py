@@ -7,7 +7,7 @@ import pytest
 from random_systems import Template, draw, growing
 
 import nonsmooth as ns
-from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
+from nonsmooth.flow.engines.engine import Section, State
 from nonsmooth.flow.engines.linear import LinearEngine, PlanarEngine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.engines.series import SeriesEngine
@@ -57,8 +57,8 @@ def test_runs_and_sweeps_as_by_the_series_of_the_same_flow(template) -> None:
             state = State(start.copy(), system.memory_vector())
             logs.append(engine.record(tables, state, duration, samples))
             ends.append(np.concatenate([state.u, state.memory, state.clock[:1]]))
-            out = Chain.empty(1, 3, len(start), len(system.indicators), len(system.outputs))
-            engine.chain(tables, 0, 1, state, None, SectionPlan(), 2, 3, out)
+            out = engine.kept(1, 3)
+            engine.chain(tables, 0, 1, state, None, Section(), 2, 3, out)
             chains.append((out, np.concatenate([state.u, state.memory])))
         ours, theirs = logs
         assert ours.status == theirs.status == 0
@@ -70,8 +70,7 @@ def test_runs_and_sweeps_as_by_the_series_of_the_same_flow(template) -> None:
         (a, end), (b, their_end) = chains
         assert (a.status, a.crossings, a.contacts) == (b.status, b.crossings, b.contacts)
         np.testing.assert_allclose(end, their_end, rtol=0, atol=1e-10)
-        for name in ("section", "maximum", "minimum", "indicator_max", "indicator_min", "output_max", "output_min",
-                     "elapsed", "section_time", "section_mode"):  # fmt: skip
+        for name in ("section", "high", "low", "elapsed", "section_time", "section_mode"):
             np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=0, atol=1e-10, err_msg=name)
         seen += len(ours.crossing_time)
     assert seen > 20
@@ -134,11 +133,11 @@ def test_a_lacking_state_has_no_value_and_no_part_in_extremes() -> None:
     assert stuck.any() and np.isnan(run.u.sel(state="v").values[stuck]).all()
     assert np.isfinite(run.u.sel(state="v").values[~stuck]).all()
     state = State(np.array([0.0, 7.0]), np.zeros(0))  # a speed that the first mode does not have
-    out = Chain.empty(1, 3, 2, 2, 0)
-    engine.chain(engine.prepare(belt.parameter_vector()[None, :]), 0, 1, state, None, SectionPlan(), 0, 3, out)
+    out = engine.kept(1, 3)
+    engine.chain(engine.prepare(belt.parameter_vector()[None, :]), 0, 1, state, None, Section(), 0, 3, out)
     speed = np.hypot(0.5, 0.2)  # of the arc about the spring's equilibrium
-    np.testing.assert_allclose([out.minimum[0, 1], out.maximum[0, 1]], [-speed, 0.2], rtol=0, atol=1e-13)
-    np.testing.assert_allclose(out.indicator_max[0, 1], 7.0 - 0.2, rtol=0, atol=1e-13)
+    np.testing.assert_allclose([out.low[0, 1], out.high[0, 1]], [-speed, 0.2], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(out.high[0, 2 + 1], 7.0 - 0.2, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize(("length", "rate"), [(1.0, 2 * np.pi), (1e-3, 200.0)])

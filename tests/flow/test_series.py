@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engines.engine import Chain, Log, SectionPlan, State
+from nonsmooth.flow.engines.engine import Kept, Log, Section, State
 from nonsmooth.flow.engines.series import SeriesEngine, order_for
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.mode import Mode
@@ -32,13 +32,12 @@ def record(
 
 
 def chain(
-    system: System, start: list[float], plan: SectionPlan, keep: int, transient: int = 0, method: str = "taylor",
+    system: System, start: list[float], plan: Section, keep: int, transient: int = 0, method: str = "taylor",
     **options: Any,
-) -> Chain:  # fmt: skip
+) -> Kept:  # fmt: skip
     e = engine(system, method, **options)
-    traced = system.traced
-    out = Chain.empty(1, keep, len(traced.u), len(traced.indicators), len(traced.outputs))
-    state = State(np.zeros(len(traced.u)), system.memory_vector())
+    out = e.kept(1, keep)
+    state = State(np.zeros(len(system.states)), system.memory_vector())
     tables = e.prepare(system.parameter_vector()[None])
     e.chain(tables, 0, 1, state, np.array([start], dtype=float), plan, transient, keep, out)
     return out
@@ -240,15 +239,15 @@ def test_dense_samples_lie_on_the_solution(method: str) -> None:
 @pytest.mark.parametrize("phase", [0.0, 0.25, 0.9])
 def test_stroboscopic_section_at_any_phase(method: str, phase: float) -> None:
     omega = 2.0
-    out = chain(forced(omega), [0.3], SectionPlan(phase=phase), keep=3, transient=2, method=method)
+    out = chain(forced(omega), [0.3], Section(phase=phase), keep=3, transient=2, method=method)
     first = 2 if phase == 0.0 else 1
     period = 2 * np.pi / omega
     times = (np.arange(first + 1, first + 4) + phase) * period
     np.testing.assert_allclose(out.section_time[0], times, rtol=1e-14)
     np.testing.assert_allclose(out.section[0, :, 0], 0.3 + np.sin(omega * times) / omega, atol=3e-12)
-    np.testing.assert_allclose(out.maximum[0], 0.3 + 1 / omega, rtol=1e-11)  # true extremes, between the samples
-    np.testing.assert_allclose(out.minimum[0], 0.3 - 1 / omega, rtol=1e-11)
-    np.testing.assert_allclose(out.indicator_max[0], 0.2 + 1 / omega, rtol=1e-11)
+    np.testing.assert_allclose(out.high[0, :1], 0.3 + 1 / omega, rtol=1e-11)  # true extremes, between the samples
+    np.testing.assert_allclose(out.low[0, :1], 0.3 - 1 / omega, rtol=1e-11)
+    np.testing.assert_allclose(out.high[0, 1:], 0.2 + 1 / omega, rtol=1e-11)
     np.testing.assert_allclose(out.elapsed, 3 * period, rtol=1e-14)
 
 
@@ -256,8 +255,8 @@ def test_stroboscopic_section_at_any_phase(method: str, phase: float) -> None:
 @pytest.mark.parametrize("phase", [0.0, 0.3])
 def test_returns_of_the_transient_are_counted_like_those_kept(method: str, phase: float) -> None:
     """In the transient no step ends at the section; the returns that follow are the same."""
-    whole = chain(forced(), [0.3], SectionPlan(phase=phase), keep=9, method=method)
-    last = chain(forced(), [0.3], SectionPlan(phase=phase), keep=2, transient=7, method=method)
+    whole = chain(forced(), [0.3], Section(phase=phase), keep=9, method=method)
+    last = chain(forced(), [0.3], Section(phase=phase), keep=2, transient=7, method=method)
     np.testing.assert_allclose(last.section_time[0], whole.section_time[0, 7:], rtol=1e-14)
     np.testing.assert_allclose(last.section[0], whole.section[0, 7:], atol=1e-11)
 
@@ -268,14 +267,14 @@ def test_returns_of_the_transient_are_counted_like_those_kept(method: str, phase
 )
 def test_poincare_section_of_a_rotation(method: str, rising: int, every: int, times: list[int]) -> None:
     """y = sin t vanishes at k pi; the start on the section is no return."""
-    plan = SectionPlan(indicator=1, rising=rising, every=every, t_max=100.0)
+    plan = Section(indicator=1, rising=rising, every=every, t_max=100.0)
     out = chain(rotor(), [1.0, 0.0], plan, keep=3, method=method)
     assert out.status[0] == codes.OK
     np.testing.assert_allclose(out.section_time[0], np.pi * np.array(times), rtol=1e-12)
     np.testing.assert_allclose(out.section[0, :, 1], 0.0, atol=1e-11)
-    np.testing.assert_allclose(out.maximum[0], 1.0, rtol=1e-11)
-    np.testing.assert_allclose(out.indicator_min[0], -1.0, rtol=1e-11)
-    np.testing.assert_allclose(out.output_max[0], [1.0, 1.0], rtol=1e-3)  # one of them has a corner and is sampled
+    np.testing.assert_allclose(out.high[0, :2], 1.0, rtol=1e-11)
+    np.testing.assert_allclose(out.low[0, 2:4], -1.0, rtol=1e-11)
+    np.testing.assert_allclose(out.high[0, 4:], [1.0, 1.0], rtol=1e-3)  # one of them has a corner and is sampled
 
 
 def test_a_section_may_be_bound_to_a_mode() -> None:
@@ -286,7 +285,7 @@ def test_a_section_may_be_bound_to_a_mode() -> None:
         indicators={"up": lambda t, u, p: u.y, "clock": lambda t, u, p: u.s - p.g},
         transitions=[Transition("a", "b", when="clock > 0")],
     )  # fmt: skip
-    plan = SectionPlan(indicator=0, rising=0, mode=1)
+    plan = Section(indicator=0, rising=0, mode=1)
     out = chain(system, [1.0, 0.0, 0.0], plan, keep=2)
     np.testing.assert_allclose(out.section_time[0], [2 * np.pi, 3 * np.pi], rtol=1e-12)
     np.testing.assert_array_equal(out.section_mode, [[1, 1]])
@@ -296,7 +295,7 @@ def test_a_section_may_be_bound_to_a_mode() -> None:
 @pytest.mark.parametrize("rising", [1, -1, 0])
 def test_a_section_on_the_impact_surface_has_two_sides(after: int, sign: int, rising: int) -> None:
     """An elastic ball (e = 1): y arrives falling and leaves rising; one return per impact, before or after it."""
-    out = chain(ball(1.0), [0.5, 0.0], SectionPlan(indicator=0, rising=rising, after=after, t_max=10.0), keep=3)
+    out = chain(ball(1.0), [0.5, 0.0], Section(indicator=0, rising=rising, after=after, t_max=10.0), keep=3)
     np.testing.assert_allclose(out.section_time[0], [1.0, 3.0, 5.0], rtol=1e-13)
     np.testing.assert_allclose(out.section[0, :, 1], sign, rtol=1e-13)
     assert out.crossings[0] == 3
@@ -304,11 +303,11 @@ def test_a_section_on_the_impact_surface_has_two_sides(after: int, sign: int, ri
 
 def test_maxima_of_the_flight_are_sections_and_extremes_hold_both_sides_of_a_jump() -> None:
     """Kept from the first maximum (t = 1) to the second one of height e^2 / 2."""
-    out = chain(ball(0.5), [0.0, 1.0], SectionPlan(indicator=1, rising=-1, t_max=10.0), keep=1, transient=1)
+    out = chain(ball(0.5), [0.0, 1.0], Section(indicator=1, rising=-1, t_max=10.0), keep=1, transient=1)
     np.testing.assert_allclose(out.section_time[0], [2.0 + 0.5], rtol=1e-13)
     np.testing.assert_allclose(out.section[0, 0], [0.125, 0.0], atol=1e-13)
-    np.testing.assert_allclose(out.maximum[0], [0.5, 0.5], rtol=1e-13)
-    np.testing.assert_allclose(out.minimum[0], [0.0, -1.0], atol=1e-13)
+    np.testing.assert_allclose(out.high[0, :2], [0.5, 0.5], rtol=1e-13)
+    np.testing.assert_allclose(out.low[0, :2], [0.0, -1.0], atol=1e-13)
     assert (out.crossings[0], out.contacts[0]) == (1, 1)
 
 
@@ -317,7 +316,7 @@ def test_no_return_is_said_so() -> None:
         states=("x",), parameters={"a": 1.0}, modes={"only": lambda t, u, p: (-p.a * u.x,)},
         indicators={"h": lambda t, u, p: u.x},
     )  # fmt: skip
-    assert chain(system, [1.0], SectionPlan(indicator=0, t_max=20.0), keep=1).status[0] == codes.NO_CONVERGENCE
+    assert chain(system, [1.0], Section(indicator=0, t_max=20.0), keep=1).status[0] == codes.NO_CONVERGENCE
 
 
 @pytest.mark.parametrize("method", ["taylor", "rkf45"])
@@ -334,8 +333,8 @@ def test_a_failed_point_does_not_spoil_the_next_one() -> None:
     )  # fmt: skip
     e = engine(system)
     tables = e.prepare(np.array([[1.0], [-3.0], [1.0]]))
-    out = Chain.empty(3, 2, 1, 0, 0)
-    e.chain(tables, 0, 3, State(np.zeros(1), np.zeros(0)), None, SectionPlan(), 20, 2, out)
+    out = e.kept(3, 2)
+    e.chain(tables, 0, 3, State(np.zeros(1), np.zeros(0)), None, Section(), 20, 2, out)
     np.testing.assert_array_equal(out.status, [codes.OK, codes.DIVERGED, codes.OK])
     np.testing.assert_allclose(out.section[[0, 2], :, 0], 0.5, rtol=1e-12)  # (cos t + sin t) / 2 at t = 0
 
@@ -344,14 +343,14 @@ def test_points_do_not_depend_on_how_they_are_chunked() -> None:
     system = forced()
     e, points = engine(system), np.linspace(1.0, 3.0, 6)[:, None]
     starts = np.full((6, 1), 0.2)
-    whole, parts = Chain.empty(6, 2, 1, 1, 0), Chain.empty(6, 2, 1, 1, 0)
-    e.chain(e.prepare(points), 0, 6, State(np.zeros(1), np.zeros(0)), starts, SectionPlan(), 3, 2, whole)
+    whole, parts = e.kept(6, 2), e.kept(6, 2)
+    e.chain(e.prepare(points), 0, 6, State(np.zeros(1), np.zeros(0)), starts, Section(), 3, 2, whole)
     for first in range(0, 6, 2):
         e.chain(
-            e.prepare(points), first, first + 2, State(np.zeros(1), np.zeros(0)), starts, SectionPlan(), 3, 2, parts
+            e.prepare(points), first, first + 2, State(np.zeros(1), np.zeros(0)), starts, Section(), 3, 2, parts
         )
     np.testing.assert_array_equal(whole.section, parts.section)
-    np.testing.assert_array_equal(whole.maximum, parts.maximum)
+    np.testing.assert_array_equal(whole.high, parts.high)
 
 
 # --- linear modes by series

@@ -23,7 +23,7 @@ TEXTS = {
     "cuda series": cuda_series_module.PARTS,
 }
 MARKERS = {"device", "inline", "kernel", "callback", "once"}  # another compiler's on a GPU
-ON_PURPOSE = MARKERS | {"build", "may_pause", "__all__"}  # replaced on a GPU
+ON_PURPOSE = MARKERS | {"build", "may_pause"}  # replaced on a GPU
 SWAPPED = {"linear.stepper", "linear.extremes", "linear.touches", "series.generated"}  # for the stepper that is joined
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
+from nonsmooth.flow.engines.engine import Section, State
 from nonsmooth.flow.engines.methods import engine_for
 
 
@@ -42,8 +42,8 @@ def test_points_of_one_call_have_their_own_phases():
     system = heater()
     engine = engine_for(system)
     tables = engine.prepare(system.parameter_points({"duty": DUTIES}))
-    out, state = Chain.empty(len(DUTIES), 1, 1, 0, 0), State(np.zeros(1), np.zeros(0))
-    engine.chain(tables, 0, len(DUTIES), state, np.zeros((len(DUTIES), 1)), SectionPlan(), 40, 1, out)
+    out, state = engine.kept(len(DUTIES), 1), State(np.zeros(1), np.zeros(0))
+    engine.chain(tables, 0, len(DUTIES), state, np.zeros((len(DUTIES), 1)), Section(), 40, 1, out)
     assert out.section.ravel() == pytest.approx([steady(duty) for duty in DUTIES], rel=1e-12)
 
 

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.attractors.settle import Attractors
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.flow.engines.devices import batch_size
-from nonsmooth.flow.engines.engine import Chain, Engine, FloatArray, IntArray, SectionPlan
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Section
 from nonsmooth.flow.engines.launches import States, batches
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.linear_cuda import SLICE, PlanarOnGpu
+from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.series import SeriesEngine
 from nonsmooth.flow.engines.series_cuda import PART, SeriesOnGpu
 from nonsmooth.kernels.hybrid import codes
@@ -77,7 +77,7 @@ class Rounds:
             last = self.single or self.kept
             self.gpu.launch(
                 self.gpu.module.decide, under_way, self.given, tuple(self.jobs), self.kept.status, last.status,
-                self.kept.section, last.maximum, last.minimum, self.mu, self.states.u,
+                self.kept.section, last.high, last.low, self.mu, self.states.u,
             )  # fmt: skip
 
     def _run(self, jobs: IntArray) -> None:
@@ -147,12 +147,12 @@ class Rounds:
                 jobs.status[other] = np.where(code[other] == codes.OK, jobs.status[other], code[other])
                 other &= code == codes.OK
             for out, which in ((self.cycle, good & cyclic), (self.kept, other)):
-                for name, to in (("maximum", found.maximum), ("minimum", found.minimum)):
+                for name, to in (("high", found.maximum), ("low", found.minimum)):
                     to[which] = getattr(out, name).copy_to_host()[which, : gpu.n]
         return found.judged(jobs)
 
 
-def _on_gpu(engine: Engine, points: FloatArray, plan: SectionPlan) -> Any:
+def _on_gpu(engine: Engine, points: FloatArray, plan: Section) -> Any:
     """Parameter points of an engine on the GPU."""
     if isinstance(engine, PlanarEngine):
         return PlanarOnGpu(engine, points, plan)
@@ -195,15 +195,14 @@ def settle_on_gpu(
 
 
 def sweep_on_gpu(
-    points: FloatArray, start: FloatArray, memory: FloatArray, rules: Attractors, chain: Chain,
-    advance: Callable[[int], Any],
+    settler: Settler, points: FloatArray, start: FloatArray, chain: Kept, advance: Callable[[int], Any],
 ) -> Settled:  # fmt: skip
-    """Every parameter point from one start: the rules of ``attractors.settle``, whose buffers ``chain`` is filled."""
+    """Settle every parameter point from one start; the kept returns go into ``chain``."""
     parts = []
-    for some, own, rows in batches(points, np.arange(len(points)), _batch(rules.engine)):
-        gpu = _on_gpu(rules.engine, own, rules.plan)
-        states = _states_at(gpu, np.tile(start, (len(rows), 1)), memory, rows, 0, 0.0)
-        rounds = Rounds(gpu, states, rules.rules, extremes=False)
+    for some, own, rows in batches(points, np.arange(len(points)), _batch(settler.engine)):
+        gpu = _on_gpu(settler.engine, own, settler.plan)
+        states = _states_at(gpu, np.tile(start, (len(rows), 1)), settler.system.memory_vector(), rows, 0, 0.0)
+        rounds = Rounds(gpu, states, settler.rules(), extremes=False)
         rounds.run()
         _into(chain, some, rounds.kept, gpu)
         parts.append(rounds.found(len(start)))
@@ -211,22 +210,18 @@ def sweep_on_gpu(
     return Settled.joined(parts)
 
 
-def _into(chain: Chain, some: slice, kept: Any, gpu: Any) -> None:
+def _into(chain: Kept, some: slice, kept: Kept, gpu: Any) -> None:
     """The kept windows of a batch."""
-    n, n_i = gpu.n, chain.indicator_max.shape[1]
-    chain.section[some] = kept.section.copy_to_host()[:, :, :n]
-    for found, names in zip(
-        gpu.extremes(kept),
-        (("maximum", "indicator_max", "output_max"), ("minimum", "indicator_min", "output_min")), strict=True,
-    ):  # fmt: skip
-        for name, part in zip(names, (slice(0, n), slice(n, n + n_i), slice(n + n_i, None)), strict=True):
-            getattr(chain, name)[some] = found[:, part][:, : getattr(chain, name).shape[1]]
-    chain.crossings[some], chain.contacts[some] = kept.crossings.copy_to_host(), kept.contacts.copy_to_host()
+    for name in ("section", "crossings", "contacts"):
+        getattr(chain, name)[some] = getattr(kept, name).copy_to_host()
+    for to, part in ((chain.high, kept.high), (chain.low, kept.low)):
+        found = gpu.extremes(part.copy_to_host())
+        to[some, : found.shape[1]] = found[:, : to.shape[1]]
 
 
 def separate_on_gpu(
     settler: Settler, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, returns: int, batch: int,
-    size: FloatArray, offsets: FloatArray, sums: FloatArray,
+    sizes: FloatArray, offsets: FloatArray, sums: FloatArray,
 ) -> IntArray:  # fmt: skip
     """Growth of neighbours of jobs, taken into their sums (``kernels.judging.exponent``); their statuses."""
     plan, status = settler.plan, np.zeros(len(rows), dtype=np.int64)
@@ -235,22 +230,22 @@ def separate_on_gpu(
         gpu = _on_gpu(settler.engine, own, plan)
         states = _states_at(gpu, starts[some], settler.system.memory_vector(), own_rows, modes[some],
                             plan.phase if plan.indicator < 0 else 0.0)  # fmt: skip
-        on_gpu = [gpu.cuda.to_device(np.ascontiguousarray(part[some])) for part in (offsets, sums, status)]
-        separate(gpu, states, returns, batch, gpu.cuda.to_device(size), *on_gpu)
-        sums[some], status[some] = (part.copy_to_host() for part in on_gpu[1:])
+        on_gpu = [gpu.cuda.to_device(np.ascontiguousarray(part[some])) for part in (sizes, offsets, sums, status)]
+        separate(gpu, states, returns, batch, *on_gpu)
+        sums[some], status[some] = (part.copy_to_host() for part in on_gpu[2:])
     return status
 
 
 def _separate_in_threads(
-    gpu: PlanarOnGpu, states: States, returns: int, batch: int, size: Any, offsets: Any, sums: Any, status: Any
+    gpu: PlanarOnGpu, states: States, returns: int, batch: int, sizes: Any, offsets: Any, sums: Any, status: Any
 ) -> None:
     """Each thread follows its job and the neighbour over some returns."""
     jobs = np.arange(len(states.rows))
     for begin in range(0, returns, SLICE // 2):
         gpu.launch(
             gpu.module.neighbours, jobs, states.rows, gpu.tables, gpu.net, states.place(),
-            (begin, min(begin + SLICE // 2, returns), batch), size, (offsets, sums), gpu.plans[0], gpu.phase, gpu.limit,
-            status,
+            (begin, min(begin + SLICE // 2, returns), batch), sizes, (offsets, sums), gpu.plans[0], gpu.phase,
+            gpu.limit, status,
         )  # fmt: skip
         jobs = jobs[status.copy_to_host()[jobs] == codes.OK]
         if not len(jobs):
@@ -258,7 +253,7 @@ def _separate_in_threads(
 
 
 def _separate_in_rounds(
-    gpu: SeriesOnGpu, states: States, returns: int, batch: int, size: Any, offsets: Any, sums: Any, status: Any
+    gpu: SeriesOnGpu, states: States, returns: int, batch: int, sizes: Any, offsets: Any, sums: Any, status: Any
 ) -> None:
     """Both are run to their next return, one after the other."""
     jobs = every = np.arange(len(states.rows))
@@ -276,6 +271,6 @@ def _separate_in_rounds(
         if not len(jobs):
             break
         gpu.launch(
-            gpu.module.separated, jobs, n, batch, gpu.cuda.to_device(first), states.u, others.u, size, offsets, sums
+            gpu.module.separated, jobs, n, batch, gpu.cuda.to_device(first), states.u, others.u, sizes, offsets, sums
         )
     status.copy_to_device(np.where(np.isin(every, jobs), codes.OK, out.status.copy_to_host()))

@@ -1,30 +1,28 @@
 """Many starts brought to their attractors and judged: the work behind charts and basins.
 
-A *job* is a start at one parameter point. Linear systems with the exact flow and a stroboscopic section run their jobs
-in one compiled call (``compiled``); all others go through ``attractors.settle`` one by one. What is done is
-decided in one place (``kernels.settle``): a period number is granted with a certificate only.
+A *job* is a start at one parameter point. All jobs of a call run in one compiled loop (``mapper``), on a GPU in rounds.
+What is done is decided in one place (``kernels.judging.settle``): a period number is granted with a certificate only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.attractors.compiled import exponents_compiled, load, run_compiled
-from nonsmooth.attractors.exponents import rates, separate_one_by_one, separation_sizes
-from nonsmooth.attractors.settle import ATTEMPTS, Attractors, rules_of, tolerance_of
+from nonsmooth.attractors.exponents import rates, separation_sizes
+from nonsmooth.attractors.mapper import Mapper
+from nonsmooth.attractors.settle import tolerance_of
 from nonsmooth.attractors.settle_cuda import separate_on_gpu, settle_on_gpu
-from nonsmooth.attractors.settled import Settled, least_sizes, usable
-from nonsmooth.attractors.trace import Trace, mode_at, period_of, place_of, state_at, trace
-from nonsmooth.flow.engines.engine import Chain, Engine, FloatArray, IntArray, SectionPlan, State
-from nonsmooth.flow.engines.linear import LinearEngine
-from nonsmooth.flow.engines.loop import LoopEngine
+from nonsmooth.attractors.settled import LEAST, ROUNDED, Settled, least_sizes
+from nonsmooth.attractors.trace import Trace, mode_at
+from nonsmooth.flow.engines.engine import FloatArray, Section, State
+from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
-from nonsmooth.flow.engines.series import SeriesEngine
+from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.phases import varying_phases
 
@@ -32,8 +30,10 @@ if TYPE_CHECKING:
     from nonsmooth.kernels.judging.settle import Rules
     from nonsmooth.system.system import System
 
-__all__ = ["FIRST_LOOK", "Settler"]
+__all__ = ["ATTEMPTS", "FIRST_LOOK", "Settler"]
 
+ATTEMPTS = 3  # further transients for a point that is still settling: of 1, 2 and 4 times the first
+DIFFERENCE = 1e-6  # finite differences of the return map, in units of the motion's size
 FIRST_LOOK = 40  # returns after which a point is judged for the first time, where it may stop early
 
 
@@ -53,7 +53,7 @@ class Settler:
 
     system: System
     engine: Engine
-    plan: SectionPlan
+    plan: Section
     transient: int
     keep: int
     max_period: int
@@ -79,19 +79,14 @@ class Settler:
         text, values = options["system"].to_text(), dict(options["system"].values)
         return _remade, (text, values, options["engine"].name, given)
 
-    @property
-    def compiled(self) -> LoopEngine | None:
-        """The engine whose jobs run in one compiled call; None where they run one by one: modes that are made on the
-        way, what elements decide together, phases that depend on the parameters, sections on a surface."""
-        engine = self.engine
-        if not isinstance(engine, LinearEngine | SeriesEngine) or engine.traced.decider is not None:
-            return None
-        return engine if engine.phases is None and self.plan.indicator < 0 else None
-
     def load(self) -> None:
-        """Compile or load the kernel now, before threads ask for it."""
-        if self.compiled is not None and self.device == "cpu":
-            load(self.compiled)
+        """Compile or load the kernels now, before threads ask for them."""
+        from nonsmooth.kernels.compile.cache import compiled
+        from nonsmooth.kernels.judging import driver
+
+        if self.device == "cpu":
+            for kernel in (self.engine.module().run, driver.settle_many, driver.separate_many):
+                compiled(kernel)
 
     def run(
         self,
@@ -133,18 +128,24 @@ class Settler:
         if self.device == "cuda":
             assert not carried  # refused at the door
             return settle_on_gpu(self, points, rows, starts, modes, begin, attempts)
-        if self.compiled is None:
-            return self._run_one_by_one(points, rows, starts, carried, modes, begin, attempts)
-        return run_compiled(
-            self.compiled, points, rows, starts, self.system.memory_vector(), modes, begin, self.plan.phase, carried,
-            self.extremes, self.rules(attempts, beyond=1),
-        )  # fmt: skip
+        # true extremes are dear: where returns are one period each, one more gives the motion's size
+        beyond = int(self.plan.indicator < 0 and not self.engine.own_systems)
+        plan = self.plan._replace(extremes=not beyond)
+        mapper = Mapper(replace(self, plan=plan), self.engine.prepare(points), rows, starts, modes, begin)
+        mapper.settle(self.rules(attempts, beyond), int(carried), self.extremes or not beyond)(len(rows))
+        return mapper.settled()
 
     def rules(self, attempts: int = ATTEMPTS, beyond: int = 0) -> Rules:
         """The rules of judgement; ``beyond`` as in :class:`nonsmooth.kernels.judging.settle.Rules`."""
-        return rules_of(
-            self.engine.name, self.transient, self.keep, self.max_period, self.tolerance, self.system.scale_vector(),
-            FIRST_LOOK if self.stop_early else 0, attempts, beyond,
+        from nonsmooth.kernels.judging.settle import Rules
+
+        # at rest a Runge-Kutta pair errs by atol: a difference must stand well above that
+        clear = min(1e3 * self.tolerance, 1e-4) if self.engine.name == "rkf45" else DIFFERENCE
+        scale = self.system.scale_vector()
+        least, rounded = least_sizes(self.engine.name, scale)
+        return Rules(
+            self.transient, self.keep, self.max_period, FIRST_LOOK if self.stop_early else 0, attempts, beyond,
+            self.tolerance, max(DIFFERENCE, 1e2 * self.tolerance, clear), least, rounded, LEAST * scale, ROUNDED,
         )  # fmt: skip
 
     @property
@@ -164,7 +165,20 @@ class Settler:
 
     def trace(self, point: FloatArray, place: FloatArray, mode: int, transient: int, keep: int) -> Trace:
         """Section points of one run at one parameter point (1, n_parameters), from a place on the section."""
-        return trace(self.system, self.engine, self.plan, point, place, mode, transient, keep, self.width)
+        system, tables, n = self.system, self.engine.prepare(point), len(self.system.states)
+        period, whole, strobed = float(tables.period[0]), n + len(system.traced.m), self.plan.indicator < 0
+        state = State(place[:n].copy(), place[n:whole].copy() if len(place) >= whole else system.memory_vector())
+        state.counters[0] = mode
+        if period < np.inf:
+            state.clock[2] = period
+            state.clock[0] = place[-1] if len(place) > whole else self.plan.phase * period if strobed else 0.0
+        begin, out = state.clock[0], self.engine.kept(1, keep)
+        self.engine.chain(tables, 0, 1, state, None, self.plan._replace(extremes=False), transient, keep, out)
+        if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
+            none = np.zeros(0)
+            return Trace(np.zeros((0, n)), np.zeros(0, dtype=np.int64), none, place, mode)
+        end = np.concatenate([state.u, state.memory, state.clock[:1]])[: self.width]
+        return Trace(out.section[0], out.section_mode[0], out.section_time[0] - begin, end, int(state.counters[0]))
 
     def exponents(
         self, points: FloatArray, rows: Any, starts: FloatArray, modes: Any, n_returns: int, maximum: FloatArray,
@@ -175,73 +189,26 @@ class Settler:
         Two neighbours over ``n_returns`` returns, put back to a small distance after each, in units of the motion's
         size by its extremes (J, n); NaN where one failed.
         """
+        from nonsmooth.kernels.judging.exponent import BATCHES, DISTANCE, RATE_SUMS
+
         points = np.ascontiguousarray(points, dtype=float)
         rows = np.ascontiguousarray(rows, dtype=np.int64)
         starts = np.ascontiguousarray(starts, dtype=float)
         modes = np.array(modes, dtype=np.int64)
         sizes = separation_sizes(maximum, minimum, self.system.scale_vector())
-        largest, error = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
-        for size in np.unique(sizes, axis=0):
-            jobs = np.flatnonzero((sizes == size).all(axis=1))
-            largest[jobs], error[jobs] = self._parted(points, rows[jobs], starts[jobs], modes[jobs], n_returns, size)
-        return largest, error
-
-    def _parted(
-        self, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, n_returns: int, size: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Exponents of jobs whose motions are of one size."""
-        from nonsmooth.kernels.judging.exponent import BATCHES, DISTANCE, RATE_SUMS
-
         batch = n_returns // BATCHES
-        offsets, sums = np.tile(DISTANCE * size, (len(rows), 1)), np.zeros((len(rows), RATE_SUMS))
+        offsets, sums = DISTANCE * sizes, np.zeros((len(rows), RATE_SUMS))
         jobs = points, rows, starts, modes, batch // 4 + BATCHES * batch, batch
         if self.device == "cuda" and self.width == len(self.system.traced.u) + len(self.system.traced.m):
-            status = separate_on_gpu(self, *jobs, size, offsets, sums)
-        elif self.compiled is not None:
-            status = exponents_compiled(
-                self.compiled, *jobs[:3], self.system.memory_vector(), *jobs[3:], self.plan.phase, size, offsets, sums
-            )
+            status = separate_on_gpu(self, *jobs, sizes, offsets, sums)
         else:
-            status = separate_one_by_one(self.system, self.engine, self.plan, *jobs, size, offsets, sums)
+            plan = self.plan._replace(extremes=False, every=1)
+            if plan.indicator >= 0 and self.system.traced.period is not None:
+                plan = Section(extremes=False)  # once per period, at the phase that a place has
+            quiet = replace(self, plan=plan, keep=1, max_period=1)
+            mapper = Mapper(quiet, self.engine.prepare(points), rows, starts, modes, self.section_phase)
+            status = mapper.separate(*jobs[4:], sizes, offsets, sums)
         return rates(sums, status)
-
-    def _run_one_by_one(
-        self, points: FloatArray, rows: IntArray, starts: FloatArray, carried: bool, modes: IntArray, begin: float,
-        attempts: int,
-    ) -> Settled:  # fmt: skip
-        system, traced = self.system, self.system.traced
-        tables = self.engine.prepare(points)
-        attractors = Attractors(
-            self.engine, tables, self.plan, self.transient, self.keep, self.max_period, self.tolerance,
-            system.scale_vector(), FIRST_LOOK if self.stop_early else 0, attempts,
-        )  # fmt: skip
-        out = Chain.empty(len(points), self.keep, len(traced.u), len(traced.indicators), len(traced.outputs))
-        found = Settled.empty(len(rows), len(traced.u), self.width)
-        state: State | None = None
-        for j, i in enumerate(rows):
-
-            def fresh(j: int = j, i: int = i) -> State:
-                period = period_of(tables, i)
-                return state_at(system, starts[j], int(modes[j]), begin * period, period)
-
-            if state is None or not carried:
-                state = fresh()
-            verdict = attractors.settle(int(i), state, out, fresh)
-            for name in ("period_number", "status", "residual", "multiplier", "returns"):
-                getattr(found, name)[j] = getattr(verdict, name)
-            if not usable(verdict.status):
-                state = None
-                continue
-            # counts and extremes over one whole cycle: the kept window may begin before it was reached
-            p, cycle = verdict.period_number, out
-            if p:
-                cycle = Chain.empty(int(i) + 1, p, len(traced.u), len(traced.indicators), len(traced.outputs))
-                self.engine.chain(tables, int(i), int(i) + 1, state.copy(), None, self.plan, 0, p, cycle)
-            n = p or self.keep
-            found.crossings[j], found.contacts[j] = cycle.crossings[i] / n, cycle.contacts[i] / n
-            found.maximum[j], found.minimum[j] = cycle.maximum[i], cycle.minimum[i]
-            found.last[j], found.mode[j] = place_of(state, self.width), state.counters[0]
-        return found
 
 
 @lru_cache(maxsize=8)

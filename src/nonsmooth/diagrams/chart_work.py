@@ -149,7 +149,7 @@ def attractors_among(found: Settled, n_places: int, n_starts: int, settler: Sett
     n = size.shape[2]
     last, mode = found.last.reshape(n_places, n_starts, -1)[..., :n], found.mode.reshape(n_places, n_starts)
     count = wandering.any(axis=1).astype(np.int64)
-    every, whole = settler.plan.every, replace(settler, plan=replace(settler.plan, every=1))
+    every, whole = settler.plan.every, replace(settler, plan=settler.plan._replace(every=1))
     for k in range(n_starts):
         new = period[:, k] > 0
         for j in range(k):

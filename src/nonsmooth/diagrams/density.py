@@ -1,28 +1,24 @@
 """Histograms of a sweep's section points in place of the points: what a density diagram is made of.
 
-The points of a few parameter values at a time are run into one small buffer, counted there and forgotten, so that
-memory does not grow with the number of returns kept.
+The points of one parameter value at a time are run into a buffer, counted there and forgotten.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.attractors.settle import Attractors
 from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import real_number, whole_number
-from nonsmooth.flow.engines.engine import Chain, FloatArray, IntArray
+from nonsmooth.flow.engines.engine import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["CountedSlot", "Counter", "bin_edges", "coarse_values", "given_ranges"]
+__all__ = ["Counter", "bin_edges", "coarse_values", "given_ranges"]
 
-POINTS = 200_000  # section points of one buffer, at most (but one parameter value's)
-VALUES = 64  # parameter values of one buffer, at most
 COARSE = 48  # parameter values of the run that finds the ranges
 MARGIN = 0.05  # of the range found, added on either side
 
@@ -98,45 +94,8 @@ class Counter:
         self.counts = np.zeros((n_points, edges.shape[0], edges.shape[1] - 1), dtype=np.int32)
         self.outside: IntArray = np.zeros((n_points, edges.shape[0]), dtype=np.int64)
 
-    def count(self, section: FloatArray, row: int, i: int) -> None:
-        """Add the points of one row of a buffer (rows, keep, n) to the histogram of parameter value i."""
+    def count(self, section: FloatArray, i: int) -> None:
+        """Add points (1, keep, n) to the histogram of parameter value i."""
         from nonsmooth.kernels.histogram import count
 
-        count(section, row, self.edges, self.counts[i], self.outside[i])
-
-
-class CountedSlot:
-    """One direction and start of a sweep of which no section points are kept: ``chain`` has all but these."""
-
-    def __init__(
-        self, attractors: Attractors, points: FloatArray, sizes: tuple[int, int, int], edges: FloatArray
-    ) -> None:
-        self.attractors, self.points, self.sizes = attractors, points, sizes
-        self.chain = Chain.empty(len(points), 0, *sizes)
-        self.counter = Counter(len(points), edges)
-
-    def places(self, order: Sequence[int]) -> Iterator[tuple[int, int, Attractors, Chain]]:
-        """For each parameter value of ``order``: its number, its row in a buffer, what runs it, that buffer.
-
-        A buffer is emptied into the histograms when its last row has been run."""
-        keep = self.attractors.keep
-        size = max(1, min(VALUES, POINTS // keep))
-        for first in range(0, len(order), size):
-            part = list(order[first : first + size])
-            buffer = Chain.empty(len(part), keep, *self.sizes)
-            tables = self.attractors.engine.prepare(np.ascontiguousarray(self.points[part]))
-            attractors = self.attractors.over(tables)
-            for row, i in enumerate(part):
-                yield i, row, attractors, buffer
-            self._empty(part, buffer)
-
-    def _empty(self, part: Sequence[int], buffer: Chain) -> None:
-        for name in (
-            "maximum", "minimum", "indicator_max", "indicator_min", "output_max", "output_min", "crossings", "contacts",
-            "elapsed", "status",
-        ):  # fmt: skip
-            getattr(self.chain, name)[part] = getattr(buffer, name)
-
-    def count(self, i: int, row: int, buffer: Chain) -> None:
-        """Count the points of a run that came to its end."""
-        self.counter.count(buffer.section, row, i)
+        count(section, 0, self.edges, self.counts[i], self.outside[i])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.flow.engines.devices import batch_size
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, SectionPlan
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Section
 from nonsmooth.flow.engines.launches import States
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.linear_cuda import PlanarOnGpu
@@ -52,7 +52,7 @@ def _batch(
     edges: IntArray,
 ) -> tuple[FloatArray, FloatArray, IntArray]:  # fmt: skip
     n = len(points)
-    gpu = PlanarOnGpu(engine, points, SectionPlan())
+    gpu = PlanarOnGpu(engine, points, Section())
     module, to_device = gpu.growth(), gpu.cuda.to_device
     states = States.of(gpu.cuda, np.arange(n), np.tile(start, (n, 1)), np.zeros((n, 0)), mode, np.zeros((n, 3)))
     status = np.zeros(n, dtype=np.int64)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.flow.engines.engine import Chain, Engine, FloatArray, SectionPlan, State
+from nonsmooth.flow.engines.engine import FloatArray, Section, State
+from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.equilibria import Equilibrium, equilibrium_at
 from nonsmooth.flow.spectrum import frame_for
 from nonsmooth.kernels.hybrid import codes
@@ -135,12 +136,10 @@ def _run_on(
     system: System, engine: Engine, tables: Any, i: int, state: State, period: float | None, unit: float, count: int
 ) -> int:
     """Pass over ``count`` units of time."""
-    traced = system.traced
     if period is not None and unit == period:
-        sizes = len(traced.u), len(traced.indicators), len(traced.outputs)
-        out = Chain.empty(i + 1, 1, *sizes)
+        out = engine.kept(i + 1, 1)
         phase = state.clock[0] / period
-        plan = SectionPlan(phase=float(phase % 1.0), extremes=False)
+        plan = Section(phase=float(phase % 1.0), extremes=False)
         engine.chain(tables, i, i + 1, state, None, plan, count - 1, 1, out)
         return int(out.status[i])
     return frame_for(system, engine, tables, i).advance(state, count, unit).status

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.attractors.settle import Attractors, longest_period, tolerance_of, warn_if_small
+from nonsmooth.attractors.settle import longest_period, warn_if_small
+from nonsmooth.attractors.settler import Settler
 from nonsmooth.diagrams.density import bin_edges, coarse_values, given_ranges
 from nonsmooth.diagrams.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
 from nonsmooth.flow.arguments import check_options, check_system, swept_values, whole_number
 from nonsmooth.flow.engines.devices import engine_on, on_gpu, workers_of
-from nonsmooth.flow.engines.engine import FloatArray, State
+from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
@@ -150,10 +150,8 @@ def sweep(
     points = system.parameter_points({parameter: numbers})
     if plan.indicator >= 0:
         refuse_resting(system, starts, points, "sweep")
-    traced = system.traced
-    sizes = len(traced.u), len(traced.indicators), len(traced.outputs)
     ranges, n_bins = ({}, 0) if density is False else given_ranges(system, density, bins)
-    width = keep * (len(traced.u) + 2) if density is False else len(traced.u) * (n_bins + 1) / 2
+    width = keep * (len(system.states) + 2) if density is False else len(system.states) * (n_bins + 1) / 2
     room_for(
         16.0 * width * len(points) * len(directions) * len(starts), f"a sweep over {len(points)} values",
         "take fewer values, starts or bins, keep fewer returns, or count them with density=True",
@@ -169,11 +167,10 @@ def sweep(
                 atol=atol, threads=threads, progress=False, **expert,
             )["section"].transpose(..., "state").values  # fmt: skip
         edges = bin_edges(system, ranges, n_bins, coarse)
-    attractors = Attractors(
-        engine, engine.prepare(points), replace(plan, extremes=extremes), transient, keep, max_period,
-        tolerance_of(engine, rtol), system.scale_vector(),
-    )  # fmt: skip
-    slots = {(d, k): Slot(attractors, points, sizes, edges) for d in range(len(directions)) for k in range(len(starts))}
+    settler = Settler(
+        system, engine, plan._replace(extremes=extremes), transient, keep, max_period if judge else 0, False, rtol=rtol
+    )
+    slots = {(d, k): Slot(settler, len(points), edges) for d in range(len(directions)) for k in range(len(starts))}
     options = {
         "parameter": parameter, "values": values, "direction": direction, "start": plain_start(system, start),
         "section": section, "transient": transient, "keep": keep, "max_period": max_period,
@@ -182,26 +179,16 @@ def sweep(
         "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
     squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
-    memory = system.memory_vector()
-
-    def march(slot: tuple[int, int], order: Sequence[int], report: Report) -> None:
-        d, k = slot
-        state: State | None = None
-        for i, row, rules, chain in slots[slot].places(order):
-            if report.stop.is_set():
-                return
-            if state is None or directions[d] == "none":
-                state = State(starts[k].copy(), memory.copy())
-            if judge:
-                verdict = rules.settle(row, state, chain, lambda: State(starts[k].copy(), memory.copy()))
-            else:
-                verdict = rules.pass_by(row, state, chain)
-            slots[slot].keep(i, row, verdict, chain)
-            report.advance(1)
-
     if gpu:
-        run_on_gpu(points, starts, memory, attractors, slots, progress, parameter)
+        run_on_gpu(points, starts, slots, progress, parameter)
     else:
+        settler.load()
+        tables = engine.prepare(points)
+
+        def march(slot: tuple[int, int], order: Sequence[int], report: Report) -> None:
+            d, k = slot
+            slots[slot].march(tables, order, starts[k], directions[d] != "none", report)
+
         run_pieces(march, pieces_of(directions, len(starts), numbers), threads, progress, parameter)
     largest = largest_of(starts, slots.values(), extremes)
     warn_if_coarse(system, engine, largest)
@@ -244,18 +231,18 @@ def _dataset(
         """NaN where the point failed: the kernel's buffers hold what it had by then."""
         return np.where(failed.reshape(failed.shape + (1,) * (values.ndim - 3)), np.nan, values)
 
-    returns = gather(lambda slot: np.full(len(numbers), slot.attractors.keep, dtype=float))
+    returns = gather(lambda slot: np.full(len(numbers), slot.settler.keep, dtype=float))
     arrays = {
-        "section": whole(gather(lambda s: s.chain.section)),
-        "maximum": whole(gather(lambda s: s.chain.maximum)),
-        "minimum": whole(gather(lambda s: s.chain.minimum)),
+        "section": whole(gather(lambda s: s.kept.section)),
+        "maximum": whole(gather(lambda s: s.extremes()[0])),
+        "minimum": whole(gather(lambda s: s.extremes()[3])),
         "period_number": gather(lambda s: s.period_number),
         "residual": gather(lambda s: s.residual),
-        "crossings_per_period": whole(gather(lambda s: s.chain.crossings) / returns),
-        "contacts_per_period": whole(gather(lambda s: s.chain.contacts) / returns),
-        "clearance": whole(gather(lambda s: np.where(sides > 0, -s.chain.indicator_max, s.chain.indicator_min))),
-        "output_maximum": whole(gather(lambda s: s.chain.output_max)),
-        "output_minimum": whole(gather(lambda s: s.chain.output_min)),
+        "crossings_per_period": whole(gather(lambda s: s.kept.crossings) / returns),
+        "contacts_per_period": whole(gather(lambda s: s.kept.contacts) / returns),
+        "clearance": whole(gather(lambda s: np.where(sides > 0, -s.extremes()[1], s.extremes()[4]))),
+        "output_maximum": whole(gather(lambda s: s.extremes()[2])),
+        "output_minimum": whole(gather(lambda s: s.extremes()[5])),
         "status": gather(lambda s: s.status),
     }
     if not system.outputs or arrays["output_maximum"].shape[-1] != len(system.outputs):
@@ -265,16 +252,16 @@ def _dataset(
     if not extremes:
         for name in ("maximum", "minimum", "clearance", "output_maximum", "output_minimum"):
             arrays.pop(name, None)
-    counted = next(iter(slots.values())).counted
-    if counted is not None:
+    counter = next(iter(slots.values())).counter
+    if counter is not None:
         del arrays["section"]
-        arrays["density"] = gather(lambda s: s.counter.counts)
-        arrays["outside"] = gather(lambda s: s.counter.outside)
+        for name, part in (("density", "counts"), ("outside", "outside")):
+            arrays[name] = gather(lambda s, part=part: getattr(s.counter, part))  # type: ignore[misc]
     labels = labels_of(system)
     return build(
         labels, provenance(labels, "sweep", options, method=method), parameter, numbers, arrays,
         directions=directions, starts=starts, squeeze=tuple(squeeze),
-        edges=None if counted is None else counted.counter.edges,
+        edges=None if counter is None else counter.edges,
     )  # fmt: skip
 
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from nonsmooth.attractors.settle import Attractors, Verdict
-from nonsmooth.attractors.settled import usable
+from nonsmooth.attractors.mapper import Mapper
+from nonsmooth.attractors.settled import Settled, usable
+from nonsmooth.attractors.settler import Settler
 from nonsmooth.campaign.threads import cores, over_items
-from nonsmooth.diagrams.density import CountedSlot, Counter
-from nonsmooth.flow.engines.engine import Chain, FloatArray
+from nonsmooth.diagrams.density import Counter
+from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
@@ -22,38 +24,44 @@ PIECE = 16  # points of one piece of independent work
 
 
 class Slot:
-    """One direction and start: the kernel's buffers over all points (histograms in place of points), the verdicts."""
+    """One direction and start: kept returns of all parameter values (histograms in place of points), the verdicts."""
 
-    def __init__(
-        self, attractors: Attractors, points: FloatArray, sizes: tuple[int, int, int], edges: FloatArray | None
-    ) -> None:
-        n_points = len(points)
-        self.attractors = attractors
-        self.counted = None if edges is None else CountedSlot(attractors, points, sizes, edges)
-        self.chain = Chain.empty(n_points, attractors.keep, *sizes) if self.counted is None else self.counted.chain
-        self.period_number = np.zeros(n_points, dtype=np.int64)
-        self.residual = np.full(n_points, np.nan)
-        self.status = np.full(n_points, codes.INTERRUPTED, dtype=np.int8)
+    def __init__(self, settler: Settler, points: int, edges: FloatArray | None) -> None:
+        self.settler = settler
+        self.counter = None if edges is None else Counter(points, edges)
+        self.kept = settler.engine.kept(points, settler.keep if edges is None else 0)
+        self.period_number = np.zeros(points, dtype=np.int64)
+        self.residual = np.full(points, np.nan)
+        self.status = np.full(points, codes.INTERRUPTED, dtype=np.int8)
 
-    @property
-    def counter(self) -> Counter:
-        """The histograms of a sweep with ``density``."""
-        assert self.counted is not None
-        return self.counted.counter
+    def march(self, tables: Any, order: Sequence[int], start: FloatArray, carried: bool, report: Report) -> None:
+        """Run some parameter values from a start, the state carried from each to the next or not."""
+        rows, n = np.array(order, dtype=np.int64), len(order)
+        room: dict[str, Any] = {"kept": self.kept, "into": rows} if self.counter is None else {}
+        mapper = Mapper(self.settler, tables, rows, np.tile(start, (n, 1)), **room)
+        run = mapper.settle(self.settler.rules(), 2 * carried, False)
+        for j, i in enumerate(order):
+            if report.stop.is_set():
+                return
+            run(j + 1)
+            if self.counter is not None:
+                for part, own in zip(self.kept[1:6], mapper.kept[1:6], strict=True):
+                    part[i] = own[0]
+                if usable(mapper.jobs.status[j]):
+                    self.counter.count(mapper.kept.section, i)
+            report.advance(1)
+        self.put(rows, mapper.settled())
 
-    def places(self, order: Sequence[int]) -> Iterable[tuple[int, int, Attractors, Chain]]:
-        """For each point of ``order``: its number, its row in a buffer, what runs it, that buffer."""
-        if self.counted is not None:
-            return self.counted.places(order)
-        return ((i, i, self.attractors, self.chain) for i in order)
+    def put(self, rows: Any, found: Settled) -> None:
+        """Take the verdicts on some parameter values."""
+        for name in ("period_number", "residual", "status"):
+            getattr(self, name)[rows] = getattr(found, name)
 
-    def keep(self, i: int, row: int, verdict: Verdict, chain: Chain) -> None:
-        """The verdict on parameter value i, whose run stands in a row of a buffer."""
-        self.period_number[i] = verdict.period_number
-        self.residual[i] = verdict.residual
-        self.status[i] = verdict.status
-        if self.counted is not None and usable(verdict.status):
-            self.counted.count(i, row, chain)
+    def extremes(self) -> tuple[FloatArray, ...]:
+        """Maxima and minima of states, indicators, outputs."""
+        n, n_i = self.kept.section.shape[2], len(self.settler.system.indicators)
+        both = self.kept.high, self.kept.low
+        return tuple(part for whole in both for part in np.split(whole, [n, n + n_i], axis=1))
 
 
 class Report:
@@ -92,17 +100,15 @@ def run_pieces(
 
 
 def run_on_gpu(
-    points: FloatArray, starts: FloatArray, memory: FloatArray, rules: Attractors,
-    slots: Mapping[tuple[int, int], Slot], progress: Progress, label: str,
-) -> None:  # fmt: skip
+    points: FloatArray, starts: FloatArray, slots: Mapping[tuple[int, int], Slot], progress: Progress, label: str
+) -> None:
     """All points from each start, on the GPU."""
     from nonsmooth.attractors.settle_cuda import sweep_on_gpu
 
     with progress_bar(len(points) * len(starts), f"sweep over {label}", progress) as advance:
         for k, start in enumerate(starts):
             slot = slots[0, k]
-            found = sweep_on_gpu(points, start, memory, rules, slot.chain, advance)
-            slot.period_number[:], slot.residual[:], slot.status[:] = found.period_number, found.residual, found.status
+            slot.put(slice(None), sweep_on_gpu(slot.settler, points, start, slot.kept, advance))
 
 
 def largest_of(starts: FloatArray, slots: Iterable[Slot], extremes: bool) -> FloatArray:
@@ -111,7 +117,7 @@ def largest_of(starts: FloatArray, slots: Iterable[Slot], extremes: bool) -> Flo
     sizes = [np.abs(starts)]
     for slot in slots:
         there = ended(slot)
-        ends = (slot.chain.maximum, slot.chain.minimum) if extremes else (np.abs(slot.chain.section).max(axis=1),)
+        ends = slot.extremes()[::3] if extremes else (np.abs(slot.kept.section).max(axis=1),)
         sizes += [np.abs(end[there]) for end in ends]
     return np.nan_to_num(np.vstack(sizes)).max(axis=0)
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
-from nonsmooth.flow.engines.engine import Chain, State
+from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.failure import solve_error
@@ -75,13 +74,12 @@ def poincare(
     check_options(system, expert, poincare)
     n, transient = whole_number(n, "n", 1), whole_number(transient, "transient", 0)
     section, plan = section_plan(system, section)
-    plan = replace(plan, extremes=False)
+    plan = plan._replace(extremes=False)
     starts = start_states(system, start)
     if plan.indicator >= 0:
         refuse_resting(system, starts, system.parameter_vector()[None, :], "poincare")
     engine = engine_for(system, method, rtol, atol, **expert)
-    traced = system.traced
-    out = Chain.empty(len(starts), n, len(traced.u), len(traced.indicators), len(traced.outputs))
+    out = engine.kept(len(starts), n)
     tables = engine.prepare(np.tile(system.parameter_vector(), (len(starts), 1)))
     state = State(starts[0].copy(), system.memory_vector())
     engine.chain(tables, 0, len(starts), state, starts, plan, transient, n, out)

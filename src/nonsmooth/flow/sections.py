@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import real_number, whole_number
-from nonsmooth.flow.engines.engine import SectionPlan
+from nonsmooth.flow.engines.engine import Section
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -76,7 +76,7 @@ class Poincare:
             raise ValueError(f"t_max = {self.t_max!r}: the longest wait for a return is a positive time")
 
 
-def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare, SectionPlan]:
+def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare, Section]:
     """The section meant (``Stroboscopic(0)`` where None and the system has a period), and its integers.
 
     Raises
@@ -95,7 +95,7 @@ def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare,
     if isinstance(section, Stroboscopic):
         if period is None:
             raise ValueError(f"{system.name!r} has no forcing period: use ns.Poincare(...) in place of {section}")
-        return section, SectionPlan(phase=section.phase)
+        return section, Section(phase=section.phase)
     if not isinstance(section, Poincare):
         raise TypeError(f"section must be ns.Stroboscopic(...) or ns.Poincare(...), not {shortened(section)}")
     from nonsmooth.system.names import unknown
@@ -108,7 +108,7 @@ def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare,
     t_max = section.t_max
     if t_max is None:
         t_max = 1e6 if period is None else 1e3 * period
-    return section, SectionPlan(
+    return section, Section(
         phase=-1.0,
         indicator=indicators.index(section.indicator),
         rising=0 if section.rising is None else 2 * int(section.rising) - 1,

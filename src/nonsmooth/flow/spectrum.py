@@ -15,13 +15,13 @@ Fractals 5 (1995) 1671-1681.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nonsmooth.flow.engines.engine import Engine, FloatArray, Log, State
+from nonsmooth.flow.engines.engine import FloatArray, Log, State
 from nonsmooth.flow.engines.linear import LinearEngine
+from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.series import SeriesEngine, order_for
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
 
-__all__ = ["Frame", "Growth", "frame_for"]
+__all__ = ["Growth", "frame_for"]
 
 CHUNK = 250  # units of time recorded at once
 APART = 1e3  # times the engine's tolerance: what a piece may end away from the record
@@ -56,35 +56,30 @@ class Growth:
         return 0.0 if found == wanted else found - wanted
 
 
-class Frame(Protocol):
-    """Orthonormal directions that follow a trajectory; :meth:`advance` carries both on."""
+def _record(scale: FloatArray, Q: FloatArray, count: int) -> Any:
+    """Room for the growth of a frame over some units of time (``kernels.records.Growth``)."""
+    from nonsmooth.kernels.hybrid.records import Growth as Record
 
-    active: NDArray[np.bool_]  # (n,) components of z = (u, memory) that have directions of their own
-
-    def advance(self, state: State, count: int, unit: float) -> Growth:
-        """March ``count`` units of time. ``state`` is left at the end; its clock may be set back by whole periods."""
+    (n, columns), square = Q.shape, np.zeros((len(scale), len(scale)))
+    return Record(
+        scale, Q, np.zeros((count, columns)), np.ones(columns), np.array([0.0, 0.0, 0.0, 1.0, 0.0]), square,
+        square.copy(), square.copy(), np.zeros((3, n)), np.zeros(n), np.zeros(n),
+    )  # fmt: skip
 
 
 class _LinearFrame:
     """One kernel of the exact flow for the trajectory and its frame."""
 
     def __init__(self, engine: LinearEngine, tables: Any, i: int, scale: FloatArray) -> None:
-        from nonsmooth.kernels.hybrid.records import Growth as Record
-
-        self.engine, self.tables, self.i = engine, tables, i
-        n = len(scale)
-        square, vector = (n, n), np.zeros(n)
-        self.record = Record(
-            scale, np.eye(n), np.zeros((0, n)), np.ones(n), np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(square),
-            np.zeros(square), np.zeros(square), np.zeros((3, n)), vector, vector.copy(),
-        )  # fmt: skip
-        self.active = np.ones(n, dtype=bool)
+        self.engine, self.tables, self.i, self.scale, self.Q = engine, tables, i, scale, np.eye(len(scale))
+        self.active = np.ones(len(scale), dtype=bool)
 
     def advance(self, state: State, count: int, unit: float) -> Growth:
-        sums = np.array([0.0, 0.0, 0.0, 1.0])
-        record = self.record._replace(growth=np.zeros((count, len(self.active))), sums=sums)
+        """March ``count`` units of time. ``state`` is left at the end; its clock may be set back by whole periods."""
+        record = _record(self.scale, self.Q, count)
         status = self.engine.grow(self.tables, self.i, state, count, unit, record)
-        return Growth(record.growth, float(sums[0]), float(sums[1]), float(sums[3]), status)
+        divergence, determinants, _, nearest, _ = record.sums.tolist()
+        return Growth(record.growth, divergence, determinants, nearest, status)
 
 
 class _SeriesFrame:
@@ -183,21 +178,15 @@ class _SeriesFrame:
 
     def _grow(self, pieces: Any, count: int) -> tuple[int, FloatArray, FloatArray]:
         """Carry the frame along the pieces."""
-        from nonsmooth.kernels.hybrid.records import Growth as Record
         from nonsmooth.kernels.tangent.spectrum import grow
 
-        flow, n, columns = self.flow, self.flow.n, self.Q.shape[1]
-        sums, square = np.array([0.0, 0.0, 0.0, 1.0, 0.0]), np.zeros((n, n))
-        record = Record(
-            flow.scale, self.Q, np.zeros((count, columns)), np.ones(columns), sums, square, square.copy(),
-            square.copy(), np.zeros((3, n)), np.zeros(n), np.zeros(n),
-        )  # fmt: skip
-        sizes = np.concatenate([np.zeros(len(flow.model.entries)), np.repeat(flow.scale[: flow.n_u], columns)])
+        flow, record = self.flow, _record(self.flow.scale, self.Q, count)
+        sizes = np.concatenate([np.zeros(len(flow.model.entries)), np.repeat(flow.scale[: flow.n_u], self.Q.shape[1])])
         status = grow(
             flow.equations, pieces, self.pace._replace(sizes=sizes), self.values, record, np.zeros(flow.n_out),
             flow.scratch(),
         )  # fmt: skip
-        return int(status), record.growth, sums
+        return int(status), record.growth, record.sums
 
     def _widen(self, visited: set[int], written: set[int]) -> None:
         """Directions for the states of the modes now visited, and for the memory now written."""
@@ -250,7 +239,7 @@ def _smooth(engine: Engine, traced: Traced) -> bool:
     return engine.step is None and engine.order is None and not engine.layers.checked
 
 
-def frame_for(system: System, engine: Engine, tables: Any, i: int) -> Frame:
+def frame_for(system: System, engine: Engine, tables: Any, i: int) -> _LinearFrame | _SeriesFrame:
     """A frame for row ``i`` of an engine's tables."""
     if isinstance(engine, LinearEngine) and engine.is_plain:
         return _LinearFrame(engine, tables, i, system.scale_vector())

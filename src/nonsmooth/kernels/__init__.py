@@ -9,7 +9,5 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-__all__ = ["before_compiling"]
-
 #: Called with a kernel's name before it is compiled, which happens where the cache on disk has no entry for it.
 before_compiling: list[Callable[[str], None]] = []

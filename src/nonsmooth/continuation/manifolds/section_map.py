@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
+from nonsmooth.flow.engines.engine import Section, State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.kernels.hybrid import codes
 
@@ -44,19 +44,18 @@ class SectionMap:
         self.system, self.size, self.periods = system, size, periods
         self.engine = engine_for(system, rtol=RTOL)
         self.tables = self.engine.prepare(np.tile(system.parameter_vector(), (CHUNK, 1)))
-        self.plan = SectionPlan(extremes=False)
-        self.shape = (len(size), len(system.indicators), len(system.outputs))
+        self.plan = Section(extremes=False)
 
     def at_phase(self, x: FloatArray, phase: float) -> FloatArray:
         """The scaled points x (m, n) of phase 0 at a later phase of the same period."""
-        return x if phase == 0.0 else self._images(x, SectionPlan(phase=phase, extremes=False), 1)
+        return x if phase == 0.0 else self._images(x, Section(phase=phase, extremes=False), 1)
 
     def forward(self, x: FloatArray, near: FloatArray | None = None) -> FloatArray:
         """Images (m, n) of the scaled points x (m, n)."""
         del near
         return self._images(x, self.plan, self.periods)
 
-    def _images(self, x: FloatArray, plan: SectionPlan, returns: int) -> FloatArray:
+    def _images(self, x: FloatArray, plan: Section, returns: int) -> FloatArray:
         images = np.full_like(x, np.nan)
         starts = np.ascontiguousarray(x * self.size)
         for a in range(0, len(x), CHUNK):
@@ -65,7 +64,7 @@ class SectionMap:
             if not safe.any():
                 continue
             given = np.ascontiguousarray(part[safe])
-            out = Chain.empty(len(given), 1, *self.shape)
+            out = self.engine.kept(len(given), 1)
             state = State(given[0].copy(), self.system.memory_vector())
             self.engine.chain(self.tables, 0, len(given), state, given, plan, returns - 1, 1, out)
             good = np.isin(out.status, (codes.OK, codes.NOT_GUARANTEED))

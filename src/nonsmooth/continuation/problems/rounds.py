@@ -22,7 +22,8 @@ from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.problems.shooting import Shooting
-    from nonsmooth.flow.engines.engine import Engine, Log
+    from nonsmooth.flow.engines.engine import Log
+    from nonsmooth.flow.engines.loop import Engine
 
 __all__ = ["Rounds"]
 

@@ -19,7 +19,7 @@ from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 
 if TYPE_CHECKING:
-    from nonsmooth.flow.engines.engine import Engine
+    from nonsmooth.flow.engines.loop import Engine
 
 __all__ = ["Search", "search_within"]
 

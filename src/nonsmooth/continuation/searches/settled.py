@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.signature import Signature, Visit
 from nonsmooth.continuation.problems.visits import visits_of
-from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
+from nonsmooth.flow.engines.engine import Section, State
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.searches.search import Search
-    from nonsmooth.flow.engines.engine import Engine
+    from nonsmooth.flow.engines.loop import Engine
     from nonsmooth.system.system import System
 
 __all__ = ["CLOSED", "NEAR", "Guess", "forced_guesses", "settle_forced", "touching"]
@@ -58,29 +58,28 @@ class Settled:
 
 def settle_forced(system: System, engine: Engine, state: State, transient: int, keep: int, search: Search) -> Settled:
     """Run a forced system through a transient and keep the section points after it."""
-    traced = system.traced
-    sizes = len(traced.u), len(traced.indicators), len(traced.outputs)
     tables = engine.prepare(system.parameter_vector()[None, :])
-    passed, left, begun = Chain.empty(1, 1, *sizes), transient, state.copy()
+    passed, left, begun = engine.kept(1, 1), transient, state.copy()
 
     def march(piece: float) -> bool:
         nonlocal left
         some = min(max(1, round(piece)), left)
         if some:
-            engine.chain(tables, 0, 1, state, None, SectionPlan(), some - 1, 1, passed)
+            engine.chain(tables, 0, 1, state, None, Section(), some - 1, 1, passed)
             left -= some
         return int(passed.status[0]) in (codes.OK, codes.NOT_GUARANTEED)
 
     search.in_pieces(float(transient), march)
     if passed.status[0] == codes.BEYOND_STOP:  # an impact on the section: a motion that was cut there cannot begin
         state, left, passed.status[0] = begun, transient, codes.OK
-    out = Chain.empty(1, keep, *sizes)
+    out = engine.kept(1, keep)
     if passed.status[0] in (codes.OK, codes.NOT_GUARANTEED):
-        engine.chain(tables, 0, 1, state, None, SectionPlan(), left, keep, out)
+        engine.chain(tables, 0, 1, state, None, Section(), left, keep, out)
     else:
         out.status[0] = passed.status[0]
     search.look()
-    size = np.maximum(0.5 * (out.maximum[0] - out.minimum[0]), 1e-3 * system.scale_vector())
+    scale = system.scale_vector()
+    size = np.maximum(0.5 * (out.high - out.low)[0, : len(scale)], 1e-3 * scale)
     return Settled(np.nan_to_num(out.section[0]), out.section_mode[0], size, state, int(out.status[0]), engine, tables)
 
 

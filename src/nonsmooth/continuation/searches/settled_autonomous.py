@@ -25,7 +25,7 @@ from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.searches.search import Search
-    from nonsmooth.flow.engines.engine import Engine
+    from nonsmooth.flow.engines.loop import Engine
     from nonsmooth.system.system import System
 
 __all__ = ["autonomous_guesses"]

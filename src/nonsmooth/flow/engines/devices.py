@@ -7,9 +7,9 @@ import os
 from typing import Any
 
 from nonsmooth.errors import not_installed
-from nonsmooth.flow.engines.engine import Engine, SectionPlan
+from nonsmooth.flow.engines.engine import Section
 from nonsmooth.flow.engines.linear import LinearEngine, PlanarEngine
-from nonsmooth.flow.engines.loop import LoopEngine
+from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.patterns import PatternEngine
 from nonsmooth.flow.engines.series import SeriesEngine
 
@@ -74,12 +74,12 @@ def workers_of(device: str, threads: int | None, client: Any = None) -> int | No
     return 1
 
 
-def engine_on(device: Any, engine: Engine, plan: SectionPlan | None) -> Engine:
+def engine_on(device: Any, engine: Engine, plan: Section | None) -> Engine:
     """The engine for a device.
 
     The planar kernels of a GPU know two states and stroboscopic sections only: else the same flow goes there by the
     series kernels."""
-    decides = isinstance(engine, LoopEngine) and engine.traced.decider is not None
+    decides = engine.traced.decider is not None
     if device == "cuda" and (decides or isinstance(engine, PatternEngine)):
         raise ValueError(
             "what contacts and frictions decide together, and modes that are made when they are visited, are found by "
@@ -94,14 +94,14 @@ def engine_on(device: Any, engine: Engine, plan: SectionPlan | None) -> Engine:
     return SeriesEngine(engine.traced, engine.scale, "taylor", SHARPEST)
 
 
-def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, carried: bool = False) -> bool:
+def on_gpu(device: Any, verb: str, engine: Engine, plan: Section | None, *, carried: bool = False) -> bool:
     """Return whether a verb's work goes to the GPU; every reason why it cannot is raised before anything is compiled.
 
     Parameters
     ----------
     engine : Engine
         The method resolved for the system.
-    plan : SectionPlan, optional
+    plan : Section, optional
         The section, where the verb has one.
     carried : bool
         Whether a state is to be carried from one parameter value to the next.
@@ -118,7 +118,7 @@ def on_gpu(device: Any, verb: str, engine: Engine, plan: SectionPlan | None, *, 
     """
     if check_device(device) == "cpu":
         return False
-    if isinstance(engine, LoopEngine) and engine.phases is not None:
+    if engine.phases is not None:
         raise ValueError(
             f'{verb} with device="cuda" takes transitions at fixed phases; here `at` depends on the parameters: use '
             'device="cpu"'

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, IntArray
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept
 
-__all__ = ["States", "batches", "launch"]
+__all__ = ["OnGpu", "States", "batches"]
 
 
 @dataclass
@@ -55,11 +55,27 @@ def batches(points: FloatArray, rows: IntArray, size: int) -> Iterator[tuple[sli
         yield some, points[needed], own.astype(np.int64)
 
 
-def launch(entry: Any, threads: int, jobs: Any, *arguments: Any) -> None:
-    """One thread for each job, in blocks of ``threads``; waits for nothing."""
-    from numba.core.errors import NumbaPerformanceWarning
+class OnGpu:
+    """Launches, and room for what they leave, of an engine on a GPU; ``n`` states, ``rows`` whose extremes are kept."""
 
-    with warnings.catch_warnings():  # a few threads on a large GPU: Numba warns of it
-        warnings.simplefilter("ignore", NumbaPerformanceWarning)
-        configured = entry[-(-len(jobs) // threads), threads]
-    configured(jobs, *arguments)
+    cuda: Any
+    threads: int
+    n: int
+    rows: int
+
+    def launch(self, entry: Any, jobs: IntArray, *arguments: Any) -> None:
+        """One thread for each job, in blocks of ``threads``; waits for nothing."""
+        from numba.core.errors import NumbaPerformanceWarning
+
+        with warnings.catch_warnings():  # a few threads on a large GPU: Numba warns of it
+            warnings.simplefilter("ignore", NumbaPerformanceWarning)
+            configured = entry[-(-len(jobs) // self.threads), self.threads]
+        configured(self.cuda.to_device(jobs), *arguments)
+
+    def buffers(self, n: int, keep: int) -> Kept:
+        """Room for ``keep`` section points of each of n trajectories."""
+        array, whole, keep = self.cuda.device_array, np.int64, max(keep, 1)
+        return Kept(
+            array((n, keep, self.n)), array((n, self.rows)), array((n, self.rows)), array(n, whole), array(n, whole),
+            array(n), array((n, keep)), array((n, keep), whole), array(n, whole),
+        )  # fmt: skip

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray, State
-from nonsmooth.flow.engines.loop import LoopEngine, pack_net
+from nonsmooth.flow.engines.loop import Engine, pack_net
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearForm
@@ -51,7 +51,7 @@ class Tables:
 
 
 @dataclass
-class LinearEngine(LoopEngine):
+class LinearEngine(Engine):
     """``Engine`` over ``kernels.linear`` for one system's traced form."""
 
     traced: Traced
@@ -124,9 +124,6 @@ class LinearEngine(LoopEngine):
         if local.last is not tables:  # the same place among other points
             local.work[1].built[0], local.last = 0, tables
         return tables.form, *local.work
-
-    def outputs_of(self, tables: Tables) -> int:
-        return tables.sizes[2]
 
     def touches_of_a_leg(self) -> int:
         return 64 * len(self.net.rows)

@@ -2,59 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, SectionPlan
-from nonsmooth.flow.engines.launches import States, launch
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Section
+from nonsmooth.flow.engines.launches import OnGpu, States
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.loop import DIVERGENCE
 from nonsmooth.kernels.hybrid import codes
 
-__all__ = ["SLICE", "Buffers", "PlanarOnGpu"]
+__all__ = ["SLICE", "PlanarOnGpu"]
 
 SLICE = 256  # section returns of one launch, at most: below a second also on a small GPU
 
 
-@dataclass
-class Buffers:
-    """Room for what a run leaves behind for N trajectories, on the GPU; the order is that of :class:`engine.Chain`."""
-
-    section: Any
-    maximum: Any
-    minimum: Any
-    indicator_max: Any
-    indicator_min: Any
-    output_max: Any
-    output_min: Any
-    crossings: Any
-    contacts: Any
-    elapsed: Any
-    section_time: Any
-    section_mode: Any
-    status: Any
-
-    def all(self) -> tuple[Any, ...]:
-        return tuple(vars(self).values())
-
-
-class PlanarOnGpu:
+class PlanarOnGpu(OnGpu):
     """A planar engine's parameter points on the GPU, and the runs from there.
 
     Parameters
     ----------
     engine : PlanarEngine
     points : array (P, n_parameters)
-    plan : SectionPlan
+    plan : Section
         A stroboscopic section.
     """
 
     n, n_memory = 2, 0
 
-    def __init__(self, engine: PlanarEngine, points: FloatArray, plan: SectionPlan) -> None:
+    def __init__(self, engine: PlanarEngine, points: FloatArray, plan: Section) -> None:
         from nonsmooth.kernels.cuda.module import cuda_linear_module
         from nonsmooth.kernels.cuda.target import THREADS, cuda
         from nonsmooth.kernels.linear.layout import scratch
@@ -62,6 +39,7 @@ class PlanarOnGpu:
         tables = engine.prepare(points)
         n_modes, n_indicators, n_outputs, n_rows = tables.sizes
         self.sizes = max(n_indicators, 1), max(n_outputs, 1)
+        self.rows = 2 + sum(self.sizes)
         self.void = [] if n_indicators else [self.n]  # a row of no indicator: no array is empty there
         harmonics = len(tables.form.multiples)
         shape = harmonics, n_modes, *self.sizes, max(len(engine.net.transitions), 1), n_rows
@@ -78,34 +56,13 @@ class PlanarOnGpu:
         self.plans = [cuda.to_device(np.array([-1, 1, -1, 1, 1, extremes], dtype=np.int64)) for extremes in (0, 1)]
         self.periods = cuda.to_device(self.period)
 
-    def launch(self, entry: Any, jobs: IntArray, *arguments: Any) -> None:
-        """One thread for each job; waits for nothing."""
-        launch(entry, self.threads, self.cuda.to_device(jobs), *arguments)
-
-    def buffers(self, n: int, keep: int) -> Buffers:
-        """Room for ``keep`` section points of each of n trajectories."""
-        array, whole = self.cuda.device_array, np.int64
-        n_i, n_o = self.sizes
-        return Buffers(
-            array((n, keep, 2)), array((n, 2)), array((n, 2)), array((n, n_i)), array((n, n_i)), array((n, n_o)),
-            array((n, n_o)), array(n, whole), array(n, whole), array(n), array((n, keep)), array((n, keep), whole),
-            array(n, whole),
-        )  # fmt: skip
-
-    def extremes(self, out: Buffers) -> tuple[FloatArray, FloatArray]:
-        """Maxima and minima (N, rows) of states, indicators and outputs over the kept window."""
-        high = (out.maximum, out.indicator_max, out.output_max)
-        low = (out.minimum, out.indicator_min, out.output_min)
-
-        def rows(parts: tuple[Any, ...]) -> FloatArray:
-            found = np.concatenate([part.copy_to_host() for part in parts], axis=1)
-            return np.delete(found, self.void, axis=1)
-
-        return rows(high), rows(low)
+    def extremes(self, found: FloatArray) -> FloatArray:
+        """Extremes (N, rows) of states, indicators and outputs, from what stands in :class:`Kept`."""
+        return np.delete(found, self.void, axis=1)
 
     def run(
-        self, jobs: IntArray, states: States, transient: int, keep: Any, out: Buffers, settled: Any = False, *,
-        extremes: bool = False, one_more: Buffers | None = None,
+        self, jobs: IntArray, states: States, transient: int, keep: Any, out: Kept, settled: Any = False, *,
+        extremes: bool = False, one_more: Kept | None = None,
     ) -> IntArray:  # fmt: skip
         """March jobs by ``transient`` returns, then ``keep`` more into ``out`` (a number, or one for each trajectory).
 
@@ -113,7 +70,7 @@ class PlanarOnGpu:
         ----------
         settled
             Of no concern here: what holds where a run begins is always taken.
-        one_more : Buffers, optional
+        one_more : Kept, optional
             One return more, with extremes, goes in here.
 
         Returns
@@ -132,21 +89,21 @@ class PlanarOnGpu:
         return done[one_more.status.copy_to_host()[done] == codes.OK]
 
     def run_beside(
-        self, jobs: IntArray, others: States, period: IntArray, whole: Buffers, arrived: Buffers, extremes: bool
+        self, jobs: IntArray, others: States, period: IntArray, whole: Kept, arrived: Kept, extremes: bool
     ) -> None:
         """March jobs j by period[j] returns into ``whole``, and their neighbours, which stand behind them in
         ``others``; of these the last return goes into ``arrived``."""
         self._advance(jobs, others, 0, period, whole, extremes, arrived, False, 3, len(period))
 
     def _advance(
-        self, jobs: IntArray, states: States, transient: int, keep: Any, out: Buffers, extremes: bool = False,
-        other: Buffers | None = None, after: bool = False, legs: int = 2, apart: int = 0,
+        self, jobs: IntArray, states: States, transient: int, keep: Any, out: Kept, extremes: bool = False,
+        other: Kept | None = None, after: bool = False, legs: int = 2, apart: int = 0,
     ) -> IntArray:  # fmt: skip
         counts = tuple(self.cuda.to_device(np.atleast_1d(np.asarray(n, dtype=np.int64))) for n in (transient, keep))
         self.launch(
             self.module.advance, jobs, states.rows, self.tables, self.net, states.place(), counts,
             (self.plans[extremes], self.plans[after]), (1 if other is None else legs, apart), self.phase, self.limit,
-            out.all(), (out if other is None else other).all(),
+            tuple(out), tuple(out if other is None else other),
         )  # fmt: skip
         return jobs[out.status.copy_to_host()[jobs] == codes.OK]
 

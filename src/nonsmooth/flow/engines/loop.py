@@ -1,4 +1,8 @@
-"""Both engines' way into the hybrid loop: they differ in what they give it, not in how it is run."""
+"""Flow methods as the analyses see them; engines differ in what they give the hybrid loop, not in how it is run.
+
+An engine is bound to one system (its parameters' values apart), one method and one tolerance. It never raises for
+numerical trouble; it writes a status code (``kernels.hybrid.codes``).
+"""
 
 from __future__ import annotations
 
@@ -11,11 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import Chain, FloatArray, Log, SectionPlan, State
+from nonsmooth.flow.engines.engine import FloatArray, Kept, Log, Section, State
 from nonsmooth.flow.engines.march import March
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, MODE, RESET, TIME, TOUCHES, WAITS
+from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, MODE, RESET, STARTS, TIME, TOUCHES, WAITS
 from nonsmooth.kernels.hybrid.stopping import flag
+from nonsmooth.results.memory import room_for
 from nonsmooth.system.derived.deciding import begun, decide
 from nonsmooth.system.phases import phases, varying_phases
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, FOUND, TOGETHER
@@ -24,26 +29,27 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.patterns import Rows
     from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
-__all__ = ["DIVERGENCE", "LoopEngine", "pack_net"]
+__all__ = ["DIVERGENCE", "Engine", "end_if_not_wanted", "pack_net"]
 
 DIVERGENCE = 1e9  # in units of a state's scale
 SPARE = 64  # crossings that one leg may add to a log
 
 
-class LoopEngine(ABC):
+class Engine(ABC):
     """``chain`` and ``record`` of an engine over the kernels of ``kernels.hybrid``.
 
     An engine says which compiled module marches (:meth:`module`), and what stands for the system there: model, tables
     and work (:meth:`given`).
     """
 
+    name: str  # "exact", "taylor" or "rkf45"
     traced: Traced
     scale: FloatArray
     net: Any  # ``kernels.records.Net``
 
     @abstractmethod
     def prepare(self, points: FloatArray) -> Any:
-        """See :class:`nonsmooth.flow.engines.engine.Engine`."""
+        """Tables for the parameter points ``points`` (P, n_parameters), to be passed to the calls below."""
 
     @abstractmethod
     def module(self) -> ModuleType:
@@ -61,7 +67,7 @@ class LoopEngine(ABC):
         """The present thread's way into the kernels."""
         local = self._threads
         if not hasattr(local, "march"):
-            local.march = March(self.module(), self._limit)
+            local.march = March(self.module(), self.limit)
         found: March = local.march
         return found
 
@@ -69,9 +75,23 @@ class LoopEngine(ABC):
     def _threads(self) -> threading.local:
         return threading.local()
 
-    def outputs_of(self, tables: Any) -> int:
-        """Number of outputs whose extremes are kept."""
-        return len(self.traced.outputs)
+    def kept(self, points: int, keep: int) -> Kept:
+        """Room for ``keep`` section points of each of so many runs."""
+        n = len(self.scale)
+        room_for(8.0 * points * keep * (n + 2), f"{points:.6g} x {keep:.6g} section points", "ask for fewer of them")
+        return Kept.room(points, keep, n, n + len(self.traced.indicators) + len(self.traced.outputs))
+
+    @property
+    def own_systems(self) -> bool:
+        """Return whether each point has a transition table, or all tables, of its own."""
+        return self.phases is not None
+
+    def enter(self, tables: Any, i: int, state: State) -> tuple[Any, int]:
+        """Tables and row under which point i is run; the state's mode gets the number that it has there."""
+        return tables, i
+
+    def leave(self, here: Any, state: State) -> None:  # noqa: B027
+        """The reverse of :meth:`enter`, for a state."""
 
     def go_on(self, tables: Any, march: March, system: Any) -> bool:
         """Give a run that has paused what it waits for; True where that exchanged model, tables or work.
@@ -89,22 +109,19 @@ class LoopEngine(ABC):
     def _answer(self, waits: int, tables: Any, march: March, system: Any) -> int:
         """Say where a transition that is asked leads, and which one is taken; -1 at a start."""
         decider, i, local, work = self.traced.decider, int(march.orders[0]), self._threads, system[3]
-        assert decider is not None and march.state is not None
-        begins = work.tally[BEGUN] == 0
+        assert decider is not None
         if getattr(local, "asked", None) != (id(tables), i):
             local.asked, local.rows = (id(tables), i), decider.rows(decider.form.evaluate(tables.points[i : i + 1]), 0)
         rows: Rows = local.rows
-        w = rows.augmented(march.state.u if begins else work.w[: rows.n], float(work.memo[TIME]))
-        mode = int(work.tally[MODE])
-        pattern = decider.visited[mode]
-        if begins:
-            found = begun(rows, decider.mode, pattern, w)
-            march.state.counters[:2], march.state.u[:] = (decider.number(found.pattern), 1), found.states
-            return -1
-        found = decide(rows, decider.mode, pattern, w, self.step_in(mode, system))
-        if not found.struck:
+        w, mode = rows.augmented(work.w[: rows.n], float(work.memo[TIME])), int(work.tally[MODE])
+        if work.tally[STARTS]:
+            found, taken = begun(rows, decider.mode, decider.visited[mode], w), -1
+            work.tally[MODE] = decider.number(found.pattern)
+        else:
+            found = decide(rows, decider.mode, decider.visited[mode], w, self.step_in(mode, system))
+            taken = decider.found(waits, decider.number(found.pattern), found.struck)
+        if taken < 0 or not found.struck:
             work.w[: rows.n] = found.states
-        taken = decider.found(waits, decider.number(found.pattern), found.struck)
         work.tally[WAITS] = taken + 1
         return taken
 
@@ -137,7 +154,7 @@ class LoopEngine(ABC):
         return _samples(np.empty(0), n_u, n_m), _crossings(0, n_u, n_m), _touches(0, n_u)
 
     @cached_property
-    def _limit(self) -> FloatArray:
+    def limit(self) -> FloatArray:
         return DIVERGENCE * np.asarray(self.scale, dtype=float)
 
     def system(self, tables: Any, i: int, indicator: int = -1) -> tuple[Any, Any, Any, Any]:
@@ -153,9 +170,13 @@ class LoopEngine(ABC):
 
     def chain(
         self, tables: Any, first: int, last: int, state: State, starts: FloatArray | None,
-        plan: SectionPlan, transient: int, keep: int, out: Chain,
+        plan: Section, transient: int, keep: int, out: Kept,
     ) -> None:  # fmt: skip
-        """See :class:`nonsmooth.flow.engines.engine.Engine`."""
+        """Points ``first <= i < last``: run ``transient`` section returns, then ``keep`` more into ``out``.
+
+        With ``starts`` None each point goes on from ``state`` (carried along, left at the end of the last point); else
+        point i begins afresh at ``starts[i]`` in the first mode, at t = 0. Releases the GIL. A point that fails gets
+        its status; the next carried one then starts from the last finite state of the previous good point."""
         if self.phases is not None and last - first > 1:  # each point has a net of its own
             for i in range(first, last):
                 self.chain(tables, i, i + 1, state, starts, plan, transient, keep, out)
@@ -164,10 +185,11 @@ class LoopEngine(ABC):
         if carry:
             state.keep_phase(float(tables.period[first]), plan.phase if plan.indicator < 0 else -1.0)
             state.clock[2] = 0.0  # for the kernel: done, take the time as it stands
-        begun = None if starts is None else _with_memory(starts, state.memory)
+        if starts is not None:  # every start begins with the memory that is given
+            starts = np.ascontiguousarray(np.hstack([starts, np.tile(state.memory, (len(starts), 1))]), dtype=float)
         state.counters[1] = int(carry and state.settled)
         march = self.march()
-        march.returns(first, last, state, begun, plan, transient, keep, out)
+        march.returns(first, last, state, starts, plan, transient, keep, out)
         self._run(march, tables, plan.indicator)
         if carry:
             state.settled = True
@@ -177,7 +199,7 @@ class LoopEngine(ABC):
     def _run(self, march: March, tables: Any, indicator: int = -1) -> tuple[int, Any]:
         """March until the goal is reached or a log is full; Ctrl-C comes in between. Returns the code, and the work."""
         system = self.system(tables, int(march.orders[0]), indicator)
-        system[3].tally[BEGUN] = system[3].tally[WAITS] = 0
+        system[3].tally[BEGUN] = system[3].tally[STARTS] = system[3].tally[WAITS] = 0
         return self._go_on(march, tables, indicator, system)
 
     def _go_on(self, march: March, tables: Any, indicator: int, system: Any) -> tuple[int, Any]:
@@ -186,7 +208,7 @@ class LoopEngine(ABC):
             code = march.run(system)
             if self.go_on(tables, march, system):
                 system = self.system(tables, int(march.orders[0]), indicator)
-            _end_if_not_wanted()
+            end_if_not_wanted()
         return code, system
 
     def room(self, tables: Any) -> Any:
@@ -197,12 +219,13 @@ class LoopEngine(ABC):
     def record(
         self, tables: Any, state: State, until: float, samples: FloatArray, room: Any = None
     ) -> Log:
-        """See :class:`nonsmooth.flow.engines.engine.Engine`. A state that a mode lacks is NaN."""
+        """Point 0: march ``state`` to the time ``until``, with dense samples at the increasing absolute times
+        ``samples`` (a sample exactly at a crossing is the limit after it). A state that a mode lacks is NaN."""
         from nonsmooth.kernels.hybrid import records
 
         n, n_u, n_m = len(samples), len(self.scale), len(self.traced.m)
         sampled = _samples(samples, n_u, n_m) if n else self._none[0]
-        crossings, touches = LoopEngine.room(self, tables) if room is None else room
+        crossings, touches = Engine.room(self, tables) if room is None else room
         spare, march = self.touches_of_a_leg(), self.march()
         state.counters[1] = int(state.settled)
         march.logged(state, float(until))
@@ -230,12 +253,8 @@ class LoopEngine(ABC):
         )  # fmt: skip
 
 
-def _with_memory(starts: FloatArray, memory: FloatArray) -> FloatArray:
-    """States and memory side by side: every start begins with the memory that is given."""
-    return np.ascontiguousarray(np.hstack([starts, np.tile(memory, (len(starts), 1))]), dtype=float)
-
-
-def _end_if_not_wanted() -> None:
+def end_if_not_wanted() -> None:
+    """Raise KeyboardInterrupt where the work of this thread is not wanted any more."""
     if flag()[0]:
         raise KeyboardInterrupt
 
@@ -287,7 +306,7 @@ def _change(traced: Traced, jump: TracedTransition) -> int:
 def pack_net(traced: Traced) -> Any:
     """The transition table (``kernels.records.Net``), with two more rows for a section.
 
-    Phases that depend on the parameters are zero here; see :meth:`LoopEngine.net_of`."""
+    Phases that depend on the parameters are zero here; see :meth:`Engine.net_of`."""
     from nonsmooth.kernels.hybrid.records import Net
 
     integer, jumps, modes = np.int64, traced.transitions, range(len(traced.mode_names))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import Chain, FloatArray, SectionPlan, State
+from nonsmooth.flow.engines.engine import FloatArray, Kept, Section, State
 from nonsmooth.kernels.hybrid.places import GROW, LOGGED, PATIENCE, RETURNS_OF_SECTION
 
 __all__ = ["March"]
@@ -20,27 +20,26 @@ class March:
 
     def __init__(self, module: ModuleType, limit: FloatArray) -> None:
         from nonsmooth.kernels.compile.pointers import Block
-        from nonsmooth.kernels.hybrid.blocks import call_block, growth_block, kept_block, log_block
-        from nonsmooth.kernels.hybrid.records import N_ORDERS, N_REALS
+        from nonsmooth.kernels.hybrid import blocks, records
 
         self.module, self.limit = module, limit
-        self.state: State | None = None  # that goes on
         self.system = Block(module.SYSTEM, module.put_system)
-        self.call, self.kept, self.log, self.growth = call_block(), kept_block(), log_block(), growth_block()
-        self.orders, self.reals = np.zeros(N_ORDERS, dtype=np.int64), np.zeros(N_REALS)
+        self.call, self.kept = Block(records.CALL, blocks.put_call), Block(records.KEPT, blocks.put_kept)
+        self.log, self.growth = Block(records.LOG, blocks.put_log), Block(records.GROWTH, blocks.put_growth)
+        self.orders, self.reals = np.zeros(records.N_ORDERS, dtype=np.int64), np.zeros(records.N_REALS)
 
     def returns(
-        self, first: int, last: int, state: State, starts: FloatArray | None, plan: SectionPlan, transient: int,
-        keep: int, out: Chain,
+        self, first: int, last: int, state: State, starts: FloatArray | None, plan: Section, transient: int,
+        keep: int, out: Kept,
     ) -> None:  # fmt: skip
-        """Ask for section returns of some points; see :class:`nonsmooth.flow.engines.engine.Engine`."""
+        """Ask for section returns of some points; see :class:`nonsmooth.flow.engines.loop.Engine`."""
         self.orders[:] = (
             first, last, RETURNS_OF_SECTION, transient, keep, PATIENCE, plan.indicator, plan.rising, plan.mode,
-            plan.after, plan.every, plan.extremes,
+            plan.after, plan.every, plan.extremes, -1,
         )  # fmt: skip
         phase = plan.phase if plan.indicator < 0 else -1.0
         self.reals[:] = 0.0, 0.0, phase, min(plan.t_max, 1e300)
-        self.kept.put(out.record())
+        self.kept.put(out)
         self._ask(state, _NO_STARTS if starts is None else starts)
 
     def logged(self, state: State, until: float) -> None:
@@ -63,10 +62,9 @@ class March:
 
     def _anywhere(self, i: int, kind: int, keep: int) -> None:
         """A run that knows no section."""
-        self.orders[:] = i, i + 1, kind, 0, keep, PATIENCE, -1, 0, -1, 0, 1, 0
+        self.orders[:] = i, i + 1, kind, 0, keep, PATIENCE, -1, 0, -1, 0, 1, 0, -1
 
     def _ask(self, state: State, starts: FloatArray) -> None:
         from nonsmooth.kernels.hybrid.records import Call
 
-        self.state = state
         self.call.put(Call(self.orders, self.reals, self.limit, starts, state.motion()))

@@ -10,7 +10,8 @@ import numpy as np
 
 from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import float_array, real_number, whole_number
-from nonsmooth.flow.engines.engine import Engine, FloatArray
+from nonsmooth.flow.engines.engine import FloatArray
+from nonsmooth.flow.engines.loop import Engine
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced

@@ -9,20 +9,20 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import Chain, FloatArray, IntArray, Log, SectionPlan, State
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Log, Section, State
 from nonsmooth.flow.engines.linear import table_bytes
-from nonsmooth.flow.engines.loop import LoopEngine
+from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.march import March
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.kernels.hybrid.places import BEGUN, MODE, RESET, TIME, WAITS
+from nonsmooth.kernels.hybrid.places import MODE, RESET, STARTS, TIME, WAITS
 from nonsmooth.results.memory import free_memory, room_for
-from nonsmooth.system.derived.deciding import begun, decide
+from nonsmooth.system.derived.deciding import Outcome, begun, decide
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, FOUND, TOGETHER
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Points:
 
 
 @dataclass
-class PatternEngine(LoopEngine):
+class PatternEngine(Engine):
     """``Engine`` over ``kernels.linear`` for a system whose patterns are made when they are visited."""
 
     traced: Traced
@@ -72,22 +72,31 @@ class PatternEngine(LoopEngine):
     def net_of(self, tables: Any, i: int) -> Any:
         return tables.net
 
+    own_systems = True
+
+    def enter(self, tables: Points, i: int, state: State) -> tuple[PatternTables, int]:
+        here = self._at(tables, i)
+        here.enter(state)
+        return here, 0
+
+    def leave(self, here: PatternTables, state: State) -> None:
+        here.leave(state)
+
     def touches_of_a_leg(self) -> int:
         """None: an extremum of each condition of each element, in a hundred states, would fill the memory."""
         return 0
 
     def go_on(self, tables: Any, march: March, system: Any) -> bool:
-        tables.complete(march, system[3])
+        tables.complete()
         return True
 
     def chain(
         self, tables: Points, first: int, last: int, state: State, starts: FloatArray | None,
-        plan: SectionPlan, transient: int, keep: int, out: Chain,
+        plan: Section, transient: int, keep: int, out: Kept,
     ) -> None:  # fmt: skip
         for i in range(first, last):
-            here = self._at(tables, i)
-            here.enter(state)
-            one = Chain(*[getattr(out, part.name)[i : i + 1] for part in fields(Chain)])
+            here, _ = self.enter(tables, i, state)
+            one = Kept(*[part[i : i + 1] for part in out])
             own = None if starts is None else starts[i : i + 1]
             super().chain(here, 0, 1, state, own, plan, transient, keep, one)
             here.leave(state)
@@ -99,8 +108,7 @@ class PatternEngine(LoopEngine):
         """None: a pattern that is met for the first time changes the memory."""
 
     def record(self, tables: Points, state: State, until: float, samples: FloatArray, room: Any = None) -> Log:
-        here = self._at(tables, 0)
-        here.enter(state)
+        here, _ = self.enter(tables, 0, state)
         log = super().record(here, state, until, samples)
         here.leave(state)
         numbers = np.array(here.numbers, dtype=np.int64)
@@ -192,9 +200,10 @@ class PatternTables:
             every[t] = self.patterns.transition(*ends, lead.element, lead.rows)
         return every[taken]
 
-    def complete(self, march: March, work: Any) -> None:
+    def complete(self) -> None:
         """Make the mode for which a run waits, or say where what it has asked leads."""
-        waits = int(work.tally[WAITS]) - 1
+        tally = self.work.tally
+        waits = int(tally[WAITS]) - 1
         if waits < 0:
             return
         lead, rows, mode = self.leads[waits], self.rows, self.patterns.mode
@@ -202,29 +211,33 @@ class PatternTables:
             if self.transitions[waits, 0] < 0:
                 self.add(lead.target)
             return
-        state, begins = march.state, work.tally[BEGUN] == 0
-        assert state is not None
-        w = rows.augmented(state.u if begins else work.w[: rows.n], float(work.memo[TIME]))
-        pattern = self.patterns.visited[self.numbers[int(work.tally[MODE])]]
-        if begins:
+        w, here = rows.augmented(self.work.w[: rows.n], float(self.work.memo[TIME])), int(tally[MODE])
+        pattern = self.patterns.visited[self.numbers[here]]
+        if tally[STARTS]:
             found = begun(rows, mode, pattern, w)
-            state.counters[0], state.counters[1], state.u[:] = self.place(found.pattern), 1, found.states
-            return
-        found = decide(rows, mode, pattern, w, float(self.own.info[int(work.tally[MODE]), 0]))
-        if not found.struck:
-            work.w[: rows.n] = found.states
-        struck = tuple(k for k, _ in found.struck)
+            target, taken = self.place(found.pattern), -1
+            self.work.tally[MODE] = target
+        else:
+            found = decide(rows, mode, pattern, w, float(self.own.info[here, 0]))
+            taken = self._answer(waits, found)
+        if taken < 0 or not found.struck:
+            self.work.w[: rows.n] = found.states
+        self.work.tally[WAITS] = taken + 1
+
+    def _answer(self, waits: int, found: Outcome) -> int:
+        """The transition to which a question has led; it is made where it is new."""
+        lead, struck = self.leads[waits], tuple(k for k, _ in found.struck)
         key = waits, self.place(found.pattern), struck
         if key not in self.answers:
             self.answers[key] = len(self.leads)
-            number = self._map(rows.impact(struck, mode)) if struck else 0
+            number = self._map(self.rows.impact(struck, self.patterns.mode)) if struck else 0
             contact = bool(struck) or self.numbers[lead.source] == 0
             way = (key[1], RESET if struck else 0, int(contact), number, 0)
             self.transitions = np.concatenate([self.transitions, np.array([way], dtype=np.int64)])
             self.leads.append(Lead(lead.source, found.pattern, lead.element, lead.rows, FOUND))
             self.lengths.append(0)
             self.form, self.net = self.form._replace(**self._maps()), self._net()
-        work.tally[WAITS] = self.answers[key] + 1
+        return self.answers[key]
 
     def place(self, pattern: Pattern) -> int:
         """The number of a pattern here; it is made where it is new."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.layers import Layers, layers
-from nonsmooth.flow.engines.loop import DIVERGENCE, LoopEngine, pack_net
+from nonsmooth.flow.engines.loop import DIVERGENCE, Engine, pack_net
 from nonsmooth.flow.engines.series_tables import Tables, periods, work_of
 from nonsmooth.kernels.series.places import METHODS
 
@@ -36,7 +36,7 @@ def order_for(rtol: float, fixed_step: bool = False) -> int:
 
 
 @dataclass
-class SeriesEngine(LoopEngine):
+class SeriesEngine(Engine):
     """``Engine`` over ``kernels.series`` for one system, method and tolerance.
 
     Parameters

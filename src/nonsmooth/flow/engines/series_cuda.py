@@ -2,40 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, SectionPlan
-from nonsmooth.flow.engines.launches import States, launch
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Section
+from nonsmooth.flow.engines.launches import OnGpu, States
 from nonsmooth.flow.engines.series import SeriesEngine
 from nonsmooth.flow.engines.series_tables import Tables
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.series.places import METHODS
 
-__all__ = ["PART", "STEPS", "Buffers", "SeriesOnGpu", "module_of"]
+__all__ = ["PART", "STEPS", "SeriesOnGpu", "module_of"]
 
 STEPS = 1024  # of one launch, at most: below a second also on a small GPU
 PART = 0.75  # of ``devices.batch_size`` in one launch: what the registers hold by the compiler's choice (168 of each)
-
-
-@dataclass
-class Buffers:
-    """Room for what a run leaves behind for N trajectories, on the GPU, and what it needs to go on after a launch."""
-
-    whole: Any  # (numbers, N)
-    real: Any
-    section: Any  # (N, keep, n + 2): section points with time and mode
-    maximum: Any  # (N, rows): of states, indicators, outputs
-    minimum: Any
-    crossings: Any  # (N,)
-    contacts: Any
-    elapsed: Any
-    status: Any
-
-    def all(self) -> tuple[Any, ...]:
-        return tuple(vars(self).values())
 
 
 def module_of(engine: SeriesEngine, tables: Tables) -> Any:
@@ -62,7 +43,7 @@ def _filled(array: Any, shape: tuple[int, ...]) -> Any:
     return array if array.size else np.zeros(shape, dtype=array.dtype)
 
 
-class SeriesOnGpu:
+class SeriesOnGpu(OnGpu):
     """An engine's parameter points on the GPU, and the runs from there to a section.
 
     Parameters
@@ -70,10 +51,10 @@ class SeriesOnGpu:
     engine : SeriesEngine
         ``"taylor"`` with crossings located.
     points : array (P, n_parameters)
-    plan : SectionPlan
+    plan : Section
     """
 
-    def __init__(self, engine: SeriesEngine, points: FloatArray, plan: SectionPlan) -> None:
+    def __init__(self, engine: SeriesEngine, points: FloatArray, plan: Section) -> None:
         from nonsmooth.kernels.cuda.target import THREADS, cuda
 
         tables = engine.prepare(points)
@@ -83,6 +64,7 @@ class SeriesOnGpu:
         self.module, self.cuda, self.threads, self.plan = module_of(engine, tables), cuda, THREADS, plan
         self.period: FloatArray = tables.period
         self.repeats = engine.repeats
+        self._rooms: dict[int, tuple[Any, Any]] = {}
         columns = points.T if points.shape[1] else np.zeros((1, len(points)))
         phase = plan.phase if plan.indicator < 0 else 0.0
         step = 0.0 if engine.step is None else engine.step
@@ -93,27 +75,21 @@ class SeriesOnGpu:
             cuda.to_device(np.array([engine.rtol, step, phase, min(plan.t_max, 1e300)])),
         )
 
-    def launch(self, entry: Any, jobs: IntArray, *arguments: Any) -> None:
-        """One thread for each job; waits for nothing."""
-        launch(entry, self.threads, self.cuda.to_device(jobs), *arguments)
-
-    def buffers(self, n: int, keep: int) -> Buffers:
-        """Room for ``keep`` section points of each of n trajectories."""
-        array, whole, module = self.cuda.device_array, np.int64, self.module
-        return Buffers(
-            array((module.N_WHOLE, n), whole), array((module.N_REAL, n)), array((n, max(keep, 1), self.n + 2)),
-            array((n, self.rows)), array((n, self.rows)), array(n, whole), array(n, whole), array(n), array(n, whole),
-        )  # fmt: skip
-
-    def extremes(self, out: Buffers) -> tuple[FloatArray, FloatArray]:
-        """Maxima and minima (N, rows) of states, indicators and outputs over the kept window."""
-        high, low = out.maximum.copy_to_host(), out.minimum.copy_to_host()
+    def extremes(self, found: FloatArray) -> FloatArray:
+        """Extremes (N, rows) of states, indicators and outputs, from what stands in :class:`Kept`."""
         for row, original in self.repeats.items():
-            high[:, row], low[:, row] = high[:, original], low[:, original]
-        return high, low
+            found[:, row] = found[:, original]
+        return found
+
+    def _between(self, n: int) -> tuple[Any, Any]:
+        """Room for what n trajectories need to go on after a launch."""
+        if n not in self._rooms:
+            array, module = self.cuda.device_array, self.module
+            self._rooms[n] = array((module.N_WHOLE, n), np.int64), array((module.N_REAL, n))
+        return self._rooms[n]
 
     def run(
-        self, jobs: IntArray, states: States, transient: Any, keep: Any, out: Buffers, settled: Any = False,
+        self, jobs: IntArray, states: States, transient: Any, keep: Any, out: Kept, settled: Any = False,
         *, extremes: bool = True, one_more: None = None,
     ) -> IntArray:  # fmt: skip
         """March jobs by ``transient`` returns, then ``keep`` more into ``out`` (numbers, or one for each trajectory).
@@ -137,13 +113,13 @@ class SeriesOnGpu:
         while len(under_way):
             self.launch(
                 self.module.advance, under_way, states.rows, *self.tables, states.all(), (begun, *counts),
-                (fresh, STEPS), out.all(),
+                (fresh, STEPS), self._between(n), tuple(out),
             )  # fmt: skip
             under_way, fresh = under_way[out.status.copy_to_host()[under_way] == codes.PAUSED], 0
         return jobs[np.isin(out.status.copy_to_host()[jobs], (codes.OK, codes.NOT_GUARANTEED))]
 
     def run_beside(
-        self, jobs: IntArray, others: States, period: IntArray, whole: Buffers, arrived: Buffers, extremes: bool
+        self, jobs: IntArray, others: States, period: IntArray, whole: Kept, arrived: Kept, extremes: bool
     ) -> None:
         """March jobs j by period[j] returns into ``whole``, and their neighbours, which stand behind them in
         ``others``; of these the last return goes into ``arrived``. (Extremes are always there.)"""

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.attractors.settle import Attractors, longest_period, tolerance_of
-from nonsmooth.attractors.settled import usable
-from nonsmooth.flow.engines.engine import Chain, SectionPlan, State
+from nonsmooth.attractors.mapper import Mapper
+from nonsmooth.attractors.settle import longest_period
+from nonsmooth.attractors.settled import Settled, usable
+from nonsmooth.attractors.settler import Settler
+from nonsmooth.flow.engines.engine import Kept, Section, State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.sections import Stroboscopic, section_plan
@@ -73,38 +74,35 @@ class Motions:
         self.engine = engine_for(self.system, **options)
         self.points = np.array([one.parameter_vector() for one in systems])
         keep = max(keep, max_period + 1)
-        self.rules = Attractors(
-            self.engine, self.engine.prepare(self.points), self._plan(phase), transient, keep,
-            longest_period(keep, max_period), tolerance_of(self.engine, options.get("rtol")),
-            self.system.scale_vector(),
+        self.settler = Settler(
+            self.system, self.engine, self._plan(phase), transient, keep, longest_period(keep, max_period), False,
+            rtol=options.get("rtol"),
         )  # fmt: skip
-        self.out = self._buffers(len(systems), keep)
 
-    def _plan(self, phase: float) -> SectionPlan:
+    def _plan(self, phase: float) -> Section:
         return section_plan(self.system, Stroboscopic(phase))[1]
 
-    def _buffers(self, points: int, keep: int) -> Chain:
-        traced = self.system.traced
-        return Chain.empty(points, keep, len(traced.u), len(traced.indicators), len(traced.outputs))
-
-    def _state(self, start: Any = None) -> State:
-        u = np.zeros(len(self.system.states)) if start is None else np.array(start, dtype=np.float64)
-        return State(u, self.system.memory_vector())
+    def _state(self, start: FloatArray) -> State:
+        return State(start.copy(), self.system.memory_vector())
 
     def _alone(self, i: int) -> Any:
         return self.engine.prepare(self.points[i : i + 1])
 
     def carried(self, order: Iterable[int]) -> tuple[FloatArray, NDArray[np.int64]]:
         """Section points and period numbers of all systems, the state carried from one to the next, from rest."""
-        periods = np.zeros(len(self.periods), dtype=np.int64)
-        sections = np.full_like(self.out.section, np.nan)
-        state = self._state()
-        for i in order:
-            verdict = self.rules.settle(i, state, self.out, self._state)
-            periods[i] = verdict.period_number
-            if usable(verdict.status):
-                sections[i] = self.out.section[i]
+        rows, periods = np.array([*order], dtype=np.int64), np.zeros(len(self.periods), dtype=np.int64)
+        sections = self.engine.kept(len(periods), self.settler.keep).section
+        kept, found = self._settled(rows, np.zeros((len(rows), sections.shape[2])), 2)
+        periods[rows], good = found.period_number, usable(found.status)
+        sections[rows[good]] = kept.section[good]
         return sections[..., self.places], periods
+
+    def _settled(self, rows: NDArray[np.int64], starts: FloatArray, carried: int) -> tuple[Kept, Settled]:
+        """The kept returns of jobs, and what is known of them."""
+        kept, into = self.engine.kept(len(rows), self.settler.keep), np.arange(len(rows))
+        mapper = Mapper(self.settler, self.engine.prepare(self.points), rows, starts, kept=kept, into=into)
+        mapper.settle(self.settler.rules(), carried, False)(len(rows))
+        return kept, mapper.settled()
 
     def attractors(self, i: int, starts: Any) -> list[Attractor]:
         """The different motions of system i that the starts settle on, in the order of the starts.
@@ -119,11 +117,11 @@ class Motions:
         found: list[Attractor] = []
         orbits: list[FloatArray] = []
         statuses = set()
-        for k, start in enumerate(np.atleast_2d(starts)):
-            verdict = self.rules.settle(i, self._state(start), self.out, partial(self._state, start))
-            statuses.add(int(verdict.status))
-            points, number = self.out.section[i].copy(), verdict.period_number
-            if not usable(verdict.status) or not np.isfinite(points).all():
+        begin = np.atleast_2d(np.asarray(starts, dtype=float))
+        kept, runs = self._settled(np.full(len(begin), i), begin, 0)
+        for k, (points, number) in enumerate(zip(kept.section, runs.period_number, strict=True)):
+            statuses.add(int(runs.status[k]))
+            if not usable(runs.status[k]) or not np.isfinite(points).all():
                 continue
             size = np.maximum(np.ptp(points, axis=0), 1e-3 * self.system.scale_vector())
             cycle = points[-max(int(number), 1) :]
@@ -142,8 +140,8 @@ class Motions:
     def cloud(self, i: int, attractor: Attractor, phase: float, n: int) -> FloatArray:
         """Successive points of the section at ``phase``: (n, states); those of a periodic motion come round again."""
         count = attractor.period_number or n
-        out = self._buffers(1, count)
-        plan = replace(self._plan(phase), extremes=False)
+        out = self.engine.kept(1, count)
+        plan = self._plan(phase)._replace(extremes=False)
         start = attractor.point[None, :]
         self.engine.chain(self._alone(i), 0, 1, self._state(start[0]), start, plan, 0, count, out)
         if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):

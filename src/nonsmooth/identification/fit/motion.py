@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.flow.engines.engine import Engine, Log, State
+from nonsmooth.flow.engines.engine import Log, State
+from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.sensitivity import apart, settled
 from nonsmooth.flow.variational import VariationalFlow

@@ -23,8 +23,6 @@ from typing import Any
 from nonsmooth.kernels.compile.target import AHEAD, level
 from nonsmooth.kernels.series.places import METHODS
 
-__all__ = ["STEPPERS", "compile_ahead", "kernels_of", "plain_files", "tasks"]
-
 STEPPERS = (*METHODS, "linear", "planar")
 JOINED = ("kernels.hybrid.run", "kernels.linear.modes")  # texts of modules that are made for a stepper
 _ROOT = Path(__file__).parents[2]

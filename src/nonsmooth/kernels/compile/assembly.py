@@ -11,8 +11,6 @@ import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-__all__ = ["joined", "with_numbers"]
-
 _ROOM = Path(__file__).parents[1]
 #: Files that name a place others can take: what is imported of them is in the joined text under the same name.
 _PLACES = ("linear.stepper", "linear.extremes", "linear.touches")

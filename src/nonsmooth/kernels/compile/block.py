@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["one_block"]
-
 LINE = 64  # bytes of a cache line
 PAGE = 4096
 

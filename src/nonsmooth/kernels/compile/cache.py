@@ -49,11 +49,6 @@ from nonsmooth.kernels.compile.folder import (
 )
 from nonsmooth.kernels.compile.target import Function, made_ahead
 
-__all__ = [
-    "cache_statistics", "callback", "compiled", "device", "inline", "kernel", "load_module", "once", "reached",
-    "summed",
-]  # fmt: skip
-
 # Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
 # What only kernels call needs no way in from Python. Numba takes over what is not set here (``forceinline``, fastmath)

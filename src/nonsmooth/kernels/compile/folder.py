@@ -20,8 +20,6 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-__all__ = ["cache_folder", "make_private", "mark_used", "prune", "read_private", "usable_folder", "write_atomically"]
-
 UNUSED_DAYS = 90.0
 #: Names that `cache` gives: of code, and of a generated module by the hash of its text; unfinished ones have more.
 _ENTRY = re.compile(r".+(-[0-9a-f]{32}\.nbc|_(?P<module>[0-9a-f]{20})\.py)(?P<unfinished>\.[0-9a-f]{12}\.tmp)?")

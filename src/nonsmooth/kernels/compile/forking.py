@@ -16,8 +16,6 @@ from functools import cached_property
 from types import CodeType, FrameType
 from typing import Any
 
-__all__ = ["is_importing", "watch_forks"]
-
 _OFTEN = 0.002  # seconds between two looks
 _LONGEST = 120.0  # seconds; a module that waits for the fork itself must not hold it up for ever
 _COMPUTED_ONCE = cached_property.__get__.__code__

@@ -17,11 +17,6 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic, models, register_model
 
-__all__ = [
-    "FOUR", "apart", "four_at", "load", "number_at", "plus", "store", "sum_columns", "times", "whole_at", "write_four",
-    "write_number",
-]  # fmt: skip
-
 FOUR = 4  # numbers of a vector that is a value in a kernel
 MOST = 8  # vectors of a column that are summed side by side: they keep the processor busy
 CONTRACT = ("contract",)

@@ -24,8 +24,6 @@ from llvmlite import ir
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-__all__ = ["Block", "addresses", "function_at", "stored"]
-
 _DISABLED = bool(numba.config.DISABLE_JIT)
 
 
@@ -64,7 +62,7 @@ def function_at(function_type: Any) -> Any:
 def stored(kind: Any) -> tuple[Any, Any]:
     """Functions for use inside kernels that write a record of this type to an address, and read it there."""
     if _DISABLED:
-        return lambda address, record: address.append(record), lambda address: address[-1]
+        return lambda address, record: address.append(record), lambda address: address[-1] if address else None
 
     @intrinsic
     def put(typing_context: Any, address: Any, record: Any) -> Any:

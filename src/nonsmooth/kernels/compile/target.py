@@ -22,8 +22,6 @@ from llvmlite.binding import create_new_function_pass_manager
 from numba.core.codegen import JITCPUCodegen, get_host_cpu_features
 from numba.core.registry import CPUDispatcher, CPUTarget, cpu_target
 
-__all__ = ["AHEAD", "LEVELS", "Function", "level", "made_ahead"]
-
 AHEAD = Path(__file__).parents[1] / "ahead"  # a folder for each level; what they hold comes with the package
 
 _V2 = "cx16 popcnt sahf sse3 sse4.1 sse4.2 ssse3"

@@ -9,9 +9,11 @@ of the next launch, and a launch stays short.
 from nonsmooth.kernels.cuda.tables import tabled
 from nonsmooth.kernels.cuda.target import cuda, device, entry
 from nonsmooth.kernels.hybrid.codes import OK
+from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.hybrid.loop import leave, march
 from nonsmooth.kernels.hybrid.places import BEGUN, RETURNS_OF_SECTION
-from nonsmooth.kernels.hybrid.records import Goal, Kept, Motion, Net, Section, Seen
+from nonsmooth.kernels.hybrid.records import Goal, Motion, Net, Seen
+from nonsmooth.kernels.hybrid.sections import window_of
 from nonsmooth.kernels.linear.extremes import finish
 
 
@@ -19,28 +21,16 @@ from nonsmooth.kernels.linear.extremes import finish
 def go(motion, form, net, phase, limit, plan, transient, keep, out, scratch):
     """Run the one parameter row on from a motion, which is left where it ends. Returns the status."""
     tables, work = scratch
-    section = Section(plan[0], plan[1], plan[2], plan[3], plan[4], plan[5], phase, 1e300)
+    section = Section(phase, plan[0], plan[1], plan[2], plan[3], plan[4], 1e300, plan[5])
     goal = Goal(RETURNS_OF_SECTION, transient, keep, 0.0, 0.0, limit, 1 << 62)
     code = march(0, form, net, section, goal, motion, Seen(out, (), ()), tables, work)
     work.tally[BEGUN] = 0
     motion.counters[1] = 0
-    finish(0, form, tables, work, out)
+    finish(form, tables, work, out)
     out.status[0] = code
     if code == OK:
         leave(0, form, motion, work)
     return code
-
-
-@device
-def arrays_of_row(buffers, row):
-    """The arrays that ``go`` writes for one trajectory, from the buffers of all."""
-    section, maximum, minimum, i_max, i_min, o_max, o_min, crossings, contacts, elapsed, times, modes, status = buffers
-    return Kept(
-        section[row : row + 1], maximum[row : row + 1], minimum[row : row + 1], i_max[row : row + 1],
-        i_min[row : row + 1], o_max[row : row + 1], o_min[row : row + 1], crossings[row : row + 1],
-        contacts[row : row + 1], elapsed[row : row + 1], times[row : row + 1], modes[row : row + 1],
-        status[row : row + 1],
-    )  # fmt: skip
 
 
 @entry
@@ -69,7 +59,7 @@ def advance(jobs, rows, point, net, place, counts, plans, way, phase, limit, out
             n_transient, n_keep = n_transient + n_keep - 1 if apart > 0 else 0, 1
         motion = Motion(u[row], u[row, 0:0], clock[row], counters[row])
         plan, into = (plans[1], other) if leg > 0 else (plans[0], out)
-        buffers = arrays_of_row(into, row)
-        code = go(motion, linear, Net(*net), phase, limit, plan, n_transient, n_keep, buffers, scratch)
+        window = window_of(Kept(*into), row)
+        code = go(motion, linear, Net(*net), phase, limit, plan, n_transient, n_keep, window, scratch)
         if code != OK:
             break

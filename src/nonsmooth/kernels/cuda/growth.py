@@ -8,9 +8,10 @@ from numba import float64
 
 from nonsmooth.kernels.cuda.tables import tabled
 from nonsmooth.kernels.cuda.target import cuda, entry
+from nonsmooth.kernels.hybrid.kept import Section
 from nonsmooth.kernels.hybrid.loop import leave, march
 from nonsmooth.kernels.hybrid.places import GROW
-from nonsmooth.kernels.hybrid.records import Goal, Growth, Motion, Net, Section, Seen
+from nonsmooth.kernels.hybrid.records import Goal, Growth, Motion, Net, Seen
 from nonsmooth.kernels.linear.tables import STATES
 
 UNITS = 128  # of time in one launch of ``frames``, at most
@@ -43,7 +44,7 @@ def frames(jobs, rows, point, net, place, count, units, limit, scale, found):
     motion.counters[1] = 0
     seen = Growth(scale, Q[j], logarithms, lengths, sums[j], step, reset, matrix, fields, t_z, turned)
     goal = Goal(GROW, 0, count, 0.0, units[rows[j]], limit, 1 << 62)
-    section = Section(-1, 0, -1, 0, 1, 0, 0.0, 0.0)
+    section = Section(0.0, -1, 0, -1, 0, 1, 0.0, 0)
     status[j] = march(0, form, Net(*net), section, goal, motion, Seen((), (), seen), scratch[0], scratch[1])
     leave(0, form, motion, scratch[1])
     for n in range(count):

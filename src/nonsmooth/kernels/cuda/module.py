@@ -18,8 +18,6 @@ from nonsmooth.kernels.compile.assembly import with_numbers
 from nonsmooth.kernels.compile.cache import load_module
 from nonsmooth.kernels.linear.module import STEPPER
 
-__all__ = ["cuda_linear_module", "joined", "stamp"]
-
 OBSERVERS = {
     "sections": (
         "linear.extremes", "hybrid.sections", "hybrid.observers", "judging.judge", "judging.settle", "judging.exponent",

@@ -7,37 +7,32 @@ them, so that a launch stays short.
 from numba import float64, int64
 
 from nonsmooth.kernels.cuda.advance import go
-from nonsmooth.kernels.cuda.arrays import N_INDICATORS, N_OUTPUTS
+from nonsmooth.kernels.cuda.arrays import N_FUNCTIONALS
 from nonsmooth.kernels.cuda.tables import tabled
 from nonsmooth.kernels.cuda.target import cuda, entry, local
 from nonsmooth.kernels.hybrid.codes import OK
-from nonsmooth.kernels.hybrid.records import Kept, Motion, Net
+from nonsmooth.kernels.hybrid.kept import Kept
+from nonsmooth.kernels.hybrid.records import Motion, Net
 from nonsmooth.kernels.judging.exponent import separate
 
 
 @local
 def single():
     """Room for the results of ``go``, for one return of one trajectory."""
-    section = cuda.local.array((1, 1, 2), float64)
-    top = cuda.local.array((1, 2), float64)
-    bottom = cuda.local.array((1, 2), float64)
-    i_top = cuda.local.array((1, N_INDICATORS), float64)
-    i_bottom = cuda.local.array((1, N_INDICATORS), float64)
-    o_top = cuda.local.array((1, N_OUTPUTS), float64)
-    o_bottom = cuda.local.array((1, N_OUTPUTS), float64)
+    section = cuda.local.array((1, 2), float64)
+    high = cuda.local.array(N_FUNCTIONALS, float64)
+    low = cuda.local.array(N_FUNCTIONALS, float64)
     crossings = cuda.local.array(1, int64)
     contacts = cuda.local.array(1, int64)
     elapsed = cuda.local.array(1, float64)
-    times = cuda.local.array((1, 1), float64)
-    modes = cuda.local.array((1, 1), int64)
+    times = cuda.local.array(1, float64)
+    modes = cuda.local.array(1, int64)
     status = cuda.local.array(1, int64)
-    return Kept(
-        section, top, bottom, i_top, i_bottom, o_top, o_bottom, crossings, contacts, elapsed, times, modes, status
-    )
+    return Kept(section, high, low, crossings, contacts, elapsed, times, modes, status)
 
 
 @entry
-def neighbours(jobs, rows, point, net, place, span, size, pair, plan, phase, limit, status):
+def neighbours(jobs, rows, point, net, place, span, sizes, pair, plan, phase, limit, status):
     """Returns begin <= n < end of each job and its neighbour (``span``: begin, end, batch): see ``exponent``."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
@@ -64,5 +59,5 @@ def neighbours(jobs, rows, point, net, place, span, size, pair, plan, phase, lim
                 break
         if code != OK:
             break
-        separate(n, batch, linear.period[0], motion.u, moved.u, size, offsets[j], sums[j])
+        separate(n, batch, linear.period[0], motion.u, moved.u, sizes[j], offsets[j], sums[j])
     status[j] = code

@@ -15,8 +15,6 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
-__all__ = ["ptx_of", "ptx_of_module", "resources_of"]
-
 CAPABILITY = (9, 0)
 
 

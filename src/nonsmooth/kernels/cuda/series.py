@@ -14,9 +14,11 @@ from numba import float64, int64
 
 from nonsmooth.kernels.cuda.target import cuda, entry, local, once
 from nonsmooth.kernels.hybrid.codes import PAUSED
+from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.hybrid.loop import leave, march
 from nonsmooth.kernels.hybrid.places import BEGUN, RETURNS_OF_SECTION
-from nonsmooth.kernels.hybrid.records import Generated, Goal, Kept, Motion, Net, Section, Seen, SeriesWork
+from nonsmooth.kernels.hybrid.records import Generated, Goal, Motion, Net, Seen, SeriesWork
+from nonsmooth.kernels.hybrid.sections import window_of
 from nonsmooth.kernels.series.places import N_SERIES_MEMO, N_SERIES_TALLY, OPEN_STEP, READY, ZERO_ROW
 from nonsmooth.kernels.series.polynomial import stack_size
 
@@ -37,7 +39,6 @@ N_U = LACKING.shape[1]
 N_MODES = LACKING.shape[0]
 N_ROWS = ROWS.shape[0]
 ALL_ROWS = N_U + N_INDICATORS + N_OUTPUTS + N_GUARDS
-SEEN_ROWS = N_U + N_INDICATORS + N_OUTPUTS
 N_Q = max(N_PARAMETERS + N_MEMORY, 1)
 N_SIDES = max(N_INDICATORS, 1)
 N_VALUES = max(ALL_ROWS - N_U, 1)
@@ -101,13 +102,13 @@ def may_pause(work):
 
 
 @entry
-def advance(jobs, rows, point, norms, plan, settings, place, counts, way, out):
+def advance(jobs, rows, point, norms, plan, settings, place, counts, way, between, out):
     """Thread k: march the state of job j = jobs[k] at parameter point rows[j] by transient[j] section returns, then
     keep[j] more, whose points and extremes are kept (one number for all jobs where these arrays are short).
 
     ``way``: fresh, pause; fresh = 1 begins a run, 0 goes on with one whose status is PAUSED. ``point``: parameters,
     periods of all; ``place``: states, memory, clocks, counters; ``counts``: settled, transient, keep;
-    ``out``: what is kept between launches, then as in ``Kept``. ``plan``: indicator, rising, mode, after,
+    ``between``: what is kept between launches; ``out``: as in ``Kept``. ``plan``: indicator, rising, mode, after,
     every; ``settings``: rtol, fixed step, phase of the section, longest wait for a return."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
@@ -118,7 +119,7 @@ def advance(jobs, rows, point, norms, plan, settings, place, counts, way, out):
     u, memory, clock, counters = place
     settled, transient, keep = counts
     fresh, pause = way
-    whole, real, section, maximum, minimum, crossings, contacts, elapsed, status = out
+    whole, real = between
     work = arrays_of_thread()
     tally, memo = work.tally, work.memo
     own = cuda.local.array((1, N_Q), float64)
@@ -153,22 +154,15 @@ def advance(jobs, rows, point, norms, plan, settings, place, counts, way, out):
         periods, own[:, :N_PARAMETERS], periods[i : i + 1], LACKING, KINDS, norms[0], norms[1],
         settings[0], settings[1], ORDER, 1, CHECKED, CORNERS, N_GUARDS, N_INDICATORS, N_OUTPUTS,
     )  # fmt: skip
-    at = Section(plan[0], plan[1], plan[2], plan[3], plan[4], 1, settings[2] if plan[0] < 0 else -1.0, settings[3])
+    at = Section(settings[2] if plan[0] < 0 else -1.0, plan[0], plan[1], plan[2], plan[3], plan[4], settings[3], 1)
     returns = transient[min(j, transient.shape[0] - 1)], keep[min(j, keep.shape[0] - 1)]
     goal = Goal(RETURNS_OF_SECTION, returns[0], returns[1], 0.0, 0.0, norms[2], pause)
     motion = Motion(u[j], memory[j, :N_MEMORY], clock[j], counters[j])
-    points_kept, top, bottom = section[j : j + 1], maximum[j : j + 1], minimum[j : j + 1]
-    seen = Kept(
-        points_kept[:, :, :N_U], top[:, :N_U], bottom[:, :N_U], top[:, N_U : N_U + N_INDICATORS],
-        bottom[:, N_U : N_U + N_INDICATORS], top[:, N_U + N_INDICATORS :], bottom[:, N_U + N_INDICATORS :],
-        crossings[j : j + 1], contacts[j : j + 1], elapsed[j : j + 1], points_kept[:, :, N_U],
-        points_kept[:, :, N_U + 1],
-        status[j : j + 1],
-    )  # fmt: skip
+    window = window_of(Kept(*out), j)
     none = MODE_LIST  # series ask nothing of the last ones
     net = Net(TRANSITIONS, ROWS, ROW_START, MODE_START, MODE_LIST, AT, TRANSITIONS, none, none, none)
-    code = march(0, form, net, at, goal, motion, Seen(seen, (), ()), (), work)
-    status[j] = code
+    code = march(0, form, net, at, goal, motion, Seen(window, (), ()), (), work)
+    window.status[0] = code
     if code != PAUSED:
         leave(0, form, motion, work)
         return

@@ -16,8 +16,6 @@ from nonsmooth.kernels.compile.assembly import with_numbers
 from nonsmooth.kernels.compile.cache import load_module
 from nonsmooth.kernels.cuda.module import joined, stamp
 
-__all__ = ["cuda_series_module", "cuda_series_source"]
-
 PARTS = (
     "circular", "series.polynomial", "series.crossing", "series.rkf45", "series.taylor", "series.trust", "series.step",
     "series.watch", "series.stepper", "hybrid.loop", "hybrid.sections", "hybrid.observers", "judging.judge",

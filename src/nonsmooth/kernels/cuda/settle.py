@@ -81,10 +81,10 @@ def decide(jobs, given, known, codes, codes_after, section, top, bottom, mu, u):
 
 
 @entry
-def separated(jobs, n, batch, elapsed, u, others, size, offsets, sums):
+def separated(jobs, n, batch, elapsed, u, others, sizes, offsets, sums):
     """Return n of each job and of its neighbour, taken into sums[j]: see ``separate``."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
     j = jobs[k]
-    separate(n, batch, elapsed[j], u[j], others[j], size, offsets[j], sums[j])
+    separate(n, batch, elapsed[j], u[j], others[j], sizes[j], offsets[j], sums[j])

@@ -15,8 +15,6 @@ from typing import Any
 
 from numba import config, cuda
 
-__all__ = ["REGISTERS", "THREADS", "callback", "cuda", "device", "entry", "inline", "kernel", "local", "once"]
-
 THREADS = 64  # in a block: few, because a trajectory fills a thread's registers
 REGISTERS = None  # of a thread, at most; None: as many as the compiler takes (255)
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from numba import types
 
 from nonsmooth.kernels.compile.cache import kernel
-from nonsmooth.kernels.compile.pointers import Block, stored
+from nonsmooth.kernels.compile.pointers import stored
 from nonsmooth.kernels.hybrid.records import CALL, GROWTH, KEPT, LOG
-
-__all__ = ["call_at", "call_block", "growth_at", "growth_block", "kept_at", "kept_block", "log_at", "log_block"]
 
 _put_call, call_at = stored(CALL)
 _put_kept, kept_at = stored(KEPT)
@@ -40,23 +36,3 @@ def put_log(address, record):
 def put_growth(address, record):
     """Write the arrays of a frame and its growth to an address."""
     _put_growth(address, record)
-
-
-def call_block() -> Any:
-    """Room for what is asked of a march (``records.Call``)."""
-    return Block(CALL, put_call)
-
-
-def kept_block() -> Any:
-    """Room for kept returns (``records.Kept``)."""
-    return Block(KEPT, put_kept)
-
-
-def log_block() -> Any:
-    """Room for a log (``records.Log``)."""
-    return Block(LOG, put_log)
-
-
-def growth_block() -> Any:
-    """Room for a frame and its growth (``records.Growth``)."""
-    return Block(GROWTH, put_growth)

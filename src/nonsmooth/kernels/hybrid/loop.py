@@ -43,6 +43,7 @@ from nonsmooth.kernels.hybrid.places import (
     SHORT,
     SINCE,
     SOURCE,
+    STARTS,
     TAKEN,
     TIME,
     WAITS,
@@ -71,11 +72,8 @@ def settle(i, form, net, tables, work):
     """Start rule: transitions that hold already are taken, each mode at most once; so is an impact that begins there.
 
     Returns a status: BEYOND_STOP where one with a reset holds and the start does not lie on its surface; PAUSED where
-    one waits for the tables of its mode, or what the elements of a system do at a start is asked."""
+    one waits for the tables of its mode."""
     tally, visited = work.tally, work.visited
-    if MAY_WAIT != 0 and net.together[tally[MODE]] >= 0:
-        tally[WAITS] = net.together[tally[MODE]] + 1
-        return PAUSED
     for k in range(visited.shape[0]):
         visited[k] = 0
     visited[tally[MODE]] = 1
@@ -104,21 +102,27 @@ def settle(i, form, net, tables, work):
 
 @once
 def begin(i, form, net, section, motion, tables, work):
-    """State and mode where a run begins, by the start rule. Returns a status."""
-    tally, memo = work.tally, work.memo
-    for k in range(tally.shape[0]):
-        tally[k] = 0
-    for k in range(memo.shape[0]):
-        memo[k] = 0.0
-    tally[BEGUN], tally[MODE] = 1, motion.counters[0]
-    memo[TIME], memo[PERIODS], memo[SINCE] = motion.clock[0], motion.clock[1], NO_END
-    prepare(i, form, motion, tables, work)
-    look(i, form, tables, work, tally[MODE])
-    code = OK
-    if motion.counters[1] != 1:
-        code = settle(i, form, net, tables, work)
-    if code == PAUSED:  # it begins anew when the mode stands
-        tally[BEGUN] = 0
+    """State and mode where a run begins, by the start rule. Returns a status, PAUSED where elements are asked."""
+    tally, memo, code = work.tally, work.memo, OK
+    if MAY_WAIT != 0 and tally[STARTS] != 0:  # it has been answered
+        tally[BEGUN], tally[STARTS] = 1, 0
+        look(i, form, tables, work, tally[MODE])
+    else:
+        for k in range(tally.shape[0]):
+            tally[k] = 0
+        for k in range(memo.shape[0]):
+            memo[k] = 0.0
+        tally[BEGUN], tally[MODE] = 1, motion.counters[0]
+        memo[TIME], memo[PERIODS], memo[SINCE] = motion.clock[0], motion.clock[1], NO_END
+        prepare(i, form, motion, tables, work)
+        if MAY_WAIT != 0 and motion.counters[1] != 1 and net.together[tally[MODE]] >= 0:
+            tally[BEGUN], tally[STARTS], tally[WAITS] = 0, 1, net.together[tally[MODE]] + 1
+            return PAUSED
+        look(i, form, tables, work, tally[MODE])
+        if motion.counters[1] != 1:
+            code = settle(i, form, net, tables, work)
+        if code == PAUSED:  # it begins anew when the mode stands
+            tally[BEGUN] = 0
     if section.indicator >= 0:  # a start on the section is no return
         start_on_section(form, section, tables, work)
     return code
@@ -195,6 +199,8 @@ def march(i, form, net, section, goal, motion, seen, tables, work):
     code = OK
     if tally[BEGUN] == 0:
         code = begin(i, form, net, section, motion, tables, work)
+        if MAY_WAIT != 0 and code == PAUSED:
+            return code
         open_window(i, form, section, goal, seen, tables, work)
     patience = goal.patience
     strides = may_stride(i, form, net, section, goal)

@@ -39,7 +39,7 @@ def open_window(i, form, section, goal, seen, tables, work):
     elif LOGS == 1 and goal.kind == LOGGED:
         work.memo[DONE] = base_of(i, form, work)
     else:
-        open_returns(i, seen.kept)
+        open_returns(seen.kept)
 
 
 @once
@@ -133,7 +133,7 @@ def cross(i, t, mode, form, net, section, goal, seen, tables, work):
     elif LOGS == 1 and goal.kind == LOGGED:
         log_transition(t, form, seen.log, work)
     else:
-        count_transition(i, t, mode, form, net, section, goal, seen.kept, tables, work)
+        count_transition(t, mode, form, net, section, goal, seen.kept, tables, work)
 
 
 @once

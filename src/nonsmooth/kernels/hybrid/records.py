@@ -9,12 +9,7 @@ from typing import Any, NamedTuple
 
 from numba import types
 
-__all__ = [
-    "CALL", "FORM", "GENERATED", "GOAL", "GROWTH", "KEPT", "LOG", "MOTION", "NET", "SECTION", "SEEN", "SERIES_WORK",
-    "TABLES", "WORK",
-    "Call", "Form", "Generated", "Goal", "Growth", "Kept", "Log", "Motion", "Net", "Section", "Seen", "SeriesWork",
-    "Tables", "Work", "type_of",
-]  # fmt: skip
+from nonsmooth.kernels.hybrid.kept import Kept
 
 _i, _f = types.int64, types.float64
 _f1, _f2, _f3, _f4, _i1, _i2 = _f[::1], _f[:, ::1], _f[:, :, ::1], _f[:, :, :, ::1], _i[::1], _i[:, ::1]
@@ -171,19 +166,6 @@ class Motion(NamedTuple):
     counters: Any  # (4,) mode, and for others what they count
 
 
-class Section(NamedTuple):
-    """The section whose returns are counted, and how long one is waited for."""
-
-    indicator: Any  # -1: at a phase of the forcing
-    rising: Any  # direction 1, -1, or 0 for both
-    mode: Any  # -1: any
-    after: Any  # 1: the state after a transition on the section
-    every: Any  # so many passes are one return
-    extremes: Any  # 1: wanted in the kept window
-    phase: Any  # in periods
-    t_max: Any
-
-
 class Goal(NamedTuple):
     """When a run is over, and when it has failed or is to pause. A kernel takes of it what it has use for."""
 
@@ -194,24 +176,6 @@ class Goal(NamedTuple):
     unit: Any  # of time, after which logarithms of a frame are put away
     limit: Any  # (n,) sizes beyond which a state has diverged
     patience: Any  # steps after which it pauses, to be called again
-
-
-class Kept(NamedTuple):
-    """The kept values of P points of a sweep (see ``flow.engines.engine.Chain``)."""
-
-    section: Any  # (P, keep, n)
-    maximum: Any  # (P, n)
-    minimum: Any
-    i_max: Any  # (P, indicators)
-    i_min: Any
-    o_max: Any  # (P, outputs)
-    o_min: Any
-    crossings: Any  # (P,)
-    contacts: Any
-    elapsed: Any
-    section_time: Any  # (P, keep)
-    section_mode: Any
-    status: Any  # (P,)
 
 
 class Log(NamedTuple):
@@ -269,9 +233,9 @@ class Call(NamedTuple):
 
 
 # Places in ``Call.orders`` and ``Call.reals``.
-BEGIN, END, KIND, TRANSIENT, KEEP, PATIENCE_LEFT, INDICATOR, RISING, OF_MODE, AFTER, EVERY, EXTREMES = range(12)
+BEGIN, END, KIND, TRANSIENT, KEEP, PATIENCE_LEFT, INDICATOR, RISING, OF_MODE, AFTER, EVERY, EXTREMES, ROW = range(13)
 UNTIL, UNIT, PHASE, T_MAX = range(4)
-N_ORDERS, N_REALS = 12, 4
+N_ORDERS, N_REALS = 13, 4
 
 
 FORM = type_of(
@@ -286,10 +250,7 @@ SERIES_WORK = type_of(
     _i1, _f1,
 )  # fmt: skip
 MOTION = type_of(Motion, _f1, _f1, _f1, _i1)
-SECTION = type_of(Section, *[_i] * 6, _f, _f)
-GOAL = type_of(Goal, _i, _i, _i, _f, _f, _f1, _i)
 CALL = type_of(Call, _i1, _f1, _f1, _f2, MOTION)
-KEPT = type_of(Kept, _f3, *[_f2] * 6, _i1, _i1, _f1, _f2, _i2, _i1)
+KEPT = type_of(Kept, _f3, _f2, _f2, _i1, _i1, _f1, _f2, _i2, _i1)
 LOG = type_of(Log, _f1, _f2, _f2, _i1, _i1, _f1, _i1, _f2, _f2, _f2, _f1, _i1, _f2, _f1, _i)
 GROWTH = type_of(Growth, _f1, _f2, _f2, _f1, _f1, _f2, _f2, _f2, _f2, _f1, _f1)
-SEEN = type_of(Seen, KEPT, LOG, GROWTH)

@@ -12,8 +12,9 @@ from nonsmooth.kernels.compile.cache import kernel, once
 from nonsmooth.kernels.compile.pointers import stored
 from nonsmooth.kernels.hybrid.blocks import call_at, growth_at, kept_at, log_at
 from nonsmooth.kernels.hybrid.codes import LOG_FULL, NOT_GUARANTEED, OK, PAUSED
+from nonsmooth.kernels.hybrid.kept import Section
 from nonsmooth.kernels.hybrid.loop import leave, march
-from nonsmooth.kernels.hybrid.places import BEGUN, LOGGED, NO_END, RETURNS_OF_SECTION, WAITS
+from nonsmooth.kernels.hybrid.places import BEGUN, LOGGED, NO_END, RETURNS_OF_SECTION, STARTS
 from nonsmooth.kernels.hybrid.record import last_samples
 from nonsmooth.kernels.hybrid.records import (
     AFTER,
@@ -29,14 +30,15 @@ from nonsmooth.kernels.hybrid.records import (
     PATIENCE_LEFT,
     PHASE,
     RISING,
+    ROW,
     T_MAX,
     TRANSIENT,
     UNIT,
     UNTIL,
     Goal,
-    Section,
     Seen,
 )
+from nonsmooth.kernels.hybrid.sections import window_of
 from nonsmooth.kernels.linear.extremes import finish
 from nonsmooth.kernels.linear.stepper import STEPPER
 
@@ -75,19 +77,19 @@ def run(system, call, kept, log, growth):
 
     PAUSED and LOG_FULL ask to be called again: ``BEGIN`` is then the point that waits. For section returns each point
     goes on from where the last good one ended, or from its own start; one that fails leaves the motion where it was,
-    and its status stands in ``Kept.status``. Else the status of the last point is returned."""
+    and its status stands in its row of ``Kept`` (of its own number, or ``ROW``). Else the last point's is returned."""
     form, net, tables, work = system_at(system)
     orders, reals, limit, starts, motion = call_at(call)
-    seen = Seen(kept_at(kept), log_at(log), growth_at(growth))
     kind, code = orders[KIND], OK
     section = Section(
-        orders[INDICATOR], orders[RISING], orders[OF_MODE], orders[AFTER], orders[EVERY], orders[EXTREMES],
-        reals[PHASE], reals[T_MAX],
+        reals[PHASE], orders[INDICATOR], orders[RISING], orders[OF_MODE], orders[AFTER], orders[EVERY], reals[T_MAX],
+        orders[EXTREMES],
     )  # fmt: skip
     goal = Goal(kind, orders[TRANSIENT], orders[KEEP], reals[UNTIL], reals[UNIT], limit, orders[PATIENCE_LEFT])
     for i in range(orders[BEGIN], orders[END]):
-        if work.tally[BEGUN] == 0 and work.tally[WAITS] == 0 and kind == RETURNS_OF_SECTION:
+        if work.tally[BEGUN] == 0 and work.tally[STARTS] == 0 and kind == RETURNS_OF_SECTION:
             place_start(i, form, section, starts, motion)
+        seen = Seen(window_of(kept_at(kept), i if orders[ROW] < 0 else orders[ROW]), log_at(log), growth_at(growth))
         code = march(i, form, net, section, goal, motion, seen, tables, work)
         if code == PAUSED or code == LOG_FULL:
             orders[BEGIN] = i
@@ -96,8 +98,8 @@ def run(system, call, kept, log, growth):
         good = True
         if kind == RETURNS_OF_SECTION:
             motion.counters[1] = 0
-            finish(i, form, tables, work, seen.kept)
-            seen.kept.status[i] = code
+            finish(form, tables, work, seen.kept)
+            seen.kept.status[0] = code
             good = code == OK or code == NOT_GUARANTEED
             code = OK
         elif kind == LOGGED and code == OK:

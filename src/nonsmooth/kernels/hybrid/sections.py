@@ -8,6 +8,7 @@ from math import inf
 
 from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.codes import NO_CONVERGENCE, OK
+from nonsmooth.kernels.hybrid.kept import Kept
 from nonsmooth.kernels.hybrid.places import (
     CLOSED,
     JUMPS,
@@ -38,24 +39,24 @@ def stroboscopic_hit(s, s1, target, period):
     return -1.0
 
 
-@once
-def forget(i, kept):
-    """Begin the extremes of point i."""
-    for k in range(kept.maximum.shape[1]):
-        kept.maximum[i, k], kept.minimum[i, k] = -inf, inf
-    for k in range(kept.i_max.shape[1]):
-        kept.i_max[i, k], kept.i_min[i, k] = -inf, inf
-    for k in range(kept.o_max.shape[1]):
-        kept.o_max[i, k], kept.o_min[i, k] = -inf, inf
+@inline
+def window_of(kept, row):
+    """The arrays of one run."""
+    return Kept(
+        kept.section[row], kept.high[row], kept.low[row], kept.crossings[row : row + 1],
+        kept.contacts[row : row + 1], kept.elapsed[row : row + 1], kept.section_time[row], kept.section_mode[row],
+        kept.status[row : row + 1],
+    )  # fmt: skip
 
 
 @once
-def open_returns(i, seen):
-    """Begin the counts of point i."""
-    forget(i, seen)
-    seen.crossings[i] = 0
-    seen.contacts[i] = 0
-    seen.elapsed[i] = 0.0
+def open_returns(seen):
+    """Begin extremes and counts of a run."""
+    for k in range(seen.high.shape[0]):
+        seen.high[k], seen.low[k] = -inf, inf
+    seen.crossings[0] = 0
+    seen.contacts[0] = 0
+    seen.elapsed[0] = 0.0
 
 
 @once
@@ -93,18 +94,18 @@ def hurry(i, form, net, section, goal, seen, tables, work, patience):
     if s != began or whole != turns:
         memo[SINCE] = 1e300
         if counted >= goal.transient:
-            seen.elapsed[i] += (whole - turns) * T + (s - began)
+            seen.elapsed[0] += (whole - turns) * T + (s - began)
         memo[TIME], memo[PERIODS] = s, whole
     return True, first, patience
 
 
 @inline
-def keep_point(i, k, u, mode, time, seen, work):
+def keep_point(k, u, mode, time, seen):
     """The k-th kept point of the section."""
-    for j in range(seen.section.shape[2]):
-        seen.section[i, k, j] = u[j]
-    seen.section_mode[i, k] = mode
-    seen.section_time[i, k] = time
+    for j in range(seen.section.shape[1]):
+        seen.section[k, j] = u[j]
+    seen.section_mode[k] = mode
+    seen.section_time[k] = time
 
 
 @once
@@ -130,7 +131,7 @@ def observe_returns(i, step, stop, triggered, form, section, goal, seen, tables,
             if is_open:
                 state_at(r, form, tables, work, work.wp)
                 turn = memo[PERIODS] if s < target and target <= after else memo[PERIODS] + 1.0
-                keep_point(i, tally[RETURNS] - goal.transient - 1, work.wp, tally[MODE], turn * T + target, seen, work)
+                keep_point(tally[RETURNS] - goal.transient - 1, work.wp, tally[MODE], turn * T + target, seen)
                 if tally[RETURNS] >= goal.transient + goal.keep:
                     state, b = CLOSED, r
                     memo[PERIODS] = turn
@@ -138,12 +139,12 @@ def observe_returns(i, step, stop, triggered, form, section, goal, seen, tables,
                 is_open, a = True, r
     if is_open:
         if section.extremes != 0:
-            widen(i, a, b, form, tables, work, seen)
-        seen.elapsed[i] += b - a
+            widen(a, b, form, tables, work, seen)
+        seen.elapsed[0] += b - a
     if state == CLOSED:
         memo[TIME] = section.phase * T
-        for j in range(seen.section.shape[2]):
-            work.w[j] = seen.section[i, goal.keep - 1, j]
+        for j in range(seen.section.shape[1]):
+            work.w[j] = seen.section[goal.keep - 1, j]
     return state
 
 
@@ -155,13 +156,13 @@ def mark_return(step, work):
 
 
 @once
-def count_transition(i, t, mode, form, net, section, goal, seen, tables, work):
+def count_transition(t, mode, form, net, section, goal, seen, tables, work):
     """Count a transition in the kept window."""
     if work.tally[RETURNS] >= goal.transient:
-        seen.crossings[i] += 1
-        seen.contacts[i] += net.transitions[t, 2]
+        seen.crossings[0] += 1
+        seen.contacts[0] += net.transitions[t, 2]
         if section.extremes != 0:
-            include(i, mode, form, tables, work, seen)
+            include(mode, form, tables, work, seen)
 
 
 @once
@@ -179,18 +180,14 @@ def arrive_at_section(i, code, source, t, sense, state, form, section, goal, see
             if tally[RETURNS] > goal.transient:
                 after = section.after != 0 or t < 0
                 time = (memo[PERIODS] * T if T < NO_END else 0.0) + memo[TIME]
-                keep_point(
-                    i, tally[RETURNS] - goal.transient - 1, work.w if after else work.before, mode if after else source,
-                    time, seen, work,
-                )  # fmt: skip
+                where = work.w if after else work.before
+                keep_point(tally[RETURNS] - goal.transient - 1, where, mode if after else source, time, seen)
     if state == LATE and code == OK:
         memo[TIME] = section.phase * T
         tally[RETURNS] += 1
         tally[JUMPS], tally[TRIES] = 0, 0
         if tally[RETURNS] > goal.transient:
-            keep_point(
-                i, tally[RETURNS] - goal.transient - 1, work.w, mode, memo[PERIODS] * T + memo[TIME], seen, work
-            )  # fmt: skip
+            keep_point(tally[RETURNS] - goal.transient - 1, work.w, mode, memo[PERIODS] * T + memo[TIME], seen)
     if section.indicator >= 0:
         note_side(t, sense, section, tables, work)
         waited = memo[WAITED] >= section.t_max * (1.0 - 1e-12)

@@ -1,8 +1,8 @@
-"""Jobs brought to their attractors in one compiled call, and their exponents, with the march of any engine.
+"""Jobs brought to their attractors, and their exponents by two neighbours, with the march of any engine on any section.
 
-What is wanted of a job next is decided in ``settle``; the loop here runs it, because in Python the steps between the
-runs cost more than the motion itself. The march is called by its address (``hybrid.run``). The sections are
-stroboscopic.
+What is wanted of a job next is decided in ``settle``; the loops here run it, because in Python the steps between the
+runs cost more than the motion itself. The march is called by its address (``hybrid.run``). Where it pauses, so do the
+loops: called again with the same arguments they go on. All that they know stands in ``at``.
 """
 
 from math import nan
@@ -12,11 +12,23 @@ from numba import types
 
 from nonsmooth.kernels.compile.cache import device, kernel
 from nonsmooth.kernels.compile.pointers import function_at
-from nonsmooth.kernels.hybrid.codes import INTERRUPTED, NOT_GUARANTEED, OK, PAUSED
-from nonsmooth.kernels.hybrid.places import BEGUN
-from nonsmooth.kernels.hybrid.records import BEGIN, END, EXTREMES, KEEP, KEPT, MOTION, TRANSIENT, type_of
+from nonsmooth.kernels.hybrid.codes import NOT_GUARANTEED, OK, PAUSED
+from nonsmooth.kernels.hybrid.places import BEGUN, NO_END
+from nonsmooth.kernels.hybrid.records import (
+    BEGIN,
+    END,
+    EVERY,
+    EXTREMES,
+    KEEP,
+    KEPT,
+    MOTION,
+    PHASE,
+    ROW,
+    TRANSIENT,
+    type_of,
+)
 from nonsmooth.kernels.judging.exponent import separate
-from nonsmooth.kernels.judging.judge import multiplier
+from nonsmooth.kernels.judging.judge import ROUNDS, contraction, multiplier
 from nonsmooth.kernels.judging.settle import END as SETTLED
 from nonsmooth.kernels.judging.settle import FRESH, JOBS, PROBE, RULES, begin_job, next_run
 
@@ -25,13 +37,23 @@ _f1, _f2, _f3, _i1 = _f[::1], _f[:, ::1], _f[:, :, ::1], _i[::1]
 
 run_at = function_at(types.FunctionType(types.int64(*[types.int64] * 5)))
 
+# Places in ``at``: the job, the one before which to stop, what is run of it now, the code of its last kept window (or
+# the number of returns of a pair), whether the motion stands where the job before ended.
+JOB, STOP, STAGE, CODE, GOOD = range(5)
+# Stages: the kept window; what follows it; extremes where there is no cycle; the cycle, and that many neighbours.
+NEXT, MAIN, BEYOND, EXTENT, CYCLE = range(5)
+OWN, OTHER = 1, 2  # of a pair; beyond that: once more
+
 
 class Runs(NamedTuple):
     """The march of an engine for a trajectory and one beside it, which share what is ordered."""
 
     function: Any  # (1,) address of ``hybrid.run.run``
-    blocks: Any  # addresses: system, call of the trajectory and of the one beside, kept returns, one cycle, log, growth
+    blocks: Any  # addresses: system, log, growth; kept, calls, cycle, window
     orders: Any  # (N_ORDERS,) of both calls
+    reals: Any
+    every: Any  # so many passes of the section are a return
+    extremes: Any  # 1: those of the kept returns are wanted
     tally: Any  # counts of the work
     periods: Any  # (P,) of the forcing
     memory: Any  # (n_memory,) at a fresh start
@@ -39,42 +61,44 @@ class Runs(NamedTuple):
     motion: Any
     beside: Any
     kept: Any  # room for the kept returns
-    cycle: Any  # and for one cycle
+    cycle: Any  # for one cycle
+    window: Any  # and for a neighbour
 
 
-RUNS = type_of(Runs, *[_i1] * 4, _f1, _f1, _i1, MOTION, MOTION, KEPT, KEPT)
-STARTS = types.Tuple((_i1, _f2, _f1, _i1))
+RUNS = type_of(Runs, *[_i1] * 3, _f1, _i, _i, _i1, _f1, _f1, _i1, MOTION, MOTION, KEPT, KEPT, KEPT)
+STARTS = types.Tuple((_i1, _f2, _f1, _i1, _i1))
 PROBES = types.Tuple((_f2, _f3))
 RESULTS = types.Tuple((_f1, _f1, _f2, _f2, _f2, _i1))
 
 
 @device
-def go(i, beside, cycle, extremes, transient, keep, settled, runs):
-    """Run parameter row i on from a motion, which is left where it ends. Returns the status.
+def go(i, beside, room, row, extremes, transient, keep, settled, runs):
+    """Run parameter row i on from a motion, which is left where it ends. Returns a code; PAUSED: call it again.
 
-    ``settled`` = 0: transitions that hold there already are taken first."""
+    ``room``: 0, 1, 2 for ``kept`` (its ``row``), ``cycle``, ``window``; ``settled`` = 0: transitions that hold there
+    already are taken first."""
     orders, blocks, run = runs.orders, runs.blocks, run_at(runs.function[0])
-    orders[BEGIN], orders[END], orders[EXTREMES], orders[TRANSIENT], orders[KEEP] = i, i + 1, extremes, transient, keep
-    motion = runs.beside if beside else runs.motion
-    motion.counters[1] = settled
-    motion.clock[2] = 0.0  # the time stands as it is: the march must not scale it to another period
-    while run(blocks[0], blocks[2 if beside else 1], blocks[4 if cycle else 3], blocks[5], blocks[6]) == PAUSED:
-        if runs.stop[0] != 0:
-            runs.tally[BEGUN] = 0
-            return INTERRUPTED
-    return runs.cycle.status[i] if cycle else runs.kept.status[i]
+    if runs.tally[BEGUN] == 0:
+        orders[BEGIN], orders[END], orders[EXTREMES], orders[TRANSIENT] = i, i + 1, extremes, transient
+        orders[KEEP], orders[ROW], orders[EVERY] = keep, row, runs.every if room == 0 else 1
+        motion = runs.beside if beside else runs.motion
+        motion.counters[1] = settled
+        motion.clock[2] = 0.0  # the time stands as it is: the march must not scale it to another period
+    if run(blocks[0], blocks[5 if beside else 4], blocks[3 if room == 0 else 5 + room], blocks[1], blocks[2]) == PAUSED:
+        return PAUSED
+    return runs.kept.status[row] if room == 0 else (runs.cycle if room == 1 else runs.window).status[0]
 
 
 @device
 def put(i, place, phase, mode, runs):
-    """A state (and memory, where the place says it) at a phase of the forcing of parameter row i."""
+    """A state at a phase of the forcing of parameter row i; memory and time in the period where the place says them."""
     motion, T = runs.motion, runs.periods[i]
-    n = motion.u.shape[0]
+    n, whole = motion.u.shape[0], motion.u.shape[0] + motion.memory.shape[0]
     for k in range(n):
         motion.u[k] = place[k]
-    for k in range(motion.memory.shape[0]):
-        motion.memory[k] = place[n + k] if place.shape[0] > n + k else runs.memory[k]
-    motion.clock[0] = phase * T if T < 1e300 else 0.0
+    for k in range(n, whole):
+        motion.memory[k - n] = place[k] if place.shape[0] > k else runs.memory[k - n]
+    motion.clock[0] = (place[whole] if place.shape[0] > whole else phase * T) if T < NO_END else 0.0
     motion.clock[1] = 0.0
     motion.counters[0] = mode
 
@@ -94,104 +118,167 @@ def copy(runs):
 
 
 @device
-def probe(i, p, size, rules, extremes, runs, work):
-    """Largest modulus of the multipliers of the p-th return map where the job stands; nan: unknown.
-
-    The neighbours first: ``cycle`` is left with the whole cycle of the job itself."""
-    images, matrices = work
-    n = size.shape[0]
-    for leg in range(n, -1, -1):
+def probe(i, row, leg, p, size, rules, extremes, strobed, runs):
+    """Run the cycle of p returns where a job stands (``leg`` 0), or a neighbour of it; on a surface one neighbour."""
+    if runs.tally[BEGUN] == 0:
         copy(runs)
-        if leg > 0:
-            runs.beside.u[leg - 1] += rules.difference * size[leg - 1]
-            code = go(i, True, True, 0, p - 1, 1, 0, runs)
-        else:
-            code = go(i, True, True, extremes, 0, p, 1, runs)
-        if code != OK and code != NOT_GUARANTEED:
-            return nan
-        for k in range(n):
-            images[leg, k] = runs.beside.u[k]
-    return multiplier(images, size, rules.difference, matrices)
-
-
-@kernel(types.void(STARTS, _f, _i, _i, RULES, JOBS, RUNS, PROBES, RESULTS))
-def settle_many(starts, phase, carried, extremes, rules, jobs, runs, work, results):
-    """Job j: parameter row rows[j], from places[j] at phases[j] of the forcing in the mode modes[j] (``starts``).
-
-    With ``carried`` = 1 a job goes on at the section's phase from where the one before it ended (from its own start
-    where that failed). ``results``: crossings and contacts per return, maxima, minima (over one whole cycle where there
-    is one, else over as many returns as are kept), last section point with memory, mode there."""
-    rows, places, phases, modes = starts
-    crossings, contacts, maximum, minimum, last, mode = results
-    motion, n = runs.motion, runs.motion.u.shape[0]
-    good = False
-    for j in range(rows.shape[0]):
-        if runs.stop[0] != 0:
-            break
-        i = rows[j]
-        if good and carried != 0:
-            motion.clock[0] = phase * runs.periods[i] if runs.periods[i] < 1e300 else 0.0
-            motion.clock[1] = 0.0
-        begin_job(jobs, j, rules, 1 if good and carried != 0 else 0)
-        code = OK
-        while jobs.wanted[j] != SETTLED:
-            mu = nan
-            if jobs.wanted[j] == PROBE:
-                mu = probe(i, jobs.period_number[j], jobs.size[j], rules, extremes, runs, work)
-            else:
-                if jobs.wanted[j] == FRESH:
-                    put(i, places[j], phases[j], modes[j], runs)
-                code = go(i, False, False, 0, jobs.transient[j], rules.keep, jobs.settled[j], runs)
-                if code == OK or code == NOT_GUARANTEED:  # true extremes are dear: one return gives the motion's size
-                    after = go(i, False, True, 1, 0, rules.beyond, 1, runs)
-                    code = after if code == OK else code
-            kept, cycle = runs.kept, runs.cycle
-            next_run(jobs, j, rules, code, kept.section[i], cycle.maximum[i], cycle.minimum[i], mu, motion.u)
-        mode[j] = motion.counters[0]
-        for k in range(n):
-            last[j, k] = motion.u[k]
-        for k in range(motion.memory.shape[0]):
-            last[j, n + k] = motion.memory[k]
-        p = jobs.period_number[j]
-        good = p > 0 or code == OK or code == NOT_GUARANTEED
-        if not good:
-            continue
-        if p == 0 and extremes != 0:
-            copy(runs)
-            code = go(i, True, False, 1, 0, rules.keep, 1, runs)
-            if code != OK and code != NOT_GUARANTEED:
-                jobs.status[j] = code
-                continue
-        out, count = (runs.cycle, p) if p > 0 else (runs.kept, rules.keep)
-        crossings[j] = out.crossings[i] / count
-        contacts[j] = out.contacts[i] / count
-        if extremes != 0:
-            for k in range(n):
-                maximum[j, k] = out.maximum[i, k]
-                minimum[j, k] = out.minimum[i, k]
+        for k in range(size.shape[0]):
+            if leg > 0 and (k == leg - 1 or not strobed):
+                runs.beside.u[k] += rules.difference * size[k]
+    if leg == 0:
+        return go(i, True, 1, 0, extremes, 0, p * runs.every, 1, runs)
+    if strobed:
+        return go(i, True, 2, 0, 0, p - 1, 1, 0, runs)
+    return go(i, True, 2, 0, 0, 0, ROUNDS * p * runs.every + 2, 0, runs)
 
 
 @device
-def follow_pair(begin, end, batch, i, size, offset, sums, runs):
-    """Returns begin <= n < end of a run and of its neighbour; gives a status. See ``exponent``."""
-    for n in range(begin, end):
-        copy(runs)
-        for k in range(size.shape[0]):
-            runs.beside.u[k] += offset[k]
-        for one in range(2):
-            code = go(i, one == 1, False, 0, 0, 1, 0, runs)
-            if code != OK and code != NOT_GUARANTEED:
-                return code
-        separate(n, batch, runs.periods[i], runs.motion.u, runs.beside.u, size, offset, sums)
+def slowest(row, p, size, rules, strobed, runs, work):
+    """The largest modulus of the multipliers of p returns, from the cycle and its neighbours (``probe``)."""
+    images, matrices = work
+    if strobed:
+        return multiplier(images, size, rules.difference, matrices)
+    passes = p * runs.every
+    points = runs.kept.section[row] if runs.every == 1 else runs.cycle.section[0, :passes]
+    return contraction(points, runs.window.section[0], size, passes, rules.tolerance)
+
+
+@kernel(types.int64(STARTS, _f, _i, _i, RULES, JOBS, RUNS, _i1, PROBES, RESULTS))
+def settle_many(starts, phase, carried, extremes, rules, jobs, runs, at, work, results):
+    """Job j: parameter row rows[j], from places[j] at phases[j] of the forcing in the mode modes[j] (``starts``); its
+    kept returns stand in row into[j].
+
+    With ``carried`` = 1 a job goes on from where the one before it ended (from its own start where that failed; with 2
+    then from where it was), at the section's phase, or at its own where that is negative: a surface. ``results``:
+    crossings and contacts per return, maxima, minima (over a whole cycle where there is one, else over as many returns
+    as are kept), the place at the end, mode there."""
+    rows, places, phases, modes, into = starts
+    crossings, contacts, maximum, minimum, last, mode = results
+    motion, strobed = runs.motion, phase >= 0.0
+    n, whole = motion.u.shape[0], motion.u.shape[0] + motion.memory.shape[0]
+    while at[JOB] < at[STOP]:
+        if runs.stop[0] != 0:
+            return PAUSED
+        j, stage = at[JOB], at[STAGE]
+        i, row, T = rows[j], into[j], runs.periods[rows[j]]
+        if stage == NEXT:
+            goes_on = at[GOOD] != 0 and carried != 0
+            if goes_on and T < NO_END:
+                if strobed:
+                    motion.clock[0] = phase * T
+                elif motion.clock[2] > 0.0:
+                    motion.clock[0] *= T / motion.clock[2]
+                motion.clock[1] = 0.0
+            begin_job(jobs, j, rules, 1 if goes_on else 0)
+            stage = MAIN
+        p, leg = jobs.period_number[j], stage - CYCLE
+        at[STAGE] = stage
+        if stage == MAIN:
+            if jobs.wanted[j] == FRESH and runs.tally[BEGUN] == 0:
+                put(i, places[j], phases[j], modes[j], runs)
+            code = go(i, False, 0, row, runs.extremes, jobs.transient[j], rules.keep, jobs.settled[j], runs)
+        elif stage == BEYOND:  # true extremes are dear: one return gives the motion's size
+            code = go(i, False, 1, 0, 1, 0, rules.beyond, 1, runs)
+        elif stage == EXTENT:
+            if runs.tally[BEGUN] == 0:
+                copy(runs)
+            code = go(i, True, 0, row, 1, 0, rules.keep, 1, runs)
+        else:
+            code = probe(i, row, leg, p, jobs.size[j], rules, extremes, strobed, runs)
+        if code == PAUSED:
+            return PAUSED
+        good = code == OK or code == NOT_GUARANTEED
+        if stage == MAIN or (stage == BEYOND and at[CODE] == OK):
+            at[CODE] = code
+        if stage == MAIN and good and rules.beyond > 0:
+            at[STAGE] = BEYOND
+            continue
+        if stage >= CYCLE and good:
+            for k in range(n):
+                work[0][leg if strobed else 0, k] = runs.beside.u[k]
+            if leg > 0:
+                at[STAGE] = stage - 1
+                continue
+        if stage != EXTENT:
+            mu = slowest(row, p, jobs.size[j], rules, strobed, runs, work) if stage == CYCLE and good else nan
+            code = at[CODE]
+            room, line = (runs.cycle, 0) if rules.beyond > 0 else (runs.kept, row)
+            next_run(jobs, j, rules, code, runs.kept.section[row], room.high[line], room.low[line], mu, motion.u)
+            p = jobs.period_number[j]
+            if jobs.wanted[j] != SETTLED:
+                at[STAGE] = MAIN
+                if jobs.wanted[j] == PROBE:
+                    at[STAGE] = CYCLE + (n if strobed else 1)
+                continue
+            good = p > 0 or code == OK or code == NOT_GUARANTEED
+            at[GOOD] = 1 if good or carried == 2 else 0
+            mode[j] = motion.counters[0]
+            for k in range(n):
+                last[j, k] = motion.u[k]
+            for k in range(n, whole):
+                last[j, k] = motion.memory[k - n]
+            if last.shape[1] > whole:
+                last[j, whole] = motion.clock[0]
+            if good and p == 0 and extremes != 0 and runs.extremes == 0:
+                at[STAGE] = EXTENT
+                continue
+        elif not good:
+            jobs.status[j] = code
+        at[STAGE] = NEXT
+        at[JOB] = j + 1
+        if good:
+            room, line, count = (runs.cycle, 0, p) if p > 0 else (runs.kept, row, rules.keep)
+            crossings[j] = room.crossings[line] / count
+            contacts[j] = room.contacts[line] / count
+            if extremes != 0:
+                for k in range(n):
+                    maximum[j, k] = room.high[line, k]
+                    minimum[j, k] = room.low[line, k]
     return OK
 
 
-@kernel(types.void(STARTS, _i, _i, _f1, RUNS, _f2, _f2, _i1))
-def separate_many(starts, returns, batch, size, runs, offsets, sums, status):
+@kernel(types.int64(STARTS, _i, _i, _f2, RUNS, _i1, _f2, _f2, _i1))
+def separate_many(starts, returns, batch, sizes, runs, at, offsets, sums, status):
     """Growth of the distance of two neighbours over ``returns`` section returns, taken into sums[j], for each job.
 
-    Job j begins at places[j] at phases[j] in the mode modes[j], its neighbour beside it by offsets[j]."""
-    rows, places, phases, modes = starts
-    for j in range(rows.shape[0]):
-        put(rows[j], places[j], phases[j], modes[j], runs)
-        status[j] = follow_pair(0, returns, batch, rows[j], size, offsets[j], sums[j], runs)
+    Job j begins at places[j] at phases[j] in the mode modes[j], its neighbour beside it by offsets[j]. Where the place
+    has a time in the period, returns are counted at that phase: neighbours are compared at equal phase. On a surface a
+    neighbour just before it has a return too many."""
+    rows, places, phases, modes, _ = starts
+    motion, beside, elapsed = runs.motion, runs.beside, runs.cycle.elapsed
+    while at[JOB] < at[STOP]:
+        if runs.stop[0] != 0:
+            return PAUSED
+        j, stage = at[JOB], at[STAGE]
+        i, T = rows[j], runs.periods[rows[j]]
+        if stage == NEXT:
+            put(i, places[j], phases[j], modes[j], runs)
+            if places.shape[1] > motion.u.shape[0] + motion.memory.shape[0]:
+                runs.reals[PHASE] = motion.clock[0] / T % 1.0
+            at[CODE], stage = 0, OWN
+        if stage == OWN and runs.tally[BEGUN] == 0:
+            copy(runs)
+            for k in range(sizes.shape[1]):
+                beside.u[k] += offsets[j, k]
+        at[STAGE] = stage
+        code = go(i, stage >= OTHER, 0, 0, 0, 0, 1, 1 if stage == OWN and at[CODE] > 0 else 0, runs)
+        if code == PAUSED:
+            return PAUSED
+        status[j] = code
+        at[STAGE] = NEXT
+        if code != OK and code != NOT_GUARANTEED:
+            at[JOB] = j + 1
+            continue
+        if stage == OWN:
+            elapsed[0] = T if T < NO_END else runs.kept.elapsed[0]
+            at[STAGE] = OTHER
+            continue
+        if stage == OTHER and runs.kept.elapsed[0] < 0.5 * elapsed[0]:
+            at[STAGE] = OTHER + 1
+            continue
+        separate(at[CODE], batch, elapsed[0], motion.u, beside.u, sizes[j], offsets[j], sums[j])
+        at[CODE] += 1
+        at[STAGE] = OWN
+        if at[CODE] == returns:
+            at[STAGE], at[JOB] = NEXT, j + 1
+    return OK

@@ -31,7 +31,7 @@ class Rules(NamedTuple):
 
     transient: Any
     keep: Any
-    max_period: Any
+    max_period: Any  # 0: nothing is judged
     first_look: Any  # 0: none before the transient ends
     attempts: Any  # further transients, at most
     beyond: Any  # returns that follow each kept window, for its extremes
@@ -103,10 +103,10 @@ def next_run(jobs, j, rules, code, points, top, bottom, mu, u):
     else:
         jobs.multiplier[j] = nan
         jobs.settled[j] = 1
-        if code != OK and code != NOT_GUARANTEED:
-            if code == BEYOND_STOP and jobs.carried[j] != 0:  # a carried state that a moved stop has overtaken
-                begin_job(jobs, j, rules, 0)
-                return
+        if code == BEYOND_STOP and jobs.carried[j] != 0:  # a carried state that a moved stop has overtaken
+            begin_job(jobs, j, rules, 0)
+            return
+        if (code != OK and code != NOT_GUARANTEED) or rules.max_period == 0:
             jobs.period_number[j] = 0
             jobs.status[j] = code
             jobs.residual[j] = nan

@@ -61,56 +61,54 @@ def exceeds(tables, row, mode, f, w, w1, lowest, highest):
 
 
 @inline
-def extremes_of(f, n, n_i, kept):
-    """Maxima and minima in which those of functional f are kept, and its column there."""
+def kept_row(f, n, n_i, own):
+    """The row in which the extremes of functional f are kept (states, indicators, outputs); -1: memory has none."""
     if f < n_i:
-        return kept.i_max, kept.i_min, f
+        return own + f
     if f < n_i + n:
-        return kept.maximum, kept.minimum, f - n_i
-    return kept.o_max, kept.o_min, f - n_i - n
+        return f - n_i if f < n_i + own else -1
+    return own + f - n
 
 
 @once
-def widen(i, a, b, form, tables, work, kept):
-    """Extend the extremes of point i by the piece [a, b] of a segment."""
-    n = states_of(tables.field)
+def widen(a, b, form, tables, work, kept):
+    """Extend the extremes by the piece [a, b] of a segment."""
+    n, high, low = states_of(tables.field), kept.high, kept.low
     n_i, mode = work.zero.shape[0], work.tally[MODE]
     for f in range(tables.fun.shape[1]):
         if f < n_i and work.twin[f] >= 0:
             continue  # a state but for a constant: see ``finish``
-        if n_i + kept.maximum.shape[1] <= f < n_i + n:  # memory
+        k = kept_row(f, n, n_i, kept.section.shape[1])
+        if k < 0:
             continue
-        hi, lo, k = extremes_of(f, n, n_i, kept)
-        below, above = exceeds(tables, work.row, mode, f, work.w, work.w1, lo[i, k], hi[i, k])
+        below, above = exceeds(tables, work.row, mode, f, work.w, work.w1, low[k], high[k])
         for side in range(2):
             if above if side == 0 else below:
                 sign = 1.0 if side == 0 else -1.0
-                found = sign * locate_maximum(tables, work, mode, f, sign, a, b, hi[i, k] if side == 0 else -lo[i, k])
+                found = sign * locate_maximum(tables, work, mode, f, sign, a, b, high[k] if side == 0 else -low[k])
                 if side == 0:
-                    hi[i, k] = found
+                    high[k] = found
                 else:
-                    lo[i, k] = found
+                    low[k] = found
 
 
 @once
-def finish(i, form, tables, work, kept):
+def finish(form, tables, work, kept):
     """Extremes of the indicators that are a state but for a constant."""
-    n = states_of(tables.field)
+    n, own = states_of(tables.field), kept.section.shape[1]
     for f in range(work.zero.shape[0]):
         if work.twin[f] >= 0:
-            kept.i_max[i, f] = kept.maximum[i, work.twin[f]] + tables.fun[0, f, n]
-            kept.i_min[i, f] = kept.minimum[i, work.twin[f]] + tables.fun[0, f, n]
+            kept.high[own + f] = kept.high[work.twin[f]] + tables.fun[0, f, n]
+            kept.low[own + f] = kept.low[work.twin[f]] + tables.fun[0, f, n]
 
 
 @once
-def include(i, mode, form, tables, work, kept):
-    """Extend the extremes of point i by the present instant."""
+def include(mode, form, tables, work, kept):
+    """Extend the extremes by the present instant."""
     n = states_of(tables.field)
-    n_i = work.zero.shape[0]
     for f in range(tables.fun.shape[1]):
-        if n_i + kept.maximum.shape[1] <= f < n_i + n:  # memory
-            continue
-        hi, lo, k = extremes_of(f, n, n_i, kept)
-        value = value_of(tables, mode, f, work.w)
-        hi[i, k] = max(hi[i, k], value)
-        lo[i, k] = min(lo[i, k], value)
+        k = kept_row(f, n, work.zero.shape[0], kept.section.shape[1])
+        if k >= 0:
+            value = value_of(tables, mode, f, work.w)
+            kept.high[k] = max(kept.high[k], value)
+            kept.low[k] = min(kept.low[k], value)

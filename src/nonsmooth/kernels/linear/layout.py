@@ -14,8 +14,6 @@ from nonsmooth.kernels.linear.module import is_planar
 from nonsmooth.kernels.linear.search import WIDTH
 from nonsmooth.kernels.linear.tables import DEGREE, NODES, TERMS
 
-__all__ = ["scratch"]
-
 LANES = 4  # numbers of a vector: columns of propagators are filled up to whole ones
 
 

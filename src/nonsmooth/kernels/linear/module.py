@@ -8,8 +8,6 @@ from types import ModuleType
 from nonsmooth.kernels.compile.assembly import joined, with_numbers
 from nonsmooth.kernels.compile.cache import load_module
 
-__all__ = ["STEPPER", "is_planar", "linear_module", "modes_module"]
-
 STEPPER = (
     "linear.tables", "linear.bands", "linear.build", "linear.polynomial", "linear.values", "linear.search",
     "linear.limits", "linear.stepper", "hybrid.loop",

@@ -11,8 +11,6 @@ from math import fabs, sqrt
 from nonsmooth.kernels.compile.cache import device, inline
 from nonsmooth.kernels.series.polynomial import NONE, UP, bounds, dense, first_crossing, load, row_bounds, shift, strip
 
-__all__ = ["NOISE", "earliest", "rows_hold", "section_crossing", "sides_at", "snap"]
-
 NOISE = 3.6e-15  # 16 roundings: an indicator this small against its own scale is zero
 
 

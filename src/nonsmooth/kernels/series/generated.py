@@ -5,8 +5,6 @@ from numba import types
 from nonsmooth.kernels.compile.cache import inline
 from nonsmooth.kernels.compile.pointers import function_at
 
-__all__ = ["field_of", "jet_of", "jump_of", "values_of"]
-
 _i, _f = types.int64, types.float64
 _f1, _f2 = _f[::1], _f[:, ::1]
 field_at = function_at(types.FunctionType(types.void(_i, _f, _f1, _f1, _f1)))

@@ -9,8 +9,6 @@ from nonsmooth.kernels.compile.assembly import joined, with_numbers
 from nonsmooth.kernels.compile.cache import load_module
 from nonsmooth.kernels.series.places import METHODS
 
-__all__ = ["METHODS", "STEPPER", "series_module"]
-
 STEPPER = ("series.step", "series.watch", "series.stepper", "hybrid.loop")
 OBSERVERS = ("hybrid.sections", "hybrid.record", "hybrid.observers", "hybrid.run")
 

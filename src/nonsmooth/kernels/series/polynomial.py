@@ -16,11 +16,6 @@ import numpy as np
 
 from nonsmooth.kernels.compile.cache import device, inline
 
-__all__ = [
-    "DOWN", "NONE", "UP", "bernstein", "bounds", "dense", "first_crossing", "largest", "load", "row_bounds", "shift",
-    "stack_size", "strip",
-]  # fmt: skip
-
 UP, DOWN = np.int64(1), np.int64(-1)  # of this type, so that Numba compiles one version, not one per number
 NONE = 2.0  # "no crossing on [0, 1]"
 DEPTH = 44  # halvings; below, neighbouring doubles cannot be told apart any more

@@ -10,8 +10,6 @@ from math import fabs, inf, sqrt
 
 from nonsmooth.kernels.compile.cache import device, inline, once
 
-__all__ = ["first_step", "hermite", "quiet", "stages", "time_to_transition"]
-
 
 @inline
 def stages(field, mode, t, u, q, h, n, K, fifth, absolute, rtol):

@@ -15,8 +15,6 @@ from nonsmooth.kernels.series.rkf45 import first_step, hermite, quiet, stages, t
 from nonsmooth.kernels.series.taylor import dense_states, fill_powers, step_length
 from nonsmooth.kernels.series.trust import trusted
 
-__all__ = ["METHOD", "at_end", "judged_at_end", "log_tolerance", "make_step", "polished"]
-
 # Of ``series.places``: set where the text is joined, so that each method has a kernel of its own.
 METHOD = 0
 

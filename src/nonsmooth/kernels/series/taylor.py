@@ -9,8 +9,6 @@ from math import exp, fabs, inf, log
 
 from nonsmooth.kernels.compile.cache import device, inline
 
-__all__ = ["copied", "dense_states", "end_states", "fill_powers", "step_length"]
-
 
 @inline
 def step_length(C, order, n, n_indicators, u, weight, scale, log_rtol):

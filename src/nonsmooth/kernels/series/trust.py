@@ -16,8 +16,6 @@ from nonsmooth.kernels.series.crossing import NOISE
 from nonsmooth.kernels.series.generated import field_of, values_of
 from nonsmooth.kernels.series.polynomial import NONE, first_crossing, load, row_bounds, shift, strip
 
-__all__ = ["trusted"]
-
 EITHER = np.int64(0)  # way and sign for ``first_crossing``, of the type it was compiled for
 SHORTER = 0.8  # a step ends at this fraction of the time to a place where the polynomial is wrong
 MOST = 4000  # such fractions in a row: more than there are powers of two

@@ -1,7 +1,7 @@
 """Observations made while a step's polynomials are at hand: extremes and touches."""
 
 import nonsmooth.kernels.series.places as place
-from nonsmooth.kernels.compile.cache import inline, once
+from nonsmooth.kernels.compile.cache import once
 from nonsmooth.kernels.hybrid.places import DONE, MODE, TOUCHES
 from nonsmooth.kernels.series.crossing import NOISE
 from nonsmooth.kernels.series.generated import values_of
@@ -19,41 +19,28 @@ from nonsmooth.kernels.series.polynomial import (
 from nonsmooth.kernels.series.step import METHOD
 from nonsmooth.kernels.series.taylor import dense_states
 
-__all__ = ["finish", "include", "log_touches", "widen"]
-
-
-@inline
-def extremes_of(row, n, n_i, kept):
-    """Maxima and minima in which those of a row of the jets are kept, and its column there."""
-    if row < n:
-        return kept.maximum, kept.minimum, row
-    if row < n + n_i:
-        return kept.i_max, kept.i_min, row - n
-    return kept.o_max, kept.o_min, row - n - n_i
-
 
 @once
-def widen(i, a, b, form, tables, work, kept):
-    """Extend the extremes of point i by a step, when it is over; rows that cannot exceed the old ones cost a bound."""
+def widen(a, b, form, tables, work, kept):
+    """Extend the extremes by a step, when it is over; rows that cannot exceed the old ones cost a bound."""
     if work.tally[place.OPEN_STEP] == 1 or not (b > a):
         return
-    C, n, n_i, mode, poly = work.C, work.w.shape[0], form.indicators, work.tally[MODE], work.a
+    C, n, mode, poly, top, bottom = work.C, work.w.shape[0], work.tally[MODE], work.a, kept.high, kept.low
     m = 5 if METHOD == place.RKF45 else form.order
     for row in range(form.kinds.shape[0]):
         if form.kinds[row] != 1 or (row < n and form.lacking[mode, row] == 1):
             continue
-        top, bottom, k = extremes_of(row, n, n_i, kept)
         _, low, high = row_bounds(C, row, 1.0, m, work.powers)
-        if high > top[i, k]:
-            top[i, k] = largest(poly, load(C, row, 1.0, m, work.powers, poly), top[i, k], work.stack)
-        if low < bottom[i, k]:
-            bottom[i, k] = -largest(poly, load(C, row, -1.0, m, work.powers, poly), -bottom[i, k], work.stack)
+        if high > top[row]:
+            top[row] = largest(poly, load(C, row, 1.0, m, work.powers, poly), top[row], work.stack)
+        if low < bottom[row]:
+            bottom[row] = -largest(poly, load(C, row, -1.0, m, work.powers, poly), -bottom[row], work.stack)
     if form.corners == 1:
-        widen_corners(i, m, form, work, kept)
+        widen_corners(m, form, work, kept)
 
 
 @once
-def widen_corners(i, m, form, work, kept):
+def widen_corners(m, form, work, kept):
     """Outputs with a corner have no polynomial: sampled four times on the step."""
     n, h = work.w.shape[0], work.memo[place.PART]
     values = values_of(form)
@@ -62,36 +49,32 @@ def widen_corners(i, m, form, work, kept):
         values(work.tally[MODE], work.memo[place.BASE] + 0.25 * j * h, work.dense, work.q, work.vals)
         for row in range(n, form.kinds.shape[0]):
             if form.kinds[row] == 0:
-                top, bottom, k = extremes_of(row, n, form.indicators, kept)
-                top[i, k] = max(top[i, k], work.vals[row - n])
-                bottom[i, k] = min(bottom[i, k], work.vals[row - n])
+                kept.high[row] = max(kept.high[row], work.vals[row - n])
+                kept.low[row] = min(kept.low[row], work.vals[row - n])
 
 
 @once
-def include(i, mode, form, tables, work, kept):
-    """Extend the extremes of point i by the present instant, just after a transition."""
+def include(mode, form, tables, work, kept):
+    """Extend the extremes by the present instant, just after a transition."""
     n = work.w.shape[0]
     jets = work.J0 if METHOD == place.RKF45 else work.C
     for row in range(form.kinds.shape[0]):
         if row < n and form.lacking[mode, row] == 1:
             continue
-        top, bottom, k = extremes_of(row, n, form.indicators, kept)
         value = jets[row, 0]
-        if value > top[i, k]:
-            top[i, k] = value
-        if value < bottom[i, k]:
-            bottom[i, k] = value
+        if value > kept.high[row]:
+            kept.high[row] = value
+        if value < kept.low[row]:
+            kept.low[row] = value
 
 
 @once
-def finish(i, form, tables, work, kept):
+def finish(form, tables, work, kept):
     """Extremes of the rows that repeat a state."""
-    n = work.w.shape[0]
-    for row in range(n, form.kinds.shape[0]):
+    for row in range(work.w.shape[0], form.kinds.shape[0]):
         if form.kinds[row] < 0:
-            top, bottom, k = extremes_of(row, n, form.indicators, kept)
-            top[i, k] = kept.maximum[i, -1 - form.kinds[row]]
-            bottom[i, k] = kept.minimum[i, -1 - form.kinds[row]]
+            kept.high[row] = kept.high[-1 - form.kinds[row]]
+            kept.low[row] = kept.low[-1 - form.kinds[row]]
 
 
 @once

@@ -8,8 +8,6 @@ from math import fabs, inf, log, sqrt
 
 from nonsmooth.kernels.compile.cache import inline
 
-__all__ = ["log_determinant", "multiply", "saltation", "straighten"]
-
 SINGULAR = 1e-13  # a pivot below this part of its row's size is that of a matrix without full rank
 
 

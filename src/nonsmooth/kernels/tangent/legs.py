@@ -23,8 +23,6 @@ from nonsmooth.kernels.hybrid.records import type_of
 from nonsmooth.kernels.tangent.agreement import fits
 from nonsmooth.kernels.tangent.frame import saltation
 
-__all__ = ["ORDER", "Crossing", "Ends", "Equations", "Steps", "cross", "follow", "march_legs"]
-
 ORDER = 24
 ACCURACY = 1e-17  # of the last two terms of a series against its largest one
 MOST_STEPS = 100_000  # in one leg

@@ -18,8 +18,6 @@ from nonsmooth.kernels.hybrid.codes import DIVERGED, NO_CONVERGENCE, OK
 from nonsmooth.kernels.hybrid.records import NET, type_of
 from nonsmooth.kernels.series.taylor import dense_states, step_length
 
-__all__ = ["Margins", "Visits", "follow"]
-
 PARTS = 8  # of a step of the series: an extremum shows as a change of the slope's sign over one part
 BISECTIONS = 60
 ROUNDING = 1e-13  # of an indicator's size

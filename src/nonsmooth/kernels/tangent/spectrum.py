@@ -30,8 +30,6 @@ from nonsmooth.kernels.tangent.legs import (
     step_end,
 )
 
-__all__ = ["Pace", "Pieces", "grow"]
-
 _i, _f = types.int64, types.float64
 _f1, _f2, _i1 = _f[::1], _f[:, ::1], _i[::1]
 
