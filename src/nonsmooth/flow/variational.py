@@ -71,13 +71,17 @@ class VariationalFlow:
 
         self.traced, self.active = traced, active
         self.places = tuple(traced.parameter_names.index(name) for name in active)
-        self.model = variational_model(traced, self.places)
+        plain, stands = traced.without_answers()
+        self.model = variational_model(plain, self.places)
         self.n_u, self.n = len(traced.u), len(traced.u) + len(traced.m)
         self.n_active, self.n_p = len(active), len(traced.p)
         self.scale = np.concatenate([scale, np.ones(len(traced.m))])
         self.equations = Equations(
             addresses(self.model.jet, self.model.field, self.model.switch), self.model.entries, self.model.kinds,
-            np.array([(t.source, t.target, len(t.rows)) for t in traced.transitions], dtype=np.int64).reshape(-1, 3),
+            np.array(
+                [(t.source, t.target, len(t.rows), k) for t, k in zip(traced.transitions, stands, strict=True)],
+                dtype=np.int64,
+            ).reshape(-1, 4),
         )  # fmt: skip
         self._local = threading.local()
         self._touches: dict[tuple[int, int], Any] = {}

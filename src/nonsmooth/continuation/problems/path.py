@@ -217,4 +217,4 @@ def _compiled(traced: Traced) -> tuple[Any, Any]:
     from nonsmooth.flow.engines.loop import pack_net
     from nonsmooth.system.codegen.generate import compile_model
 
-    return compile_model(traced), pack_net(traced)
+    return compile_model(traced.without_answers()[0]), pack_net(traced)

@@ -109,11 +109,10 @@ class LinearEngine(Engine):
 
     def given(self, tables: Tables) -> tuple[Any, Any, Any]:
         """The present thread's tables and work; the kernel keeps the tables of the last point in them."""
-        maps = max((j + 1 for j, jump in enumerate(self.traced.transitions) if jump.reset is not None), default=0)
-        if tables.form.ra.shape[1] < maps:  # some were found since
+        if tables.form.ra.shape[1] < len(self.net.changed):  # some were found since
             from nonsmooth.system.codegen.linear import linear_form
 
-            self.form = linear_form(self.traced) or self.form
+            self.form = linear_form(self.traced.without_answers()[0]) or self.form
             tables.form = self.prepare(tables.points).form
         local = self._local
         if not hasattr(local, "work"):

@@ -104,6 +104,7 @@ class Engine(ABC):
         if taken >= len(self.net.transitions):
             self.traced = self.traced.decider.known()
             self.net = pack_net(self.traced)
+            self.renew()
         return taken >= len(system[1].transitions)
 
     def _answer(self, waits: int, tables: Any, march: March, system: Any) -> int:
@@ -124,6 +125,9 @@ class Engine(ABC):
             work.w[: rows.n] = found.states
         work.tally[WAITS] = taken + 1
         return taken
+
+    def renew(self) -> None:  # noqa: B027
+        """Let go of what depends on the transitions, of which there are more now."""
 
     def step_in(self, mode: int, system: Any) -> float:
         """A time in which states change as much as they do from one step to the next."""
@@ -310,13 +314,14 @@ def pack_net(traced: Traced) -> Any:
     from nonsmooth.kernels.hybrid.records import Net
 
     integer, jumps, modes = np.int64, traced.transitions, range(len(traced.mode_names))
+    plain, maps = traced.without_answers()
     transitions = np.array(
         [
             (
                 -1 if t.kind in (ASKED, TOGETHER) else t.target, _change(traced, t),
                 DEAD_END if traced.ends(t) else t.contact, j, t.kind == ALONE,
             )
-            for j, t in enumerate(jumps)
+            for j, t in zip(maps, jumps, strict=True)
         ],
         dtype=integer,
     ).reshape(-1, 5)  # fmt: skip
@@ -326,8 +331,8 @@ def pack_net(traced: Traced) -> Any:
     mode_start = np.cumsum([0] + [len(one) for one in leaving], dtype=integer)
     mode_list = np.array([j for one in leaving for j in one], dtype=integer)
     both = np.array([*rows, (0, 1, 1), (0, -1, 1)], dtype=integer).reshape(-1, 3)
-    changed = np.zeros((len(transitions), len(traced.u) + len(traced.m) + 1), dtype=integer)
-    for j, t in enumerate(jumps):
+    changed = np.zeros((len(plain.transitions), len(traced.u) + len(traced.m) + 1), dtype=integer)
+    for j, t in enumerate(plain.transitions):
         moved = [i for i, e in enumerate(t.reset or ()) if e != traced.u[i]]
         moved += [len(traced.u) + i for i, _ in t.writes]
         changed[j, : len(moved) + 1] = [len(moved), *moved]

@@ -75,7 +75,7 @@ def engine_for(
     if method in ("auto", "exact") and traced is None:
         from nonsmooth.system.codegen.linear import linear_form
 
-        form = linear_form(equations)
+        form = linear_form(equations.without_answers()[0])
     if method == "exact":
         if form is None:
             raise ValueError(

@@ -115,7 +115,7 @@ class SeriesEngine(Engine):
         """The generated functions of the system."""
         from nonsmooth.system.codegen.generate import compile_model
 
-        return compile_model(self.layers.model)
+        return compile_model(self.layers.model.without_answers()[0])
 
     @cached_property
     def layers(self) -> Layers:
@@ -129,6 +129,10 @@ class SeriesEngine(Engine):
         """Per output of the system: whether it has a series."""
         return self.model.smooth_outputs[: len(self.traced.outputs)]
 
+    def renew(self) -> None:
+        for name in ("layers", "model", "functions"):
+            self.__dict__.pop(name, None)
+
     def prepare(self, points: FloatArray) -> Tables:
         """Periods at the parameter points (P, n_parameters)."""
         points = np.ascontiguousarray(points, dtype=float)
@@ -141,8 +145,8 @@ class SeriesEngine(Engine):
 
     def given(self, tables: Tables) -> tuple[Any, Any, Any]:
         local = self._threads
-        if getattr(local, "tables", None) is not tables:
-            local.tables, local.generated = tables, self.generated(tables)
+        if getattr(local, "tables", None) is not tables or local.maps != len(self.net.changed):
+            local.tables, local.generated, local.maps = tables, self.generated(tables), len(self.net.changed)
         if not hasattr(local, "work"):
             local.work = self._work()
         return local.generated, (), local.work

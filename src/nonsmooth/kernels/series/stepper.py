@@ -115,7 +115,7 @@ def take(i, t, fired, form, tables, net, work):
         values(work.tally[MODE], time, w, q, work.vals)
         work.measured[fired] = fabs(work.vals[fired])
     jump = jump_of(form)
-    jump(t, time, w, q, work.end, work.q_new)
+    jump(net.transitions[t, 3], time, w, q, work.end, work.q_new)
     for j in range(w.shape[0]):
         work.wp[j] = w[j]
         w[j] = work.end[j]

@@ -40,7 +40,7 @@ class Equations(NamedTuple):
     functions: Any  # addresses of the jet, the field and the switch (see ``pointers``)
     entries: Any  # (entries, 2) row and column of each entry of the Jacobians
     kinds: Any  # (modes, entries) 0: zero in this mode, 1: constant, 2: varying
-    transitions: Any  # (transitions, 3) source, target, rows of the condition
+    transitions: Any  # (transitions, 4) source, target, rows of the condition, the number by which ``switch`` knows it
 
 
 class Steps(NamedTuple):
@@ -262,7 +262,7 @@ def jump_at(k, t, n, equations, seen, out, work):
     n_a, r_z, r_t = both - n, n, n + n * n
     for i in range(both):
         f[0, i], f[1, i], f[2, i] = 0.0, 0.0, 0.0
-    switch(k, t, u, q, out)
+    switch(equations.transitions[k, 3], t, u, q, out)
     field(equations.transitions[k, 0], t, u, q, f[0])
     put(out, n, u, q)
     field(equations.transitions[k, 1], t, u, q, f[1])

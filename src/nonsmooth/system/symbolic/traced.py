@@ -6,7 +6,7 @@ derivatives, the code generator, the smoothed switch and the text form.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -91,6 +91,22 @@ class Traced:
     def is_map(self) -> bool:
         """Return whether the states change by transitions alone, and the period is 1."""
         return self.period == 1 and all(entry == 0 for field in self.fields for entry in field)
+
+    def without_answers(self) -> tuple[Traced, tuple[int, ...]]:
+        """The system without the answers that change no state, so that nothing is compiled anew for them; and for each
+        transition the one of that system which reads the same: for such an answer its question."""
+        if self.decider is None:
+            return self, tuple(range(len(self.transitions)))
+        kept: list[TracedTransition] = []
+        stands: list[int] = []
+        for jump in self.transitions:
+            if jump.kind == FOUND and jump.reset is None:
+                asked = (k for k, one in enumerate(kept) if one.source == jump.source and one.kind in (ASKED, TOGETHER))
+                stands.append(next(k for k in asked if kept[k].rows == jump.rows))
+            else:
+                stands.append(len(kept))
+                kept.append(jump)
+        return replace(self, transitions=tuple(kept)), tuple(stands)
 
     def keeps_at_zero(self, mode: int, indicator: int) -> bool:
         """Return whether motion in a mode slides along the surface of an indicator."""
