@@ -141,6 +141,8 @@ if __name__ == "__main__":
     parser.add_argument("--rows", help="file of one JSON object per seed; seeds that stand in it are not run again")
     arguments = parser.parse_args()
     store = Path(arguments.rows) if arguments.rows else None
+    if store:
+        store.parent.mkdir(parents=True, exist_ok=True)
     rows = [json.loads(line) for line in store.read_text().splitlines()] if store and store.exists() else []
     rows = [r for r in rows if arguments.first <= r["seed"] < arguments.last]
     for seed in sorted(set(range(arguments.first, arguments.last)) - {r["seed"] for r in rows}):
