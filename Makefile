@@ -13,7 +13,7 @@ PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward coverage-fit check \
-	bench gpu gpu-compiler docs screenshots clean distclean versions
+	contacts bench gpu gpu-compiler docs screenshots clean distclean versions
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26
@@ -47,6 +47,9 @@ coverage-awkward: $(VENV)/.compiled-run  ## the same on rigs where much goes wro
 
 coverage-fit: $(VENV)/.compiled-test  ## fit ten systems to data of SciPy, 40 seeds each; writes docs/measured_coverage_fit.md
 	$(BIN)/python -m tests.identification.fit_coverage --seeds 0-39 --out docs/measured_coverage_fit.md
+
+contacts: $(VENV)/.compiled-test  ## 1000 random systems with contacts and friction beside an independent reference (hours)
+	$(BIN)/python tests/independent/contact_campaign.py 0 1000 --rows out/contacts.jsonl
 
 check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell, the prose of docstrings, the weight of rooms
 	$(BIN)/ruff check .
