@@ -90,7 +90,7 @@ def test_a_ball_rests_when_its_bounces_end(e: float) -> None:
 
 
 def arrival(w: float) -> float:
-    """Return the phase w t at which the mass arrives at the other stop, having left where the load turned, at 3 pi / 2."""
+    """Return the phase w t at which the mass arrives at the other stop, having left as the load turned, at 3 pi / 2."""
     c, begin = 0.2, 1.5 * np.pi
     X, Y = np.linalg.solve([[-w * w, c * w], [-c * w, -w * w]], [1.0, 0.0])  # X cos wt + Y sin wt
 

@@ -275,7 +275,7 @@ def assembled(
     forces: dict[str, dict[str, Any]] = {part.name: {} for part in make.parts}
     transitions: list[Transition | Surface] = []
     kinds: list[str] = []  # of the transitions
-    asked: list[tuple[str, str, str]] = []  # mode, kind, condition
+    asked: list[tuple[str, str, str, int]] = []  # mode, kind, condition, the stop that is met or -1
     for mode, pattern in pairs:
         here = name(mode, pattern)
         f, found = make.flow(mode, pattern)
@@ -286,7 +286,7 @@ def assembled(
             for way in make.leaving(k, mode, pattern):
                 if way.phase is None:
                     owner = "" if k in make.held(pattern) else part.name
-                    asked.append((here, ASKED, make.condition(way.conditions, owner)))
+                    asked.append((here, ASKED, make.condition(way.conditions, owner), k if owner else -1))
                     continue
                 there = make.place(k, mode, pattern).put(way.phase).pattern
                 if (mode, there) not in pairs:
@@ -296,7 +296,7 @@ def assembled(
                 transitions.append(Transition(here, name(mode, there), when=when, reset=reset))
                 kinds.append(ALONE if make.asks and part.element.held else "")
         if make.asks:
-            asked.append((here, TOGETHER, _meetings(make, mode, pattern)))
+            asked.append((here, TOGETHER, _meetings(make, mode, pattern), -1))
         for item in given["transitions"]:
             if isinstance(item, Surface) and item.below == mode:
                 ends = name(item.below, pattern), name(item.above, pattern)

@@ -292,18 +292,24 @@ class Patterns:
         self.visited, self._known = list(patterns), {pattern: k for k, pattern in enumerate(patterns)}
         return self
 
-    def decides(self, traced: Traced, kinds: Sequence[str], asked: Sequence[tuple[str, str, str]]) -> Traced:
-        """The system with all its combinations written out, with the questions (mode, kind, condition) behind its
-        transitions, which have these ``kinds``."""
+    def decides(self, traced: Traced, kinds: Sequence[str], asked: Sequence[tuple[str, str, str, int]]) -> Traced:
+        """The system with all its combinations written out, with the questions (mode, kind, condition, stop) behind its
+        transitions, which have these ``kinds``.
+
+        The impact of the stop that is met is there from the first, so that nothing is compiled anew for it."""
         jumps = [replace(jump, kind=kind) for jump, kind in zip(traced.transitions, kinds, strict=True)]
         numbers = {name: i for i, name in enumerate(traced.indicator_names)}
         count = len(traced.indicator_names) - len(self.make.indicators)
         self.own = traced.indicator_names[:count], traced.indicators[:count]
-        for name, kind, text in asked:
+        impacts: dict[int, Any] = {}
+        for name, kind, text, k in asked:
             here = traced.mode_names.index(name)
             signs = read_condition(text, traced.indicator_names, name) if text else ()
             rows = tuple(Condition(numbers[one], sign, strict) for one, sign, strict in signs)
             jumps.append(TracedTransition(here, here, rows, label=name, kind=kind))
+            if k >= 0 and self.make.parts[k].element.strikes:
+                impacts[k] = impacts.get(k) or tuple(self.make.impact([k], self.mode))
+                jumps.append(TracedTransition(here, here, rows, reset=impacts[k], label=name, kind=FOUND))
         own = len(traced.output_names) - len(self.elements)
         self.equations = replace(
             self.equations, name=traced.name, period=traced.period, output_names=traced.output_names[:own],

@@ -93,18 +93,20 @@ class Traced:
         return self.period == 1 and all(entry == 0 for field in self.fields for entry in field)
 
     def without_answers(self) -> tuple[Traced, tuple[int, ...]]:
-        """The system without the answers that change no state, so that nothing is compiled anew for them; and for each
-        transition the one of that system which reads the same: for such an answer its question."""
+        """The system without the answers that change states like their question (not at all) or like an answer before
+        them, so that nothing is compiled anew; and for each transition the one there that reads the same."""
         if self.decider is None:
             return self, tuple(range(len(self.transitions)))
         kept: list[TracedTransition] = []
         stands: list[int] = []
         for jump in self.transitions:
-            if jump.kind == FOUND and jump.reset is None:
-                asked = (k for k, one in enumerate(kept) if one.source == jump.source and one.kind in (ASKED, TOGETHER))
-                stands.append(next(k for k in asked if kept[k].rows == jump.rows))
-            else:
-                stands.append(len(kept))
+            same = (jump.source, jump.rows, jump.reset)
+            like = [
+                k for k, one in enumerate(kept)
+                if one.kind in (ASKED, TOGETHER, FOUND) and (one.source, one.rows, one.reset) == same
+            ] if jump.kind == FOUND else []  # fmt: skip
+            stands.append(like[0] if like else len(kept))
+            if not like:
                 kept.append(jump)
         return replace(self, transitions=tuple(kept)), tuple(stands)
 
