@@ -340,7 +340,8 @@ def test_energy_never_grows_without_a_source() -> None:
     assert ran > 50
 
 
-@pytest.mark.parametrize("seed", [pytest.param(17, marks=pytest.mark.slow), 86, 118])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [17, 86, 118])
 def test_time_stepping_agrees(seed: int) -> None:
     draw = random_contact_system(seed)
     count = 60

@@ -90,7 +90,7 @@ def test_a_ball_rests_when_its_bounces_end(e: float) -> None:
 
 
 def arrival(w: float) -> float:
-    """Return the phase w t at which the mass arrives at the other stop, having left as the load turned, at 3 pi / 2."""
+    """Return the phase at which the mass arrives at the other stop; it left where the load turned, at 3 pi / 2."""
     c, begin = 0.2, 1.5 * np.pi
     X, Y = np.linalg.solve([[-w * w, c * w], [-c * w, -w * w]], [1.0, 0.0])  # X cos wt + Y sin wt
 
@@ -126,7 +126,7 @@ def test_two_plastic_stops_are_hit_twice_a_period(w: float) -> None:
 
 
 def test_where_sticking_at_two_plastic_stops_ends() -> None:
-    """Where the flight from the turn of the load ends at the turn of the load."""
+    """A flight from one turn of the load ends there at the next."""
     limit = brentq(lambda w: arrival(w) - 2.5 * np.pi, 1.0, 1.3, xtol=1e-14)
     assert limit == pytest.approx(1.1598356214676, abs=1e-12)
     assert visits(limit - 1e-6)[1] == 8

@@ -126,7 +126,7 @@ class PatternEngine(Engine):
 
 
 class Lead(NamedTuple):
-    """Where a transition leads, from which mode, by the conditions of which element."""
+    """A transition's source and target, by the conditions of which element."""
 
     source: int
     target: Pattern
@@ -387,7 +387,7 @@ class PatternTables:
 
 
 def _joined(lists: list[list[int]]) -> tuple[IntArray, IntArray]:
-    """Where each list begins, and all of them in one."""
+    """The beginnings of lists that stand in one, and that one."""
     every = [one for some in lists for one in some]
     return np.cumsum([0, *map(len, lists)], dtype=np.int64), np.array(every, dtype=np.int64)
 

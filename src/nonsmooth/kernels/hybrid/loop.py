@@ -174,7 +174,10 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
         if net.transitions[t, 2] == DEAD_END:
             code = NOT_UNIQUE
             break
+        alone = MAY_WAIT != 0 and net.transitions[t, 4] != 0 and net.transitions[t, 1] == RESET
         t = next_holding(mode, tables, net, work)
+        if alone and meets_another(mode, fired, net, tables, work):  # an impact has ended other rates too
+            t = net.together[mode]
     tally[TAKEN] = 0
     depart(jumps, goal, seen, work)
     tally[JUMPS] += jumps

@@ -330,7 +330,7 @@ def _meetings(make: Expressions, mode: str, pattern: Pattern) -> str:
 
 
 def _decider(make: Expressions, base: Mapping[str, Any], given: Mapping[str, Any]) -> Patterns | None:
-    """What elements that hold each other decide together; None where no two do, or where it is not known how to.
+    """The patterns of elements that decide together; None where no two hold each other, or it is not known how to.
 
     It is known where everything is affine, in a system with one mode and nothing else that changes it."""
     from nonsmooth.system.derived.patterns import Patterns

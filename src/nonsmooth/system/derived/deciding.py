@@ -1,4 +1,4 @@
-r"""What holds and what lets go at an instant at which several contacts and frictions have a say.
+r"""Decisions of several contacts and frictions at one instant: which hold and which let go.
 
 Candidates are the rigid contacts with g = g' = 0 and the frictions whose slip is zero. Their forces :math:`\lambda` and
 the derivatives a of their rates are those of the convex problem
@@ -151,7 +151,7 @@ class _Instant:
         return tuple((k, float(e)) for k, e, p in zip(contacts, given_back, impulses, strict=True) if p > 0.0)
 
     def outcome(self, contacts: list[int], struck: tuple[tuple[int, float], ...]) -> Outcome:
-        """What holds and what lets go, with the rates as they are now."""
+        """Those that hold and those that let go, with the rates as they are now."""
         candidates = [k for k in contacts if self.speeds[k] == 0.0]
         for k in self.contacts:
             self.put(k, "open")

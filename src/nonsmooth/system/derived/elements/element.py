@@ -118,7 +118,7 @@ class Element(ABC):
         return None
 
     def lies(self, where: float, rate: float, slow: float) -> int:
-        """Which of its ``sides`` it is on, 1 or -1, by its place and its rate; 0 where it may hold."""
+        """Return on which of its ``sides`` it is, 1 or -1, by its place and its rate; 0 where it may hold."""
         return 0
 
     def meeting(self, here: Place) -> list[list[Condition]]:
