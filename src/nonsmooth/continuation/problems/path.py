@@ -201,7 +201,7 @@ class Walk:
 
 
 def _in_net(traced: Traced, net: Any, k: int, row: int) -> tuple[int, int]:
-    """A transition and the row of its condition that is zero, as the transition table has them: a question for its answer."""
+    """A transition and the row of it that is zero, as the transition table has them: a question for its answer."""
     jump = traced.transitions[k] if k >= 0 else None
     if jump is not None and jump.kind == FOUND:
         fired = jump.rows[max(row, 0)]
