@@ -173,7 +173,11 @@ class _Instant:
                 self.put(k, self.rows.parts[k].element.sides[moving[k] < 0])
         for k in self.contacts:
             self.pressed.setdefault(k, False)
-        if candidates:  # rates that are zero are set to zero
+        closed = [self.rows.parts[k].where.values for k in held if k in self.contacts]
+        if closed:  # gaps and rates that are zero are set to zero
+            gaps = np.array(closed)
+            self.w[: self.rows.n] -= np.linalg.lstsq(gaps[:, : self.rows.n], gaps @ self.w, rcond=1e-10)[0]
+        if candidates:
             off = np.array([self.rates[k] @ self.w for k in candidates])
             amounts = np.linalg.lstsq(self.effects(candidates, candidates), -off, rcond=1e-10)[0]
             for k, amount in zip(candidates, amounts, strict=True):
