@@ -90,7 +90,8 @@ class Walk:
         )  # fmt: skip
         self.shape = (m, n_t)
         self.n = n
-        conditions = (self.net.at < 0) & [jump.kind not in (TOGETHER, FOUND) for jump in traced.transitions]
+        asked = np.array([jump.kind in (TOGETHER, FOUND) for jump in traced.transitions], dtype=bool)
+        conditions = (self.net.at < 0) & ~asked
         armed = [[traced.transitions[k].source == mode for k in range(n_t)] for mode in self.modes]
         self.armed = np.array(armed, dtype=bool).reshape(m, n_t)
         self.armed &= conditions[None, :]
@@ -99,7 +100,8 @@ class Walk:
             if k >= 0:  # what holds wherever this one does, and was declared behind it, is not taken
                 own = set(traced.transitions[k].rows)
                 self.elsewhere[i, k] = False
-                self.elsewhere[i, k:] &= [not (jump.rows and set(jump.rows) <= own) for jump in traced.transitions[k:]]
+                behind = traced.transitions[k:]
+                self.elsewhere[i, k:] &= np.array([not (jump.rows and set(jump.rows) <= own) for jump in behind])
             if traced.decider is not None and r >= 0:  # what several decide fires with what one does
                 self.elsewhere[i] &= [all(one.indicator != self.net.rows[r, 0] for one in jump.rows)
                                       for jump in traced.transitions]  # fmt: skip
