@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.errors import SolveError
 from nonsmooth.system.derived.elements.element import CREEP, SLOW
 
 if TYPE_CHECKING:
@@ -312,6 +313,8 @@ def least(G: FloatArray, a: FloatArray, low: FloatArray, high: FloatArray) -> Fl
         if not wish.any():
             break
         free[int((wish / np.sqrt(np.maximum(np.diag(G), 1e-300))).argmax())] = True
+    else:
+        raise SolveError("the forces of contacts and frictions that decide together were not found: no set is the last")
     return x * scale
 
 
