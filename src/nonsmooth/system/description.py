@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import sympy as sp
@@ -51,6 +52,7 @@ class Description:
     symmetry: Symmetry | None = None
     explicit_time: bool = False  # depends on the time, and not periodically
     ranges: tuple[tuple[sp.Expr, str], ...] = ()  # of the parameters: what must not be negative, and what to say
+    plain: Callable[[], Description] | None = field(default=None, compare=False, repr=False)  # without elements
     variants: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # a cache, see variant.py
 
     def with_sliding(self, traced: Traced) -> Traced:
@@ -106,6 +108,7 @@ def describe(
     ranges: Sequence[tuple[sp.Expr, str]] = ()
     patterns: Any = None
     made: Mapping[str, Any] = {}
+    plain: Callable[[], Description] | None = None
     if elements:
         from nonsmooth.system.derived.combinations import assembled
 
@@ -117,6 +120,11 @@ def describe(
         made = assembled(symbols, modes, elements, given, _scale(scale, units, name), now)
         derived = made["indicators"].keys() - (indicators or {}).keys()
         ranges, patterns = made["ranges"], made.get("patterns")
+        plain = partial(
+            describe, name=name, states=states, parameters=parameters, modes=modes, indicators=indicators,
+            transitions=transitions, memory=memory, outputs=outputs, symmetry=None, scale=scale, period=period,
+            bands=None,
+        )  # fmt: skip
         modes, indicators, transitions, outputs = (made[k] for k in ("modes", "indicators", "transitions", "outputs"))
     indicators = dict(indicators or {})
     shown = {key: _output(key, given) for key, given in (outputs or {}).items()}
@@ -153,7 +161,7 @@ def describe(
         traced=traced, surfaces=surfaces,
         bands=tuple(trace_band(key, band, traced, symbols, shown, known) for key, band in bands.items()),
         symmetry=None if symmetry is None else trace_symmetry(symmetry, traced, symbols, values),
-        explicit_time=explicit, ranges=tuple(ranges),
+        explicit_time=explicit, ranges=tuple(ranges), plain=plain,
     )  # fmt: skip
 
 

@@ -75,23 +75,22 @@ def _pieces(
 
 
 def _content(d: Description) -> dict[str, Any]:
-    t, names = d.traced, d.symbol_names
-    elements = t.patterns or t.decider
-    if t.decider is not None:
-        t = t.decider.plain
+    elements = d.traced.patterns or d.traced.decider
+    plain = d.plain() if d.traced.decider is not None and d.plain is not None else d
+    t, names = plain.traced, d.symbol_names
 
     def text(expression: sp.Expr) -> str:
         return write_expression(expression, names)
 
-    upward = {(s.below, s.above, (Row(s.indicator, 1),)): s for s in d.surfaces}
-    downward = {(s.above, s.below, (Row(s.indicator, -1),)) for s in d.surfaces}
+    upward = {(s.below, s.above, (Row(s.indicator, 1),)): s for s in plain.surfaces}
+    downward = {(s.above, s.below, (Row(s.indicator, -1),)) for s in plain.surfaces}
     transitions: list[dict[str, Any]] = []
     for jump in t.transitions:
         crossing = (jump.source, jump.target, jump.rows)
         if crossing in downward:  # the second half of a surface
             continue
         if crossing in upward:
-            transitions.append(_surface_content(upward[crossing], d))
+            transitions.append(_surface_content(upward[crossing], plain))
             continue
         entry: dict[str, Any] = {"source": t.mode_names[jump.source], "target": t.mode_names[jump.target]}
         if jump.at is None:
@@ -108,7 +107,7 @@ def _content(d: Description) -> dict[str, Any]:
     modes = {}
     for mode, field, lacking in zip(t.mode_names, t.fields, t.lacking, strict=True):
         modes[mode] = {s: text(e) for s, e, gone in zip(t.state_names, field, lacking, strict=True) if not gone}
-    known = {} if elements is None else elements.described()
+    known = {} if elements is None else elements.make.described()
     content: dict[str, Any] = {
         "format": _FORMAT,
         "version": _VERSION,
@@ -118,7 +117,7 @@ def _content(d: Description) -> dict[str, Any]:
         "parameters": {k: {"unit": v.unit, "symbol": v.symbol} for k, v in d.parameters.items()},
         "memory": {k: {"value": value, "unit": unit} for k, (value, unit) in d.memory.items()},
         "modes": modes,
-        "indicators": {} if known else {k: text(e) for k, e in zip(t.indicator_names, t.indicators, strict=True)},
+        "indicators": {} if d.traced.patterns is not None else {k: text(e) for k, e in zip(t.indicator_names, t.indicators, strict=True)},
         "transitions": transitions,
         "outputs": {
             k: {"unit": d.outputs[k], "modes": {m: text(e) for m, e in zip(t.mode_names, row, strict=True)}}
@@ -131,7 +130,7 @@ def _content(d: Description) -> dict[str, Any]:
         content["symmetry"] = {
             "map": {s: text(e) for s, e in zip(t.state_names, d.symmetry.map, strict=True)},
             "shift": d.symmetry.shift,
-            "modes": {t.mode_names[i]: t.mode_names[j] for i, j in enumerate(d.symmetry.modes)},
+            "modes": {d.traced.mode_names[i]: d.traced.mode_names[j] for i, j in enumerate(d.symmetry.modes)},
         }
     if known:
         from nonsmooth.system.derived.combinations import SPEED
@@ -141,7 +140,7 @@ def _content(d: Description) -> dict[str, Any]:
     if d.ranges and not known:
         content["ranges"] = [{"not negative": text(e), "else": sentence} for e, sentence in d.ranges]
     if d.bands:
-        content["bands"] = {t.indicator_names[band.indicator]: _band_content(band, d) for band in d.bands}
+        content["bands"] = {d.traced.indicator_names[band.indicator]: _band_content(band, d) for band in d.bands}
     return content
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from nonsmooth.flow.engines.engine import FloatArray, Kept, Log, Section, State
 from nonsmooth.flow.engines.march import March
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, MODE, RESET, STARTS, TIME, TOUCHES, WAITS
+from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, FIRED, MODE, RESET, STARTS, TIME, TOUCHES, WAITS
 from nonsmooth.kernels.hybrid.stopping import flag
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.derived.deciding import begun, decide
@@ -26,7 +26,6 @@ from nonsmooth.system.phases import phases, varying_phases
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, FOUND, TOGETHER
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derived.patterns import Rows
     from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 __all__ = ["DIVERGENCE", "Engine", "end_if_not_wanted", "pack_net"]
@@ -112,22 +111,28 @@ class Engine(ABC):
         decider, i, local, work = self.traced.decider, int(march.orders[0]), self._threads, system[3]
         assert decider is not None
         if getattr(local, "asked", None) != (id(tables), i):
-            local.asked, local.rows = (id(tables), i), decider.rows(decider.form.evaluate(tables.points[i : i + 1]), 0)
-        rows: Rows = local.rows
-        w, mode = rows.augmented(work.w[: rows.n], float(work.memo[TIME])), int(work.tally[MODE])
-        if work.tally[STARTS]:
-            found, taken = begun(rows, decider.mode, decider.visited[mode], w), -1
-            work.tally[MODE] = decider.number(found.pattern)
+            local.asked, local.point = (id(tables), i), decider.at_point(tables.points[i])
+        starts, mode, n = bool(work.tally[STARTS]), int(work.tally[MODE]), len(self.scale)
+        base, pattern = decider.modes[mode]
+        memory, step = self.memory_in(work), 0.0 if starts else self.step_in(mode, system)
+        numbers = decider.at_instant(local.point, mode, float(work.memo[TIME]), work.w[:n], memory, step)
+        found = begun(numbers, pattern) if starts else decide(numbers, pattern, decider.met(int(work.tally[FIRED])))
+        there, taken = decider.numbers[base, found.pattern], -1
+        if starts:
+            work.tally[MODE] = there
         else:
-            found = decide(rows, decider.mode, decider.visited[mode], w, self.step_in(mode, system))
-            taken = decider.found(waits, decider.number(found.pattern), found.struck)
+            taken = decider.found(waits, there, tuple(k for k, _ in found.struck))
         if taken < 0 or not found.struck:
-            work.w[: rows.n] = found.states
+            work.w[:n] = found.states
         work.tally[WAITS] = taken + 1
         return taken
 
     def renew(self) -> None:  # noqa: B027
         """Let go of what depends on the transitions, of which there are more now."""
+
+    def memory_in(self, work: Any) -> FloatArray:
+        """The memory of the motion in the kernels' work: behind the states, or where an engine has it."""
+        return np.asarray(work.w[len(self.scale) :])
 
     def step_in(self, mode: int, system: Any) -> float:
         """A time in which states change as much as they do from one step to the next."""

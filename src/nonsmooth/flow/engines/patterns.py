@@ -23,6 +23,7 @@ from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.places import MODE, RESET, STARTS, TIME, WAITS
 from nonsmooth.results.memory import free_memory, room_for
 from nonsmooth.system.derived.deciding import Outcome, begun, decide
+from nonsmooth.system.derived.instants import RowNumbers
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, FOUND, TOGETHER
 
 if TYPE_CHECKING:
@@ -214,11 +215,11 @@ class PatternTables:
         w, here = rows.augmented(self.work.w[: rows.n], float(self.work.memo[TIME])), int(tally[MODE])
         pattern = self.patterns.visited[self.numbers[here]]
         if tally[STARTS]:
-            found = begun(rows, mode, pattern, w)
+            found = begun(RowNumbers(rows, mode, w), pattern)
             target, taken = self.place(found.pattern), -1
             self.work.tally[MODE] = target
         else:
-            found = decide(rows, mode, pattern, w, float(self.own.info[here, 0]))
+            found = decide(RowNumbers(rows, mode, w, float(self.own.info[here, 0])), pattern)
             taken = self._answer(waits, found)
         if taken < 0 or not found.struck:
             self.work.w[: rows.n] = found.states

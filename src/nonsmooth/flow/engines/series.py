@@ -17,7 +17,7 @@ from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.layers import Layers, layers
 from nonsmooth.flow.engines.loop import DIVERGENCE, Engine, pack_net
 from nonsmooth.flow.engines.series_tables import Tables, periods, work_of
-from nonsmooth.kernels.series.places import METHODS
+from nonsmooth.kernels.series.places import LENGTH, METHODS
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.generate import CompiledModel
@@ -132,6 +132,12 @@ class SeriesEngine(Engine):
     def renew(self) -> None:
         for name in ("layers", "model", "functions"):
             self.__dict__.pop(name, None)
+
+    def memory_in(self, work: Any) -> FloatArray:
+        return np.asarray(work.q[len(self.traced.p) :])
+
+    def step_in(self, mode: int, system: Any) -> float:
+        return float(system[3].memo[LENGTH])
 
     def prepare(self, points: FloatArray) -> Tables:
         """Periods at the parameter points (P, n_parameters)."""

@@ -16,7 +16,7 @@ from nonsmooth.system.codegen.recurrences import Sum
 from nonsmooth.system.codegen.series import CornerError, Linear, Series
 from nonsmooth.system.symbolic.printing import Printer
 
-__all__ = ["JetCode", "jet_code"]
+__all__ = ["JetCode", "jet_code", "jet_steps"]
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,25 @@ def jet_code(
     SystemDefinitionError
         A field has a corner, or holds a function without known series.
     """
+    return _writer(t, u, constants, fields, rows).code()
+
+
+def jet_steps(
+    t: Symbol, u: Sequence[Symbol], constants: dict[Basic, str], fields: Sequence[Expr], rows: Sequence[Expr]
+) -> tuple[list[str], list[str]]:
+    """The same in two parts, to be called order by order: for coefficient 0, and for coefficient ``k`` of the rest."""
+    writer = _writer(t, u, constants, fields, rows)
+    first, following = writer.first(), writer.following()
+    return [*writer.series.constant_lines(), *first], following
+
+
+def _writer(
+    t: Symbol, u: Sequence[Symbol], constants: dict[Basic, str], fields: Sequence[Expr], rows: Sequence[Expr]
+) -> _Writer:
     series = Series(t, tuple(u), constants)
     field_forms = [series.linear(e) for e in fields]
     row_forms = [_form_or_none(series, e) for e in rows]
-    return _Writer(series, field_forms, rows, row_forms).code()
+    return _Writer(series, field_forms, rows, row_forms)
 
 
 def _form_or_none(series: Series, expression: Expr) -> Linear | None:
@@ -90,12 +105,13 @@ class _Writer:
         return sorted(i for i in reached if i >= self.n)
 
     def code(self) -> JetCode:
-        first, loop, tail = self._first(), self._loop(), self._tail()
+        first, following, tail = self.first(), self.following(), self._tail()
+        loop = ["for k in range(1, order):", *("    " + line for line in following)]
         lines = [*self.series.constant_lines(), *first, *loop, *tail]
         smooth = tuple(form is not None for form in self.row_forms)
         return JetCode(lines, len(self.scratch), smooth, frozenset(self.series.functions | self.functions))
 
-    def _first(self) -> list[str]:
+    def first(self) -> list[str]:
         """Coefficient 0 of everything and 1 of the states."""
         series, n = self.series, self.n
         lines = [f"z{i} = u[{i}]" for i in range(n)]
@@ -112,7 +128,8 @@ class _Writer:
         lines += [f"c{i} = {series.combination(form, True)}" for i, form in enumerate(self.fields)]
         return [*lines, *(f"C[{i}, 1] = c{i}" for i in range(n))]
 
-    def _loop(self) -> list[str]:
+    def following(self) -> list[str]:
+        """Coefficient k of everything and k + 1 of the states."""
         series, n = self.series, self.n
         body = [*self._steps(self.all, store=True), *self._row_lines("k")]
         body.append("r1 = 1.0/(k + 1)")
@@ -122,7 +139,7 @@ class _Writer:
         body += [f"c{i} = d{i}" for i in range(n)]
         body += [f"C[{i}, k + 1] = d{i}" for i in range(n)]
         body += [f"c{series.time} = 0.0"] if series.time in self.all else []
-        return ["for k in range(1, order):", *("    " + line for line in body)]
+        return body
 
     def _tail(self) -> list[str]:
         lines = self._steps(self.tail, store=False)

@@ -91,16 +91,13 @@ class Assembler(ABC):
         """The solution of a linear system of expressions."""
 
     @abstractmethod
-    def regular(self, matrix: list[list[Any]]) -> bool:
-        """Return whether a matrix of effects can be inverted."""
+    def slopes(self, expression: Any, draw: int = 0) -> FloatArray:
+        """The derivatives of an expression in the states, as numbers; where they depend on the state, in one of those
+        that are drawn at random."""
 
     @abstractmethod
-    def slopes(self, expression: Any) -> FloatArray:
-        """The derivatives of an expression in the states, as numbers; those that depend on states are NaN."""
-
-    @abstractmethod
-    def pushes(self, part: Part) -> FloatArray:
-        """The direction of an element as numbers, at the present values of the parameters."""
+    def pushes(self, part: Part, draw: int = 0) -> FloatArray:
+        """The direction of an element as numbers, likewise; at the present values of the parameters."""
 
     @abstractmethod
     def vanishes(self, expression: Any) -> bool:
@@ -152,8 +149,8 @@ class Assembler(ABC):
         return [[self.across(self.rate(i, mode), self.parts[j]) for j in some] for i in some]
 
     def may_hold(self, some: Sequence[int], mode: str) -> bool:
-        """Return whether the rates of some elements can be held at zero each by its own force, or by all together."""
-        return not some or self.asks or self.regular(self.effects(some, mode))
+        """Return whether some elements can be held at once."""
+        return True
 
     def coupled(self, i: int, j: int, mode: str) -> bool:
         """Return whether a force of one of two elements changes the rate of the other at once."""
@@ -176,7 +173,17 @@ class Assembler(ABC):
 
     def basis(self, held: Sequence[int], mode: str) -> tuple[list[int], FloatArray]:
         """Held elements whose rates are independent, and the forces of all of them as sums of those."""
-        rows = np.array([self.slopes(self.rate(k, mode)) for k in held])
+        chosen, sums = self._basis(held, mode, 0)
+        if len(chosen) < len(held) and not np.allclose(sums, self._basis(held, mode, 1)[1], rtol=1e-9, atol=1e-9):
+            names = ", ".join(repr(self.parts[k].name) for k in held)
+            raise SystemDefinitionError(
+                f"elements {names} hold together, and by which sum of forces depends on the state: take fewer elements"
+            )
+        return chosen, sums
+
+    def _basis(self, held: Sequence[int], mode: str, draw: int) -> tuple[list[int], FloatArray]:
+        """The same in one state."""
+        rows = np.array([self.slopes(self.rate(k, mode), draw) for k in held])
         rows = rows / np.linalg.norm(rows, axis=1)[:, None]
         chosen: list[int] = []
         for i in sorted(range(len(held)), key=lambda i: not self.parts[held[i]].element.bears):  # those with a place
@@ -194,7 +201,7 @@ class Assembler(ABC):
                 )
         if len(chosen) == len(held):
             return list(held), np.eye(len(held))
-        ways = np.array([self.pushes(self.parts[k]) for k in held])
+        ways = np.array([self.pushes(self.parts[k], draw) for k in held])
         sums = np.linalg.lstsq(ways[chosen].T, ways.T, rcond=None)[0].T
         return [held[i] for i in chosen], np.where(np.abs(sums) < INDEPENDENT * np.abs(sums).max(), 0.0, sums)
 

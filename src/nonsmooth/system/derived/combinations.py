@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,8 @@ import sympy as sp
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError, shortened
-from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
+from nonsmooth.system.derived.assembly import INDEPENDENT, Assembler, Part, Pattern
+from nonsmooth.system.derived.decider import Decider
 from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.derived.elements.element import Condition, Law
 from nonsmooth.system.mode import Mode
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["SPEED", "assembled", "element_names"]
 
 MOST = 256  # modes that are written out
+OTHER = 8  # draws from here on have other parameters too
 SPEED = sp.Symbol("speed_", real=True)  # in a law of it
 
 
@@ -137,9 +139,6 @@ class Expressions(Assembler):
         found = list(sp.Matrix(matrix).LUsolve(sp.Matrix(right)))
         return [sp.cancel(value) for value in found] if len(found) > 1 else found
 
-    def regular(self, matrix: list[list[sp.Expr]]) -> bool:
-        return sp.simplify(sp.Matrix(matrix).det()) != 0
-
     def vanishes(self, expression: Any) -> bool:
         expanded = sp.expand(expression)
         return expanded == 0 or (not expanded.is_number and sp.simplify(expanded) == 0)
@@ -175,16 +174,56 @@ class Expressions(Assembler):
             self._flows[key] = [sp.expand(entry) for entry in field], expanded
         return self._flows[key]
 
-    def slopes(self, expression: sp.Expr) -> FloatArray:
-        return self._numbers([sp.diff(expression, symbol) for symbol in self.u])
+    def slopes(self, expression: sp.Expr, draw: int = 0) -> FloatArray:
+        return self._numbers([sp.diff(expression, symbol) for symbol in self.u], draw)
 
-    def pushes(self, part: Part) -> FloatArray:
-        return self._numbers([part.direction.get(i, sp.Integer(0)) for i in range(len(self.u))])
+    def pushes(self, part: Part, draw: int = 0) -> FloatArray:
+        return self._numbers([part.direction.get(i, sp.Integer(0)) for i in range(len(self.u))], draw)
 
-    def _numbers(self, expressions: Sequence[Any]) -> FloatArray:
-        """Their values at the present parameters; NaN where they depend on more."""
-        found = (sp.sympify(one).subs(self.values) for one in expressions)
-        return np.array([float(one) if not one.free_symbols else np.nan for one in found])
+    def _numbers(self, expressions: Sequence[Any], draw: int) -> FloatArray:
+        """Their values in a state drawn at random; from ``OTHER`` on at parameters drawn at random too."""
+        at, rng = dict(self.values), np.random.default_rng(draw)
+        for symbol in [self.symbols.t, *self.u, *self.symbols.m.values(), *(at if draw >= OTHER else ())]:
+            at[symbol] = rng.uniform(0.5, 1.5)
+        return np.array([float(sp.sympify(one).subs(at)) for one in expressions])
+
+    def may_hold(self, some: Sequence[int], mode: str) -> bool:
+        rates = [self.rate(k, mode) for k in some]
+        gaps = [self.parts[k].where for k in some if self.parts[k].element.bears]
+        return self._vanish_together(rates) and self._vanish_together(gaps)
+
+    def _vanish_together(self, expressions: Sequence[sp.Expr]) -> bool:
+        """Return whether expressions may be zero at once: not where a sum of them is a number other than zero."""
+        chosen: list[sp.Expr] = []
+        for one in expressions:
+            before = np.array([self.slopes(other) for other in chosen]).reshape(len(chosen), len(self.u))
+            sums, off = np.linalg.lstsq(before.T, self.slopes(one), rcond=None)[0], np.inf
+            if len(chosen):
+                off = np.abs(before.T @ sums - self.slopes(one)).max()
+            if off > INDEPENDENT * np.abs(self.slopes(one)).max():
+                chosen.append(one)
+                continue
+            left = [n[0] - sums @ n[1:] for n in (self._numbers([one, *chosen], draw) for draw in (0, 1, OTHER))]
+            if abs(left[0]) > INDEPENDENT and np.ptp(left) < INDEPENDENT * abs(left[0]):
+                return False
+        return True
+
+    def described(self) -> dict[str, dict[str, Any]]:
+        """The elements as data: kind, options, and expressions of where they are, what they act on, and their laws."""
+        found = {}
+        for k, part in enumerate(self.parts):
+            e, others = part.element, {other.name for other in self.parts} - {part.name}
+            known = {"at", "on", e.kinematics, "position", "belt", *e.laws}
+            options = {one.name: getattr(e, one.name) for one in fields(e) if one.name not in known}
+            named = {name: getattr(e, name) for name in e.laws if isinstance(getattr(e, name), str)}
+            options |= {name: value for name, value in named.items() if value in others}
+            laws = {name: self.spoken(k, name) for name in e.laws if getattr(e, name) is not None}
+            found[part.name] = {
+                "kind": type(e).__name__, "options": options, e.kinematics: part.where,
+                "on": {self.names[i]: d for i, d in part.direction.items() if d != 0},
+                "laws": {name: law for name, law in laws.items() if name not in options},
+            }  # fmt: skip
+        return found
 
     # What a user would have written
 
@@ -263,7 +302,7 @@ def assembled(
     number = len(base) * int(sp.prod(counts))
     if number > MOST:
         return _opened(make, parts, base, given)
-    decider = _decider(make, base, given)
+    make.asks = _decide_together(make, base)
     every = product(base, product(*[range(count) for count in counts]))
     pairs = [pair for pair in every if make.may_hold(make.held(pair[1]), pair[0])]
 
@@ -315,7 +354,7 @@ def assembled(
         "indicators": {**(given["indicators"] or {}), **{key: _returns(g) for key, g in make.indicators.items()}},
         "outputs": {**outputs, **{f"{key}_force": (table, "") for key, table in forces.items()}},
         "ranges": make.ranges(next(iter(base))), "kinds": kinds, "asked": asked,
-        "decider": None if decider is None else decider.numbered([pattern for _, pattern in pairs]),
+        "decider": Decider(make, pairs, _affine(make, base, given)) if make.asks else None,
     }  # fmt: skip
 
 
@@ -329,25 +368,27 @@ def _meetings(make: Expressions, mode: str, pattern: Pattern) -> str:
     return " and ".join(rows)
 
 
-def _decider(make: Expressions, base: Mapping[str, Any], given: Mapping[str, Any]) -> Patterns | None:
-    """The patterns of elements that decide together; None where no two hold each other, or it is not known how to.
+def _decide_together(make: Expressions, base: Mapping[str, Any]) -> bool:
+    """Return whether the force of one element that may be held changes the rate of another at once."""
+    bearing = [k for k, part in enumerate(make.parts) if part.element.held]
+    return any(make.coupled(i, j, mode) for mode in base for i in bearing for j in bearing if i < j)
 
-    It is known where everything is affine, in a system with one mode and nothing else that changes it."""
+
+def _affine(make: Expressions, base: Mapping[str, Any], given: Mapping[str, Any]) -> Patterns | None:
+    """Rows of numbers in place of expressions, where all is affine in the states; None where something is not."""
     from nonsmooth.system.derived.patterns import Patterns
 
     mode = next(iter(base))
     bearing = [k for k, part in enumerate(make.parts) if part.element.held]
-    if len(base) > 1 or any(given[key] for key in ("transitions", "memory", "symmetry", "bands")):
+    known = {*make.values, make.symbols.t}
+    if len(base) > 1 or given["memory"]:
         return None
-    if not any(make.coupled(i, j, mode) for i in bearing for j in bearing if i < j):
+    if any(not sp.diff(make.rate(k, mode), x).free_symbols <= known for k in bearing for x in make.u):
         return None
-    if any(np.isnan([*make.slopes(make.rate(k, mode)), *make.pushes(make.parts[k])]).any() for k in bearing):
+    if any(not d.free_symbols <= known for k in bearing for d in make.parts[k].direction.values()):
         return None
     found = Patterns(make, mode)
-    if not found.is_affine(given["period"]):
-        return None
-    make.asks = True
-    return found
+    return found if found.is_affine(given["period"]) else None
 
 
 def _opened(

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -20,10 +20,9 @@ import sympy as sp
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.condition import read_condition
 from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
 from nonsmooth.system.symbolic.period import forcing_period
-from nonsmooth.system.symbolic.traced import FOUND, Traced, TracedTransition
+from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 from nonsmooth.system.symbolic.traced import Row as Condition
 from nonsmooth.system.symbolic.tracing import call_scalar
 
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
 __all__ = ["Patterns", "Row", "Rows"]
 
 ROUNDING = 1e-12  # of the terms of a sum: below it the sum is zero
-REGULAR = 1e-9  # least singular value of effects in units of their diagonal, above which forces are determined
 
 
 class Row:
@@ -160,16 +158,10 @@ class Rows(Assembler):
         rows = [one.values if isinstance(one, Row) else np.zeros(self.field.shape[1]) for one in right]
         return [Row(values, self.n) for values in np.linalg.solve(np.array(matrix), np.array(rows))]
 
-    def regular(self, matrix: list[list[float]]) -> bool:
-        sizes = np.sqrt(np.abs(np.diag(matrix)))
-        if not (sizes > 0).all():
-            return False
-        return bool(np.linalg.svd(np.array(matrix) / np.outer(sizes, sizes), compute_uv=False)[-1] > REGULAR)
-
-    def slopes(self, expression: Row) -> FloatArray:
+    def slopes(self, expression: Row, draw: int = 0) -> FloatArray:
         return expression.values[: self.n]
 
-    def pushes(self, part: Part) -> FloatArray:
+    def pushes(self, part: Part, draw: int = 0) -> FloatArray:
         return np.asarray(part.direction)
 
     def vanishes(self, expression: Any) -> bool:
@@ -210,8 +202,6 @@ class Patterns:
     at: dict[tuple[int, str, int | None], int] = field(default_factory=dict)
     visited: list[Pattern] = field(default_factory=list)
     jumps: list[TracedTransition] = field(default_factory=list)
-    own: tuple[tuple[str, ...], tuple[sp.Expr, ...]] = ((), ())  # names and expressions of the user's indicators
-    written: Traced | None = None  # the system with all its combinations of phases, where they are written out
     equations: Traced = field(init=False)  # without elements; the expressions are its indicators
 
     def __post_init__(self) -> None:
@@ -287,59 +277,6 @@ class Patterns:
         form = linear_form(self.equations)
         return form is not None and form.affine_indicators
 
-    def numbered(self, patterns: Sequence[Pattern]) -> Patterns:
-        """The same with these patterns as the first ones."""
-        self.visited, self._known = list(patterns), {pattern: k for k, pattern in enumerate(patterns)}
-        return self
-
-    def decides(self, traced: Traced, kinds: Sequence[str], asked: Sequence[tuple[str, str, str, int]]) -> Traced:
-        """The system with all its combinations written out, with the questions (mode, kind, condition, stop) behind its
-        transitions, which have these ``kinds``.
-
-        The impact of the stop that is met is there from the first, so that nothing is compiled anew for it."""
-        jumps = [replace(jump, kind=kind) for jump, kind in zip(traced.transitions, kinds, strict=True)]
-        numbers = {name: i for i, name in enumerate(traced.indicator_names)}
-        count = len(traced.indicator_names) - len(self.make.indicators)
-        self.own = traced.indicator_names[:count], traced.indicators[:count]
-        impacts: dict[int, Any] = {}
-        for name, kind, text, k in asked:
-            here = traced.mode_names.index(name)
-            signs = read_condition(text, traced.indicator_names, name) if text else ()
-            rows = tuple(Condition(numbers[one], sign, strict) for one, sign, strict in signs)
-            jumps.append(TracedTransition(here, here, rows, label=name, kind=kind))
-            if k >= 0 and self.make.parts[k].element.strikes:
-                impacts[k] = impacts.get(k) or tuple(self.make.impact([k], self.mode))
-                jumps.append(TracedTransition(here, here, rows, reset=impacts[k], label=name, kind=FOUND))
-        own = len(traced.output_names) - len(self.elements)
-        self.equations = replace(
-            self.equations, name=traced.name, period=traced.period, output_names=traced.output_names[:own],
-            outputs=tuple((row[0],) for row in traced.outputs[:own]),
-        )  # fmt: skip
-        self.written = replace(traced, transitions=tuple(jumps), decider=self)
-        return self.written
-
-    def known(self) -> Traced:
-        """The system written out, with all that was found so far."""
-        assert self.written is not None
-        return self.written
-
-    def found(self, asked: int, target: int, struck: tuple[tuple[int, float], ...]) -> int:
-        """The number of the transition to which a question has led: to a mode, by an impact of some elements."""
-        with self._lock:
-            key = asked, target, tuple(k for k, _ in struck)
-            written = self.known()
-            if key not in self._jumped:
-                question, names = written.transitions[asked], written.mode_names
-                reset = None if not struck else tuple(self.make.impact([k for k, _ in struck], self.mode))
-                self._jumped[key] = len(written.transitions)
-                jump = TracedTransition(
-                    question.source, target, question.rows, reset=reset, kind=FOUND,
-                    contact=bool(struck) or question.source == 0,
-                    label=f"{names[question.source]} -> {names[target]}",
-                )  # fmt: skip
-                self.written = replace(written, transitions=(*written.transitions, jump))
-            return self._jumped[key]
-
     def bind(self, traced: Traced) -> Traced:
         """The equations, which from here on know their patterns."""
         self.equations = traced
@@ -348,7 +285,7 @@ class Patterns:
     @cached_property
     def plain(self) -> Traced:
         """The equations without elements."""
-        return replace(self.equations, indicators=self.own[1], indicator_names=self.own[0])
+        return replace(self.equations, indicators=(), indicator_names=())
 
     @cached_property
     def form(self) -> LinearForm:
@@ -386,23 +323,6 @@ class Patterns:
                 self._jumped[key] = len(self.jumps)
                 self.jumps.append(TracedTransition(source, target, conditions, label=" -> ".join(names)))
             return self._jumped[key]
-
-    def described(self) -> dict[str, dict[str, Any]]:
-        """The elements as data: kind, options, and expressions of where they are, what they act on, and their laws."""
-        found = {}
-        for k, part in enumerate(self.make.parts):
-            e, others = part.element, set(self.elements) - {part.name}
-            known = {"at", "on", e.kinematics, "position", "belt", *e.laws}
-            options = {one.name: getattr(e, one.name) for one in fields(e) if one.name not in known}
-            named = {name: getattr(e, name) for name in e.laws if isinstance(getattr(e, name), str)}
-            options |= {name: value for name, value in named.items() if value in others}
-            laws = {name: self.make.spoken(k, name) for name in e.laws if getattr(e, name) is not None}
-            found[part.name] = {
-                "kind": type(e).__name__, "options": options, e.kinematics: part.where,
-                "on": {self.make.names[i]: part.direction[i] for i in self.acts_on[k]},
-                "laws": {name: law for name, law in laws.items() if name not in options},
-            }  # fmt: skip
-        return found
 
     def name(self, pattern: Pattern) -> str:
         """The phases of all elements as one name."""

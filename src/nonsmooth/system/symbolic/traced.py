@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
 
+    from nonsmooth.system.derived.decider import Decider
     from nonsmooth.system.derived.patterns import Patterns
 
 __all__ = ["ALONE", "ASKED", "FOUND", "NOT_UNIQUE", "TOGETHER", "Row", "Traced", "TracedTransition"]
@@ -85,7 +86,7 @@ class Traced:
     period: Expr | None
     along: tuple[frozenset[int], ...] = ()
     patterns: Patterns | None = field(default=None, compare=False, repr=False)  # modes are made when they are visited
-    decider: Patterns | None = field(default=None, compare=False, repr=False)  # what elements decide together
+    decider: Decider | None = field(default=None, compare=False, repr=False)  # what elements decide together
 
     @property
     def is_map(self) -> bool:

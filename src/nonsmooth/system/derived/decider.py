@@ -1,0 +1,105 @@
+"""The questions of a system whose combinations of phases are written out, and the answers found so far.
+
+Where several elements decide together (:mod:`nonsmooth.system.derived.deciding`), a transition says when they are asked
+but not what follows: an answer becomes a transition of its own when it is first found. Numbers are shared by all copies
+of a system.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from nonsmooth.arrays import FloatArray
+from nonsmooth.system.condition import read_condition
+from nonsmooth.system.derived.instants import Numbers, RowNumbers, SeriesCode, SeriesNumbers
+from nonsmooth.system.symbolic.traced import FOUND, Row, Traced, TracedTransition
+
+if TYPE_CHECKING:
+    from nonsmooth.system.derived.assembly import Pattern
+    from nonsmooth.system.derived.combinations import Expressions
+    from nonsmooth.system.derived.patterns import Patterns, Rows
+
+__all__ = ["Decider"]
+
+
+class Decider:
+    """Questions and answers of one system.
+
+    ``modes`` are the mode without elements and the phases of each of its modes; ``rows`` those of an affine system."""
+
+    def __init__(self, make: Expressions, modes: Sequence[tuple[str, Pattern]], rows: Patterns | None) -> None:
+        self.make, self.modes, self.rows = make, list(modes), rows
+        self.numbers = {one: number for number, one in enumerate(self.modes)}
+        self.code = SeriesCode(make)
+        self._lock = threading.Lock()
+        self._found: dict[Any, int] = {}
+        self._impacts: dict[tuple[str, tuple[int, ...]], tuple[Any, ...]] = {}
+        self._written: Traced | None = None
+
+    def decides(self, traced: Traced, kinds: Sequence[str], asked: Sequence[tuple[str, str, str, int]]) -> Traced:
+        """The system with all its combinations written out, with the questions (mode, kind, condition, stop) behind its
+        transitions, which have these ``kinds``.
+
+        The impact of the stop that is met is there from the first, so that nothing is compiled anew for it."""
+        jumps = [replace(jump, kind=kind) for jump, kind in zip(traced.transitions, kinds, strict=True)]
+        numbers = {name: i for i, name in enumerate(traced.indicator_names)}
+        for name, kind, text, k in asked:
+            here = traced.mode_names.index(name)
+            signs = read_condition(text, traced.indicator_names, name) if text else ()
+            rows = tuple(Row(numbers[one], sign, strict) for one, sign, strict in signs)
+            jumps.append(TracedTransition(here, here, rows, label=name, kind=kind))
+            if k >= 0 and self.make.parts[k].element.strikes:
+                reset = self._impact(self.modes[here][0], (k,))
+                jumps.append(TracedTransition(here, here, rows, reset=reset, label=name, kind=FOUND))
+        self._written = replace(traced, transitions=tuple(jumps), decider=self)
+        return self._written
+
+    def known(self) -> Traced:
+        """The system written out, with all that was found so far."""
+        assert self._written is not None
+        return self._written
+
+    def found(self, asked: int, target: int, struck: tuple[int, ...]) -> int:
+        """The number of the transition to which a question has led: to a mode, by an impact of some elements."""
+        with self._lock:
+            key, written = (asked, target, struck), self.known()
+            if key not in self._found:
+                question, names = written.transitions[asked], written.mode_names
+                reset = self._impact(self.modes[question.source][0], struck) if struck else None
+                self._found[key] = len(written.transitions)
+                jump = TracedTransition(
+                    question.source, target, question.rows, reset=reset, kind=FOUND,
+                    contact=bool(struck) or question.source == 0,
+                    label=f"{names[question.source]} -> {names[target]}",
+                )  # fmt: skip
+                self._written = replace(written, transitions=(*written.transitions, jump))
+            return self._found[key]
+
+    def _impact(self, mode: str, struck: tuple[int, ...]) -> tuple[Any, ...]:
+        key = mode, struck
+        if key not in self._impacts:
+            self._impacts[key] = tuple(self.make.impact(struck, mode))
+        return self._impacts[key]
+
+    def met(self, indicator: int) -> list[int]:
+        """The elements whose place is an indicator."""
+        if indicator < 0:
+            return []
+        where = self.known().indicators[indicator]
+        return [k for k, part in enumerate(self.make.parts) if part.element.held and part.where in (where, -where)]
+
+    def at_point(self, values: FloatArray) -> Rows | FloatArray:
+        """What the numbers at all instants of one parameter point share."""
+        return values if self.rows is None else self.rows.rows(self.rows.form.evaluate(values[None, :]), 0)
+
+    def at_instant(
+        self, point: Rows | FloatArray, mode: int, time: float, u: FloatArray, memory: FloatArray, step: float
+    ) -> Numbers:
+        """The numbers at an instant in a mode; ``step`` is a time in which states change as from step to step."""
+        base = self.modes[mode][0]
+        if self.rows is None:
+            return SeriesNumbers(self.code, base, time, u, [*point, *memory], step)
+        return RowNumbers(point, base, point.augmented(u, time), step)
