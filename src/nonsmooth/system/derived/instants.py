@@ -301,7 +301,7 @@ class SeriesCode:
             rates = [make.along(make.rate(k, mode), field) for k in some]
             first, following = jet_steps(
                 make.symbols.t, (*make.u, *inputs), self.names, [*field, *([sp.S.Zero] * len(inputs))],
-                [*rates, *laws],
+                [*rates, *map(sp.sympify, laws)],
             )  # fmt: skip
             self._steps[key] = (
                 compile("\n".join(first), "<instant>", "exec"), compile("\n".join(following), "<instant>", "exec"),
