@@ -52,7 +52,9 @@ class Description:
     symmetry: Symmetry | None = None
     explicit_time: bool = False  # depends on the time, and not periodically
     ranges: tuple[tuple[sp.Expr, str], ...] = ()  # of the parameters: what must not be negative, and what to say
-    plain: Callable[[], Description] | None = field(default=None, compare=False, repr=False)  # without elements
+    plain: Callable[[], tuple[Traced, tuple[TracedSurface, ...]]] | None = field(
+        default=None, compare=False, repr=False
+    )  # without elements
     variants: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # a cache, see variant.py
 
     def with_sliding(self, traced: Traced) -> Traced:
@@ -108,7 +110,7 @@ def describe(
     ranges: Sequence[tuple[sp.Expr, str]] = ()
     patterns: Any = None
     made: Mapping[str, Any] = {}
-    plain: Callable[[], Description] | None = None
+    plain: Any = None
     if elements:
         from nonsmooth.system.derived.combinations import assembled
 
@@ -120,11 +122,7 @@ def describe(
         made = assembled(symbols, modes, elements, given, _scale(scale, units, name), now)
         derived = made["indicators"].keys() - (indicators or {}).keys()
         ranges, patterns = made["ranges"], made.get("patterns")
-        plain = partial(
-            describe, name=name, states=states, parameters=parameters, modes=modes, indicators=indicators,
-            transitions=transitions, memory=memory, outputs=outputs, symmetry=None, scale=scale, period=period,
-            bands=None,
-        )  # fmt: skip
+        plain = partial(_without_elements, name, symbols, units, modes, indicators, transitions, outputs)
         modes, indicators, transitions, outputs = (made[k] for k in ("modes", "indicators", "transitions", "outputs"))
     indicators = dict(indicators or {})
     shown = {key: _output(key, given) for key, given in (outputs or {}).items()}
@@ -163,6 +161,17 @@ def describe(
         symmetry=None if symmetry is None else trace_symmetry(symmetry, traced, symbols, values),
         explicit_time=explicit, ranges=tuple(ranges), plain=plain,
     )  # fmt: skip
+
+
+def _without_elements(
+    name: str, symbols: Symbols, states: Mapping[str, str], modes: Any, indicators: Any, transitions: Any, outputs: Any
+) -> tuple[Traced, tuple[TracedSurface, ...]]:
+    """The equations that elements were put into, and their surfaces."""
+    kinds = {key: _mode(mode, key, states) for key, mode in modes.items()}
+    shown = {key: _output(key, given) for key, given in (outputs or {}).items()}
+    traced = trace_system(name, symbols, kinds, dict(indicators or {}), transitions, shown)
+    slid = [(item, sliding_mode(item, transitions)) for item in _surfaces(transitions)]
+    return traced, tuple(trace_surface(item, mode, traced, symbols) for item, mode in slid)
 
 
 def _surfaces(transitions: Any) -> list[Surface]:

@@ -20,7 +20,7 @@ from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.symbolic.expressions import read_expression, write_expression
 from nonsmooth.system.symbolic.scalar import Scalar
-from nonsmooth.system.symbolic.traced import Row
+from nonsmooth.system.symbolic.traced import Row, Traced
 from nonsmooth.system.symbolic.tracing import Symbols
 from nonsmooth.system.transition import Surface, Transition
 from nonsmooth.system.variant import variant_of
@@ -76,21 +76,22 @@ def _pieces(
 
 def _content(d: Description) -> dict[str, Any]:
     elements = d.traced.patterns or d.traced.decider
-    plain = d.plain() if d.traced.decider is not None and d.plain is not None else d
-    t, names = plain.traced, d.symbol_names
+    t, surfaces, names = d.traced, d.surfaces, d.symbol_names
+    if t.decider is not None and d.plain is not None:
+        t, surfaces = d.plain()
 
     def text(expression: sp.Expr) -> str:
         return write_expression(expression, names)
 
-    upward = {(s.below, s.above, (Row(s.indicator, 1),)): s for s in plain.surfaces}
-    downward = {(s.above, s.below, (Row(s.indicator, -1),)) for s in plain.surfaces}
+    upward = {(s.below, s.above, (Row(s.indicator, 1),)): s for s in surfaces}
+    downward = {(s.above, s.below, (Row(s.indicator, -1),)) for s in surfaces}
     transitions: list[dict[str, Any]] = []
     for jump in t.transitions:
         crossing = (jump.source, jump.target, jump.rows)
         if crossing in downward:  # the second half of a surface
             continue
         if crossing in upward:
-            transitions.append(_surface_content(upward[crossing], plain))
+            transitions.append(_surface_content(upward[crossing], t, names))
             continue
         entry: dict[str, Any] = {"source": t.mode_names[jump.source], "target": t.mode_names[jump.target]}
         if jump.at is None:
@@ -124,8 +125,8 @@ def _content(d: Description) -> dict[str, Any]:
             for k, row in zip(t.output_names, t.outputs, strict=True)
         },
     }
-    if t.period is not None:
-        content["period"] = text(t.period)
+    if d.traced.period is not None:
+        content["period"] = text(d.traced.period)
     if d.symmetry is not None:
         content["symmetry"] = {
             "map": {s: text(e) for s, e in zip(t.state_names, d.symmetry.map, strict=True)},
@@ -153,9 +154,8 @@ def _element_content(element: Mapping[str, Any], text: Callable[[sp.Expr], str])
     }  # fmt: skip
 
 
-def _surface_content(surface: TracedSurface, d: Description) -> dict[str, Any]:
+def _surface_content(surface: TracedSurface, t: Traced, names: Mapping[sp.Symbol, str]) -> dict[str, Any]:
     """Return a surface; what was not given is left out."""
-    t, names = d.traced, d.symbol_names
     entry: dict[str, Any] = {
         "surface": t.indicator_names[surface.indicator],
         "below": t.mode_names[surface.below],

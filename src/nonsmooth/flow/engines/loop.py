@@ -117,7 +117,7 @@ class Engine(ABC):
         memory, step = self.memory_in(work), 0.0 if starts else self.step_in(mode, system)
         numbers = decider.at_instant(local.point, mode, float(work.memo[TIME]), work.w[:n], memory, step)
         found = begun(numbers, pattern) if starts else decide(numbers, pattern, decider.met(int(work.tally[FIRED])))
-        there, taken = decider.numbers[base, found.pattern], -1
+        there, taken = decider.number(base, found.pattern), -1
         if starts:
             work.tally[MODE] = there
         else:

@@ -52,6 +52,9 @@ class Expressions(Assembler):
         self._known: dict[tuple[str, sp.Expr], str] = {}
         self._laws: dict[tuple[int, str, int | None], sp.Expr] = {}
         self._approaches: dict[tuple[int, str], sp.Expr] = {}
+        self._slopes: dict[tuple[sp.Expr, int], FloatArray] = {}
+        self._drawn: dict[int, dict[sp.Basic, sp.Float]] = {}
+        self._may_hold: dict[tuple[str, tuple[int, ...]], bool] = {}
         self._flows: dict[tuple[str, Pattern], tuple[list[sp.Expr], dict[int, sp.Expr]]] = {}
 
     # What the user gave
@@ -175,25 +178,34 @@ class Expressions(Assembler):
         return self._flows[key]
 
     def slopes(self, expression: sp.Expr, draw: int = 0) -> FloatArray:
-        return self._numbers([sp.diff(expression, symbol) for symbol in self.u], draw)
+        key = expression, draw
+        if key not in self._slopes:
+            self._slopes[key] = self._numbers([sp.diff(expression, symbol) for symbol in self.u], draw)
+        return self._slopes[key]
 
     def pushes(self, part: Part, draw: int = 0) -> FloatArray:
         return self._numbers([part.direction.get(i, sp.Integer(0)) for i in range(len(self.u))], draw)
 
     def _numbers(self, expressions: Sequence[Any], draw: int) -> FloatArray:
         """Their values in a state drawn at random; from ``OTHER`` on at parameters drawn at random too."""
-        at, rng = dict(self.values), np.random.default_rng(draw)
-        for symbol in [self.symbols.t, *self.u, *self.symbols.m.values(), *(at if draw >= OTHER else ())]:
-            at[symbol] = rng.uniform(0.5, 1.5)
-        return np.array([float(sp.sympify(one).subs(at)) for one in expressions])
+        if draw not in self._drawn:
+            at, rng = dict(self.values), np.random.default_rng(draw)
+            for symbol in [self.symbols.t, *self.u, *self.symbols.m.values(), *(at if draw >= OTHER else ())]:
+                at[symbol] = rng.uniform(0.5, 1.5)
+            self._drawn[draw] = {symbol: sp.Float(value) for symbol, value in at.items()}
+        return np.array([float(sp.sympify(one).xreplace(self._drawn[draw])) for one in expressions])
 
     def may_hold(self, some: Sequence[int], mode: str) -> bool:
-        rates = [self.rate(k, mode) for k in some]
-        gaps = [self.parts[k].where for k in some if self.parts[k].element.bears]
-        return self._vanish_together(rates) and self._vanish_together(gaps)
+        key = mode, tuple(some)
+        if key not in self._may_hold:
+            rates = [self.rate(k, mode) for k in some]
+            gaps = [self.parts[k].where for k in some if self.parts[k].element.bears]
+            self._may_hold[key] = self._vanish_together(rates, OTHER) and self._vanish_together(gaps, 2)
+        return self._may_hold[key]
 
-    def _vanish_together(self, expressions: Sequence[sp.Expr]) -> bool:
-        """Return whether expressions may be zero at once: not where a sum of them is a number other than zero."""
+    def _vanish_together(self, expressions: Sequence[sp.Expr], draw: int) -> bool:
+        """Return whether expressions may be zero at once: not where a sum of them is a number other than zero, as far
+        as drawn states (with ``OTHER`` parameters too) tell."""
         chosen: list[sp.Expr] = []
         for one in expressions:
             before = np.array([self.slopes(other) for other in chosen]).reshape(len(chosen), len(self.u))
@@ -203,7 +215,7 @@ class Expressions(Assembler):
             if off > INDEPENDENT * np.abs(self.slopes(one)).max():
                 chosen.append(one)
                 continue
-            left = [n[0] - sums @ n[1:] for n in (self._numbers([one, *chosen], draw) for draw in (0, 1, OTHER))]
+            left = [n[0] - sums @ n[1:] for n in (self._numbers([one, *chosen], draw) for draw in (0, 1, draw))]
             if abs(left[0]) > INDEPENDENT and np.ptp(left) < INDEPENDENT * abs(left[0]):
                 return False
         return True

@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.errors import SolveError
 from nonsmooth.system.condition import read_condition
 from nonsmooth.system.derived.instants import Numbers, RowNumbers, SeriesCode, SeriesNumbers
 from nonsmooth.system.symbolic.traced import FOUND, Row, Traced, TracedTransition
@@ -83,6 +84,16 @@ class Decider:
         if key not in self._impacts:
             self._impacts[key] = tuple(self.make.impact(struck, mode))
         return self._impacts[key]
+
+    def number(self, mode: str, pattern: Pattern) -> int:
+        """The number of a combination of phases."""
+        if (mode, pattern) not in self.numbers:
+            held = ", ".join(repr(self.make.parts[k].name) for k in self.make.held(pattern))
+            raise SolveError(
+                f"elements {held} hold at once, which they cannot at the parameters with which the system was defined: "
+                "define it with those of this run"
+            )
+        return self.numbers[mode, pattern]
 
     def met(self, indicator: int) -> list[int]:
         """The elements whose place is an indicator."""
