@@ -92,7 +92,7 @@ class Rows(Assembler):
     def __init__(self, patterns: Patterns, tables: LinearTables, i: int) -> None:
         self.n, harmonics = tables.A.shape[-1], tables.c.shape[-2]
         self.rates = tables.omega[i] * np.array(patterns.form.multiples, dtype=float)
-        self.struck, self.scale, self.asks = False, patterns.scale, True
+        self.struck, self.scale, self.asks, self.mode = False, patterns.scale, True, patterns.mode
         self.field = np.zeros((self.n, self.n + 1 + 2 * harmonics))
         self._fill(self.field, tables.A[i, 0], tables.b[i, 0], tables.c[i, 0].T, tables.s[i, 0].T)
         every = np.zeros((len(tables.ib[i]), self.field.shape[1]))
@@ -100,6 +100,7 @@ class Rows(Assembler):
         self._every, self._at = every, patterns.at
         self.parts = [self._part(k, name, patterns) for k, name in enumerate(patterns.elements)]
         self._approaches: dict[int, Row] = {}
+        self._rates: dict[int, Row] = {}
         self._flows: dict[Pattern, tuple[FloatArray, dict[int, Any]]] = {}
 
     def _fill(self, into: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray, s: FloatArray) -> None:
@@ -185,6 +186,19 @@ class Rows(Assembler):
         if k not in self._approaches:
             self._approaches[k] = super().approach(k, mode)
         return self._approaches[k]
+
+    def rate(self, k: int, mode: str) -> Row:
+        if k not in self._rates:
+            self._rates[k] = super().rate(k, mode)
+        return self._rates[k]
+
+    @cached_property
+    def changes(self) -> FloatArray:
+        """Changes of the derivatives of the rates of all that may hold by unit forces of each of them."""
+        bearing = [k for k, part in enumerate(self.parts) if part.element.held]
+        found = np.zeros((len(self.parts), len(self.parts)))
+        found[np.ix_(bearing, bearing)] = self.effects(bearing, self.mode)
+        return found
 
     def flow(self, mode: str, pattern: Pattern) -> tuple[FloatArray, dict[int, Any]]:
         if pattern not in self._flows:
