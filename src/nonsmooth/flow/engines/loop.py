@@ -17,13 +17,13 @@ import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray, Kept, Log, Section, State
 from nonsmooth.flow.engines.march import March
-from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid import codes, places
 from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, FIRED, MODE, RESET, STARTS, TIME, TOUCHES, WAITS
 from nonsmooth.kernels.hybrid.stopping import flag
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.derived.deciding import begun, decide
 from nonsmooth.system.phases import phases, varying_phases
-from nonsmooth.system.symbolic.traced import ALONE, ASKED, FOUND, TOGETHER
+from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, FOUND, OWN, TOGETHER
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced, TracedTransition
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["DIVERGENCE", "Engine", "end_if_not_wanted", "pack_net"]
 
 DIVERGENCE = 1e9  # in units of a state's scale
+KINDS = {ALONE: places.ALONE, OWN: places.OWN, ASKS_BEHIND: places.ASKS_BEHIND}  # place 4 of ``Net.transitions``
 SPARE = 64  # crossings that one leg may add to a log
 
 
@@ -324,7 +325,7 @@ def pack_net(traced: Traced) -> Any:
         [
             (
                 -1 if t.kind in (ASKED, TOGETHER) else t.target, _change(traced, t),
-                DEAD_END if traced.ends(t) else t.contact, j, t.kind == ALONE,
+                DEAD_END if traced.ends(t) else t.contact, j, KINDS.get(t.kind, 0),
             )
             for j, t in zip(maps, jumps, strict=True)
         ],

@@ -24,6 +24,8 @@ from nonsmooth.kernels.hybrid.codes import (
     TOO_MANY_CROSSINGS,
 )
 from nonsmooth.kernels.hybrid.places import (
+    ALONE,
+    ASKS_BEHIND,
     BEGUN,
     BURST,
     BURST_LENGTH,
@@ -38,6 +40,7 @@ from nonsmooth.kernels.hybrid.places import (
     MOST_CROSSINGS,
     NO_END,
     NOTED,
+    OWN,
     PERIODS,
     RESET,
     SHORT,
@@ -81,6 +84,8 @@ def settle(i, form, net, tables, work):
         mode, t = tally[MODE], -1
         for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
             one = net.mode_list[k]
+            if MAY_WAIT != 0 and tally[STARTS] != 0 and net.transitions[one, 4] < OWN:
+                continue  # what elements do has been asked
             if holds(one, mode, tables, net, work):
                 impact = net.transitions[one, 1] == RESET
                 if impact and lies_beyond(one, form, net, work):
@@ -94,6 +99,7 @@ def settle(i, form, net, tables, work):
         if t < 0:
             break
         tally[MODE] = take(i, t, -1, form, tables, net, work)
+        tally[TAKEN] += 1
         if net.transitions[t, 2] == DEAD_END:
             return NOT_UNIQUE
         visited[tally[MODE]] = 1
@@ -105,8 +111,15 @@ def begin(i, form, net, section, motion, tables, work):
     """State and mode where a run begins, by the start rule. Returns a status, PAUSED where elements are asked."""
     tally, memo, code = work.tally, work.memo, OK
     if MAY_WAIT != 0 and tally[STARTS] != 0:  # it has been answered
-        tally[BEGUN], tally[STARTS] = 1, 0
+        tally[BEGUN] = 1
         look(i, form, tables, work, tally[MODE])
+        code, moved = settle(i, form, net, tables, work), tally[TAKEN] != 0
+        tally[TAKEN] = 0
+        if moved and code == OK and tally[STARTS] <= net.together.shape[0]:  # behind the system's own they are asked again
+            tally[BEGUN], tally[WAITS] = 0, net.together[tally[MODE]] + 1
+            tally[STARTS] += 1
+            return PAUSED
+        tally[STARTS] = 0
     else:
         for k in range(tally.shape[0]):
             tally[k] = 0
@@ -121,6 +134,7 @@ def begin(i, form, net, section, motion, tables, work):
         look(i, form, tables, work, tally[MODE])
         if motion.counters[1] != 1:
             code = settle(i, form, net, tables, work)
+            tally[TAKEN] = 0
         if code == PAUSED:  # it begins anew when the mode stands
             tally[BEGUN] = 0
     if section.indicator >= 0:  # a start on the section is no return
@@ -156,7 +170,7 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
     mode, code, fired = tally[MODE], OK, tally[FIRED]
     jumps = tally[TAKEN] if MAY_WAIT != 0 else 0
     if jumps == 0:
-        if MAY_WAIT != 0 and net.transitions[t, 4] != 0 and meets_another(mode, fired, net, tables, work):
+        if MAY_WAIT != 0 and net.transitions[t, 4] == ALONE and meets_another(mode, fired, net, tables, work):
             t = net.together[mode]
         tally[SOURCE], tally[FIRST] = mode, t
         approach(mode, fired, goal, seen, tables, work)
@@ -174,8 +188,11 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
         if net.transitions[t, 2] == DEAD_END:
             code = NOT_UNIQUE
             break
-        alone = MAY_WAIT != 0 and net.transitions[t, 4] != 0 and net.transitions[t, 1] == RESET
+        alone = MAY_WAIT != 0 and net.transitions[t, 4] == ALONE and net.transitions[t, 1] == RESET
+        asks = MAY_WAIT != 0 and net.transitions[t, 4] == ASKS_BEHIND
         t = next_holding(mode, tables, net, work)
+        if asks and (t < 0 or net.transitions[t, 4] < OWN):
+            t = net.together[mode]
         if alone and meets_another(mode, fired, net, tables, work):  # an impact has ended other rates too
             t = net.together[mode]
     tally[TAKEN] = 0

@@ -65,7 +65,7 @@ class Net(NamedTuple):
     """The transition table of a linear system."""
 
     transitions: Any  # (transitions, 5): target (-1: its tables do not stand yet, or it is asked), what it changes (0,
-    # ``places.RESET``, ...), contact or ``DEAD_END``, its map among those of the form, 1 where it decides alone
+    # ``places.RESET``, ...), contact or ``DEAD_END``, its map among those of the form, ``places.ALONE``, ...
     rows: Any  # (rows + 2, 3): functional, sign, strict; the last two belong to the section (rising, falling)
     row_start: Any  # (transitions + 1,)
     mode_start: Any  # (modes + 1,)

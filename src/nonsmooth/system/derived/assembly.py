@@ -49,7 +49,6 @@ class Assembler(ABC):
     """The fields, forces and impulses of combinations of phases, over a calculus."""
 
     parts: list[Part]
-    struck: bool  # the system has resets of its own, which turn speeds
     asks: bool = False  # what several elements decide together is asked at each instant (``deciding``)
 
     # The calculus
@@ -104,10 +103,6 @@ class Assembler(ABC):
         """Return whether an expression is zero whatever the state."""
 
     @abstractmethod
-    def sign(self, effect: Any, one: Part, other: Part) -> int:
-        """The sign of what an impulse of the other does to the rate of one, the same in all states."""
-
-    @abstractmethod
     def size(self, expression: Any) -> Any:
         """The scale of the states that an expression involves."""
 
@@ -147,10 +142,6 @@ class Assembler(ABC):
     def effects(self, some: Sequence[int], mode: str) -> list[list[Any]]:
         """Changes of the derivatives of the rates of some elements by their unit forces."""
         return [[self.across(self.rate(i, mode), self.parts[j]) for j in some] for i in some]
-
-    def may_hold(self, some: Sequence[int], mode: str) -> bool:
-        """Return whether some elements can be held at once."""
-        return True
 
     def coupled(self, i: int, j: int, mode: str) -> bool:
         """Return whether a force of one of two elements changes the rate of the other at once."""
@@ -249,21 +240,15 @@ class Assembler(ABC):
             found.append(Leaving(None, [Condition(beyond, 1, names.pop(0))]))
         return found
 
-    def impulse(self, k: int, factor: Any, held: Sequence[int], mode: str) -> Any:
-        """States behind an impulse of element k that takes its rate to -factor times it; what is held bears a part."""
-        wanted = [-(1 + factor) * self.rate(k, mode), *([0] * len(held))]
-        after = self.identity()
-        for j, amount in zip([k, *held], self.solved(self.effects([k, *held], mode), wanted), strict=True):
-            after = self.moved(after, self.parts[j], amount)
-        return self.tidy(after)
-
-    def impact(self, contacts: Sequence[int], mode: str) -> Any:
-        """States behind an impact of several contacts that bear an impulse, each by its own restitution.
+    def impact(self, some: Sequence[int], mode: str, factor: Any = None) -> Any:
+        """States behind impulses of several elements that take their rates to -factor times these; without one, by the
+        restitution of each.
 
         Of those that keep their rate at zero, as at rest, the rate is zero before it as well."""
-        wanted = [-(1 + self.law(k, "restitution")) * self.rate(k, mode) for k in contacts]
+        factors = [self.law(k, "restitution") if factor is None else factor for k in some]
+        wanted = [-(1 + e) * self.rate(k, mode) for k, e in zip(some, factors, strict=True)]
         after = self.identity()
-        for k, amount in zip(contacts, self.solved(self.effects(contacts, mode), wanted), strict=True):
+        for k, amount in zip(some, self.solved(self.effects(some, mode), wanted), strict=True):
             after = self.moved(after, self.parts[k], amount)
         return self.tidy(after)
 
@@ -351,14 +336,6 @@ class Place:
         found = [j for j, part in enumerate(self.make.parts) if part.name == name]
         return self.other(found[0]) if found else None
 
-    def held(self) -> list[int]:
-        """Elements whose force is that of a constraint here."""
-        return self.make.held(self.pattern)
-
-    def may_hold(self, some: Sequence[int]) -> bool:
-        """Return whether the rates of some elements can be held at zero each by its own force."""
-        return self.make.may_hold(some, self.mode)
-
     def holding(self) -> Any:
         """The force of the element."""
         return self.make.flow(self.mode, self.pattern)[1][self.k]
@@ -368,9 +345,9 @@ class Place:
         field, _ = self.make.flow(self.mode, self.put("open").pattern)
         return self.make.along(self.rate(), field)
 
-    def struck(self, factor: Any, held: Sequence[int]) -> Any:
-        """States behind an impulse of the element, see :meth:`Assembler.impulse`."""
-        return self.make.impulse(self.k, factor, held, self.mode)
+    def struck(self, factor: Any) -> Any:
+        """States behind an impulse of the element that takes its rate to -factor times it."""
+        return self.make.impact([self.k], self.mode, factor)
 
     def behind(self, expression: Any, states: Any) -> Any:
         """An expression behind an impulse, by the states before it."""
@@ -381,19 +358,13 @@ class Place:
         return self.make.shifted_back(states, self.where)
 
     def is_struck(self) -> bool:
-        """Return whether its speed may jump: by the impact of a stop, or by a reset of the system's own."""
-        make = self.make
-        strikes = (part for part in make.parts if part.element.strikes)
-        return make.struck or any(not make.vanishes(make.across(self.where, part)) for part in strikes)
+        """Return whether the impact of a stop turns its speed."""
+        strikes = (part for part in self.make.parts if part.element.strikes)
+        return any(not self.vanishes(self.make.across(self.where, part)) for part in strikes)
 
-    def moves(self, j: int) -> bool:
-        """Return whether a force of the element changes the rate of element j."""
-        return not self.make.vanishes(self.make.across(self.make.rate(j, self.mode), self.part))
-
-    def effect_on(self, j: int) -> int:
-        """The sign of what an impulse of the element does to the rate of element j."""
-        effect = self.make.across(self.make.rate(j, self.mode), self.part)
-        return self.make.sign(effect, self.make.parts[j], self.part)
+    def begins_alone(self) -> bool:
+        """Return whether nothing is asked where a run begins, so that its conditions must lead out of its phase."""
+        return not self.make.asks
 
     def vanishes(self, expression: Any) -> bool:
         """Return whether an expression is zero whatever the state."""

@@ -24,7 +24,7 @@ from nonsmooth.system.derived.elements.element import Condition, Law
 from nonsmooth.system.mode import Mode
 from nonsmooth.system.names import unknown
 from nonsmooth.system.symbolic.scalar import Scalar, to_expression
-from nonsmooth.system.symbolic.traced import ALONE, ASKED, TOGETHER
+from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, OWN, TOGETHER
 from nonsmooth.system.symbolic.tracing import Symbols, call_scalar, call_vector
 from nonsmooth.system.transition import Surface, Transition
 
@@ -43,9 +43,9 @@ class Expressions(Assembler):
 
     def __init__(
         self, symbols: Symbols, base: Mapping[str, tuple[sp.Expr, ...]], elements: Mapping[str, Element],
-        scale: Mapping[str, float], values: Mapping[sp.Symbol, float], struck: bool,
+        scale: Mapping[str, float], values: Mapping[sp.Symbol, float],
     ) -> None:  # fmt: skip
-        self.symbols, self.fields, self.scale, self.values, self.struck = symbols, base, scale, values, struck
+        self.symbols, self.fields, self.scale, self.values = symbols, base, scale, values
         self.u = tuple(symbols.u.values())
         self.parts = [self._part(name, element) for name, element in elements.items()]
         self.indicators: dict[str, sp.Expr] = {}
@@ -146,16 +146,6 @@ class Expressions(Assembler):
         expanded = sp.expand(expression)
         return expanded == 0 or (not expanded.is_number and sp.simplify(expanded) == 0)
 
-    def sign(self, effect: sp.Expr, one: Part, other: Part) -> int:
-        effect = sp.simplify(effect.subs(self.values))
-        for number, holds in ((-1, effect.is_negative), (0, effect.is_zero), (1, effect.is_positive)):
-            if holds:
-                return number
-        raise SystemDefinitionError(
-            f"elements {one.name!r} and {other.name!r}: whether an impact of one opens the other depends on the state "
-            f"({effect}), and that is decided once for all; give {one.name!r} rest=False"
-        )
-
     def size(self, expression: sp.Expr) -> sp.Expr:
         found = [self.scale[name] for name, symbol in self.symbols.u.items() if expression.has(symbol)]
         return to_expression(max(found, default=1.0))
@@ -196,6 +186,7 @@ class Expressions(Assembler):
         return np.array([float(sp.sympify(one).xreplace(self._drawn[draw])) for one in expressions])
 
     def may_hold(self, some: Sequence[int], mode: str) -> bool:
+        """Return whether some elements can be held at once."""
         key = mode, tuple(some)
         if key not in self._may_hold:
             rates = [self.rate(k, mode) for k in some]
@@ -309,12 +300,12 @@ def assembled(
         for key, mode in modes.items()
     }  # fmt: skip
     resets = any(isinstance(item, Transition) and item.reset is not None for item in given["transitions"])
-    make = Expressions(symbols, base, parts, scale, values, resets)
+    make = Expressions(symbols, base, parts, scale, values)
     counts = [len(part.element.phases) for part in make.parts]
     number = len(base) * int(sp.prod(counts))
     if number > MOST:
         return _opened(make, parts, base, given)
-    make.asks = _decide_together(make, base)
+    make.asks = _decide_together(make, base, resets)
     every = product(base, product(*[range(count) for count in counts]))
     pairs = [pair for pair in every if make.may_hold(make.held(pair[1]), pair[0])]
 
@@ -352,9 +343,16 @@ def assembled(
             if isinstance(item, Surface) and item.below == mode:
                 ends = name(item.below, pattern), name(item.above, pattern)
                 transitions.append(replace(item, below=ends[0], above=ends[1]))
+                if make.asks:
+                    raise SystemDefinitionError(
+                        f"{item.label}: a surface on which motion may slide cannot stand beside elements whose forces "
+                        "change the rates of each other; write it as an element (ns.elements.Coulomb), or as two "
+                        "transitions"
+                    )
             elif isinstance(item, Transition) and item.source == mode:
                 ends = name(item.source, pattern), name(item.target, pattern)
                 transitions.append(Transition(*ends, item.when, item.at, item.reset, item.write))
+                kinds.append(OWN if item.reset is None else ASKS_BEHIND)
     outputs = {}
     for key, output in (given["outputs"] or {}).items():
         function, unit = output if isinstance(output, (tuple, list)) else (output, "")
@@ -380,10 +378,17 @@ def _meetings(make: Expressions, mode: str, pattern: Pattern) -> str:
     return " and ".join(rows)
 
 
-def _decide_together(make: Expressions, base: Mapping[str, Any]) -> bool:
-    """Return whether the force of one element that may be held changes the rate of another at once."""
+def _decide_together(make: Expressions, base: Mapping[str, Any], resets: bool) -> bool:
+    """Return whether the force of one element that may be held changes the rate of another at once, or a reset of the
+    system's own may."""
     bearing = [k for k, part in enumerate(make.parts) if part.element.held]
-    return any(make.coupled(i, j, mode) for mode in base for i in bearing for j in bearing if i < j)
+    for k in bearing:
+        if any(make.vanishes(make.across(make.rate(k, mode), make.parts[k])) for mode in base):
+            raise SystemDefinitionError(
+                f"element {make.parts[k].name!r}: its force changes nothing of the rate that it holds at zero; on= names "
+                "the state whose derivative it adds to, as the speed"
+            )
+    return (bool(bearing) and resets) or any(make.coupled(i, j, mode) for mode in base for i in bearing for j in bearing if i < j)
 
 
 def _affine(make: Expressions, base: Mapping[str, Any], given: Mapping[str, Any]) -> Patterns | None:

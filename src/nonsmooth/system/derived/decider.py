@@ -96,8 +96,8 @@ class Decider:
         return self.numbers[mode, pattern]
 
     def met(self, indicator: int) -> list[int]:
-        """The elements whose place is an indicator."""
-        if indicator < 0:
+        """The elements whose place is an indicator that was made for them."""
+        if indicator < 0 or self.known().indicator_names[indicator] not in self.make.indicators:
             return []
         where = self.known().indicators[indicator]
         return [k for k, part in enumerate(self.make.parts) if part.element.held and part.where in (where, -where)]

@@ -25,7 +25,8 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.system.derived.elements.element import CREEP, SLOW
+from nonsmooth.kernels import convex
+from nonsmooth.system.derived.elements.element import CREEP, SLOW, SMALL
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern, Place
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
 __all__ = ["Outcome", "begun", "decide", "least"]
 
 ZERO = 1e-11  # of the sum of the terms of a row: what is smaller is zero
-FAR = 1e30  # beyond all bounds
 ORDERS = 24  # derivatives that are looked at where all before are zero
 
 
@@ -99,11 +99,16 @@ class _Instant:
         self.contacts = [k for k in bearing if self.parts[k].element.bears]
         self.frictions = [k for k in bearing if not self.parts[k].element.bears]
         self.rates = {k: self.make.rate(k, self.mode) for k in bearing}
-        still = {k for k in bearing if self.holds(k)}
+        still = {k for k in bearing if self.holds(k) and self._is_still(k)}
         zero = {k for k in met if self.parts[k].where is self.rates[k]} | still
         self.speeds = {k: 0.0 if k in zero else self.number(self.rates[k]) for k in bearing}
         self.places = {k: 0.0 if k in still or k in met else self.number(self.parts[k].where) for k in bearing}
         self.pressed: dict[int, bool] = {}
+
+    def _is_still(self, k: int) -> bool:
+        """Return whether what is held has stayed where it was: a reset of the system's own may have moved it."""
+        both = (self.rates[k], self.parts[k].where)
+        return all(abs(self.numbers.value(one)) <= SMALL * float(self.make.size(one)) for one in both)
 
     def number(self, expression: Any) -> float:
         """The value of an expression, 0 where it is rounding."""
@@ -118,6 +123,10 @@ class _Instant:
 
     def put(self, k: int, phase: str) -> None:
         self.pattern = self.place(k).put(phase).pattern
+
+    def _may_rest(self, k: int) -> bool:
+        element = self.parts[k].element
+        return element.held[0] in element.phases
 
     def restitution(self, k: int) -> float:
         return self.numbers.value(self.place(k).law("restitution"))
@@ -147,7 +156,7 @@ class _Instant:
 
     def outcome(self, contacts: list[int], struck: tuple[tuple[int, float], ...]) -> Outcome:
         """Those that hold and those that let go, with the rates as they are now."""
-        candidates = [k for k in contacts if self.speeds[k] == 0.0]
+        candidates = [k for k in contacts if self.speeds[k] == 0.0 and self._may_rest(k)]
         for k in self.contacts:
             self.put(k, "open")
         for k in self.frictions:
@@ -253,45 +262,16 @@ class _Instant:
 
 
 def least(G: FloatArray, a: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Minimise 1/2 x' G x + a' x between bounds, for G symmetric and not negative, by active sets.
-
-    G may be singular: then x is one solution of several with the same a + G x."""
-    scale = _symmetric(G)
-    G, low, high = G * scale, low / scale, high / scale
-    size = len(a)
-    x = np.clip(np.zeros(size), low, high)
-    free = np.zeros(size, dtype=bool) | (np.isinf(low) & np.isinf(high))
-    rounding = 1e-13 * (np.abs(a) + np.abs(G) @ np.where(np.isfinite(x), np.abs(x), 0.0))
-    for _ in range(50 * size + 50):
-        while free.any():
-            some = np.flatnonzero(free)
-            within, slope = G[np.ix_(some, some)], (a + G @ x)[some]
-            step = np.linalg.lstsq(within, -slope, rcond=1e-10)[0]
-            left = within @ step + slope  # along it forces change nothing but the sum: up to a bound
-            if np.abs(left).max() > 1e-9 * (np.abs(slope).max() + np.abs(a).max()):
-                step = -FAR * left
-            goal = x[some] + step
-            over = np.where(goal > high[some], high[some] - x[some], np.where(goal < low[some], low[some] - x[some], 0))
-            blocked = (goal > high[some]) | (goal < low[some])
-            if not blocked.any():
-                x[some] = goal
-                break
-            parts = np.full(len(some), np.inf)
-            parts[blocked] = over[blocked] / step[blocked]
-            first = int(parts.argmin())
-            x[some] += parts[first] * step
-            x[some[first]] = high[some[first]] if step[first] > 0 else low[some[first]]
-            free[some[first]] = False
-        slope = a + G @ x
-        rounding = 1e-13 * (np.abs(a) + np.abs(G) @ np.abs(x))
-        wish = np.where(~free & (x < high) & (slope < -rounding), -slope, 0.0)
-        wish = np.where(~free & (x > low) & (slope > rounding), slope, wish)
-        if not wish.any():
-            break
-        free[int((wish / np.sqrt(np.maximum(np.diag(G), 1e-300))).argmax())] = True
-    else:
-        raise SolveError("the forces of contacts and frictions that decide together were not found: no set is the last")
-    return x * scale
+    """Minimise 1/2 x' G x + a' x between bounds, for G not negative and symmetric by factors (:mod:`.convex`)."""
+    size, scale = len(a), _symmetric(G)
+    x, sets, factor = np.empty((2, size)), np.empty((2, size), dtype=np.int64), np.empty((size, size + 1))
+    status = convex.least(G * scale, a + 0.0, low / scale, high / scale, x[0], *sets, factor, x[1])
+    if status:
+        raise SolveError(
+            "the forces of contacts and frictions that decide together were not found: "
+            + ("no set is the last" if status == 1 else "contacts close on what cannot give way")
+        )
+    return x[0] * scale
 
 
 def _symmetric(G: FloatArray) -> FloatArray:

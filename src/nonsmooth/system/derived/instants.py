@@ -119,9 +119,7 @@ class RowNumbers(Numbers):
         return found
 
     def effects(self, some: Sequence[int], by: Sequence[int]) -> FloatArray:
-        return np.array(
-            [[self.rows.across(self.rows.rate(i, self.mode), self.rows.parts[j]) for j in by] for i in some]
-        ).reshape(len(some), len(by))
+        return self.rows.changes[np.ix_(some, by)]
 
     def shift(self, change: FloatArray) -> None:
         self.u += change

@@ -90,7 +90,7 @@ class Rows(Assembler):
     def __init__(self, patterns: Patterns, tables: LinearTables, i: int) -> None:
         self.n, harmonics = tables.A.shape[-1], tables.c.shape[-2]
         self.rates = tables.omega[i] * np.array(patterns.form.multiples, dtype=float)
-        self.struck, self.scale, self.asks = False, patterns.scale, True
+        self.scale, self.asks, self.mode = patterns.scale, True, patterns.mode
         self.field = np.zeros((self.n, self.n + 1 + 2 * harmonics))
         self._fill(self.field, tables.A[i, 0], tables.b[i, 0], tables.c[i, 0].T, tables.s[i, 0].T)
         every = np.zeros((len(tables.ib[i]), self.field.shape[1]))
@@ -98,6 +98,7 @@ class Rows(Assembler):
         self._every, self._at = every, patterns.at
         self.parts = [self._part(k, name, patterns) for k, name in enumerate(patterns.elements)]
         self._approaches: dict[int, Row] = {}
+        self._rates: dict[int, Row] = {}
         self._flows: dict[Pattern, tuple[FloatArray, dict[int, Any]]] = {}
 
     def _fill(self, into: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray, s: FloatArray) -> None:
@@ -167,9 +168,6 @@ class Rows(Assembler):
     def vanishes(self, expression: Any) -> bool:
         return not (expression.values.any() if isinstance(expression, Row) else expression)
 
-    def sign(self, effect: float, one: Part, other: Part) -> int:
-        return int(np.sign(effect))
-
     def size(self, expression: Row) -> float:
         return float(max(self.scale[expression.values[: self.n] != 0], default=1.0))
 
@@ -177,6 +175,19 @@ class Rows(Assembler):
         if k not in self._approaches:
             self._approaches[k] = super().approach(k, mode)
         return self._approaches[k]
+
+    def rate(self, k: int, mode: str) -> Row:
+        if k not in self._rates:
+            self._rates[k] = super().rate(k, mode)
+        return self._rates[k]
+
+    @cached_property
+    def changes(self) -> FloatArray:
+        """Changes of the derivatives of the rates of all that may hold by unit forces of each of them."""
+        bearing = [k for k, part in enumerate(self.parts) if part.element.held]
+        found = np.zeros((len(self.parts), len(self.parts)))
+        found[np.ix_(bearing, bearing)] = self.effects(bearing, self.mode)
+        return found
 
     def flow(self, mode: str, pattern: Pattern) -> tuple[FloatArray, dict[int, Any]]:
         if pattern not in self._flows:
@@ -216,17 +227,7 @@ class Patterns:
         self._lock = threading.Lock()
         self._known: dict[Pattern, int] = {}
         self._jumped: dict[Any, int] = {}
-        self.number(self._first())
-
-    def _first(self) -> Pattern:
-        """The first phase of each element, or the first that is not held where its rate could not be held as well."""
-        pattern: Pattern = (0,) * len(self.make.parts)
-        for k, part in enumerate(self.make.parts):
-            held = part.element.phases[0] in part.element.held
-            if held and not self.make.may_hold([j for j in self.make.held(pattern) if j <= k], self.mode):
-                free = next(i for i, phase in enumerate(part.element.phases) if phase not in part.element.held)
-                pattern = (*pattern[:k], free, *pattern[k + 1 :])
-        return pattern
+        self.number((0,) * len(self.make.parts))
 
     def _keep(self, key: tuple[int, str, int | None], expression: Any) -> None:
         self.at[key] = len(self.expressions)

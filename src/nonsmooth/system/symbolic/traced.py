@@ -15,9 +15,10 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.decider import Decider
     from nonsmooth.system.derived.patterns import Patterns
 
-__all__ = ["ALONE", "ASKED", "FOUND", "NOT_UNIQUE", "TOGETHER", "Row", "Traced", "TracedTransition"]
+__all__ = ["ALONE", "ASKED", "ASKS_BEHIND", "FOUND", "NOT_UNIQUE", "OWN", "TOGETHER", "Row", "Traced", "TracedTransition"]
 
 ALONE, ASKED, TOGETHER, FOUND = "alone", "asked", "together", "found"  # kinds of transitions of elements
+OWN, ASKS_BEHIND = "own", "asks behind"  # of the system's own beside elements that are asked
 NOT_UNIQUE = "_not_unique"  # ends the name of a derived mode from which motion has no unique way on
 
 
@@ -44,7 +45,8 @@ class TracedTransition:
     ``contact`` marks the transitions counted as contacts: those with a reset, and those that leave the first mode.
     ``kind`` is that of a transition of elements: ``ALONE`` where one decides by itself what it does next, ``ASKED``
     where several do so together (where it leads is found when it happens), ``TOGETHER`` what is asked where those of
-    the rows vanish together with another; ``FOUND`` where such a question has led: it never fires by its rows.
+    the rows vanish together with another; ``FOUND`` where such a question has led: it never fires by its rows. Beside
+    these the system's own are ``OWN``, or ``ASKS_BEHIND`` where they have a reset: behind it elements are asked.
     """
 
     source: int

@@ -100,21 +100,18 @@ class Coulomb(Element):
     def meeting(self, here: Place) -> list[list[Condition]]:
         return [[Condition(here.where, -1 if here.phase == "forward" else 1, "speed")]]
 
-    def bearing(self, here: Place) -> list[int]:
-        return [j for j in here.held() if here.moves(j)]
-
     def leaving(self, here: Place) -> list[Leaving]:
-        v, stuck = here.where, here.put("stick")
-        if not here.may_hold(stuck.held()):
-            return []  # what rests and sticks leaves it no way to move
-        hold, most = stuck.holding(), self.most(here)
+        v, hold, most = here.where, here.put("stick").holding(), self.most(here)
         over, under = hold - most, hold + most
         if here.phase == "stick":
-            off = SMALL * here.size(v)
+            off, moves = SMALL * here.size(v), []
+            if here.begins_alone():
+                moves = [
+                    Leaving("forward", [Condition(v - off, 1, "speed_above")]),
+                    Leaving("back", [Condition(v + off, -1, "speed_below")]),
+                ]  # fmt: skip
             return [
-                Leaving("forward", [Condition(v - off, 1, "speed_above")]),
-                Leaving("back", [Condition(v + off, -1, "speed_below")]),
-                Leaving("back", [Condition(over, 1, "over")]), Leaving("forward", [Condition(under, -1, "under")]),
+                *moves, Leaving("back", [Condition(over, 1, "over")]), Leaving("forward", [Condition(under, -1, "under")]),
             ]  # fmt: skip
         other, sign = ("back", -1) if here.phase == "forward" else ("forward", 1)
         stopped = Condition(v, sign, "speed")
@@ -122,7 +119,7 @@ class Coulomb(Element):
             return [Leaving(other, [stopped])]  # an open contact, which bears no friction
         within = [Condition(over, -1, "over"), Condition(under, 1, "under")]
         torn = Condition(over, 1, "over") if here.phase == "forward" else Condition(under, -1, "under")
-        still = here.struck(0, self.bearing(here))
+        still = here.struck(0)
         tie = Leaving("stick", [stopped], still)  # a load as large as the friction, to all orders: it holds
         if not here.is_struck():
             return [Leaving("stick", [stopped, *within], still), Leaving(other, [stopped, torn]), tie]

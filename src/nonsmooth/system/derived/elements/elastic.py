@@ -150,7 +150,7 @@ class PreloadedSpring(Displaced):
         side, rate = Condition(here.where, sign, "side"), here.rate()
         fast = Condition(rate - sign * SLOW * here.size(rate), sign, "fast")
         crossed = [Leaving(to, [side, one]) for one in (fast, over, under)]
-        return [*crossed, Leaving("held", [side], here.struck(0, []))]
+        return [*crossed, Leaving("held", [side], here.struck(0))]
 
 
 def damped(here: Place) -> Any:

@@ -125,10 +125,6 @@ class Element(ABC):
         """The conditions, of each way in, at which what it does next is asked where it is not held."""
         return []
 
-    def bearing(self, here: Place) -> list[int]:
-        """Of what is held, the elements that take part in its own impulse."""
-        return []
-
     def ranges(self, here: Place) -> list[tuple[Any, str]]:
         """Expressions of the parameters that must not be negative, each with the sentence for where it is."""
         return []

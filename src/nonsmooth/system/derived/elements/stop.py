@@ -81,40 +81,29 @@ class Stop(Contact):
     def meeting(self, here: Place) -> list[list[Condition]]:
         return [[Condition(here.where, -1, "gap"), Condition(here.rate(), -1, "closing")]]
 
-    def bearing(self, here: Place) -> list[int]:
-        """Those that it would pull open part instead; friction is finite and lets go of what it held."""
-        return [j for j in here.held() if here.other(j).element.bears and here.effect_on(j) < 0]
-
-    def pulled(self, here: Place, held: list[int]) -> Any:
-        """The derivative of its rate without its force, where the approach has ended."""
-        return here.behind(here.free(), here.struck(0, held))
-
     def leaving(self, here: Place) -> list[Leaving]:
-        if here.phase == "rest":
-            pull = self.pulled(here, [])
-            off = SMALL * here.size(here.where)
-            return [
-                Leaving("open", [Condition(pull, 1, "opens")]),
-                Leaving("open", [Condition(here.where - off, 1, "off")]),
-                Leaving("open", [Condition(here.where + off, -1, "beyond")], here.back_on(here.struck(0, []))),
-            ]
-        w, held = here.rate(), self.bearing(here)
-        if not here.may_hold([here.k, *held]):
-            return []  # what rests and sticks leaves it no way to move
-        restitution = here.law("restitution")
-        rebound = here.struck(restitution, held)
-        closed = Condition(here.where, -1, "gap")
-        if not self.rest:
-            return [Leaving("open", [closed], rebound)]
-        still, pull = here.struck(0, held), self.pulled(here, held)
-        closing = [closed, Condition(w, -1, "closing")]
+        if here.phase == "open" and not self.rest:
+            return [Leaving("open", [Condition(here.where, -1, "gap")], here.struck(here.law("restitution")))]
+        still = here.struck(0)
+        pull = here.behind(here.free(), still)  # the derivative of its rate without its force, the approach ended
         presses, lifts = Condition(pull, -1, "opens"), Condition(pull, 1, "opens")
+        if here.phase == "rest":
+            off, ways = SMALL * here.size(here.where), [Leaving("open", [lifts])]
+            if here.begins_alone():
+                ways += [
+                    Leaving("open", [Condition(here.where - off, 1, "off")]),
+                    Leaving("open", [Condition(here.where + off, -1, "beyond")], here.back_on(still)),
+                ]  # fmt: skip
+            return ways
+        w, restitution = here.rate(), here.law("restitution")
+        closed = Condition(here.where, -1, "gap")
+        closing = [closed, Condition(w, -1, "closing")]
         if here.vanishes(restitution):
             return [
                 Leaving("rest", [*closing, presses], still), Leaving("open", [*closing, lifts], still),
                 Leaving("rest", closing, still),  # neither, to all orders: it holds
             ]
-        speed = w + (self.creep if self.creep is not None else CREEP * here.size(w))
+        speed, rebound = w + (self.creep if self.creep is not None else CREEP * here.size(w)), here.struck(restitution)
         slow = [*closing, Condition(speed, 1, "slow")]
         return [
             Leaving("open", [closed, Condition(speed, -1, "slow")], rebound),
