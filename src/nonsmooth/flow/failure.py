@@ -20,6 +20,14 @@ BEYOND_STOP = (
 )
 
 
+CONTACTS = {
+    "not_unique": "the laws of contact and friction allow several motions from here (Painleve's paradox, or impacts at "
+    "one instant of which one rubs). Lower the friction, replace a rigid contact by an elastic one, or start elsewhere.",
+    "no_motion": "no motion satisfies the laws of contact and friction here (Painleve's paradox). Lower the friction, "
+    "or replace a rigid contact by an elastic one.",
+}
+
+
 def solve_error(code: int, because: str = "", **where: Any) -> SolveError:
     """The error for a kernel's code; ``where`` (time, state, mode) as :class:`SolveError` takes it."""
     from nonsmooth.results.statuses import by_code
@@ -53,9 +61,12 @@ def wrong_way(system: System, log: Log) -> str:
 
     An impact turns the rate of its indicator round. With the wrong sign it does not, and follows itself without end.
     """
-    if log.status not in (codes.CHATTER, codes.TOO_MANY_CROSSINGS, codes.NOT_UNIQUE) or not len(log.crossing_time):
+    ended = codes.CHATTER, codes.TOO_MANY_CROSSINGS, codes.NOT_UNIQUE, codes.NO_MOTION
+    if log.status not in ended or not len(log.crossing_time):
         return ""
     t, jump = system.traced, system.transitions[int(log.crossing_transition[-1])]
+    if jump.kind in CONTACTS:
+        return f"Elements {jump.label}: {CONTACTS[jump.kind]}"
     if system.surfaces and (lost := _not_unique(system, jump)):
         return lost
     if jump.reset is None or jump.source != jump.target:

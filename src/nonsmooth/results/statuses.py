@@ -75,9 +75,14 @@ STATUSES: tuple[Status, ...] = (
     ),
     Status(
         codes.NOT_UNIQUE, "not_unique",
-        "Sliding reached a point where its surface stops attracting from both sides at once (a two-fold): motion from "
-        "there is not unique.",
+        "Motion is not unique from there on: sliding reached a point where its surface stops attracting from both sides "
+        "at once (a two-fold), or contacts with friction allow several motions (Painleve's paradox).",
         "Change the model there, or start elsewhere.",
+    ),
+    Status(
+        codes.NO_MOTION, "no_motion",
+        "No motion satisfies the laws of contacts with friction there (Painleve's paradox).",
+        "Lower the friction, or replace a rigid contact by an elastic one.",
     ),
 )  # fmt: skip
 

@@ -10,6 +10,7 @@ NOT_GUARANTEED = 6
 NO_CONVERGENCE = 7
 INTERRUPTED = 8
 NOT_UNIQUE = 9
+NO_MOTION = 10
 
 # Only between a kernel and the driver that called it, never in a result.
 LOG_FULL = -1  # a log buffer is full: grow it and call again with the same state

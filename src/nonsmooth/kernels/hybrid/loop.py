@@ -100,8 +100,8 @@ def settle(i, form, net, tables, work):
             break
         tally[MODE] = take(i, t, -1, form, tables, net, work)
         tally[TAKEN] += 1
-        if net.transitions[t, 2] == DEAD_END:
-            return NOT_UNIQUE
+        if net.transitions[t, 2] >= DEAD_END:
+            return NOT_UNIQUE + net.transitions[t, 2] - DEAD_END
         visited[tally[MODE]] = 1
     return OK
 
@@ -185,8 +185,8 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
         cross(i, t, mode, form, net, section, goal, seen, tables, work)
         tally[MODE] = mode
         jumps += 1
-        if net.transitions[t, 2] == DEAD_END:
-            code = NOT_UNIQUE
+        if net.transitions[t, 2] >= DEAD_END:
+            code = NOT_UNIQUE + net.transitions[t, 2] - DEAD_END
             break
         alone = MAY_WAIT != 0 and net.transitions[t, 4] == ALONE and net.transitions[t, 1] == RESET
         asks = MAY_WAIT != 0 and net.transitions[t, 4] == ASKS_BEHIND

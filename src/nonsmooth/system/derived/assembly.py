@@ -26,7 +26,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.derived.elements import Element
+from nonsmooth.system.derived.elements import Element, Rubbing
 from nonsmooth.system.derived.elements.element import Condition, Leaving
 
 __all__ = ["Assembler", "Part", "Pattern", "Place"]
@@ -72,6 +72,14 @@ class Assembler(ABC):
     @abstractmethod
     def moved(self, vector: Any, part: Part, amount: Any) -> Any:
         """A vector of states, or field, with ``amount`` times the direction of an element added."""
+
+    @abstractmethod
+    def joined(self, part: Part, other: Part, share: Any) -> Part:
+        """An element whose force brings ``share`` of it along as the force of another."""
+
+    def constant(self, k: int, name: str) -> Any:
+        """A law of element k that depends on parameters alone."""
+        return self.law(k, name)
 
     @abstractmethod
     def shifted_back(self, states: Any, expression: Any) -> Any:
@@ -139,16 +147,30 @@ class Assembler(ABC):
         """The rate that a constraint of element k holds at zero."""
         return self.parts[k].element.rate(self.place(k, mode, (0,) * len(self.parts)))
 
-    def effects(self, some: Sequence[int], mode: str) -> list[list[Any]]:
+    def effects(self, some: Sequence[int], mode: str, parts: Sequence[Part] | None = None) -> list[list[Any]]:
         """Changes of the derivatives of the rates of some elements by their unit forces."""
-        return [[self.across(self.rate(i, mode), self.parts[j]) for j in some] for i in some]
+        parts = parts or [self.parts[k] for k in some]
+        return [[self.across(self.rate(i, mode), part) for part in parts] for i in some]
+
+    @cached_property
+    def rubbing(self) -> dict[int, int]:
+        """The friction of each rigid stop that rubs."""
+        numbers = {part.name: k for k, part in enumerate(self.parts)}
+        return {numbers[part.element.of]: k for k, part in enumerate(self.parts) if isinstance(part.element, Rubbing)}
+
+    def pushing(self, k: int, mode: str, pattern: Pattern) -> Part:
+        """An element with what its unit force brings along: a contact that slips, its friction."""
+        part, r = self.parts[k], self.rubbing.get(k)
+        side = 0 if r is None else self.place(r, mode, pattern).side
+        return part if r is None or not side else self.joined(part, self.parts[r], -side * self.constant(r, "friction"))
 
     def coupled(self, i: int, j: int, mode: str) -> bool:
         """Return whether a force of one of two elements changes the rate of the other at once."""
         key = min(i, j), max(i, j)
         if key not in self._coupled:
             one, other = ((self.rate(a, mode), self.parts[b]) for a, b in (key, key[::-1]))
-            self._coupled[key] = not (self.vanishes(self.across(*one)) and self.vanishes(self.across(*other)))
+            apart = self.vanishes(self.across(*one)) and self.vanishes(self.across(*other))
+            self._coupled[key] = not apart or self.rubbing.get(i) == j or self.rubbing.get(j) == i
         return self._coupled[key]
 
     @cached_property
@@ -162,17 +184,17 @@ class Assembler(ABC):
             found += [j for j in held if j not in found and self.coupled(i, j, mode)]
         return sorted(found)
 
-    def basis(self, held: Sequence[int], mode: str) -> tuple[list[int], FloatArray]:
+    def basis(self, held: Sequence[int], mode: str, pattern: Pattern) -> tuple[list[int], FloatArray]:
         """Held elements whose rates are independent, and the forces of all of them as sums of those."""
-        chosen, sums = self._basis(held, mode, 0)
-        if len(chosen) < len(held) and not np.allclose(sums, self._basis(held, mode, 1)[1], rtol=1e-9, atol=1e-9):
+        chosen, sums = self._basis(held, mode, pattern, 0)
+        if len(chosen) < len(held) and not np.allclose(sums, self._basis(held, mode, pattern, 1)[1], rtol=1e-9, atol=1e-9):
             names = ", ".join(repr(self.parts[k].name) for k in held)
             raise SystemDefinitionError(
                 f"elements {names} hold together, and by which sum of forces depends on the state: take fewer elements"
             )
         return chosen, sums
 
-    def _basis(self, held: Sequence[int], mode: str, draw: int) -> tuple[list[int], FloatArray]:
+    def _basis(self, held: Sequence[int], mode: str, pattern: Pattern, draw: int) -> tuple[list[int], FloatArray]:
         """The same in one state."""
         rows = np.array([self.slopes(self.rate(k, mode), draw) for k in held])
         rows = rows / np.linalg.norm(rows, axis=1)[:, None]
@@ -192,7 +214,7 @@ class Assembler(ABC):
                 )
         if len(chosen) == len(held):
             return list(held), np.eye(len(held))
-        ways = np.array([self.pushes(self.parts[k], draw) for k in held])
+        ways = np.array([self.pushes(self.pushing(k, mode, pattern), draw) for k in held])
         sums = np.linalg.lstsq(ways[chosen].T, ways.T, rcond=None)[0].T
         return [held[i] for i in chosen], np.where(np.abs(sums) < INDEPENDENT * np.abs(sums).max(), 0.0, sums)
 
@@ -205,17 +227,21 @@ class Assembler(ABC):
             forces[here.k] = here.part.element.force(here)
             f = self.moved(f, here.part, forces[here.k])
         if held:
-            chosen, sums = self.basis(held, mode) if self.asks else (held, np.zeros((0, 0)))
-            matrix = self.effects(chosen, mode)
+            chosen, sums = self.basis(held, mode, pattern) if self.asks else (held, np.zeros((0, 0)))
+            parts = [self.pushing(k, mode, pattern) for k in chosen]
+            matrix = self.effects(chosen, mode, parts)
             needed = self.solved(matrix, [-self.along(self.rate(k, mode), f) for k in chosen])
             back = self.solved(matrix, [self.parts[k].element.pull(self.place(k, mode, pattern)) for k in chosen])
-            for k, force, extra in zip(chosen, needed, back, strict=True):
-                f = self.moved(f, self.parts[k], force + extra)
+            for part, force, extra in zip(parts, needed, back, strict=True):
+                f = self.moved(f, part, force + extra)
             if len(chosen) == len(held):
                 forces |= dict(zip(held, needed, strict=True))
             else:
                 for k, of in zip(held, np.linalg.pinv(sums.T), strict=True):  # of least norm
                     forces[k] = sum((float(share) * force for share, force in zip(of, needed, strict=True) if share), 0)
+            for k, r in self.rubbing.items():
+                if k in held and (side := self.place(r, mode, pattern).side):
+                    forces[r] = -side * self.constant(r, "friction") * forces[k]
         return f, {k: forces[k] for k in sorted(forces)}
 
     def asked(self, k: int, mode: str, pattern: Pattern) -> list[Leaving]:
@@ -226,17 +252,25 @@ class Assembler(ABC):
         group = self.together(k, mode, pattern)
         if k != group[0]:
             return []
-        sums = self.basis(group, mode)[1]
+        sums = self.basis(group, mode, pattern)[1]
         forces = self.flow(mode, pattern)[1]
-        most = {j: self.parts[j].element.most(self.place(j, mode, pattern)) for j in group}
-        usual = ("over", "under", "opens")
         names = [f"{self.parts[j].name}_{name}" for j in group for name in self.parts[j].element.conditions]
-        names.sort(key=lambda name: not name.endswith(usual))
+        names.sort(key=lambda name: not name.endswith(("over", "under", "opens")))
         found: list[Leaving] = []
-        for edge in _edges(sums, [most[j] is None for j in group]):
-            reach = [(float(part), j) for part, j in zip(sums @ edge, group, strict=True) if part]
-            beyond = sum((part * forces[j] for part, j in reach), 0)
-            beyond -= sum((abs(part) * most[j] for part, j in reach if most[j] is not None), 0)
+        edges, one_sided, bounds = [], [], []  # of the body of all forces; of the forces within bounds
+        for j, row in zip(group, sums, strict=True):
+            most, r = self.parts[j].element.most(self.place(j, mode, pattern)), self.rubbing.get(j)
+            if most is not None and j not in self.rubbing.values():
+                bounds.append((row, most))
+                edges.append(row)
+            elif r in group:  # the cone of a contact that sticks
+                edges += [row + s * self.constant(r, "friction") * sums[group.index(r)] for s in (-1, 1)]
+            elif most is None:
+                edges.append(row)
+            one_sided += [most is None] * (len(edges) - len(one_sided))
+        for edge in _faces(np.array(edges), one_sided):
+            beyond = sum((float(p) * forces[j] for p, j in zip(sums @ edge, group, strict=True) if p), 0)
+            beyond -= sum((abs(float(row @ edge)) * most for row, most in bounds if row @ edge), 0)
             found.append(Leaving(None, [Condition(beyond, 1, names.pop(0))]))
         return found
 
@@ -254,12 +288,13 @@ class Assembler(ABC):
 
     def leaving(self, k: int, mode: str, pattern: Pattern) -> list[Leaving]:
         """The ways of element k out of its phase; those that it decides with others have none behind it."""
-        if self.asks and self.parts[k].element.held and len(self.together(k, mode, pattern)) > 1:
+        together = k in self.rubbing or len(self.together(k, mode, pattern)) > 1
+        if self.asks and self.parts[k].element.held and together:
             return self.asked(k, mode, pattern)
         return self.parts[k].element.leaving(self.place(k, mode, pattern))
 
 
-def _edges(sums: FloatArray, one_sided: Sequence[bool]) -> list[FloatArray]:
+def _faces(sums: FloatArray, one_sided: Sequence[bool]) -> list[FloatArray]:
     """The directions in which forces that hold together can be too weak; ``one_sided`` ones push only.
 
     Forces within bounds add up to a body whose faces lie along all but one of its independent edges."""
@@ -304,6 +339,12 @@ class Place:
     @property
     def phase(self) -> str:
         return self.element.phases[self.pattern[self.k]]
+
+    @property
+    def side(self) -> int:
+        """1 where it slips forward, -1 back, else 0."""
+        sides = self.element.sides
+        return (self.phase == sides[0]) - (self.phase == sides[1])
 
     @property
     def where(self) -> Any:

@@ -130,6 +130,10 @@ class Expressions(Assembler):
     def moved(self, vector: Sequence[sp.Expr], part: Part, amount: sp.Expr) -> list[sp.Expr]:
         return [entry + part.direction.get(i, 0) * amount for i, entry in enumerate(vector)]
 
+    def joined(self, part: Part, other: Part, share: Any) -> Part:
+        both = {*part.direction, *other.direction}
+        return replace(part, direction={i: part.direction.get(i, 0) + share * other.direction.get(i, 0) for i in both})
+
     def shifted_back(self, states: Sequence[sp.Expr], expression: sp.Expr) -> list[sp.Expr]:
         slopes = [sp.diff(expression, symbol) for symbol in self.u]
         length = sp.Add(*[slope**2 for slope in slopes])
@@ -266,19 +270,22 @@ def _arguments(function: Callable[..., Any]) -> int:
 def element_names(elements: Any) -> dict[str, Element]:
     """Elements by name; those of a list are called after their kind."""
     if isinstance(elements, Mapping):
-        return dict(elements)
+        found = {}
+        for name, element in elements.items():
+            found |= element.parts(name) if isinstance(element, Element) else {name: element}
+        return found
     if isinstance(elements, (str, Element)) or not isinstance(elements, Sequence):
         raise SystemDefinitionError(
             'elements= maps names to elements, {"stop": ns.elements.Stop(...)}, or is a list of them; not '
             + shortened(elements)
         )
-    found: dict[str, Element] = {}
+    found = {}
     for element in elements:
         name = first = type(element).__name__.lower()
         while name in found:
             name = f"{first}_{sum(other.startswith(first) for other in found) + 1}"
         found[name] = element
-    return found
+    return element_names(found)
 
 
 def assembled(
@@ -303,8 +310,8 @@ def assembled(
     make = Expressions(symbols, base, parts, scale, values)
     counts = [len(part.element.phases) for part in make.parts]
     number = len(base) * int(sp.prod(counts))
-    if number > MOST:
-        return _opened(make, parts, base, given)
+    if number > MOST or make.rubbing:
+        return _opened(make, base, given, "rub" if make.rubbing else f"have more than {MOST} combinations of phases")
     make.asks = _decide_together(make, base, resets)
     every = product(base, product(*[range(count) for count in counts]))
     pairs = [pair for pair in every if make.may_hold(make.held(pair[1]), pair[0])]
@@ -409,7 +416,7 @@ def _affine(make: Expressions, base: Mapping[str, Any], given: Mapping[str, Any]
 
 
 def _opened(
-    make: Expressions, parts: Mapping[str, Element], base: Mapping[str, tuple[sp.Expr, ...]], given: Mapping[str, Any]
+    make: Expressions, base: Mapping[str, tuple[sp.Expr, ...]], given: Mapping[str, Any], why: str
 ) -> dict[str, Any]:
     """The system without its elements, with all that these need as indicators: modes are made when they are visited."""
     from nonsmooth.system.derived.patterns import Patterns
@@ -417,11 +424,10 @@ def _opened(
     make.asks = True
     if len(base) > 1 or any(given[key] for key in ("transitions", "indicators", "memory", "symmetry", "bands")):
         raise SystemDefinitionError(
-            f"{len(parts)} elements have more than {MOST} combinations of phases, which are not written out but made "
-            "when they are visited: such a system has one mode and no indicators, transitions, memory, symmetry or "
-            "bands of its own"
+            f"its elements {why}, so that their modes are made when they are visited: such a system has one mode and "
+            "no indicators, transitions, memory, symmetry or bands of its own"
         )
-    patterns = Patterns(make, next(iter(base)))
+    patterns = Patterns(make, next(iter(base)), why=why)
     return {
         "modes": {key: _returns(list(field)) for key, field in base.items()}, "transitions": (),
         "indicators": {key: _returns(e) for key, e in zip(patterns.labels, patterns.expressions, strict=True)},

@@ -128,6 +128,15 @@ class Rows(Assembler):
     def law(self, k: int, name: str, side: int | None = None) -> Row:
         return Row(self._every[self._at[k, name, side]], self.n)
 
+    def constant(self, k: int, name: str) -> float:
+        number = self.law(k, name).number
+        if number is None:
+            raise SystemDefinitionError(
+                f"{name} of element {self.parts[k].name!r} depends on states or time; at a rigid contact it is a "
+                "number or a function of parameters"
+            )
+        return number
+
     def along(self, expression: Row, field: FloatArray) -> Row:
         n, e = self.n, expression.values
         values = e[:n] @ field
@@ -145,6 +154,9 @@ class Rows(Assembler):
 
     def moved(self, vector: FloatArray, part: Part, amount: Any) -> FloatArray:
         return vector + np.outer(part.direction, amount.values) if isinstance(amount, Row) else vector
+
+    def joined(self, part: Part, other: Part, share: Any) -> Part:
+        return replace(part, direction=part.direction + share * other.direction)
 
     def shifted_back(self, states: FloatArray, expression: Row) -> FloatArray:
         slopes = expression.values[: self.n]
@@ -209,6 +221,7 @@ class Patterns:
 
     make: Expressions
     mode: str
+    why: str = ""  # modes are made when they are visited
     expressions: list[sp.Expr] = field(default_factory=list)
     at: dict[tuple[int, str, int | None], int] = field(default_factory=dict)
     visited: list[Pattern] = field(default_factory=list)
@@ -296,9 +309,9 @@ class Patterns:
         form = linear_form(self.equations)
         if form is None or not form.affine_indicators:
             raise SystemDefinitionError(
-                f"{self.equations.name!r}: its {len(self.elements)} elements have more combinations of phases than can "
-                "be written out, and a mode can be made when it is first visited only where everything is affine in "
-                "the states with harmonics in time; take fewer elements or write the nonlinear ones as modes"
+                f"{self.equations.name!r}: its elements {self.why}, and a mode can be made when it is first visited "
+                "only where everything is affine in the states with harmonics in time; take fewer elements, or elastic "
+                "contacts in place of rigid ones that rub, or write the nonlinear ones as modes"
             )
         return form
 
@@ -314,15 +327,18 @@ class Patterns:
                 self.visited.append(pattern)
             return self._known[pattern]
 
-    def transition(self, source: int, target: int, element: str, rows: Sequence[tuple[int, int, int]]) -> int:
-        """The number of a transition between numbered patterns."""
+    def transition(
+        self, source: int, target: int, element: str, rows: Sequence[tuple[int, int, int]], ends: str = ""
+    ) -> int:
+        """The number of a transition between numbered patterns; ``ends`` is the status of a run that ends there."""
         with self._lock:
-            key = source, target, f"{element} {rows}"
+            key = source, target, f"{element} {rows} {ends}"
             if key not in self._jumped:
                 names = self.name(self.visited[source]), self.name(self.visited[target])
                 conditions = tuple(Condition(indicator, sign, bool(strict)) for indicator, sign, strict in rows)
                 self._jumped[key] = len(self.jumps)
-                self.jumps.append(TracedTransition(source, target, conditions, label=" -> ".join(names)))
+                label = element if ends else " -> ".join(names)
+                self.jumps.append(TracedTransition(source, target, conditions, label=label, kind=ends))
             return self._jumped[key]
 
     def name(self, pattern: Pattern) -> str:

@@ -3,6 +3,7 @@
 from nonsmooth.system.derived.elements.coulomb import Coulomb
 from nonsmooth.system.derived.elements.elastic import Backlash, ElasticStop, PreloadedSpring
 from nonsmooth.system.derived.elements.element import Element
+from nonsmooth.system.derived.elements.rubbing import Rubbing
 from nonsmooth.system.derived.elements.stop import Stop
 
-__all__ = ["Backlash", "Coulomb", "ElasticStop", "Element", "PreloadedSpring", "Stop"]
+__all__ = ["Backlash", "Coulomb", "ElasticStop", "Element", "PreloadedSpring", "Rubbing", "Stop"]

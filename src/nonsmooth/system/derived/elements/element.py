@@ -92,6 +92,10 @@ class Element(ABC):
         """With ``at=``: the sign of what a positive force does to the coordinate."""
         return 1
 
+    def parts(self, name: str) -> dict[str, Element]:
+        """The elements of which it consists, by names that begin with its own."""
+        return {name: self}
+
     @abstractmethod
     def force(self, here: Place) -> Any:
         """The force by its law, in a phase that is not held."""

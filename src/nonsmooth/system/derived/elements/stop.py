@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.derived.elements.element import CREEP, SMALL, Condition, Contact, Law, Leaving
+from nonsmooth.system.derived.elements.element import CREEP, SMALL, Condition, Contact, Element, Law, Leaving
+from nonsmooth.system.derived.elements.rubbing import Rubbing
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Place
@@ -36,6 +38,16 @@ class Stop(Contact):
         Without rest every impact rebounds, and an accumulation ends in the status ``chatter``.
     creep : float, optional
         Speed of approach below which impacts are not followed: 1e-7 of the scale of the speed's states.
+    friction : number, name of a parameter or function of parameters, optional
+        Coefficient of Coulomb's friction in the contact, :math:`|\lambda_t| \le \mu \lambda_n` (static equals kinetic),
+        in impacts too, by Stronge's energetic law: ``restitution``, squared, is then the ratio of the normal works of
+        restitution and compression. It needs ``tangent``; its force is that of an element ``<name>_friction``.
+    tangent : str, mapping of str to float, or callable
+        The direction in which it slips: with ``at=`` as ``at``; with ``gap=`` the slip speed ``v(t, u, p)``.
+    on_tangent : mapping
+        With ``gap=``: what a unit friction force adds to the derivatives of states, as ``on``.
+    belt : number, name of a parameter, or function
+        Speed of the stop's surface along ``tangent`` (with ``at=``).
     at, on
         See :class:`Element`.
 
@@ -53,6 +65,10 @@ class Stop(Contact):
     restitution: Law = 0.0
     rest: bool = True
     creep: float | None = None
+    friction: Law | None = None
+    tangent: str | Mapping[str, float] | Callable[..., Any] | None = None
+    on_tangent: Mapping[str, Law] | None = None
+    belt: Law = 0.0
 
     phases: ClassVar[tuple[str, ...]] = ("open", "rest")
     laws: ClassVar[tuple[str, ...]] = ("restitution",)
@@ -67,8 +83,26 @@ class Stop(Contact):
             raise SystemDefinitionError(f"Stop: restitution = {self.restitution}; it lies between 0 and 1")
         if self.creep is not None and not (isinstance(self.creep, (int, float)) and self.creep > 0):
             raise SystemDefinitionError(f"Stop: creep is a positive speed, not {self.creep!r}")
+        if (self.friction is None) != (self.tangent is None):
+            raise SystemDefinitionError("Stop: friction= (a coefficient) and tangent= (where it slips) go together")
+        if self.friction is not None and callable(self.tangent) == (self.on_tangent is None):
+            raise SystemDefinitionError(
+                "Stop: tangent= is a coordinate with at=; with gap= it is the slip speed, a function of t, u, p, and "
+                "on_tangent= says what a unit friction force adds to which state's derivative"
+            )
+        if self.friction is not None and not self.rest:
+            raise SystemDefinitionError("Stop: a contact with friction rests; leave out rest=False")
         if not self.rest:
             object.__setattr__(self, "phases", ("open",))
+
+    def parts(self, name: str) -> dict[str, Element]:
+        """The stop without friction, and its friction as an element of its own."""
+        if self.friction is None:
+            return {name: self}
+        where = {"speed": self.tangent, "on": self.on_tangent} if callable(self.tangent) else {"at": self.tangent}
+        plain = replace(self, friction=None, tangent=None, on_tangent=None, belt=0.0)
+        rubs = Rubbing(of=name, belt=self.belt, friction=self.friction, **where)  # type: ignore[arg-type]
+        return {name: plain, f"{name}_friction": rubs}
 
     def force(self, here: Place) -> Any:
         return 0
