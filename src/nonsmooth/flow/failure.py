@@ -22,7 +22,7 @@ BEYOND_STOP = (
 
 CONTACTS = {
     "not_unique": "the laws of contact and friction allow several motions from here (Painleve's paradox, or impacts at "
-    "one instant of which one rubs). Lower the friction, replace a rigid contact by an elastic one, or start elsewhere.",
+    "one instant of which one rubs). Lower the friction, replace a rigid stop by an elastic one, or start elsewhere.",
     "no_motion": "no motion satisfies the laws of contact and friction here (Painleve's paradox). Lower the friction, "
     "or replace a rigid contact by an elastic one.",
 }

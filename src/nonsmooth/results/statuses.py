@@ -75,8 +75,8 @@ STATUSES: tuple[Status, ...] = (
     ),
     Status(
         codes.NOT_UNIQUE, "not_unique",
-        "Motion is not unique from there on: sliding reached a point where its surface stops attracting from both sides "
-        "at once (a two-fold), or contacts with friction allow several motions (Painleve's paradox).",
+        "Motion is not unique from there on: sliding reached a point where its surface stops attracting from both "
+        "sides at once (a two-fold), or contacts with friction allow several motions (Painleve's paradox).",
         "Change the model there, or start elsewhere.",
     ),
     Status(

@@ -20,7 +20,7 @@ from nonsmooth.flow.engines.linear import table_bytes
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.march import March
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.kernels.hybrid.places import MODE, RESET, STARTS, TIME, WAITS
+from nonsmooth.kernels.hybrid.places import DEAD_END, MODE, RESET, STARTS, TIME, WAITS
 from nonsmooth.results.memory import free_memory, room_for
 from nonsmooth.system.derived.deciding import Outcome, begun, decide
 from nonsmooth.system.derived.instants import RowNumbers
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["PatternEngine"]
 
 MOST = 1024  # patterns for which room is made at first
+ENDS = ("not_unique", "no_motion")  # statuses of a question without an answer, in the order of their codes
 SECTION = np.array([(0, 1, 1), (0, -1, 1)], dtype=np.int64)  # the last rows of a transition table
 
 
@@ -198,7 +199,8 @@ class PatternTables:
         for t in np.unique(taken):
             lead = self.leads[t]
             ends = self.numbers[lead.source], self.numbers[self.index[lead.target]]
-            every[t] = self.patterns.transition(*ends, lead.element, lead.rows)
+            status = lead.kind if lead.kind in ENDS else ""
+            every[t] = self.patterns.transition(*ends, lead.element, lead.rows, status)
         return every[taken]
 
     def complete(self) -> None:
@@ -218,6 +220,8 @@ class PatternTables:
             found = begun(RowNumbers(rows, mode, w), pattern)
             target, taken = self.place(found.pattern), -1
             self.work.tally[MODE] = target
+            if found.ends:
+                self.work.tally[STARTS] = -1 - ENDS.index(found.ends)
         else:
             found = decide(RowNumbers(rows, mode, w, float(self.own.info[here, 0])), pattern)
             taken = self._answer(waits, found)
@@ -228,17 +232,31 @@ class PatternTables:
     def _answer(self, waits: int, found: Outcome) -> int:
         """The transition to which a question has led; it is made where it is new."""
         lead, struck = self.leads[waits], tuple(k for k, _ in found.struck)
-        key = waits, self.place(found.pattern), struck
+        key = waits, self.place(found.pattern), (found.rubbed is not None, *struck), found.ends
         if key not in self.answers:
             self.answers[key] = len(self.leads)
-            number = self._map(self.rows.impact(struck, self.patterns.mode)) if struck else 0
-            contact = bool(struck) or self.numbers[lead.source] == 0
-            way = (key[1], RESET if struck else 0, int(contact), number, 0)
+            number = 0
+            if found.rubbed is not None:
+                number = len(self.maps)
+                self.maps.append(self.maps[0])
+            elif struck:
+                number = self._map(self.rows.impact(struck, self.patterns.mode))
+            contact = int(bool(struck) or self.numbers[lead.source] == 0)
+            contact = ENDS.index(found.ends) + DEAD_END if found.ends else contact
+            way = (key[1], RESET if struck else 0, contact, number, 0)
             self.transitions = np.concatenate([self.transitions, np.array([way], dtype=np.int64)])
-            self.leads.append(Lead(lead.source, found.pattern, lead.element, lead.rows, FOUND))
+            element = found.names or lead.element
+            self.leads.append(Lead(lead.source, found.pattern, element, lead.rows, found.ends or FOUND))
             self.lengths.append(0)
             self.form, self.net = self.form._replace(**self._maps()), self._net()
-        return self.answers[key]
+        taken = self.answers[key]
+        if found.rubbed is not None:  # of the rates that an impact had, of which its impulses depend as no row does
+            some, slopes = found.rubbed
+            ways = np.array([self.rows.parts[k].direction for k in some]).T
+            rates = np.array([self.rows.rate(k, self.patterns.mode).values for k in some])
+            self.maps[self.transitions[taken, 3]] = self.maps[0] + ways @ slopes @ rates
+            self.form, self.net = self.form._replace(**self._maps()), self._net()
+        return taken
 
     def place(self, pattern: Pattern) -> int:
         """The number of a pattern here; it is made where it is new."""

@@ -111,6 +111,10 @@ def begin(i, form, net, section, motion, tables, work):
     """State and mode where a run begins, by the start rule. Returns a status, PAUSED where elements are asked."""
     tally, memo, code = work.tally, work.memo, OK
     if MAY_WAIT != 0 and tally[STARTS] != 0:  # it has been answered
+        if tally[STARTS] < 0:  # and there is no answer
+            code = NOT_UNIQUE - 1 - tally[STARTS]
+            tally[STARTS] = 0
+            return code
         tally[BEGUN] = 1
         look(i, form, tables, work, tally[MODE])
         code, moved = settle(i, form, net, tables, work), tally[TAKEN] != 0

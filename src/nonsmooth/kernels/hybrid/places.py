@@ -8,7 +8,7 @@ FIRED = 10  # the functional (indicator) that has crossed, or -1
 # a transition (plus one) that waits for the tables of its mode, and of its instant: the transitions taken before it,
 # the mode before the first, the first; whether they are closely behind others, and what the observer saw on the leg
 WAITS, TAKEN, SOURCE, FIRST, CLOSELY, NOTED = 11, 12, 13, 14, 15, 16
-STARTS = 17  # 1 where what the elements of a system do at a start is asked
+STARTS = 17  # 1 where what the elements of a system do at a start is asked; -1: motion is not unique, -2: there is none
 N_TALLY = 18
 
 # times

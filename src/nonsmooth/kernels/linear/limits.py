@@ -3,7 +3,7 @@
 from math import fabs
 
 from nonsmooth.kernels.compile.cache import device, inline, once
-from nonsmooth.kernels.hybrid.places import LONGEST_STEP, TIME
+from nonsmooth.kernels.hybrid.places import LONGEST_STEP, MODE, TIME
 from nonsmooth.kernels.linear.sums import at, dot
 from nonsmooth.kernels.linear.tables import STATES, sizes_at, states_of, width_of
 from nonsmooth.kernels.linear.values import EPS, rounding, slope_of, value_of
@@ -164,16 +164,17 @@ def apply_map(i, t, form, net, tables, work):
 def take(i, t, fired, form, tables, net, work):
     """Take transition t (its functional ``fired`` has just crossed; -1: a time trigger). Returns the new mode.
 
-    What has crossed is zero, also behind a reset that leaves it where it was. ``work.wp`` keeps w just before."""
+    What has crossed is zero, also behind a reset that leaves it where it was; not in a mode where it is another
+    quantity. ``work.wp`` keeps w just before."""
     w, wp, zero = work.w, work.wp, work.zero
     for j in range(width_of(tables.field)):
         wp[j] = w[j]
-    mode = net.transitions[t, 0]
-    if net.transitions[t, 1] != 0:
-        off = fabs(value_of(tables, mode, fired, w)) if fired >= 0 else 0.0
+    mode, changes = net.transitions[t, 0], net.transitions[t, 1] != 0
+    off = fabs(value_of(tables, mode if changes else work.tally[MODE], fired, w)) if fired >= 0 else 0.0
+    if changes:
         apply_map(i, t, form, net, tables, work)
-        if fired >= 0 and fabs(value_of(tables, mode, fired, w)) > 2.0 * off:
-            fired = -1
+    if fired >= 0 and fabs(value_of(tables, mode, fired, w)) > 2.0 * off:
+        fired = -1
     mark_zeros(tables, work, mode)
     if fired >= 0:
         zero[fired] = 1

@@ -27,6 +27,8 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.kernels import convex
 from nonsmooth.system.derived.elements.element import CREEP, SLOW, SMALL
+from nonsmooth.system.derived.enumerating import HELD, Candidates, moving_by_trial
+from nonsmooth.system.derived.impact_with_friction import stronge
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern, Place
@@ -41,11 +43,17 @@ ORDERS = 24  # derivatives that are looked at where all before are zero
 @dataclass(frozen=True)
 class Outcome:
     """The phases behind an instant and the states there; the contacts that bore an impulse, each with the part of its
-    approach that it gave back."""
+    approach that it gave back.
+
+    ``rubbed``: of an impact that rubs the elements that bore impulses, and the derivatives of these in their rates;
+    ``ends`` and ``names``: the status of a run that cannot go on, and the elements for which it cannot."""
 
     pattern: Pattern
     states: FloatArray
     struck: tuple[tuple[int, float], ...] = ()
+    rubbed: tuple[tuple[int, ...], FloatArray] | None = None
+    ends: str = ""
+    names: str = ""
 
 
 def decide(numbers: Numbers, pattern: Pattern, met: Sequence[int] = ()) -> Outcome:
@@ -59,6 +67,8 @@ def decide(numbers: Numbers, pattern: Pattern, met: Sequence[int] = ()) -> Outco
     approaching = [k for k in contacts if here.speeds[k] < 0.0]
     if not approaching:
         return here.outcome(contacts, ())
+    if len(approaching) > 1 and any(k in here.make.rubbing for k in approaching):
+        return here.end("not_unique", approaching)
     own = {k: here.restitution(k) for k in contacts}
     if all(-here.speeds[k] < here.creep(k) for k in approaching):
         still = _Instant(numbers.copy(), pattern, met)
@@ -104,6 +114,9 @@ class _Instant:
         self.speeds = {k: 0.0 if k in zero else self.number(self.rates[k]) for k in bearing}
         self.places = {k: 0.0 if k in still or k in met else self.number(self.parts[k].where) for k in bearing}
         self.pressed: dict[int, bool] = {}
+        self.stops = {r: k for k, r in self.make.rubbing.items()}
+        self.rubbed: tuple[tuple[int, ...], FloatArray] | None = None
+        self.ends = ""
 
     def _is_still(self, k: int) -> bool:
         """Return whether what is held has stayed where it was: a reset of the system's own may have moved it."""
@@ -136,8 +149,16 @@ class _Instant:
         given = getattr(self.parts[k].element, "creep", None)
         return float(given) if given is not None else CREEP * float(self.make.size(self.rates[k]))
 
+    def end(self, status: str, elements: Sequence[int]) -> Outcome:
+        """The run ends here."""
+        names = ", ".join(repr(self.parts[k].name) for k in sorted(elements))
+        return Outcome(self.pattern, self.numbers.u.copy(), ends=status, names=names)
+
     def strike(self, contacts: list[int], restitution: dict[int, float]) -> tuple[tuple[int, float], ...]:
         """The impact of all contacts that are closed; returns those that bore an impulse."""
+        rubs = [k for k in contacts if self.speeds[k] < 0.0 and k in self.make.rubbing]
+        if rubs:
+            return self._rub(rubs[0], contacts, restitution[rubs[0]])
         before = np.array([self.speeds[k] for k in contacts])
         given_back = np.array([restitution[k] if self.speeds[k] < 0.0 else 0.0 for k in contacts])
         G = self.numbers.effects(contacts, contacts)
@@ -154,59 +175,95 @@ class _Instant:
             self.numbers.shift(self.numbers.direction(k) * impulse)
         return tuple((k, float(e)) for k, e, p in zip(contacts, given_back, impulses, strict=True) if p > 0.0)
 
+    def _rub(self, k: int, contacts: list[int], restitution: float) -> tuple[tuple[int, float], ...]:
+        """The impact of one contact that rubs, the others that are closed without friction."""
+        r = self.make.rubbing[k]
+        some = [k, r, *(j for j in contacts if j != k)]
+        rates = np.array([self.speeds[j] for j in some])
+        found = stronge(self.numbers.effects(some, some), rates, restitution, self.share(r), least)
+        if found is None:
+            self.ends = "no_motion"
+            return ()
+        impulses, slopes, after = found
+        changes = self.numbers.effects([*self.contacts, *self.frictions], some)
+        for j, change in zip([*self.contacts, *self.frictions], changes, strict=True):
+            total, terms = self.speeds[j] + change @ impulses, abs(self.speeds[j]) + np.abs(change) @ np.abs(impulses)
+            self.speeds[j] = total if abs(total) > ZERO * terms else 0.0
+        self.speeds |= dict(zip(some, map(float, after), strict=True))
+        for j, impulse in zip(some, impulses, strict=True):
+            self.numbers.shift(self.numbers.direction(j) * impulse)
+        self.rubbed = tuple(some), slopes
+        return ((k, restitution),)
+
+    def share(self, r: int) -> float:
+        """The coefficient of friction of a contact."""
+        return self.numbers.value(self.place(r).law("friction"))
+
     def outcome(self, contacts: list[int], struck: tuple[tuple[int, float], ...]) -> Outcome:
         """Those that hold and those that let go, with the rates as they are now."""
         candidates = [k for k in contacts if self.speeds[k] == 0.0 and self._may_rest(k)]
+        slips: dict[int, int] = {}  # at contacts that may stay closed
         for k in self.contacts:
             self.put(k, "open")
         for k in self.frictions:
-            part = self.parts[k]
-            slow = SLOW * float(self.make.size(self.rates[k]))
-            side = part.element.lies(self.places[k], self.speeds[k], slow)
-            self.put(k, part.element.sides[side < 0])  # one that may hold is asked below
+            element = self.parts[k].element
+            side = element.lies(self.places[k], self.speeds[k], SLOW * float(self.make.size(self.rates[k])))
+            if k in self.stops and self.stops[k] not in candidates:
+                self.put(k, element.phases[0])
+                continue
+            self.put(k, element.sides[side < 0])  # one that may hold is asked below
             if not side:
                 candidates.append(k)
-        moving = self._let_go(candidates) if candidates else {}
-        held = [k for k in candidates if k not in moving]
-        for k in candidates:
-            if k in self.contacts:
-                self.pressed[k] = k in held
-            if k in held:
-                self.put(k, self.parts[k].element.held[0])
-            elif k in self.frictions:
-                self.put(k, self.parts[k].element.sides[moving[k] < 0])
-        for k in self.contacts:
-            self.pressed.setdefault(k, False)
-        self._set_to_zero([self.parts[k].where for k in held if k in self.contacts], None)
+            elif k in self.stops:
+                slips[k] = side
+        states = self._states(candidates, slips) if candidates and not self.ends else {}
+        if self.ends:
+            return self.end(self.ends, [*candidates, *slips] or contacts)
+        for k, state in states.items():
+            element = self.parts[k].element
+            self.put(k, element.held[0] if state == HELD else element.sides[state < 0] if state else element.phases[0])
+        self.pressed = {k: states.get(k) == HELD for k in self.contacts}
+        self._set_to_zero([self.parts[k].where for k in candidates if self.pressed.get(k)], None)
         self._set_to_zero([self.rates[k] for k in candidates], candidates)
-        return Outcome(self.pattern, self.numbers.u.copy(), struck)
+        return Outcome(self.pattern, self.numbers.u.copy(), struck, self.rubbed)
 
     def _set_to_zero(self, expressions: list[Any], by: list[int] | None) -> None:
         """Set gaps or rates that are zero to zero: by impulses of some elements, or the shortest way."""
         if not expressions:
             return
-        off = np.array([self.numbers.value(one) for one in expressions])
-        if by is None:
-            slopes = np.array([self.numbers.slopes(one) for one in expressions])
-            self.numbers.shift(-np.linalg.lstsq(slopes, off, rcond=1e-10)[0])
-            return
-        amounts = np.linalg.lstsq(self.numbers.effects(by, by), -off, rcond=1e-10)[0]
-        self.numbers.shift(sum(self.numbers.direction(k) * x for k, x in zip(by, amounts, strict=True)))
+        for _ in range(2):  # what the first leaves is rounding of it, and one term has no other size than its own
+            off = np.array([self.numbers.value(one) for one in expressions])
+            if by is None:
+                slopes = np.array([self.numbers.slopes(one) for one in expressions])
+                self.numbers.shift(-np.linalg.lstsq(slopes, off, rcond=1e-10)[0])
+                continue
+            amounts = np.linalg.lstsq(self.numbers.effects(by, by), -off, rcond=1e-10)[0]
+            self.numbers.shift(sum(self.numbers.direction(k) * x for k, x in zip(by, amounts, strict=True)))
 
-    def _let_go(self, candidates: list[int]) -> dict[int, int]:
-        """Of the candidates those that move, each with the sign of its rate behind the instant."""
+    def _states(self, candidates: list[int], slips: dict[int, int]) -> dict[int, int]:
+        """The contact states of the candidates, and of frictions that slip at a contact: those of the convex problem,
+        or of all that are tried where there is none."""
+        every = [*candidates, *slips]
+        G = self.numbers.effects(every, every)
+        tried = any(k in self.make.rubbing for k in candidates) or not _is_symmetric(G)
         kinetic: set[int] = set()
         while True:
-            moving = self._moving(candidates, kinetic)
-            fresh = {k for k in moving if k in self.frictions} - kinetic
-            if not fresh:
-                return moving
+            if tried:
+                rubbing = {k: self.make.rubbing[k] for k in candidates if k in self.make.rubbing}
+                shares = {r: self.share(r) for r in rubbing.values()}
+                who = Candidates(every, {*self.contacts} & {*candidates}, rubbing, shares, slips, kinetic)
+                states, self.ends = moving_by_trial(who, G, lambda: self._ahead(every))
+            else:
+                moving = self._moving(candidates, kinetic, G)
+                states = {k: HELD if k not in moving else 0 if k in self.contacts else moving[k] for k in candidates}
+            fresh = {k for k, one in states.items() if one != HELD} - {*self.contacts, *self.stops} - kinetic
+            if not fresh or self.ends:
+                return states
             kinetic |= fresh
 
-    def _moving(self, candidates: list[int], kinetic: set[int]) -> dict[int, int]:
+    def _moving(self, candidates: list[int], kinetic: set[int], G: FloatArray) -> dict[int, int]:
         """One look: those that move with the static bounds, but for some that have the kinetic ones."""
         count = len(candidates)
-        G = self.numbers.effects(candidates, candidates)
         ahead = self._ahead(candidates)
         at: dict[int, str] = dict.fromkeys(candidates, "both")  # bounds on which the forces lie so far
         moving: dict[int, int] = {}
@@ -272,6 +329,12 @@ def least(G: FloatArray, a: FloatArray, low: FloatArray, high: FloatArray) -> Fl
             + ("no set is the last" if status == 1 else "contacts close on what cannot give way")
         )
     return x[0] * scale
+
+
+def _is_symmetric(G: FloatArray) -> bool:
+    """Return whether positive factors of its columns make G symmetric."""
+    scaled = G * _symmetric(G)
+    return bool((np.abs(scaled - scaled.T) <= 1e-12 * np.abs(scaled).max(initial=0.0)).all())
 
 
 def _symmetric(G: FloatArray) -> FloatArray:
