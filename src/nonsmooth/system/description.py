@@ -55,6 +55,7 @@ class Description:
     plain: Callable[[], tuple[Traced, tuple[TracedSurface, ...]]] | None = field(
         default=None, compare=False, repr=False
     )  # without elements
+    relays: bool = False  # the elements are the surfaces that were given
     variants: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # a cache, see variant.py
 
     def with_sliding(self, traced: Traced) -> Traced:
@@ -111,7 +112,10 @@ def describe(
     patterns: Any = None
     made: Mapping[str, Any] = {}
     plain: Any = None
-    if elements:
+    from nonsmooth.system.derived.relays import relays_of
+
+    relays = None if elements else relays_of(symbols, modes, indicators, transitions, outputs)
+    if elements or relays:
         from nonsmooth.system.derived.combinations import assembled
 
         given = {
@@ -119,7 +123,12 @@ def describe(
             "symmetry": symmetry, "bands": bands, "period": period,
         }  # fmt: skip
         now = {symbols.p[key]: parameter.value for key, parameter in known.items()}
-        made = assembled(symbols, modes, elements, given, _scale(scale, units, name), now)
+        if relays is None:
+            made = assembled(symbols, modes, elements, given, _scale(scale, units, name), now)
+        else:
+            given["transitions"] = ()
+            between = {"all": relays.field}
+            made = assembled(symbols, between, relays.elements, given, _scale(scale, units, name), now, relays.name)
         derived = made["indicators"].keys() - (indicators or {}).keys()
         ranges, patterns = made["ranges"], made.get("patterns")
         plain = partial(_without_elements, name, symbols, units, modes, indicators, transitions, outputs)
@@ -159,7 +168,7 @@ def describe(
         traced=traced, surfaces=surfaces,
         bands=tuple(trace_band(key, band, traced, symbols, shown, known) for key, band in bands.items()),
         symmetry=None if symmetry is None else trace_symmetry(symmetry, traced, symbols, values),
-        explicit_time=explicit, ranges=tuple(ranges), plain=plain,
+        explicit_time=explicit, ranges=tuple(ranges), plain=plain, relays=relays is not None,
     )  # fmt: skip
 
 

@@ -108,7 +108,7 @@ def _content(d: Description) -> dict[str, Any]:
     modes = {}
     for mode, field, lacking in zip(t.mode_names, t.fields, t.lacking, strict=True):
         modes[mode] = {s: text(e) for s, e, gone in zip(t.state_names, field, lacking, strict=True) if not gone}
-    known = {} if elements is None else elements.make.described()
+    known = {} if elements is None or d.relays else elements.make.described()
     content: dict[str, Any] = {
         "format": _FORMAT,
         "version": _VERSION,

@@ -290,11 +290,12 @@ def element_names(elements: Any) -> dict[str, Element]:
 
 def assembled(
     symbols: Symbols, modes: Mapping[str, Any], elements: Any, given: Mapping[str, Any], scale: Mapping[str, float],
-    values: Mapping[sp.Symbol, float],
+    values: Mapping[sp.Symbol, float], named: Callable[[list[str]], str] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Modes, indicators, transitions and outputs of a system with elements, as a user would give them.
 
     ``given`` are those without elements: its transitions go from each combination of phases to the same of the target.
+    ``named`` gives the name of a combination, where elements are not the user's; these then have no outputs.
     """
     parts = element_names(elements)
     for key, mode in modes.items():
@@ -317,6 +318,8 @@ def assembled(
     pairs = [pair for pair in every if make.may_hold(make.held(pair[1]), pair[0])]
 
     def name(mode: str, pattern: Pattern) -> str:
+        if named is not None:
+            return named([part.element.phases[k] for part, k in zip(make.parts, pattern, strict=True)])
         words = [f"{part.name}_{part.element.phases[k]}" for part, k in zip(make.parts, pattern, strict=True)]
         return "_".join(words if len(base) == 1 else [mode, *words])
 
@@ -369,7 +372,7 @@ def assembled(
     return {
         "modes": fields, "transitions": transitions,
         "indicators": {**(given["indicators"] or {}), **{key: _returns(g) for key, g in make.indicators.items()}},
-        "outputs": {**outputs, **{f"{key}_force": (table, "") for key, table in forces.items()}},
+        "outputs": outputs if named else {**outputs, **{f"{key}_force": (row, "") for key, row in forces.items()}},
         "ranges": make.ranges(next(iter(base))), "kinds": kinds, "asked": asked,
         "decider": Decider(make, pairs, _affine(make, base, given)) if make.asks else None,
     }  # fmt: skip

@@ -26,7 +26,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.kernels import convex
-from nonsmooth.system.derived.elements.element import CREEP, SLOW, SMALL
+from nonsmooth.system.derived.elements.element import CREEP, SMALL
 from nonsmooth.system.derived.enumerating import HELD, Candidates, moving_by_trial
 from nonsmooth.system.derived.impact_with_friction import stronge
 
@@ -207,7 +207,7 @@ class _Instant:
             self.put(k, "open")
         for k in self.frictions:
             element = self.parts[k].element
-            side = element.lies(self.places[k], self.speeds[k], SLOW * float(self.make.size(self.rates[k])))
+            side = element.lies(self.places[k], self.speeds[k], element.slow * float(self.make.size(self.rates[k])))
             if k in self.stops and self.stops[k] not in candidates:
                 self.put(k, element.phases[0])
                 continue

@@ -148,7 +148,7 @@ class PreloadedSpring(Displaced):
             return [Leaving("below", [over]), Leaving("above", [under])]
         to, sign = ("below", -1) if here.phase == "above" else ("above", 1)
         side, rate = Condition(here.where, sign, "side"), here.rate()
-        fast = Condition(rate - sign * SLOW * here.size(rate), sign, "fast")
+        fast = Condition(rate - sign * self.slow * here.size(rate), sign, "fast")
         crossed = [Leaving(to, [side, one]) for one in (fast, over, under)]
         return [*crossed, Leaving("held", [side], here.struck(0))]
 

@@ -70,6 +70,7 @@ class Element(ABC):
     sides: ClassVar[tuple[str, str]] = ("", "")  # the phases in which it lets go, its rate rising or falling
     strikes: ClassVar[bool] = False  # its impacts turn speeds at once
     bears: ClassVar[bool] = False  # while it is held it bears its part of an impulse
+    slow: ClassVar[float] = SLOW  # of the scale of its rate: below it it may hold, where a place decides
     presses: ClassVar[bool] = False  # its law is a normal force for friction
 
     def __post_init__(self) -> None:
