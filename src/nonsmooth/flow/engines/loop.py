@@ -133,7 +133,7 @@ class Engine(ABC):
 
     def memory_in(self, work: Any) -> FloatArray:
         """The memory of the motion in the kernels' work: behind the states, or where an engine has it."""
-        return np.asarray(work.w[len(self.scale) :])
+        return np.asarray(work.w[len(self.scale) :][: len(self.traced.m)])
 
     def step_in(self, mode: int, system: Any) -> float:
         """A time in which states change as much as they do from one step to the next."""

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Ahead", "Numbers", "RowNumbers", "SeriesCode", "SeriesNumbers"]
 
 ROUNDING = 1e-12  # of the terms of an effect: below it there is none
+OFF = 1e-7  # of numbers, to see their sizes
 
 
 class Ahead(ABC):
@@ -160,92 +162,6 @@ class _RowsAhead(Ahead):
         return ahead
 
 
-class Sized:
-    """A number with a size of which its rounding is a small part: the sum of its absolute terms."""
-
-    __slots__ = ("size", "value")
-
-    def __init__(self, value: float, size: float | None = None) -> None:
-        self.value, self.size = value, abs(value) if size is None else size
-
-    def __float__(self) -> float:
-        return self.value
-
-    def __add__(self, other: Sized | float) -> Sized:
-        if isinstance(other, Sized):
-            return Sized(self.value + other.value, self.size + other.size)
-        return Sized(self.value + other, self.size + abs(other))
-
-    __radd__ = __add__
-
-    def __neg__(self) -> Sized:
-        return Sized(-self.value, self.size)
-
-    def __sub__(self, other: Sized | float) -> Sized:
-        return self + -other
-
-    def __rsub__(self, other: float) -> Sized:
-        return -self + other
-
-    def __mul__(self, other: Sized | float) -> Sized:
-        if not isinstance(other, Sized):
-            return Sized(self.value * other, self.size * abs(other))
-        a, b = abs(self.value), abs(other.value)
-        return Sized(self.value * other.value, self.size * b + a * (other.size - b))
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Sized | float) -> Sized:
-        return self * (other**-1 if isinstance(other, Sized) else 1.0 / other)
-
-    def __rtruediv__(self, other: float) -> Sized:
-        return self**-1 * other
-
-    def __pow__(self, exponent: Sized | float) -> Sized:
-        e = float(exponent)
-        found = self.value**e
-        off = abs(e * self.value ** (e - 1)) * (self.size - abs(self.value)) if self.value else self.size * (e == 1)
-        return Sized(found, abs(found) + off)
-
-    def __abs__(self) -> Sized:
-        return Sized(abs(self.value), self.size)
-
-    def __lt__(self, other: Sized | float) -> bool:
-        return self.value < float(other)
-
-    def __gt__(self, other: Sized | float) -> bool:
-        return self.value > float(other)
-
-    def __le__(self, other: Sized | float) -> bool:
-        return self.value <= float(other)
-
-    def __ge__(self, other: Sized | float) -> bool:
-        return self.value >= float(other)
-
-
-def _sized(function: Callable[..., float]) -> Callable[..., Any]:
-    """A function of ``math`` of sized numbers: its size grows with its slope."""
-
-    def of(*arguments: Sized | float) -> Sized:
-        at = [float(x) for x in arguments]
-        found = function(*at)
-        size = abs(found)
-        for i, x in enumerate(arguments):
-            off = 1e-6 * (x.size if isinstance(x, Sized) else abs(x)) or 1e-300
-            for near in (at[i] + off, at[i] - off):
-                try:
-                    size += abs(function(*at[:i], near, *at[i + 1 :]) - found) * 1e6
-                except ValueError:  # beyond the end of its domain
-                    continue
-                break
-        return Sized(found, size)
-
-    return of
-
-
-FUNCTIONS = {name: _sized(f) for name, f in vars(math).items() if callable(f)}
-
-
 class SeriesCode:
     """Text of the expressions of one system, compiled for numbers of any kind; kept, and shared by all instants."""
 
@@ -308,43 +224,44 @@ class SeriesCode:
 
 
 class SeriesNumbers(Numbers):
-    """Numbers of a system whose expressions are any that have Taylor series."""
+    """Numbers of a system whose expressions are any that have Taylor series.
+
+    They are computed three times: as they are, and with all that they are computed from off by ``OFF`` at random; what
+    that changes is their size, of which rounding is a small part."""
 
     def __init__(
         self, code: SeriesCode, mode: str, t: float, u: FloatArray, constants: Sequence[float], step: float = 0.0
     ) -> None:
-        self.make, self.code, self.mode, self.t, self.constants = code.make, code, mode, t, constants
-        self.u = u.copy()
-        self.size = np.abs(u)
-        self.names = self._names()
+        self.make, self.code, self.mode, self.u, self.size = code.make, code, mode, u.copy(), np.abs(u)
+        self.constants = np.array([t, *constants], dtype=float)
+        self.lanes = self._lanes()
         if step:
-            self.size = self.size + 0.25 * step * np.array([self._sized(e).size for e in code.make.base(mode)])
-            self.names = self._names()
+            self.size = self.size + 0.25 * step * np.abs([self.value(e) for e in code.make.base(mode)])
+            self.lanes = self._lanes()
 
-    def _names(self) -> dict[str, Any]:
-        """The numbers at this instant by their names in code."""
-        return {
-            **FUNCTIONS, "t": Sized(self.t), **{f"q{i}": Sized(value) for i, value in enumerate(self.constants)},
-            **{f"x{i}": Sized(value, size) for i, (value, size) in enumerate(zip(self.u, self.size, strict=True))},
-        }  # fmt: skip
+    def _lanes(self) -> list[dict[str, Any]]:
+        """The numbers at this instant by their names in code, three times."""
+        names, lanes = ["t", *self.code.names.values(), *(f"x{i}" for i in range(len(self.u)))], []
+        for way in off(len(names)):
+            constants, states = np.split(way, [len(self.constants)])
+            numbers = [*self.constants * (1.0 + constants), *self.u + states * self.size]
+            lanes.append({**vars(math), **dict(zip(names, map(float, numbers), strict=True))})
+        return lanes
 
-    def _sized(self, expression: Any) -> Sized:
-        expression = sp.sympify(expression)
-        if expression.is_Number:
-            return Sized(float(expression))
-        found = eval(self.code.value(expression), self.names)
-        return found if isinstance(found, Sized) else Sized(found)
+    def _three(self, expression: Any) -> list[float]:
+        code = self.code.value(sp.sympify(expression))
+        return [float(eval(code, names)) for names in self.lanes]
 
     def copy(self) -> SeriesNumbers:
-        found = SeriesNumbers(self.code, self.mode, self.t, self.u, self.constants)
-        found.size, found.names = self.size, self.names
+        found = SeriesNumbers(self.code, self.mode, self.constants[0], self.u, self.constants[1:])
+        found.size, found.lanes = self.size, self.lanes
         return found
 
     def value(self, expression: Any) -> float:
-        return self._sized(expression).value
+        return float(eval(self.code.value(sp.sympify(expression)), self.lanes[0]))
 
     def terms(self, expression: Any) -> float:
-        return self._sized(expression).size
+        return float(sizes(np.array(self._three(expression))))
 
     def slopes(self, expression: Any) -> FloatArray:
         return np.array([self.value(e) for e in self.code.slopes(expression)])
@@ -356,16 +273,13 @@ class SeriesNumbers(Numbers):
         return found
 
     def effects(self, some: Sequence[int], by: Sequence[int]) -> FloatArray:
-        found = np.zeros((len(some), len(by)))
-        for a, i in enumerate(some):
-            for b, j in enumerate(by):
-                effect = self._sized(self.code.effect(self.mode, i, j))
-                found[a, b] = effect.value if abs(effect.value) > ROUNDING * effect.size else 0.0
-        return found
+        found = np.array([[self._three(self.code.effect(self.mode, i, j)) for j in by] for i in some])
+        found = np.moveaxis(found.reshape(len(some), len(by), len(self.lanes)), -1, 0)
+        return np.where(np.abs(found[0]) > ROUNDING * sizes(found), found[0], 0.0)
 
     def shift(self, change: FloatArray) -> None:
         self.u = self.u + change
-        self.names = self._names()
+        self.lanes = self._lanes()
 
     def ahead(self, some: Sequence[int], pattern: Pattern, forces: Sequence[tuple[int, Any]], laws: Any) -> Ahead:
         return _SeriesAhead(self, self.code.steps(self.mode, some, pattern, forces, laws), len(some), len(laws))
@@ -375,33 +289,45 @@ class _SeriesAhead(Ahead):
     """Taylor coefficients: the k-th derivative is k! times the k-th of them, in forces, rates and bounds alike."""
 
     def __init__(self, here: SeriesNumbers, steps: tuple[Any, Any], count: int, laws: int) -> None:
-        n = len(here.u)
-        self.steps, self.order, self.n, self.count, self.laws = steps, 0, n, count, laws
-        self.C: dict[tuple[int, int], Any] = {}
-        states = [here.names[f"x{i}"] for i in range(n)]
-        self.known: Mapping[str, Any] = {**here.names, "C": self.C, "W": {}, "u": states + [Sized(0.0)] * count}
+        self.steps, self.order, self.n, self.count, self.laws = steps, 0, len(here.u), count, laws
+        states = [f"x{i}" for i in range(self.n)]
+        self.lanes: list[dict[str, Any]] = [
+            {**names, "C": {}, "W": {}, "u": [*(names[x] for x in states), *([0.0] * count)]} for names in here.lanes
+        ]
 
     def rates(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        self._step(np.zeros(self.count))
-        first = self.n + self.count
-        rates = [self.C[row, self.order] for row in range(first, first + self.count)]
-        laws = [float(self.C[row, self.order]) for row in range(first + self.count, first + self.count + self.laws)]
-        found = [one if isinstance(one, Sized) else Sized(one) for one in rates]
-        return np.array([one.value for one in found]), np.array([one.size for one in found]), np.array(laws)
+        lanes, first = self._step(np.zeros(self.count)), self.n + self.count
+        rows = range(first, first + self.count + self.laws)
+        found = np.array([[names["C"][row, self.order] for row in rows] for names in lanes])
+        return found[0, : self.count], sizes(found)[: self.count], found[0, self.count :]
 
     def put(self, forces: FloatArray) -> None:
-        self.known = self._step(forces)
+        self.lanes = self._step(forces)
         self.order += 1
 
-    def _step(self, forces: FloatArray) -> dict[str, Any]:
+    def _step(self, forces: FloatArray) -> list[dict[str, Any]]:
         """Write the coefficients of this order; the numbers by their names behind it."""
-        names = {**self.known, "k": self.order}
-        inputs = [Sized(float(force)) for force in forces]
-        if self.order == 0:
+        lanes = [{**names, "k": self.order} for names in self.lanes]
+        for names, way in zip(lanes, off(self.count, 1 + self.order), strict=True):
+            inputs = list(map(float, forces * (1.0 + way)))
             names["u"] = [*names["u"][: self.n], *inputs]
-            exec(self.steps[0], names)
-            return names
-        for j, one in enumerate(inputs, start=self.n):
-            names[f"c{j}"] = self.C[j, self.order] = one
-        exec(self.steps[1], names)
-        return names
+            if self.order:
+                for j, force in enumerate(inputs, start=self.n):
+                    names[f"c{j}"] = names["C"][j, self.order] = force
+            exec(self.steps[self.order > 0], names)
+        return lanes
+
+
+@cache
+def off(count: int, seed: int = 0) -> FloatArray:
+    """Zeros, and what two copies of so many numbers are off by."""
+    rng = np.random.default_rng([count, seed])
+    ways = OFF * rng.uniform(0.5, 1.0, (3, count)) * rng.choice([-1.0, 1.0], (3, count))
+    ways[0] = 0.0
+    return ways
+
+
+def sizes(three: FloatArray) -> FloatArray:
+    """The sizes of numbers (3, ...) that were computed three times."""
+    found: FloatArray = np.abs(three[1:] - three[0]).max(axis=0) * (2.0 / OFF)
+    return found

@@ -1,0 +1,96 @@
+"""Nonlinear systems whose contacts and frictions decide together, beside a program written apart."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from nonlinear_contacts import Array, Friction, Masses, Wall
+
+import nonsmooth as ns
+from nonsmooth.elements import Coulomb, Stop
+
+
+def speed(row: tuple[float, ...], belt: float = 0.0) -> Any:
+    return lambda t, u, p: sum(a * x for a, x in zip(row, list(u)[len(row) :], strict=True)) - belt
+
+
+def on(row: tuple[float, ...], mass: tuple[float, ...]) -> dict[str, float]:
+    return {f"v{i + 1}": a / m for i, (a, m) in enumerate(zip(row, mass, strict=True)) if a}
+
+
+def friction(row: tuple[float, ...], mass: tuple[float, ...], **given: Any) -> tuple[Friction, Coulomb]:
+    law = Friction(row, given["friction"], given.get("static"), given.get("belt", 0.0))
+    belt = given.pop("belt", 0.0)
+    return law, Coulomb(speed=speed(row, belt), on=on(row, mass), **given)
+
+
+def stop(row: tuple[float, ...], mass: tuple[float, ...], position: float, e: float) -> tuple[Wall, Stop]:
+    """Keeps row . q below a position."""
+    r = np.array(row)
+    wall = Wall(lambda q: position - r @ q, lambda q: -r, restitution=e)
+    gap = lambda t, u, p: position - sum(a * x for a, x in zip(row, list(u)[: len(row)], strict=True))  # noqa: E731
+    return wall, Stop(gap=gap, on=on(tuple(-r), mass), restitution=e)
+
+
+def duffing(mass: tuple[float, ...], load: float, rate: float, *pairs: Any) -> tuple[Masses, ns.System]:
+    """A chain of masses with hardening springs to the ground and to each other, the first one driven."""
+    n = len(mass)
+
+    def forces(q: Any, v: Any, drive: Any) -> list[Any]:
+        found = [-q[i] - q[i] ** 3 - 0.1 * v[i] for i in range(n)]
+        found[0] = found[0] + drive
+        for i in range(n - 1):
+            between = (q[i + 1] - q[i]) + 0.5 * (q[i + 1] - q[i]) ** 3
+            found[i], found[i + 1] = found[i] + between, found[i + 1] - between
+        return found
+
+    def force(t: float, q: Array, v: Array) -> Array:
+        return np.array(forces(q, v, load * np.cos(rate * t)))
+
+    def field(t: Any, u: Any, p: Any) -> list[Any]:
+        q, v = list(u)[:n], list(u)[n:]
+        return [*v, *(f / m for f, m in zip(forces(q, v, load * np.cos(rate * t)), mass, strict=True))]
+
+    names = [f"{x}{i + 1}" for x in "qv" for i in range(n)]
+    elements = {f"e{i}": pair[1] for i, pair in enumerate(pairs)}
+    system = ns.System(states=names, parameters={}, modes={"all": field}, elements=elements)
+    return Masses(np.diag(mass), force, [pair[0] for pair in pairs]), system
+
+
+ONE, TWO = (1.0,), (1.0, 1.3)
+CASES = {
+    "two frictions and a stop": (
+        ONE, 1.0, 0.8, [0.1], friction((1.0,), ONE, friction=0.2, static=0.3),
+        friction((1.0,), ONE, friction=0.15, belt=0.1), stop((1.0,), ONE, 0.6, 0.5),
+    ),
+    "frictions that hold together": (
+        ONE, 0.9, 0.5, [0.0], friction((1.0,), ONE, friction=0.3, static=0.5), friction((1.0,), ONE, friction=0.3),
+    ),
+    "a plastic stop of a mass that rubs": (
+        ONE, 1.2, 0.7, [0.0], friction((1.0,), ONE, friction=0.2), stop((1.0,), ONE, 0.3, 0.0),
+        stop((-1.0,), ONE, 0.5, 0.3),
+    ),
+    "two masses that rub on each other and on the ground": (
+        TWO, 1.5, 0.6, [0.1, 0.0], friction((1.0, 0.0), TWO, friction=0.2), friction((0.0, 1.0), TWO, friction=0.15),
+        friction((1.0, -1.0), TWO, friction=0.1, static=0.2),
+    ),
+    "two masses with a stop between them and one outside": (
+        TWO, 2.0, 0.7, [0.0, 0.1], stop((1.0, -1.0), TWO, 0.1, 0.0), stop((0.0, 1.0), TWO, 0.3, 0.4),
+        friction((0.0, 1.0), TWO, friction=0.2, static=0.25),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_duffing_masses_move_as_in_the_reference(name: str) -> None:
+    mass, load, rate, start, *pairs = CASES[name]
+    reference, system = duffing(mass, load, rate, *pairs)
+    times = np.linspace(0.0, 4 * 2 * np.pi / rate, 161)
+    n = len(mass)
+    expected = reference.run(np.array(start), np.zeros(n), times)
+    run = ns.simulate(system, duration=times[-1], samples=times, start=[*start, *[0.0] * n], rtol=1e-12)
+    assert len(run["crossing_time"]) > 8
+    at = np.searchsorted(run["time"].values, times, side="right") - 1
+    assert np.abs(run["u"].values[at] - expected).max() < 1e-8
