@@ -13,6 +13,7 @@ from nonsmooth.flow.engines.engine import FloatArray, Log, State
 from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
 from nonsmooth.flow.failure import solve_error, wrong_way
+from nonsmooth.flow.loads import meter_of
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
@@ -76,7 +77,9 @@ def simulate(
         ``u(time, state)``, ``mode``, ``segment`` (each crossing stands twice in ``time``: the limits before and
         after), ``crossing_time``, ``crossing_transition``, ``u_before``, ``u_after``, the touches (``touch_time``,
         ``touch_indicator``, ``touch_u``, ``touch_clearance``: maxima of an armed indicator that do not reach zero),
-        the outputs, and ``status``. A run that stays at an equilibrium from its start says so in the attribute
+        the outputs, and ``status``. For each rigid stop among the elements, over ``crossing``: ``<element>_impulse``,
+        ``<element>_impact_speed`` (of approach; NaN where it has no impact) and ``<element>_energy_lost``, the energy
+        that the impact dissipates. The output ``<element>_force`` is the force between impacts, without impulses. A run that stays at an equilibrium from its start says so in the attribute
         ``note``, and in a warning where the equilibrium is unstable.
 
     Raises
@@ -95,7 +98,7 @@ def simulate(
     t_begin, t_end = transient * unit, transient * unit + length
     traced = system.traced
     if ramps:
-        from nonsmooth.flow.ramps import with_ramps
+        from nonsmooth.flow.ramps import values_along, with_ramps
 
         system.refuse_patterns("ramps")
         if method == "exact":
@@ -121,6 +124,16 @@ def simulate(
     if not ramps:
         traced = system.traced  # with what the run has visited and found
     found = _dataset(system, traced, engine.name, options, log, instants, period)
+    meter = meter_of(system)
+    if meter is not None and meter.striking:
+        from nonsmooth.results.schema import with_impacts
+
+        values: FloatArray = system.parameter_vector()
+        if ramps:
+            values = values_along(system, ramps, t_begin, t_end, log.crossing_time)
+        size = np.nanmax(np.abs(np.vstack([begun, log.sample_u, log.u_before, log.u_after])), axis=0)
+        crossings = log.crossing_time, log.u_before, log.u_after, log.memory_after
+        found = with_impacts(found, meter.at_crossings, meter.impacts(values, *crossings, size)[:3])
     note = "" if ramps else _resting(system, begun, log, state)
     return found.assign_attrs(note=note) if note else found
 

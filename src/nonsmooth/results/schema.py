@@ -39,7 +39,7 @@ from nonsmooth.results.statuses import flag_attributes, status_attributes
 
 __all__ = [
     "floats", "parameter_coords", "quantity_attributes", "response", "section_points", "start_coords", "state_coords",
-    "strings", "sweep", "trajectory", "varied",
+    "strings", "sweep", "trajectory", "varied", "with_impacts",
 ]  # fmt: skip
 
 #: Trailing dims of each array a sweep may bring, after (direction, start, parameter).
@@ -127,6 +127,19 @@ def trajectory(
         **parameter_coords(d),
     }
     return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
+
+
+def with_impacts(
+    run: xr.Dataset, quantities: Mapping[str, tuple[str, str]], columns: Sequence[NDArray[np.float64]]
+) -> xr.Dataset:
+    """The result of ``simulate`` with quantities of impacts over ``crossing``: long names and units; ``columns`` (C, S)
+    each, those of an element one after the other."""
+    table = np.stack(columns, axis=2).reshape(run.sizes["crossing"], len(quantities))
+    added = {
+        name: ("crossing", column, {"long_name": words, "units": unit})
+        for (name, (words, unit)), column in zip(quantities.items(), table.T, strict=True)
+    }
+    return run.assign(added)
 
 
 def sweep(

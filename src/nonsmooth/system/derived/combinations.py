@@ -315,7 +315,7 @@ def assembled(
         "indicators": {**(given["indicators"] or {}), **{key: _returns(g) for key, g in make.indicators.items()}},
         "outputs": {**outputs, **{f"{key}_force": (table, "") for key, table in forces.items()}},
         "ranges": make.ranges(next(iter(base))), "kinds": kinds, "asked": asked,
-        "decider": None if decider is None else decider.numbered([pattern for _, pattern in pairs]),
+        "decider": None if decider is None else decider.numbered([pattern for _, pattern in pairs]), "make": make,
     }  # fmt: skip
 
 
@@ -367,7 +367,7 @@ def _opened(
     return {
         "modes": {key: _returns(list(field)) for key, field in base.items()}, "transitions": (),
         "indicators": {key: _returns(e) for key, e in zip(patterns.labels, patterns.expressions, strict=True)},
-        "outputs": given["outputs"], "ranges": make.ranges(patterns.mode), "patterns": patterns,
+        "outputs": given["outputs"], "ranges": make.ranges(patterns.mode), "patterns": patterns, "make": make,
     }  # fmt: skip
 
 

@@ -71,6 +71,7 @@ class Element(ABC):
     strikes: ClassVar[bool] = False  # its impacts turn speeds at once
     bears: ClassVar[bool] = False  # while it is held it bears its part of an impulse
     presses: ClassVar[bool] = False  # its law is a normal force for friction
+    given: ClassVar[Any] = None  # on an element that stands for one with ``at``: that one
 
     def __post_init__(self) -> None:
         label = type(self).__name__
