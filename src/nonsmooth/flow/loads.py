@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.flow.arguments import yes_or_no
 from nonsmooth.flow.engines.engine import FloatArray, Log, State
 from nonsmooth.flow.outputs import output_values
 from nonsmooth.kernels.hybrid import codes
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from nonsmooth.system.description import Description
     from nonsmooth.system.system import System
 
-__all__ = ["Meter", "Quantities", "meter_of"]
+__all__ = ["Meter", "Quantities", "checked_loads", "meter_of"]
 
 ZERO = 1e-11  # of the largest value of a speed on the motion: a smaller change is no impact
 CLOSED = 1e-7  # of the largest states of a gap: below it a contact is closed
@@ -295,3 +296,22 @@ def meter_of(system: System) -> Meter | None:
         d.variants["meter"] = Meter(d, d.loads)
     found: Meter = d.variants["meter"]
     return found
+
+
+def checked_loads(system: System, wanted: Any, verb: str) -> Meter | None:
+    """The meter of a system whose loads are wanted; None where they are not.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A system that has none; a word that is not True or False.
+    """
+    if not yes_or_no(wanted, "loads"):
+        return None
+    meter = meter_of(system)
+    if meter is None:
+        raise ValueError(
+            f"{verb}: loads are those of elements, and {system.name!r} has none; give System(elements=...) or make it "
+            "by ns.mechanical, or leave loads out"
+        )
+    return meter

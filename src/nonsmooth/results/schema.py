@@ -153,10 +153,12 @@ def sweep(
     starts: ArrayLike,
     squeeze: Sequence[str] = (),
     edges: ArrayLike | None = None,
+    loads: Mapping[str, tuple[ArrayLike, str, str]] | None = None,
 ) -> xr.Dataset:
     """The result of ``sweep``: everything known per point of the swept parameter.
 
-    ``directions`` holds "up", "down" or "none"; ``starts`` (S, n) the first states. See the module's text.
+    ``directions`` holds "up", "down" or "none"; ``starts`` (S, n) the first states; ``loads`` arrays (D, S, P) with their
+    long names and units. See the module's text.
     """
     d = labels
     unknown = set(arrays) - set(_SWEEP_ARRAYS)
@@ -175,6 +177,8 @@ def sweep(
             variables[name] = (dims, np.asarray(array, np.int8), status_attributes())
         else:
             variables[name] = (dims, _own(array), {"long_name": _LONG_NAMES[name]})
+    for name, (array, words, unit) in (loads or {}).items():  # a maximum of an output is there already
+        variables.setdefault(name, (leading, floats(array), {"long_name": words, "units": unit}))
     coords: dict[str, Any] = {
         **varied(d, parameter, values),
         "direction": ("direction", strings(directions), {"long_name": "direction of the sweep"}),
