@@ -17,12 +17,13 @@ from nonsmooth.attractors.exponents import rates, separation_sizes
 from nonsmooth.attractors.mapper import Mapper
 from nonsmooth.attractors.settle import tolerance_of
 from nonsmooth.attractors.settle_cuda import separate_on_gpu, settle_on_gpu
-from nonsmooth.attractors.settled import LEAST, ROUNDED, Settled, least_sizes, usable
+from nonsmooth.attractors.settled import ROUNDED, Settled, least_sizes, usable
 from nonsmooth.attractors.trace import Trace, mode_at
 from nonsmooth.flow.engines.engine import FloatArray, Section, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.loads import meter_of
+from nonsmooth.flow.scales import LEAST
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.phases import varying_phases

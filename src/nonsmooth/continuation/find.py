@@ -136,7 +136,7 @@ def _guesses(
             # The motion leaves an unstable orbit and fails later: its first rounds are enough.
             settled = settle_forced(system, engine, begun, 0, period_number + 1, search)
         if settled.status not in GOOD:
-            raise solve_error(settled.status)
+            raise solve_error(settled.status, begun=(system, begun.u))
         guesses = forced_guesses(system, settled, period_number, max_period)
     if not guesses:
         unit = "rounds" if system.period() is None else "iterates" if system.is_map else "forcing periods"

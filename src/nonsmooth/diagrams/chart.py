@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.attractors.settle import longest_period, warn_if_small
+from nonsmooth.attractors.settle import longest_period
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import CHUNK, STORED, inputs
@@ -20,6 +20,7 @@ from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.loads import checked_loads
+from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 from nonsmooth.results.progress import Progress

@@ -193,7 +193,7 @@ def lyapunov(
             advance(1)
     done = [one for one in found if one is not None]
     if numbers is None and done[0].status not in GOOD:
-        raise solve_error(done[0].status)
+        raise solve_error(done[0].status, begun=(system, first_state(system, start).u))
     return _dataset(system, engine.name, options, parameter, numbers, done)
 
 

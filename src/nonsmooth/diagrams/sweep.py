@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.attractors.settle import longest_period, warn_if_small
+from nonsmooth.attractors.settle import longest_period
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.diagrams.density import bin_edges, coarse_values, given_ranges
 from nonsmooth.diagrams.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
@@ -17,6 +17,7 @@ from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.loads import Quantities, checked_loads
+from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 from nonsmooth.results.memory import room_for

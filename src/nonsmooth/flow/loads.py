@@ -309,9 +309,9 @@ def checked_loads(system: System, wanted: Any, verb: str) -> Meter | None:
     if not yes_or_no(wanted, "loads"):
         return None
     meter = meter_of(system)
-    if meter is None:
+    if meter is None or not meter.per_period:
         raise ValueError(
-            f"{verb}: loads are those of elements, and {system.name!r} has none; give System(elements=...) or make it "
+            f"{verb}: loads are those of elements, and {system.name!r} has none with forces on speeds; give System(elements=...) or make it "
             "by ns.mechanical, or leave loads out"
         )
     return meter

@@ -14,6 +14,7 @@ from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
 from nonsmooth.flow.failure import solve_error, wrong_way
 from nonsmooth.flow.loads import meter_of
+from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
@@ -114,7 +115,9 @@ def simulate(
         check_complete(engine.record(tables, state, t_begin, np.empty(0)), system, state, period)
     log = engine.record(tables, state, t_end, instants)
     check_complete(log, system, state, period)
-    warn_if_coarse(system, engine, np.nanmax(np.abs(np.vstack([begun, log.sample_u, log.u_after])), axis=0))
+    largest = np.nanmax(np.abs(np.vstack([begun, log.sample_u, log.u_before, log.u_after])), axis=0)
+    warn_if_coarse(system, engine, largest)
+    warn_if_slow(system, largest)
     options = {
         "periods": periods, "duration": duration, "start": plain_start(system, start), "mode": mode,
         "transient": transient, "samples": samples, "step": step,
@@ -131,9 +134,8 @@ def simulate(
         values: FloatArray = system.parameter_vector()
         if ramps:
             values = values_along(system, ramps, t_begin, t_end, log.crossing_time)
-        size = np.nanmax(np.abs(np.vstack([begun, log.sample_u, log.u_before, log.u_after])), axis=0)
         crossings = log.crossing_time, log.u_before, log.u_after, log.memory_after
-        found = with_impacts(found, meter.at_crossings, meter.impacts(values, *crossings, size)[:3])
+        found = with_impacts(found, meter.at_crossings, meter.impacts(values, *crossings, largest)[:3])
     note = "" if ramps else _resting(system, begun, log, state)
     return found.assign_attrs(note=note) if note else found
 
@@ -204,8 +206,9 @@ def check_complete(log: Log, system: System, state: State, period: float | None)
     time = state.clock[0] + (state.clock[1] * period if period is not None else 0.0)
     where = dict(zip(system.states, map(float, state.u), strict=True))
     raise solve_error(
-        log.status, wrong_way(system, log), time=float(time), state=where, mode=system.modes[int(state.counters[0])]
-    )
+        log.status, wrong_way(system, log), begun=(system, state.u), time=float(time), state=where,
+        mode=system.modes[int(state.counters[0])],
+    )  # fmt: skip
 
 
 def _dataset(

@@ -13,6 +13,7 @@ from typing import Any
 
 import sympy as sp
 
+from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.combinations import SPEED, Expressions
 from nonsmooth.system.symbolic.expressions import write_expression
 from nonsmooth.system.units import Unit, product, read_unit, unit_of, write_unit
@@ -23,7 +24,8 @@ __all__ = ["Load", "Loads", "loads_of"]
 @dataclass(frozen=True, eq=False)
 class Load:
     """An element: as it was given, its gap where it has impacts, its rate, and what a unit force adds to states'
-    derivatives. ``rate`` is None where it differs between the modes of the system without elements."""
+    derivatives. ``rate`` is None where it has no meaning: where forces change its place at once, or where it differs
+    between the modes of the system without elements."""
 
     name: str
     text: str
@@ -71,7 +73,10 @@ def loads_of(make: Expressions) -> Loads:
     """The loads of elements that are put together by expressions."""
     modes, found = list(make.fields), []
     for k, part in enumerate(make.parts):
-        rates = {sp.expand(make.rate(k, mode)) for mode in modes}
+        try:
+            rates = {sp.expand(make.rate(k, mode)) for mode in modes}
+        except SystemDefinitionError:  # a force changes its place at once
+            rates = set()
         found.append(Load(
             part.name, _text(make, k), part.where if part.element.strikes else None,
             rates.pop() if len(rates) == 1 else None, part.direction,
