@@ -21,6 +21,7 @@ from nonsmooth.flow.arguments import check_system, real_number, whole_number
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.loads import checked_loads
+from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state, plain_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
@@ -106,6 +107,7 @@ def find_orbit(
     with search_within(seconds, "find_orbit", progress) as search:
         guesses = _guesses(system, state, period_number, transient, max_period, search)
         orbit = _polished(system, guesses, period_number is not None, transient == 0, search)
+    warn_if_slow(system, orbit.maximum, orbit.minimum)
     options = {
         "start": plain_start(system, start), "period_number": period_number, "transient": transient,
         "max_period": max_period, **({"loads": True} if wanted else {}),

@@ -53,7 +53,7 @@ class Meter:
     @cached_property
     def striking(self) -> list[int]:
         """The numbers of those that have impacts."""
-        return [k for k, load in enumerate(self.elements) if load.gap is not None]
+        return [k for k, load in enumerate(self.elements) if load.element.strikes]
 
     @cached_property
     def units(self) -> dict[str, list[str]]:
@@ -99,7 +99,7 @@ class Meter:
 
         t = self.description.traced
         every = [
-            *(self.elements[k].gap for k in self.striking), *(load.rate for load in self.elements),
+            *(self.elements[k].where for k in self.striking), *(load.rate for load in self.elements),
             *(load.moved(t.u) for load in self.elements),
             *(self.elements[k].direction[i] for k in self.striking for i in self.elements[k].direction),
             *self.loads.powers.values(),
@@ -133,8 +133,20 @@ class Meter:
     def _places(self) -> list[list[int]]:
         """The states in each gap."""
         u = self.description.traced.u
-        gaps = [self.elements[k].gap for k in self.striking]
-        return [[i for i, one in enumerate(u) if gap is not None and gap.has(one)] for gap in gaps]
+        gaps = [self.elements[k].where for k in self.striking]
+        return [[i for i, one in enumerate(u) if gap.has(one)] for gap in gaps]
+
+    def constraints(self, mode: str, values: FloatArray, time: float, u: FloatArray, memory: FloatArray) -> FloatArray:
+        """The derivatives in the states of what the elements keep at zero in a mode, (constraints, n)."""
+        from sympy import diff, lambdify
+
+        t = self.description.traced
+        held = [load for load in self.loads.held(mode) if load.rate is not None]
+        kept = [e for load in held for e in dict.fromkeys((load.rate, load.where))]
+        rows = [[diff(e, one) for one in t.u] for e in kept]
+        columns = (time, *u, *memory[: len(t.m)], *values[: len(t.p)])
+        found = lambdify([t.t, *t.u, *t.m, *t.p], rows, modules="numpy")(*columns) if rows else []
+        return np.array(found, dtype=float).reshape(-1, len(t.u))
 
     # Impacts
 

@@ -162,9 +162,9 @@ def _loads_content(loads: Loads, d: Description, text: Callable[[sp.Expr], str])
     states = d.traced.state_names
 
     def element(load: Load) -> dict[str, Any]:
-        known = {"gap": load.gap, "rate": load.rate}
+        known = {"where": load.where, "rate": load.rate}
         return {
-            "given": load.text, **{key: text(e) for key, e in known.items() if e is not None},
+            "kind": load.kind, "given": load.text, **{key: text(e) for key, e in known.items() if e is not None},
             "on": {states[i]: text(e) for i, e in load.direction.items()},
         }  # fmt: skip
 
@@ -294,13 +294,17 @@ class _Reader:
             "elements": {k: self.element(e) for k, e in c.get("elements", {}).items()} or None,
         }
 
-    def element(self, entry: Mapping[str, Any]) -> Any:
+    def kind(self, name: str) -> Any:
         from nonsmooth.system.derived import elements
+
+        if name not in elements.__all__ or name == "Element":
+            raise SystemDefinitionError(f"there is no element {shortened(name)}")
+        return getattr(elements, name)
+
+    def element(self, entry: Mapping[str, Any]) -> Any:
         from nonsmooth.system.derived.combinations import SPEED
 
-        if entry["kind"] not in elements.__all__ or entry["kind"] == "Element":
-            raise SystemDefinitionError(f"there is no element {shortened(entry['kind'])}")
-        kind = getattr(elements, entry["kind"])
+        kind = self.kind(entry["kind"])
 
         def law(text: str) -> Callable[..., Any]:
             expression = self.function(text, {"speed": SPEED})().expression
@@ -336,7 +340,7 @@ class _Reader:
             return None if text is None else self.function(text)().expression
 
         elements = tuple(
-            Load(str(name), str(e["given"]), read(e.get("gap")), read(e.get("rate")),
+            Load(str(name), self.kind(e["kind"]).__name__, str(e["given"]), read(e["where"]), read(e.get("rate")),
                  {states.index(state): read(one) for state, one in e["on"].items()})
             for name, e in c["elements"].items()
         )  # fmt: skip

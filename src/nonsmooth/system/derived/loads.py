@@ -7,6 +7,7 @@ speeds that its force changes, each times the derivative of the rate in it.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any
@@ -14,7 +15,9 @@ from typing import Any
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.derived import elements
 from nonsmooth.system.derived.combinations import SPEED, Expressions
+from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.symbolic.expressions import write_expression
 from nonsmooth.system.units import Unit, product, read_unit, unit_of, write_unit
 
@@ -23,15 +26,23 @@ __all__ = ["Load", "Loads", "loads_of"]
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """An element: as it was given, its gap where it has impacts, its rate, and what a unit force adds to states'
-    derivatives. ``rate`` is None where it has no meaning: where forces change its place at once, or where it differs
-    between the modes of the system without elements."""
+    """An element: its kind, how it was given, where it is, its rate, and what a unit force adds to states' derivatives.
+
+    ``rate`` is None where it has no meaning: where forces change its place at once, or where it differs between the
+    modes of the system without elements."""
 
     name: str
+    kind: str
     text: str
-    gap: sp.Expr | None
+    where: sp.Expr
     rate: sp.Expr | None
     direction: Mapping[int, sp.Expr]
+
+    @property
+    def element(self) -> type[Element]:
+        """Its class."""
+        found: type[Element] = getattr(elements, self.kind)
+        return found
 
     def moved(self, u: tuple[sp.Symbol, ...]) -> sp.Expr:
         """The speed w.v of the masses along the element."""
@@ -47,6 +58,13 @@ class Loads:
     fields: Mapping[str, tuple[sp.Expr, ...]]
     powers: Mapping[str, sp.Expr] = field(default_factory=dict)
     energy: str = ""
+
+    def held(self, mode: str) -> list[Load]:
+        """The elements that hold their rates at zero in a mode, by its name."""
+        words = [f"{re.escape(one.name)}_({'|'.join(one.element.phases)})" for one in self.elements]
+        found = re.fullmatch("(?:.*_)?" + "_".join(words), mode)
+        phases = found.groups() if found else ()
+        return [one for one, phase in zip(self.elements, phases, strict=False) if phase in one.element.held]
 
     def units(self, units: Mapping[sp.Symbol, str]) -> dict[str, tuple[str, str, str, str]]:
         """Units of force, rate, impulse and energy of each element, by those of states, parameters and time."""
@@ -78,7 +96,7 @@ def loads_of(make: Expressions) -> Loads:
         except SystemDefinitionError:  # a force changes its place at once
             rates = set()
         found.append(Load(
-            part.name, _text(make, k), part.where if part.element.strikes else None,
+            part.name, type(part.element).__name__, _text(make, k), part.where,
             rates.pop() if len(rates) == 1 else None, part.direction,
         ))  # fmt: skip
     return Loads(tuple(found), {mode: tuple(make.fields[mode]) for mode in modes})
