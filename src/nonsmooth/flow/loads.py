@@ -130,7 +130,7 @@ class Meter:
         return sum(len(self.elements[k].direction) for k in self.striking)
 
     @cached_property
-    def _places(self) -> list[list[int]]:
+    def places(self) -> list[list[int]]:
         """The states in each gap."""
         u = self.description.traced.u
         gaps = [self.elements[k].where for k in self.striking]
@@ -160,7 +160,7 @@ class Meter:
         _, rate_after, moved_after, _, _ = self.values(parameters, time, after, memory)
         speeds = (D != 0.0).any(axis=(0, 1))
         change = np.where(speeds, np.nan_to_num(after - before), 0.0)
-        closed = gap <= CLOSED * np.array([size[some].max(initial=0.0) for some in self._places])
+        closed = gap <= CLOSED * np.array([size[some].max(initial=0.0) for some in self.places])
         jumps = (np.abs(change) > ZERO * size).any(axis=1)
         impulses = np.zeros(gap.shape)
         for c in np.flatnonzero(jumps & closed.any(axis=1)):

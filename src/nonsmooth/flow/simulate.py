@@ -12,7 +12,7 @@ from nonsmooth.flow.arguments import check_options, check_system, float_array, r
 from nonsmooth.flow.engines.engine import FloatArray, Log, State
 from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
-from nonsmooth.flow.failure import solve_error, wrong_way
+from nonsmooth.flow.failure import refuse_beyond_stops, solve_error, wrong_way
 from nonsmooth.flow.loads import meter_of
 from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
@@ -108,6 +108,8 @@ def simulate(
     width = 2 * len(traced.u) + len(traced.outputs) + 3  # of the log and of the result
     instants = _instants(samples, t_begin, t_end, None if ramps and period is None else period, width)
     state = first_state(system, start, mode)
+    if not ramps:
+        refuse_beyond_stops(system, state.u[None, :])
     engine = engine_for(system, method, rtol, atol, step, traced=traced if ramps else None, **expert)
     begun = np.abs(state.u)
     tables = engine.prepare(system.parameter_vector()[None, :])
