@@ -390,8 +390,9 @@ def test_a_system_is_printed_with_its_elements_as_they_were_given() -> None:
 
 
 def test_messages_name_the_element_and_what_is_allowed() -> None:
-    below = ns.mechanical(1.0, 0.1, 1.0, parameters={}, elements={"floor": Stop(at="x", position=-1.0)}, coordinates=["x"])
-    with pytest.raises(ns.SolveError, match=r"beyond a stop: 'floor', Stop\(at=\"x\", position=-1.0\).*-1 there.*side=-1"):
+    floor = {"floor": Stop(at="x", position=-1.0)}
+    below = ns.mechanical(1.0, 0.1, 1.0, parameters={}, elements=floor, coordinates=["x"])
+    with pytest.raises(ns.SolveError, match=r"a stop: 'floor', Stop\(at=\"x\", position=-1.0\).*-1 there.*side=-1"):
         ns.simulate(below, duration=1.0)
     with pytest.raises(TypeError, match=r"`pos` is not an option of Stop; nearest: position; all: at, creep, gap"):
         Stop(pos=1)  # type: ignore[call-arg]

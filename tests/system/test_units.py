@@ -54,6 +54,8 @@ def test_forces_of_elements_have_the_units_of_their_system() -> None:
     units = {name: run[f"stop_{name}"].attrs["units"] for name in ("force", "impulse", "impact_speed", "energy_lost")}
     assert units == {"force": "N m", "impulse": "N m s", "impact_speed": "1/s", "energy_lost": "J"}
     assert run["stop_energy_lost"].values == pytest.approx([1.0])  # 1/2 J v^2
-    driven = ns.mechanical("m", 0.1, 1.0, parameters={"m": (2.0, "kg"), "w": 1.0}, coordinates={"q": "m"},
-                           forcing={"q": lambda t, p: np.cos(p.w * t)}, elements={"s": Stop(at="q", position=1.0)})  # fmt: skip
+    driven = ns.mechanical(
+        "m", 0.1, 1.0, parameters={"m": (2.0, "kg"), "w": 1.0}, coordinates={"q": "m"},
+        forcing={"q": lambda t, p: np.cos(p.w * t)}, elements={"s": Stop(at="q", position=1.0)},
+    )  # fmt: skip
     assert dict(ns.System.from_text(driven.to_text()).outputs) == dict(driven.outputs) == {"s_force": "N"}

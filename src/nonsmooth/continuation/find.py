@@ -102,7 +102,7 @@ def find_orbit(
     seconds = real_number(budget, "budget")
     if not seconds > 0:
         raise ValueError(f"budget = {budget!r}: a search takes a positive number of seconds")
-    wanted = checked_loads(system, loads, "find_orbit") is not None
+    wanted = bool(checked_loads(system, loads, "find_orbit"))
     state = first_state(system, start)
     with search_within(seconds, "find_orbit", progress) as search:
         guesses = _guesses(system, state, period_number, transient, max_period, search)

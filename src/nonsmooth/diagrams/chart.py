@@ -19,7 +19,7 @@ from nonsmooth.flow.engines.devices import BATCH, engine_on, on_gpu, workers_of
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.equilibria import refuse_resting
-from nonsmooth.flow.loads import checked_loads
+from nonsmooth.flow.loads import Quantities, checked_loads
 from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
@@ -153,7 +153,6 @@ def chart(
         arrays = {name: planned.order(column) for name, column in flat.items()}
     if "maximum" in arrays:
         warn_if_small(system, work.starts, arrays["maximum"], arrays["minimum"])
-    meter = checked_loads(system, loads, "chart")
     from nonsmooth.results.global_schema import chart as build
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
@@ -161,7 +160,7 @@ def chart(
     labels = labels_of(system)
     return build(
         labels, provenance(labels, "chart", planned.options, method=work.settler.engine.name), planned.values, arrays,
-        starts=work.starts, one_start=is_one_start(start) or len(work.starts) == 1, loads={} if meter is None else meter.per_period,
+        starts=work.starts, one_start=is_one_start(start) or len(work.starts) == 1, loads=planned.loads,
     )  # fmt: skip
 
 
@@ -173,13 +172,14 @@ class PlannedChart:
     values: Mapping[str, FloatArray]
     options: Mapping[str, Any]
     order: Callable[[Any], Any]
+    loads: Quantities
 
 
 def plan_chart(
     system: System, grid: Mapping[str, Any], *, start: Any = None, carry: Any = None, section: Any = None,
     transient: Any = 500, keep: Any = 60, max_period: Any = None, stop_early: bool = True, extremes: bool = True,
-    loads: Any = False, lyapunov: Any = False, refine: Any = False, method: str = "auto", rtol: Any = None, atol: Any = None,
-    device: str = "cpu", campaign: bool = False, **expert: Any,
+    loads: Any = False, lyapunov: Any = False, refine: Any = False, method: str = "auto", rtol: Any = None,
+    atol: Any = None, device: str = "cpu", campaign: bool = False, **expert: Any,
 ) -> PlannedChart:  # fmt: skip
     """Check the arguments of :func:`chart` and lay its work out, without computing anything."""
     check_system(system, "chart")
@@ -193,7 +193,7 @@ def plan_chart(
     starts = start_states(system, start)
     if plan.indicator >= 0:
         refuse_resting(system, starts, _corners(system, values), "chart")
-    meter = checked_loads(system, loads, "chart")
+    measured = checked_loads(system, loads, "chart")
     n_exponent = (EXPONENT_RETURNS if lyapunov else 0) if isinstance(lyapunov, bool | np.bool_) else lyapunov
     n_exponent = whole_number(n_exponent, "lyapunov", 0)
     if 0 < n_exponent < 40:
@@ -209,16 +209,17 @@ def plan_chart(
     options = {
         "grid": values, "start": plain_start(system, start), "carry": None if carry is None else dict(carry),
         "section": section, "transient": transient, "keep": keep, "max_period": max_period,
-        "stop_early": stop_early, "extremes": extremes, **({"loads": True} if meter else {}), "lyapunov": n_exponent, "refine": refine,
+        "stop_early": stop_early, "extremes": extremes, **({"loads": True} if measured else {}),
+        "lyapunov": n_exponent, "refine": refine,
         "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
     axes, order = _axes(values, along)
     chunk = BATCH if gpu else STORED if campaign else CHUNK
     work = ChartWork(
-        settler, axes, starts, along is not None, n_exponent, () if meter is None else tuple(meter.per_period),
+        settler, axes, starts, along is not None, n_exponent, tuple(measured),
         chunk=chunk, described=inputs(system, "chart", options),
     )  # fmt: skip
-    return PlannedChart(work, values, options, order)
+    return PlannedChart(work, values, options, order, measured)
 
 
 def _grid(system: System, grid: Any) -> dict[str, FloatArray]:

@@ -120,9 +120,9 @@ def lyapunov(
     without full rank (sticking, a plastic impact, memory that is written anew): such a direction is lost in finite
     time. So it is for each constraint that elements hold where the measurement begins (a mass that sticks, two for a
     contact that rests): the frame is laid into what they leave free, and rates at which the equations bring rounding
-    errors back to a constraint are no exponents. One is NaN, and comes last, for memory that is never written or a state of modes that are never visited: it
-    is constant. The phase of the forcing is no state, so a forced limit cycle has negative exponents only; an
-    autonomous motion that does not end in an equilibrium has one exponent zero.
+    errors back to a constraint are no exponents. One is NaN, and comes last, for memory that is never written or a
+    state of modes that are never visited: it is constant. The phase of the forcing is no state, so a forced limit cycle
+    has negative exponents only; an autonomous motion that does not end in an equilibrium has one exponent zero.
 
     A run that stops at a stable equilibrium has the real parts of its eigenvalues, and the standard error is no
     less than the distance from them. A run that begins at an unstable one, as the start of zeros often is, stays there:

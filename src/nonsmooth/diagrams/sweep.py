@@ -133,8 +133,8 @@ def sweep(
     see :mod:`nonsmooth.kernels.judging.judge`.
 
     Loads are per return of the section (per forcing period), averaged over the returns of a cycle, from the last
-    section point on; over ``keep`` returns where the motion has no period. Forces are without impulses. The energy of an
-    element is what it takes from the masses,
+    section point on; over ``keep`` returns where the motion has no period. Forces are without impulses. The energy of
+    an element is what it takes from the masses,
 
     .. math:: E = -\int \lambda\, w \cdot v\, dt - \sum \Lambda\, w \cdot (v^+ + v^-) / 2
 
@@ -176,7 +176,7 @@ def sweep(
         "take fewer values, starts or bins, keep fewer returns, or count them with density=True",
     )  # fmt: skip
     edges = None
-    meter = checked_loads(system, loads, "sweep")
+    measured = checked_loads(system, loads, "sweep")
     if density is not False:
         coarse = None
         if len(ranges) < len(system.states):
@@ -190,7 +190,6 @@ def sweep(
     settler = Settler(
         system, engine, plan._replace(extremes=extremes), transient, keep, max_period if judge else 0, False, rtol=rtol
     )
-    measured = {} if meter is None else meter.per_period
     slots = {(d, k): Slot(settler, points, edges, measured) for d in range(len(directions)) for k in range(len(starts))}
     options = {
         "parameter": parameter, "values": values, "direction": direction, "start": plain_start(system, start),
@@ -285,7 +284,7 @@ def _dataset(
         labels, provenance(labels, "sweep", options, method=method), parameter, numbers, arrays,
         directions=directions, starts=starts, squeeze=tuple(squeeze),
         edges=None if counter is None else counter.edges,
-        loads={name: (gather(lambda s, name=name: s.loads[name]), *measured[name]) for name in measured},
+        loads={name: (gather(lambda s: s.loads[name]), *measured[name]) for name in measured},  # noqa: B023
     )  # fmt: skip
 
 

@@ -48,8 +48,8 @@ def refuse_beyond_stops(system: System, starts: FloatArray) -> None:
 
 
 def _beyond_stop(system: System, u: FloatArray, time: float, least: float = 0.0) -> str:
-    """A sentence that names the rigid stop beyond which a state lies, by more than ``least`` of its scale; nothing where
-    it lies beyond none."""
+    """A sentence that names the rigid stop beyond which a state lies, by more than ``least`` of its scale; nothing
+    where it lies beyond none."""
     meter = meter_of(system)
     if meter is None or not meter.striking:
         return ""
@@ -63,8 +63,8 @@ def _beyond_stop(system: System, u: FloatArray, time: float, least: float = 0.0)
         "; side=1, where none is given, is a stop above the motion, side=-1 one below it"
     )  # fmt: skip
     return (
-        f"the start lies beyond a stop: {load.name!r}, {load.text}, has a gap of {gaps.min():.6g} there{sides}. Start on "
-        "its other side, or correct its position or side"
+        f"the start lies beyond a stop: {load.name!r}, {load.text}, has a gap of {gaps.min():.6g} there{sides}. Start "
+        "on its other side, or correct its position or side"
     )
 
 

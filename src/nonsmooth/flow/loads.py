@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,7 +64,7 @@ class Meter:
 
     @cached_property
     def at_crossings(self) -> Quantities:
-        """What each crossing has."""
+        """Quantities of each crossing."""
         found = {}
         for k in self.striking:
             name = self.elements[k].name
@@ -75,7 +76,7 @@ class Meter:
 
     @cached_property
     def per_period(self) -> Quantities:
-        """What each motion has."""
+        """Quantities of each motion."""
         found = {}
         for k, load in enumerate(self.elements):
             force, rate, impulse, energy = self.units[load.name]
@@ -251,7 +252,7 @@ class _Failed(Exception):
 
 def _cut(edges: FloatArray, longest: float) -> FloatArray:
     """The edges with more of them, so that no piece between two is longer."""
-    pieces = [(a, b) for a, b in zip(edges, edges[1:], strict=False) if b - a > 1e-13 * (edges[-1] - edges[0])]
+    pieces = [(a, b) for a, b in pairwise(edges) if b - a > 1e-13 * (edges[-1] - edges[0])]
     cuts = [np.linspace(a, b, int(np.ceil((b - a) / longest)) + 1)[:-1] for a, b in pieces]
     return np.append(np.concatenate(cuts), edges[-1])
 
@@ -310,8 +311,8 @@ def meter_of(system: System) -> Meter | None:
     return found
 
 
-def checked_loads(system: System, wanted: Any, verb: str) -> Meter | None:
-    """The meter of a system whose loads are wanted; None where they are not.
+def checked_loads(system: System, wanted: Any, verb: str) -> Quantities:
+    """The quantities of a system whose loads are wanted; none where they are not.
 
     Raises
     ------
@@ -319,11 +320,11 @@ def checked_loads(system: System, wanted: Any, verb: str) -> Meter | None:
         A system that has none; a word that is not True or False.
     """
     if not yes_or_no(wanted, "loads"):
-        return None
+        return {}
     meter = meter_of(system)
     if meter is None or not meter.per_period:
         raise ValueError(
-            f"{verb}: loads are those of elements, and {system.name!r} has none with forces on speeds; give System(elements=...) or make it "
-            "by ns.mechanical, or leave loads out"
+            f"{verb}: loads are those of elements, and {system.name!r} has none with forces on speeds; give "
+            "System(elements=...) or make it by ns.mechanical, or leave loads out"
         )
-    return meter
+    return meter.per_period

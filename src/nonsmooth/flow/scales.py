@@ -40,7 +40,7 @@ def warn_if_slow(system: System, *sizes: FloatArray) -> None:
     """
     loads = system._description.loads
     if loads is not None and loads.elements:
-        _warn(system, sizes, np.inf, "by which impacts are told from rest and starts from contact, so both may be wrong")
+        _warn(system, sizes, np.inf, "by which impacts are told from rest and contact from none, so both may be wrong")
 
 
 def _warn(system: System, sizes: tuple[FloatArray, ...], resting: float, what: str) -> None:

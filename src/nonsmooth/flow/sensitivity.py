@@ -11,8 +11,8 @@ from nonsmooth.flow.arguments import check_system
 from nonsmooth.flow.engines.engine import FloatArray, Log, State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.saltation import Jump
-from nonsmooth.flow.simulate import check_complete, run_length
 from nonsmooth.flow.scales import warn_if_slow
+from nonsmooth.flow.simulate import check_complete, run_length
 from nonsmooth.flow.starts import first_state, plain_start
 from nonsmooth.flow.variational import Segments, VariationalFlow
 from nonsmooth.system.names import by_name

@@ -157,8 +157,8 @@ def sweep(
 ) -> xr.Dataset:
     """The result of ``sweep``: everything known per point of the swept parameter.
 
-    ``directions`` holds "up", "down" or "none"; ``starts`` (S, n) the first states; ``loads`` arrays (D, S, P) with their
-    long names and units. See the module's text.
+    ``directions`` holds "up", "down" or "none"; ``starts`` (S, n) the first states; ``loads`` arrays (D, S, P) with
+    their long names and units. See the module's text.
     """
     d = labels
     unknown = set(arrays) - set(_SWEEP_ARRAYS)

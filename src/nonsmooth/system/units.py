@@ -1,7 +1,7 @@
 """Units as products of powers: what a force, an impulse or an energy is measured in, by the units of a system.
 
-A unit is a mapping from symbols to exponents, ``{"kg": 1, "m": 1, "s": -2}``. N, J, W, Pa and Hz are written out, rad is
-1, and every other symbol (mm, V) stands for itself: nothing is converted.
+A unit is a mapping from symbols to exponents, ``{"kg": 1, "m": 1, "s": -2}``. N, J, W, Pa and Hz are written out, rad
+is 1, and every other symbol (mm, V) stands for itself: nothing is converted.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ _NAMED = {
     "N m s": {"kg": 1, "m": 2, "s": -1},
 }  # fmt: skip
 _RAISED = {"\N{SUPERSCRIPT TWO}": 2, "\N{SUPERSCRIPT THREE}": 3}
+_HIGH = "".join(_RAISED)
 _TOKEN = re.compile(
-    r"\s*(?:([/()*\N{MIDDLE DOT}])(?!\*)|([^\W\d_%s]+|%%|1)(?:(?:\^|\*\*)?([+-]?\d+|[%s]))?)" % (2 * ("".join(_RAISED),))
+    rf"\s*(?:([/()*\N{{MIDDLE DOT}}])(?!\*)|([^\W\d_{_HIGH}]+|%|1)(?:(?:\^|\*\*)?([+-]?\d+|[{_HIGH}]))?)"
 )
 
 

@@ -125,7 +125,8 @@ class Orbit:
         SolveError
             An orbit that cannot be followed.
         """
-        meter = checked_loads(self.system, True, "with_loads")
+        checked_loads(self.system, True, "with_loads")
+        meter = meter_of(self.system)
         assert meter is not None
         u, memory, mode = self._begin()
         state = State(u.copy(), memory.copy())
@@ -195,9 +196,7 @@ class Orbit:
         values = vars(self) | {"clearance": np.array(list(self.clearance.values()), dtype=float)}
         variables = {column.name: (column.dims, values[column.field], attributes(labels, column)) for column in FOUND}
         if self.loads:
-            meter = checked_loads(self.system, True, "to_dataset")
-            assert meter is not None
-            for name, (words, unit) in meter.per_period.items():
+            for name, (words, unit) in checked_loads(self.system, True, "to_dataset").items():
                 variables[name] = ((), self.loads[name], {"long_name": words, "units": unit})
         names = np.array([*self.system.states, *self.system.memory], dtype=str)
         coords = {

@@ -253,4 +253,6 @@ def _matrix(given: Any, p: Any, size: int, what: str) -> sp.Matrix:
     try:
         return sp.Matrix(size, size, [to_expression(p[one] if isinstance(one, str) else one) for one in array.ravel()])
     except TypeError as error:
-        raise SystemDefinitionError(f"{what} holds {shortened(found)}: numbers or names of parameters are wanted ({error})") from error
+        raise SystemDefinitionError(
+            f"{what} holds {shortened(found)}: numbers or names of parameters are wanted ({error})"
+        ) from error

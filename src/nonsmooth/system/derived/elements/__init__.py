@@ -9,4 +9,4 @@ from nonsmooth.system.names import by_name
 __all__ = ["Backlash", "Coulomb", "ElasticStop", "Element", "PreloadedSpring", "Stop"]
 
 for kind in (Backlash, Coulomb, ElasticStop, PreloadedSpring, Stop):
-    kind.__init__ = by_name(kind.__init__)  # type: ignore[misc]
+    kind.__init__ = by_name(kind.__init__)  # type: ignore[method-assign]
