@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
 from nonsmooth.diagrams.lyapunov import kaplan_yorke
+from nonsmooth.elements import Coulomb, Stop
 
 DEFECT = 1e-10
 
@@ -376,3 +377,23 @@ def test_results_are_saved_whole(tmp_path: Path) -> None:
         path = tmp_path / f"{k}.nc"
         ns.save(found, path)
         assert ns.load(path).identical(found)
+
+
+def test_what_contacts_hold_is_no_exponent() -> None:
+    """A mass stuck on the ground beside a damped one: its place is free (0), its speed lost (-inf), and the other mass
+    has the eigenvalues of x'' + 0.1 x' + 2 x = 0; one at rest at a stop loses place and speed."""
+    for element, free in (({"f": Coulomb(at="q1", friction=6.0)}, [0.0]), ({"s": Stop(at="q1", position=0.3)}, [])):
+        pair = ns.mechanical(
+            np.eye(2), 0.1 * np.eye(2), [[2.0, -1.0], [-1.0, 2.0]], parameters={"w": 0.7}, elements=element,
+            forcing={"q1": lambda t, p: 3.0 + 0.3 * np.cos(p.w * t)},
+        )  # fmt: skip
+        found = ns.lyapunov(pair, periods=400)
+        exponents = found["exponents"].values
+        lost = 2 - len(free)
+        assert exponents[: len(free)] == pytest.approx(free, abs=1e-12)
+        assert exponents[len(free) : len(free) + 2].sum() == pytest.approx(-0.1, abs=1e-10)
+        assert exponents[len(free) : len(free) + 2] == pytest.approx([-0.05, -0.05], abs=1e-3)
+        assert (exponents[-lost:] == -np.inf).all() and len(exponents) == len(free) + 2 + lost
+        assert float(found["trace_defect"]) == 0.0
+    alone = ns.mechanical(1.0, 0.1, 1.0, parameters={}, elements={"f": Coulomb(at="q", friction=0.6)})
+    assert ns.lyapunov(alone, duration=50.0, start={"q": 0.2})["exponents"].values == pytest.approx([0.0, -np.inf])

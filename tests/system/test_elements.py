@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -366,3 +367,68 @@ def test_multipliers_through_stick_and_rest() -> None:
     expected = np.linalg.eigvals(np.array(columns).T)
     found = np.asarray(orbit.floquet_multipliers)
     assert np.allclose(np.sort(abs(found)), np.sort(abs(expected)), atol=1e-6)
+
+
+def test_a_system_is_printed_with_its_elements_as_they_were_given() -> None:
+    rig = ns.mechanical(
+        1.0, 0.1, 1.0, parameters={"mu": 0.3, "w": 2.0},
+        elements={
+            "f": Coulomb(at="q", friction="mu", belt=-0.5), "s": Stop(at="q", position=-0.2, side=-1),
+            "g": Coulomb(at={"q": 2}, friction=lambda v, p: p.mu / (1 + v), belt=lambda t, u, p: np.sin(p.w * t)),
+        },
+    )  # fmt: skip
+    lines = [line.strip() for line in str(rig).splitlines()]
+    assert 'elements    f: Coulomb(at="q", belt=-0.5, friction="mu")' in lines
+    assert 's: Stop(at="q", position=-0.2, side=-1)' in lines
+    assert 'g: Coulomb(at={"q": 2}, belt=sin(w*t), friction=mu/(1 + v))' in lines
+    assert "v_q' = -q - 0.1*v_q" in lines and len(lines) < 14
+    assert "->" not in str(rig) and "->" in rig.summary(verbose=True)
+    assert "indicator s_gap" in rig.summary(verbose=True) and "s_gap" not in rig.summary()
+    ball = shaken()
+    assert 'stop: Stop(gap=d - x, on={"v": -1.0}, restitution="e")' in str(ball)
+    assert str(ns.System.from_text(ball.to_text())) == str(ball)
+
+
+def test_messages_name_the_element_and_what_is_allowed() -> None:
+    floor = {"floor": Stop(at="x", position=-1.0)}
+    below = ns.mechanical(1.0, 0.1, 1.0, parameters={}, elements=floor, coordinates=["x"])
+    with pytest.raises(ns.SolveError, match=r"a stop: 'floor', Stop\(at=\"x\", position=-1.0\).*-1 there.*side=-1"):
+        ns.simulate(below, duration=1.0)
+    with pytest.raises(TypeError, match=r"`pos` is not an option of Stop; nearest: position; all: at, creep, gap"):
+        Stop(pos=1)  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match=r"Coulomb takes no arguments by position"):
+        Coulomb("q")  # type: ignore[misc]
+
+
+def test_a_mechanical_system_takes_names_of_parameters() -> None:
+    named = ns.mechanical("m", [["c"]], "k", parameters={"m": 2.0, "c": 0.1, "k": 3.0, "F": 1.5}, forcing={"q": "F"})
+    plain = ns.mechanical(2.0, 0.1, 3.0, parameters={}, forcing={"q": 1.5})
+    runs = [ns.simulate(system, duration=3.0, samples=5)["u"].values for system in (named, plain)]
+    assert np.allclose(*runs, rtol=0, atol=1e-14)
+    with pytest.raises(ns.SystemDefinitionError, match=r"`d` is not a parameter of .*; all: c, k"):
+        ns.mechanical(1.0, "d", "k", parameters={"c": 0.1, "k": 3.0})
+
+
+def test_small_numbers_without_scales_are_warned_of() -> None:
+    """All lengths 1e-7: impacts are slower than the rest speed of the scales 1."""
+
+    def system(**scale: Any) -> ns.System:
+        return ns.mechanical(
+            1.0, 0.2, 0.0, parameters={"w": 1.0}, forcing={"q": lambda t, p: 1e-7 * np.cos(p.w * t)}, **scale,
+            elements={"s": Stop(at="q", position=1e-7, restitution=0.5)},
+        )  # fmt: skip
+
+    def large(t: Any, p: Any) -> Any:
+        return np.cos(p.w * t)
+
+    for verb in (partial(ns.simulate, periods=3), partial(ns.poincare, n=3), partial(ns.lyapunov, periods=40)):
+        with pytest.warns(UserWarning, match=r"told from rest.*System\(scale=\{'q': .*'v_q'"):
+            verb(system())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run = ns.simulate(system(scale={"q": 1e-7, "v_q": 1e-7}), periods=3)
+    true = ns.simulate(
+        ns.mechanical(1.0, 0.2, 0.0, parameters={"w": 1.0}, forcing={"q": large},
+                      elements={"s": Stop(at="q", position=1.0, restitution=0.5)}), periods=3,
+    )  # fmt: skip
+    assert run["u"].values[-1] * 1e7 == pytest.approx(true["u"].values[-1], rel=1e-9)

@@ -90,7 +90,7 @@ def test_its_text_is_read_back_whatever_it_has_visited(both: tuple[ns.System, ns
         assert np.allclose(*(run["u"].values for run in runs), rtol=0, atol=1e-14)
         with pytest.raises(ns.SystemDefinitionError, match="lies between 0 and 1"):
             again.with_parameters(e=-0.1)
-    assert "wall (Stop)" in repr(made) and "visited so far" in repr(made)
+    assert 'wall: Stop(at="q2"' in repr(made) and "visited so far" in repr(made)
 
 
 def test_what_cannot_be_done_with_patterns_is_refused(both: tuple[ns.System, ns.System]) -> None:

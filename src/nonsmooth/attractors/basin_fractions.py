@@ -13,12 +13,12 @@ from nonsmooth.attractors.basins_attractors import Attractor, Patience, find_att
 from nonsmooth.attractors.basins_matching import numbered
 from nonsmooth.attractors.basins_measures import share_errors, starts_needed
 from nonsmooth.attractors.basins_work import StartsWork, settled_from
-from nonsmooth.attractors.settle import warn_if_small
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import CHUNK, STORED, inputs
 from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import check_options, check_system, real_number, swept_values, whole_number
 from nonsmooth.flow.engines.devices import BATCH, workers_of
+from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.sections import Poincare, Stroboscopic
 from nonsmooth.flow.starts import random_starts, start_states
 from nonsmooth.results.memory import room_for

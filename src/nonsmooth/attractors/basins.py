@@ -17,7 +17,7 @@ from nonsmooth.attractors.basins_measures import (
     uncertain_part,
 )
 from nonsmooth.attractors.basins_work import StartsWork, settled_from
-from nonsmooth.attractors.settle import longest_period, warn_if_small
+from nonsmooth.attractors.settle import longest_period
 from nonsmooth.attractors.settled import usable
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.campaign.run import run
@@ -26,6 +26,7 @@ from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
 from nonsmooth.flow.engines.devices import BATCH, engine_on, on_gpu, workers_of
 from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for

@@ -52,6 +52,7 @@ class Mapper:
         self.at = np.zeros(5, dtype=np.int64)
         self.runs: Any = None
         self.system: Any = None
+        self.found: Settled | None = None
         self.march = March(engine.module(), engine.limit)
 
     def settle(self, rules: Rules, carried: int, extremes: bool) -> Callable[[int], None]:
@@ -74,6 +75,7 @@ class Mapper:
 
     def settled(self) -> Settled:
         """Return the results of the jobs."""
+        assert self.found is not None
         return self.found.judged(self.jobs)
 
     def separate(self, returns: int, batch: int, sizes: FloatArray, offsets: FloatArray, sums: FloatArray) -> IntArray:
@@ -108,6 +110,10 @@ class Mapper:
                 end_if_not_wanted()
             if engine.own_systems:
                 engine.leave(here, state)
+                if self.found is not None and int(self.at[0]) > j:  # modes have the numbers that all points share
+                    begin.counters[0] = self.found.mode[j]
+                    engine.leave(here, begin)
+                    self.found.mode[j] = begin.counters[0]
 
     def _system(self, tables: Any, row: int) -> Any:
         self.system = self.engine.system(tables, row, self.settler.plan.indicator)

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.flow.poincare import result_status
+from nonsmooth.flow.scales import LEAST
 from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
     from nonsmooth.kernels.judging.settle import Jobs
 
-__all__ = ["LEAST", "ROUNDED", "Settled", "least_sizes", "usable"]
+__all__ = ["ROUNDED", "Settled", "least_sizes", "usable"]
 
-LEAST = 1e-3  # the least size of a motion, in units of the states' scales
 ROUNDED = 1e-4  # of a state's value: what is smaller cannot be told from rounding where returns are to be nil
 
 USABLE = (codes.OK, codes.SLOW, codes.NOT_PERIODIC, codes.NOT_GUARANTEED)

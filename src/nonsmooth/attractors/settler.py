@@ -17,11 +17,13 @@ from nonsmooth.attractors.exponents import rates, separation_sizes
 from nonsmooth.attractors.mapper import Mapper
 from nonsmooth.attractors.settle import tolerance_of
 from nonsmooth.attractors.settle_cuda import separate_on_gpu, settle_on_gpu
-from nonsmooth.attractors.settled import LEAST, ROUNDED, Settled, least_sizes
+from nonsmooth.attractors.settled import ROUNDED, Settled, least_sizes, usable
 from nonsmooth.attractors.trace import Trace, mode_at
 from nonsmooth.flow.engines.engine import FloatArray, Section, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.loads import meter_of
+from nonsmooth.flow.scales import LEAST
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.phases import varying_phases
@@ -165,13 +167,8 @@ class Settler:
 
     def trace(self, point: FloatArray, place: FloatArray, mode: int, transient: int, keep: int) -> Trace:
         """Section points of one run at one parameter point (1, n_parameters), from a place on the section."""
-        system, tables, n = self.system, self.engine.prepare(point), len(self.system.states)
-        period, whole, strobed = float(tables.period[0]), n + len(system.traced.m), self.plan.indicator < 0
-        state = State(place[:n].copy(), place[n:whole].copy() if len(place) >= whole else system.memory_vector())
-        state.counters[0] = mode
-        if period < np.inf:
-            state.clock[2] = period
-            state.clock[0] = place[-1] if len(place) > whole else self.plan.phase * period if strobed else 0.0
+        tables, n = self.engine.prepare(point), len(self.system.states)
+        state = self._state(place, mode, float(tables.period[0]))
         begin, out = state.clock[0], self.engine.kept(1, keep)
         self.engine.chain(tables, 0, 1, state, None, self.plan._replace(extremes=False), transient, keep, out)
         if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
@@ -179,6 +176,40 @@ class Settler:
             return Trace(np.zeros((0, n)), np.zeros(0, dtype=np.int64), none, place, mode)
         end = np.concatenate([state.u, state.memory, state.clock[:1]])[: self.width]
         return Trace(out.section[0], out.section_mode[0], out.section_time[0] - begin, end, int(state.counters[0]))
+
+    def _state(self, place: FloatArray, mode: int, period: float) -> State:
+        """The state of a run that goes on from a place."""
+        n, strobed = len(self.system.states), self.plan.indicator < 0
+        whole = n + len(self.system.traced.m)
+        memory = place[n:whole].copy() if len(place) >= whole else self.system.memory_vector()
+        state = State(place[:n].copy(), memory)
+        state.counters[0] = mode
+        if period < np.inf:
+            state.clock[2] = period
+            state.clock[0] = place[-1] if len(place) > whole else self.plan.phase * period if strobed else 0.0
+        return state
+
+    def loads(self, points: FloatArray, rows: Any, found: Settled) -> dict[str, FloatArray]:
+        """Loads of elements (``flow.loads``) of J jobs that have settled, per return of their section, over the returns
+        of a cycle, or as many as are kept where there is none; NaN where a run failed."""
+        meter = meter_of(self.system)
+        assert meter is not None  # refused at the door
+        columns = {name: np.full(len(found.status), np.nan) for name in meter.per_period}
+        for j in np.flatnonzero(usable(found.status)):
+            point, returns = points[rows[j]], int(found.period_number[j]) or self.keep
+            period = self.system.period_at(point) or np.inf
+            place, mode = found.last[j], int(found.mode[j])
+            if self.plan.indicator < 0:
+                duration = returns * period
+            else:
+                times = self.trace(point[None, :], place, mode, 0, returns).times
+                if not len(times):
+                    continue
+                duration = float(times[-1])
+            one = meter.over(self.engine, point, self._state(place, mode, period), duration, returns)
+            for name, value in (one or {}).items():
+                columns[name][j] = value
+        return columns
 
     def exponents(
         self, points: FloatArray, rows: Any, starts: FloatArray, modes: Any, n_returns: int, maximum: FloatArray,

@@ -20,6 +20,8 @@ from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, real_number, whole_number
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import solve_error
+from nonsmooth.flow.loads import checked_loads
+from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state, plain_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
@@ -49,6 +51,7 @@ def find_orbit(
     period_number: int | None = None,
     transient: int = 500,
     max_period: int = 32,
+    loads: bool = False,
     budget: float = 60.0,
     progress: Progress = True,
 ) -> Orbit:
@@ -68,6 +71,8 @@ def find_orbit(
         near it too.
     max_period : int
         The longest period searched.
+    loads : bool
+        True: the orbit has its ``loads``, those of elements and work per forcing period; see :func:`nonsmooth.sweep`.
     budget : float
         Seconds of processor time after which the search ends with an error (``budget``); compiling does not count.
     progress : bool, or function
@@ -97,15 +102,17 @@ def find_orbit(
     seconds = real_number(budget, "budget")
     if not seconds > 0:
         raise ValueError(f"budget = {budget!r}: a search takes a positive number of seconds")
+    wanted = bool(checked_loads(system, loads, "find_orbit"))
     state = first_state(system, start)
     with search_within(seconds, "find_orbit", progress) as search:
         guesses = _guesses(system, state, period_number, transient, max_period, search)
         orbit = _polished(system, guesses, period_number is not None, transient == 0, search)
+    warn_if_slow(system, orbit.maximum, orbit.minimum)
     options = {
         "start": plain_start(system, start), "period_number": period_number, "transient": transient,
-        "max_period": max_period,
+        "max_period": max_period, **({"loads": True} if wanted else {}),
     }  # fmt: skip
-    return replace(orbit, options=options)
+    return replace(orbit.with_loads() if wanted else orbit, options=options)
 
 
 def _guesses(
@@ -131,7 +138,7 @@ def _guesses(
             # The motion leaves an unstable orbit and fails later: its first rounds are enough.
             settled = settle_forced(system, engine, begun, 0, period_number + 1, search)
         if settled.status not in GOOD:
-            raise solve_error(settled.status)
+            raise solve_error(settled.status, begun=(system, begun.u))
         guesses = forced_guesses(system, settled, period_number, max_period)
     if not guesses:
         unit = "rounds" if system.period() is None else "iterates" if system.is_map else "forcing periods"

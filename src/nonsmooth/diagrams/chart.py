@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.attractors.settle import longest_period, warn_if_small
+from nonsmooth.attractors.settle import longest_period
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import CHUNK, STORED, inputs
@@ -19,6 +19,8 @@ from nonsmooth.flow.engines.devices import BATCH, engine_on, on_gpu, workers_of
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.equilibria import refuse_resting
+from nonsmooth.flow.loads import Quantities, checked_loads
+from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 from nonsmooth.results.progress import Progress
@@ -48,6 +50,7 @@ def chart(
     max_period: int | None = None,
     stop_early: bool = True,
     extremes: bool = True,
+    loads: bool = False,
     lyapunov: bool | int = False,
     refine: bool | float = False,
     method: str = "auto",
@@ -84,6 +87,8 @@ def chart(
         instead of at the end of its transient. Labels are the same, but for chaotic transients that end about then.
     extremes : bool
         Whether ``maximum`` and ``minimum`` are wanted.
+    loads : bool
+        True: loads of elements and work per return, as in :func:`nonsmooth.sweep`.
     lyapunov : bool or int
         Largest exponent, from two neighbours over 1000 (or this many) returns. On a Poincare section of an autonomous
         system the largest beside the zero along the flow.
@@ -112,7 +117,8 @@ def chart(
     xarray.Dataset
         Over the two parameters: ``period_number`` (0: none found), ``crossings_per_period``,
         ``contacts_per_period``, ``maximum``, ``minimum``, ``status``, and where asked for ``lyapunov`` (per unit
-        time) with ``lyapunov_error``, ``n_attractors``, ``confidence`` and ``computed``.
+        time) with ``lyapunov_error``, ``n_attractors``, ``confidence`` and ``computed``, and the loads (NaN where a
+        point was not computed).
 
     Raises
     ------
@@ -154,7 +160,7 @@ def chart(
     labels = labels_of(system)
     return build(
         labels, provenance(labels, "chart", planned.options, method=work.settler.engine.name), planned.values, arrays,
-        starts=work.starts, one_start=is_one_start(start) or len(work.starts) == 1,
+        starts=work.starts, one_start=is_one_start(start) or len(work.starts) == 1, loads=planned.loads,
     )  # fmt: skip
 
 
@@ -166,13 +172,14 @@ class PlannedChart:
     values: Mapping[str, FloatArray]
     options: Mapping[str, Any]
     order: Callable[[Any], Any]
+    loads: Quantities
 
 
 def plan_chart(
     system: System, grid: Mapping[str, Any], *, start: Any = None, carry: Any = None, section: Any = None,
     transient: Any = 500, keep: Any = 60, max_period: Any = None, stop_early: bool = True, extremes: bool = True,
-    lyapunov: Any = False, refine: Any = False, method: str = "auto", rtol: Any = None, atol: Any = None,
-    device: str = "cpu", campaign: bool = False, **expert: Any,
+    loads: Any = False, lyapunov: Any = False, refine: Any = False, method: str = "auto", rtol: Any = None,
+    atol: Any = None, device: str = "cpu", campaign: bool = False, **expert: Any,
 ) -> PlannedChart:  # fmt: skip
     """Check the arguments of :func:`chart` and lay its work out, without computing anything."""
     check_system(system, "chart")
@@ -186,6 +193,7 @@ def plan_chart(
     starts = start_states(system, start)
     if plan.indicator >= 0:
         refuse_resting(system, starts, _corners(system, values), "chart")
+    measured = checked_loads(system, loads, "chart")
     n_exponent = (EXPONENT_RETURNS if lyapunov else 0) if isinstance(lyapunov, bool | np.bool_) else lyapunov
     n_exponent = whole_number(n_exponent, "lyapunov", 0)
     if 0 < n_exponent < 40:
@@ -201,15 +209,17 @@ def plan_chart(
     options = {
         "grid": values, "start": plain_start(system, start), "carry": None if carry is None else dict(carry),
         "section": section, "transient": transient, "keep": keep, "max_period": max_period,
-        "stop_early": stop_early, "extremes": extremes, "lyapunov": n_exponent, "refine": refine,
+        "stop_early": stop_early, "extremes": extremes, **({"loads": True} if measured else {}),
+        "lyapunov": n_exponent, "refine": refine,
         "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
     axes, order = _axes(values, along)
     chunk = BATCH if gpu else STORED if campaign else CHUNK
     work = ChartWork(
-        settler, axes, starts, along is not None, n_exponent, chunk=chunk, described=inputs(system, "chart", options)
-    )
-    return PlannedChart(work, values, options, order)
+        settler, axes, starts, along is not None, n_exponent, tuple(measured),
+        chunk=chunk, described=inputs(system, "chart", options),
+    )  # fmt: skip
+    return PlannedChart(work, values, options, order, measured)
 
 
 def _grid(system: System, grid: Any) -> dict[str, FloatArray]:

@@ -34,6 +34,8 @@ class ChartWork:
         Flat places in the plane, where not all are wanted.
     lyapunov : int
         Returns over which the exponent is measured; 0: not wanted.
+    loads : tuple of str
+        Names of the loads of elements, where they are wanted.
     """
 
     settler: Settler
@@ -41,6 +43,7 @@ class ChartWork:
     starts: FloatArray  # (S, n)
     carried: bool = False
     lyapunov: int = 0
+    loads: tuple[str, ...] = ()
     where: IntArray | None = None
     chunk: int = CHUNK
     described: Mapping[str, Any] = field(default_factory=dict)
@@ -78,6 +81,7 @@ class ChartWork:
             found |= {"maximum": Column("f8", (*many, n)), "minimum": Column("f8", (*many, n))}
         if self.lyapunov:
             found |= {"lyapunov": Column("f8", many), "lyapunov_error": Column("f8", many)}
+        found |= {name: Column("f8", many) for name in self.loads}
         if many:
             found["n_attractors"] = Column("i2")
         return found
@@ -102,23 +106,24 @@ class ChartWork:
         (a, values_a), (b, values_b) = self.grid.items()
         points = self.settler.system.parameter_points({a: values_a[row], b: values_b[column]})
         n_places, n_starts = len(places), len(self.starts)
+        rows = np.repeat(np.arange(n_places), n_starts)
         if self.carried:
             found = along_rows(self.settler, points, self._shape[1], self.starts)
         else:
-            rows = np.repeat(np.arange(n_places), n_starts)
             found = self.settler.run(points, rows, np.tile(self.starts, (n_places, 1)))
         arrays = {
             "period_number": found.period_number, "status": found.status,
             "crossings_per_period": found.crossings, "contacts_per_period": found.contacts,
             "maximum": found.maximum, "minimum": found.minimum,
         }  # fmt: skip
+        if self.loads:
+            arrays |= self.settler.loads(points, rows, found)
         if self.lyapunov:
             good = np.flatnonzero(usable(found.status))
             exponent, error = np.full(len(found.status), np.nan), np.full(len(found.status), np.nan)
-            rows = np.repeat(np.arange(n_places), n_starts)[good]
             exponent[good], error[good] = self.settler.exponents(
                 points,
-                rows,
+                rows[good],
                 found.last[good],
                 found.mode[good],
                 self.lyapunov,

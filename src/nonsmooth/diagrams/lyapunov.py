@@ -34,6 +34,7 @@ from nonsmooth.flow.engines.engine import FloatArray, State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.poincare import result_status
+from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
@@ -117,9 +118,11 @@ def lyapunov(
     -----
     There are as many exponents as states and memory. One is minus infinity where a transition has a saltation matrix
     without full rank (sticking, a plastic impact, memory that is written anew): such a direction is lost in finite
-    time. One is NaN, and comes last, for memory that is never written or a state of modes that are never visited: it
-    is constant. The phase of the forcing is no state, so a forced limit cycle has negative exponents only; an
-    autonomous motion that does not end in an equilibrium has one exponent zero.
+    time. So it is for each constraint that elements hold where the measurement begins (a mass that sticks, two for a
+    contact that rests): the frame is laid into what they leave free, and rates at which the equations bring rounding
+    errors back to a constraint are no exponents. One is NaN, and comes last, for memory that is never written or a
+    state of modes that are never visited: it is constant. The phase of the forcing is no state, so a forced limit cycle
+    has negative exponents only; an autonomous motion that does not end in an equilibrium has one exponent zero.
 
     A run that stops at a stable equilibrium has the real parts of its eigenvalues, and the standard error is no
     less than the distance from them. A run that begins at an unstable one, as the start of zeros often is, stays there:
@@ -174,6 +177,7 @@ def lyapunov(
         order = order[::-1]
     found: list[Spectrum | None] = [None] * len(points)
     state: State | None = None
+    sizes: list[FloatArray] = []
     with progress_bar(len(points), "lyapunov", progress if numbers is not None else False) as advance:
         for i in order:
             carried = state is not None and direction is not None
@@ -188,12 +192,14 @@ def lyapunov(
                 kept = state.copy()
                 one = spectrum_along(system, engine, tables, int(i), points[i], state, here, unit, count, wait)
             found[i] = one
+            sizes.append(np.abs([kept.u, state.u]))
             if one.status not in GOOD:
                 state = kept if i != order[0] else None
             advance(1)
     done = [one for one in found if one is not None]
     if numbers is None and done[0].status not in GOOD:
-        raise solve_error(done[0].status)
+        raise solve_error(done[0].status, begun=(system, first_state(system, start).u))
+    warn_if_slow(system, *sizes)
     return _dataset(system, engine.name, options, parameter, numbers, done)
 
 

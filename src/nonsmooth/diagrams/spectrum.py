@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from nonsmooth.flow.engines.engine import FloatArray, Section, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.equilibria import Equilibrium, equilibrium_at
+from nonsmooth.flow.loads import meter_of
 from nonsmooth.flow.spectrum import frame_for
 from nonsmooth.kernels.hybrid import codes
 
@@ -22,6 +23,7 @@ __all__ = ["ALIGN", "BATCHES", "GOOD", "Spectrum", "at_rest", "batch_ends", "eva
 
 BATCHES = 32
 ALIGN = 100  # units of the transient in which the frame turns into the directions of growth
+INDEPENDENT = 1e-7  # of the largest singular value of constraints
 GOOD = (codes.OK, codes.NOT_GUARANTEED)
 
 
@@ -56,6 +58,7 @@ def spectrum_along(
     if status in GOOD and align:
         status = frame.advance(state, align, unit).status
     begun = state.copy()
+    lost = _hold(system, frame, values, begun) if status in GOOD else 0
     if status in GOOD:
         growth = frame.advance(state, count, unit)
         status = growth.status
@@ -66,11 +69,37 @@ def spectrum_along(
         state.clock[2] = period
     used = int(frame.active.sum())
     logs = growth.logarithms[:, :used]
+    if lost:
+        logs[:, used - lost :], growth.determinants = -np.inf, -np.inf
     batches = np.add.reduceat(logs, batch_ends(count)[:-1]) if count >= BATCHES else None
     found = evaluated(
         n, logs.mean(axis=0) / unit, batches, count, unit, growth.defect, growth.nearest, status, period is not None
     )
     return at_rest(found, system, values, begun, state)
+
+
+def _hold(system: System, frame: Any, values: FloatArray, state: State) -> int:
+    """Turn the frame so that what elements hold in the present mode stands in its last columns; their number.
+
+    A held contact or friction takes each neighbour to its constraint in a finite time, so these directions are lost; the
+    rate at which the equations bring rounding errors back to it means nothing. The others stay within it."""
+    meter = meter_of(system)
+    if meter is None:
+        return 0
+    mode = system.modes[int(state.counters[0])]
+    rows = meter.constraints(mode, values, float(state.clock[0]), state.u, state.memory) * system.scale_vector()
+    active = frame.active[: rows.shape[1]]
+    _, sizes, turned = np.linalg.svd(rows[:, active])
+    lost = int((sizes > INDEPENDENT * sizes.max(initial=0.0)).sum())
+    if lost:
+        own, place = np.zeros((frame.Q.shape[0], len(turned))), np.flatnonzero(active)
+        own[place] = turned.T
+        within = own[:, lost:]
+        rest = np.eye(frame.Q.shape[0])[:, len(active) :][:, frame.active[len(active) :]]  # memory
+        within = np.hstack([within, rest])
+        aligned = np.linalg.qr(within.T @ frame.Q)[0]
+        frame.Q[:] = np.hstack([within @ aligned, own[:, :lost]])
+    return lost
 
 
 def at_rest(found: Spectrum, system: System, values: FloatArray, begun: State, ended: State) -> Spectrum:
@@ -93,7 +122,8 @@ def at_rest(found: Spectrum, system: System, values: FloatArray, begun: State, e
         return replace(found, rest=rest, error=np.full_like(found.error, np.nan), dimension=np.nan)
     error, known = found.error, rest.eigenvalues.real
     if rest.kind == "stable" and len(known) == len(error):
-        error = np.maximum(error, np.abs(found.exponents - known) + np.finfo(float).eps * np.abs(known))
+        apart = np.abs(found.exponents - known) + np.finfo(float).eps * np.abs(known)
+        error = np.maximum(error, np.where(np.isfinite(found.exponents), apart, 0.0))
     return replace(found, rest=rest, error=error)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.attractors.settle import longest_period, warn_if_small
+from nonsmooth.attractors.settle import longest_period
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.diagrams.density import bin_edges, coarse_values, given_ranges
 from nonsmooth.diagrams.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
@@ -16,6 +16,8 @@ from nonsmooth.flow.engines.devices import engine_on, on_gpu, workers_of
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import refuse_resting
+from nonsmooth.flow.loads import Quantities, checked_loads
+from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 from nonsmooth.results.memory import room_for
@@ -48,6 +50,7 @@ def sweep(
     max_period: int | None = None,
     judge: bool = True,
     extremes: bool = True,
+    loads: bool = False,
     density: bool | Mapping[str, Any] = False,
     bins: int = 400,
     method: str = "auto",
@@ -58,7 +61,7 @@ def sweep(
     progress: Progress = True,
     **expert: Any,
 ) -> xr.Dataset:
-    """Long-time behaviour over a parameter: section points, extremes, period numbers.
+    r"""Long-time behaviour over a parameter: section points, extremes, period numbers.
 
     Parameters
     ----------
@@ -85,6 +88,9 @@ def sweep(
     extremes : bool
         False, with ``judge=False``: leave out the extremes of states, indicators and outputs too, which takes half the
         time of the kept returns away.
+    loads : bool
+        True: impulses, impact speeds and energies of each element and the work of forcing, damping and base, per return
+        (a millisecond or more for each point). See Notes.
     density : bool or mapping
         Store a histogram of each state's section points instead of the points. A mapping gives ranges,
         ``{"x": (lowest, highest)}``; where none is given it is that of a coarse sweep and a twentieth more either side.
@@ -108,7 +114,9 @@ def sweep(
         ``minimum``, ``period_number`` (0: none found), ``residual``, ``crossings_per_period``,
         ``contacts_per_period``, ``clearance``, extremes of the outputs, ``status``. With ``density``, in place of
         ``section``: ``density(..., state, bin)`` (section points in each bin), ``outside(..., state)`` (those beyond
-        the range) and ``bin_edge(state, edge)``.
+        the range) and ``bin_edge(state, edge)``. With ``loads``, of each element ``<element>_force_maximum`` and
+        ``<element>_energy``, of rigid stops ``_impact_speed_maximum``, ``_impacts`` and ``_impulse`` too, and of
+        :func:`nonsmooth.mechanical` ``work_of_forcing``, ``work_of_damping`` and ``work_of_base``.
 
     Raises
     ------
@@ -123,6 +131,17 @@ def sweep(
     With ``density`` memory does not depend on ``keep``: points are counted as soon as they have been judged.
     A period number p is granted only where the p-th return is below 1e-9 of the motion's size and contracts:
     see :mod:`nonsmooth.kernels.judging.judge`.
+
+    Loads are per return of the section (per forcing period), averaged over the returns of a cycle, from the last
+    section point on; over ``keep`` returns where the motion has no period. Forces are without impulses. The energy of
+    an element is what it takes from the masses,
+
+    .. math:: E = -\int \lambda\, w \cdot v\, dt - \sum \Lambda\, w \cdot (v^+ + v^-) / 2
+
+    with the speed w.v of the masses along it (negative where a belt or a moving stop gives energy). Work of forcing and
+    base is done on the masses, that of damping by them, so on a cycle ``work_of_forcing + work_of_base`` is
+    ``work_of_damping`` and the energies of all elements (and ``work_of_stiffness`` where K is not symmetric). Forcing
+    and damping of a system of another kind cannot be told apart, and their work is left out.
     """
     check_system(system, "sweep")
     check_options(system, expert, sweep)
@@ -157,6 +176,7 @@ def sweep(
         "take fewer values, starts or bins, keep fewer returns, or count them with density=True",
     )  # fmt: skip
     edges = None
+    measured = checked_loads(system, loads, "sweep")
     if density is not False:
         coarse = None
         if len(ranges) < len(system.states):
@@ -170,11 +190,12 @@ def sweep(
     settler = Settler(
         system, engine, plan._replace(extremes=extremes), transient, keep, max_period if judge else 0, False, rtol=rtol
     )
-    slots = {(d, k): Slot(settler, len(points), edges) for d in range(len(directions)) for k in range(len(starts))}
+    slots = {(d, k): Slot(settler, points, edges, measured) for d in range(len(directions)) for k in range(len(starts))}
     options = {
         "parameter": parameter, "values": values, "direction": direction, "start": plain_start(system, start),
         "section": section, "transient": transient, "keep": keep, "max_period": max_period,
         **({} if judge else {"judge": False}), **({} if extremes else {"extremes": False}),
+        **({"loads": True} if measured else {}),
         **({} if density is False else {"density": density, "bins": bins}),
         "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
     }  # fmt: skip
@@ -194,7 +215,7 @@ def sweep(
     warn_if_coarse(system, engine, largest)
     warn_if_small(system, largest)
     return _dataset(
-        system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze, judge, extremes
+        system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze, judge, extremes, measured
     )
 
 
@@ -216,6 +237,7 @@ def _dataset(
     squeeze: Iterable[str],
     judge: bool,
     extremes: bool,
+    measured: Quantities,
 ) -> xr.Dataset:
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
@@ -262,6 +284,7 @@ def _dataset(
         labels, provenance(labels, "sweep", options, method=method), parameter, numbers, arrays,
         directions=directions, starts=starts, squeeze=tuple(squeeze),
         edges=None if counter is None else counter.edges,
+        loads={name: (gather(lambda s: s.loads[name]), *measured[name]) for name in measured},  # noqa: B023
     )  # fmt: skip
 
 

@@ -24,10 +24,12 @@ PIECE = 16  # points of one piece of independent work
 
 
 class Slot:
-    """One direction and start: kept returns of all parameter values (histograms in place of points), the verdicts."""
+    """One direction and start: kept returns of all parameter values (histograms in place of points), the verdicts, and
+    loads by the names of those that are wanted."""
 
-    def __init__(self, settler: Settler, points: int, edges: FloatArray | None) -> None:
-        self.settler = settler
+    def __init__(self, settler: Settler, at: FloatArray, edges: FloatArray | None, loads: Iterable[str]) -> None:
+        self.settler, self.at, points = settler, at, len(at)
+        self.loads = {name: np.full(points, np.nan) for name in loads}
         self.counter = None if edges is None else Counter(points, edges)
         self.kept = settler.engine.kept(points, settler.keep if edges is None else 0)
         self.period_number = np.zeros(points, dtype=np.int64)
@@ -56,6 +58,9 @@ class Slot:
         """Take the verdicts on some parameter values."""
         for name in ("period_number", "residual", "status"):
             getattr(self, name)[rows] = getattr(found, name)
+        if self.loads:
+            for name, values in self.settler.loads(self.at, np.arange(len(self.at))[rows], found).items():
+                self.loads[name][rows] = values
 
     def extremes(self) -> tuple[FloatArray, ...]:
         """Maxima and minima of states, indicators, outputs."""

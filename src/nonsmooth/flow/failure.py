@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
+from nonsmooth.flow.loads import meter_of
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.system.derived.elements.element import SMALL
 
 if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import Log
     from nonsmooth.system.symbolic.traced import TracedTransition
     from nonsmooth.system.system import System
 
-__all__ = ["solve_error", "wrong_way"]
+__all__ = ["refuse_beyond_stops", "solve_error", "wrong_way"]
 
 BEYOND_STOP = (
     "the start lies beyond a stop: a transition with a reset holds there already; "
@@ -28,14 +33,47 @@ CONTACTS = {
 }
 
 
-def solve_error(code: int, because: str = "", **where: Any) -> SolveError:
-    """The error for a kernel's code; ``where`` (time, state, mode) as :class:`SolveError` takes it."""
+def solve_error(
+    code: int, because: str = "", *, begun: tuple[System, FloatArray] | None = None, **where: Any
+) -> SolveError:
+    """The error for a kernel's code; ``begun`` are the system and the state where the run began, to name a stop that it
+    was beyond; ``where`` (time, state, mode) as :class:`SolveError` takes it."""
     from nonsmooth.results.statuses import by_code
 
     if code == codes.BEYOND_STOP:
-        return SolveError(BEYOND_STOP, status="beyond_stop", **where)
+        named = "" if begun is None else _beyond_stop(*begun, where.get("time", 0.0))
+        return SolveError(named or BEYOND_STOP, status="beyond_stop", **where)
     status = by_code(code)
     return SolveError(because or status.sentence, status=status.name, **where)
+
+
+def refuse_beyond_stops(system: System, starts: FloatArray) -> None:
+    """Raise SolveError for a start, at t = 0, that lies beyond a rigid stop by more than rounding leaves."""
+    for u in starts:
+        if named := _beyond_stop(system, u, 0.0, SMALL):
+            where = dict(zip(system.states, map(float, u), strict=True))
+            raise SolveError(named, status="beyond_stop", time=0.0, state=where)
+
+
+def _beyond_stop(system: System, u: FloatArray, time: float, least: float = 0.0) -> str:
+    """A sentence that names the rigid stop beyond which a state lies, by more than ``least`` of its scale; nothing
+    where it lies beyond none."""
+    meter = meter_of(system)
+    if meter is None or not meter.striking:
+        return ""
+    at = np.array([time]), np.asarray(u, dtype=float)[None, :], system.memory_vector()[None, :]
+    gaps = meter.values(system.parameter_vector(), *at)[0][0]
+    sizes = np.array([system.scale_vector()[some].max(initial=0.0) for some in meter.places])
+    if not (gaps < -least * sizes).any():
+        return ""
+    load = meter.elements[meter.striking[int(gaps.argmin())]]
+    sides = "" if "at=" not in load.text else (
+        "; side=1, where none is given, is a stop above the motion, side=-1 one below it"
+    )  # fmt: skip
+    return (
+        f"the start lies beyond a stop: {load.name!r}, {load.text}, has a gap of {gaps.min():.6g} there{sides}. Start "
+        "on its other side, or correct its position or side"
+    )
 
 
 def _not_unique(system: System, jump: TracedTransition) -> str:

@@ -10,7 +10,8 @@ from nonsmooth.flow.arguments import check_options, check_system, whole_number
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.equilibria import refuse_resting
-from nonsmooth.flow.failure import solve_error
+from nonsmooth.flow.failure import refuse_beyond_stops, solve_error
+from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 from nonsmooth.kernels.hybrid import codes
@@ -76,6 +77,8 @@ def poincare(
     section, plan = section_plan(system, section)
     plan = plan._replace(extremes=False)
     starts = start_states(system, start)
+    if is_one_start(start):
+        refuse_beyond_stops(system, starts)
     if plan.indicator >= 0:
         refuse_resting(system, starts, system.parameter_vector()[None, :], "poincare")
     engine = engine_for(system, method, rtol, atol, **expert)
@@ -84,7 +87,8 @@ def poincare(
     state = State(starts[0].copy(), system.memory_vector())
     engine.chain(tables, 0, len(starts), state, starts, plan, transient, n, out)
     if is_one_start(start) and out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
-        raise solve_error(int(out.status[0]))
+        raise solve_error(int(out.status[0]), begun=(system, starts[0]))
+    warn_if_slow(system, starts, out.section)
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
     from nonsmooth.results.schema import section_points

@@ -12,10 +12,11 @@ from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import real_number
 
 if TYPE_CHECKING:
+    from nonsmooth.arrays import FloatArray
     from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
 
-__all__ = ["with_ramps"]
+__all__ = ["values_along", "with_ramps"]
 
 WATCHED = 101  # values of a linear ramp that are checked to be allowed
 
@@ -88,3 +89,15 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
         period=None,
     )
     return system.with_sliding(moved)
+
+
+def values_along(
+    system: System, ramps: Mapping[str, Any], t_begin: float, t_end: float, time: FloatArray
+) -> FloatArray:
+    """The parameters at some instants of a run with ramps, (N, n_parameters)."""
+    values = np.tile(system.parameter_vector(), (len(time), 1))
+    for name, ramp in ramps.items():
+        part = (time - t_begin) / (t_end - t_begin)
+        column = ramp(time) if callable(ramp) else ramp[0] + (ramp[1] - ramp[0]) * part
+        values[:, list(system.values).index(name)] = column
+    return values

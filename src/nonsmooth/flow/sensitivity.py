@@ -11,6 +11,7 @@ from nonsmooth.flow.arguments import check_system
 from nonsmooth.flow.engines.engine import FloatArray, Log, State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.saltation import Jump
+from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.simulate import check_complete, run_length
 from nonsmooth.flow.starts import first_state, plain_start
 from nonsmooth.flow.variational import Segments, VariationalFlow
@@ -199,6 +200,7 @@ def sensitivity(
     flow = VariationalFlow.of(system, names)
     _, length = run_length(system, periods, duration, system.period(), 0.0)
     found, log = variation(system, flow, first_state(system, start, mode), length)
+    warn_if_slow(system, found.segments.z[:, : len(system.states)], log.u_before, log.u_after)
     parameter_part = found.P
     if periods is not None and names:
         _, gradient = flow.period(system.parameter_vector())

@@ -12,7 +12,9 @@ from nonsmooth.flow.arguments import check_options, check_system, float_array, r
 from nonsmooth.flow.engines.engine import FloatArray, Log, State
 from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
-from nonsmooth.flow.failure import solve_error, wrong_way
+from nonsmooth.flow.failure import refuse_beyond_stops, solve_error, wrong_way
+from nonsmooth.flow.loads import meter_of
+from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
@@ -76,8 +78,11 @@ def simulate(
         ``u(time, state)``, ``mode``, ``segment`` (each crossing stands twice in ``time``: the limits before and
         after), ``crossing_time``, ``crossing_transition``, ``u_before``, ``u_after``, the touches (``touch_time``,
         ``touch_indicator``, ``touch_u``, ``touch_clearance``: maxima of an armed indicator that do not reach zero),
-        the outputs, and ``status``. A run that stays at an equilibrium from its start says so in the attribute
-        ``note``, and in a warning where the equilibrium is unstable.
+        the outputs, and ``status``. For each rigid stop among the elements, over ``crossing``: ``<element>_impulse``,
+        ``<element>_impact_speed`` (of approach; NaN where it has no impact) and ``<element>_energy_lost``, the energy
+        that the impact dissipates. The output ``<element>_force`` is the force between impacts, without impulses. A run
+        that stays at an equilibrium from its start says so in the attribute ``note``, and in a warning where the
+        equilibrium is unstable.
 
     Raises
     ------
@@ -95,7 +100,7 @@ def simulate(
     t_begin, t_end = transient * unit, transient * unit + length
     traced = system.traced
     if ramps:
-        from nonsmooth.flow.ramps import with_ramps
+        from nonsmooth.flow.ramps import values_along, with_ramps
 
         system.refuse_patterns("ramps")
         if method == "exact":
@@ -104,6 +109,8 @@ def simulate(
     width = 2 * len(traced.u) + len(traced.outputs) + 3  # of the log and of the result
     instants = _instants(samples, t_begin, t_end, None if ramps and period is None else period, width)
     state = first_state(system, start, mode)
+    if not ramps:
+        refuse_beyond_stops(system, state.u[None, :])
     engine = engine_for(system, method, rtol, atol, step, traced=traced if ramps else None, **expert)
     begun = np.abs(state.u)
     tables = engine.prepare(system.parameter_vector()[None, :])
@@ -111,7 +118,9 @@ def simulate(
         check_complete(engine.record(tables, state, t_begin, np.empty(0)), system, state, period)
     log = engine.record(tables, state, t_end, instants)
     check_complete(log, system, state, period)
-    warn_if_coarse(system, engine, np.nanmax(np.abs(np.vstack([begun, log.sample_u, log.u_after])), axis=0))
+    largest = np.nanmax(np.abs(np.vstack([begun, log.sample_u, log.u_before, log.u_after])), axis=0)
+    warn_if_coarse(system, engine, largest)
+    warn_if_slow(system, largest)
     options = {
         "periods": periods, "duration": duration, "start": plain_start(system, start), "mode": mode,
         "transient": transient, "samples": samples, "step": step,
@@ -121,6 +130,15 @@ def simulate(
     if not ramps:
         traced = system.traced  # with what the run has visited and found
     found = _dataset(system, traced, engine.name, options, log, instants, period)
+    meter = meter_of(system)
+    if meter is not None and meter.striking:
+        from nonsmooth.results.schema import with_impacts
+
+        values: FloatArray = system.parameter_vector()
+        if ramps:
+            values = values_along(system, ramps, t_begin, t_end, log.crossing_time)
+        crossings = log.crossing_time, log.u_before, log.u_after, log.memory_after
+        found = with_impacts(found, meter.at_crossings, meter.impacts(values, *crossings, largest)[:3])
     note = "" if ramps else _resting(system, begun, log, state)
     return found.assign_attrs(note=note) if note else found
 
@@ -191,8 +209,9 @@ def check_complete(log: Log, system: System, state: State, period: float | None)
     time = state.clock[0] + (state.clock[1] * period if period is not None else 0.0)
     where = dict(zip(system.states, map(float, state.u), strict=True))
     raise solve_error(
-        log.status, wrong_way(system, log), time=float(time), state=where, mode=system.modes[int(state.counters[0])]
-    )
+        log.status, wrong_way(system, log), begun=(system, state.u), time=float(time), state=where,
+        mode=system.modes[int(state.counters[0])],
+    )  # fmt: skip
 
 
 def _dataset(

@@ -67,8 +67,10 @@ def chart(
     *,
     starts: ArrayLike,
     one_start: bool,
+    loads: Mapping[str, tuple[str, str]] | None = None,
 ) -> xr.Dataset:
-    """The result of ``chart``: everything known per point of the plane of two parameters."""
+    """The result of ``chart``: everything known per point of the plane of two parameters; ``loads`` are the long names
+    and units of those among the arrays."""
     plane = tuple(grid)
     each = plane if one_start else (*plane, "start")
     variables: dict[str, Any] = {}
@@ -80,6 +82,8 @@ def chart(
             dims = plane
         if name == "status":
             attributes: dict[str, Any] = status_attributes()
+        elif loads and name in loads:
+            attributes = dict(zip(("long_name", "units"), loads[name], strict=True))
         elif name.startswith("lyapunov"):
             words = "standard error of the largest" if name.endswith("error") else "largest"
             attributes = {"long_name": f"{words} Lyapunov exponent", "units": f"1/{labels.time_unit}"}

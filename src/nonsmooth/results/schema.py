@@ -39,7 +39,7 @@ from nonsmooth.results.statuses import flag_attributes, status_attributes
 
 __all__ = [
     "floats", "parameter_coords", "quantity_attributes", "response", "section_points", "start_coords", "state_coords",
-    "strings", "sweep", "trajectory", "varied",
+    "strings", "sweep", "trajectory", "varied", "with_impacts",
 ]  # fmt: skip
 
 #: Trailing dims of each array a sweep may bring, after (direction, start, parameter).
@@ -129,6 +129,19 @@ def trajectory(
     return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
 
 
+def with_impacts(
+    run: xr.Dataset, quantities: Mapping[str, tuple[str, str]], columns: Sequence[NDArray[np.float64]]
+) -> xr.Dataset:
+    """The result of ``simulate`` with quantities of impacts over ``crossing``: long names and units; ``columns`` (C, S)
+    each, those of an element one after the other."""
+    table = np.stack(columns, axis=2).reshape(run.sizes["crossing"], len(quantities))
+    added = {
+        name: ("crossing", column, {"long_name": words, "units": unit})
+        for (name, (words, unit)), column in zip(quantities.items(), table.T, strict=True)
+    }
+    return run.assign(added)
+
+
 def sweep(
     labels: Labels,
     attrs: Mapping[str, str],
@@ -140,10 +153,12 @@ def sweep(
     starts: ArrayLike,
     squeeze: Sequence[str] = (),
     edges: ArrayLike | None = None,
+    loads: Mapping[str, tuple[ArrayLike, str, str]] | None = None,
 ) -> xr.Dataset:
     """The result of ``sweep``: everything known per point of the swept parameter.
 
-    ``directions`` holds "up", "down" or "none"; ``starts`` (S, n) the first states. See the module's text.
+    ``directions`` holds "up", "down" or "none"; ``starts`` (S, n) the first states; ``loads`` arrays (D, S, P) with
+    their long names and units. See the module's text.
     """
     d = labels
     unknown = set(arrays) - set(_SWEEP_ARRAYS)
@@ -162,6 +177,8 @@ def sweep(
             variables[name] = (dims, np.asarray(array, np.int8), status_attributes())
         else:
             variables[name] = (dims, _own(array), {"long_name": _LONG_NAMES[name]})
+    for name, (array, words, unit) in (loads or {}).items():  # a maximum of an output is there already
+        variables.setdefault(name, (leading, floats(array), {"long_name": words, "units": unit}))
     coords: dict[str, Any] = {
         **varied(d, parameter, values),
         "direction": ("direction", strings(directions), {"long_name": "direction of the sweep"}),

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
@@ -32,6 +32,9 @@ from nonsmooth.system.symbolic.traced import Traced
 from nonsmooth.system.symbolic.tracing import Symbols, call_scalar
 from nonsmooth.system.symmetry import Symmetry, trace_symmetry
 from nonsmooth.system.transition import Surface, Transition
+
+if TYPE_CHECKING:
+    from nonsmooth.system.derived.loads import Loads
 
 __all__ = ["Description", "describe"]
 
@@ -56,7 +59,13 @@ class Description:
         default=None, compare=False, repr=False
     )  # without elements
     relays: bool = False  # the elements are the surfaces that were given
+    loads: Loads | None = None  # of a system with elements
     variants: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # a cache, see variant.py
+
+    def with_loads(self, loads: Loads) -> Description:
+        """Return the description with these loads, and the units of forces that follow from all others."""
+        forces = {f"{name}_force": units[0] for name, units in loads.units(self.symbol_units).items()}
+        return replace(self, loads=loads, outputs={**self.outputs, **forces})
 
     def with_sliding(self, traced: Traced) -> Traced:
         """Return the declared equations, or what they became, with their sliding modes."""
@@ -65,6 +74,15 @@ class Description:
         from nonsmooth.system.derived.sliding import slide
 
         return slide(traced, self.surfaces, self.scale)
+
+    @property
+    def symbol_units(self) -> dict[sp.Symbol, str]:
+        """Units of the symbols of states, parameters and memory; the time's is s where a state has a unit."""
+        t = self.traced
+        units = dict(zip(t.u, self.states.values(), strict=True))
+        units |= {s: parameter.unit for s, parameter in zip(t.p, self.parameters.values(), strict=True)}
+        units |= {s: unit for s, (_, unit) in zip(t.m, self.memory.values(), strict=True)}
+        return units | {t.t: "s" if any(self.states.values()) else ""}
 
     @property
     def symbol_names(self) -> dict[sp.Symbol, str]:
@@ -161,15 +179,21 @@ def describe(
     elif made.get("decider") is not None:
         traced = made["decider"].decides(traced, made["kinds"], made["asked"])
     units_out = {key: unit for key, (_, unit) in shown.items()}
-    return Description(
+    loads = None
+    if elements:
+        from nonsmooth.system.derived.loads import loads_of
+
+        loads = loads_of(made["make"])
+        units_out |= {f"{load.name}_force": "" for load in loads.elements}
+    description = Description(
         name=name, states=units, parameters=known, memory=remembered,
         scale=_scale(scale, units, name),
-        outputs=units_out if patterns is None else {**units_out, **dict.fromkeys(patterns.outputs, "")},
-        traced=traced, surfaces=surfaces,
+        outputs=units_out, traced=traced, surfaces=surfaces,
         bands=tuple(trace_band(key, band, traced, symbols, shown, known) for key, band in bands.items()),
         symmetry=None if symmetry is None else trace_symmetry(symmetry, traced, symbols, values),
-        explicit_time=explicit, ranges=tuple(ranges), plain=plain, relays=relays is not None,
+        explicit_time=explicit, ranges=tuple(ranges), plain=plain, relays=relays is not None, loads=loads,
     )  # fmt: skip
+    return description if loads is None else description.with_loads(loads)
 
 
 def _without_elements(

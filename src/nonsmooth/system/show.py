@@ -52,9 +52,11 @@ def _jump(jump: TracedTransition, traced: Traced, names: dict[sp.Symbol, str]) -
     return text
 
 
-def table(system: System, *, whole: bool = True) -> str:
-    """Return the equations as a table; short enough for a terminal where it need not be ``whole``."""
-    return text_table(f"System {system.name!r}", _rows(system), whole=whole, more="print(system) shows")
+def table(system: System, *, whole: bool = True, verbose: bool = False) -> str:
+    """Return the equations as a table; short enough for a terminal where it need not be ``whole``.
+
+    Elements stand there as they were given, and where it is ``verbose`` as the modes and transitions made of them."""
+    return text_table(f"System {system.name!r}", _rows(system, verbose), whole=whole, more="print(system) shows")
 
 
 def page(system: System) -> str:
@@ -62,12 +64,13 @@ def page(system: System) -> str:
     return html_table(f"System {system.name!r}", _rows(system))
 
 
-def _rows(system: System) -> list[tuple[str, str]]:
+def _rows(system: System, verbose: bool = False) -> list[tuple[str, str]]:
     """Headings and texts: states, parameters, equations by mode, indicators, transitions, period."""
-    patterns = system.traced.patterns
+    patterns, loads = system.traced.patterns, system._description.loads
     traced = system.traced if patterns is None else patterns.plain
     names = _plain(traced)
     lines: list[tuple[str, str]] = []
+    short = loads is not None and bool(loads.elements) and not system.is_smoothed and not verbose
 
     def unit(text: str) -> str:
         return f" [{text}]" if text else ""
@@ -77,14 +80,22 @@ def _rows(system: System) -> list[tuple[str, str]]:
     lines.append(("parameters", ", ".join(values) or "none"))
     if system.memory:
         lines.append(("memory", ", ".join(f"{name}{unit(u)}" for name, u in system.memory.items())))
-    for mode, field, lacking in zip(traced.mode_names, traced.fields, traced.lacking, strict=True):
-        head = f"mode {mode}"
+    modes = traced.mode_names, traced.fields, traced.lacking
+    if short and loads is not None:
+        modes = tuple(loads.fields), tuple(loads.fields.values()), len(loads.fields) * (traced.lacking[0],)
+    for mode, field, lacking in zip(*modes, strict=True):
+        head = "equations" if short and len(modes[0]) == 1 else f"mode {mode}"
         for name, e, gone in zip(traced.state_names, field, lacking, strict=True):
             if not gone:
                 lines.append((head, f"{name}' = {write_expression(e, names)}"))
                 head = ""
+    if loads is not None:
+        lines += [("elements" if k == 0 else "", f"{one.name}: {one.text}") for k, one in enumerate(loads.elements)]
     n = len(system._description.traced.indicator_names)  # those derived for a band are named by their formula
+    own = [f"{one.name}_" for one in loads.elements] if short and loads is not None else []
     for name, e in zip(traced.indicator_names[:n], traced.indicators, strict=False):
+        if any(name.startswith(one) for one in own):
+            continue
         lines.append((f"indicator {name}", write_expression(e, names)))
     for surface in system.surfaces:
         text = f"{traced.mode_names[surface.below]} | {traced.mode_names[surface.above]}, crossed or slid on"
@@ -93,14 +104,15 @@ def _rows(system: System) -> list[tuple[str, str]]:
         lines.append((f"surface {traced.indicator_names[surface.indicator]}", text))
     either_side = {frozenset((surface.below, surface.above)) for surface in system.surfaces}
     head = "transitions"
-    for jump in system.declared.transitions if patterns is None else ():
+    for jump in system.declared.transitions if patterns is None and not short else ():
         if frozenset((jump.source, jump.target)) not in either_side:
             lines.append((head, _jump(jump, traced, names)))
             head = ""
     if patterns is not None:
-        kinds = ", ".join(f"{name} ({type(element).__name__})" for name, element in patterns.elements.items())
-        lines.append(("elements", kinds))
-        lines.append(("patterns", f"{len(patterns.visited)} visited so far"))
+        lines.append(("combinations", f"{len(patterns.visited)} of contact states visited so far"))
+    elif short:
+        count = f"{len(system.modes)}, with {len(system.declared.transitions)} transitions"
+        lines.append(("modes", f"{count}: print(system.summary(verbose=True)) shows them"))
     if system.outputs:
         lines.append(("outputs", ", ".join(f"{name}{unit(u)}" for name, u in system.outputs.items())))
     lines.append(("period", _period(system, names)))

@@ -389,6 +389,18 @@ class System:
 
         return page(self)
 
+    def summary(self, *, verbose: bool = False) -> str:
+        """Return the system as a table, as ``print`` shows it.
+
+        Parameters
+        ----------
+        verbose : bool
+            True: the modes, indicators and transitions that were made of elements stand there as well.
+        """
+        from nonsmooth.system.show import table
+
+        return table(self, verbose=verbose)
+
     def to_latex(self) -> str:
         """Return the equations as LaTeX (an ``align*`` environment)."""
         from nonsmooth.system.show import latex

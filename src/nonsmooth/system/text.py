@@ -26,6 +26,7 @@ from nonsmooth.system.transition import Surface, Transition
 from nonsmooth.system.variant import variant_of
 
 if TYPE_CHECKING:
+    from nonsmooth.system.derived.loads import Load, Loads
     from nonsmooth.system.system import System
 
 __all__ = ["read_system", "write_system"]
@@ -138,6 +139,8 @@ def _content(d: Description) -> dict[str, Any]:
 
         names = {**names, SPEED: "speed"}
         content["elements"] = {k: _element_content(one, text) for k, one in known.items()}
+    if d.loads is not None:
+        content["loads"] = _loads_content(d.loads, d, text)
     if d.ranges and not known:
         content["ranges"] = [{"not negative": text(e), "else": sentence} for e, sentence in d.ranges]
     if d.bands:
@@ -151,6 +154,24 @@ def _element_content(element: Mapping[str, Any], text: Callable[[sp.Expr], str])
         key: text(e) if isinstance(e, sp.Expr) else {k: text(v) if isinstance(v, sp.Expr) else v for k, v in e.items()}
         if isinstance(e, Mapping) else e
         for key, e in element.items()
+    }  # fmt: skip
+
+
+def _loads_content(loads: Loads, d: Description, text: Callable[[sp.Expr], str]) -> dict[str, Any]:
+    """Return the loads of elements; what is not there is left out."""
+    states = d.traced.state_names
+
+    def element(load: Load) -> dict[str, Any]:
+        known = {"where": load.where, "rate": load.rate}
+        return {
+            "kind": load.kind, "given": load.text, **{key: text(e) for key, e in known.items() if e is not None},
+            "on": {states[i]: text(e) for i, e in load.direction.items()},
+        }  # fmt: skip
+
+    return {
+        "elements": {load.name: element(load) for load in loads.elements},
+        "modes": {mode: dict(zip(states, map(text, field), strict=True)) for mode, field in loads.fields.items()},
+        "powers": {key: text(power) for key, power in loads.powers.items()}, "energy": loads.energy,
     }  # fmt: skip
 
 
@@ -197,7 +218,7 @@ def read_system(text: str) -> System:
         )
     try:
         reader = _Reader(content)
-        system = reader.within_ranges(System(**reader.arguments()))
+        system = reader.with_loads(reader.within_ranges(System(**reader.arguments())))
         smoothing = content.get("smoothing")
         return system if smoothing is None else system.smoothed(smoothing["eta"], smoothing.get("band", "linear"))
     except SystemDefinitionError as error:  # names and units in it may be of any length
@@ -272,13 +293,17 @@ class _Reader:
             "elements": {k: self.element(e) for k, e in c.get("elements", {}).items()} or None,
         }
 
-    def element(self, entry: Mapping[str, Any]) -> Any:
+    def kind(self, name: str) -> Any:
         from nonsmooth.system.derived import elements
+
+        if name not in elements.__all__ or name == "Element":
+            raise SystemDefinitionError(f"there is no element {shortened(name)}")
+        return getattr(elements, name)
+
+    def element(self, entry: Mapping[str, Any]) -> Any:
         from nonsmooth.system.derived.combinations import SPEED
 
-        if entry["kind"] not in elements.__all__ or entry["kind"] == "Element":
-            raise SystemDefinitionError(f"there is no element {shortened(entry['kind'])}")
-        kind = getattr(elements, entry["kind"])
+        kind = self.kind(entry["kind"])
 
         def law(text: str) -> Callable[..., Any]:
             expression = self.function(text, {"speed": SPEED})().expression
@@ -298,6 +323,30 @@ class _Reader:
             return system
         description = replace(system._description, ranges=tuple(ranges), variants={})
         return type(system)._make(description, dict(system.values), variant_of(description))
+
+    def with_loads(self, system: System) -> System:
+        """The system with the loads of its elements."""
+        if "loads" not in self.content:
+            return system
+        from nonsmooth.system.derived.loads import Load, Loads
+
+        c, states = self.content["loads"], list(system.states)
+        for name in c["elements"]:
+            if f"{name}_force" not in system.outputs:
+                raise SystemDefinitionError(f"loads of an element {shortened(name)}, which is not there")
+
+        def read(text: Any) -> sp.Expr | None:
+            return None if text is None else self.function(text)().expression
+
+        elements = tuple(
+            Load(str(name), self.kind(e["kind"]).__name__, str(e["given"]), read(e["where"]), read(e.get("rate")),
+                 {states.index(state): read(one) for state, one in e["on"].items()})
+            for name, e in c["elements"].items()
+        )  # fmt: skip
+        fields = {mode: tuple(read(e[state]) for state in states) for mode, e in c["modes"].items()}
+        powers = {name: read(power) for name, power in c["powers"].items()}
+        description = system._description.with_loads(Loads(elements, fields, powers, str(c["energy"])))
+        return type(system)._make(description, dict(system.values), system._variant)
 
     def transition(self, entry: Mapping[str, Any]) -> Transition | Surface:
         if "surface" in entry:

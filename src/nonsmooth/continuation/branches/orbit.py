@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +15,10 @@ from nonsmooth.continuation.problems.multipliers import stability, stable_by
 from nonsmooth.continuation.problems.path import Path
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
 from nonsmooth.continuation.problems.signature import Signature
+from nonsmooth.errors import SolveError
+from nonsmooth.flow.engines.engine import State
+from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.loads import checked_loads, meter_of
 from nonsmooth.results.representation import cut, html_table
 from nonsmooth.system.system import System
 
@@ -63,6 +67,9 @@ class Orbit:
         Least distance to a transition that does not happen; NaN where none comes near.
     virtual : bool
         Whether the path goes through a boundary it should have obeyed: no orbit of the system then.
+    loads : mapping of str to float
+        Loads of elements and work, per forcing period (autonomous: once round), where they were asked for; names and
+        signs are those of :func:`nonsmooth.sweep`.
     options : mapping
         Arguments of :func:`nonsmooth.find_orbit`, as they were given.
     """
@@ -85,6 +92,7 @@ class Orbit:
     virtual: bool = False
     reference: tuple[FloatArray, FloatArray] | None = field(default=None)
     options: Mapping[str, Any] = field(default_factory=dict)
+    loads: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def crossings_per_period(self) -> float:
@@ -101,15 +109,42 @@ class Orbit:
         """The orbit once round, as a result of ``simulate``; begun behind the transitions that lie on the section."""
         from nonsmooth.flow.simulate import simulate
 
-        u, memory, mode = self.u, self.memory, self.mode
-        n, visits = len(self.u), self.signature.visits
-        for i in np.flatnonzero(self.crossing_times <= AT_SECTION * self.period):  # a start cannot lead into a stop
-            u, memory = np.split(self.crossing_states[i], [n])
-            mode = self.system.modes[visits[i + 1].mode]
+        u, memory, mode = self._begin()
         return simulate(
             self.system, duration=self.period, start=self._start(u, memory), mode=mode, samples=samples or 1025,
             rtol=RTOL,
         )  # fmt: skip
+
+    def with_loads(self) -> Orbit:
+        """The same orbit with its ``loads``.
+
+        Raises
+        ------
+        ValueError
+            A system without elements that is not made by :func:`nonsmooth.mechanical`.
+        SolveError
+            An orbit that cannot be followed.
+        """
+        checked_loads(self.system, True, "with_loads")
+        meter = meter_of(self.system)
+        assert meter is not None
+        u, memory, mode = self._begin()
+        state = State(u.copy(), memory.copy())
+        state.counters[0] = self.system.modes.index(mode)
+        engine, values = engine_for(self.system, rtol=RTOL), self.system.parameter_vector()
+        loads = meter.over(engine, values, state, self.period, max(self.period_number, 1))
+        if loads is None:
+            raise SolveError("the orbit cannot be followed once round, so its loads are not known: it is unstable")
+        return replace(self, loads=loads)
+
+    def _begin(self) -> tuple[FloatArray, FloatArray, str]:
+        """State, memory and mode behind the transitions that lie on the section: a start cannot lead into a stop."""
+        u, memory, mode = self.u, self.memory, self.mode
+        n, visits = len(self.u), self.signature.visits
+        for i in np.flatnonzero(self.crossing_times <= AT_SECTION * self.period):
+            u, memory = np.split(self.crossing_states[i], [n])
+            mode = self.system.modes[visits[i + 1].mode]
+        return u, memory, mode
 
     def _start(self, u: FloatArray, memory: FloatArray) -> Any:
         """A state as a start; with the memory, where the system has one."""
@@ -160,6 +195,9 @@ class Orbit:
         attrs["layouts"] = json.dumps([self.signature.data])
         values = vars(self) | {"clearance": np.array(list(self.clearance.values()), dtype=float)}
         variables = {column.name: (column.dims, values[column.field], attributes(labels, column)) for column in FOUND}
+        if self.loads:
+            for name, (words, unit) in checked_loads(self.system, True, "to_dataset").items():
+                variables[name] = ((), self.loads[name], {"long_name": words, "units": unit})
         names = np.array([*self.system.states, *self.system.memory], dtype=str)
         coords = {
             **state_coords(labels), **parameter_coords(labels), "component": ("component", names),
@@ -193,7 +231,9 @@ class Orbit:
             values["crossing_states"] = values["crossing_states"].reshape(shape)
             names = map(str, dataset["indicator"].values)
             values["clearance"] = dict(zip(names, map(float, values["clearance"]), strict=True))
-            return cls(system=system, signature=signature, options=source["options"], **values)
+            meter = meter_of(system)
+            loads = {name: float(dataset[name]) for name in meter.per_period if name in dataset} if meter else {}
+            return cls(system=system, signature=signature, options=source["options"], loads=loads, **values)
 
 
 def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArray, virtual: bool) -> Orbit:

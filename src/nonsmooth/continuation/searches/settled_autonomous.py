@@ -51,7 +51,7 @@ def autonomous_guesses(
         instants = begin + np.linspace(0.0, duration, SAMPLES)
         log = search.record(engine, tables, state, begin + duration, instants)
         if log.status not in (codes.OK, codes.NOT_GUARANTEED):
-            raise solve_error(log.status)
+            raise solve_error(log.status, begun=(system, state.u))
         return log, instants
 
     first = state.copy()  # in the mode to which transitions that already hold lead

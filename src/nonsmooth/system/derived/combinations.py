@@ -374,7 +374,7 @@ def assembled(
         "indicators": {**(given["indicators"] or {}), **{key: _returns(g) for key, g in make.indicators.items()}},
         "outputs": outputs if named else {**outputs, **{f"{key}_force": (row, "") for key, row in forces.items()}},
         "ranges": make.ranges(next(iter(base))), "kinds": kinds, "asked": asked,
-        "decider": Decider(make, pairs, _affine(make, base, given)) if make.asks else None,
+        "decider": Decider(make, pairs, _affine(make, base, given)) if make.asks else None, "make": make,
     }  # fmt: skip
 
 
@@ -434,7 +434,7 @@ def _opened(
     return {
         "modes": {key: _returns(list(field)) for key, field in base.items()}, "transitions": (),
         "indicators": {key: _returns(e) for key, e in zip(patterns.labels, patterns.expressions, strict=True)},
-        "outputs": given["outputs"], "ranges": make.ranges(patterns.mode), "patterns": patterns,
+        "outputs": given["outputs"], "ranges": make.ranges(patterns.mode), "patterns": patterns, "make": make,
     }  # fmt: skip
 
 

@@ -12,9 +12,12 @@ import sympy as sp
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.derived.combinations import element_names
 from nonsmooth.system.derived.elements import Element
+from nonsmooth.system.derived.loads import Loads
 from nonsmooth.system.names import by_name, unknown
 from nonsmooth.system.symbolic.scalar import Scalar, to_expression
+from nonsmooth.system.symbolic.tracing import Symbols
 from nonsmooth.system.system import System
+from nonsmooth.system.units import product, read_unit, unit_of, write_unit
 
 __all__ = ["mechanical"]
 
@@ -44,9 +47,10 @@ def mechanical(
 
     Parameters
     ----------
-    M, C, K : array (N, N), SciPy sparse array, number, or function
-        Mass, damping, stiffness; a function of ``p`` where they depend on parameters: ``lambda p: [[p.m]]``.
-    forcing : mapping of coordinate to function, optional
+    M, C, K : array (N, N), SciPy sparse array, number, name of a parameter, or function
+        Mass, damping, stiffness; a function of ``p`` where they depend on parameters: ``lambda p: [[p.m]]``. Entries of
+        an array may be names of parameters too: ``[["m", 0], [0, "m"]]``.
+    forcing : mapping of coordinate to function, number or name of a parameter, optional
         ``{"q1": lambda t, p: p.F * np.cos(p.w * t)}``; a rotating unbalance is ``p.me * p.w**2 * np.cos(p.w * t)``.
     elements : mapping of str to element, or sequence, optional
         Elements of :mod:`nonsmooth.elements` with ``at=``: a coordinate, or a combination of them.
@@ -62,7 +66,9 @@ def mechanical(
     Returns
     -------
     System
-        States: the coordinates, then their speeds. The force of each element is an output ``<name>_force``.
+        States: the coordinates, then their speeds. The force of each element is an output ``<name>_force``, in the unit
+        that follows from those of the coordinates and of the masses. Impulses are not in it: those of rigid stops stand
+        in the results of :func:`nonsmooth.simulate`, and in those of sweeps with ``loads=True``.
 
     Raises
     ------
@@ -90,23 +96,28 @@ def mechanical(
         if key not in names:
             raise SystemDefinitionError(f"forcing: {unknown(key, 'a coordinate', repr(name), names)}")
 
-    found: list[tuple[sp.Matrix, sp.Matrix, sp.Matrix]] = []
+    forces = {key: _function(one) for key, one in (forcing or {}).items()}
+    found: list[tuple[sp.Matrix, sp.Matrix, sp.Matrix, sp.Matrix]] = []
 
-    def matrices(p: Any) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
-        """Inverse mass, damping, stiffness; the symbols in them are the same at every call."""
+    def matrices(p: Any) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix, sp.Matrix]:
+        """Inverse mass, damping, stiffness, mass; the symbols in them are the same at every call."""
         if not found:
             mass, damping, stiffness = (_matrix(one, p, size, what) for one, what in ((M, "M"), (C, "C"), (K, "K")))
-            found.append((_inverse(mass, name), damping, stiffness))
+            found.append((_inverse(mass, name), damping, stiffness, mass))
         return found[0]
 
+    def outside(t: Any, p: Any) -> tuple[sp.Matrix, sp.Expr]:
+        """Forcing of each coordinate, acceleration of the base."""
+        loads = [to_expression(forces[key](t, p)) if key in forces else sp.Integer(0) for key in names]
+        return sp.Matrix(loads), sp.Integer(0) if base is None else to_expression(base(t, p))
+
     def field(t: Any, u: Any, p: Any) -> list[Any]:
-        inverse, damping, stiffness = matrices(p)
+        inverse, damping, stiffness, _ = matrices(p)
         q, v = list(u)[:size], list(u)[size:]
-        loads = [to_expression((forcing or {}).get(key, lambda t, p: 0.0)(t, p)) for key in names]
+        loads, ride = outside(t, p)
         for i in range(size):
             for j in range(size):
                 loads[i] -= damping[i, j] * v[j].expression + stiffness[i, j] * q[j].expression
-        ride = sp.Integer(0) if base is None else to_expression(base(t, p))
         return [*v, *[Scalar(sp.Add(*[inverse[i, j] * loads[j] for j in range(size)]) - ride) for i in range(size)]]
 
     units = coordinates if isinstance(coordinates, Mapping) else dict.fromkeys(names, "")
@@ -115,10 +126,41 @@ def mechanical(
         key: _placed(key, element, names, lambda p: matrices(p)[0], name)
         for key, element in element_names(elements or {}).items()
     }
-    return System(
+    system = System(
         name=name, states=states, parameters=given, modes={"all": field}, outputs=outputs, scale=scale,
         symmetry=symmetry, period=period, elements=parts or None,
     )  # fmt: skip
+    d = system._description
+    p = Symbols(name, states, dict.fromkeys(d.parameters, ""), {}).parameters()
+    powers = _powers(*matrices(p)[1:], *outside(Scalar(d.traced.t), p), d.traced.u)
+    units_of = {symbol: read_unit(unit) for symbol, unit in d.symbol_units.items()}
+    energies = (
+        product(unit_of(matrices(p)[3][i, i], units_of), *2 * [units_of[d.traced.u[size + i]]]) for i in range(size)
+    )
+    energy = next((one for one in energies if one is not None), None)
+    loads = d.loads or Loads((), {"all": d.traced.fields[0]})
+    new = d.with_loads(replace(loads, powers=powers, energy=write_unit(energy)))
+    return System._make(new, dict(system.values), system._variant)
+
+
+def _powers(
+    damping: sp.Matrix, stiffness: sp.Matrix, mass: sp.Matrix, forcing: sp.Matrix, ride: sp.Expr,
+    u: Sequence[sp.Symbol],
+) -> dict[str, sp.Expr]:  # fmt: skip
+    """The powers that forcing and base give the masses, and those that they lose to damping and to what is not
+    symmetric in a stiffness."""
+    size = len(u) // 2
+    at, speeds = sp.Matrix(u[:size]), sp.Matrix([u[size:]])
+    powers = {
+        "forcing": speeds * forcing, "base": -ride * speeds * mass * sp.ones(size, 1),
+        "damping": speeds * damping * speeds.T, "stiffness": speeds * (stiffness - stiffness.T) * at / 2,
+    }  # fmt: skip
+    return {key: power[0, 0] for key, power in powers.items() if key in ("forcing", "damping") or power[0, 0] != 0}
+
+
+def _function(given: Any) -> Callable[..., Any]:
+    """A force as a function of time and parameters; it may be a number or the name of a parameter."""
+    return given if callable(given) else (lambda t, p: p[given] if isinstance(given, str) else given)
 
 
 def _placed(label: str, element: Any, names: list[str], inverse: Callable[[Any], sp.Matrix], system: str) -> Any:
@@ -145,7 +187,9 @@ def _placed(label: str, element: Any, names: list[str], inverse: Callable[[Any],
         return into
 
     on = {f"v_{key}": acts(i) for i, key in enumerate(names)}
-    return replace(element, at=None, on=on, **{element.kinematics: own})
+    placed = replace(element, at=None, on=on, **{element.kinematics: own})
+    object.__setattr__(placed, "given", element)
+    return placed
 
 
 def _law(given: Any, t: Any, u: Any, p: Any) -> Any:
@@ -207,6 +251,8 @@ def _matrix(given: Any, p: Any, size: int, what: str) -> sp.Matrix:
     if array.shape != (size, size):
         raise SystemDefinitionError(f"{what} has the shape {array.shape}, M {(size, size)}: both must be the same")
     try:
-        return sp.Matrix(size, size, [to_expression(entry) for entry in array.ravel()])
+        return sp.Matrix(size, size, [to_expression(p[one] if isinstance(one, str) else one) for one in array.ravel()])
     except TypeError as error:
-        raise SystemDefinitionError(f"{what} holds {shortened(found)}: numbers are wanted ({error})") from error
+        raise SystemDefinitionError(
+            f"{what} holds {shortened(found)}: numbers or names of parameters are wanted ({error})"
+        ) from error

@@ -72,6 +72,7 @@ class Element(ABC):
     bears: ClassVar[bool] = False  # while it is held it bears its part of an impulse
     slow: ClassVar[float] = SLOW  # of the scale of its rate: below it it may hold, where a place decides
     presses: ClassVar[bool] = False  # its law is a normal force for friction
+    given: ClassVar[Any] = None  # on an element that stands for one with ``at``: that one
 
     def __post_init__(self) -> None:
         label = type(self).__name__

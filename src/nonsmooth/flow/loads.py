@@ -1,0 +1,330 @@
+r"""Loads of elements on a motion: impulses, impact speeds and energies of impacts; work per period.
+
+At a crossing :math:`u^+ - u^- = \sum_i D_i \Lambda_i` over the rigid contacts that are closed; where several bear, the
+impulses are the ones :math:`\Lambda \ge 0` of least norm. Forces do work between crossings: it is integrated by Gauss's
+rule over pieces in which the motion is smooth, of samples that the engine takes there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.flow.arguments import yes_or_no
+from nonsmooth.flow.engines.engine import FloatArray, Log, State
+from nonsmooth.flow.outputs import output_values
+from nonsmooth.kernels.hybrid import codes
+
+if TYPE_CHECKING:
+    from nonsmooth.flow.engines.loop import Engine
+    from nonsmooth.system.derived.loads import Load, Loads
+    from nonsmooth.system.description import Description
+    from nonsmooth.system.system import System
+
+__all__ = ["Meter", "Quantities", "checked_loads", "meter_of"]
+
+ZERO = 1e-11  # of the largest value of a speed on the motion: a smaller change is no impact
+CLOSED = 1e-7  # of the largest states of a gap: below it a contact is closed
+ALONE = 1e-6  # of a change of speeds: what impulses leave of it; more is a reset of another kind
+NODES = 16  # of Gauss's rule on one piece
+PIECES = 8  # of one return, at least
+FINEST = 64  # times as many, at most
+TAIL = 1e-10  # of the largest power: the last coefficients of a piece's polynomial
+
+Quantities = dict[str, tuple[str, str]]  # long name and unit of each quantity
+
+
+@dataclass(frozen=True, eq=False)
+class Meter:
+    """The loads of a system as functions of numbers."""
+
+    description: Description
+    loads: Loads
+
+    @cached_property
+    def elements(self) -> list[Load]:
+        """The elements whose rate is the same in all modes of the system without them."""
+        return [load for load in self.loads.elements if load.rate is not None]
+
+    @cached_property
+    def striking(self) -> list[int]:
+        """The numbers of those that have impacts."""
+        return [k for k, load in enumerate(self.elements) if load.element.strikes]
+
+    @cached_property
+    def units(self) -> dict[str, list[str]]:
+        """Units of force, rate, impulse and energy by element."""
+        found = self.loads.units(self.description.symbol_units)
+        return {name: [unit or "1" for unit in units] for name, units in found.items()}
+
+    @cached_property
+    def at_crossings(self) -> Quantities:
+        """Quantities of each crossing."""
+        found = {}
+        for k in self.striking:
+            name = self.elements[k].name
+            _, rate, impulse, energy = self.units[name]
+            found[f"{name}_impulse"] = f"impulse of {name}", impulse
+            found[f"{name}_impact_speed"] = f"approach speed of {name} (NaN: no impact)", rate
+            found[f"{name}_energy_lost"] = f"energy lost by the impact of {name}", energy
+        return found
+
+    @cached_property
+    def per_period(self) -> Quantities:
+        """Quantities of each motion."""
+        found = {}
+        for k, load in enumerate(self.elements):
+            force, rate, impulse, energy = self.units[load.name]
+            found[f"{load.name}_force_maximum"] = f"maximum of {load.name}_force", force
+            if k in self.striking:
+                found[f"{load.name}_impact_speed_maximum"] = f"largest approach speed of {load.name}", rate
+                found[f"{load.name}_impacts"] = f"impacts of {load.name} per return", "1"
+                found[f"{load.name}_impulse"] = f"impulse of {load.name} per return", impulse
+            found[f"{load.name}_energy"] = f"energy that {load.name} takes from the masses per return", energy
+        for name in self.loads.powers:
+            words = "that the masses lose to" if name in ("damping", "stiffness") else "done on the masses by"
+            found[f"work_of_{name}"] = f"work {words} {name} per return", self.loads.energy or "1"
+        return found
+
+    # Values of expressions
+
+    @cached_property
+    def _function(self) -> Callable[..., Any]:
+        """Gaps of striking elements, rates, speeds w.v, directions (in order of their states), powers."""
+        from sympy import lambdify
+
+        t = self.description.traced
+        every = [
+            *(self.elements[k].where for k in self.striking), *(load.rate for load in self.elements),
+            *(load.moved(t.u) for load in self.elements),
+            *(self.elements[k].direction[i] for k in self.striking for i in self.elements[k].direction),
+            *self.loads.powers.values(),
+        ]  # fmt: skip
+        function: Callable[..., Any] = lambdify([t.t, *t.u, *t.m, *t.p], every, modules="numpy", cse=True)
+        return function
+
+    def values(
+        self, parameters: FloatArray, time: FloatArray, u: FloatArray, memory: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        """Those at N instants, the instants first; ``parameters`` are one row, or one for each instant."""
+        t, count, n = self.description.traced, len(self.elements), len(self.striking)
+        columns = (time, *np.nan_to_num(u).T, *memory.T[: len(t.m)], *parameters.T[: len(t.p)])
+        found = np.empty((len(time), n + 2 * count + self._entries + len(self.loads.powers)))
+        for i, value in enumerate(self._function(*columns)):
+            found[:, i] = value
+        cuts = np.cumsum([n, count, count, self._entries])
+        gap, rate, moved, entries, power = np.split(found, cuts, axis=1)
+        direction, at = np.zeros((len(time), n, len(t.u))), 0
+        for j, k in enumerate(self.striking):
+            own = list(self.elements[k].direction)
+            direction[:, j, own] = entries[:, at : at + len(own)]
+            at += len(own)
+        return gap, rate, moved, direction, power
+
+    @cached_property
+    def _entries(self) -> int:
+        return sum(len(self.elements[k].direction) for k in self.striking)
+
+    @cached_property
+    def places(self) -> list[list[int]]:
+        """The states in each gap."""
+        u = self.description.traced.u
+        gaps = [self.elements[k].where for k in self.striking]
+        return [[i for i, one in enumerate(u) if gap.has(one)] for gap in gaps]
+
+    def constraints(self, mode: str, values: FloatArray, time: float, u: FloatArray, memory: FloatArray) -> FloatArray:
+        """The derivatives in the states of what the elements keep at zero in a mode, (constraints, n)."""
+        from sympy import diff, lambdify
+
+        t = self.description.traced
+        held = [load for load in self.loads.held(mode) if load.rate is not None]
+        kept = [e for load in held for e in dict.fromkeys((load.rate, load.where))]
+        rows = [[diff(e, one) for one in t.u] for e in kept]
+        columns = (time, *u, *memory[: len(t.m)], *values[: len(t.p)])
+        found = lambdify([t.t, *t.u, *t.m, *t.p], rows, modules="numpy")(*columns) if rows else []
+        return np.array(found, dtype=float).reshape(-1, len(t.u))
+
+    # Impacts
+
+    def impacts(
+        self, parameters: FloatArray, time: FloatArray, before: FloatArray, after: FloatArray, memory: FloatArray,
+        size: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:  # fmt: skip
+        """Impulses, approach speeds (NaN where there is no impact), energies lost and energies taken from the masses,
+        each (C, striking elements); ``size`` are the largest states on the motion."""
+        gap, rate, moved, D, _ = self.values(parameters, time, before, memory)
+        _, rate_after, moved_after, _, _ = self.values(parameters, time, after, memory)
+        speeds = (D != 0.0).any(axis=(0, 1))
+        change = np.where(speeds, np.nan_to_num(after - before), 0.0)
+        closed = gap <= CLOSED * np.array([size[some].max(initial=0.0) for some in self.places])
+        jumps = (np.abs(change) > ZERO * size).any(axis=1)
+        impulses = np.zeros(gap.shape)
+        for c in np.flatnonzero(jumps & closed.any(axis=1)):
+            some = np.flatnonzero(closed[c])
+            impulses[c, some] = _least(D[c, some].T, change[c])
+        impulses[(impulses[:, :, None] * np.abs(D) <= ZERO * size).all(axis=2)] = 0.0
+        one = self.striking
+        speed = np.where(impulses > 0.0, np.maximum(-rate[:, one], 0.0), np.nan)
+        lost, taken = (
+            -0.5 * impulses * (a + b)[:, one] for a, b in ((rate, rate_after), (moved, moved_after))
+        )  # fmt: skip
+        return impulses, speed, lost + 0.0, taken + 0.0
+
+    # Work
+
+    def over(
+        self, engine: Engine, values: FloatArray, state: State, duration: float, returns: int
+    ) -> dict[str, float] | None:
+        """Loads of a motion over some returns to its section, per return; None where it could not be followed.
+
+        The window begins between two crossings, not at the section, so that none is counted at both of its ends."""
+        traced, tables = engine.traced, engine.prepare(np.asarray(values, dtype=float)[None, :])
+
+        def marched(begun: State, until: float, samples: FloatArray | None = None) -> Log:
+            log = engine.record(tables, begun, until, np.empty(0) if samples is None else samples)
+            if log.status not in (codes.OK, codes.NOT_GUARANTEED):
+                raise _Failed
+            return log
+
+        def parts(begin: float, log: Log) -> FloatArray:
+            return np.unique(np.concatenate([[begin], log.crossing_time, [begin + duration]]))
+
+        def now(place: State) -> float:
+            return float(place.clock[0] + (place.clock[1] * tables.period[0] if place.clock[1] else 0.0))
+
+        try:
+            state = state.copy()
+            begin = now(state)
+            edges = parts(begin, marched(state.copy(), begin + duration))
+            longest = int(np.diff(edges).argmax())
+            marched(state, float(0.5 * (edges[longest] + edges[longest + 1])))
+            begin = now(state)
+            edges = parts(begin, marched(state.copy(), begin + duration))
+            x, weight, back = _rule()
+            tail = TAIL if engine.name == "exact" else max(TAIL, 10.0 * getattr(engine, "rtol", TAIL))
+            piece = duration / (returns * PIECES)
+            while True:
+                ends = _cut(edges, piece)
+                half = 0.5 * np.diff(ends)
+                time = (ends[:-1, None] + half[:, None] * (x + 1.0)).ravel()
+                log = marched(state.copy(), begin + duration, time)
+                _, _, moved, _, power = self.values(values, time, log.sample_u, log.sample_memory)
+                outputs = output_values(traced, values, time, log.sample_u, log.sample_memory, log.sample_mode)
+                names = list(traced.output_names)
+                force = outputs[:, [names.index(f"{load.name}_force") for load in self.elements]]
+                work = np.hstack([-force * moved, power]).reshape(len(half), NODES, -1)
+                tails = np.abs(np.einsum("kx,pxi->pki", back[-2:], work)).max(axis=(0, 1), initial=0.0)
+                fine = tails <= tail * np.abs(work).max(axis=(0, 1), initial=0.0)
+                if fine.all() or piece * FINEST * returns * PIECES < duration:
+                    break
+                piece /= 2.0
+        except _Failed:
+            return None
+        total = np.einsum("p,x,pxi->i", half, weight, work) / returns
+        highest = _highest(force.reshape(len(half), NODES, -1), back)
+        size = np.nanmax(np.abs(np.vstack([log.sample_u, log.u_before, log.u_after])), axis=0)
+        impulses, speed, _, taken = self.impacts(
+            values, log.crossing_time, log.u_before, log.u_after, log.memory_after, size
+        )
+        found = {}
+        for k, load in enumerate(self.elements):
+            found[f"{load.name}_force_maximum"] = highest[k]
+            if k in self.striking:
+                j = self.striking.index(k)
+                struck = speed[~np.isnan(speed[:, j]), j]
+                found[f"{load.name}_impact_speed_maximum"] = struck.max(initial=0.0)
+                found[f"{load.name}_impacts"] = np.count_nonzero(struck) / returns
+                found[f"{load.name}_impulse"] = impulses[:, j].sum() / returns
+                total[k] += taken[:, j].sum() / returns
+            found[f"{load.name}_energy"] = total[k]
+        found |= {f"work_of_{name}": w for name, w in zip(self.loads.powers, total[len(self.elements) :], strict=True)}
+        return {name: float(value) for name, value in found.items()}
+
+
+class _Failed(Exception):
+    """A motion that could not be followed."""
+
+
+def _cut(edges: FloatArray, longest: float) -> FloatArray:
+    """The edges with more of them, so that no piece between two is longer."""
+    pieces = [(a, b) for a, b in pairwise(edges) if b - a > 1e-13 * (edges[-1] - edges[0])]
+    cuts = [np.linspace(a, b, int(np.ceil((b - a) / longest)) + 1)[:-1] for a, b in pieces]
+    return np.append(np.concatenate(cuts), edges[-1])
+
+
+@lru_cache(maxsize=1)
+def _rule() -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Gauss's nodes and weights, and the matrix from values there to coefficients of Legendre polynomials."""
+    x, weight = np.polynomial.legendre.leggauss(NODES)
+    every = np.polynomial.legendre.legvander(x, NODES - 1)
+    return x, weight, (np.arange(NODES)[:, None] + 0.5) * every.T * weight
+
+
+def _highest(values: FloatArray, back: FloatArray) -> list[float]:
+    """The maxima of functions (pieces, nodes, i), by their polynomials on the pieces."""
+    from numpy.polynomial import Legendre
+
+    found = []
+    for own in np.moveaxis(values, 2, 0):
+        rows = own @ back.T
+        both = np.stack([rows.sum(axis=1), rows[:, ::2].sum(axis=1) - rows[:, 1::2].sum(axis=1)], axis=1)
+        every = np.hstack([own, both])
+        at, highest = int(every.max(axis=1).argmax()), float(every.max())
+        some = Legendre(np.where(np.abs(rows[at]) > 1e-14 * np.abs(rows[at]).max(), rows[at], 0.0)).trim()
+        turns = some.deriv().roots() if some.degree() > 1 else np.zeros(0)
+        inside = turns.real[(np.abs(turns.imag) < 1e-8) & (np.abs(turns.real) <= 1.0)]
+        found.append(float(some(inside).max(initial=highest)))
+    return found
+
+
+def _least(D: FloatArray, change: FloatArray) -> FloatArray:
+    """The impulses, not negative and of least norm, that make a change of states; zeros where none do."""
+    from scipy.optimize import nnls
+
+    if D.shape[1] == 1:
+        impulses = np.maximum(D.T @ change / np.maximum((D * D).sum(axis=0), 1e-300), 0.0)
+    else:
+        size = np.abs(D).max()
+        impulses = nnls(np.vstack([D, 1e-7 * size * np.eye(D.shape[1])]), np.append(change, np.zeros(D.shape[1])))[0]
+        bearing = impulses > 1e-6 * impulses.max(initial=0.0)
+        exact = np.linalg.lstsq(D[:, bearing], change, rcond=1e-10)[0]
+        if (exact >= 0.0).all():
+            impulses = np.where(bearing, 0.0, impulses)
+            impulses[bearing] = exact
+    left = np.abs(change - D @ impulses).max()
+    return impulses if left <= ALONE * np.abs(change).max() else np.zeros(D.shape[1])
+
+
+def meter_of(system: System) -> Meter | None:
+    """The meter of a system, made once for all its copies; None where it has no elements and is not mechanical."""
+    d = system._description
+    if d.loads is None:
+        return None
+    if "meter" not in d.variants:
+        d.variants["meter"] = Meter(d, d.loads)
+    found: Meter = d.variants["meter"]
+    return found
+
+
+def checked_loads(system: System, wanted: Any, verb: str) -> Quantities:
+    """The quantities of a system whose loads are wanted; none where they are not.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A system that has none; a word that is not True or False.
+    """
+    if not yes_or_no(wanted, "loads"):
+        return {}
+    meter = meter_of(system)
+    if meter is None or not meter.per_period:
+        raise ValueError(
+            f"{verb}: loads are those of elements, and {system.name!r} has none with forces on speeds; give "
+            "System(elements=...) or make it by ns.mechanical, or leave loads out"
+        )
+    return meter.per_period
