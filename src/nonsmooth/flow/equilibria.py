@@ -50,27 +50,32 @@ class ModeField:
         self.own = [i for i in range(len(traced.u)) if not traced.lacking[mode][i]]
         u = [traced.u[i] for i in self.own]
         f = [sp.sympify(traced.fields[mode][i]) for i in self.own]
-        h = [sp.sympify(e) for e in traced.indicators]
-        arguments = [traced.t, list(traced.u), list(traced.p), list(traced.m)]
-        derived = [*(e.diff(s) for e in f for s in u), *(e.diff(traced.p[k]) for e in f for k in places)]
-        self._field = sp.lambdify(arguments, [*f, *derived], modules="numpy")
-        self._indicators = sp.lambdify(arguments, [*h, *(e.diff(s) for e in h for s in traced.u)], modules="numpy")
+        jacobian = [e.diff(s) for e in f for s in u]
+        derived = [*jacobian, *(e.diff(traced.p[k]) for e in f for k in places)]
+        self._field = sp.lambdify(_arguments(traced), [*f, *derived], modules="numpy")
+        self._indicators, slopes = _indicators(traced)
+        moving = {*traced.u}
+        self.linear = not any(e.free_symbols & moving for e in jacobian)  # in the states, as are the indicators:
+        self.affine = self.linear and not any(e.free_symbols & moving for e in slopes)
 
     def evaluate(
-        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: float = 0.0
+        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """f (n,), its Jacobian (n, n) and its derivatives in the parameters (n, n_places), of the mode's own states."""
-        with np.errstate(all="ignore"):
-            found: Any = np.array(self._field(t, u, values, memory), dtype=float)
-        n = len(self.own)
-        return found[:n], found[n : n + n * n].reshape(n, n), found[n + n * n :].reshape(n, self._n_places)
+        """f (n,), its Jacobian (n, n) and its derivatives in the parameters (n, n_places), of the mode's own states; at
+        several times each with a leading dim."""
+        found, n = _numbers(self._field, t, u, values, memory), len(self.own)
+        shape = found.shape[:-1]
+        return (
+            found[..., :n], found[..., n : n + n * n].reshape(*shape, n, n),
+            found[..., n + n * n :].reshape(*shape, n, self._n_places),
+        )  # fmt: skip
 
-    def indicators(self, u: FloatArray, values: FloatArray, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Indicators (n_indicators,) and their gradients (n_indicators, n_u)."""
-        with np.errstate(all="ignore"):
-            found: Any = np.array(self._indicators(0.0, u, values, memory), dtype=float)
-        n, n_u = len(self.traced.indicators), len(self.traced.u)
-        return found[:n], found[n:].reshape(n, n_u)
+    def indicators(
+        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
+    ) -> tuple[FloatArray, FloatArray]:
+        """Indicators (n_indicators,) and their gradients (n_indicators, n_u); at several times with a leading dim."""
+        found, n, n_u = _numbers(self._indicators, t, u, values, memory), len(self.traced.indicators), len(self.traced.u)
+        return found[..., :n], found[..., n:].reshape(*found.shape[:-1], n, n_u)
 
     def margins(self, h: FloatArray, edge: FloatArray | float = 0.0) -> FloatArray:
         """Margins by which conditions of transitions hold (n_transitions,), -inf for those that are not of the mode.
@@ -196,6 +201,29 @@ def mode_field(traced: Traced, mode: int) -> ModeField:
     return ModeField(traced, mode)
 
 
+def _numbers(function: Any, t: Any, u: FloatArray, values: FloatArray, memory: FloatArray) -> FloatArray:
+    """What a function of numbers gives at a time (m,), or at several (T, m)."""
+    with np.errstate(all="ignore"):
+        found = function(t, u, values, memory)
+    if np.ndim(t) == 0:
+        return np.array(found, dtype=float)
+    return np.array([np.broadcast_to(one, np.shape(t)) for one in found], dtype=float).reshape(len(found), -1).T
+
+
+def _arguments(traced: Traced) -> list[Any]:
+    return [traced.t, list(traced.u), list(traced.p), list(traced.m)]
+
+
+@lru_cache(maxsize=8)
+def _indicators(traced: Traced) -> tuple[Any, list[Any]]:
+    """The indicators of a system with their slopes as a function of numbers, and the slopes as expressions."""
+    import sympy as sp
+
+    h = [sp.sympify(e) for e in traced.indicators]
+    slopes = [e.diff(s) for e in h for s in traced.u]
+    return sp.lambdify(_arguments(traced), [*h, *slopes], modules="numpy"), slopes
+
+
 def sorted_eigenvalues(J: FloatArray) -> ComplexArray:
     """Eigenvalues (n,) of a Jacobian, largest real part first."""
     found = np.linalg.eigvals(J).astype(complex)
@@ -231,7 +259,7 @@ def _fixed(traced: Traced, reset: Sequence[Any], u: FloatArray, values: FloatArr
     """Return whether a reset leaves the state alone."""
     import sympy as sp
 
-    image = sp.lambdify([traced.t, list(traced.u), list(traced.p), list(traced.m)], list(reset), modules="numpy")
+    image = sp.lambdify(_arguments(traced), list(reset), modules="numpy")
     moved = np.abs(np.array(image(0.0, u, values, memory), dtype=float) - u)
     return bool((moved <= 1e-12 * np.maximum(np.abs(u), 1e-3)).all())
 
