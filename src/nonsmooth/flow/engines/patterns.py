@@ -161,7 +161,7 @@ class PatternTables:
         self.lists: list[list[int]] = []  # transitions out of each mode
         self.together: list[int] = []  # the transition of each mode that is asked where several elements meet
         self.meets: list[list[int]] = []  # the conditions of each mode that are looked at then
-        self.answers: dict[tuple[int, int, tuple[int, ...]], int] = {}
+        self.answers: dict[tuple[int, int, tuple[int, ...], str], int] = {}
         self.maps: list[FloatArray] = [self.rows.identity()]
         self.known_maps: dict[bytes, int] = {self.maps[0].tobytes(): 0}
         self.transitions: IntArray = np.zeros((0, 5), dtype=np.int64)

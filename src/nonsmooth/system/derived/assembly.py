@@ -257,7 +257,9 @@ class Assembler(ABC):
         names = [f"{self.parts[j].name}_{name}" for j in group for name in self.parts[j].element.conditions]
         names.sort(key=lambda name: not name.endswith(("over", "under", "opens")))
         found: list[Leaving] = []
-        edges, one_sided, bounds = [], [], []  # of the body of all forces; of the forces within bounds
+        edges: list[FloatArray] = []  # of the body of all forces
+        one_sided: list[bool] = []
+        bounds: list[tuple[FloatArray, Any]] = []  # of the forces within bounds
         for j, row in zip(group, sums, strict=True):
             most, r = self.parts[j].element.most(self.place(j, mode, pattern)), self.rubbing.get(j)
             if most is not None and j not in self.rubbing.values():

@@ -270,7 +270,7 @@ def _arguments(function: Callable[..., Any]) -> int:
 def element_names(elements: Any) -> dict[str, Element]:
     """Elements by name; those of a list are called after their kind."""
     if isinstance(elements, Mapping):
-        found = {}
+        found: dict[str, Element] = {}
         for name, element in elements.items():
             found |= element.parts(name) if isinstance(element, Element) else {name: element}
         return found

@@ -90,7 +90,8 @@ def relays_of(
         if len(halves) != 1:
             return None
         pushes.append(halves.pop())
-    degrees, elements = [], {}
+    degrees: list[int] = []
+    elements: dict[str, Element] = {}
     for key, b in zip(keys, pushes, strict=True):
         h = call_scalar(indicators[key], arguments, f"indicator {key!r}")  # type: ignore[index]
         slopes = [sp.diff(h, symbol) for symbol in u]

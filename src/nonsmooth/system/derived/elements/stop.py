@@ -101,7 +101,7 @@ class Stop(Contact):
             return {name: self}
         where = {"speed": self.tangent, "on": self.on_tangent} if callable(self.tangent) else {"at": self.tangent}
         plain = replace(self, friction=None, tangent=None, on_tangent=None, belt=0.0)
-        rubs = Rubbing(of=name, belt=self.belt, friction=self.friction, **where)  # type: ignore[arg-type]
+        rubs = Rubbing(of=name, belt=self.belt, friction=self.friction, **where)
         return {name: plain, f"{name}_friction": rubs}
 
     def force(self, here: Place) -> Any:
