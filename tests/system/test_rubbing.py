@@ -217,3 +217,30 @@ class TestParadox:
                 np.eye(2), 0 * np.eye(2), 0 * np.eye(2), coordinates=["x", "y"], parameters={},
                 elements={"s": E.Stop(at="y", **options)},
             )
+
+
+class TestLoads:
+    """Energies of impacts and of sliding from outputs alone."""
+
+    def test_the_energy_lost_by_an_impact_is_that_of_both_impulses(self):
+        """The worked case: .25 before, .057213489679 behind; the work of each impulse is its mean speed times it."""
+        stop = E.Stop(at={"q1": 1, "q2": 1}, side=-1, restitution=0.5, friction=0.1, tangent={"q1": -2, "q2": 1})
+        pair = ns.mechanical(np.eye(2), 0 * np.eye(2), 0 * np.eye(2), parameters={}, elements={"s": stop})
+        run = ns.simulate(pair, duration=1.5, start={"q1": 0.5, "q2": 0.5, "v_q1": -0.5, "v_q2": -0.5})
+        assert float(run.s_impulse[0]) == pytest.approx(0.742724055909, abs=2e-12)
+        assert float(run.s_friction_impulse[0]) == pytest.approx(0.007605738924, abs=2e-12)
+        lost = float(run.s_energy_lost[0] + run.s_friction_energy_lost[0])
+        assert lost == pytest.approx(0.25 - 0.057213489679, abs=2e-12)
+
+    def test_a_hopping_block_takes_what_the_forcing_gives(self):
+        """Per period, by loads alone: work of the forcing = damping + stop + friction."""
+        hop = floor(
+            0.2, restitution=0.0, forcing=lambda t, p: 0.5 * np.cos(p.w * t), stiffness=2.0, damping=0.3,
+            normal=lambda t, p: -(1.0 + 2.0 * np.sin(p.w * t)),
+        )
+        response = ns.sweep(hop, "w", [1.0], transient=200, keep=10, loads=True, progress=False)
+        assert int(response.period_number[0]) == 1
+        names = ("work_of_damping", "work_of_stiffness", "floor_energy", "floor_friction_energy")
+        taken = sum(float(response[name][0]) for name in names if name in response)
+        assert float(response.floor_impulse[0]) > 0.1
+        assert taken == pytest.approx(float(response.work_of_forcing[0]), abs=1e-9)

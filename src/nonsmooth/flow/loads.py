@@ -53,8 +53,19 @@ class Meter:
 
     @cached_property
     def striking(self) -> list[int]:
-        """The numbers of those that have impacts."""
-        return [k for k, load in enumerate(self.elements) if load.element.strikes]
+        """The numbers of those that have impacts, and of the friction in them."""
+        return [k for k, load in enumerate(self.elements) if load.element.strikes or load.rubs]
+
+    @cached_property
+    def gaps(self) -> list[Any]:
+        """The gaps of those; of a friction that of its contact."""
+        where = {load.name: load.where for load in self.elements}
+        return [where[load.rubs or load.name] for load in (self.elements[k] for k in self.striking)]
+
+    @cached_property
+    def rubs(self) -> FloatArray:
+        """Which of those are frictions."""
+        return np.array([bool(self.elements[k].rubs) for k in self.striking], dtype=bool)
 
     @cached_property
     def units(self) -> dict[str, list[str]]:
@@ -70,7 +81,8 @@ class Meter:
             name = self.elements[k].name
             _, rate, impulse, energy = self.units[name]
             found[f"{name}_impulse"] = f"impulse of {name}", impulse
-            found[f"{name}_impact_speed"] = f"approach speed of {name} (NaN: no impact)", rate
+            speed = "slip speed before the impact" if self.elements[k].rubs else "approach speed"
+            found[f"{name}_impact_speed"] = f"{speed} of {name} (NaN: no impact)", rate
             found[f"{name}_energy_lost"] = f"energy lost by the impact of {name}", energy
         return found
 
@@ -100,7 +112,7 @@ class Meter:
 
         t = self.description.traced
         every = [
-            *(self.elements[k].where for k in self.striking), *(load.rate for load in self.elements),
+            *self.gaps, *(load.rate for load in self.elements),
             *(load.moved(t.u) for load in self.elements),
             *(self.elements[k].direction[i] for k in self.striking for i in self.elements[k].direction),
             *self.loads.powers.values(),
@@ -134,8 +146,7 @@ class Meter:
     def places(self) -> list[list[int]]:
         """The states in each gap."""
         u = self.description.traced.u
-        gaps = [self.elements[k].where for k in self.striking]
-        return [[i for i, one in enumerate(u) if gap.has(one)] for gap in gaps]
+        return [[i for i, one in enumerate(u) if gap.has(one)] for gap in self.gaps]
 
     def constraints(self, mode: str, values: FloatArray, time: float, u: FloatArray, memory: FloatArray) -> FloatArray:
         """The derivatives in the states of what the elements keep at zero in a mode, (constraints, n)."""
@@ -166,10 +177,14 @@ class Meter:
         impulses = np.zeros(gap.shape)
         for c in np.flatnonzero(jumps & closed.any(axis=1)):
             some = np.flatnonzero(closed[c])
-            impulses[c, some] = _least(D[c, some].T, change[c])
-        impulses[(impulses[:, :, None] * np.abs(D) <= ZERO * size).all(axis=2)] = 0.0
+            rubs = some[self.rubs[some]]
+            found = _least(np.concatenate([D[c, some], -D[c, rubs]]).T, change[c])  # a friction's has either sign
+            impulses[c, some] = found[: len(some)]
+            impulses[c, rubs] -= found[len(some) :]
+        impulses[(np.abs(impulses[:, :, None] * D) <= ZERO * size).all(axis=2)] = 0.0
         one = self.striking
-        speed = np.where(impulses > 0.0, np.maximum(-rate[:, one], 0.0), np.nan)
+        approach = np.where(self.rubs, np.abs(rate[:, one]), np.maximum(-rate[:, one], 0.0))
+        speed = np.where(impulses != 0.0, approach, np.nan)
         lost, taken = (
             -0.5 * impulses * (a + b)[:, one] for a, b in ((rate, rate_after), (moved, moved_after))
         )  # fmt: skip

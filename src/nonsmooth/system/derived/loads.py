@@ -18,6 +18,7 @@ from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived import elements
 from nonsmooth.system.derived.combinations import SPEED, Expressions
 from nonsmooth.system.derived.elements import Element
+from nonsmooth.system.derived.elements.rubbing import RUBS
 from nonsmooth.system.symbolic.expressions import write_expression
 from nonsmooth.system.units import Unit, product, read_unit, unit_of, write_unit
 
@@ -37,6 +38,11 @@ class Load:
     where: sp.Expr
     rate: sp.Expr | None
     direction: Mapping[int, sp.Expr]
+
+    @property
+    def rubs(self) -> str:
+        """Of the friction at a rigid contact the name of that; else nothing."""
+        return self.name.removesuffix(RUBS) if self.kind == "Rubbing" else ""
 
     @property
     def element(self) -> type[Element]:

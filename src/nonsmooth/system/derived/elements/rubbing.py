@@ -13,7 +13,9 @@ from nonsmooth.system.derived.elements.element import Condition, Element, Law, L
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Place
 
-__all__ = ["Rubbing"]
+__all__ = ["RUBS", "Rubbing"]
+
+RUBS = "_friction"  # ends its name, behind that of the stop
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.elements.element import CREEP, SMALL, Condition, Contact, Element, Law, Leaving
-from nonsmooth.system.derived.elements.rubbing import Rubbing
+from nonsmooth.system.derived.elements.rubbing import RUBS, Rubbing
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Place
@@ -102,7 +102,7 @@ class Stop(Contact):
         where = {"speed": self.tangent, "on": self.on_tangent} if callable(self.tangent) else {"at": self.tangent}
         plain = replace(self, friction=None, tangent=None, on_tangent=None, belt=0.0)
         rubs = Rubbing(of=name, belt=self.belt, friction=self.friction, **where)
-        return {name: plain, f"{name}_friction": rubs}
+        return {name: plain, name + RUBS: rubs}
 
     def force(self, here: Place) -> Any:
         return 0
