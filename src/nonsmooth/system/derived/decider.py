@@ -8,9 +8,12 @@ of a system.
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy as sp
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
@@ -21,7 +24,7 @@ from nonsmooth.system.symbolic.traced import FOUND, Row, Traced, TracedTransitio
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern
     from nonsmooth.system.derived.combinations import Expressions
-    from nonsmooth.system.derived.patterns import Patterns, Rows
+    from nonsmooth.system.derived.patterns import Patterns
 
 __all__ = ["Decider"]
 
@@ -39,6 +42,7 @@ class Decider:
         self._found: dict[Any, int] = {}
         self._impacts: dict[tuple[str, tuple[int, ...]], tuple[Any, ...]] = {}
         self._written: Traced | None = None
+        self.idle: list[set[int]] = []  # of each mode, the conditions of elements that are not asked for in it
 
     def decides(self, traced: Traced, kinds: Sequence[str], asked: Sequence[tuple[str, str, str, int]]) -> Traced:
         """The system with all its combinations written out, with the questions (mode, kind, condition, stop) behind its
@@ -55,6 +59,11 @@ class Decider:
             if k >= 0 and self.make.parts[k].element.strikes:
                 reset = self._impact(self.modes[here][0], (k,))
                 jumps.append(TracedTransition(here, here, rows, reset=reset, label=name, kind=FOUND))
+        places = {number for name, number in numbers.items() if self.met(name, traced.indicators[number])}
+        own = {number for name, number in numbers.items() if name not in self.make.indicators}
+        self.idle = [{*range(len(numbers))} - places - own for _ in self.modes]
+        for jump in jumps:
+            self.idle[jump.source] -= {row.indicator for row in jump.rows}
         self._written = replace(traced, transitions=tuple(jumps), decider=self)
         return self._written
 
@@ -95,22 +104,18 @@ class Decider:
             )
         return self.numbers[mode, pattern]
 
-    def met(self, indicator: int) -> list[int]:
-        """The elements whose place is an indicator that was made for them."""
-        if indicator < 0 or self.known().indicator_names[indicator] not in self.make.indicators:
+    def met(self, name: str, where: sp.Expr) -> list[int]:
+        """The elements whose place is an indicator that was made for them, by its name and expression."""
+        if name not in self.make.indicators:
             return []
-        where = self.known().indicators[indicator]
         return [k for k, part in enumerate(self.make.parts) if part.element.held and part.where in (where, -where)]
 
-    def at_point(self, values: FloatArray) -> Rows | FloatArray:
-        """What the numbers at all instants of one parameter point share."""
-        return values if self.rows is None else self.rows.rows(self.rows.form.evaluate(values[None, :]), 0)
-
-    def at_instant(
-        self, point: Rows | FloatArray, mode: int, time: float, u: FloatArray, memory: FloatArray, step: float
-    ) -> Numbers:
-        """The numbers at an instant in a mode; ``step`` is a time in which states change as from step to step."""
-        base = self.modes[mode][0]
+    def at_point(self, values: FloatArray) -> Callable[[int, float, FloatArray, FloatArray, float], Numbers]:
+        """The numbers at an instant, of one parameter point: by the mode, the time, states, memory, and a time in which
+        states change as from step to step."""
         if self.rows is None:
-            return SeriesNumbers(self.code, base, time, u, [*point, *memory], step)
-        return RowNumbers(point, base, point.augmented(u, time), step)
+            return lambda mode, time, u, memory, step: SeriesNumbers(
+                self.code, self.modes[mode][0], time, u, np.concatenate([values, memory]), step
+            )
+        rows = self.rows.rows(self.rows.form.evaluate(values[None, :]), 0)
+        return lambda mode, time, u, memory, step: RowNumbers(rows, rows.mode, rows.augmented(u, time), step)

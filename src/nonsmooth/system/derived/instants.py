@@ -1,9 +1,9 @@
 """Numbers at one instant, of which elements that decide together are asked (:mod:`nonsmooth.system.derived.deciding`).
 
 :class:`Numbers` are values of expressions at one instant, with the sums of their absolute terms, and derivatives along
-the flow behind it, order by order: those of a rate with the forces found so far, then the forces of that order are put
-in. :class:`RowNumbers` are those of affine systems, over w = (u, 1, cos, sin, ...); :class:`SeriesNumbers` of any other,
-by the recurrences of Taylor coefficients with the forces as inputs (:mod:`nonsmooth.system.codegen.recurrences`).
+the flow behind it, order by order: those of rates with the forces found so far, then the forces of that order are put
+in. :class:`RowNumbers` are those of affine systems, over w = (u, 1, cos, sin, ...); :class:`SeriesNumbers` are those of
+any other, by recurrences of Taylor coefficients with the forces as inputs (:mod:`nonsmooth.system.codegen.recurrences`).
 """
 
 from __future__ import annotations
@@ -230,10 +230,10 @@ class SeriesNumbers(Numbers):
     that changes is their size, of which rounding is a small part."""
 
     def __init__(
-        self, code: SeriesCode, mode: str, t: float, u: FloatArray, constants: Sequence[float], step: float = 0.0
+        self, code: SeriesCode, mode: str, t: float, u: FloatArray, constants: FloatArray, step: float = 0.0
     ) -> None:
         self.make, self.code, self.mode, self.u, self.size = code.make, code, mode, u.copy(), np.abs(u)
-        self.constants = np.array([t, *constants], dtype=float)
+        self.constants = np.array([t, *constants])
         self.lanes = self._lanes()
         if step:
             self.size = self.size + 0.25 * step * np.abs([self.value(e) for e in code.make.base(mode)])

@@ -22,8 +22,8 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
 from nonsmooth.system.symbolic.period import forcing_period
-from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 from nonsmooth.system.symbolic.traced import Row as Condition
+from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 from nonsmooth.system.symbolic.tracing import call_scalar
 
 if TYPE_CHECKING:
