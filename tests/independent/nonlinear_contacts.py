@@ -197,7 +197,8 @@ class Masses:
                 out[np.searchsorted(times, run.t)] = np.transpose(run.y)
             if run.status == 0:
                 break
-            t, y = max((when[-1], where[-1]) for when, where in zip(run.t_events, run.y_events, strict=True) if len(when))
+            ended = zip(run.t_events, run.y_events, strict=True)
+            t, y = max((when[-1], where[-1]) for when, where in ended if len(when))
             y = np.concatenate([y[:n], self.strike(y[:n], y[n:])])
             y = self._on_constraints(y, n)
             self.decide(t, y[:n], y[n:])

@@ -3,7 +3,8 @@
 :class:`Numbers` are values of expressions at one instant, with the sums of their absolute terms, and derivatives along
 the flow behind it, order by order: those of rates with the forces found so far, then the forces of that order are put
 in. :class:`RowNumbers` are those of affine systems, over w = (u, 1, cos, sin, ...); :class:`SeriesNumbers` are those of
-any other, by recurrences of Taylor coefficients with the forces as inputs (:mod:`nonsmooth.system.codegen.recurrences`).
+any other, by the recurrences of their Taylor coefficients (:mod:`nonsmooth.system.codegen.recurrences`) with the forces
+as inputs.
 """
 
 from __future__ import annotations

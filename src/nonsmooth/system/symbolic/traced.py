@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.decider import Decider
     from nonsmooth.system.derived.patterns import Patterns
 
-__all__ = ["ALONE", "ASKED", "ASKS_BEHIND", "FOUND", "NOT_UNIQUE", "OWN", "TOGETHER", "Row", "Traced", "TracedTransition"]
+__all__ = [
+    "ALONE", "ASKED", "ASKS_BEHIND", "FOUND", "NOT_UNIQUE", "OWN", "TOGETHER", "Row", "Traced", "TracedTransition",
+]  # fmt: skip
 
 ALONE, ASKED, TOGETHER, FOUND = "alone", "asked", "together", "found"  # kinds of transitions of elements
 OWN, ASKS_BEHIND = "own", "asks behind"  # of the system's own beside elements that are asked
