@@ -8,7 +8,7 @@ of a system.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -37,7 +37,7 @@ class Decider:
     def __init__(self, make: Expressions, modes: Sequence[tuple[str, Pattern]], rows: Patterns | None) -> None:
         self.make, self.modes, self.rows = make, list(modes), rows
         self.numbers = {one: number for number, one in enumerate(self.modes)}
-        self.code = SeriesCode(make)
+        self.code = SeriesCode(make, {})
         self._lock = threading.Lock()
         self._found: dict[Any, int] = {}
         self._impacts: dict[tuple[str, tuple[int, ...]], tuple[Any, ...]] = {}
@@ -67,6 +67,13 @@ class Decider:
         self._written = replace(traced, transitions=tuple(jumps), decider=self)
         return self._written
 
+    def with_changes(self, traced: Traced, changes: Mapping[sp.Basic, sp.Expr]) -> Traced:
+        """The equations with functions of time put in place of parameters, and questions of their own."""
+        other = Decider(self.make, self.modes, None)
+        other.code, other.idle = SeriesCode(self.make, changes), self.idle
+        other._written = replace(traced, decider=other)
+        return other._written
+
     def known(self) -> Traced:
         """The system written out, with all that was found so far."""
         assert self._written is not None
@@ -91,7 +98,7 @@ class Decider:
     def _impact(self, mode: str, struck: tuple[int, ...]) -> tuple[Any, ...]:
         key = mode, struck
         if key not in self._impacts:
-            self._impacts[key] = tuple(self.make.impact(struck, mode))
+            self._impacts[key] = tuple(e.xreplace(self.code.changes) for e in self.make.impact(struck, mode))
         return self._impacts[key]
 
     def number(self, mode: str, pattern: Pattern) -> int:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -166,8 +166,8 @@ class _RowsAhead(Ahead):
 class SeriesCode:
     """Text of the expressions of one system, compiled for numbers of any kind; kept, and shared by all instants."""
 
-    def __init__(self, make: Expressions) -> None:
-        self.make = make
+    def __init__(self, make: Expressions, changes: Mapping[sp.Basic, sp.Expr]) -> None:
+        self.make, self.changes = make, changes  # functions of time in place of parameters
         symbols = make.symbols
         self.names: dict[sp.Basic, str] = {s: f"q{i}" for i, s in enumerate([*symbols.p.values(), *symbols.m.values()])}
         self.own: dict[sp.Basic, str] = {
@@ -183,7 +183,9 @@ class SeriesCode:
         from nonsmooth.system.symbolic.printing import Printer
 
         if expression not in self._values:
-            self._values[expression] = compile(Printer(self.own)(expression), "<instant>", "eval")
+            self._values[expression] = compile(
+                Printer(self.own)(expression.xreplace(self.changes)), "<instant>", "eval"
+            )  # fmt: skip
         return self._values[expression]
 
     def slopes(self, expression: sp.Expr) -> list[sp.Expr]:
@@ -215,8 +217,9 @@ class SeriesCode:
                 field = make.moved(field, make.parts[k], law)
             rates = [make.along(make.rate(k, mode), field) for k in some]
             first, following = jet_steps(
-                make.symbols.t, (*make.u, *inputs), self.names, [*field, *([sp.S.Zero] * len(inputs))],
-                [*rates, *map(sp.sympify, laws)],
+                make.symbols.t, (*make.u, *inputs), self.names,
+                [*(e.xreplace(self.changes) for e in field), *([sp.S.Zero] * len(inputs))],
+                [sp.sympify(e).xreplace(self.changes) for e in (*rates, *laws)],
             )  # fmt: skip
             self._steps[key] = (
                 compile("\n".join(first), "<instant>", "exec"), compile("\n".join(following), "<instant>", "exec"),
