@@ -118,8 +118,7 @@ def simulate(
         "ramps": None if not ramps else {k: v if not callable(v) else str(v) for k, v in ramps.items()},
         "method": method, "rtol": rtol, "atol": atol, **expert,
     }  # fmt: skip
-    if not ramps:
-        traced = system.traced  # with what the run has visited and found
+    traced = engine.traced if ramps else system.traced  # with what the run has visited and found
     found = _dataset(system, traced, engine.name, options, log, instants, period)
     note = "" if ramps else _resting(system, begun, log, state)
     return found.assign_attrs(note=note) if note else found

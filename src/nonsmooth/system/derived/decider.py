@@ -42,6 +42,7 @@ class Decider:
         self._found: dict[Any, int] = {}
         self._impacts: dict[tuple[str, tuple[int, ...]], tuple[Any, ...]] = {}
         self._written: Traced | None = None
+        self._origin: Decider | None = None
         self.idle: list[set[int]] = []  # of each mode, the conditions of elements that are not asked for in it
 
     def decides(self, traced: Traced, kinds: Sequence[str], asked: Sequence[tuple[str, str, str, int]]) -> Traced:
@@ -68,9 +69,9 @@ class Decider:
         return self._written
 
     def with_changes(self, traced: Traced, changes: Mapping[sp.Basic, sp.Expr]) -> Traced:
-        """The equations with functions of time put in place of parameters, and questions of their own."""
+        """The equations with functions of time put in place of parameters; its answers are numbered as here."""
         other = Decider(self.make, self.modes, None)
-        other.code, other.idle = SeriesCode(self.make, changes), self.idle
+        other.code, other.idle, other._origin = SeriesCode(self.make, changes), self.idle, self
         other._written = replace(traced, decider=other)
         return other._written
 
@@ -81,6 +82,14 @@ class Decider:
 
     def found(self, asked: int, target: int, struck: tuple[int, ...]) -> int:
         """The number of the transition to which a question has led: to a mode, by an impact of some elements."""
+        if self._origin is not None:
+            number, written, changes = self._origin.found(asked, target, struck), self.known(), self.code.changes
+            more = [
+                replace(jump, reset=jump.reset and tuple(e.xreplace(changes) for e in jump.reset))
+                for jump in self._origin.known().transitions[len(written.transitions) :]
+            ]
+            self._written = replace(written, transitions=(*written.transitions, *more))
+            return number
         with self._lock:
             key, written = (asked, target, struck), self.known()
             if key not in self._found:
@@ -98,7 +107,7 @@ class Decider:
     def _impact(self, mode: str, struck: tuple[int, ...]) -> tuple[Any, ...]:
         key = mode, struck
         if key not in self._impacts:
-            self._impacts[key] = tuple(e.xreplace(self.code.changes) for e in self.make.impact(struck, mode))
+            self._impacts[key] = tuple(self.make.impact(struck, mode))
         return self._impacts[key]
 
     def number(self, mode: str, pattern: Pattern) -> int:
