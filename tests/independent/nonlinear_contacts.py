@@ -73,7 +73,7 @@ class Masses:
                 found = found - s * e.kinetic * np.array(e.row)
         return found
 
-    def held(self, t: float, q: Array, v: Array, state: Sequence[int]) -> tuple[Array, list[int], Array, Array, Array]:
+    def held(self, t: float, q: Array, v: Array, state: Sequence[int]) -> tuple[Array, list[int], Array, Any, Any]:
         """Accelerations without held forces, what is held, its rows, effects and needed rates."""
         free = np.linalg.solve(self.mass, self.loads(t, q, v, state))
         some = [i for i, s in enumerate(state) if s == 0]
@@ -145,7 +145,8 @@ class Masses:
         if not closed or rates[closed].min() > -1e-12:
             return v
         slow = rates[closed].min() > -REST
-        goal = np.array([-(0.0 if slow else self.elements[i].restitution) * min(rates[i], 0.0) for i in closed])
+        back = {i: e.restitution for i, e in enumerate(self.elements) if isinstance(e, Wall)}
+        goal = np.array([-(0.0 if slow else back[i]) * min(rates[i], 0.0) for i in closed])
         W = self.rows(q)[closed]
         G = W @ np.linalg.solve(self.mass, W.T)
         for some in product([True, False], repeat=len(closed)):
@@ -196,7 +197,8 @@ class Masses:
                 out[np.searchsorted(times, run.t)] = np.transpose(run.y)
             if run.status == 0:
                 break
-            t, y = max((when[-1], where[-1]) for when, where in zip(run.t_events, run.y_events, strict=True) if len(when))
+            ended = zip(run.t_events, run.y_events, strict=True)
+            t, y = max((when[-1], where[-1]) for when, where in ended if len(when))
             y = np.concatenate([y[:n], self.strike(y[:n], y[n:])])
             y = self._on_constraints(y, n)
             self.decide(t, y[:n], y[n:])
@@ -210,7 +212,8 @@ class Masses:
             W = self.rows(q)[closed]
             q -= np.linalg.lstsq(W, self.gaps(q)[closed], rcond=1e-9)[0]
         rates = self.rates(q, v)
-        zero = [i for i, e in enumerate(self.elements) if abs(rates[i]) < ZERO and (isinstance(e, Friction) or i in closed)]
+        bear = [i for i, e in enumerate(self.elements) if isinstance(e, Friction) or i in closed]
+        zero = [i for i in bear if abs(rates[i]) < ZERO]
         if zero:
             v -= np.linalg.lstsq(self.rows(q)[zero], rates[zero], rcond=1e-9)[0]
         return np.concatenate([q, v])

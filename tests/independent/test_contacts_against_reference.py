@@ -19,8 +19,12 @@ OTHERS = (1, 2, 4, 8, 11, 12, 13, 14, 19, 20, 22, 23, 26, 30, 31, 32, 34, 35, 36
 PERIODS, INSTANTS = 2.5, 150
 
 
+@pytest.mark.parametrize("calculus", ["rows", "series"])
 @pytest.mark.parametrize("seed", HARD + OTHERS)
-def test_states_are_those_of_the_reference(seed: int) -> None:
+def test_states_are_those_of_the_reference(seed: int, calculus: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Elements are asked by rows of numbers, and by Taylor series as where something is not affine."""
+    if calculus == "series":
+        monkeypatch.setattr("nonsmooth.system.derived.combinations._affine", lambda *given: None)
     draw = random_contact_system(seed)
     times = np.linspace(0, PERIODS * draw.period, INSTANTS + 1)
     states, agreed, failure, _ = campaign.reference(draw, times)

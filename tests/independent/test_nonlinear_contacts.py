@@ -30,7 +30,7 @@ def stop(row: tuple[float, ...], mass: tuple[float, ...], position: float, e: fl
     """Keeps row . q below a position."""
     r = np.array(row)
     wall = Wall(lambda q: position - r @ q, lambda q: -r, restitution=e)
-    gap = lambda t, u, p: position - sum(a * x for a, x in zip(row, list(u)[: len(row)], strict=True))  # noqa: E731
+    gap = lambda t, u, p: position - sum(a * x for a, x in zip(row, list(u)[: len(row)], strict=True))
     return wall, Stop(gap=gap, on=on(tuple(-r), mass), restitution=e)
 
 

@@ -12,9 +12,17 @@ import xarray as xr
 from scipy.optimize import brentq
 
 import nonsmooth as ns
-from nonsmooth.elements import Coulomb, PreloadedSpring, Stop
+from nonsmooth.elements import Coulomb, ElasticStop, PreloadedSpring, Stop
 
 Force = Callable[[Any, Any], Any]
+
+
+@pytest.fixture(params=["rows", "series"], autouse=True)
+def calculus(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ask elements by rows of numbers, and by Taylor series as where something is not affine."""
+    two_stops.cache_clear()
+    if request.param == "series":
+        monkeypatch.setattr("nonsmooth.system.derived.combinations._affine", lambda *given: None)
 
 
 def one(force: Force | None = None, *, mass: float = 1.0, c: float = 0.0, k: float = 0.0, **elements: Any) -> ns.System:
@@ -234,6 +242,67 @@ def test_a_preloaded_spring_holds_and_lets_go() -> None:
     run = ns.simulate(still, start={"v_q": 0.0}, duration=20)
     assert not run["u"].values.any()
     assert run["p_force"].values == pytest.approx(-0.3 * np.sin(run["time"].values), abs=1e-14)
+
+
+# Modes, resets and memory of the system's own beside elements that decide together
+
+PULL: dict[str, Any] = {"on": {"v": 1.0}}
+HOLDS = {
+    "a": Coulomb(speed=lambda t, u, p: u.v, friction=0.2, static=0.35, **PULL),
+    "b": Coulomb(speed=lambda t, u, p: u.v, friction=0.1, **PULL),
+    "s": Stop(gap=lambda t, u, p: 0.9 - u.x, on={"v": -1.0}, restitution=0.3),
+}  # fmt: skip
+
+
+def block(pull: Any = lambda u, p: 0 * u.x, **given: Any) -> ns.System:
+    """A block with two frictions and a stop."""
+    given = {"modes": {"all": lambda t, u, p: (u.v, pull(u, p))}, "elements": HOLDS, "parameters": {}} | given
+    return ns.System(states=["x", "v"], **given)
+
+
+@pytest.mark.parametrize("start", [[0.6, 0.2], [0.0, 0.0], [0.9, 1.0]])
+def test_modes_of_the_systems_own_are_those_of_an_elastic_stop(start: list[float]) -> None:
+    """A spring that is met at .4, as two modes and as an element; a run may begin in either."""
+
+    def field(k: float) -> Any:
+        return lambda t, u, p: (u.v, 1.6 * np.cos(0.7 * t) - 0.05 * u.v - u.x - k * (u.x - 0.4))
+
+    modes = block(
+        modes={"soft": field(0.0), "hard": field(5.0)}, indicators={"g": lambda t, u, p: u.x - 0.4},
+        transitions=[ns.Transition("soft", "hard", when="g > 0"), ns.Transition("hard", "soft", when="g < 0")],
+    )  # fmt: skip
+    spring = ElasticStop(gap=lambda t, u, p: 0.4 - u.x, on={"v": -1.0}, stiffness=5.0)
+    element = block(modes={"all": field(0.0)}, elements={**HOLDS, "spring": spring})
+    grid = np.linspace(0, 5 * 2 * np.pi / 0.7, 101)
+    one, other = (ns.simulate(system, duration=grid[-1], samples=grid, start=start) for system in (modes, element))
+    assert len(one["crossing_time"]) == len(other["crossing_time"]) > 40
+    assert one["u"].values == pytest.approx(other["u"].values, abs=1e-12)
+
+
+@pytest.mark.parametrize("kick", [0.3, 0.9])
+def test_a_reset_of_the_systems_own_sets_free_what_sticks(kick: float) -> None:
+    """Kicked at a quarter of the period, the block comes to rest by .3; faster ones hit the stop at .9."""
+    system = block(
+        period=2 * np.pi,
+        transitions=[ns.Transition("all", "all", at=0.25, reset=lambda t, u, p: (u.x, u.v + kick))],
+    )  # fmt: skip
+    run = ns.simulate(system, duration=6.0, start=[0.0, 0.0])
+    if kick**2 / 0.6 < 0.9:
+        assert run["crossing_time"].values[-1] == pytest.approx(np.pi / 2 + kick / 0.3, rel=1e-12)
+        assert end(run) == pytest.approx([kick**2 / 0.6, 0.0], abs=1e-14)
+    else:
+        back = 0.3 * np.sqrt(kick**2 - 0.54)  # behind the impact
+        assert end(run) == pytest.approx([0.9 - back**2 / 0.6, 0.0], abs=1e-14)
+
+
+def test_memory_of_the_systems_own_loads_what_sticks() -> None:
+    system = block(
+        lambda u, p: p.load, memory={"load": ""}, period=2 * np.pi,
+        transitions=[ns.Transition("all", "all", at=0.25, write={"load": lambda t, u, p: 0.5})],
+    )  # fmt: skip
+    run = ns.simulate(system, duration=3.0, start=[0.0, 0.0])
+    gone = 3.0 - np.pi / 2
+    assert end(run) == pytest.approx([0.1 * gone**2, 0.2 * gone], abs=1e-14)
 
 
 # Nothing depends on threads or on the order of elements

@@ -88,6 +88,8 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
         outputs=tuple(put(output) for output in traced.outputs),
         period=None,
     )
+    if traced.decider is not None:
+        moved = traced.decider.with_changes(moved, changes)
     return system.with_sliding(moved)
 
 

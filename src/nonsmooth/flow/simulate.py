@@ -127,8 +127,7 @@ def simulate(
         "ramps": None if not ramps else {k: v if not callable(v) else str(v) for k, v in ramps.items()},
         "method": method, "rtol": rtol, "atol": atol, **expert,
     }  # fmt: skip
-    if not ramps:
-        traced = system.traced  # with what the run has visited and found
+    traced = engine.traced if ramps else system.traced  # with what the run has visited and found
     found = _dataset(system, traced, engine.name, options, log, instants, period)
     meter = meter_of(system)
     if meter is not None and meter.striking:

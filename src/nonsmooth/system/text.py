@@ -110,6 +110,7 @@ def _content(d: Description) -> dict[str, Any]:
     for mode, field, lacking in zip(t.mode_names, t.fields, t.lacking, strict=True):
         modes[mode] = {s: text(e) for s, e, gone in zip(t.state_names, field, lacking, strict=True) if not gone}
     known = {} if elements is None or d.relays else elements.make.described()
+    indicators = {} if t.patterns is not None else dict(zip(t.indicator_names, map(text, t.indicators), strict=True))
     content: dict[str, Any] = {
         "format": _FORMAT,
         "version": _VERSION,
@@ -119,7 +120,7 @@ def _content(d: Description) -> dict[str, Any]:
         "parameters": {k: {"unit": v.unit, "symbol": v.symbol} for k, v in d.parameters.items()},
         "memory": {k: {"value": value, "unit": unit} for k, (value, unit) in d.memory.items()},
         "modes": modes,
-        "indicators": {} if d.traced.patterns is not None else {k: text(e) for k, e in zip(t.indicator_names, t.indicators, strict=True)},
+        "indicators": indicators,
         "transitions": transitions,
         "outputs": {
             k: {"unit": d.outputs[k], "modes": {m: text(e) for m, e in zip(t.mode_names, row, strict=True)}}

@@ -116,8 +116,10 @@ class Engine(ABC):
         starts, mode, n = bool(work.tally[STARTS]), int(work.tally[MODE]), len(self.scale)
         base, pattern = decider.modes[mode]
         memory, step = self.memory_in(work), 0.0 if starts else self.step_in(mode, system)
-        numbers = decider.at_instant(local.point, mode, float(work.memo[TIME]), work.w[:n], memory, step)
-        found = begun(numbers, pattern) if starts else decide(numbers, pattern, decider.met(int(work.tally[FIRED])))
+        numbers = local.point(mode, float(work.memo[TIME]), work.w[:n], memory, step)
+        fired = int(work.tally[FIRED])
+        met = [] if fired < 0 else decider.met(self.traced.indicator_names[fired], self.traced.indicators[fired])
+        found = begun(numbers, pattern) if starts else decide(numbers, pattern, met)
         there, taken = decider.number(base, found.pattern), -1
         if starts:
             work.tally[MODE] = there

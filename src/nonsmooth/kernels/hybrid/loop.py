@@ -119,7 +119,7 @@ def begin(i, form, net, section, motion, tables, work):
         look(i, form, tables, work, tally[MODE])
         code, moved = settle(i, form, net, tables, work), tally[TAKEN] != 0
         tally[TAKEN] = 0
-        if moved and code == OK and tally[STARTS] <= net.together.shape[0]:  # behind the system's own they are asked again
+        if moved and code == OK and tally[STARTS] <= net.together.shape[0]:  # they are asked again
             tally[BEGUN], tally[WAITS] = 0, net.together[tally[MODE]] + 1
             tally[STARTS] += 1
             return PAUSED

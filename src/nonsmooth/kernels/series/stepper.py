@@ -123,6 +123,10 @@ def take(i, t, fired, form, tables, net, work):
         q[j] = work.q_new[j]
     mode = net.transitions[t, 0]
     look(i, form, tables, work, mode)
+    if net.meets.shape[0] > 0:
+        J = work.J0 if METHOD == place.RKF45 else work.C
+        for j in range(form.indicators):
+            work.vals[j] = J[w.shape[0] + j, 0]
     if fired >= 0:
         work.measured[fired] = 0.0
         if work.usual[mode] <= 0.0:
@@ -292,6 +296,9 @@ def arrive_at(t, since, full, wrapped, form, net, tables, work):
         return t
     if t >= 0:
         work.dwell[tally[MODE]] = since
+        if net.meets.shape[0] > 0:
+            values = values_of(form)
+            values(tally[MODE], work.memo[TIME], work.w, work.q, work.vals)
     if tally[place.PENDING] >= 0:
         return t
     if rkf:

@@ -104,7 +104,7 @@ def model_source(traced: Traced) -> str:
     }
     jets = []
     for mode, fields in enumerate(traced.fields):
-        rows = [Integer(0) if traced.keeps_at_zero(mode, i) else h for i, h in enumerate(traced.indicators)]
+        rows = [Integer(0) if traced.keeps_at_zero(mode, i) else h for i, h in enumerate(_asked(traced, mode))]
         rows += [output[mode] for output in traced.outputs]
         jets.append(jet_code(traced.t, traced.u, _constants(traced), fields, rows))
     bodies = {name: [lines for lines, _ in parts] for name, parts in writers.items()}
@@ -128,6 +128,11 @@ def model_source(traced: Traced) -> str:
     copies += [f"for i in range({n_constants}):", "    q_new[i] = q[i]"]
     parts += [_function(name, bodies[name], constants, copies if name == "jump" else []) for name in SIGNATURES]
     return "\n".join(part for part in parts if part) + "\n"
+
+
+def _asked(traced: Traced, mode: int) -> list[Expr]:
+    """The indicators, zero in place of those that are not asked for in a mode."""
+    return [Integer(0) if traced.is_idle(mode, i) else h for i, h in enumerate(traced.indicators)]
 
 
 def _inlined(lines: list[str]) -> list[str]:
@@ -166,7 +171,7 @@ def _field(traced: Traced, mode: int) -> tuple[list[str], set[str]]:
 
 
 def _values(traced: Traced, mode: int) -> tuple[list[str], set[str]]:
-    rows = [*traced.indicators, *(output[mode] for output in traced.outputs)]
+    rows = [*_asked(traced, mode), *(output[mode] for output in traced.outputs)]
     return _scalar_code(traced, [(f"out[{i}]", e) for i, e in enumerate(rows)])
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
-from itertools import product
+from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -395,10 +395,11 @@ def _decide_together(make: Expressions, base: Mapping[str, Any], resets: bool) -
     for k in bearing:
         if any(make.vanishes(make.across(make.rate(k, mode), make.parts[k])) for mode in base):
             raise SystemDefinitionError(
-                f"element {make.parts[k].name!r}: its force changes nothing of the rate that it holds at zero; on= names "
+                f"element {make.parts[k].name!r}: its force does not change the rate that it holds at zero; on= names "
                 "the state whose derivative it adds to, as the speed"
             )
-    return (bool(bearing) and resets) or any(make.coupled(i, j, mode) for mode in base for i in bearing for j in bearing if i < j)
+    pairs = combinations(bearing, 2)
+    return (bool(bearing) and resets) or any(make.coupled(i, j, mode) for i, j in pairs for mode in base)
 
 
 def _affine(make: Expressions, base: Mapping[str, Any], given: Mapping[str, Any]) -> Patterns | None:

@@ -8,9 +8,12 @@ of a system.
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy as sp
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
@@ -21,7 +24,7 @@ from nonsmooth.system.symbolic.traced import FOUND, Row, Traced, TracedTransitio
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern
     from nonsmooth.system.derived.combinations import Expressions
-    from nonsmooth.system.derived.patterns import Patterns, Rows
+    from nonsmooth.system.derived.patterns import Patterns
 
 __all__ = ["Decider"]
 
@@ -34,11 +37,13 @@ class Decider:
     def __init__(self, make: Expressions, modes: Sequence[tuple[str, Pattern]], rows: Patterns | None) -> None:
         self.make, self.modes, self.rows = make, list(modes), rows
         self.numbers = {one: number for number, one in enumerate(self.modes)}
-        self.code = SeriesCode(make)
+        self.code = SeriesCode(make, {})
         self._lock = threading.Lock()
         self._found: dict[Any, int] = {}
         self._impacts: dict[tuple[str, tuple[int, ...]], tuple[Any, ...]] = {}
         self._written: Traced | None = None
+        self._origin: Decider | None = None
+        self.idle: list[set[int]] = []  # of each mode, the conditions of elements that are not asked for in it
 
     def decides(self, traced: Traced, kinds: Sequence[str], asked: Sequence[tuple[str, str, str, int]]) -> Traced:
         """The system with all its combinations written out, with the questions (mode, kind, condition, stop) behind its
@@ -55,8 +60,20 @@ class Decider:
             if k >= 0 and self.make.parts[k].element.strikes:
                 reset = self._impact(self.modes[here][0], (k,))
                 jumps.append(TracedTransition(here, here, rows, reset=reset, label=name, kind=FOUND))
+        places = {number for name, number in numbers.items() if self.met(name, traced.indicators[number])}
+        own = {number for name, number in numbers.items() if name not in self.make.indicators}
+        self.idle = [{*range(len(numbers))} - places - own for _ in self.modes]
+        for jump in jumps:
+            self.idle[jump.source] -= {row.indicator for row in jump.rows}
         self._written = replace(traced, transitions=tuple(jumps), decider=self)
         return self._written
+
+    def with_changes(self, traced: Traced, changes: Mapping[sp.Basic, sp.Expr]) -> Traced:
+        """The equations with functions of time put in place of parameters; its answers are numbered as here."""
+        other = Decider(self.make, self.modes, None)
+        other.code, other.idle, other._origin = SeriesCode(self.make, changes), self.idle, self
+        other._written = replace(traced, decider=other)
+        return other._written
 
     def known(self) -> Traced:
         """The system written out, with all that was found so far."""
@@ -65,6 +82,14 @@ class Decider:
 
     def found(self, asked: int, target: int, struck: tuple[int, ...]) -> int:
         """The number of the transition to which a question has led: to a mode, by an impact of some elements."""
+        if self._origin is not None:
+            number, written, changes = self._origin.found(asked, target, struck), self.known(), self.code.changes
+            more = [
+                replace(jump, reset=jump.reset and tuple(e.xreplace(changes) for e in jump.reset))
+                for jump in self._origin.known().transitions[len(written.transitions) :]
+            ]
+            self._written = replace(written, transitions=(*written.transitions, *more))
+            return number
         with self._lock:
             key, written = (asked, target, struck), self.known()
             if key not in self._found:
@@ -95,22 +120,18 @@ class Decider:
             )
         return self.numbers[mode, pattern]
 
-    def met(self, indicator: int) -> list[int]:
-        """The elements whose place is an indicator that was made for them."""
-        if indicator < 0 or self.known().indicator_names[indicator] not in self.make.indicators:
+    def met(self, name: str, where: sp.Expr) -> list[int]:
+        """The elements whose place is an indicator that was made for them, by its name and expression."""
+        if name not in self.make.indicators:
             return []
-        where = self.known().indicators[indicator]
         return [k for k, part in enumerate(self.make.parts) if part.element.held and part.where in (where, -where)]
 
-    def at_point(self, values: FloatArray) -> Rows | FloatArray:
-        """What the numbers at all instants of one parameter point share."""
-        return values if self.rows is None else self.rows.rows(self.rows.form.evaluate(values[None, :]), 0)
-
-    def at_instant(
-        self, point: Rows | FloatArray, mode: int, time: float, u: FloatArray, memory: FloatArray, step: float
-    ) -> Numbers:
-        """The numbers at an instant in a mode; ``step`` is a time in which states change as from step to step."""
-        base = self.modes[mode][0]
+    def at_point(self, values: FloatArray) -> Callable[[int, float, FloatArray, FloatArray, float], Numbers]:
+        """The numbers at an instant, of one parameter point: by the mode, the time, states, memory, and a time in which
+        states change as from step to step."""
         if self.rows is None:
-            return SeriesNumbers(self.code, base, time, u, [*point, *memory], step)
-        return RowNumbers(point, base, point.augmented(u, time), step)
+            return lambda mode, time, u, memory, step: SeriesNumbers(
+                self.code, self.modes[mode][0], time, u, np.concatenate([values, memory]), step
+            )
+        rows = self.rows.rows(self.rows.form.evaluate(values[None, :]), 0)
+        return lambda mode, time, u, memory, step: RowNumbers(rows, rows.mode, rows.augmented(u, time), step)

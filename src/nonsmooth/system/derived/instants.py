@@ -1,16 +1,17 @@
 """Numbers at one instant, of which elements that decide together are asked (:mod:`nonsmooth.system.derived.deciding`).
 
 :class:`Numbers` are values of expressions at one instant, with the sums of their absolute terms, and derivatives along
-the flow behind it, order by order: those of a rate with the forces found so far, then the forces of that order are put
-in. :class:`RowNumbers` are those of affine systems, over w = (u, 1, cos, sin, ...); :class:`SeriesNumbers` of any other,
-by the recurrences of Taylor coefficients with the forces as inputs (:mod:`nonsmooth.system.codegen.recurrences`).
+the flow behind it, order by order: those of rates with the forces found so far, then the forces of that order are put
+in. :class:`RowNumbers` are those of affine systems, over w = (u, 1, cos, sin, ...); :class:`SeriesNumbers` are those of
+any other, by the recurrences of their Taylor coefficients (:mod:`nonsmooth.system.codegen.recurrences`) with the forces
+as inputs.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -165,8 +166,8 @@ class _RowsAhead(Ahead):
 class SeriesCode:
     """Text of the expressions of one system, compiled for numbers of any kind; kept, and shared by all instants."""
 
-    def __init__(self, make: Expressions) -> None:
-        self.make = make
+    def __init__(self, make: Expressions, changes: Mapping[sp.Basic, sp.Expr]) -> None:
+        self.make, self.changes = make, changes  # functions of time in place of parameters
         symbols = make.symbols
         self.names: dict[sp.Basic, str] = {s: f"q{i}" for i, s in enumerate([*symbols.p.values(), *symbols.m.values()])}
         self.own: dict[sp.Basic, str] = {
@@ -182,7 +183,9 @@ class SeriesCode:
         from nonsmooth.system.symbolic.printing import Printer
 
         if expression not in self._values:
-            self._values[expression] = compile(Printer(self.own)(expression), "<instant>", "eval")
+            self._values[expression] = compile(
+                Printer(self.own)(expression.xreplace(self.changes)), "<instant>", "eval"
+            )  # fmt: skip
         return self._values[expression]
 
     def slopes(self, expression: sp.Expr) -> list[sp.Expr]:
@@ -214,8 +217,9 @@ class SeriesCode:
                 field = make.moved(field, make.parts[k], law)
             rates = [make.along(make.rate(k, mode), field) for k in some]
             first, following = jet_steps(
-                make.symbols.t, (*make.u, *inputs), self.names, [*field, *([sp.S.Zero] * len(inputs))],
-                [*rates, *map(sp.sympify, laws)],
+                make.symbols.t, (*make.u, *inputs), self.names,
+                [*(e.xreplace(self.changes) for e in field), *([sp.S.Zero] * len(inputs))],
+                [sp.sympify(e).xreplace(self.changes) for e in (*rates, *laws)],
             )  # fmt: skip
             self._steps[key] = (
                 compile("\n".join(first), "<instant>", "exec"), compile("\n".join(following), "<instant>", "exec"),
@@ -230,10 +234,10 @@ class SeriesNumbers(Numbers):
     that changes is their size, of which rounding is a small part."""
 
     def __init__(
-        self, code: SeriesCode, mode: str, t: float, u: FloatArray, constants: Sequence[float], step: float = 0.0
+        self, code: SeriesCode, mode: str, t: float, u: FloatArray, constants: FloatArray, step: float = 0.0
     ) -> None:
         self.make, self.code, self.mode, self.u, self.size = code.make, code, mode, u.copy(), np.abs(u)
-        self.constants = np.array([t, *constants], dtype=float)
+        self.constants = np.array([t, *constants])
         self.lanes = self._lanes()
         if step:
             self.size = self.size + 0.25 * step * np.abs([self.value(e) for e in code.make.base(mode)])

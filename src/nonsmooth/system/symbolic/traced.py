@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.decider import Decider
     from nonsmooth.system.derived.patterns import Patterns
 
-__all__ = ["ALONE", "ASKED", "ASKS_BEHIND", "FOUND", "NOT_UNIQUE", "OWN", "TOGETHER", "Row", "Traced", "TracedTransition"]
+__all__ = [
+    "ALONE", "ASKED", "ASKS_BEHIND", "FOUND", "NOT_UNIQUE", "OWN", "TOGETHER", "Row", "Traced", "TracedTransition",
+]  # fmt: skip
 
 ALONE, ASKED, TOGETHER, FOUND = "alone", "asked", "together", "found"  # kinds of transitions of elements
 OWN, ASKS_BEHIND = "own", "asks behind"  # of the system's own beside elements that are asked
@@ -116,6 +118,11 @@ class Traced:
     def keeps_at_zero(self, mode: int, indicator: int) -> bool:
         """Return whether motion in a mode slides along the surface of an indicator."""
         return mode < len(self.along) and indicator in self.along[mode]
+
+    def is_idle(self, mode: int, indicator: int) -> bool:
+        """Return whether an indicator is a condition of elements that is not asked for in a mode: it is not computed
+        there."""
+        return self.decider is not None and indicator in self.decider.idle[mode]
 
     def phase_text(self, jump: TracedTransition) -> str:
         """The phase of a transition as it was written."""

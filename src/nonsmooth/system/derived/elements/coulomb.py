@@ -104,15 +104,13 @@ class Coulomb(Element):
         v, hold, most = here.where, here.put("stick").holding(), self.most(here)
         over, under = hold - most, hold + most
         if here.phase == "stick":
-            off, moves = SMALL * here.size(v), []
-            if here.begins_alone():
-                moves = [
-                    Leaving("forward", [Condition(v - off, 1, "speed_above")]),
-                    Leaving("back", [Condition(v + off, -1, "speed_below")]),
-                ]  # fmt: skip
-            return [
-                *moves, Leaving("back", [Condition(over, 1, "over")]), Leaving("forward", [Condition(under, -1, "under")]),
-            ]  # fmt: skip
+            off = SMALL * here.size(v)
+            begins = [
+                Leaving("forward", [Condition(v - off, 1, "speed_above")]),
+                Leaving("back", [Condition(v + off, -1, "speed_below")]),
+            ] if here.begins_alone() else []  # fmt: skip
+            ends = Condition(over, 1, "over"), Condition(under, -1, "under")
+            return [*begins, Leaving("back", [ends[0]]), Leaving("forward", [ends[1]])]
         other, sign = ("back", -1) if here.phase == "forward" else ("forward", 1)
         stopped = Condition(v, sign, "speed")
         if here.vanishes(most):
