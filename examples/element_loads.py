@@ -1,8 +1,8 @@
 """The energy of a shaken mass: what its damper, a dry friction and a stop take from it over the forcing frequency.
 
-A mass on a spring with a damper rubs on the ground and hits a stop on one side. In a forcing period the force does the
-work W = integral F v dt. The damper takes integral c v^2 dt, the friction integral mu |v| dt, and an impact at the speed
-v takes (1 - e^2) m v^2 / 2 by the impulse (1 + e) m v. On a cycle the three add up to W.
+A mass on a spring with a damper rubs on the ground and hits a stop on one side. In a forcing period the force does
+the work W = integral F v dt. The damper takes integral c v^2 dt, the friction integral mu |v| dt, and an impact at the
+speed v takes (1 - e^2) m v^2 / 2 by the impulse (1 + e) m v. On a cycle the three add up to W.
 """
 
 from __future__ import annotations
