@@ -89,3 +89,14 @@ def test_arguments_that_do_not_fit() -> None:
         ns.amplitude_spectrum(SUPPORT, samples=2)
     with pytest.raises(ValueError, match="no forcing period"):
         ns.amplitude_spectrum(ns.models.relay_feedback())
+
+
+def test_a_system_without_parameters() -> None:
+    """x'' + 0.2 x' + x = cos 2t: one line, of 1 / |1 - 4 + 0.4 i| at the frequency 1 / pi."""
+    system = ns.System(
+        states=["x", "v"], parameters={}, modes={"all": lambda t, u, p: (u.v, np.cos(2 * t) - 0.2 * u.v - u.x)}
+    )
+    found = ns.amplitude_spectrum(system)
+    lines = found["amplitude"].sel(state="x").values
+    assert int(found["period_number"]) == 1 and found["frequency"].values[1] == pytest.approx(1 / np.pi)
+    assert lines[1] == pytest.approx(1 / abs(-3 + 0.4j), rel=1e-12) and np.delete(lines, 1).max() < 1e-12

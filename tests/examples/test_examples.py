@@ -9,7 +9,10 @@ from pathlib import Path
 import pytest
 
 #: Sizes that show the same in less time than those of the pictures.
-SMALL = {"basins": {"points": 60}, "chart": {"points": 60}, "basin_fractions": {"points": 26, "starts": 60}}
+SMALL = {
+    "basins": {"points": 60}, "chart": {"points": 60}, "basin_fractions": {"points": 26, "starts": 60},
+    "element_loads": {"points": 41},
+}  # fmt: skip
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 
 

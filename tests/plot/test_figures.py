@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import nonsmooth as ns
 from nonsmooth import plot
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import column, name_and_unit
@@ -203,3 +204,17 @@ def test_a_legend_covers_nothing(crowded: bool, outside: bool) -> None:
     assert (box.y0 >= ax.bbox.y1) == outside
     for line in ax.lines:
         assert not box.count_contains(line.get_transform().transform(line.get_xydata()))
+
+
+def test_loads_are_drawn_with_their_units() -> None:
+    """A resonance curve of a load: its own name and unit, and the values as they stand."""
+    rig = ns.mechanical(
+        "m", 0.1, 1.0, parameters={"m": (2.0, "kg"), "w": 1.0}, coordinates={"q": "m"},
+        forcing={"q": lambda t, p: np.cos(p.w * t)}, elements={"wall": ns.elements.Stop(at="q", position=1.0)},
+    )  # fmt: skip
+    w = np.linspace(0.8, 1.0, 5)
+    curve = ns.frequency_response(rig, w, parameter="w", direction="up", loads=True, progress=False)
+    ax = plot.frequency_response(curve, y="wall_energy")
+    assert ax.get_ylabel() == "wall energy (J)"
+    (line,) = ax.get_lines()
+    assert np.array_equal(np.asarray(line.get_ydata(), dtype=float), curve["wall_energy"].values)

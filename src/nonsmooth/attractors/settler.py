@@ -36,6 +36,7 @@ __all__ = ["ATTEMPTS", "FIRST_LOOK", "Settler"]
 
 ATTEMPTS = 3  # further transients for a point that is still settling: of 1, 2 and 4 times the first
 DIFFERENCE = 1e-6  # finite differences of the return map, in units of the motion's size
+MEASURED = 200  # returns over which loads of a motion without a period are measured, at most
 FIRST_LOOK = 40  # returns after which a point is judged for the first time, where it may stop early
 
 
@@ -191,12 +192,12 @@ class Settler:
 
     def loads(self, points: FloatArray, rows: Any, found: Settled) -> dict[str, FloatArray]:
         """Loads of elements (``flow.loads``) of J jobs that have settled, per return of their section, over the returns
-        of a cycle, or as many as are kept where there is none; NaN where a run failed."""
+        of a cycle, or as many as are kept (at most ``MEASURED``) where there is none; NaN where a run failed."""
         meter = meter_of(self.system)
         assert meter is not None  # refused at the door
         columns = {name: np.full(len(found.status), np.nan) for name in meter.per_period}
         for j in np.flatnonzero(usable(found.status)):
-            point, returns = points[rows[j]], int(found.period_number[j]) or self.keep
+            point, returns = points[rows[j]], int(found.period_number[j]) or min(self.keep, MEASURED)
             period = self.system.period_at(point) or np.inf
             place, mode = found.last[j], int(found.mode[j])
             if self.plan.indicator < 0:

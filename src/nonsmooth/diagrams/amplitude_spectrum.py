@@ -12,26 +12,32 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.diagrams.sweep import sweep
+from nonsmooth.attractors.settle import longest_period
+from nonsmooth.attractors.settler import Settler
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_options, check_system, whole_number
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.poincare import poincare
-from nonsmooth.flow.sections import Poincare, Stroboscopic
+from nonsmooth.flow.scales import warn_if_small
+from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.simulate import simulate
-from nonsmooth.flow.starts import is_one_start, plain_start
+from nonsmooth.flow.starts import is_one_start, plain_start, start_states
 from nonsmooth.results.progress import Progress
+from nonsmooth.results.progress import progress as progress_bar
 from nonsmooth.system.names import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from nonsmooth.flow.engines.loop import Engine
     from nonsmooth.system.system import System
 
 __all__ = ["amplitude_spectrum"]
 
 CLOSED = 1e-7  # of the motion's range: what a period may leave open
+KEPT = 100  # section points by which a motion is judged
 PATIENCE = (1, 2, 4, 8)  # transients tried until the record closes
 LEAST = 4096  # samples of a motion of a short period; more raise the highest line
 
@@ -107,7 +113,9 @@ def amplitude_spectrum(
     periods, samples = whole_number(periods, "periods", 8), whole_number(samples, "samples", 8)
     engine = engine_for(system, method, rtol, atol, **expert)
     how = {"method": method, "rtol": rtol, "atol": atol, **expert}
-    count = _period_number(system, {"start": start, "section": section, "transient": transient, **how}, progress)
+    with progress_bar(1, "amplitude_spectrum", progress) as advance:
+        count = _period_number(system, engine, section, start, transient, rtol)
+        advance(1)
     length = count or periods
     each = max(samples, -(-LEAST // length)) if count else samples
     for patience in PATIENCE:  # the judge may have passed over as many transients
@@ -143,10 +151,18 @@ def amplitude_spectrum(
     return _dataset(system, engine.name, options, frequency, amplitude, base, count)
 
 
-def _period_number(system: System, options: dict[str, Any], progress: Progress) -> int:
-    name = next(iter(system.parameters))
-    judged = sweep(system, name, [system.values[name]], direction=None, progress=progress, **options)
-    return int(judged["period_number"].values[0])
+def _period_number(
+    system: System, engine: Engine, section: Any, start: Any, transient: int, rtol: float | None
+) -> int:  # fmt: skip
+    """The period number of the attractor that a start leads to, as a sweep finds it."""
+    plan, starts = section_plan(system, section)[1], start_states(system, start)
+    points = system.parameter_vector()[None, :]
+    if plan.indicator >= 0:
+        refuse_resting(system, starts, points, "amplitude_spectrum")
+    settler = Settler(system, engine, plan, transient, KEPT, longest_period(KEPT, None), False, rtol=rtol)
+    found = settler.run(points, [0], starts)
+    warn_if_small(system, starts, found.maximum, found.minimum)
+    return int(found.period_number[0])
 
 
 def _stretch(

@@ -81,8 +81,8 @@ def spectrum_along(
 def _hold(system: System, frame: Any, values: FloatArray, state: State) -> int:
     """Turn the frame so that what elements hold in the present mode stands in its last columns; their number.
 
-    A held contact or friction takes each neighbour to its constraint in a finite time, so these directions are lost; the
-    rate at which the equations bring rounding errors back to it means nothing. The others stay within it."""
+    A held contact or friction takes each neighbour to its constraint in a finite time, so these directions are lost; at
+    which rate the equations bring rounding errors back to it means nothing. The others stay within it."""
     meter = meter_of(system)
     if meter is None:
         return 0

@@ -136,8 +136,8 @@ def sweep(
     see :mod:`nonsmooth.kernels.judging.judge`.
 
     Loads are per return of the section (per forcing period), averaged over the returns of a cycle, from the last
-    section point on; over ``keep`` returns where the motion has no period. Forces are without impulses. The energy of
-    an element is what it takes from the masses,
+    section point on; over ``keep`` returns, at most 200, where the motion has no period. Forces are without impulses.
+    The energy of an element is what it takes from the masses,
 
     .. math:: E = -\int \lambda\, w \cdot v\, dt - \sum \Lambda\, w \cdot (v^+ + v^-) / 2
 

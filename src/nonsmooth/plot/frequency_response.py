@@ -47,7 +47,7 @@ def frequency_response(
     ax
         Where to draw; a new one-column figure if None.
     y
-        The state; by default the first.
+        The state; by default the first. Or a variable over the parameter alone, such as a load (``"stop_energy"``).
     quantity
         ``"amplitude"`` (half the peak-to-peak value), ``"maximum"`` or ``"minimum"``.
     jumps
@@ -60,7 +60,8 @@ def frequency_response(
     (name,) = first_states(result, y)
     parameter = str(result["maximum"].dims[0])
     values = result[parameter].values
-    heights = column(result, quantity, name)
+    alone = name in result.data_vars and result[name].dims == result["status"].dims
+    heights = result[name] if alone else column(result, quantity, name)
     ax, branches = sorted_out(over, ax, parameter)
     with style.axes(ax) as drawn:
         for i, direction in enumerate(np.atleast_1d(result["direction"].values).astype(str)):
@@ -77,7 +78,7 @@ def frequency_response(
         for behind in branches:
             draw_branch(drawn, behind, y=name, quantity=quantity, color=style.COLORS["section"], width=0.7, behind=True)
         drawn.margins(x=0)
-        name_axes(drawn, name_and_unit(result, parameter), _ordinate(result, name, quantity))
+        name_axes(drawn, name_and_unit(result, parameter), _ordinate(result, name, "" if alone else quantity))
         style.clear_legend(drawn)
     return drawn
 
@@ -132,4 +133,4 @@ def _mark(
 
 def _ordinate(result: xr.Dataset, name: str, quantity: str) -> tuple[str, str]:
     text, unit = name_and_unit(result, name)
-    return f"{quantity} of {text}", unit
+    return f"{quantity} of {text}" if quantity else text, unit

@@ -56,7 +56,7 @@ class System:
         Fields prescribed inside the bands of the smoothed system, by indicator.
     elements : mapping of str to element, or sequence, optional
         Stops, friction, backlash (:mod:`nonsmooth.elements`): modes and transitions are written for all combinations of
-        their phases; the force of each is an output ``<name>_force``.
+        their phases; the force of each, without impulses, is an output ``<name>_force``.
     name : str
 
     Raises

@@ -23,6 +23,7 @@ class Stop(Contact):
     With the gap :math:`\delta(t, u) \ge 0` and :math:`w = \dot\delta`, an impact at :math:`\delta = 0` turns w into
     :math:`-e w`. Impacts that accumulate are completed: below the speed ``creep`` the contact rests, where it would
     not open by itself. The force that holds :math:`w = 0` is the contact force; the contact opens where it vanishes.
+    The impulses of impacts are not in it: results hold them beside it (:func:`nonsmooth.simulate`).
     What is left out is shorter than :math:`2 w / (|a| (1 - e))`, with the free acceleration :math:`a = \dot w`, and
     displaces nothing by more than :math:`w^2 / 2 |a|`.
 
