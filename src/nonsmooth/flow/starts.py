@@ -44,7 +44,8 @@ def random_starts(n: int, low: Any, high: Any, seed: int) -> list[Any]:
 
     Examples
     --------
-    >>> random_starts(2, {"x": 0.0}, {"x": 0.01}, seed=1)  # doctest: +ELLIPSIS
+    >>> import nonsmooth as ns
+    >>> ns.random_starts(2, {"x": 0.0}, {"x": 0.01}, seed=1)  # doctest: +ELLIPSIS
     [{'x': 0.005...}, {'x': 0.009...}]
     """
     n = whole_number(n, "n (the number of starts)", 1)

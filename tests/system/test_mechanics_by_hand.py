@@ -1,0 +1,140 @@
+"""Mechanical systems against closed forms and SciPy's matrix exponential, through verbs alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.optimize
+
+import nonsmooth as ns
+
+E = ns.elements
+pytestmark = pytest.mark.physics
+#: So many other stops, never met, that all combinations cannot be written out.
+FAR = {f"far_{i}": E.Stop(at="q", position=100.0 + i) for i in range(8)}
+
+
+@pytest.fixture(scope="module", params=["written out", "patterns"])
+def others(request: pytest.FixtureRequest) -> dict[str, Any]:
+    return {} if request.param == "written out" else FAR
+
+
+def end(run: Any) -> np.ndarray:
+    return run["u"].values[-1]
+
+
+def test_a_base_that_moves_is_the_absolute_frame() -> None:
+    """x'' + c (x' - y') + k (x - y) = 0 with y = Y cos wt: x - y = Re w^2 Y / (k - w^2 + i c w) e^(iwt)."""
+    c, k, w, Y = 0.3, 2.0, 1.1, 0.4
+    relative = w**2 * Y / (k - w**2 + 1j * c * w)
+    system = ns.mechanical(
+        1.0, c, k, parameters={"w": w, "Y": Y}, base=lambda t, p: -p.Y * p.w**2 * np.cos(p.w * t), coordinates=["q"]
+    )
+    run = ns.simulate(system, periods=2.3, start={"q": relative.real, "v_q": (1j * w * relative).real})
+    wave = relative * np.exp(1j * w * run["time"].values)
+    assert run["u"].sel(state="q").values == pytest.approx(wave.real, abs=1e-10)
+    assert run["u"].sel(state="v_q").values == pytest.approx((1j * w * wave).real, abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("C", "K"),
+    [
+        ([[0.1, -1.2], [1.2, 0.1]], [[3.0, 0.0], [0.0, 1.0]]),  # gyroscopic
+        ([[0.1, 0.0], [0.0, 0.2]], [[3.0, -0.4], [0.9, 1.0]]),  # a follower force
+    ],
+)
+def test_damping_and_stiffness_need_not_be_symmetric(C: list[list[float]], K: list[list[float]]) -> None:
+    M = np.array([[2.0, 0.3], [0.3, 1.0]])
+    A = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+    start = np.array([0.5, -0.2, 0.1, 0.7])
+    run = ns.simulate(ns.mechanical(M.tolist(), C, K, parameters={}), duration=3.0, start=start)
+    assert end(run) == pytest.approx(scipy.linalg.expm(3.0 * A) @ start, abs=1e-10)
+
+
+def test_an_impact_on_a_wall_that_moves_harmonically(others: dict[str, Any]) -> None:
+    """Without force q = v t until it meets 1 + a sin wt + b cos wt; then v' = (1 + e) wall' - e v."""
+    a, b, w, e, v = 0.3, 0.1, 2.0, 0.5, 1.5
+
+    def wall(t: Any) -> Any:
+        return 1.0 + a * np.sin(w * t) + b * np.cos(w * t)
+
+    stop = E.Stop(at="q", position=lambda t, u, p: 1.0 + a * np.sin(p.w * t) + b * np.cos(p.w * t), restitution=e)
+    system = ns.mechanical(1.0, 0.0, 0.0, parameters={"w": w}, elements={"wall": stop, **others}, coordinates=["q"])
+    run = ns.simulate(system, duration=1.2, start={"v_q": v})
+    at = scipy.optimize.brentq(lambda t: v * t - wall(t), 0.5, 1.0, xtol=1e-14)
+    after = (1 + e) * w * (a * np.cos(w * at) - b * np.sin(w * at)) - e * v
+    assert run["crossing_time"].values == pytest.approx([at], abs=1e-12)
+    assert end(run) == pytest.approx([wall(at) + after * (1.2 - at), after], abs=1e-11)
+
+
+def test_what_sticks_to_a_belt_that_moves_harmonically_moves_with_it(others: dict[str, Any]) -> None:
+    """Its acceleration, at most .66, stays below the friction of 1: v = V sin wt, q = V (1 - cos wt) / w."""
+    V, w = 0.6, 1.1
+    belt = E.Coulomb(at="q", friction=1.0, belt=lambda t, u, p: V * np.sin(p.w * t))
+    system = ns.mechanical(1.0, 0.0, 0.0, parameters={"w": w}, elements={"belt": belt, **others}, coordinates=["q"])
+    run = ns.simulate(system, duration=7.0)
+    assert end(run) == pytest.approx([V * (1 - np.cos(w * 7.0)) / w, V * np.sin(w * 7.0)], abs=1e-9)
+
+
+@pytest.mark.parametrize("direction", ["up", "down"])
+def test_a_mass_that_rests_on_a_stop_goes_where_the_stop_goes(others: dict[str, Any], direction: str) -> None:
+    """Pressed by 2 + .1 cos t against its own spring it rests at q = d, whether d falls under it or away from it."""
+    stop = E.Stop(at="q", position="d")
+    system = ns.mechanical(
+        1.0, 0.2, 1.0, parameters={"d": 0.5, "w": 1.0}, forcing={"q": lambda t, p: 2.0 + 0.1 * np.cos(p.w * t)},
+        elements={"stop": stop, **others}, coordinates=["q"],
+    )  # fmt: skip
+    values = np.linspace(0.5, 0.8, 4)
+    swept = ns.sweep(
+        system, "d", values, direction=direction, start={"q": 0.5}, transient=20, keep=3, max_period=1, progress=False
+    )
+    section = swept["section"].squeeze().transpose("d", "iterate", "state").values
+    assert section[..., 0] == pytest.approx(np.repeat(swept["d"].values[:, None], 3, axis=1), abs=1e-9)
+    assert section[..., 1] == pytest.approx(0.0, abs=1e-9)
+    assert (swept["period_number"].values == 1).all()
+
+
+def test_a_stop_that_moves_by_a_ramp_pushes_the_mass() -> None:
+    """What rests on it stays within 1e-4 of the scale: the ramp moves by a hundred times that."""
+    stop = E.Stop(at="q", position="d")
+    system = ns.mechanical(
+        1.0, 0.2, 1.0, parameters={"d": 0.8}, forcing={"q": lambda t, p: 2.0}, elements={"stop": stop},
+        coordinates=["q"],
+    )  # fmt: skip
+    run = ns.simulate(system, duration=0.6, start={"q": 0.8}, ramps={"d": (0.8, 0.79)})
+    assert run["u"].sel(state="q").values == pytest.approx(0.8 - 0.01 * run["time"].values / 0.6, abs=1.1e-4)
+
+
+def test_an_impact_slower_than_creep_under_a_pull_rebounds(others: dict[str, Any]) -> None:
+    """q'' = -1 pulls away from the stop at 1/2, met at 0.05 < creep: it leaves at e times that speed, and no faster."""
+    v = 0.05
+    stop = E.Stop(at="q", position=0.5, restitution=0.5, creep=0.1)
+    system = ns.mechanical(
+        1.0, 0.0, 0.0, parameters={"w": 1.0}, forcing={"q": lambda t, p: -1.0 + 0.0 * np.cos(p.w * t)},
+        elements={"stop": stop, **others}, coordinates=["q"],
+    )  # fmt: skip
+    first = np.sqrt(1.0 + v**2)  # v0^2 = v^2 + 2 * 1/2
+    run = ns.simulate(system, duration=first - v + 0.3, start={"v_q": first})
+    assert run["crossing_time"].values == pytest.approx([first - v], abs=1e-10)
+    assert end(run) == pytest.approx([0.5 - 0.5 * v * 0.3 - 0.045, -0.5 * v - 0.3], abs=1e-10)
+
+
+def test_what_was_taken_off_a_surface_decays_at_the_same_rate_whatever_its_gradient() -> None:
+    """Beside the surface a motion with a field of its own comes back as e^(-t): h = L (x + 2 y) for every L."""
+    from nonsmooth import Surface, System
+
+    for length in (1.0, 30.0):
+        system = System(
+            states=["x", "y"], parameters={"L": length},
+            modes={"below": lambda t, u, p: (1.0, 0.5), "above": lambda t, u, p: (1.0, -2.0)},
+            indicators={"h": lambda t, u, p: p.L * (u.x + 2 * u.y)},
+            transitions=[Surface("h", below="below", above="above", field=lambda t, u, p: (2.0, -1.0))],
+        )  # fmt: skip
+        off = 1e-9
+        run = ns.simulate(system, duration=1.5, start={"x": off}, mode="h_sliding")
+        x, y = end(run)
+        assert x + 2 * y == pytest.approx(off * np.exp(-1.5), rel=1e-4)
+        assert [x, y] == pytest.approx([3.0, -1.5], abs=1e-8)
