@@ -1,7 +1,8 @@
 """Apply small mistakes to the sources one by one and see that a test fails: ``python tests/mutants.py [part of name]``.
 
 ``mutants.toml`` lists them: the file, the text and what it becomes, and the tests that state the fact. A mutant that
-all of them survive is a hole in the tests, and one whose text has moved says nothing: exit code 1. The sources themselves are not touched; a copy is.
+all of them survive is a hole in the tests, and one whose text has moved says nothing: exit code 1. The sources
+themselves are not touched; a copy is.
 """
 
 from __future__ import annotations

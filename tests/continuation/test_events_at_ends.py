@@ -1,0 +1,62 @@
+"""Events at the very ends of a step or of a branch: met once, and only where they are."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from nonsmooth.continuation.march.event import Fold, Step, locate, special_on
+from nonsmooth.continuation.problems.curve import Curve, Point
+
+
+class Circle(Curve[Point]):
+    """x^2 + p^2 = 1."""
+
+    scale = np.ones(2)
+
+    def evaluate(self, Y: Any) -> Any:
+        return SimpleNamespace(X=Y, F=np.array([Y @ Y - 1.0]), J=2.0 * Y[None, :])
+
+    def fill(self, solved: Any, matrix: Any) -> None:
+        matrix[:] = solved.J
+
+    def residual(self, solved: Any) -> Any:
+        return solved.F
+
+    def moved(self, solved: Any, Y: Any) -> Any:
+        return self.evaluate(Y)
+
+    def described(self, Y: Any, tangent: Any, orientation: float, iterations: int, solved: Any) -> Point:
+        return Point(Y, tangent, orientation, iterations, solved)
+
+    def at_angle(self, angle: float) -> Point:
+        Y = np.array([np.sin(angle), np.cos(angle)])
+        return self.described(Y, np.array([Y[1], -Y[0]]), 1.0, 0, self.evaluate(Y))
+
+
+def step(a: float, b: float, cause: str = "") -> Step:
+    circle = Circle()
+    ends = circle.at_angle(a), circle.at_angle(b)
+    numbers = tuple([Fold().number(circle, end)] for end in ends)
+    return Step(circle, *ends, numbers, (np.empty(0), np.empty(0)), cause=cause)
+
+
+@pytest.mark.parametrize(("first", "found"), [(-1e-9, True), (-5e-3, False), (-0.5, False)])
+def test_a_branch_begins_at_an_event_where_its_number_is_nothing_there(first: float, found: bool) -> None:
+    """5 parts in a thousand of the number behind are no rounding: the event lies elsewhere, or nowhere."""
+    one = step(0.2, 0.4)
+    there = locate(one, lambda point: first - (1.0 + first) * float(one.a.tangent @ (point.Y - one.a.Y)) / one.end)
+    assert (there is not None) is found
+    assert there is None or there[0] == 0.0
+
+
+@pytest.mark.parametrize(("beyond", "listed"), [(1e-2, 1), (1e-7, 0), (-1e-7, 0)])
+def test_the_fold_at_which_a_closed_branch_begins_is_not_met_once_more(beyond: float, listed: int) -> None:
+    """The last step ends where the branch began; a fold 1e-2 before that is another one."""
+    last = step(-0.2, 0.05, "closed")
+    end = Circle().at_angle(beyond)
+    last.stop = float(last.a.tangent @ (end.Y - last.a.Y))
+    assert len(special_on(last, [Fold()])) == listed
