@@ -42,20 +42,22 @@ def test_a_longer_orbit_beside_a_branch_is_another_branch() -> None:
     """x = 100 r is fixed, and beside it, at +-1/2 of a range of 100, lies a cycle of two: neither is the other."""
 
     def inside(u: Any, p: Any) -> Any:
-        return (100 * p.r - (0.5 + p.r) * (u.x - 100 * p.r),)
+        return (100 * p.r - (p.r - 0.5) * (u.x - 100 * p.r),)
 
     def outside(side: int) -> Any:  # side / 2 goes to -side / 2
         return lambda u, p: (100 * p.r - side * 0.5 - 0.3 * (u.x - 100 * p.r - side * 0.5),)
 
     system = ns.Map(
-        states=["x"], parameters={"r": 0.0}, scale={"x": 100.0},
+        states=["x"], parameters={"r": 1.0}, scale={"x": 100.0},
         branches=[
             ns.Branch(outside(-1), when="low < 0 and high < 0"), ns.Branch(inside, when="low > 0 and high < 0"),
             ns.Branch(outside(1), when="low > 0 and high > 0"),
         ],
         indicators={"low": lambda u, p: u.x - 100 * p.r + 0.25, "high": lambda u, p: u.x - 100 * p.r - 0.25},
     )  # fmt: skip
-    found = ns.bifurcation_diagram(system, "r", (0.0, 1.0), n=21, depth=0, max_period=2, progress=False)
+    found = ns.bifurcation_diagram(
+        system, "r", (1.0, 2.0), n=21, start={"x": 100.0}, depth=0, max_period=2, progress=False
+    )
     assert found["period_number"].values.tolist() == [1, 2]
     assert found["parent"].values.tolist() == [-1, -1]
     second = found.isel(point=np.flatnonzero(found["branch"].values == 1))

@@ -1,7 +1,8 @@
-"""Mechanical systems against closed forms and SciPy's matrix exponential, through verbs alone."""
+"""Mechanical systems, elements and maps against closed forms and SciPy's matrix exponential, through verbs alone."""
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -98,7 +99,7 @@ def test_a_mass_that_rests_on_a_stop_goes_where_the_stop_goes(others: dict[str, 
 
 
 def test_a_stop_that_moves_by_a_ramp_pushes_the_mass() -> None:
-    """What rests on it stays within 1e-4 of the scale: the ramp moves by a hundred times that."""
+    """A mass that rests on it stays within 1e-4 of the scale: the ramp moves by a hundred times that."""
     stop = E.Stop(at="q", position="d")
     system = ns.mechanical(
         1.0, 0.2, 1.0, parameters={"d": 0.8}, forcing={"q": lambda t, p: 2.0}, elements={"stop": stop},
@@ -138,3 +139,15 @@ def test_what_was_taken_off_a_surface_decays_at_the_same_rate_whatever_its_gradi
         x, y = end(run)
         assert x + 2 * y == pytest.approx(off * np.exp(-1.5), rel=1e-4)
         assert [x, y] == pytest.approx([3.0, -1.5], abs=1e-8)
+
+
+def test_a_gap_between_regions_of_a_map_is_shown_in_the_units_of_its_states() -> None:
+    """The regions x < 200 and x > 500 leave out what lies between them: the message names a point of it."""
+    still = lambda u, p: (0.5 * u.x,)
+    with pytest.raises(ns.SystemDefinitionError, match="lies in no region") as caught:
+        ns.Map(
+            states=["x"], parameters={"a": 1.0}, scale={"x": 100.0},
+            branches=[ns.Branch(still, when="low < 0"), ns.Branch(still, when="high > 0")],
+            indicators={"low": lambda u, p: u.x - 200 * p.a, "high": lambda u, p: u.x - 500 * p.a},
+        )  # fmt: skip
+    assert 200.0 < float(re.search(r"x = (\S+) lies", str(caught.value))[1]) < 500.0
