@@ -28,7 +28,13 @@ test: $(VENV)/.compiled-test  ## run the tests
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 slow: $(VENV)/.compiled-test $(VENV)/.installed-cluster  ## run the long campaigns that `make test` leaves out
-	$(BIN)/python -m pytest -m slow -s
+	$(BIN)/python -m pytest -m slow -s -o faulthandler_timeout=0
+
+installed: $(VENV)/.compiled-test  ## build sdist and wheel; the README's ten lines by the wheel, in an empty environment
+	$(BIN)/python tests/installed.py
+
+test-times: $(VENV)/.compiled-test  ## processor time of each file of tests: compiling, importing, children, browser, rest
+	$(BIN)/python -m pytest -p tests.costs -n 0 -q
 
 mutants: $(VENV)/.compiled-test  ## small mistakes in the sources, one by one: each must fail a test
 	$(BIN)/python tests/mutants.py

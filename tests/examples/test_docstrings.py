@@ -15,7 +15,8 @@ WITH = (ast.Module, ast.ClassDef, ast.FunctionDef)
 def examples(path: Path) -> list[doctest.DocTest]:
     """The examples of a file's docstrings, one list of lines for each."""
     found, parser = [], doctest.DocTestParser()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    source = path.read_text(encoding="utf-8")
+    for node in ast.walk(ast.parse(source)) if ">>>" in source else ():
         if isinstance(node, WITH) and ">>>" in (text := ast.get_docstring(node) or ""):
             name = getattr(node, "name", path.stem)
             found.append(parser.get_doctest(text, {}, name, str(path), getattr(node, "lineno", 1)))
