@@ -1,0 +1,134 @@
+"""Fits of x' = a to straight lines with noise: each number of the result is one of linear regression."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import nonsmooth as ns
+
+pytestmark = pytest.mark.physics
+NOISE = 0.1
+
+
+def line(unit: str = "") -> ns.System:
+    states = {"x": unit} if unit else ["x"]
+    return ns.System(states=states, parameters={"a": 1.5}, modes={"m": lambda t, u, p: (p.a,)})
+
+
+def readings(seed: int = 2, n: int = 60, x0: float = 1.0, a: float = 2.0) -> xr.Dataset:
+    t = np.linspace(0.0, 3.0, n)
+    return xr.Dataset({"x": ("time", x0 + a * t + NOISE * np.random.default_rng(seed).standard_normal(n))}, {"time": t})
+
+
+def regression(data: xr.Dataset) -> tuple[np.ndarray, np.ndarray, float]:
+    """Slope and start, their covariance over that of a reading, and the scatter about the line."""
+    t, x = data["time"].values, data["x"].values
+    A = np.column_stack([t, np.ones_like(t)])
+    found, left, *_ = np.linalg.lstsq(A, x, rcond=None)
+    return found, np.linalg.inv(A.T @ A), float(np.sqrt(left[0] / (len(t) - 2)))
+
+
+@cache
+def plain(seed: int = 2) -> Any:
+    return ns.fit(line(), readings(seed), ["a"], progress=False)
+
+
+def test_slope_start_and_noise_are_those_of_regression() -> None:
+    (a, x0), _, scatter = regression(readings())
+    found = plain()
+    assert found["a"] == pytest.approx(a, rel=1e-7)
+    assert found.extra["x(0)"].value == pytest.approx(x0, rel=1e-6)
+    assert found.extra["x.noise"].value == pytest.approx(scatter, rel=1e-6)
+
+
+def test_uncertainties_cover_over_seeds() -> None:
+    """Means over records whose scatter differs: those of regression; of the noise, its size over the root of 2 n."""
+    rows = []
+    for seed in range(8):
+        found, (_, C, _) = plain(seed), regression(readings(seed))
+        stated = [found.estimate("a"), found.extra["x(0)"], found.extra["x.noise"]]
+        exact = [NOISE * np.sqrt(C[0, 0]), NOISE * np.sqrt(C[1, 1]), NOISE / np.sqrt(2 * 60)]
+        rows.append([one.uncertainty / size for one, size in zip(stated, exact, strict=True)])
+    assert np.median(rows, axis=0) == pytest.approx(1.0, abs=0.25)
+
+
+def test_the_scatter_of_the_record_is_the_uncertainty_whatever_noise_is_stated() -> None:
+    stated = [
+        ns.fit(line(), readings(), ["a"], measured={"x": ns.Sensor("x", noise=k * NOISE)}, progress=False)
+        for k in (1, 5)
+    ]  # fmt: skip
+    sizes = [one.estimate("a").uncertainty for one in stated]
+    assert sizes == pytest.approx([plain().estimate("a").uncertainty] * 2, rel=0.05)
+    assert not any("x.noise" in one.extra for one in stated)
+
+
+@pytest.mark.parametrize(("centre", "error"), [(2.5, 0.05), (2.05, 0.01)])
+def test_a_value_known_before_is_weighed_by_its_precision(centre: float, error: float) -> None:
+    """The mean of both values by the inverses of their variances."""
+    (a, _), C, _ = regression(readings())
+    weight = np.array([1 / (NOISE**2 * C[0, 0]), 1 / error**2])
+    found = ns.fit(
+        line(), readings(), ["a"], measured={"x": ns.Sensor("x", noise=NOISE)}, priors={"a": (centre, error)},
+        progress=False,
+    )  # fmt: skip
+    assert found["a"] == pytest.approx(weight @ [a, centre] / weight.sum(), rel=1e-6)
+    assert found.estimate("a").uncertainty == pytest.approx(weight.sum() ** -0.5, rel=0.3)
+
+
+@pytest.mark.parametrize(("bounds", "end"), [((1.0, 1.8), 1.8), ((None, 1.7), 1.7)])
+def test_an_unknown_at_its_bound_is_said_to_be_there(bounds: tuple[Any, float], end: float) -> None:
+    found = ns.fit(line(), readings(), {"a": bounds}, progress=False)
+    assert found["a"] == end and "at its bound" in found.identifiability["a"]
+    low = ns.fit(line().with_parameters(a=2.5), readings(), {"a": (2.3, 3.0)}, progress=False)
+    assert low["a"] == 2.3 and "at its bound" in low.identifiability["a"]
+    assert "readings of x" in plain().identifiability["a"]
+
+
+def test_a_sensor_shows_gain_times_the_state_and_an_offset() -> None:
+    """3 (x - ...) + 0.5: slope and start of the state are those of the reading over the gain, less the offset."""
+    data = readings()
+    shown = data.assign(x=3.0 * data["x"] + 0.5)
+    found = ns.fit(line(), shown, ["a"], measured={"x": ns.Sensor("x", gain=3.0, offset=0.5)}, progress=False)
+    assert found["a"] == pytest.approx(plain()["a"], rel=1e-8)
+    assert found.extra["x(0)"].value == pytest.approx(plain().extra["x(0)"].value, rel=1e-7)
+    assert found.estimate("a").uncertainty == pytest.approx(plain().estimate("a").uncertainty, rel=1e-4)
+
+
+def test_limits_of_a_profile_are_those_of_chi_squared() -> None:
+    """On a line the rise of chi^2 is a parabola: its 95 % limits are 1.96 uncertainties off."""
+    found = ns.fit(line(), readings(), ["a"], profile=["a"], progress=False)
+    [profile] = [one.data for one in found.findings if one.plot == "profile"]
+    away = 1.9600 * found.estimate("a").uncertainty
+    assert float(profile["low"]) == pytest.approx(found["a"] - away, abs=0.02 * away)
+    assert float(profile["high"]) == pytest.approx(found["a"] + away, abs=0.02 * away)
+
+
+def test_noise_that_correlates_is_found_with_its_correlation() -> None:
+    """An autoregressive process with 0.7 from reading to reading; of white noise nothing is said."""
+    n, rho, rng = 400, 0.7, np.random.default_rng(5)
+    e = np.zeros(n)
+    for k, shock in enumerate(rng.standard_normal(n)):
+        e[k] = (rho * e[k - 1] if k else 0.0) + shock
+    t = np.linspace(0, 3, n)
+    data = xr.Dataset({"x": ("time", 1 + 2 * t + NOISE * e)}, {"time": t})
+    notes = [one for one in ns.fit(line(), data, ["a"], progress=False).notes if "correlates by" in one]
+    assert len(notes) == 1
+    assert float(notes[0].split("correlates by ")[1][:4]) == pytest.approx(rho, abs=0.1)
+    assert not any("correlates by" in one for seed in range(8) for one in plain(seed).notes)
+
+
+def test_two_records_share_the_slope_and_have_starts_of_their_own() -> None:
+    """Regression with one slope and two constants."""
+    first, second = readings(1), readings(7, 40, x0=-2.0)
+    t, x = (np.concatenate([one[name].values for one in (first, second)]) for name in ("time", "x"))
+    own = np.repeat(np.eye(2), [60, 40], axis=0)
+    (a, b0, b1), *_ = np.linalg.lstsq(np.column_stack([t, own]), x, rcond=None)
+    found = ns.fit(line(), [first, second], ["a"], progress=False)
+    assert found["a"] == pytest.approx(a, rel=1e-6)
+    starts = [one.value for name, one in found.extra.items() if name.startswith("x(0)")]
+    assert starts == pytest.approx([b0, b1], rel=1e-6)
