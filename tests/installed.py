@@ -1,4 +1,4 @@
-"""Build sdist and wheel, install the wheel in an empty environment and run the README's ten lines there: ``make installed``.
+"""Build sdist and wheel, install the wheel in an empty environment and run the README's ten lines: ``make installed``.
 
 The wheel takes the kernels that were compiled ahead in this checkout. Where the lines run, neither a compiler nor make
 is on the path, the checkout is not in sight and the cache is empty: nothing is compiled but the sweep's own model.
@@ -59,7 +59,8 @@ def main() -> int:
         programs = folder / "venv" / ("Scripts" if os.name == "nt" else "bin")
         took = run([str(programs / "python"), "-m", "pip", "install", "-qq", "--no-compile", str(wheel)], folder)
         print(f"installed with what it needs: {took:.0f} s", flush=True)
-        lines = re.search(r"^## Ten lines\n.*?^```python\n(.*?)^```", (ROOT / "README.md").read_text("utf-8"), re.M | re.S)
+        readme = (ROOT / "README.md").read_text(encoding="utf-8")
+        lines = re.search(r"^## Ten lines\n.*?^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
         assert lines is not None
         (folder / "ten_lines.py").write_text(lines[1], encoding="utf-8")
         alone = {"PATH": str(programs), "MPLBACKEND": "Agg", "NONSMOOTH_CACHE_DIR": str(folder / "cache")}

@@ -1,0 +1,203 @@
+"""A sample of generated mutants, spread over the rooms: ``python tests/mutants_sample.py [NUMBER] [--rooms ...]``.
+
+A mutant is one operator, condition or constant changed, or one statement dropped; messages and annotations are left
+out. Each room has a share by its lines. The seed is the hash of the commit, so that a sample is fresh after each change and
+the same for who repeats it. The tests that run a mutant's function are those that ``python -m pytest -p tests.costs
+--called out/called.json -n 0`` has seen, the quickest first; without that file, or for kernels, which no profile sees,
+the tests of the room. Survivors are printed with their lines; the score by room is the table of the documentation.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src" / "nonsmooth"
+SWAPS: dict[type, type] = {
+    ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
+    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.And: ast.Or, ast.Or: ast.And,
+}  # fmt: skip
+DROPPED = (ast.Assign, ast.AugAssign, ast.Expr, ast.Continue, ast.Break)
+SILENT = (ast.Raise, ast.JoinedStr, ast.Assert, ast.AnnAssign, ast.arguments, ast.Import, ast.ImportFrom)
+FOR_KERNELS = ["tests/kernels", "tests/flow", "tests/diagrams/test_sweep.py", "tests/diagrams/test_lyapunov.py"]
+
+
+@dataclass
+class Mutant:
+    path: Path
+    line: int
+    words: str
+    text: str  # of the whole file
+    function: int  # its first line, as a code object has it; 0 outside functions
+
+
+Place = tuple[ast.AST, str, ast.AST, ast.stmt | None, int]
+
+
+def places(node: ast.AST, around: ast.stmt | None = None, function: int = 0) -> Iterator[Place]:
+    """(node, field, what stands there instead, statement around it, first line of the function) of each change."""
+    if isinstance(node, ast.FunctionDef):
+        function = min([node.lineno, *(one.lineno for one in node.decorator_list)])
+    around = node if isinstance(node, ast.stmt) else around
+    for name, value in ast.iter_fields(node):
+        if name in ("annotation", "returns", "decorator_list"):
+            continue
+        for i, child in enumerate(value) if isinstance(value, list) else [(-1, value)]:
+            if not isinstance(child, ast.AST) or isinstance(child, SILENT) or _is_text(child):
+                continue
+            where = name if i < 0 else f"{name}.{i}"
+            if type(child) in SWAPS:
+                yield node, where, SWAPS[type(child)](), around, function
+            elif isinstance(child, ast.Constant) and type(child.value) in (int, float, bool):
+                other = not child.value if isinstance(child.value, bool) else child.value + 1
+                yield node, where, ast.Constant(other), around, function
+            elif name == "test":
+                yield node, where, ast.UnaryOp(ast.Not(), child), around, function
+            elif function and isinstance(child, DROPPED):
+                yield node, where, ast.Pass(), around, function
+            yield from places(child, around, function)
+
+
+def _is_text(node: ast.AST) -> bool:
+    value = node.value if isinstance(node, ast.Expr) else node
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)
+
+
+def mutants(path: Path) -> Iterator[Mutant]:
+    """Every mutant of a file; lines that are not touched stay where they are."""
+    text = path.read_text(encoding="utf-8")
+    tree = ast.parse(text)
+    lines = text.splitlines(keepends=True)
+    for node, where, new, around, function in places(tree):
+        name, _, i = where.partition(".")
+        old = getattr(node, name)[int(i)] if i else getattr(node, name)
+        owner = old if isinstance(old, ast.stmt) else around
+        if owner is None or isinstance(owner, SILENT):
+            continue
+        _put(node, name, i, new)
+        changed = ast.unparse(new if owner is old else owner)
+        _put(node, name, i, old)
+        begin, end = owner.lineno, owner.end_lineno or owner.lineno
+        margin = lines[begin - 1][: owner.col_offset]
+        if margin.strip():
+            continue  # behind a semicolon or a colon
+        fresh = "".join(f"{margin}{line}\n" for line in changed.splitlines())
+        words = "dropped" if owner is old else f"{type(old).__name__} -> {type(new).__name__} in"
+        shown = " ".join(ast.unparse(old if owner is old else owner).split("\n")[0].split())
+        whole = "".join([*lines[: begin - 1], fresh, *lines[end:]])
+        yield Mutant(path, begin, f"{words}: {shown[:90]}", whole, function)
+
+
+def _put(node: ast.AST, name: str, i: str, value: object) -> None:
+    if i:
+        getattr(node, name)[int(i)] = value
+    else:
+        setattr(node, name, value)
+
+
+def room_of(path: Path) -> str:
+    parts = path.relative_to(PACKAGE).parts
+    return "top" if len(parts) == 1 else parts[0]
+
+
+def sample(number: int, rooms: list[str], seed: str) -> list[Mutant]:
+    """Mutants of these rooms, each room's share by its lines, at least one."""
+    files: dict[str, list[Path]] = defaultdict(list)
+    for path in sorted(PACKAGE.rglob("*.py")):
+        if not rooms or room_of(path) in rooms:
+            files[room_of(path)].append(path)
+    sizes = {room: sum(path.read_text("utf-8").count("\n") for path in paths) for room, paths in files.items()}
+    rng, found = random.Random(seed), []
+    for room, paths in files.items():
+        for _ in range(max(1, round(number * sizes[room] / sum(sizes.values())))):
+            lengths = [path.read_text("utf-8").count("\n") for path in paths]
+            while not (every := list(mutants(rng.choices(paths, lengths)[0]))):
+                pass
+            found.append(rng.choice(every))
+    return found
+
+
+def tests_of(one: Mutant, called: dict, longest: float) -> list[str]:
+    """The tests to run, the quickest first; as many as take no longer than ``longest`` seconds together."""
+    file = str(one.path.relative_to(PACKAGE))
+    known = called.get("called", {})
+    if one.function:
+        seen = set(known.get(f"{file}:{one.function}", []))
+    else:
+        seen = {test for place, tests in known.items() if place.startswith(f"{file}:") for test in tests}
+    if not seen:
+        room = room_of(one.path)
+        return FOR_KERNELS if room == "kernels" else [f"tests/{room}"] if (ROOT / "tests" / room).is_dir() else []
+    chosen, left = [], longest
+    for test in sorted(seen, key=lambda name: called["took"][name]):
+        left -= called["took"][test]
+        chosen.append(test)
+        if left < 0:
+            break
+    return chosen
+
+
+def caught(one: Mutant, tests: list[str], sources: Path, limit: float) -> bool:
+    """Return whether a test fails, or hangs, with the mutant."""
+    place = sources / "nonsmooth" / one.path.relative_to(PACKAGE)
+    original = place.read_text(encoding="utf-8")
+    place.write_text(one.text, encoding="utf-8")
+    with tempfile.NamedTemporaryFile("w", suffix=".txt") as names:
+        names.write("\n".join(tests))
+        names.flush()
+        words = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", f"@{names.name}"]
+        try:
+            done = subprocess.run(
+                words, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(sources)}, capture_output=True, timeout=limit
+            )
+            return done.returncode != 0
+        except subprocess.TimeoutExpired:
+            return True
+        finally:
+            place.write_text(original, encoding="utf-8")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("number", type=int, nargs="?", default=300)
+    parser.add_argument("--rooms", nargs="*", default=[])
+    parser.add_argument("--seed", default="", help="instead of the hash of the commit")
+    parser.add_argument("--called", default="out/called.json")
+    parser.add_argument("--longest", type=float, default=120.0, help="seconds of tests for one mutant")
+    options = parser.parse_args()
+    head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True).stdout.strip()
+    seed = options.seed or head
+    file = ROOT / options.called
+    called = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    score: dict[str, list[bool]] = defaultdict(list)
+    with tempfile.TemporaryDirectory() as folder:
+        sources = Path(folder) / "src"
+        shutil.copytree(ROOT / "src", sources, ignore=shutil.ignore_patterns("__pycache__"))
+        for one in sample(options.number, options.rooms, seed):
+            tests = tests_of(one, called, options.longest)
+            fine = bool(tests) and caught(one, tests, sources, 10 * options.longest + 60)
+            score[room_of(one.path)].append(fine)
+            place = f"{one.path.relative_to(PACKAGE)}:{one.line}"
+            print(f"{'caught  ' if fine else 'SURVIVES'}  {place}  {one.words}  ({len(tests)} tests)", flush=True)
+    print(f"\nseed {seed}\n\n| room | mutants | caught |\n|---|---|---|")
+    for room, fine in sorted(score.items()):
+        print(f"| `{room}` | {len(fine)} | {sum(fine)} |")
+    every = [one for fine in score.values() for one in fine]
+    print(f"| all | {len(every)} | {sum(every)} |")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
