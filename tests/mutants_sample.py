@@ -1,8 +1,8 @@
 """A sample of generated mutants, spread over the rooms: ``python tests/mutants_sample.py [NUMBER] [--rooms ...]``.
 
 A mutant is one operator, condition or constant changed, or one statement dropped; messages and annotations are left
-out. Each room has a share by its lines. The seed is the hash of the commit, so that a sample is fresh after each change and
-the same for who repeats it. The tests that run a mutant's function are those that ``python -m pytest -p tests.costs
+out. Each room has a share by its lines. The seed is the hash of the commit, so that a sample is fresh after each change
+and the same for who repeats it. The tests that run a mutant's function are those that ``python -m pytest -p tests.costs
 --called out/called.json -n 0`` has seen, the quickest first; without that file, or for kernels, which no profile sees,
 the tests of the room. Survivors are printed with their lines; the score by room is the table of the documentation.
 """

@@ -62,8 +62,9 @@ def test_the_scatter_of_the_record_is_the_uncertainty_whatever_noise_is_stated()
         ns.fit(line(), readings(), ["a"], measured={"x": ns.Sensor("x", noise=k * NOISE)}, progress=False)
         for k in (1, 5)
     ]  # fmt: skip
-    sizes = [one.estimate("a").uncertainty for one in stated]
-    assert sizes == pytest.approx([plain().estimate("a").uncertainty] * 2, rel=0.05)
+    for name in ("a", "x(0)"):
+        sizes = [one.estimate(name).uncertainty for one in (*stated, plain())]
+        assert sizes == pytest.approx([sizes[-1]] * 3, rel=0.05)
     assert not any("x.noise" in one.extra for one in stated)
 
 
@@ -100,8 +101,8 @@ def test_a_sensor_shows_gain_times_the_state_and_an_offset() -> None:
 
 
 def test_limits_of_a_profile_are_those_of_chi_squared() -> None:
-    """On a line the rise of chi^2 is a parabola: its 95 % limits are 1.96 uncertainties off."""
-    found = ns.fit(line(), readings(), ["a"], profile=["a"], progress=False)
+    """On a line the rise of chi^2, over the residuals' own correlation, is a parabola: limits 1.96 uncertainties off."""
+    found = ns.fit(line(), readings(0), ["a"], profile=["a"], progress=False)
     [profile] = [one.data for one in found.findings if one.plot == "profile"]
     away = 1.9600 * found.estimate("a").uncertainty
     assert float(profile["low"]) == pytest.approx(found["a"] - away, abs=0.02 * away)

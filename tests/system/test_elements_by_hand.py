@@ -1,0 +1,121 @@
+"""Forces of elements and the instants at which they begin and end, on one mass, in closed form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import nonsmooth as ns
+
+E = ns.elements
+pytestmark = pytest.mark.physics
+
+
+def mass(force: Any = None, **elements: Any) -> ns.System:
+    """q'' = force + the elements' forces."""
+    return ns.mechanical(
+        1.0, 0.0, 0.0, parameters={}, forcing={"q": force} if force else None, elements=elements, coordinates=["q"]
+    )  # fmt: skip
+
+
+def run(system: ns.System, duration: float, q: float, v: float) -> Any:
+    return ns.simulate(system, duration=duration, start={"q": q, "v_q": v})
+
+
+def swing(t: Any, v: float, k: float, c: float) -> tuple[Any, Any]:
+    """Place and speed of x'' + c x' + k x = 0 from x = 0."""
+    w, d = np.sqrt(k - c * c / 4), c / 2
+    wave = np.exp(-d * t)
+    return v / w * wave * np.sin(w * t), v * wave * (np.cos(w * t) - d / w * np.sin(w * t))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_backlash_is_free_in_its_play_and_a_damped_spring_beyond(side: int) -> None:
+    b, k, c, v = 0.2, 9.0, 0.8, 1.5
+    found = run(mass(play=E.Backlash(at="q", half_width=b, stiffness=k, damping=c)), 0.6, 0.0, side * v)
+    x, speed = swing(0.6 - b / v, v, k, c)
+    assert found["u"].values[-1] == pytest.approx([side * (b + x), side * speed], abs=1e-10)
+    assert found["crossing_time"].values == pytest.approx([b / v], abs=1e-12)
+    assert float(found["play_force"][-1]) == pytest.approx(-side * (k * x + c * speed), abs=1e-9)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_preloaded_spring_pulls_back_by_its_preload_and_its_stiffness(side: int) -> None:
+    """From s = 0 at speed v: s = -P / k + P / k cos w t + v / w sin w t on its side."""
+    P, k, v, t = 0.7, 4.0, 2.0, 0.5
+    found = run(mass(spring=E.PreloadedSpring(at="q", preload=P, stiffness=k)), t, 0.0, side * v)
+    w = np.sqrt(k)
+    s = -P / k + P / k * np.cos(w * t) + v / w * np.sin(w * t)
+    assert found["u"].values[-1, 0] == pytest.approx(side * s, abs=1e-10)
+
+
+@pytest.mark.parametrize("load", [0.6, -0.6, 0.9, -0.9])
+def test_a_preload_holds_what_is_less(load: float) -> None:
+    """P = .7 holds .6; of .9 it leaves .2, which moves the mass as load - P - k s."""
+    P, k, t = 0.7, 4.0, 0.5
+    found = run(mass(lambda t, p: load, spring=E.PreloadedSpring(at="q", preload=P, stiffness=k)), t, 0.0, 0.0)
+    left = np.sign(load) * max(abs(load) - P, 0.0)
+    assert found["u"].values[-1, 0] == pytest.approx(left / k * (1 - np.cos(np.sqrt(k) * t)), abs=1e-8)
+
+
+@pytest.mark.parametrize("pulls", [False, True])
+def test_an_elastic_stop_ends_where_its_force_or_its_gap_vanishes(pulls: bool) -> None:
+    """A damper would pull before the gap opens: one that does not pull lets go where k x + c v = 0."""
+    k, c, v = 9.0, 1.2, 1.0
+    stop = E.ElasticStop(at="q", position=0.5, stiffness=k, damping=c, pulls=pulls)
+    found = run(mass(stop=stop), 2.5, 0.0, v)
+    last = np.pi / np.sqrt(k - c * c / 4)
+    end = last if pulls else brentq(lambda t: k * swing(t, v, k, c)[0] + c * swing(t, v, k, c)[1], 0.5 * last, last)
+    assert found["crossing_time"].values == pytest.approx([0.5 / v, 0.5 / v + end], abs=1e-9)
+    assert found["u"].values[-1, 1] == pytest.approx(swing(end, v, k, c)[1], abs=1e-9)
+    t = np.linspace(0, end, 10001)
+    largest = (k * swing(t, v, k, c)[0] + c * swing(t, v, k, c)[1]).max()
+    assert np.abs(found["stop_force"].values).max() == pytest.approx(largest, rel=2e-3)
+
+
+@pytest.mark.parametrize("v", [1.0, -1.0])
+def test_friction_is_the_coefficient_times_the_normal_force(v: float) -> None:
+    """mu N = .6 brings the mass to rest at v^2 / 2 mu N, where a load of 1.4 mu N, below static N, holds it."""
+    mu, static, N = 0.2, 0.3, 3.0
+    friction = E.Coulomb(at="q", friction=mu, static=static, normal=N)
+    found = run(mass(f=friction), 3.0, 0.0, v)
+    assert found["u"].values[-1] == pytest.approx([v * abs(v) / (2 * mu * N), 0.0], abs=1e-9)
+    held = run(mass(lambda t, p: np.sign(v) * 0.84, f=friction), 3.0, 0.0, 0.0)
+    assert held["u"].values[-1] == pytest.approx([0.0, 0.0], abs=1e-12)
+    torn = run(mass(lambda t, p: np.sign(v) * 0.96, f=friction), 1.0, 0.0, 0.0)
+    assert torn["u"].values[-1] == pytest.approx(np.sign(v) * np.array([0.18, 0.36]), abs=1e-9)
+
+
+@pytest.mark.parametrize("v", [1.0, -1.0])
+def test_friction_that_depends_on_the_speeds_magnitude(v: float) -> None:
+    """v' = -(f + g |v|): |v| = (|v_0| + f / g) e^(-g t) - f / g, until it stops."""
+    f, g, t = 0.3, 0.5, 1.0
+    found = run(mass(f=E.Coulomb(at="q", friction=lambda speed, p: f + g * speed)), t, 0.0, v)
+    size = (1 + f / g) * np.exp(-g * t) - f / g
+    assert found["u"].values[-1, 1] == pytest.approx(np.sign(v) * size, abs=1e-9)
+
+
+def test_a_belt_carries_the_mass_along() -> None:
+    """Slower than the belt the friction drives it on, until it sticks: at t = belt / f it has gone belt^2 / 2 f."""
+    f, belt = 0.4, -0.8
+    found = run(mass(f=E.Coulomb(at="q", friction=f, belt=belt)), 3.0, 0.0, 0.0)
+    assert found["u"].values[-1] == pytest.approx([-(belt**2) / (2 * f) + belt * (3.0 - 2.0), belt], abs=1e-9)
+    assert found["crossing_time"].values == pytest.approx([2.0], abs=1e-9)
+
+
+@pytest.mark.parametrize(("side", "e"), [(1, 0.5), (-1, 0.5), (1, 0.0), (1, 1.0)])
+def test_an_impact_turns_the_speed_round_by_the_restitution(side: int, e: float) -> None:
+    found = run(mass(s=E.Stop(at="q", position=side * 0.3, side=side, restitution=e)), 0.5, 0.0, side * 1.0)
+    assert found["u"].values[-1] == pytest.approx([side * (0.3 - e * 0.2), -side * e], abs=1e-10)
+    with pytest.raises(ns.SystemDefinitionError, match="between 0 and 1"):
+        E.Stop(at="q", position=0.3, restitution=1.1)
+    by_name = ns.mechanical(
+        1.0, 0.0, 0.0, parameters={"e": 0.5}, elements={"s": E.Stop(at="q", position=1.0, restitution="e")},
+        coordinates=["q"],
+    )  # fmt: skip
+    for wrong in (1.1, -0.1):
+        with pytest.raises(ValueError, match="restitution of element 's' lies between 0 and 1"):
+            by_name.with_parameters(e=wrong)
