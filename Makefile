@@ -8,12 +8,14 @@ PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 OUT    ?= out/savi2007
 # Matrices are tiny: threads of the linear algebra only wait for each other and for a core.
 export OPENBLAS_NUM_THREADS ?= 1
+# Without bytecode each worker rewrites all tests, and each child compiles all that it imports.
+export PYTHONDONTWRITEBYTECODE :=
 # The order of the files is that of tests/conftest.py.
 PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward coverage-fit check \
-	contacts bench gpu gpu-compiler docs screenshots clean distclean versions
+.PHONY: help reproduce reproduce-full test slow installed test-times mutants mutants-sample fuzz altered coverage \
+	coverage-awkward coverage-fit check contacts bench gpu gpu-compiler docs screenshots clean distclean versions
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26
@@ -38,6 +40,11 @@ test-times: $(VENV)/.compiled-test  ## processor time of each file of tests: com
 
 mutants: $(VENV)/.compiled-test  ## small mistakes in the sources, one by one: each must fail a test
 	$(BIN)/python tests/mutants.py
+
+mutants-sample: $(VENV)/.compiled-test  ## 300 generated mistakes, spread over the rooms by the commit's hash (hours)
+	@mkdir -p out
+	test -f out/called.json || $(BIN)/python -m pytest -p tests.costs --called out/called.json -n 0 -q
+	$(BIN)/python tests/mutants_sample.py $(NUMBER)
 
 fuzz: $(VENV)/.compiled-test  ## read 100 000 damaged recordings with every reader
 	$(BIN)/python -m pytest -m slow tests/recordings/test_fuzz.py -s
