@@ -54,7 +54,8 @@ def main() -> int:
         took = run([sys.executable, "-m", "hatchling", "build", "-d", str(folder / "dist")], ROOT, **kept)
         [sdist], [wheel] = (list((folder / "dist").glob(one)) for one in ("*.tar.gz", "*.whl"))
         check_contents(sdist, wheel)
-        print(f"{sdist.name}, {wheel.name} ({wheel.stat().st_size / 1e6:.1f} MB): {took:.0f} s of processor time", flush=True)
+        size = wheel.stat().st_size / 1e6
+        print(f"{sdist.name}, {wheel.name} ({size:.1f} MB): {took:.0f} s of processor time", flush=True)
         run([sys.executable, "-m", "venv", str(folder / "venv")], folder)
         programs = folder / "venv" / ("Scripts" if os.name == "nt" else "bin")
         took = run([str(programs / "python"), "-m", "pip", "install", "-qq", str(wheel)], folder)

@@ -13,6 +13,8 @@ import reference_values as known
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 support = ns.models.discontinuous_support
 #: Parameters, range, kinds of special points with their numbers on branches of period 1, and closed or known values.
 FIGURES: dict[str, tuple[dict[str, float], str, tuple[float, float], dict[str, int], list[float]]] = {

@@ -9,6 +9,8 @@ import pytest
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 
 def skew(left: float, right: float, step: float = 0.0, mu: float = -0.1) -> ns.Map:
     """Slopes on either side of 0, and how far the map falls there."""

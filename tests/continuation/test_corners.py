@@ -11,6 +11,8 @@ import xarray as xr
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 # x' = -x + cos(t - phi) answers with cos(t - phi - pi / 4) / sqrt(2)
 
 

@@ -11,6 +11,8 @@ import xarray as xr
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 
 def row(branch: xr.Dataset, kind: str, i: int = 0) -> xr.Dataset:
     special = ns.special_points(branch)

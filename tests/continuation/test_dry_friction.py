@@ -10,6 +10,8 @@ from scipy.optimize import brentq
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 
 def coulomb(w: float, F: float) -> ns.System:
     return ns.System(

@@ -13,6 +13,8 @@ from test_sliding_bifurcations import BACKWARD, FORWARD, STICK, Belt, root
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 #: x'' + x = cos(w t) - F sgn(x'), w = 1 / 5: one slip each way from a stick, or two.
 W = mpf(1) / 5
 

@@ -8,6 +8,8 @@ from scipy.optimize import brentq
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 ALPHA = np.pi / 8  # half the angle between two spokes: a step keeps cos(2 alpha)^2 = 1/2 of the energy
 
 

@@ -11,6 +11,8 @@ import xarray as xr
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 A, B = 1.4, 0.3
 
 

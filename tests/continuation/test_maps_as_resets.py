@@ -10,6 +10,8 @@ import pytest
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 
 def kicked(states: list[str], values: dict[str, float], kick: Callable[..., Any]) -> ns.System:
     """States at rest but for a reset in the middle of every period of length 1."""

@@ -13,6 +13,8 @@ import xarray as xr
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 support = ns.models.discontinuous_support
 
 

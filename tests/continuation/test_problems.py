@@ -11,6 +11,8 @@ from scipy.optimize import brentq, fsolve
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 
 def table(branch: xr.Dataset) -> list[tuple[str, float]]:
     special = ns.special_points(branch)

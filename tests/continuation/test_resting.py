@@ -10,6 +10,8 @@ import xarray as xr
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 E = ns.elements
 MU = 0.5
 

@@ -13,6 +13,8 @@ from mpmath import mp, mpf
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 DIGITS = 1e-10  # relative
 
 

@@ -11,6 +11,8 @@ from scipy.optimize import brentq
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 
 def returns(system: ns.System, branch: xr.Dataset, name: str, every: int) -> float:
     """Largest distance by which simulated orbits of a branch miss their beginning, of those with small multipliers."""

@@ -5,6 +5,8 @@ import pytest
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 
 def stopped_duffing(**parameters):
     def smooth(t, u, p):

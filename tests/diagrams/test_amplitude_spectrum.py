@@ -7,6 +7,8 @@ import pytest
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 SUPPORT = ns.models.discontinuous_support()
 
 

@@ -12,6 +12,8 @@ import pytest
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 PERIODS = 12
 ELEMENT = {"w": 0.4, "d": 0.3}
 

@@ -7,6 +7,8 @@ import pytest
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 
 def ball_on_a_table() -> ns.System:
     """A ball (g = 1) over a table that moves as a sin t, x its height over the table."""

@@ -6,6 +6,8 @@ from tests.identification import mode_cases as cases
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 FIND = list(cases.RELAY)
 
 

@@ -101,7 +101,7 @@ def test_a_sensor_shows_gain_times_the_state_and_an_offset() -> None:
 
 
 def test_limits_of_a_profile_are_those_of_chi_squared() -> None:
-    """On a line the rise of chi^2, over the residuals' own correlation, is a parabola: limits 1.96 uncertainties off."""
+    """The rise of chi^2, over the residuals' own correlation, is a parabola here: limits 1.96 uncertainties off."""
     found = ns.fit(line(), readings(0), ["a"], profile=["a"], progress=False)
     [profile] = [one.data for one in found.findings if one.plot == "profile"]
     away = 1.9600 * found.estimate("a").uncertainty

@@ -9,6 +9,8 @@ from where_runs_end import agreement, end_of
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 #: Parameters, half the box, period numbers in rising order: two cycles; and three, one of which is rare.
 CASES = {
     "bistable": ({"omega": 1.4, "d": 1.8554}, (2.0, 3.0), [1, 1]),

@@ -24,6 +24,8 @@ from contact_reference import Reference, Run, simulate
 from contact_time_stepping import time_stepping
 from scipy.optimize import lsq_linear
 
+pytestmark = pytest.mark.physics
+
 ONE = (1.0,)
 
 

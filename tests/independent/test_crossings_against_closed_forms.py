@@ -10,6 +10,8 @@ import scipy_support
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 METHODS = {"exact": {}, "taylor": {"rtol": 1e-13}, "rkf45": {"rtol": 1e-13}}
 PHASES = 2 * np.pi * np.random.default_rng(2007).random(100)
 CLEARANCE = 1e-12

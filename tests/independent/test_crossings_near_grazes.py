@@ -12,6 +12,8 @@ import pytest
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 TURNS = 2
 UNDECIDED = 1e-7  # rad: where the two intervals end together rounding decides
 

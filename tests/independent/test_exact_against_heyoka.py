@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 from heyoka_agreement import Agreement, compare_all, report
 
+pytestmark = pytest.mark.physics
+
 
 @pytest.fixture(scope="module")
 def results() -> list[Agreement]:

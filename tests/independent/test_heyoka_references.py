@@ -10,6 +10,8 @@ import pytest
 import reference_values as known
 import scipy_support
 
+pytestmark = pytest.mark.physics
+
 CASES = {
     "figure 9": dict(known.TABLE_1, rho=0.14, g=0.02, omega=4.8),
     "figure 11": dict(known.TABLE_1, rho=0.29, g=-0.0045, omega=3.69),

@@ -12,6 +12,8 @@ import reference_values as known
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 STEP = 0.005
 
 #: rho, g, window of omega, direction of the sweep, grazing frequency's index (0 lower, 1 upper).

@@ -8,6 +8,8 @@ import pytest
 import nonsmooth as ns
 from nonsmooth import models
 
+pytestmark = pytest.mark.physics
+
 
 def next_point(w: np.ndarray, p: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
     """Image and derivative in the border-collision normal form."""

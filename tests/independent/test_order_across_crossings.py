@@ -14,6 +14,8 @@ import pytest
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 
 def two_spirals() -> ns.System:
     def inside(t, u, p):

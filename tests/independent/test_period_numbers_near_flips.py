@@ -12,6 +12,8 @@ import reference_values as known
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 WIDTH = 0.02  # the window reaches 2 % either side of the flip
 
 

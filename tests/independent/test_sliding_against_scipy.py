@@ -14,6 +14,8 @@ import nonsmooth as ns
 sys.path.insert(0, str(Path(__file__).parent))
 from filippov_reference import ABOVE, BELOW, SLIDING, Contacts, Filippov, integrate, rub
 
+pytestmark = pytest.mark.physics
+
 
 def linear(seed: int, n: int, kind: str) -> tuple[ns.System, Filippov, np.ndarray]:
     """u' = A u + c cos(w t) -+ g (above, below), on the surface k u = b (1 + m cos(w t))."""

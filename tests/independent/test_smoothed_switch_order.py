@@ -14,6 +14,8 @@ import smoothed_reference
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 SCALE = np.array([1e-3, 1e-2])
 ETAS = (3e-5, 1e-5, 3e-6, 1e-6)
 N_PERIODS = 4

@@ -11,6 +11,8 @@ from scipy.optimize import brentq
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 MATRICES = np.array([[[1.0, -100.0], [10.0, 1.0]], [[1.0, 10.0], [-100.0, 1.0]]])
 SLOPES = 2.75, 0.36
 START = np.array([0.0, 1.0])

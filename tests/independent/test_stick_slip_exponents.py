@@ -14,6 +14,8 @@ from stick_slip_reference import StickSlip
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 BEGIN = [0.3, 0.1]
 BATCHES = 32
 

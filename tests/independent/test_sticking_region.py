@@ -11,6 +11,8 @@ import pytest
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 BEYOND = 1e-12
 COMBINATIONS = [
     (sigma, w, r) for sigma in (-0.5, 0.0, 0.4, 0.8, 0.95) for w, r in ((0.4, 0.6), (0.7, 0.8), (1.3, 0.5), (2.1, 0.9))

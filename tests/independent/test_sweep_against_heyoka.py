@@ -9,6 +9,8 @@ import reference_values as known
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 #: Settled periodic orbits with contact: parameters and period number.
 ORBITS = {
     "figure 9": ({"rho": 0.14, "g": 0.02, "omega": 4.8}, 1),

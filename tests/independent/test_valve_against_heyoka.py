@@ -9,6 +9,8 @@ import reference_values as known
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 START = np.array([1.0, 0.0, 11.0])
 METHODS = {"taylor": 1e-14, "rkf45": 1e-12}
 

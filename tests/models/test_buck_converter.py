@@ -10,6 +10,8 @@ from scipy.optimize import brentq, fsolve
 import nonsmooth as ns
 from nonsmooth import models
 
+pytestmark = pytest.mark.physics
+
 R, L, C, T, REF, GAIN, LOW, HIGH = 22.0, 20e-3, 47e-6, 400e-6, 11.3, 8.4, 3.8, 8.2
 A = np.array([[-1 / (R * C), 1 / C], [-1 / L, 0.0]])
 

@@ -10,6 +10,8 @@ import nonsmooth as ns
 
 from .independent import march, multipliers
 
+pytestmark = pytest.mark.physics
+
 
 def contacts(system: ns.System, **start: float) -> float:
     """Transitions per period in the steady state."""

@@ -9,6 +9,8 @@ import nonsmooth as ns
 
 from .independent import march
 
+pytestmark = pytest.mark.physics
+
 
 def test_the_drift_against_scipy_in_absolute_positions() -> None:
     """Mass x, slider's top z and the slider s itself, as the paper writes them."""

@@ -11,6 +11,8 @@ import nonsmooth as ns
 
 from .independent import march
 
+pytestmark = pytest.mark.physics
+
 
 def symmetric_motion(omega: float, g: float = 0.5, e: float = 0.6) -> tuple[float, float, np.ndarray]:
     """Impact velocity and cosine of the phase of Peterka's symmetric motion; its map from impact to impact."""

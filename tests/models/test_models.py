@@ -10,6 +10,8 @@ import sympy as sp
 
 from nonsmooth import models
 
+pytestmark = pytest.mark.physics
+
 
 def numbers(system, expressions, u, t=0.0):
     traced = system.traced

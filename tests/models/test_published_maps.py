@@ -8,6 +8,8 @@ import pytest
 import nonsmooth as ns
 from nonsmooth import models
 
+pytestmark = pytest.mark.physics
+
 # ----------------------------------------------------------------------------------------------------------------
 # Nordmark's square-root map: the period-m orbit with one impact
 

@@ -9,6 +9,8 @@ from scipy.optimize import brentq
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 
 @pytest.mark.parametrize("r", [0.6, 0.8, 1.3, 2.0])
 @pytest.mark.parametrize("f", [0.1, 0.3])

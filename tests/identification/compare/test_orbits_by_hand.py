@@ -45,7 +45,7 @@ def test_two_states_are_averaged_and_whole_shifts_are_free(periods: int) -> None
 
 
 def test_the_mean_of_three_passes_and_their_scatter() -> None:
-    """Passes 1, 2, 6: mean 3, standard deviation sqrt(((-2)^2 + (-1)^2 + 3^2) / 2) = sqrt 7; a part pass is left out."""
+    """Passes 1, 2, 6: mean 3, standard deviation sqrt(((-2)^2 + (-1)^2 + 3^2) / 2) = sqrt 7; part of a pass is none."""
     folded = np.repeat([1.0, 2.0, 6.0], 2)[:, None, None] * np.ones((6, 4, 1))
     orbit, scatter = mean_orbit(np.concatenate([folded, np.full((1, 4, 1), 99.0)]), 2)
     assert orbit == pytest.approx(np.full((8, 1), 3.0)) and scatter == pytest.approx(np.full((8, 1), np.sqrt(7)))

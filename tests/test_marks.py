@@ -1,0 +1,41 @@
+"""Tests that are marked ``physics`` import public names of the package only, and so do the helpers that they import."""
+
+from __future__ import annotations
+
+import ast
+from functools import cache
+from pathlib import Path
+
+HERE = Path(__file__).parent
+MARK = "\npytestmark = pytest.mark.physics\n"
+
+
+@cache
+def imported(path: Path) -> frozenset[str]:
+    """Names of the modules that a file imports."""
+    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    plain = {one.name for node in nodes if isinstance(node, ast.Import) for one in node.names}
+    return frozenset(plain | {str(node.module) for node in nodes if isinstance(node, ast.ImportFrom)})
+
+
+def files_of(path: Path) -> set[Path]:
+    """A file of tests and the helpers that it imports, as they import each other."""
+    found = {path}
+    for one in (waiting := [path]):
+        for name in imported(one):
+            places = [HERE.parent / f"{name.replace('.', '/')}.py", one.parent / f"{name}.py",
+                      HERE / "independent" / f"{name}.py"]  # fmt: skip
+            new = {place for place in places if place.is_file()} - found
+            found |= new
+            waiting += new
+    return found
+
+
+def test_public_names_only() -> None:
+    marked = [path for path in HERE.rglob("test_*.py") if MARK in path.read_text(encoding="utf-8")]
+    assert len(marked) > 40
+    inner = {
+        (path.name, one.name, name) for path in marked for one in files_of(path) for name in imported(one)
+        if name.startswith("nonsmooth.")
+    }  # fmt: skip
+    assert inner == set()
