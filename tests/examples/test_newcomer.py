@@ -1,7 +1,8 @@
-"""A newcomer's first quarter of an hour: README and the first tutorial, typed line by line in a fresh folder.
+"""A newcomer's first quarter of an hour: the README, typed line by line in a fresh folder.
 
 The blocks of Python go into an interactive interpreter, those of a shell to the installed program ``nonsmooth``, on a
-terminal; what the pages say is printed must be printed, in that order, and the files they name must be there.
+terminal; what the page says is printed must be printed, in that order, and the files it names must be there. The first
+tutorial, which begins with the same lines, is run by ``test_pages``.
 """
 
 from __future__ import annotations
@@ -75,13 +76,12 @@ def study(page: Path) -> str:
 README, TUTORIAL = ROOT / "README.md", ROOT / "docs" / "tutorials" / "first_diagram.md"
 
 
-@pytest.mark.parametrize("page", [README, TUTORIAL], ids=lambda page: page.stem)
-def test_lines_of_python(page: Path, tmp_path: Path) -> None:
+def test_lines_of_python(tmp_path: Path) -> None:
     checker = doctest.OutputChecker()
-    for printed, expected, line in typed(page, tmp_path):
+    for printed, expected, line in typed(README, tmp_path):
         said = re.sub(r"^<Axes: .*>\n", "", printed, flags=re.MULTILINE)  # an interpreter shows what a function returns
         assert expected is None or checker.check_output(expected, said, FLAGS), (
-            f"{page.name}, block at line {line}, prints\n{said}\nand not\n{expected}"
+            f"{README.name}, block at line {line}, prints\n{said}\nand not\n{expected}"
         )
     assert {"fig11.nc", "fig11.pdf"} <= {path.name for path in tmp_path.iterdir()}
 

@@ -1,4 +1,6 @@
-"""The tutorials as notebooks: made from their pages, executed by nbconvert, each output right and short."""
+"""The tutorials as notebooks: made from their pages; one is executed by nbconvert, each output right and short.
+
+The code of the others is run by ``test_pages``, in the process of the tests."""
 
 from __future__ import annotations
 
@@ -10,7 +12,6 @@ from pathlib import Path
 
 import nbformat
 import pytest
-from nbconvert.preprocessors import ExecutePreprocessor
 from page_code import blocks
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -33,8 +34,10 @@ def test_a_notebook_is_that_of_its_page(page: Path) -> None:
     assert code == [text.strip() for language, text, _, _ in blocks(page.read_text("utf-8")) if language == "python"]
 
 
-@pytest.mark.parametrize("page", make.PAGES[1:], ids=lambda page: page.stem)  # the first is typed by test_newcomer
-def test_a_notebook_runs_with_short_outputs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_notebook_runs_with_short_outputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    [page] = [one for one in make.PAGES if one.stem == "from_a_paper"]
+    from nbconvert.preprocessors import ExecutePreprocessor
+
     monkeypatch.delenv("MPLBACKEND")  # so that figures appear below their cells
     for folder in ("IPYTHONDIR", "JUPYTER_RUNTIME_DIR"):
         monkeypatch.setenv(folder, str(tmp_path))

@@ -1,6 +1,6 @@
 """The code in the pages of the documentation runs, and prints what the page says it prints.
 
-README and the first tutorial are typed by ``test_newcomer``, tutorials run as notebooks in ``test_notebooks``."""
+The README is typed by ``test_newcomer``, and one tutorial runs as a notebook in ``test_notebooks``."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from page_code import blocks, run_page
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(page for page in (ROOT / "docs").rglob("*.md") if "_build" not in page.parts)
-# The first two need a file of the reader's own; the others are run as notebooks.
-ELSEWHERE = {"recordings", "your_rig", "first_diagram", "impact_oscillator", "friction_oscillator", "from_a_paper"}
+# The first two need a file of the reader's own; the third is run as a notebook.
+ELSEWHERE = {"recordings", "your_rig", "from_a_paper"}
 PAGES = [page for page in PAGES if page.stem not in ELSEWHERE and blocks(page.read_text(encoding="utf-8"))]
 LONGEST = 60  # lines of an output: in a notebook the next cell stays in sight
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
