@@ -16,7 +16,7 @@ import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-MOST = 15.0  # seconds of processor time for the ten lines, with nothing in the cache; a compiled march takes more
+MOST = 20.0  # seconds of processor time for the ten lines, with nothing in any cache; a compiled march takes as much more
 IN_SIGHT = ("PYTHONPATH", "VIRTUAL_ENV", "NONSMOOTH_CACHE_DIR", "HATCH_BUILD_NO_HOOKS", "PYTHONDONTWRITEBYTECODE")
 
 
@@ -58,7 +58,7 @@ def main() -> int:
         print(f"{sdist.name}, {wheel.name} ({size:.1f} MB): {took:.0f} s of processor time", flush=True)
         run([sys.executable, "-m", "venv", str(folder / "venv")], folder)
         programs = folder / "venv" / ("Scripts" if os.name == "nt" else "bin")
-        took = run([str(programs / "python"), "-m", "pip", "install", "-qq", str(wheel)], folder)
+        took = run([str(programs / "python"), "-m", "pip", "install", "-qq", "--no-compile", str(wheel)], folder)
         print(f"installed with what it needs: {took:.0f} s", flush=True)
         readme = (ROOT / "README.md").read_text(encoding="utf-8")
         lines = re.search(r"^## Ten lines\n.*?^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)

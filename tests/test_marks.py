@@ -1,8 +1,9 @@
-"""Tests that are marked ``physics`` import public names of the package only, and so do the helpers that they import."""
+"""Tests that are marked ``physics`` import public names of the package only; mutants stand where their text is."""
 
 from __future__ import annotations
 
 import ast
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -39,3 +40,14 @@ def test_public_names_only() -> None:
         if name.startswith("nonsmooth.")
     }  # fmt: skip
     assert inner == set()
+
+
+def test_every_mutant_has_its_place() -> None:
+    """Code that moves takes its mutants along: each text stands once in its file."""
+    sources = HERE.parent / "src" / "nonsmooth"
+    every = tomllib.loads((HERE / "mutants.toml").read_text(encoding="utf-8"))["mutant"]
+    found = {one["name"]: (sources / one["file"]).read_text(encoding="utf-8").count(one["old"]) for one in every}
+    assert [name for name, number in found.items() if number != 1] == []
+    assert len(found) == len(every), "two mutants have one name"
+    files = {test.partition("::")[0] for one in every for test in one["tests"]}
+    assert [name for name in files if not (HERE.parent / name).exists()] == []
