@@ -24,7 +24,7 @@ TEXTS = {
 }
 MARKERS = {"device", "inline", "kernel", "callback", "once"}  # another compiler's on a GPU
 ON_PURPOSE = MARKERS | {"build", "may_pause"}  # replaced on a GPU
-SWAPPED = {"linear.stepper", "linear.extremes", "linear.touches", "series.generated"}  # for the stepper that is joined
+SWAPPED = {"linear.stepper", "linear.extremes", "linear.touches", "linear.growth", "series.generated"}  # by the stepper's
 
 
 @cache

@@ -13,7 +13,7 @@ from pathlib import Path
 
 _ROOM = Path(__file__).parents[1]
 #: Files that name a place others can take: what is imported of them is in the joined text under the same name.
-_PLACES = ("linear.stepper", "linear.extremes", "linear.touches")
+_PLACES = ("linear.stepper", "linear.extremes", "linear.touches", "linear.growth")
 
 
 def joined(parts: Iterable[str], absent: Iterable[str] = ()) -> str:
