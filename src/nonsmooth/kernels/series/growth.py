@@ -30,7 +30,8 @@ def shape_of(seen):
 def anchor_frame(seen, work):
     """Where the trajectory is, the frame begins."""
     copied(work.w, seen.u)
-    copied(work.q, seen.q)
+    for j in range(seen.q.shape[0]):
+        seen.q[j] = work.q[j]
     work.memo[place.ANCHOR], work.memo[place.GONE] = work.memo[TIME], 0.0
 
 
