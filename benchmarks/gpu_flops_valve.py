@@ -20,7 +20,7 @@ from nonsmooth.flow.sections import section_plan
 from nonsmooth.kernels.series import crossing, places, polynomial, taylor, trust
 from nonsmooth.kernels.series.module import series_module
 
-FILES = (crossing, polynomial, series_module("sections", "taylor"), taylor, trust)
+FILES = (crossing, polynomial, series_module(), taylor, trust)
 TRANSIENT, RETURNS, TOLERANCE = 40, 20, 1e-10
 START = [0.2, 0.0, 10.0]
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from nonsmooth.kernels.compile.assembly import PLACES
 from nonsmooth.kernels.cuda import module as cuda_module
 from nonsmooth.kernels.cuda import series_module as cuda_series_module
 from nonsmooth.kernels.linear import module as linear_module
@@ -24,7 +25,7 @@ TEXTS = {
 }
 MARKERS = {"device", "inline", "kernel", "callback", "once"}  # another compiler's on a GPU
 ON_PURPOSE = MARKERS | {"build", "may_pause"}  # replaced on a GPU
-SWAPPED = {"linear.stepper", "linear.extremes", "linear.touches", "series.generated"}  # for the stepper that is joined
+SWAPPED = {*PLACES, "series.generated"}  # for the stepper that is joined
 
 
 @cache

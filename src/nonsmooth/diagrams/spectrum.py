@@ -12,7 +12,7 @@ from nonsmooth.flow.engines.engine import FloatArray, Section, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.equilibria import Equilibrium, equilibrium_at
 from nonsmooth.flow.loads import meter_of
-from nonsmooth.flow.spectrum import frame_for
+from nonsmooth.flow.spectrum import Frame
 from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def spectrum_along(
     align = min(ALIGN, wait)
     if wait > align:
         status = _run_on(system, engine, tables, i, state, period, unit, wait - align)
-    frame = frame_for(system, engine, tables, i)
+    frame = Frame(system, engine, tables, i)
     if status in GOOD and align:
         status = frame.advance(state, align, unit).status
     begun = state.copy()
@@ -172,7 +172,7 @@ def _run_on(
         plan = Section(phase=float(phase % 1.0), extremes=False)
         engine.chain(tables, i, i + 1, state, None, plan, count - 1, 1, out)
         return int(out.status[i])
-    return frame_for(system, engine, tables, i).advance(state, count, unit).status
+    return Frame(system, engine, tables, i).advance(state, count, unit).status
 
 
 def kaplan_yorke(exponents: FloatArray, zero: float = 0.0) -> float:

@@ -2,9 +2,8 @@ r"""Growth of small changes along a trajectory: frames carried through segments 
 
 The sums of the logarithms of what is divided out, over the elapsed time, are finite-time Lyapunov exponents. Their sum
 is :math:`\frac1t \log|\det\Phi(t)|`, which must equal
-:math:`\frac1t(\int \operatorname{div} f\,dt + \sum \log|\det S|)`. Linear systems with an exact flow are marched with
-their frame in one kernel, and so is a motion of Taylor series without transitions. Every other trajectory is recorded
-by its engine piece by piece, and the frame follows it.
+:math:`\frac1t(\int \operatorname{div} f\,dt + \sum \log|\det S|)`. The frame is marched with the trajectory by the
+engine's own kernel: with the tables of an exact flow, or by Taylor series of its own.
 
 References
 ----------
@@ -19,22 +18,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, Log, State
-from nonsmooth.flow.engines.linear import LinearEngine
+from nonsmooth.flow.engines.engine import FloatArray, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.series import SeriesEngine, order_for
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.places import UNBROKEN
 
 if TYPE_CHECKING:
-    from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
 
-__all__ = ["Growth", "frame_for"]
+__all__ = ["Frame", "Growth"]
 
-CHUNK = 250  # units of time recorded at once
-APART = 1e3  # times the engine's tolerance: what a piece may end away from the record
-DENSEST = 4096  # samples per unit of time
+CHUNK = 250  # units of time at once, where to stop and go on changes nothing: sums of few numbers round little
 FINER = 0.1  # of the engine's tolerance: a step of the frame
 FINEST = 1e-11  # and no coarser than this
 
@@ -56,195 +52,105 @@ class Growth:
         return 0.0 if found == wanted else found - wanted
 
 
-def _record(scale: FloatArray, Q: FloatArray, count: int) -> Any:
-    """Room for the growth of a frame over some units of time (``kernels.records.Growth``)."""
-    from nonsmooth.kernels.hybrid.records import Growth as Record
+class Frame:
+    """Directions that follow the trajectory of row ``i`` of an engine's tables, in columns.
 
-    (n, columns), square = Q.shape, np.zeros((len(scale), len(scale)))
-    return Record(
-        scale, Q, np.zeros((count, columns)), np.ones(columns), np.array([0.0, 0.0, 0.0, 1.0, 0.0]), square,
-        square.copy(), square.copy(), np.zeros((3, n)), np.zeros(n), np.zeros(n),
-    )  # fmt: skip
+    There is one for each state that some visited mode has, and for memory that has been written: ``active``."""
 
-
-class _LinearFrame:
-    """One kernel of the exact flow for the trajectory and its frame."""
-
-    def __init__(self, engine: LinearEngine, tables: Any, i: int, scale: FloatArray) -> None:
-        self.engine, self.tables, self.i, self.scale, self.Q = engine, tables, i, scale, np.eye(len(scale))
-        self.active = np.ones(len(scale), dtype=bool)
+    def __init__(self, system: System, engine: Engine, tables: Any, i: int) -> None:
+        self.system, self.engine, self.tables, self.i = system, engine, tables, i
+        self.is_smooth, self.behind = isinstance(engine, SeriesEngine) and engine.is_smooth, None
+        self.own, memory = len(engine.scale), len(engine.traced.m)
+        self.scale = np.concatenate([system.scale_vector(), np.ones(memory)])
+        self.lacking = engine.lacking.astype(bool)
+        self.active = np.full(len(self.scale), not (memory or self.lacking.any()))
+        self.Q = np.ascontiguousarray(np.eye(len(self.scale))[:, self.active])
 
     def advance(self, state: State, count: int, unit: float) -> Growth:
         """March ``count`` units of time. ``state`` is left at the end; its clock may be set back by whole periods."""
-        record = _record(self.scale, self.Q, count)
-        status = self.engine.grow(self.tables, self.i, state, count, unit, record)
-        divergence, determinants, _, nearest, _ = record.sums.tolist()
-        return Growth(record.growth, divergence, determinants, nearest, status)
-
-
-class _SeriesFrame:
-    """Taylor series for the frame, along pieces of a trajectory that the engine records.
-
-    Where nothing can happen to the motion nothing is recorded: state and frame are marched as one."""
-
-    def __init__(
-        self, engine: Engine, tables: Any, flow: VariationalFlow, values: FloatArray, period: float | None, timed: bool
-    ) -> None:
-        from nonsmooth.kernels.tangent.spectrum import Pace
-
-        self.engine, self.tables, self.flow, self.values = engine, tables, flow, values
-        self.period, self.timed = period, timed
-        self.density = 1
-        n, n_u = flow.n, flow.n_u
-        self.active = np.zeros(n, dtype=bool)
-        self.Q = np.zeros((n, 0))
-        self._lacking = np.array(flow.traced.lacking, dtype=bool).reshape(len(flow.traced.mode_names), -1)
-        self.rtol = float(getattr(engine, "rtol", 1e-9))
-        self.smooth = _smooth(engine, flow.traced)
-        weight, limit = flow.scale[:n_u], np.full(n_u, np.inf)
-        if isinstance(engine, SeriesEngine):
-            weight, _, limit = engine.norms
-        tolerance = max(min(FINER * self.rtol, FINEST), 1e-16)
-        self.pace = Pace(order_for(tolerance), float(np.log(tolerance)), weight, np.zeros(0), limit)
-
-    def advance(self, state: State, count: int, unit: float) -> Growth:
-        total = Growth(np.zeros((count, self.flow.n)), 0.0, 0.0, 1.0, codes.OK)
-        done = 0
+        if not np.isfinite(self.tables.period[self.i]) and not self.system.depends_on_time:
+            state.clock[0] = 0.0  # no digits are lost in long runs
+        total = Growth(np.zeros((count, len(self.scale))), 0.0, 0.0, 1.0, codes.OK)
+        done, most = 0, CHUNK if self.is_smooth else count
         while done < count and total.status in (codes.OK, codes.NOT_GUARANTEED):
-            some = min(CHUNK, count - done)
-            self._chunk(state, some, unit, total, done)
+            # Where a direction is new the part is done again: the first parts are short.
+            some = min(count - done, most if self.active.all() else max(1, done))
+            before, Q = state.copy(), self.Q.copy()
+            status, record = self._march(state, some, unit)
+            if self._widen(Q, record.taken, int(state.counters[0])):
+                state.u[:], state.memory[:], state.clock[:] = before.u, before.memory, before.clock
+                state.counters[:], state.settled = before.counters, before.settled
+                continue
+            divergence, determinants, _, nearest = record.sums.tolist()
+            total.logarithms[done : done + some, : record.growth.shape[1]] = record.growth
+            total.divergence += divergence
+            total.determinants += determinants
+            total.nearest = min(total.nearest, nearest)
+            if status != codes.OK:
+                total.status = status
             done += some
         return total
 
-    def _chunk(self, state: State, count: int, unit: float, total: Growth, done: int) -> None:
-        """Follow ``count`` units, into the rows of ``total`` from ``done`` on.
+    def _march(self, state: State, count: int, unit: float) -> tuple[int, Any]:
+        """Status, and record of the growth (``kernels.records.Growth``)."""
+        from nonsmooth.kernels.hybrid.records import TRANSIENT
+        from nonsmooth.kernels.hybrid.records import Growth as Record
 
-        A piece is marched from its recorded beginning, so in chaos it parts from the record; the frame would then go on
-        along another motion. Where a piece ends too far away the piece is done again with more samples."""
-        # Times count from here, by whole periods, so that no digits are lost in long runs.
-        state.clock[1] = 0.0
-        if self.period is None and not self.timed:
-            state.clock[0] = 0.0
-        at_start, Q, active = state.copy(), self.Q.copy(), self.active
-        while True:
-            status, growth, sums = (self._march if self.smooth else self._follow)(state, count, unit)
-            if growth is None or sums[4] <= APART * self.rtol or self.density >= DENSEST:
-                break
-            self.density *= 4
-            state.u[:], state.memory[:], state.clock[:] = at_start.u, at_start.memory, at_start.clock
-            state.counters[:], state.settled = at_start.counters, at_start.settled
-            self.Q, self.active = Q.copy(), active
-        if status != codes.OK:
-            total.status = status
-        if growth is not None:
-            total.logarithms[done : done + count, : growth.shape[1]] += growth
-            total.divergence += float(sums[0])
-            total.determinants += float(sums[1])
-            total.nearest = min(total.nearest, float(sums[3]))
-
-    def _march(self, state: State, count: int, unit: float) -> tuple[int, FloatArray, FloatArray]:
-        """The motion itself with its frame, by the tolerance of the frame."""
-        from nonsmooth.kernels.tangent.spectrum import Pieces
-
-        mode, begun = int(state.counters[0]), float(state.clock[0])
-        self._widen({mode}, set())
-        pieces = Pieces(
-            np.full(count, mode), begun + unit * np.arange(count), np.full(count, unit),
-            np.concatenate([state.u, state.memory])[None, :], np.arange(count), np.zeros(count + 1, dtype=np.int64),
-            np.zeros(0, dtype=np.int64), np.zeros((0, self.flow.n)),
+        engine, (n, columns), series = self.engine, self.Q.shape, isinstance(self.engine, SeriesEngine)
+        noted = len(engine.traced.transitions) if series or not self.active.all() else 0
+        none, square = np.zeros(0), np.zeros((n, n))
+        record = Record(
+            self.scale, self.Q, np.zeros((count, columns)), np.ones(columns), np.array([0.0, 0.0, 0.0, 1.0]), square,
+            square.copy(), square.copy(), np.zeros((3, n)), np.zeros(n), np.zeros(n), np.zeros(noted, dtype=np.int64),
+            np.zeros(0, dtype=np.int64), 0, none, none,
         )  # fmt: skip
-        found = self._grow(pieces, count)
-        state.u[:], state.settled = self.flow.scratch().u, True
-        state.clock[0] += 0.0 if unit == self.period else count * unit
-        if self.period is not None and unit == self.period:
-            state.clock[1] += count
-        elif self.period is not None:
-            state.clock[1], state.clock[0] = divmod(state.clock[0], self.period)
-        return found
+        if series:
+            record = self._followed(record)
+        here, row = engine.enter(self.tables, self.i, state)
+        state.counters[1] = int(state.settled)
+        march = engine.march()
+        march.grown(row, state, count, unit, record)
+        if self.is_smooth:
+            march.orders[TRANSIENT] = UNBROKEN
+        status, _ = engine._run(march, here)
+        engine.leave(here, state)
+        state.settled = True
+        return int(status), record
 
-    def _follow(self, state: State, count: int, unit: float) -> tuple[int, FloatArray | None, FloatArray]:
-        """Record, and follow the record: (status, logarithms, sums of ``kernels.records.Growth``)."""
-        density, traced = self.density, self.flow.traced
-        steps = np.arange(count * density + 1, dtype=np.float64)
-        instants: FloatArray = float(state.clock[0]) + unit * (steps / density)
-        log = self.engine.record(self.tables, state, float(instants[-1]), instants[:-1])
-        if log.status not in (codes.OK, codes.NOT_GUARANTEED):
-            return log.status, None, np.zeros(5)
-        visited = {*log.sample_mode.tolist(), *(traced.transitions[k].target for k in log.crossing_transition)}
-        written = {i for k in set(log.crossing_transition.tolist()) for i, _ in traced.transitions[k].writes}
-        self._widen(visited, written)
-        status, growth, sums = self._grow(_pieces(traced, log, instants, density), count)
-        return status if status != codes.OK else log.status, growth, sums
+    def _followed(self, record: Any) -> Any:
+        """The record, with the series that carry the frame (``kernels.tangent.following``)."""
+        from nonsmooth.kernels.compile.cache import compiled
+        from nonsmooth.kernels.compile.pointers import Block, addresses
+        from nonsmooth.kernels.tangent.following import FOLLOWER, frame_across, frame_along, put_follower
 
-    def _grow(self, pieces: Any, count: int) -> tuple[int, FloatArray, FloatArray]:
-        """Carry the frame along the pieces."""
-        from nonsmooth.kernels.tangent.spectrum import grow
+        if self.behind is None:
+            flow, tolerance = VariationalFlow.of(self.system), max(min(FINER * self.engine.rtol, FINEST), 1e-16)
+            flow.catch_up()
+            self.behind = (
+                Block(FOLLOWER, put_follower), addresses(compiled(frame_along), compiled(frame_across)), flow,
+                flow.steps(order_for(tolerance), tolerance), np.zeros(flow.n_out),
+            )  # fmt: skip
+        block, functions, flow, steps, out = self.behind
+        record = record._replace(functions=functions, follower=block.address, u=steps.u, q=steps.q)
+        block.put((flow.equations, record, steps, out))
+        return record
 
-        flow, record = self.flow, _record(self.flow.scale, self.Q, count)
-        sizes = np.concatenate([np.zeros(len(flow.model.entries)), np.repeat(flow.scale[: flow.n_u], self.Q.shape[1])])
-        status = grow(
-            flow.equations, pieces, self.pace._replace(sizes=sizes), self.values, record, np.zeros(flow.n_out),
-            flow.scratch(),
-        )  # fmt: skip
-        return int(status), record.growth, record.sums
-
-    def _widen(self, visited: set[int], written: set[int]) -> None:
-        """Directions for the states of the modes now visited, and for the memory now written."""
+    def _widen(self, Q: FloatArray, taken: Any, mode: int) -> bool:
+        """Whether the part just marched, begun with the frame Q, is to be done again: with directions for the states of
+        the modes now visited and for the memory now written, and with transitions that are new."""
+        jumps = self.engine.traced.transitions
+        if self.active.all() and not isinstance(self.engine, SeriesEngine):
+            return False
+        if len(jumps) > len(taken):
+            self.Q, self.behind = Q, None
+            return True
+        fired = [jumps[k] for k in np.flatnonzero(taken)]
+        visited = {mode, *(jump.source for jump in fired), *(jump.target for jump in fired)}
         now = self.active.copy()
-        now[: self.flow.n_u] |= ~self._lacking[sorted(visited)].all(axis=0)
-        now[[self.flow.n_u + i for i in written]] = True
+        now[: self.own] |= ~self.lacking[sorted(visited)].all(axis=0)
+        now[[self.own + i for jump in fired for i, _ in jump.writes]] = True
         new = np.flatnonzero(now & ~self.active)
         if len(new):
-            both = np.hstack([self.Q, np.eye(self.flow.n)[:, new]])
-            self.Q = np.ascontiguousarray(np.linalg.qr(both)[0])
-            self.active = now
-
-
-def _pieces(traced: Traced, log: Log, instants: FloatArray, density: int) -> Any:
-    """Smooth pieces between samples and crossings (``kernels.spectrum.Pieces``).
-
-    A sample at the instant of a crossing is left out; transitions at one instant (a chain) form a group."""
-    from nonsmooth.kernels.tangent.spectrum import Pieces
-
-    times, first = np.unique(log.crossing_time, return_index=True)
-    ends = np.append(first, len(log.crossing_time))[1:]
-    kept = ~np.isin(instants[:-1], times)
-    kept[0] = True
-    sampled = np.hstack([log.sample_u, log.sample_memory])[kept]
-    memory = np.vstack([log.sample_memory[:1], log.memory_after])
-    after, before = np.hstack([log.u_after, memory[1:]]), np.hstack([log.u_before, memory[:-1]])
-    target = np.array([jump.target for jump in traced.transitions], dtype=np.int64)[log.crossing_transition]
-    start = np.concatenate([instants[:-1][kept], times])
-    order = np.argsort(start, kind="stable")
-    group = np.concatenate([np.full(int(kept.sum()), -1), np.arange(len(times))])[order]  # that begins each piece
-    following = np.append(group[1:], -1)
-    t0 = start[order]
-    at_end = np.zeros((len(t0), after.shape[1]))
-    at_end[following >= 0] = before[first]
-    count = np.zeros(len(t0), dtype=np.int64)
-    count[following >= 0] = ends - first
-    unit = np.clip(np.searchsorted(instants, t0, side="right") - 1, 0, len(instants) - 2)
-    return Pieces(
-        np.concatenate([log.sample_mode[kept], target[ends - 1]])[order].astype(np.int64), t0,
-        np.diff(np.append(t0, instants[-1])), np.nan_to_num(np.vstack([sampled, after[ends - 1]])[order]),
-        (unit // density).astype(np.int64), np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
-        log.crossing_transition.astype(np.int64), np.nan_to_num(at_end),
-    )  # fmt: skip
-
-
-def _smooth(engine: Engine, traced: Traced) -> bool:
-    """Return whether motion is one Taylor series after the other, of steps that need not be checked."""
-    if not isinstance(engine, SeriesEngine) or engine.name != "taylor" or traced.transitions:
-        return False
-    return engine.step is None and engine.order is None and not engine.layers.checked
-
-
-def frame_for(system: System, engine: Engine, tables: Any, i: int) -> _LinearFrame | _SeriesFrame:
-    """A frame for row ``i`` of an engine's tables."""
-    if isinstance(engine, LinearEngine) and engine.is_plain:
-        return _LinearFrame(engine, tables, i, system.scale_vector())
-    flow = VariationalFlow.of(system)
-    points = tables.points[i : i + 1]
-    period = system.period_at(points[0])
-    return _SeriesFrame(engine, engine.prepare(points), flow, np.ascontiguousarray(points[0]), period,
-                        system.depends_on_time)  # fmt: skip
+            both = np.hstack([Q, np.eye(len(now))[:, new]])
+            self.Q, self.active = np.ascontiguousarray(np.linalg.qr(both)[0]), now
+        return bool(len(new))

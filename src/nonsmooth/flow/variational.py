@@ -14,15 +14,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.saltation import Jump, Touch, chained
+from nonsmooth.kernels.tangent.segments import Segments
 from nonsmooth.system.phases import phase_slopes, varying_phases
 
 if TYPE_CHECKING:
@@ -30,23 +29,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 __all__ = ["Jump", "Segments", "Touch", "VariationalFlow"]
-
-
-@dataclass(slots=True)
-class Segments:
-    """Ends and derivatives of m segments."""
-
-    z: FloatArray  # (m, n)
-    Phi: FloatArray  # (m, n, n)
-    P: FloatArray  # (m, n, n_active), at fixed t0 and tau
-    f_begin: FloatArray  # (m, n)
-    f_end: FloatArray  # (m, n) = dz/dtau
-    divergence: FloatArray  # (m,) integral of div f = log det Phi
-    status: NDArray[np.int64]  # (m,) 0, DIVERGED or NO_CONVERGENCE
-
-    def start_time(self) -> FloatArray:
-        """dz/dt0 at fixed tau (m, n): f_end - Phi f_begin."""
-        return np.asarray(self.f_end - np.einsum("mij,mj->mi", self.Phi, self.f_begin))
 
 
 class VariationalFlow:
@@ -126,17 +108,12 @@ class VariationalFlow:
             Beginning (forced systems: within the orbit, not a large absolute time) and duration, of either sign.
         z0 : array (m, n)
         """
-        from nonsmooth.kernels.tangent.legs import Ends, march_legs
+        from nonsmooth.kernels.tangent.legs import march_legs
 
         modes = np.ascontiguousarray(modes, dtype=np.int64)
-        m, n = len(modes), self.n
-        out = Segments(
-            np.empty((m, n)), np.empty((m, n, n)), np.empty((m, n, self.n_active)), np.empty((m, n)),
-            np.empty((m, n)), np.empty(m), np.empty(m, dtype=np.int64),
-        )  # fmt: skip
-        ends = Ends(out.z, out.Phi, out.P, out.f_begin, out.f_end, out.divergence, out.status)
+        out = Segments.room(len(modes), self.n, self.n_active)
         march_legs(
-            self.equations, modes, _floats(t0), _floats(tau), _floats(z0), _floats(values), ends, self.scratch()
+            self.equations, modes, _floats(t0), _floats(tau), _floats(z0), _floats(values), out, self.scratch()
         )  # fmt: skip
         return out
 
@@ -219,18 +196,24 @@ class VariationalFlow:
         """The thread's scratch memory."""
         found = getattr(self._local, "work", None)
         if found is None:
-            from nonsmooth.kernels.compile.block import one_block
-            from nonsmooth.kernels.compile.lanes import FOUR
-            from nonsmooth.kernels.tangent.legs import ORDER, Steps
+            from nonsmooth.kernels.tangent.legs import ACCURACY, ORDER
 
-            columns, width = self.n + self.n_active, ORDER + 1
-            rows, changes = 2 * self.n_u + len(self.model.entries), np.zeros((self.n_u, columns))
-            found = self._local.work = Steps(*one_block(
-                np.zeros((rows, width)), np.zeros((width, columns, -(-columns // FOUR) * FOUR)),
-                np.zeros((self.model.n_scratch, width)), changes, changes, changes,
-                np.zeros(width), np.zeros(self.n_u), np.zeros(self.n_p + len(self.traced.m)),
-            ))  # fmt: skip
+            found = self._local.work = self.steps(ORDER, ACCURACY)
         return found
+
+    def steps(self, order: int, accuracy: float) -> Any:
+        """Working memory of steps by series of this order, whose last terms are so small."""
+        from nonsmooth.kernels.compile.block import one_block
+        from nonsmooth.kernels.compile.lanes import FOUR
+        from nonsmooth.kernels.tangent.legs import Steps
+
+        columns, width = self.n + self.n_active, order + 1
+        rows, changes = 2 * self.n_u + len(self.model.entries), np.zeros((self.n_u, columns))
+        return Steps(*one_block(
+            np.zeros((rows, width)), np.zeros((width, columns, -(-columns // FOUR) * FOUR)),
+            np.zeros((self.model.n_scratch, width)), changes, changes, changes,
+            np.zeros(width), np.zeros(self.n_u), np.zeros(self.n_p + len(self.traced.m)),
+        ), accuracy)  # fmt: skip
 
 
 def _floats(x: Any) -> FloatArray:

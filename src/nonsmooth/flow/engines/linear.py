@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, State
+from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.loop import Engine, pack_net
 
 if TYPE_CHECKING:
@@ -66,11 +66,6 @@ class LinearEngine(Engine):
 
     def step_in(self, mode: int, system: Any) -> float:
         return float(system[2].info[mode, 0])
-
-    @property
-    def is_plain(self) -> bool:
-        """Return whether there is no memory and every mode has every state."""
-        return not self.traced.m and not self.lacking.any()
 
     def prepare(self, points: FloatArray) -> Tables:
         t = self.form.evaluate(points)
@@ -126,17 +121,6 @@ class LinearEngine(Engine):
 
     def touches_of_a_leg(self) -> int:
         return 64 * len(self.net.rows)
-
-    def grow(self, tables: Tables, i: int, state: State, count: int, unit: float, growth: Any) -> int:
-        """Point i: march ``count`` units of time with a frame (``kernels.records.Growth``). Returns a status.
-
-        The periods in the state's clock count from here."""
-        march = self.march()
-        state.counters[1] = 0
-        march.grown(i, state, count, unit, growth)
-        code, _ = self._run(march, tables)
-        state.settled = True
-        return code
 
 
 def _with_harmonic(form: Any) -> Any:

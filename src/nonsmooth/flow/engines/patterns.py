@@ -141,14 +141,14 @@ class PatternTables:
     """The tables of one parameter point: those of the patterns that were visited there, and room for more."""
 
     def __init__(self, engine: PatternEngine, tables: Points, i: int) -> None:
-        from nonsmooth.kernels.linear.module import modes_module
+        from nonsmooth.kernels.linear.module import linear_module
 
         patterns = engine.patterns
         self.patterns = patterns
         self.rows = patterns.rows(tables.linear, i)
         n, width = self.rows.field.shape
         self.harmonics = (width - n - 1) // 2
-        self.stand = modes_module().stand
+        self.stand = linear_module().stand
         self.points, self.period = tables.points[i : i + 1], tables.period[i : i + 1]
         self.omega = np.ascontiguousarray(tables.linear.omega[i : i + 1])
         self.multiples = np.array(patterns.form.multiples, dtype=np.int64)

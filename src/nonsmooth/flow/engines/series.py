@@ -125,6 +125,12 @@ class SeriesEngine(Engine):
         return Layers(self.traced, 0, False)
 
     @property
+    def is_smooth(self) -> bool:
+        """Return whether motion is one Taylor series after the other, of steps that need not be checked."""
+        chosen = self.step is not None or self.order is not None
+        return self.name == "taylor" and not (chosen or self.traced.transitions or self.layers.checked)
+
+    @property
     def smooth_outputs(self) -> tuple[bool, ...]:
         """Per output of the system: whether it has a series."""
         return self.model.smooth_outputs[: len(self.traced.outputs)]
@@ -147,7 +153,7 @@ class SeriesEngine(Engine):
     def module(self) -> ModuleType:
         from nonsmooth.kernels.series.module import series_module
 
-        return series_module(self.name)
+        return series_module()
 
     def given(self, tables: Tables) -> tuple[Any, Any, Any]:
         local = self._threads
@@ -168,7 +174,7 @@ class SeriesEngine(Engine):
         weight, absolute, _ = self.norms
         return Generated(
             self.functions, tables.points, tables.period, self.lacking, self.kinds, weight, absolute, float(self.rtol),
-            0.0 if self.step is None else float(self.step), self.series_order,
+            0.0 if self.step is None else float(self.step), METHODS[self.name], self.series_order,
             int(self.locate), int(self.layers.checked), int(not all(self.smooth_outputs)), self.layers.count,
             len(traced.indicators), len(traced.outputs),
         )  # fmt: skip

@@ -21,9 +21,8 @@ from types import ModuleType
 from typing import Any
 
 from nonsmooth.kernels.compile.target import AHEAD, level
-from nonsmooth.kernels.series.places import METHODS
 
-STEPPERS = (*METHODS, "linear", "planar")
+STEPPERS = ("linear", "series", "planar")
 JOINED = ("kernels.hybrid.run", "kernels.linear.modes")  # texts of modules that are made for a stepper
 _ROOT = Path(__file__).parents[2]
 _Task = tuple[str, str, tuple[Any, ...]]  # a module, or a function in it that makes one and its arguments
@@ -43,12 +42,12 @@ def tasks(steppers: Sequence[str] = STEPPERS) -> list[_Task]:
 
     The longest come first."""
     linear, series = (f"nonsmooth.kernels.{stepper}.module" for stepper in ("linear", "series"))
-    made: dict[str, _Task] = {name: (series, "series_module", (name,)) for name in METHODS}
-    made |= {"planar": (linear, "linear_module", (True,)), "linear": (linear, "linear_module", (False,))}
-    found = [made[name] for name in STEPPERS if name in steppers]
-    if "linear" in steppers:
-        found.append((linear, "modes_module", ()))
-    return found + [(name, "", ()) for name in plain_files()]
+    made: dict[str, _Task] = {
+        "series": (series, "series_module", ()),
+        "planar": (linear, "linear_module", (True,)),
+        "linear": (linear, "linear_module", (False,)),
+    }
+    return [made[name] for name in STEPPERS if name in steppers] + [(name, "", ()) for name in plain_files()]
 
 
 def _module(task: _Task) -> ModuleType:

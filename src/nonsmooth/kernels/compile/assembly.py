@@ -13,7 +13,7 @@ from pathlib import Path
 
 _ROOM = Path(__file__).parents[1]
 #: Files that name a place others can take: what is imported of them is in the joined text under the same name.
-_PLACES = ("linear.stepper", "linear.extremes", "linear.touches")
+PLACES = ("linear.stepper", "linear.extremes", "linear.touches", "linear.growth")
 
 
 def joined(parts: Iterable[str], absent: Iterable[str] = ()) -> str:
@@ -22,7 +22,7 @@ def joined(parts: Iterable[str], absent: Iterable[str] = ()) -> str:
     Imports from ``absent`` files are left out too."""
     parts = tuple(parts)
     text = "\n".join(_ROOM.joinpath(*part.split(".")).with_suffix(".py").read_text(encoding="utf-8") for part in parts)
-    own = "|".join(re.escape(part) for part in {*parts, *_PLACES, *absent})
+    own = "|".join(re.escape(part) for part in {*parts, *PLACES, *absent})
     return re.sub(
         rf"^from nonsmooth\.kernels\.(?:{own}) import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE
     )  # fmt: skip

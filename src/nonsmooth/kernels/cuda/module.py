@@ -24,7 +24,8 @@ OBSERVERS = {
         "cuda.arrays", "cuda.tables", "cuda.advance", "cuda.settle", "cuda.neighbours",
     ),
     "growth": (
-        "tangent.frame", "hybrid.growth", "hybrid.observers", "cuda.arrays", "cuda.tables", "cuda.growth",
+        "tangent.frame", "linear.growth", "hybrid.growth", "hybrid.observers", "cuda.arrays", "cuda.tables",
+        "cuda.growth",
     ),
 }  # fmt: skip
 ELSEWHERE = ("hybrid.growth", "hybrid.record", "hybrid.sections", "linear.sums", "series.generated")  # not for a GPU

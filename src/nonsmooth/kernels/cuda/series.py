@@ -23,7 +23,7 @@ from nonsmooth.kernels.series.places import N_SERIES_MEMO, N_SERIES_TALLY, OPEN_
 from nonsmooth.kernels.series.polynomial import stack_size
 
 # Set for each system and method.
-ORDER, CHECKED, CORNERS, N_GUARDS = 16, 0, 0, 0
+METHOD, ORDER, CHECKED, CORNERS, N_GUARDS = 0, 16, 0, 0, 0
 N_PARAMETERS, N_MEMORY, N_INDICATORS, N_OUTPUTS, N_SCRATCH_ROWS = 1, 0, 1, 0, 1
 TRANSITIONS = np.array([[0, 0, 0]])
 ROWS = np.array([[0, 1, 0]])
@@ -152,7 +152,7 @@ def advance(jobs, rows, point, norms, plan, settings, place, counts, way, betwee
             work.q[N_PARAMETERS + n] = memory[j, n]
     form = Generated(
         periods, own[:, :N_PARAMETERS], periods[i : i + 1], LACKING, KINDS, norms[0], norms[1],
-        settings[0], settings[1], ORDER, 1, CHECKED, CORNERS, N_GUARDS, N_INDICATORS, N_OUTPUTS,
+        settings[0], settings[1], METHOD, ORDER, 1, CHECKED, CORNERS, N_GUARDS, N_INDICATORS, N_OUTPUTS,
     )  # fmt: skip
     at = Section(settings[2] if plan[0] < 0 else -1.0, plan[0], plan[1], plan[2], plan[3], plan[4], settings[3], 1)
     returns = transient[min(j, transient.shape[0] - 1)], keep[min(j, keep.shape[0] - 1)]

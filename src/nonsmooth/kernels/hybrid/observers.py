@@ -5,14 +5,7 @@ The loop asks these functions; each hands on to ``sections``, ``record`` or ``gr
 
 from nonsmooth.kernels.compile.cache import once
 from nonsmooth.kernels.hybrid.codes import OK
-from nonsmooth.kernels.hybrid.growth import (
-    approach_transition,
-    carry_frame,
-    leave_transitions,
-    mark_unit,
-    open_frame,
-    saltate,
-)
+from nonsmooth.kernels.hybrid.growth import leave_transitions, mark_unit, open_frame
 from nonsmooth.kernels.hybrid.places import DONE, GROW, LOGGED, NO_END, OPEN_RUN, RETURNS, RETURNS_OF_SECTION, WAITED
 from nonsmooth.kernels.hybrid.record import base_of, log_transition, mark_time, observe_samples, room_in_log
 from nonsmooth.kernels.hybrid.sections import (
@@ -24,6 +17,7 @@ from nonsmooth.kernels.hybrid.sections import (
     open_returns,
     returns_watched,
 )
+from nonsmooth.kernels.linear.growth import approach_transition, carry_frame, saltate
 from nonsmooth.kernels.linear.stepper import steps_at_a_stride
 
 # What a text is made for: 0 never, 1 where the goal says so, 2 always.
@@ -35,7 +29,7 @@ GROWS = 1
 def open_window(i, form, section, goal, seen, tables, work):
     """Begin what is kept of a run."""
     if GROWS == 2 or (GROWS == 1 and goal.kind == GROW):
-        open_frame(seen.growth, tables, work)
+        open_frame(seen.growth, work)
     elif LOGS == 1 and goal.kind == LOGGED:
         work.memo[DONE] = base_of(i, form, work)
     else:
@@ -99,7 +93,7 @@ def observe(i, step, stop, triggered, form, net, section, goal, seen, tables, wo
     """Look at a segment; returns whether the run goes on, ends on it (CLOSED) or behind its transition (LATE)."""
     state = OPEN_RUN
     if GROWS == 2 or (GROWS == 1 and goal.kind == GROW):
-        carry_frame(step, seen.growth, tables, work)
+        carry_frame(step, goal, seen.growth, tables, work)
     elif LOGS == 1 and goal.kind == LOGGED:
         observe_samples(step, form, net, seen.log, tables, work)
     else:

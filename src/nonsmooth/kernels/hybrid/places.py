@@ -26,6 +26,7 @@ NO_END = 1e300  # a time that is never reached
 
 # What a run is for (``Goal.kind``), and what an observer says of a segment.
 RETURNS_OF_SECTION, LOGGED, GROW = 0, 1, 2
+UNBROKEN = 1  # ``Goal.transient`` of growth: nothing can happen to the motion, which the frame's own series moves
 OPEN_RUN, LATE, CLOSED = 0, 1, 2
 
 RESET = 1  # of ``Net.transitions``, place 1: the states change (2: memory alone)

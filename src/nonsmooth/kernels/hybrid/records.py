@@ -113,6 +113,7 @@ class Generated(NamedTuple):
     absolute: Any  # (n,) atol
     rtol: Any
     step: Any  # a fixed one, or 0
+    method: Any  # of ``series.places``
     order: Any
     locate: Any  # 0: transitions are judged at the ends of steps
     checked: Any  # 1: polynomials are held against the equations
@@ -212,6 +213,11 @@ class Growth(NamedTuple):
     fields: Any  # (3, n) vector field before and after, derivative of the map in time
     t_z: Any  # (n,) derivative of the instant of a transition in the state
     scratch: Any  # (n,)
+    taken: Any  # (transitions,) how often; or none
+    functions: Any  # addresses of what carries it (``tangent.following``), or none where the stepper does
+    follower: Any  # and of the record that they are given
+    u: Any  # the state to which they have carried it
+    q: Any  # and parameters, then memory
 
 
 class Seen(NamedTuple):
@@ -244,7 +250,7 @@ FORM = type_of(
 TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2, _i[:, :, :, ::1], _f3, _i[:, :, ::1])
 NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1, _i2, _i1, _i1, _i1)
 WORK = type_of(Work, *[_f1] * 8, _f2, _f2, _f1, _f1, *[_i1] * 6, _f1)
-GENERATED = type_of(Generated, _i1, _f2, _f1, _i2, _i1, _f1, _f1, _f, _f, *[_i] * 7)
+GENERATED = type_of(Generated, _i1, _f2, _f1, _i2, _i1, _f1, _f1, _f, _f, *[_i] * 8)
 SERIES_WORK = type_of(
     SeriesWork, *[_f1] * 7, *[_f2] * 4, types.UniTuple(_f1, 8), *[_f1] * 7, *[_i1] * 3, _f1, _f1, _i1, _f1, _i1, _f1,
     _i1, _f1,
@@ -253,4 +259,4 @@ MOTION = type_of(Motion, _f1, _f1, _f1, _i1)
 CALL = type_of(Call, _i1, _f1, _f1, _f2, MOTION)
 KEPT = type_of(Kept, _f3, _f2, _f2, _i1, _i1, _f1, _f2, _i2, _i1)
 LOG = type_of(Log, _f1, _f2, _f2, _i1, _i1, _f1, _i1, _f2, _f2, _f2, _f1, _i1, _f2, _f1, _i)
-GROWTH = type_of(Growth, _f1, _f2, _f2, _f1, _f1, _f2, _f2, _f2, _f2, _f1, _f1)
+GROWTH = type_of(Growth, _f1, _f2, _f2, _f1, _f1, *[_f2] * 4, _f1, _f1, _i1, _i1, _i, _f1, _f1)

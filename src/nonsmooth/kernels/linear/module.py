@@ -13,8 +13,8 @@ STEPPER = (
     "linear.limits", "linear.stepper", "hybrid.loop",
 )  # fmt: skip
 OBSERVERS = (
-    "linear.extremes", "linear.touches", "hybrid.sections", "hybrid.record", "hybrid.growth", "hybrid.observers",
-    "hybrid.run",
+    "linear.extremes", "linear.touches", "linear.growth", "hybrid.sections", "hybrid.record", "hybrid.growth",
+    "hybrid.observers", "hybrid.run",
 )  # fmt: skip
 
 
@@ -25,13 +25,7 @@ def is_planar(states: int, harmonics: int) -> bool:
 
 @cache
 def linear_module(planar: bool = False) -> ModuleType:
-    """The module with ``run``: for two states, all in every mode, with one harmonic; else for any number of them."""
-    text = with_numbers(joined((*STEPPER, *OBSERVERS)), {"STATES": 2 if planar else 0})
-    return load_module(text, "linear_planar" if planar else "linear")
-
-
-@cache
-def modes_module() -> ModuleType:
-    """The module with ``stand``, which adds modes to tables."""
-    text = with_numbers(joined(("linear.tables", "linear.bands", "linear.build", "linear.modes")), {"STATES": 0})
-    return load_module(text, "linear_modes")
+    """The module with ``run``: for two states, all in every mode, with one harmonic; else for any number of them, and
+    with ``stand``, which adds modes to tables."""
+    text = joined((*STEPPER, *OBSERVERS) if planar else (*STEPPER, *OBSERVERS, "linear.modes"))
+    return load_module(with_numbers(text, {"STATES": 2 if planar else 0}), "linear_planar" if planar else "linear")

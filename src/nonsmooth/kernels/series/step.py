@@ -15,8 +15,17 @@ from nonsmooth.kernels.series.rkf45 import first_step, hermite, quiet, stages, t
 from nonsmooth.kernels.series.taylor import dense_states, fill_powers, step_length
 from nonsmooth.kernels.series.trust import trusted
 
-# Of ``series.places``: set where the text is joined, so that each method has a kernel of its own.
-METHOD = 0
+
+@inline
+def degree_of(form):
+    """The degree of a step's polynomials."""
+    return 5 if form.method == place.RKF45 else form.order
+
+
+@once
+def jets_of(form, work):
+    """The jets at the present instant."""
+    return work.J0 if form.method == place.RKF45 else work.C
 
 
 @device
@@ -27,7 +36,7 @@ def polished(form, work, row, t, h, tau):
     stands, which has the error of the step."""
     C, n = work.C, work.w.shape[0]
     values = values_of(form)
-    m = 5 if METHOD == place.RKF45 else form.order
+    m = degree_of(form)
     at = tau
     for _ in range(12):
         dense_states(C, m, n, at, work.dense)
@@ -76,7 +85,7 @@ def planned_length(mode, form, J, log_rtol, work):
     n = work.w.shape[0]
     if form.step > 0.0:
         return form.step
-    if METHOD == place.RKF45:
+    if form.method == place.RKF45:
         return work.usual[mode] if work.usual[mode] > 0.0 else first_step(J, work.w, n, form.absolute, form.rtol)
     return step_length(J, form.order, n, form.indicators, work.w, form.weight, work.scale, log_rtol)
 
@@ -90,8 +99,7 @@ def log_tolerance(form):
 @once
 def length_of_step(i, form, net, work, r_max):
     """The length of the next step, before crossings in sight shorten it; -1: there is none."""
-    tally, memo, rkf = work.tally, work.memo, METHOD == place.RKF45
-    J = work.J0 if rkf else work.C
+    tally, memo, rkf, J = work.tally, work.memo, form.method == place.RKF45, jets_of(form, work)
     n, mode, t = work.w.shape[0], tally[MODE], memo[TIME]
     if tally[place.READY] == 0:
         jet = jet_of(form)
@@ -160,11 +168,11 @@ def forget_signs(n, side):
 @once
 def make_step(i, form, net, section, wanted, work, r_max):
     """A step and its first transition, into ``work``; False where there is none (the motion has left every bound)."""
-    tally, memo, rkf = work.tally, work.memo, METHOD == place.RKF45
+    tally, memo, rkf = work.tally, work.memo, form.method == place.RKF45
     mode, t, n, fixed = tally[MODE], memo[TIME], work.w.shape[0], form.step
-    degree, n_i = 5 if rkf else form.order, form.indicators
-    checked = form.checked == 1 and METHOD == place.TAYLOR and fixed <= 0.0
-    tail = 1.0 if METHOD == place.TAYLOR else 0.0
+    degree, n_i = degree_of(form), form.indicators
+    checked = form.checked == 1 and not rkf and fixed <= 0.0
+    tail = 0.0 if rkf else 1.0
     h = length_of_step(i, form, net, work, r_max)
     pending, hit, x, calm, halvings, error, sure = -1, -1, NONE, False, 0, 0.0, 0.0
     if h < 0.0:

@@ -12,13 +12,21 @@ from numba import types
 
 import nonsmooth.kernels.series.places as place
 from nonsmooth.kernels.compile.cache import device, inline, once
-from nonsmooth.kernels.hybrid.places import FIRED, MODE, NO_END, RETURNS, TIME, TRIES
+from nonsmooth.kernels.hybrid.places import FIRED, GROW, MODE, NO_END, RETURNS, TIME, TRIES, UNBROKEN
 from nonsmooth.kernels.hybrid.records import GENERATED, SERIES_WORK
 from nonsmooth.kernels.series.crossing import NOISE, rows_hold, section_crossing, sides_at, snap
 from nonsmooth.kernels.series.generated import jet_of, jump_of, values_of
 from nonsmooth.kernels.series.polynomial import NONE, row_bounds
 from nonsmooth.kernels.series.rkf45 import first_step
-from nonsmooth.kernels.series.step import METHOD, at_end, judged_at_end, log_tolerance, make_step, polished
+from nonsmooth.kernels.series.step import (
+    at_end,
+    degree_of,
+    jets_of,
+    judged_at_end,
+    log_tolerance,
+    make_step,
+    polished,
+)
 from nonsmooth.kernels.series.taylor import copied, dense_states, end_states, fill_powers, step_length
 
 STEPPER = GENERATED, types.Tuple(()), SERIES_WORK  # the types of this stepper's records: model, tables, work
@@ -54,14 +62,14 @@ def look(i, form, tables, work, mode):
     """Jets and after-limits at a start or after a jump."""
     t, u, q, scale = work.memo[TIME], work.w, work.q, work.scale
     n, n_indicators = u.shape[0], form.indicators
-    X = work.J0 if METHOD == place.RKF45 else work.C
-    m = 4 if METHOD == place.RKF45 else form.order
+    X = jets_of(form, work)
+    m = 4 if form.method == place.RKF45 else form.order
     jet = jet_of(form)
     jet(mode, m, t, u, q, X, work.W)
     h = work.usual[mode]
     if form.step > 0.0:
         h = form.step
-    elif METHOD == place.RKF45:
+    elif form.method == place.RKF45:
         if h <= 0.0:
             h = first_step(X, u, n, form.absolute, form.rtol)
     else:
@@ -80,7 +88,7 @@ def look(i, form, tables, work, mode):
 @once
 def start_on_section(form, section, tables, work):
     """A start on the section is no return, nor is a carried state left there."""
-    J = work.J0 if METHOD == place.RKF45 else work.C
+    J = jets_of(form, work)
     s = section.indicator
     work.tally[place.STAYS] = 1 if work.side[s] == 0 else 0
     if fabs(J[work.w.shape[0] + s, 0]) <= 1e-9 * work.scale[s]:
@@ -97,7 +105,7 @@ def holds(t, mode, tables, net, work):
 @once
 def lies_beyond(t, form, net, work):
     """Return whether no indicator of transition t is zero at the present instant."""
-    J = work.J0 if METHOD == place.RKF45 else work.C
+    J = jets_of(form, work)
     beyond = True
     for r in range(net.row_start[t], net.row_start[t + 1]):
         beyond = beyond and J[work.w.shape[0] + net.rows[r, 0], 0] != 0.0
@@ -154,7 +162,7 @@ def met(t, fired, form, net, section, tables, work):
 
     The direction may be that of the arrival or, where the indicator stays zero, of the departure (an impact does
     both). A motion that comes along the surface, as one that slides, does not pass it."""
-    J = work.J0 if METHOD == place.RKF45 else work.C
+    J = jets_of(form, work)
     row = work.w.shape[0] + section.indicator
     noise, way = NOISE * work.scale[section.indicator], section.rising
     slope = work.memo[place.SLOPE_BEFORE]
@@ -214,7 +222,7 @@ def next_pass(form, section, work):
     mode, n = tally[MODE], work.w.shape[0]
     if s < 0 or tally[place.CALM] == 1 or tally[place.STAYS] == 1 or not (section.mode < 0 or section.mode == mode):
         return -1.0, 0
-    degree = 5 if METHOD == place.RKF45 else form.order
+    degree = degree_of(form)
     h, part, cursor = memo[place.LENGTH], memo[place.PART], memo[place.CURSOR]
     if cursor == 0.0:
         _, low, high = row_bounds(work.C, n + s, 1.0, degree, work.powers)
@@ -234,7 +242,7 @@ def next_pass(form, section, work):
         return -1.0, 0
     memo[place.AHEAD] = x
     tau = x * h
-    if METHOD == place.RKF45:
+    if form.method == place.RKF45:
         tau = polished(form, work, s, memo[place.BASE], h, tau)
     return tau, 1 if sense >= 0 else -1
 
@@ -243,13 +251,15 @@ def next_pass(form, section, work):
 def leg(i, form, net, section, goal, tables, work, r_max, ready, first):
     """March to the next pass of a section, transition or end of a step, not beyond r_max; ``work.end`` is the state
     there. Returns (time marched, transition or -1, False, section direction or 0); a negative time: it diverges."""
+    if goal.kind == GROW and goal.transient == UNBROKEN:  # a frame that follows fills in the end
+        return r_max, -1, False, 0
     tally, memo, C, n = work.tally, work.memo, work.C, work.w.shape[0]
     wanted = watched(section, goal, work)
     if tally[place.OPEN_STEP] == 0:
         if not make_step(i, form, net, section, wanted, work, r_max):
             return -1.0, -1, False, 0
     tally[place.OPEN_STEP] = 0
-    rkf, degree = METHOD == place.RKF45, 5 if METHOD == place.RKF45 else form.order
+    rkf, degree = form.method == place.RKF45, degree_of(form)
     h, part, gone = memo[place.LENGTH], memo[place.PART], memo[place.CURSOR] * memo[place.LENGTH]
     tau, sense = next_pass(form, section, work)
     if tau >= 0.0:
@@ -286,7 +296,7 @@ def time_scale(i, since, form, tables, work):
 @once
 def arrive_at(t, since, full, wrapped, form, net, tables, work):
     """State and signs at the end of a segment. Returns its transition, where that is judged there only."""
-    tally, rkf, n = work.tally, METHOD == place.RKF45, work.w.shape[0]
+    tally, rkf, n = work.tally, form.method == place.RKF45, work.w.shape[0]
     copied(work.end, work.w)
     if tally[place.OPEN_STEP] == 1:
         work.memo[place.CURSOR] = work.memo[place.AHEAD]
@@ -322,7 +332,7 @@ def arrive_at(t, since, full, wrapped, form, net, tables, work):
         jet = jet_of(form)
         jet(tally[MODE], form.order, work.memo[TIME], work.w, work.q, work.C, work.W)
         tally[place.READY] = 1
-    J = work.J0 if rkf else work.C
+    J = jets_of(form, work)
     judged = judged_at_end(tally[MODE], J, n, form.indicators, net, work)
     if judged < 0:
         return t
@@ -368,7 +378,7 @@ def at_rest(form, section, goal, tables, work):
 @once
 def state_at(tau, form, tables, work, out):
     """The state at any instant of the segment."""
-    degree = 5 if METHOD == place.RKF45 else form.order
+    degree = degree_of(form)
     if tau >= work.memo[place.PART]:
         for j in range(work.w.shape[0]):
             out[j] = work.end[j]

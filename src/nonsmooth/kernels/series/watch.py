@@ -16,7 +16,7 @@ from nonsmooth.kernels.series.polynomial import (
     shift,
     strip,
 )
-from nonsmooth.kernels.series.step import METHOD
+from nonsmooth.kernels.series.step import degree_of, jets_of
 from nonsmooth.kernels.series.taylor import dense_states
 
 
@@ -26,7 +26,7 @@ def widen(a, b, form, tables, work, kept):
     if work.tally[place.OPEN_STEP] == 1 or not (b > a):
         return
     C, n, mode, poly, top, bottom = work.C, work.w.shape[0], work.tally[MODE], work.a, kept.high, kept.low
-    m = 5 if METHOD == place.RKF45 else form.order
+    m = degree_of(form)
     for row in range(form.kinds.shape[0]):
         if form.kinds[row] != 1 or (row < n and form.lacking[mode, row] == 1):
             continue
@@ -57,7 +57,7 @@ def widen_corners(m, form, work, kept):
 def include(mode, form, tables, work, kept):
     """Extend the extremes by the present instant, just after a transition."""
     n = work.w.shape[0]
-    jets = work.J0 if METHOD == place.RKF45 else work.C
+    jets = jets_of(form, work)
     for row in range(form.kinds.shape[0]):
         if row < n and form.lacking[mode, row] == 1:
             continue
@@ -84,7 +84,7 @@ def log_touches(step, form, net, log, tables, work):
     ``work.rise`` is the sign of each row's slope at the end of the step before (0: just after a jump)."""
     C, n, powers, rows, rise = work.C, work.w.shape[0], work.powers, net.rows, work.rise
     a, d, stack, found, u, scale = work.a, work.d, work.stack, work.found, work.dense, work.scale
-    m = 5 if METHOD == place.RKF45 else form.order
+    m = degree_of(form)
     mode, t, h, count = work.tally[MODE], work.memo[DONE], work.memo[place.PART], work.tally[TOUCHES]
     begin = net.mode_start[mode]
     for j in range(begin, net.mode_start[mode + 1]):

@@ -3,7 +3,7 @@
 A segment is marched by Taylor series. On every step the matrix X of the step begins afresh: the identity in the columns
 of the states, zero in those of the memory and of the active parameters; its series follows from those of the Jacobians'
 entries, X_(k+1) = (sum_j A_j X_(k-j) + B_k) / (k + 1). So its error can be judged without units, and the steps'
-matrices are multiplied up.
+matrices are multiplied up. (Along a march, ``following``, it begins with a frame that is kept orthonormal.)
 
 Small changes are those of the N = n + n_active numbers (states, memory, active parameters).
 """
@@ -20,11 +20,13 @@ from nonsmooth.kernels.compile.lanes import FOUR, load, plus, store
 from nonsmooth.kernels.compile.pointers import function_at
 from nonsmooth.kernels.hybrid.codes import DIVERGED, NO_CONVERGENCE, OK
 from nonsmooth.kernels.hybrid.records import type_of
+from nonsmooth.kernels.series.taylor import fill_powers
 from nonsmooth.kernels.tangent.agreement import fits
 from nonsmooth.kernels.tangent.frame import saltation
+from nonsmooth.kernels.tangent.segments import Segments
 
-ORDER = 24
-ACCURACY = 1e-17  # of the last two terms of a series against its largest one
+ORDER = 24  # of the series of an orbit's legs
+ACCURACY = 1e-17  # of the last two terms of a series against its largest one, there
 MOST_STEPS = 100_000  # in one leg
 
 _i, _f = types.int64, types.float64
@@ -55,18 +57,7 @@ class Steps(NamedTuple):
     powers: Any  # (order + 1,) of a step
     u: Any  # (n_u,)
     q: Any  # parameters, then memory
-
-
-class Ends(NamedTuple):
-    """Ends and derivatives of m segments."""
-
-    z: Any  # (m, n)
-    Phi: Any  # (m, n, n)
-    P: Any  # (m, n, n_active)
-    f_begin: Any  # (m, n)
-    f_end: Any
-    divergence: Any  # (m,) integral of div f
-    status: Any
+    accuracy: Any  # of the last two terms of a series against its largest one
 
 
 class Crossing(NamedTuple):
@@ -80,8 +71,8 @@ class Crossing(NamedTuple):
 
 
 EQUATIONS = type_of(Equations, _i1, _i2, _i2, _i2)
-STEPS = type_of(Steps, _f2, _f3, *[_f2] * 4, *[_f1] * 3)
-ENDS = type_of(Ends, _f2, _f3, _f3, _f2, _f2, _f1, _i1)
+STEPS = type_of(Steps, _f2, _f3, *[_f2] * 4, *[_f1] * 3, _f)
+SEGMENTS = type_of(Segments, _f2, _f3, _f3, _f2, _f2, _f1, _i1)
 CROSSING = type_of(Crossing, *[_f2] * 4, _f1)
 
 
@@ -96,7 +87,8 @@ def excess(C, D, n_u, columns, powers):
     for i in range(n_u):
         top, last = 0.0, 0.0
         for k in range(half):
-            top = max(top, fabs(C[i, k]) * powers[k])
+            size = fabs(C[i, k]) * powers[k]
+            top = size if size > top else top
         last = fabs(C[i, order]) * high + fabs(C[i, order - 1]) * low
         if not (last < inf):
             return inf
@@ -105,7 +97,8 @@ def excess(C, D, n_u, columns, powers):
         top, last = 0.0, 0.0
         for c in range(columns):
             for k in range(half):
-                top = max(top, fabs(D[k, i, c]) * powers[k])
+                size = fabs(D[k, i, c]) * powers[k]
+                top = size if size > top else top
             last = max(last, fabs(D[order, i, c]) * high + fabs(D[order - 1, i, c]) * low)
             if c >= n_u - 1:
                 if not (last < inf):
@@ -117,22 +110,22 @@ def excess(C, D, n_u, columns, powers):
 
 
 @device
-def step_for(C, D, n_u, columns, remaining, guess, powers):
+def step_for(C, D, n_u, columns, remaining, guess, powers, accuracy):
     """A step on which all series have converged, at most ``remaining``; negative where there is none."""
     order = C.shape[1] - 1
     h = min(guess, remaining)
-    for attempt in range(60):
-        powers[0] = 1.0
-        for k in range(order):
-            powers[k + 1] = powers[k] * h
+    for _ in range(60):
+        fill_powers(h, order, powers)
         worst = excess(C, D, n_u, columns, powers)
         if not (worst < inf):
             return -1.0
-        # after four attempts a step may be shorter than it could be, but not longer
-        if worst <= ACCURACY and (h >= remaining or worst > 1e-3 * ACCURACY or attempt >= 4):
+        if worst <= accuracy and (h >= remaining or worst > 1e-3 * accuracy):
             return h
-        factor = 10.0 if worst <= 0.0 else min(10.0, 0.97 * (ACCURACY / worst) ** (1.0 / order))
+        factor = 10.0 if worst <= 0.0 else min(10.0, 0.97 * (accuracy / worst) ** (1.0 / order))
         h = min(h * factor, remaining)
+        if worst > 0.0 and factor > 0.5:  # .97^order is room for the term before the last
+            fill_powers(h, order, powers)
+            return h
     return -1.0
 
 
@@ -166,10 +159,31 @@ def step_end(C, D, equations, mode, order, s, u, X):
 
 
 @device
+def step_along(jet, field, mode, t, remaining, sign, compared, equations, work, guess):
+    """One step of state and small changes (of ``D[0]``), into ``u`` and ``X``: (its length, at most ``remaining``; the
+    integral of div f; a guess of the next). Length 0: none. ``compared``: the series are held against the equations."""
+    C, D, X, u = work.C, work.D, work.X, work.u
+    n_u, n_c, order = X.shape[0], X.shape[1], C.shape[1] - 1
+    jet(mode, order, t, u, work.q, C, work.W, D)
+    h = step_for(C, D, n_u, n_c, remaining, guess, work.powers, work.accuracy)
+    if not h > 0.0:
+        return 0.0, 0.0, guess
+    if h < remaining:
+        guess = h
+        h = remaining / float(int(remaining / h) + 1)  # equal steps to the end, were all alike
+    while compared and not fits(field, mode, t, sign * h, work):
+        h *= 0.5
+        guess = h
+        if not (h > 1e-15 * remaining):
+            return 0.0, 0.0, guess
+    return h, step_end(C, D, equations, mode, order, sign * h, u, X), guess
+
+
+@device
 def march_one(jet, field, mode, t0, tau, equations, work, guess):
     """March u over the time tau; ``total`` is multiplied up. Returns (status, integral of div f, next guess)."""
-    C, D, X, Y, total, u = work.C, work.D, work.X, work.Y, work.total, work.u
-    n_u, n_c, order = X.shape[0], X.shape[1], C.shape[1] - 1
+    X, Y, total = work.X, work.Y, work.total
+    n_u, n_c = X.shape
     curved = False
     for e in range(equations.entries.shape[0]):
         curved = curved or equations.kinds[mode, e] == 2
@@ -185,21 +199,11 @@ def march_one(jet, field, mode, t0, tau, equations, work, guess):
             return OK, divergence, guess
         for i in range(n_c):
             for c in range(n_c):
-                D[0, i, c] = 1.0 if i == c else 0.0
-        jet(mode, order, t0 + sign * done, u, work.q, C, work.W, D)
-        h = step_for(C, D, n_u, n_c, remaining, guess, work.powers)
+                work.D[0, i, c] = 1.0 if i == c else 0.0
+        h, part, guess = step_along(jet, field, mode, t0 + sign * done, remaining, sign, curved, equations, work, guess)
         if not (h > 1e-15 * length):
             return DIVERGED, divergence, guess
-        if h < remaining:
-            guess = h
-            h = remaining / float(int(remaining / h) + 1)  # equal steps to the end, were all alike
-        while curved and not fits(field, mode, t0 + sign * done, sign * h, work):
-            h *= 0.5
-            guess = h
-            if not (h > 1e-15 * length):
-                return DIVERGED, divergence, guess
-        s = sign * h
-        divergence += step_end(C, D, equations, mode, order, s, u, X)
+        divergence += part
         for i in range(n_u):
             for c in range(n_c):
                 v = X[i, c] if c >= n_u else 0.0
@@ -224,7 +228,7 @@ def put(z, n, u, q):
             q[q.shape[0] - n + i] = z[i]
 
 
-@kernel(types.void(EQUATIONS, _i1, _f1, _f1, _f2, _f1, ENDS, STEPS))
+@kernel(types.void(EQUATIONS, _i1, _f1, _f1, _f2, _f1, SEGMENTS, STEPS))
 def march_legs(equations, modes, t0, tau, z0, values, ends, work):
     """Segments one after the other: state at the end, dz/dz0, dz/dp, field at both ends, integral of div f, status."""
     jet, field = jet_at(equations.functions[0]), field_at(equations.functions[1])
