@@ -132,7 +132,7 @@ def take(i, t, fired, form, tables, net, work):
     mode = net.transitions[t, 0]
     look(i, form, tables, work, mode)
     if net.meets.shape[0] > 0:
-        J = work.J0 if METHOD == place.RKF45 else work.C
+        J = work.J0 if form.method == place.RKF45 else work.C
         for j in range(form.indicators):
             work.vals[j] = J[w.shape[0] + j, 0]
     if fired >= 0:
