@@ -132,7 +132,8 @@ def describe(
     plain: Any = None
     from nonsmooth.system.derived.relays import relays_of
 
-    relays = None if elements else relays_of(symbols, modes, indicators, transitions, outputs)
+    now = {symbols.p[key]: parameter.value for key, parameter in known.items()}
+    relays = None if elements else relays_of(symbols, modes, indicators, transitions, outputs, now)
     if elements or relays:
         from nonsmooth.system.derived.combinations import assembled
 
@@ -140,7 +141,6 @@ def describe(
             "indicators": indicators, "transitions": transitions, "outputs": outputs, "memory": memory,
             "symmetry": symmetry, "bands": bands, "period": period,
         }  # fmt: skip
-        now = {symbols.p[key]: parameter.value for key, parameter in known.items()}
         if relays is None:
             made = assembled(symbols, modes, elements, given, _scale(scale, units, name), now)
         else:

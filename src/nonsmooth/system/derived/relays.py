@@ -60,9 +60,11 @@ class Relays:
 
 def relays_of(
     symbols: Symbols, modes: Mapping[str, Any], indicators: Mapping[str, Any] | None, transitions: Sequence[Any],
-    outputs: Mapping[str, Any] | None,
+    outputs: Mapping[str, Any] | None, values: Mapping[sp.Symbol, float],
 ) -> Relays | None:  # fmt: skip
-    """The relays that a system's surfaces are; None where they are not, or all have relative degree one."""
+    """The relays that a system's surfaces are; None where they are not, or all have relative degree one.
+
+    They push towards their surfaces at the present ``values`` of the parameters."""
     if len(modes) < 4 or not transitions or not all(isinstance(item, Surface) for item in transitions):
         return None
     if any(item.static is not None or item.field is not None or item.mode for item in transitions):
@@ -99,8 +101,8 @@ def relays_of(
         first, second = (
             sp.simplify(sum(sp.diff(e, symbol) * part for symbol, part in zip(u, b, strict=True))) for e in (h, rate)
         )
-        acts = first if first != 0 else second
-        if acts == 0 or not acts.is_number or not acts < 0:  # it must push towards its surface
+        acts = (first if first != 0 else second).subs(values)
+        if not acts.is_number or not acts < 0:
             return None
         degrees.append(1 if first != 0 else 2)
         on = {name: _given(-part) for name, part in zip(symbols.u, b, strict=True) if part != 0}

@@ -85,7 +85,8 @@ class Coulomb(Element):
         if not other.element.presses:
             raise SystemDefinitionError(
                 f"element {here.name!r}: normal={self.normal!r} must name an ElasticStop; with the force of a rigid "
-                "contact, which friction changes in turn, a motion need not exist or be unique (Painleve)"
+                "contact, which friction changes in turn, a motion need not exist or be unique (Painleve); that is "
+                "Stop(friction=..., tangent=...)"
             )
         return other.element.force(other)
 
