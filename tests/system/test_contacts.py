@@ -211,17 +211,12 @@ def test_hyperstatic_contacts_hold_at_any_mass(mass: float) -> None:
     assert abs((forces + load)[held]).max() < 1e-10
 
 
-WITHIN = pytest.mark.xfail(strict=True, reason="forces that are not unique are reported with least norm, bounds aside")
-
-
-@WITHIN
 def test_forces_of_hyperstatic_contacts_lie_within_their_bounds() -> None:
     run, _ = between(0.838)
     assert abs(run["f_force"].values).max() <= 0.1 + 1e-12
     assert min(run[f"{name}_force"].values.min() for name in ("a", "b")) >= -1e-12
 
 
-@WITHIN
 def test_forces_of_frictions_that_hold_together_lie_within_their_bounds() -> None:
     """Of least norm within the bounds: .45 and .3 under .75."""
     system = one(lambda t, p: 0.75 * np.sin(0.5 * t), a=Coulomb(at="q", friction=0.3, static=0.6),

@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 
 __all__ = ["check_options", "check_system", "float_array", "real_number", "swept_values", "whole_number", "yes_or_no"]
 
-WITH_PATTERNS = ("simulate", "poincare", "sweep", "frequency_response")  # verbs for which a mode may be made on the way
+WITH_PATTERNS = (  # verbs for which a mode may be made on the way
+    "simulate", "poincare", "sweep", "frequency_response", "amplitude_spectrum", "chart", "basins", "basin_fractions",
+    "lyapunov",
+)  # fmt: skip
 _MOST = 2**53  # whole numbers up to here are exact in floating point
 
 

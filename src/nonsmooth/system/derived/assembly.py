@@ -16,7 +16,7 @@ them. A child of :class:`Assembler` brings one.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -26,6 +26,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.derived.deciding import least_within
 from nonsmooth.system.derived.elements import Element, Rubbing
 from nonsmooth.system.derived.elements.element import Condition, Leaving
 
@@ -243,6 +244,24 @@ class Assembler(ABC):
                 if k in held and (side := self.place(r, mode, pattern).side):
                     forces[r] = -side * self.constant(r, "friction") * forces[k]
         return f, {k: forces[k] for k in sorted(forces)}
+
+    def shared(
+        self, mode: str, pattern: Pattern, forces: FloatArray, value: Callable[[Any], FloatArray]
+    ) -> FloatArray:
+        """The forces (N, elements) in a combination, those that are not unique of least norm within their bounds;
+        ``value`` gives a law's (N,) values."""
+        held = self.held(pattern)
+        chosen, sums = self.basis(held, mode, pattern) if held else (held, np.zeros((0, 0)))
+        if len(chosen) == len(held) or {*held} & {*self.rubbing.values()}:
+            return forces
+        most = [self.parts[k].element.most(self.place(k, mode, pattern)) for k in held]
+        high = np.array([np.full(len(forces), np.inf) if m is None else value(m) for m in most]).T
+        low = np.where(np.isinf(high), 0.0, -high)
+        own, found = forces[:, held], forces.copy()
+        rounding = 1e-12 * np.abs(own).max(axis=1, keepdims=True, initial=0.0)
+        for i in np.flatnonzero(((own < low - rounding) | (own > high + rounding)).any(axis=1)):
+            found[i, held] = least_within(sums, own[i] @ sums, low[i], high[i])
+        return found
 
     def asked(self, k: int, mode: str, pattern: Pattern) -> list[Leaving]:
         """The instants at which what an element and others that are held do next is asked (:mod:`.deciding`)."""

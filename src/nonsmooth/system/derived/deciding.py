@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern, Place
     from nonsmooth.system.derived.instants import Ahead, Numbers
 
-__all__ = ["Outcome", "begun", "decide", "least"]
+__all__ = ["Outcome", "begun", "decide", "least", "least_within"]
 
 ZERO = 1e-11  # of the sum of the terms of a row: what is smaller is zero
 ORDERS = 24  # derivatives that are looked at where all before are zero
@@ -329,6 +329,18 @@ def least(G: FloatArray, a: FloatArray, low: FloatArray, high: FloatArray) -> Fl
             + ("no set is the last" if status == 1 else "contacts close on what cannot give way")
         )
     return x[0] * scale
+
+
+def least_within(sums: FloatArray, total: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """The forces x of least norm between bounds with ``x @ sums == total``."""
+    weight = 1e8 / np.square(sums).sum()
+    x = least(np.eye(len(sums)) + weight * sums @ sums.T, -weight * sums @ total, low, high)
+    near = 1e-6 * np.abs(x).max()
+    bound = np.where(x <= low + near, low, np.where(x >= high - near, high, np.nan))
+    free = np.isnan(bound)
+    x = np.where(free, 0.0, bound)
+    x[free] = np.linalg.pinv(sums[free].T) @ (total - x @ sums)
+    return x
 
 
 def _is_symmetric(G: FloatArray) -> bool:

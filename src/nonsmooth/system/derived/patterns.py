@@ -110,6 +110,12 @@ class Rows(Assembler):
         angles = self.rates * time
         return np.concatenate([u, [1.0], np.stack([np.cos(angles), np.sin(angles)], axis=-1).ravel()])
 
+    def augmented_all(self, u: FloatArray, time: FloatArray) -> FloatArray:
+        """w of states at N times."""
+        angles = time[:, None] * self.rates
+        waves = np.stack([np.cos(angles), np.sin(angles)], axis=-1).reshape(len(time), -1)
+        return np.hstack([u, np.ones((len(time), 1)), waves])
+
     def _part(self, k: int, name: str, patterns: Patterns) -> Part:
         direction = np.zeros(self.n)
         for i in patterns.acts_on[k]:
@@ -361,14 +367,13 @@ class Patterns:
     def forces(self, parameters: FloatArray, time: FloatArray, u: FloatArray, mode: Any) -> FloatArray:
         """Forces (N, elements) at N samples, each in the pattern of its mode."""
         rows = self.rows(self.form.evaluate(parameters[None, :]), 0)
-        angles = time[:, None] * rows.rates
-        waves = np.stack([np.cos(angles), np.sin(angles)], axis=-1).reshape(len(time), -1)
-        w = np.hstack([u, np.ones((len(time), 1)), waves])
+        w = rows.augmented_all(u, time)
         found = np.zeros((len(time), len(self.elements)))
         for m in np.unique(mode):
-            here = np.flatnonzero(mode == m)
-            for k, force in rows.flow(self.mode, self.visited[int(m)])[1].items():
+            here, pattern = np.flatnonzero(mode == m), self.visited[int(m)]
+            for k, force in rows.flow(self.mode, pattern)[1].items():
                 if isinstance(force, Row):
                     found[here, k] = w[here] @ force.values
+            found[here] = rows.shared(self.mode, pattern, found[here], lambda law, at=w[here]: at @ law.values)
             rows.forget()
         return found
