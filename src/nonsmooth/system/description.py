@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Description", "describe"]
 
+IMPACTS = ("simultaneous", "sequential")
+
 
 @dataclass(frozen=True)
 class Description:
@@ -109,10 +111,13 @@ def describe(
     period: Any,
     bands: Mapping[str, Band] | None,
     elements: Any = None,
+    impacts: str = "simultaneous",
 ) -> Description:
     """Check everything, call each function once with symbols, and return the description."""
     if not isinstance(name, str) or not name:
         raise SystemDefinitionError(f"`name` must be a string, not {name!r}")
+    if impacts not in IMPACTS:
+        raise SystemDefinitionError(f"{name!r}: `impacts` is one of {', '.join(map(repr, IMPACTS))}, not {impacts!r}")
     units = _units(states, "states", name)
     if not units:
         raise SystemDefinitionError(f"{name!r}: a system needs at least one state")
@@ -139,7 +144,7 @@ def describe(
 
         given = {
             "indicators": indicators, "transitions": transitions, "outputs": outputs, "memory": memory,
-            "symmetry": symmetry, "bands": bands, "period": period,
+            "symmetry": symmetry, "bands": bands, "period": period, "impacts": impacts,
         }  # fmt: skip
         if relays is None:
             made = assembled(symbols, modes, elements, given, _scale(scale, units, name), now)

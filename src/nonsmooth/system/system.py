@@ -57,6 +57,9 @@ class System:
     elements : mapping of str to element, or sequence, optional
         Stops, friction, backlash (:mod:`nonsmooth.elements`): modes and transitions are written for all combinations of
         their phases; the force of each, without impulses, is an output ``<name>_force``.
+    impacts : {"simultaneous", "sequential"}, optional
+        Impacts of several contacts at one instant: all at once by Newton's law, or one after the other, the fastest
+        approach first, as of bodies that are not quite in touch.
     name : str
 
     Raises
@@ -90,12 +93,13 @@ class System:
         period: Any = None,
         bands: Mapping[str, Band] | None = None,
         elements: Any = None,
+        impacts: str = "simultaneous",
         name: str = "system",
     ) -> None:
         description = describe(
             name=name, states=states, parameters=parameters, modes=modes, indicators=indicators,
             transitions=transitions, memory=memory, outputs=outputs, symmetry=symmetry, scale=scale,
-            period=period, bands=bands, elements=elements,
+            period=period, bands=bands, elements=elements, impacts=impacts,
         )  # fmt: skip
         values = {key: parameter.value for key, parameter in description.parameters.items()}
         self._set(description, values, variant_of(description, SHARP))

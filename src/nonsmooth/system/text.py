@@ -135,6 +135,8 @@ def _content(d: Description) -> dict[str, Any]:
             "shift": d.symmetry.shift,
             "modes": {d.traced.mode_names[i]: d.traced.mode_names[j] for i, j in enumerate(d.symmetry.modes)},
         }
+    if elements is not None and elements.make.sequential:
+        content["impacts"] = "sequential"
     if known:
         from nonsmooth.system.derived.combinations import SPEED
 
@@ -292,6 +294,7 @@ class _Reader:
             "symmetry": symmetry and (self.vector(symmetry["map"]), symmetry["shift"], symmetry["modes"]),
             "bands": {k: self.band(e) for k, e in self.bands.items()},
             "elements": {k: self.element(e) for k, e in c.get("elements", {}).items()} or None,
+            "impacts": c.get("impacts", "simultaneous"),
         }
 
     def kind(self, name: str) -> Any:

@@ -50,6 +50,7 @@ class Assembler(ABC):
     """The fields, forces and impulses of combinations of phases, over a calculus."""
 
     parts: list[Part]
+    sequential: bool = False  # impacts of one instant come one after the other
     asks: bool = False  # what several elements decide together is asked at each instant (``deciding``)
 
     # The calculus
@@ -152,6 +153,11 @@ class Assembler(ABC):
         """Changes of the derivatives of the rates of some elements by their unit forces."""
         parts = parts or [self.parts[k] for k in some]
         return [[self.across(self.rate(i, mode), part) for part in parts] for i in some]
+
+    @property
+    def striking(self) -> list[int]:
+        """The rigid stops."""
+        return [k for k, part in enumerate(self.parts) if part.element.strikes]
 
     @cached_property
     def rubbing(self) -> dict[int, int]:

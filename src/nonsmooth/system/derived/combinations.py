@@ -311,8 +311,10 @@ def assembled(
     make = Expressions(symbols, base, parts, scale, values)
     counts = [len(part.element.phases) for part in make.parts]
     number = len(base) * int(sp.prod(counts))
-    if number > MOST or make.rubbing:
-        return _opened(make, base, given, "rub" if make.rubbing else f"have more than {MOST} combinations of phases")
+    make.sequential = given["impacts"] == "sequential" and len(make.striking) > 1
+    if number > MOST or make.rubbing or make.sequential:
+        why = f"have more than {MOST} combinations of phases"
+        return _opened(make, base, given, "rub" if make.rubbing else "strike in sequence" if make.sequential else why)
     make.asks = _decide_together(make, base, resets)
     every = product(base, product(*[range(count) for count in counts]))
     pairs = [pair for pair in every if make.may_hold(make.held(pair[1]), pair[0])]

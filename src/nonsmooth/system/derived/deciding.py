@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 __all__ = ["Outcome", "begun", "decide", "least", "least_within"]
 
 ZERO = 1e-11  # of the sum of the terms of a row: what is smaller is zero
+ROUNDS = 10_000  # of impacts one after the other
 ORDERS = 24  # derivatives that are looked at where all before are zero
 
 
@@ -159,6 +160,8 @@ class _Instant:
         rubs = [k for k in contacts if self.speeds[k] < 0.0 and k in self.make.rubbing]
         if rubs:
             return self._rub(rubs[0], contacts, restitution[rubs[0]])
+        if self.make.sequential and len(contacts) > 1:
+            return self._in_sequence(contacts, restitution)
         before = np.array([self.speeds[k] for k in contacts])
         given_back = np.array([restitution[k] if self.speeds[k] < 0.0 else 0.0 for k in contacts])
         G = self.numbers.effects(contacts, contacts)
@@ -185,15 +188,50 @@ class _Instant:
             self.ends = "no_motion"
             return ()
         impulses, slopes, after = found
-        changes = self.numbers.effects([*self.contacts, *self.frictions], some)
-        for j, change in zip([*self.contacts, *self.frictions], changes, strict=True):
+        self._struck(some, impulses, after)
+        self.rubbed = tuple(some), slopes
+        return ((k, restitution),)
+
+    def _struck(self, some: list[int], impulses: FloatArray, after: FloatArray) -> None:
+        """Put in the impulses of some elements, whose rates are then ``after``."""
+        bearing = [*self.contacts, *self.frictions]
+        for j, change in zip(bearing, self.numbers.effects(bearing, some), strict=True):
             total, terms = self.speeds[j] + change @ impulses, abs(self.speeds[j]) + np.abs(change) @ np.abs(impulses)
             self.speeds[j] = total if abs(total) > ZERO * terms else 0.0
         self.speeds |= dict(zip(some, map(float, after), strict=True))
         for j, impulse in zip(some, impulses, strict=True):
             self.numbers.shift(self.numbers.direction(j) * impulse)
-        self.rubbed = tuple(some), slopes
-        return ((k, restitution),)
+
+    def _in_sequence(self, contacts: list[int], restitution: dict[int, float]) -> tuple[tuple[int, float], ...]:
+        """Impacts one after the other, the fastest approach first, those of one speed at once; a plastic one of all
+        contacts ends them where no approach is faster than rest."""
+        G, count = self.numbers.effects(contacts, contacts), len(contacts)
+        v, e = np.array([self.speeds[k] for k in contacts]), np.array([restitution[k] for k in contacts])
+        rest = np.array([self.creep(k) for k in contacts])
+        impulses, slopes, rates = np.zeros(count), np.zeros((count, count)), np.eye(count)  # of the rates at first
+        for _ in range(ROUNDS):
+            last = bool((-v <= rest).all())
+            some = list(range(count)) if last else [i for i in range(count) if v[i] <= v.min() * (1 - ZERO)]
+            factor = np.where(v[some] < 0.0, 1.0 if last else 1.0 + e[some], 1.0)
+            found = least(G[np.ix_(some, some)], v[some] * factor, np.zeros(len(some)), np.full(len(some), np.inf))
+            bearing = [i for i, impulse in zip(some, found, strict=True) if impulse > 0.0]
+            if bearing:
+                inverse = np.linalg.pinv(G[np.ix_(bearing, bearing)], rcond=1e-10)
+                back = np.array([0.0 if last else e[i] for i in bearing])
+                change = -inverse @ ((1.0 + back)[:, None] * rates[bearing])
+                slopes[bearing] += change
+                impulses[bearing] += found[[some.index(i) for i in bearing]]
+                after = -back * v[bearing]
+                v, rates = v + G[:, bearing] @ found[[some.index(i) for i in bearing]], rates + G[:, bearing] @ change
+                v[bearing] = after
+            if last:
+                break
+        else:
+            self.ends = "no_motion"
+            return ()
+        self._struck(contacts, impulses, np.where(np.abs(v) <= ZERO * np.abs(G) @ impulses, 0.0, v))
+        self.rubbed = tuple(contacts), slopes
+        return tuple((k, restitution[k]) for k, impulse in zip(contacts, impulses, strict=True) if impulse > 0.0)
 
     def share(self, r: int) -> float:
         """The coefficient of friction of a contact."""

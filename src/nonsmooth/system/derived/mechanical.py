@@ -37,6 +37,7 @@ def mechanical(
     outputs: Mapping[str, Any] | None = None,
     symmetry: Any = None,
     period: Any = None,
+    impacts: str = "simultaneous",
     name: str = "mechanical system",
 ) -> System:
     r"""A mechanical system of N degrees of freedom with contacts and friction, ready for every verb.
@@ -60,7 +61,7 @@ def mechanical(
         Names of the coordinates (``q1``, ``q2``, ...; ``q`` for one). Speeds are called ``v_<coordinate>``.
     base : callable, optional
         Acceleration of the base, ``lambda t, p: -p.Y * p.w**2 * np.cos(p.w * t)``; coordinates are relative to it.
-    scale, outputs, symmetry, period, name
+    scale, outputs, symmetry, period, impacts, name
         As for :class:`nonsmooth.System`.
 
     Returns
@@ -128,7 +129,7 @@ def mechanical(
     }
     system = System(
         name=name, states=states, parameters=given, modes={"all": field}, outputs=outputs, scale=scale,
-        symmetry=symmetry, period=period, elements=parts or None,
+        symmetry=symmetry, period=period, elements=parts or None, impacts=impacts,
     )  # fmt: skip
     d = system._description
     p = Symbols(name, states, dict.fromkeys(d.parameters, ""), {}).parameters()
