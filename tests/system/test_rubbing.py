@@ -162,6 +162,30 @@ class TestSliding:
         np.testing.assert_array_equal(one.section, two.section)
 
 
+class TestVerbs:
+    """Verbs over a contact that rubs, beside dry friction of the same force."""
+
+    @staticmethod
+    def load(t, p):
+        return 1.5 * np.cos(p.w * t)
+
+    def test_exponents(self):
+        own = floor(0.1, forcing=self.load, stiffness=2.0, damping=0.1)
+        other = ns.mechanical(
+            1.0, 0.1, 2.0, coordinates=["x"], parameters={"w": 1.0}, forcing={"x": self.load},
+            elements={"f": E.Coulomb(at="x", friction=0.1 * G)},
+        )  # fmt: skip
+        one, two = (ns.lyapunov(s, periods=50, transient=20, progress=False).exponents.values for s in (own, other))
+        np.testing.assert_allclose(one[:2], two, atol=1e-9)
+        assert (one[2:] == -np.inf).all()
+
+    def test_basins(self):
+        own = floor(0.1, forcing=self.load, stiffness=2.0, damping=0.1)
+        found = ns.basins(own, {"x": [-1.0, 1.0], "v_x": [-1.0, 1.0]}, progress=False)
+        assert (found.label == 0).all()
+        assert found.sizes["attractor"] == 1
+
+
 class TestParadox:
     """No motion, or several; what is refused."""
 

@@ -77,9 +77,8 @@ class Variant:
         """Raise SystemDefinitionError where the modes are made when they are first visited."""
         if self.traced.patterns is not None:
             raise SystemDefinitionError(
-                f"{name!r} has more combinations of its elements' phases than are written out; a mode is made "
-                "when a run first visits it, for simulate, poincare, sweep and frequency_response. Not so for "
-                f"{verb}: take fewer elements for it"
+                f"{name!r}: its elements {self.traced.patterns.why}; a mode is made when a run first visits it, for runs, "
+                f"sweeps, charts, basins and exponents. Not so for {verb}: take fewer elements for it"
             )
 
     @cached_property
