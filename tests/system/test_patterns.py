@@ -93,14 +93,19 @@ def test_its_text_is_read_back_whatever_it_has_visited(both: tuple[ns.System, ns
     assert 'wall: Stop(at="q2"' in repr(made) and "visited so far" in repr(made)
 
 
+def test_exponents_are_those_of_the_system_written_out(both: tuple[ns.System, ns.System]) -> None:
+    one, two = (ns.lyapunov(system, periods=40, transient=20, progress=False).exponents.values for system in both)
+    np.testing.assert_allclose(one, two, atol=1e-8)
+
+
 def test_what_cannot_be_done_with_patterns_is_refused(both: tuple[ns.System, ns.System]) -> None:
     made = both[1]
     verbs: list[Any] = [
-        ns.find_orbit, ns.lyapunov, ns.sensitivity, lambda s: ns.basins(s, {}), lambda s: s.smoothed(0.1),
-        lambda s: s.derivatives, lambda s: s.to_latex(), lambda s: ns.simulate(s, periods=1, ramps={"w": (0.5, 0.6)}),
+        ns.find_orbit, ns.sensitivity, lambda s: s.smoothed(0.1), lambda s: s.derivatives,
+        lambda s: s.to_latex(), lambda s: ns.simulate(s, periods=1, ramps={"w": (0.5, 0.6)}),
     ]  # fmt: skip
     for verb in verbs:
-        with pytest.raises(ns.SystemDefinitionError, match="for simulate, poincare, sweep and frequency_response"):
+        with pytest.raises(ns.SystemDefinitionError, match="for runs, sweeps, charts, basins and exponents"):
             verb(made)
     with pytest.raises(ValueError, match="by the exact flow alone"):
         ns.simulate(made, periods=1, method="taylor")
