@@ -29,7 +29,7 @@ def friction(row: tuple[float, ...], mass: tuple[float, ...], **given: Any) -> t
 def stop(row: tuple[float, ...], mass: tuple[float, ...], position: float, e: float) -> tuple[Wall, Stop]:
     """Keeps row . q below a position."""
     r = np.array(row)
-    wall = Wall(lambda q: position - r @ q, lambda q: -r, restitution=e)
+    wall = Wall(lambda q: float(position - r @ q), lambda q: -r, restitution=e)
     gap = lambda t, u, p: position - sum(a * x for a, x in zip(row, list(u)[: len(row)], strict=True))
     return wall, Stop(gap=gap, on=on(tuple(-r), mass), restitution=e)
 
@@ -60,7 +60,7 @@ def duffing(mass: tuple[float, ...], load: float, rate: float, *pairs: Any) -> t
 
 
 ONE, TWO = (1.0,), (1.0, 1.3)
-CASES = {
+CASES: dict[str, tuple[Any, ...]] = {
     "two frictions and a stop": (
         ONE, 1.0, 0.8, [0.1], friction((1.0,), ONE, friction=0.2, static=0.3),
         friction((1.0,), ONE, friction=0.15, belt=0.1), stop((1.0,), ONE, 0.6, 0.5),
