@@ -96,9 +96,10 @@ def test_duffing_masses_move_as_in_the_reference(name: str) -> None:
     assert np.abs(run["u"].values[at] - expected).max() < 1e-8
 
 
-def test_a_mass_in_a_ring_rolls_along_it() -> None:
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_a_mass_in_a_ring_rolls_along_it(e: float) -> None:
     """The gap R - |q| has a curvature: what rests at the ring is pressed by v^2 / R too."""
-    R, load, rate, e = 1.0, 1.5, 0.7, 0.0
+    R, load, rate = 1.0, 1.5, 0.7
 
     def curvature(q: Array, v: Array) -> float:
         r = np.linalg.norm(q)
