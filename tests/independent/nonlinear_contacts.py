@@ -73,7 +73,7 @@ class Masses:
                 found = found - s * e.kinetic * np.array(e.row)
         return found
 
-    def held(self, t: float, q: Array, v: Array, state: Sequence[int]) -> tuple[Array, list[int], Array, Any, Any]:
+    def held(self, t: float, q: Array, v: Array, state: Sequence[int]) -> tuple[Any, ...]:
         """Accelerations without held forces, what is held, its rows, effects and needed rates."""
         free = np.linalg.solve(self.mass, self.loads(t, q, v, state))
         some = [i for i, s in enumerate(state) if s == 0]

@@ -29,7 +29,7 @@ def friction(row: tuple[float, ...], mass: tuple[float, ...], **given: Any) -> t
 def stop(row: tuple[float, ...], mass: tuple[float, ...], position: float, e: float) -> tuple[Wall, Stop]:
     """Keeps row . q below a position."""
     r = np.array(row)
-    wall = Wall(lambda q: position - r @ q, lambda q: -r, restitution=e)
+    wall = Wall(lambda q: float(position - r @ q), lambda q: -r, restitution=e)
     gap = lambda t, u, p: position - sum(a * x for a, x in zip(row, list(u)[: len(row)], strict=True))
     return wall, Stop(gap=gap, on=on(tuple(-r), mass), restitution=e)
 
@@ -60,7 +60,7 @@ def duffing(mass: tuple[float, ...], load: float, rate: float, *pairs: Any) -> t
 
 
 ONE, TWO = (1.0,), (1.0, 1.3)
-CASES = {
+CASES: dict[str, tuple[Any, ...]] = {
     "two frictions and a stop": (
         ONE, 1.0, 0.8, [0.1], friction((1.0,), ONE, friction=0.2, static=0.3),
         friction((1.0,), ONE, friction=0.15, belt=0.1), stop((1.0,), ONE, 0.6, 0.5),
@@ -92,5 +92,43 @@ def test_duffing_masses_move_as_in_the_reference(name: str) -> None:
     expected = reference.run(np.array(start), np.zeros(n), times)
     run = ns.simulate(system, duration=times[-1], samples=times, start=[*start, *[0.0] * n], rtol=1e-12)
     assert len(run["crossing_time"]) > 8
+    at = np.searchsorted(run["time"].values, times, side="right") - 1
+    assert np.abs(run["u"].values[at] - expected).max() < 1e-8
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_a_mass_in_a_ring_rolls_along_it(e: float) -> None:
+    """The gap R - |q| has a curvature: what rests at the ring is pressed by v^2 / R too."""
+    R, load, rate = 1.0, 1.5, 0.7
+
+    def curvature(q: Array, v: Array) -> float:
+        r = np.linalg.norm(q)
+        return float(-(v @ v) / r + (q @ v) ** 2 / r**3)
+
+    ring = Wall(lambda q: float(R - np.linalg.norm(q)), lambda q: -q / np.linalg.norm(q), curvature, e)
+
+    def force(t: float, q: Array, v: Array) -> Array:
+        return load * np.array([np.cos(rate * t), np.sin(rate * t)]) - 0.2 * v - 0.5 * q
+
+    def radius(u: Any) -> Any:
+        return np.sqrt(u.x**2 + u.y**2)
+
+    def field(t: Any, u: Any, p: Any) -> Any:
+        f = load * np.cos(rate * t) - 0.2 * u.vx - 0.5 * u.x, load * np.sin(rate * t) - 0.2 * u.vy - 0.5 * u.y
+        return (u.vx, u.vy, *f)
+
+    system = ns.System(
+        states=["x", "y", "vx", "vy"], parameters={}, modes={"all": field},
+        elements={
+            "ring": Stop(gap=lambda t, u, p: R - radius(u), restitution=e,
+                         on={"vx": lambda t, u, p: -u.x / radius(u), "vy": lambda t, u, p: -u.y / radius(u)}),
+            "rub": Coulomb(speed=lambda t, u, p: u.vx, on={"vx": 1.0}, friction=0.2, static=0.3),
+        },
+    )  # fmt: skip
+    times = np.linspace(0.0, 2 * 2 * np.pi / rate, 81)
+    reference = Masses(np.eye(2), force, [ring, Friction((1.0, 0.0), 0.2, 0.3)])
+    expected = reference.run(np.array([0.3, 0.1]), np.array([0.2, 0.5]), times)
+    run = ns.simulate(system, duration=times[-1], samples=times, start=[0.3, 0.1, 0.2, 0.5], rtol=1e-12)
+    assert any(system.modes[m].startswith("ring_rest") for m in run["mode"].values)
     at = np.searchsorted(run["time"].values, times, side="right") - 1
     assert np.abs(run["u"].values[at] - expected).max() < 1e-8

@@ -251,8 +251,8 @@ HOLDS = {
 
 def block(pull: Any = lambda u, p: 0 * u.x, **given: Any) -> ns.System:
     """A block with two frictions and a stop."""
-    given = {"modes": {"all": lambda t, u, p: (u.v, pull(u, p))}, "elements": HOLDS, "parameters": {}} | given
-    return ns.System(states=["x", "v"], **given)
+    usual: dict[str, Any] = {"modes": {"all": lambda t, u, p: (u.v, pull(u, p))}, "elements": HOLDS, "parameters": {}}
+    return ns.System(states=["x", "v"], **(usual | given))
 
 
 @pytest.mark.parametrize("start", [[0.6, 0.2], [0.0, 0.0], [0.9, 1.0]])

@@ -53,7 +53,7 @@ class VariationalFlow:
 
         self.traced, self.active = traced, active
         self.places = tuple(traced.parameter_names.index(name) for name in active)
-        plain, stands = traced.without_answers()
+        plain, stands = traced.without_answers(rows=True)
         self.model = variational_model(plain, self.places)
         self.n_u, self.n = len(traced.u), len(traced.u) + len(traced.m)
         self.n_active, self.n_p = len(active), len(traced.p)

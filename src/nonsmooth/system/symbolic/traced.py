@@ -97,18 +97,18 @@ class Traced:
         """Return whether the states change by transitions alone, and the period is 1."""
         return self.period == 1 and all(entry == 0 for field in self.fields for entry in field)
 
-    def without_answers(self) -> tuple[Traced, tuple[int, ...]]:
-        """The system without the answers that change states like their question (not at all) or like an answer before
-        them, so that nothing is compiled anew; and for each transition the one there that reads the same."""
+    def without_answers(self, rows: bool = False) -> tuple[Traced, tuple[int, ...]]:
+        """The system without the answers that change states as a transition before them, with ``rows`` one by the same
+        conditions, so that nothing is compiled anew; and for each transition the one there that reads the same."""
         if self.decider is None:
             return self, tuple(range(len(self.transitions)))
         kept: list[TracedTransition] = []
         stands: list[int] = []
         for jump in self.transitions:
-            same = (jump.source, jump.rows, jump.reset)
+            same = (jump.source, jump.rows)
             like = [
                 k for k, one in enumerate(kept)
-                if one.kind in (ASKED, TOGETHER, FOUND) and (one.source, one.rows, one.reset) == same
+                if one.reset == jump.reset and not one.writes and (not rows or (one.source, one.rows) == same)
             ] if jump.kind == FOUND else []  # fmt: skip
             stands.append(like[0] if like else len(kept))
             if not like:

@@ -1,0 +1,69 @@
+"""Orbits, branches, derivatives and exponents of a Duffing oscillator that rubs, sticks and hits a stop."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.elements import Coulomb, Stop
+
+NAMES = ["F", "mu", "e", "X"]
+
+
+@cache
+def rig() -> ns.System:
+    return ns.System(
+        states=["x", "v"], parameters={"F": 1.4, "w": 0.8, "mu": 0.15, "e": 0.4, "X": 0.7},
+        modes={"all": lambda t, u, p: (u.v, p.F * np.cos(p.w * t) - 0.1 * u.v - u.x - u.x**3)},
+        elements={
+            "a": Coulomb(speed=lambda t, u, p: u.v, on={"v": 1.0}, friction="mu", static=0.3),
+            "s": Stop(gap=lambda t, u, p: p.X - u.x, on={"v": -1.0}, restitution="e"),
+        },
+    )  # fmt: skip
+
+
+@cache
+def orbit() -> ns.Orbit:
+    return ns.find_orbit(rig())
+
+
+def end(duration: float, **given: float) -> np.ndarray:
+    values = {key: given.pop(key) for key in list(given) if key in rig().values}
+    system = rig().with_parameters(values)
+    return ns.simulate(system, duration=duration, samples=2, start=given, rtol=1e-13)["u"].values[-1]
+
+
+def test_sensitivities_are_those_of_differences() -> None:
+    found = ns.sensitivity(rig(), duration=12.0, parameters=NAMES)
+    assert len(found["crossing_time"]) > 5
+    for name in NAMES:
+        value, h = rig().values[name], 1e-5
+        difference = (end(12.0, **{name: value + h}) - end(12.0, **{name: value - h})) / (2 * h)
+        assert found["P"].sel(parameter=name).values == pytest.approx(difference, abs=1e-6)
+
+
+def test_an_orbit_its_sweep_and_its_exponent_agree() -> None:
+    """Sticking makes one multiplier zero; the other one is that of differences of the return map."""
+    period, start = 2 * np.pi / 0.8, dict(zip("xv", orbit().u, strict=True))
+    assert end(period, **start) == pytest.approx(list(start.values()), abs=1e-9)
+    h, columns = 1e-5, []
+    for name in "xv":
+        ahead, behind = (end(period, **{**start, name: start[name] + s * h}) for s in (1, -1))
+        columns.append((ahead - behind) / (2 * h))
+    largest = np.abs(np.linalg.eigvals(np.array(columns).T)).max()
+    assert np.abs(orbit().floquet_multipliers) == pytest.approx([largest, 0.0], abs=1e-6)
+    exponent = ns.lyapunov(rig(), periods=40)["exponents"].values[0]
+    assert exponent == pytest.approx(np.log(largest) / period, abs=1e-6)
+
+
+def test_a_branch_is_that_of_a_sweep() -> None:
+    branch = ns.continue_orbit(orbit(), "F", range=(1.32, 1.42))
+    loads = branch["F"].values
+    assert [loads.min(), loads.max()] == pytest.approx([1.32, 1.42])
+    some = np.linspace(0, len(loads) - 1, 5).astype(int)
+    for i in some:
+        run = ns.simulate(rig().with_parameters({"F": loads[i]}), periods=1, transient=40, samples=2)
+        assert branch["section"].values[i] == pytest.approx(run["u"].values[0], abs=1e-8)
