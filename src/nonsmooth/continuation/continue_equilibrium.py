@@ -11,7 +11,7 @@ from nonsmooth.continuation.branches.following import both_ways, dataset
 from nonsmooth.continuation.branches.records import record_of
 from nonsmooth.continuation.events.of_equilibria import AlongEquilibria, beyond
 from nonsmooth.continuation.march.march import Limits, Row
-from nonsmooth.continuation.problems.equilibrium import Equilibria, Rest, set_near
+from nonsmooth.continuation.problems.equilibrium import Equilibria, Rest, equilibria_near
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
 from nonsmooth.flow.starts import first_state
@@ -79,16 +79,11 @@ def continue_equilibrium(
     here = system.values[parameter]
     largest, most = largest_step(step), whole_number(points, "points", 1)
     state = first_state(system, start, mode)
+    modes = None if mode is None else [list(system.modes).index(mode)]
     first: tuple[Equilibria, Rest] | None = None
-    for i, one in enumerate(system.modes):
-        if mode is not None and one != mode:
-            continue
-        curve = Equilibria(system, i, parameter, high - low)
-        rest = curve.at(np.nan_to_num(state.u), here)
-        if rest is not None and (rest.margins <= 0.0).all():
-            first = (curve, rest) if (rest.margins < 0.0).all() else beyond(curve, rest)
-        if rest is None:
-            first = set_near(curve, np.nan_to_num(state.u), here)
+    for curve, rest in equilibria_near(system, parameter, high - low, np.nan_to_num(state.u), here, modes):
+        inside = (rest.margins < 0.0).all()
+        first = (curve, rest) if inside else beyond(curve, rest) if (rest.margins <= 0.0).all() else None
         if first is not None:
             break
     if first is None:

@@ -50,11 +50,13 @@ class ModeField:
         self.own = [i for i in range(len(traced.u)) if not traced.lacking[mode][i]]
         u = [traced.u[i] for i in self.own]
         f = [sp.sympify(traced.fields[mode][i]) for i in self.own]
-        h = [sp.sympify(e) for e in traced.indicators]
-        arguments = [traced.t, list(traced.u), list(traced.p), list(traced.m)]
-        derived = [*(e.diff(s) for e in f for s in u), *(e.diff(traced.p[k]) for e in f for k in places)]
-        self._field = sp.lambdify(arguments, [*f, *derived], modules="numpy")
-        self._indicators = sp.lambdify(arguments, [*h, *(e.diff(s) for e in h for s in traced.u)], modules="numpy")
+        jacobian = [e.diff(s) for e in f for s in u]
+        derived = [*jacobian, *(e.diff(traced.p[k]) for e in f for k in places)]
+        self._field = sp.lambdify(_arguments(traced), [*f, *derived], modules="numpy")
+        self._indicators, slopes = _indicators(traced)
+        moving = {*traced.u}
+        self.linear = not any(e.free_symbols & moving for e in jacobian)  # in the states, as are the indicators:
+        self.affine = self.linear and not any(e.free_symbols & moving for e in slopes)
 
     def evaluate(
         self, u: FloatArray, values: FloatArray, memory: FloatArray, t: float = 0.0
@@ -65,10 +67,12 @@ class ModeField:
         n = len(self.own)
         return found[:n], found[n : n + n * n].reshape(n, n), found[n + n * n :].reshape(n, self._n_places)
 
-    def indicators(self, u: FloatArray, values: FloatArray, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def indicators(
+        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: float = 0.0
+    ) -> tuple[FloatArray, FloatArray]:
         """Indicators (n_indicators,) and their gradients (n_indicators, n_u)."""
         with np.errstate(all="ignore"):
-            found: Any = np.array(self._indicators(0.0, u, values, memory), dtype=float)
+            found: Any = np.array(self._indicators(t, u, values, memory), dtype=float)
         n, n_u = len(self.traced.indicators), len(self.traced.u)
         return found[:n], found[n:].reshape(n, n_u)
 
@@ -196,6 +200,20 @@ def mode_field(traced: Traced, mode: int) -> ModeField:
     return ModeField(traced, mode)
 
 
+def _arguments(traced: Traced) -> list[Any]:
+    return [traced.t, list(traced.u), list(traced.p), list(traced.m)]
+
+
+@lru_cache(maxsize=8)
+def _indicators(traced: Traced) -> tuple[Any, list[Any]]:
+    """The indicators of a system with their slopes as a function of numbers, and the slopes as expressions."""
+    import sympy as sp
+
+    h = [sp.sympify(e) for e in traced.indicators]
+    slopes = [e.diff(s) for e in h for s in traced.u]
+    return sp.lambdify(_arguments(traced), [*h, *slopes], modules="numpy"), slopes
+
+
 def sorted_eigenvalues(J: FloatArray) -> ComplexArray:
     """Eigenvalues (n,) of a Jacobian, largest real part first."""
     found = np.linalg.eigvals(J).astype(complex)
@@ -231,7 +249,7 @@ def _fixed(traced: Traced, reset: Sequence[Any], u: FloatArray, values: FloatArr
     """Return whether a reset leaves the state alone."""
     import sympy as sp
 
-    image = sp.lambdify([traced.t, list(traced.u), list(traced.p), list(traced.m)], list(reset), modules="numpy")
+    image = sp.lambdify(_arguments(traced), list(reset), modules="numpy")
     moved = np.abs(np.array(image(0.0, u, values, memory), dtype=float) - u)
     return bool((moved <= 1e-12 * np.maximum(np.abs(u), 1e-3)).all())
 

@@ -92,8 +92,9 @@ def record_of(row: Row) -> Any:
     """The record of a solved point of a branch."""
     curve, point = row.curve, row.point
     if isinstance(curve, Equilibria):
-        low, high = np.min(point.ends, axis=0), np.max(point.ends, axis=0)
-        record: Any = RestRecord(point.value, point.u, low, high, point.eigenvalues, curve.stable(point), curve.mode)
+        record: Any = RestRecord(
+            point.value, point.u, point.lower, point.upper, point.eigenvalues, curve.stable(point), curve.mode
+        )
     else:
         record = _of_orbit(row)
     if row.kind:

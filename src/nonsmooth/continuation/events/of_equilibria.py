@@ -8,14 +8,13 @@ import numpy as np
 
 from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
-from nonsmooth.continuation.problems.equilibrium import Equilibria, Rest, set_near
+from nonsmooth.continuation.problems.equilibrium import Equilibria, Rest, equilibria_near
 from nonsmooth.continuation.problems.multipliers import pairs
 
 __all__ = ["AlongEquilibria", "beyond"]
 
-COMMON = 1e-8  # of the states' scales: nearer than this two equilibria are one
 BEYOND = 1e-6  # along the branch: the first equilibrium behind a boundary
-NEAR = 1e-4  # of the states' scales: the ends of a set so little behind a boundary are as near
+NEAR = 1e-4  # of the states' scales: equilibria so little behind a boundary are as near
 MEETS = 1e-9  # of an indicator: a condition farther from holding is not met
 
 
@@ -78,32 +77,24 @@ class AlongEquilibria(Policy):
         after = beyond(curve, rest)
         if after is None:
             found.ending = "boundary"
-        ahead = after is not None and float(rest.tangent[-1]) * float(after[1].tangent[-1]) > 0.0
-        graze = "" if after is None else "persistence" if ahead else "non_smooth_fold"
-        found.mark(met[0].name, curve, rest, graze=graze)
+        if after is None or rest.margins[: len(curve.system.transitions)].max(initial=-np.inf) > -MEETS:
+            ahead = after is not None and float(rest.tangent[-1]) * float(after[1].tangent[-1]) > 0.0
+            graze = "" if after is None else "persistence" if ahead else "non_smooth_fold"
+            found.mark(met[0].name, curve, rest, graze=graze)
         return after
 
 
 def beyond(curve: Equilibria, rest: Rest) -> tuple[Equilibria, Rest] | None:
     """The equilibrium, or the set of them, behind a boundary, where the two meet; None where there is none."""
     system, parameter, width = curve.system, curve.parameter, curve.width
-    scale, facing = system.scale_vector(), float(rest.tangent[-1])
-    met = [int(k) for k in np.argsort(-rest.margins) if rest.margins[k] > -MEETS]
-    nearest = [*(system.transitions[k].target for k in met), curve.mode]
-    for mode in dict.fromkeys([*nearest, *range(len(system.modes))]):  # two contacts may change at once
-        other = Equilibria(system, mode, parameter, width)
-        common = other.at(rest.u, rest.value) if mode != curve.mode else None
-        if common is not None and np.abs((common.u - rest.u) / scale).max() <= COMMON:
-            for one in (common.facing(facing), common.facing(-facing)):
-                first = other.step(one, BEYOND)
-                if first is not None and (first.margins < 0.0).all():
-                    return other, first
-        for ahead in (1.0, -1.0) if mode != curve.mode else (1.0,):  # back lies the branch that has come here
-            found = set_near(other, rest.u, rest.value + float(np.copysign(BEYOND * width, facing * ahead)))
-            if found is None:
-                continue
-            fresh, first = found[0], found[1].facing(facing * ahead)
-            sides = [(np.min(one.ends, axis=0), np.max(one.ends, axis=0)) for one in (rest, first)]
-            if np.abs((np.array(sides[0]) - sides[1]) / scale).max() <= NEAR:
-                return fresh, first
+    scale, facing = system.scale_vector(), float(np.copysign(1.0, rest.tangent[-1]))
+    for ahead in (facing, -facing):
+        value = rest.value + BEYOND * width * ahead
+        for other, first in equilibria_near(system, parameter, width, rest.u, value):
+            if other.word() == curve.word():
+                continue  # back lies the branch that has come here
+            off = [(getattr(rest, side) - getattr(first, side)) / scale for side in ("lower", "upper")]
+            off = [one[np.isfinite(one)] for one in off]
+            if max(np.abs(one).max(initial=0.0) for one in off) <= NEAR and (first.margins < 0.0).all():
+                return other, first.facing(ahead)
     return None

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.curve import Curve, Point
 from nonsmooth.flow.equilibria import ModeField, sorted_eigenvalues
+from nonsmooth.flow.equilibrium_sets import EquilibriumSet, Extreme, equilibrium_sets
 from nonsmooth.system.system import System
 
-__all__ = ["Equilibria", "Rest", "SetOfEquilibria", "set_near"]
+__all__ = ["Equilibria", "Rest", "equilibria_near"]
 
 EDGE = 1e-12  # of an indicator's size: zero
 CLOSE = 1e-11
@@ -38,7 +40,8 @@ class Rest(Point):
     jacobian: FloatArray  # (n, n)
     eigenvalues: ComplexArray  # largest real part first
     margins: FloatArray  # (n_transitions,) of the transitions out of the mode, -inf for the others
-    ends: tuple[FloatArray, FloatArray]  # of the set it stands for: twice the state where it is a single one
+    lower: FloatArray  # extent of the set it stands for
+    upper: FloatArray
 
 
 class Equilibria(Curve[Rest]):
@@ -64,12 +67,10 @@ class Equilibria(Curve[Rest]):
         self.own = self.field.own
         self.scale = np.append(system.scale_vector()[self.own], width)
 
-    @cached_property
+    @property
     def linear(self) -> bool:
         """The mode's field is linear in the states: where a pair passes +-i omega all its orbits are closed."""
-        traced = self.system.traced
-        fields = [traced.fields[self.mode][i] for i in self.own]
-        return all(not f.diff(x).free_symbols & set(traced.u) for f in fields for x in traced.u)
+        return self.field.linear
 
     def _at(self, X: FloatArray) -> tuple[FloatArray, FloatArray]:
         """All states, and all parameters."""
@@ -104,13 +105,13 @@ class Equilibria(Curve[Rest]):
         h, h_u = self.field.indicators(u, values, self.memory)
         margins = self.field.margins(h, EDGE * (np.abs(h_u) @ (self.system.scale_vector() + np.abs(u))))
         eigenvalues = sorted_eigenvalues(jacobian)
-        return Rest(Y, tangent, orientation, iterations, solved, u, jacobian, eigenvalues, margins, (u, u))
+        return Rest(Y, tangent, orientation, iterations, solved, u, jacobian, eigenvalues, margins, u, u)
 
     def stable(self, rest: Rest) -> bool:
         """Return whether all eigenvalues have negative real parts."""
         return bool((rest.eigenvalues.real < 0).all())
 
-    def word(self) -> int:
+    def word(self) -> Any:
         """The mode."""
         return self.mode
 
@@ -123,107 +124,122 @@ class Equilibria(Curve[Rest]):
         return self.at_parameter(np.append(u[self.own], value) / self.scale, value)
 
 
+class _Corner:
+    """An extreme point of a set: the independent equations of its mode's field and the conditions that vanish there."""
+
+    def __init__(self, curve: Equilibria, extreme: Extreme) -> None:
+        self.curve, self.u, self.side, self.keys = curve, extreme.u, extreme.side, [i for i, _ in extreme.keys]
+        place, traced = curve.place, curve.system.traced
+        same = extreme.mode == curve.mode
+        self.field = curve.field if same else ModeField(traced, extreme.mode, (place,))
+        self.own, self.scale = self.field.own, curve.system.scale_vector()[self.field.own]
+        self.unit = np.eye(len(curve.values))[place] * STEP * curve.width
+        # conditions that are met there by construction
+        self.met = [any(row.indicator in self.keys for row in jump.rows) for jump in traced.transitions]
+        self.signs = np.array([sign for _, sign in extreme.keys])
+        self.across = np.zeros((0, 0))  # the independent equations among those of the field
+
+    def equations(self, u: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """As many equations as states, and their derivatives in scaled unknowns; directions that nothing bounds rest."""
+        curve, keys = self.curve, self.keys
+        f, J, f_p = self.field.evaluate(u, values, curve.memory)
+        J = np.column_stack([J * self.scale, f_p * curve.width])
+        if not len(self.across):
+            left, sizes, _ = np.linalg.svd(J[:, :-1])
+            self.across = left[:, : int((sizes > FREE * max(float(sizes[0]), FREE)).sum())].T
+        h, h_u = curve.field.indicators(u, values, curve.memory)
+        # indicators are differentiated in the states only
+        there = [curve.field.indicators(u, values + one, curve.memory)[0] for one in (self.unit, -self.unit)]
+        slopes = np.column_stack([h_u[:, self.own] * self.scale, (there[0] - there[1]) / (2.0 * STEP)])[keys]
+        J, f = np.vstack([self.across @ J, slopes]), np.append(self.across @ f, h[keys])
+        if (missing := len(self.own) - len(f)) > 0:
+            still = np.linalg.svd(J[:, :-1])[2][-missing:]
+            f = np.append(f, still @ ((u - self.u)[self.own] / self.scale))
+            J = np.vstack([J, np.pad(still, ((0, 0), (0, 1)))])
+        return f, J
+
+    def solved(self, values: FloatArray) -> FloatArray | None:
+        """The corner at other values of the parameters, from where it was last."""
+        u = self.u.copy()
+        for _ in range(self.curve.most):
+            f, J = self.equations(u, values)
+            step = np.linalg.lstsq(J[:, :-1], -f, rcond=None)[0]
+            u[self.own] += step * self.scale
+            if np.abs(step).max() < CLOSE:
+                self.u = u
+                return u
+        return None
+
+    def margins(self, u: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
+        """Margins of the conditions that are not met by construction; and how nearly another corner is as extreme."""
+        h, h_u = self.curve.field.indicators(u, values, self.curve.memory)
+        edge = EDGE * (np.abs(h_u) @ (self.curve.system.scale_vector() + np.abs(u)))
+        margins = np.where(self.met, -np.inf, self.field.margins(h, edge))
+        if not self.keys:
+            return margins, -np.inf
+        (k, sign), J = self.side, self.equations(u, values)[1][:, :-1]
+        pushes = np.linalg.lstsq(J.T, sign * np.eye(len(J))[self.own.index(k)], rcond=None)[0]
+        own = (pushes * np.abs(J).max(axis=1))[len(self.across) :][: len(self.keys)] * self.signs
+        return margins, -float(own.min() / np.abs(own).max()) - FREE
+
+
 class SetOfEquilibria(Equilibria):
-    """Equilibria of a mode that leaves one direction free, as dry friction does: an interval between two boundaries.
+    """A set of equilibria, as dry friction leaves it: one of its extreme points is followed, the others beside it."""
 
-    One end is followed, by the field's independent equations and the indicator that vanishes there; the other one is
-    solved for beside it.
-    """
+    def __init__(self, system: System, parameter: str, width: float, found: EquilibriumSet) -> None:
+        super().__init__(system, found.modes[0], parameter, width)
+        self.found = found
+        first = min(found.extremes, key=lambda one: one.mode != self.mode, default=None)
+        first = first or Extreme(found.point, self.mode)
+        self.corners = [_Corner(self, one) for one in (first, *(e for e in found.extremes if e is not first))]
+        self.scale = np.append(self.corners[0].scale, width)
 
-    def __init__(
-        self, system: System, mode: int, parameter: str, width: float, ends: tuple[int, int], other: FloatArray
-    ) -> None:
-        super().__init__(system, mode, parameter, width)
-        self.ends, self._other = ends, other
-        self._across: FloatArray | None = None  # (n - 1, n) the independent equations among those of the field
-
-    def evaluate(self, Y: FloatArray, end: int = 0) -> _Field:
-        """The independent equations, the indicator of an end, and their derivatives."""
-        solved = super().evaluate(Y)
-        if self._across is None:
-            self._across = np.linalg.svd(solved.J[:, :-1] / self.scale[:-1])[0][:, :-1].T
-        u, values = self._at(solved.X)
-        at = self.ends[end]
-        h, h_u = (found[at] for found in self.field.indicators(u, values, self.memory))
-        step = STEP * self.width  # indicators are differentiated in the states only
-        there = [self.field.indicators(u, values + sign * step * self._unit, self.memory)[0][at] for sign in (1, -1)]
-        slopes = np.append(h_u[self.own], (there[0] - there[1]) / (2.0 * step)) * self.scale
-        return _Field(solved.X, np.append(self._across @ solved.f, h), np.vstack([self._across @ solved.J, slopes]))
-
-    @cached_property
-    def _unit(self) -> FloatArray:
-        return np.eye(len(self.values))[self.place]
+    def evaluate(self, Y: FloatArray) -> _Field:
+        """The equations of the extreme point that is followed."""
+        X = Y * self.scale
+        return _Field(X, *self.corners[0].equations(*self._at(X)))
 
     def described(
         self, Y: FloatArray, tangent: FloatArray, orientation: float, iterations: int, solved: _Field
     ) -> Rest | None:
-        """The middle of the set with its two ends; None where the other end is not found."""
-        other, values = Y.copy(), self._at(solved.X)[1]
-        other[:-1] = self._other / self.scale[:-1]
-        for _ in range(self.most):
-            there = self.evaluate(other, 1)
-            step = np.linalg.lstsq(there.J[:, :-1], -there.f, rcond=None)[0]
-            other[:-1] += step
-            if np.abs(step).max() < CLOSE:
-                break
-        else:
-            return None
-        self._other = other[:-1] * self.scale[:-1]
-        ends = self._at(solved.X)[0], self._at(other * self.scale)[0]
-        middle = 0.5 * (ends[0] + ends[1])
+        """The middle of the set with its extent; None where an extreme point is not found."""
+        first, values = self._at(solved.X)
+        ends = [first]
+        for corner in self.corners[1:]:
+            if (end := corner.solved(values)) is None:
+                return None
+            ends.append(end)
+        both = [corner.margins(u, values) for corner, u in zip(self.corners, ends, strict=True)]
+        margins = np.append(np.max([one for one, _ in both], axis=0), max(other for _, other in both))
+        lower, upper = np.min(ends, axis=0), np.max(ends, axis=0)
+        lower, upper = np.where(np.isinf(self.found.lower), -np.inf, lower), np.where(np.isinf(self.found.upper), np.inf, upper)
+        middle = np.mean(ends, axis=0)
         jacobian = self.field.evaluate(middle, values, self.memory)[1]
-        margins = np.max([self.inside(u, values, end) for u, end in zip(ends, self.ends, strict=True)], axis=0)
-        eigenvalues = sorted_eigenvalues(jacobian)
-        return Rest(Y, tangent, orientation, iterations, solved, middle, jacobian, eigenvalues, margins, ends)
+        return Rest(
+            Y, tangent, orientation, iterations, solved, middle, jacobian, sorted_eigenvalues(jacobian), margins, lower, upper
+        )  # fmt: skip
 
-    def inside(self, u: FloatArray, values: FloatArray, end: int) -> FloatArray:
-        """Margins at an end but for the transitions that it is the boundary of."""
-        h, h_u = self.field.indicators(u, values, self.memory)
-        margins = self.field.margins(h, EDGE * (np.abs(h_u) @ (self.system.scale_vector() + np.abs(u))))
-        own = [any(row.indicator == end for row in jump.rows) for jump in self.field.traced.transitions]
-        return np.where(own, -np.inf, margins)
+    def word(self) -> Any:
+        """The conditions at the extreme points, and their modes."""
+        return tuple((corner.field.mode, tuple(sorted(corner.keys))) for corner in self.corners)
 
     def stable(self, rest: Rest) -> bool:
-        """Return whether all eigenvalues but that of the free direction have negative real parts."""
-        others = np.delete(rest.eigenvalues, int(np.abs(rest.eigenvalues).argmin()))
-        return bool((others.real < 0).all())
+        """Return whether all eigenvalues but those of the free directions have negative real parts."""
+        others = np.argsort(np.abs(rest.eigenvalues))[self.found.free :]
+        return bool((rest.eigenvalues[others].real < 0).all())
 
 
-def set_near(single: Equilibria, u: FloatArray, value: float) -> tuple[SetOfEquilibria, Rest] | None:
-    """The interval of equilibria of a mode next to a state; None where it has none, or leaves more free."""
-    system, mode = single.system, single.mode
-    u, values = u.copy(), single.values.copy()
-    values[single.place] = value
-    for _ in range(single.most):
-        f, J, _ = single.field.evaluate(u, values, single.memory)
-        if not (np.isfinite(f).all() and np.isfinite(J).all()) or not len(f):
-            return None
-        u[single.own] -= np.linalg.lstsq(J, f, rcond=None)[0]
-    _, sizes, right = np.linalg.svd(J * single.scale[:-1])
-    free = sizes <= FREE * max(float(sizes[0]), FREE)
-    if free.sum() != 1 or np.abs(f).max() > CLOSE * max(1.0, float(np.abs(J).max())):
-        return None
-    line = np.zeros(len(u))
-    line[single.own] = right[-1] * single.scale[:-1]
-    found: list[tuple[float, int]] = []
-    for i in sorted({row.indicator for jump in system.transitions if jump.source == mode for row in jump.rows}):
-        s = 0.0
-        for _ in range(single.most):
-            h, h_u = single.field.indicators(u + s * line, values, single.memory)
-            slope = float(h_u[i] @ line)
-            if slope == 0.0:  # this indicator bounds nothing here
-                s = np.inf
-                break
-            s -= float(h[i]) / slope
-        probe = SetOfEquilibria(system, mode, single.parameter, single.width, (i, i), u)
-        if np.isfinite(s) and (probe.inside(u + s * line, values, i) < 0.0).all():
-            found.append((s, i))
-    if len(found) != 2:
-        return None
-    (low, first), (high, second) = sorted(found)
-    if line[int(np.abs(line).argmax())] < 0.0:
-        low, first, high, second = high, second, low, first
-    ends = [(u + s * line)[single.own] for s in (low, high)]
-    curve = SetOfEquilibria(system, mode, single.parameter, single.width, (first, second), ends[1])
-    rest = curve.at_parameter(np.append(ends[0], value) / curve.scale, value)
-    return (curve, rest) if rest is not None and (rest.margins < 0.0).all() else None
+def equilibria_near(
+    system: System, parameter: str, width: float, u: FloatArray, value: float, modes: Sequence[int] | None = None
+) -> Iterator[tuple[Equilibria, Rest]]:
+    """Equilibria and sets of them at a value of the parameter, the nearest to a state first."""
+    values = system.parameter_vector()
+    values[list(system.values).index(parameter)] = value
+    found = equilibrium_sets(system, u, values=values, modes=modes)
+    for one in sorted(found, key=lambda one: one.distance(u)):
+        curve = SetOfEquilibria(system, parameter, width, one) if one.free else Equilibria(
+            system, one.modes[0], parameter, width
+        )
+        rest = curve.at(one.extremes[0].u if not one.free else curve.corners[0].u, value)
+        if rest is not None:
+            yield curve, rest

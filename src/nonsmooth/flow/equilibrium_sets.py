@@ -1,0 +1,363 @@
+r"""Sets of equilibria: what dry friction leaves, intervals and polytopes of states from which nothing moves.
+
+The equilibria of a mode are the states where its field vanishes and no condition of a transition holds,
+
+    f(u) = 0,    sign_i h_i(u) <= 0,
+
+under a forcing at all times. Where these are linear in the states, they are a polytope, whose extent in each state is
+a linear programme; elsewhere the same is asked again beside each extreme point until that stays where it is. Polytopes
+of different modes that touch (sticking with an elastic stop open, with it closed) are one set.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from nonsmooth.arrays import FloatArray
+from nonsmooth.flow.equilibria import VANISHING, mode_field
+from nonsmooth.system.symbolic.traced import FOUND, NOT_UNIQUE, TOGETHER
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from nonsmooth.system.system import System
+
+__all__ = ["EquilibriumSet", "Extreme", "Local", "equilibrium_sets", "local"]
+
+FREE = 1e-9  # a singular value as small as this, beside the largest, leaves its direction free
+TOUCHING = 1e-8  # of the states' scales: polytopes nearer than this are one set
+MOST = 20  # linear problems, each beside the solution of the one before
+TIMES = 64  # of a forcing period
+
+
+class Condition(NamedTuple):
+    """``sign * indicator > 0`` beside a state: ``slopes @ (u - there)`` and its greatest and least value there."""
+
+    key: tuple[int, int]  # indicator, sign
+    slopes: FloatArray
+    top: float
+    bottom: float
+    size: float  # of the terms
+
+
+@dataclass(frozen=True)
+class Local:
+    """A mode beside a state: the equations ``matrix @ (u - there) = right`` and the conditions of each way out."""
+
+    own: list[int]
+    there: FloatArray
+    matrix: FloatArray
+    right: FloatArray
+    ways: list[list[Condition]]
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """The point of a set where a state is least or greatest (``side``: the state, -1 or 1), and the conditions
+    (indicator, sign) of its mode that vanish there."""
+
+    u: FloatArray
+    mode: int
+    side: tuple[int, int] = (0, 0)
+    keys: tuple[tuple[int, int], ...] = ()
+
+
+@dataclass(frozen=True)
+class Polytope:
+    """Equilibria of one mode: ``origin + ways @ z`` with ``slopes @ z <= room``; all in units of the scales."""
+
+    mode: int
+    scale: FloatArray
+    origin: FloatArray
+    ways: FloatArray  # (n, d)
+    slopes: FloatArray
+    room: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    extremes: tuple[Extreme, ...]
+
+    def holds(self, u: FloatArray, tolerance: float) -> NDArray[np.bool_]:
+        """Marks of the states (J, n) that lie in it."""
+        off = u / self.scale - self.origin
+        z = off @ self.ways
+        apart = np.abs(off - z @ self.ways.T).max(axis=1, initial=0.0)
+        return np.asarray((apart <= tolerance) & (z @ self.slopes.T <= self.room + tolerance).all(axis=1))
+
+    def distance(self, other: Polytope | FloatArray) -> float:
+        """The distance to another polytope, or to a state, in the largest of all states."""
+        if isinstance(other, Polytope):
+            origin, ways, slopes, room = other.origin, other.ways, other.slopes, other.room
+        else:
+            origin, ways = other / self.scale, np.zeros((len(other), 0))
+            slopes, room = np.zeros((0, 0)), np.zeros(0)
+        d, e = self.ways.shape[1], ways.shape[1]
+        gap = np.hstack([self.ways, -ways])
+        if not d + e:
+            return float(np.abs(self.origin - origin).max())
+        one = np.ones((len(gap), 1))
+        both = np.zeros((len(slopes) + len(self.slopes), d + e))
+        both[: len(self.slopes), :d], both[len(self.slopes) :, d:] = self.slopes, slopes
+        rows = np.vstack([np.hstack([gap, -one]), np.hstack([-gap, -one]), np.pad(both, ((0, 0), (0, 1)))])
+        off = origin - self.origin
+        z = _best(np.append(np.zeros(d + e), 1.0), rows, np.concatenate([off, -off, self.room, room]))
+        return np.inf if z is None else float(z[-1])
+
+
+@dataclass(frozen=True)
+class EquilibriumSet:
+    """A connected set of equilibria, or a single one; its largest polytope stands first.
+
+    ``extremes`` hold a point for the least and the greatest value of each state, where it is bounded.
+    """
+
+    polytopes: tuple[Polytope, ...]
+    extremes: tuple[Extreme, ...]
+    lower: FloatArray
+    upper: FloatArray
+
+    @property
+    def free(self) -> int:
+        """The number of directions that it leaves free: 0 for a single equilibrium."""
+        return self.polytopes[0].ways.shape[1]
+
+    @property
+    def modes(self) -> tuple[int, ...]:
+        """The modes that it lies in; the first is that of its largest polytope."""
+        return tuple(dict.fromkeys(one.mode for one in self.polytopes))
+
+    @property
+    def point(self) -> FloatArray:
+        """The mean of the extreme points of its largest polytope; any state of it where it has none."""
+        largest = self.polytopes[0]
+        if not largest.extremes:
+            return largest.origin * largest.scale
+        return np.asarray(np.mean([one.u for one in largest.extremes], axis=0))
+
+    def holds(self, u: FloatArray, tolerance: float = TOUCHING) -> NDArray[np.bool_]:
+        """Marks of the states (J, n) that belong to it."""
+        return np.any([one.holds(u, tolerance) for one in self.polytopes], axis=0)
+
+    def distance(self, u: FloatArray) -> float:
+        """The distance of a state, in units of the scales."""
+        return min(one.distance(u) for one in self.polytopes)
+
+
+def equilibrium_sets(
+    system: System, near: FloatArray, *, values: FloatArray | None = None, memory: FloatArray | None = None,
+    modes: Sequence[int] | None = None,
+) -> list[EquilibriumSet]:  # fmt: skip
+    """The sets of equilibria of a system: all of them where its modes are affine, else those beside a state."""
+    values = system.parameter_vector() if values is None else values
+    memory = system.memory_vector() if memory is None else memory
+    if system.explicit_time:
+        return []
+    traced, parts = system.traced, []
+    for mode in range(len(traced.mode_names)) if modes is None else modes:
+        timed = any(jump.at is not None and jump.source == mode for jump in traced.transitions)
+        if not timed and not traced.mode_names[mode].endswith(NOT_UNIQUE):
+            parts += _polytopes(system, mode, near, values, memory)
+    return _joined(parts)
+
+
+def local(system: System, mode: int, u: FloatArray, values: FloatArray, memory: FloatArray) -> Local | None:
+    """A mode beside a state."""
+    traced, field = system.traced, mode_field(system.traced, mode)
+    u = np.where(np.array(traced.lacking[mode], dtype=bool), 0.0, u)
+    period = system.period_at(values)
+    times = np.zeros(1) if period is None else np.linspace(0.0, period, TIMES, endpoint=False)
+    found = [field.evaluate(u, values, memory, t)[:2] for t in times]
+    matrix, right = np.vstack([J for _, J in found]), -np.concatenate([f for f, _ in found])
+    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+        return None
+    h, h_u = field.indicators(u, values, memory)
+    size = np.abs(h_u) @ (system.scale_vector() + np.abs(u))
+    tops, bottoms = h, h
+    if period is not None:
+        at = np.array([field.indicators(u, values, memory, t)[0] for t in times])
+        tops, bottoms = _peaks(at), -_peaks(-at)
+    ways = [
+        [
+            Condition(
+                (row.indicator, row.sign), row.sign * h_u[row.indicator][field.own],
+                *sorted((row.sign * tops[row.indicator], row.sign * bottoms[row.indicator]), reverse=True),
+                size[row.indicator],
+            )
+            for row in jump.rows
+        ]
+        for jump in traced.transitions
+        if jump.source == mode and jump.rows and jump.kind not in (TOGETHER, FOUND)
+    ]  # fmt: skip
+    return Local(field.own, u[field.own], matrix, right, ways)
+
+
+def _peaks(at: FloatArray) -> FloatArray:
+    """The greatest values of periodic functions given at equal steps, as trigonometric polynomials."""
+    fine = np.fft.irfft(np.fft.rfft(at, axis=0), n=16 * len(at), axis=0) * 16.0
+    k = fine.argmax(axis=0)
+    here, before, after = (fine[(k + shift) % len(fine), np.arange(fine.shape[1])] for shift in (0, -1, 1))
+    bend = before - 2.0 * here + after
+    with np.errstate(all="ignore"):
+        return np.where(bend < 0.0, here - (after - before) ** 2 / (8.0 * bend), here)
+
+
+@dataclass(frozen=True)
+class _Faces:
+    """The equilibria of a mode beside a state, in units of the scales: ``origin + ways @ z``, ``slopes @ z <= room``."""
+
+    origin: FloatArray
+    ways: FloatArray
+    slopes: FloatArray
+    room: FloatArray
+    keys: tuple[tuple[int, int], ...]
+
+    def farthest(self, way: FloatArray) -> tuple[FloatArray, tuple[tuple[int, int], ...]] | None:
+        """The vertex farthest along a direction, with its conditions: infinite where unbounded; None where empty."""
+        z = _best(-way @ self.ways, self.slopes, self.room)
+        if z is None or not np.isfinite(z).all():
+            return None if z is None else (np.full(len(self.origin), np.inf), ())
+        slack = self.room - self.slopes @ z
+        chosen: list[int] = []
+        for i in np.flatnonzero(slack <= TOUCHING):
+            if np.linalg.matrix_rank(self.slopes[[*chosen, i]], tol=FREE) > len(chosen):
+                chosen.append(int(i))
+        z = z + np.linalg.lstsq(self.slopes[chosen], slack[chosen], rcond=None)[0]
+        return self.origin + self.ways @ z, tuple(self.keys[i] for i in chosen)
+
+
+def _polytopes(system: System, mode: int, near: FloatArray, values: FloatArray, memory: FloatArray) -> list[Polytope]:
+    """The equilibria of one mode: one polytope for each choice of the conditions that do not hold."""
+    scale, affine = system.scale_vector(), mode_field(system.traced, mode).affine
+    found = []
+    for which, faces in enumerate(_faces(system, mode, near, values, memory)):
+        n, d = faces.ways.shape
+        extremes = [] if d else [Extreme(faces.origin * scale, mode)]
+        lower, upper = faces.origin * scale, faces.origin * scale
+        for k, sign in product(range(n), (-1, 1)) if d else ():
+            if np.abs(faces.ways[k]).max() <= FREE:
+                continue
+            here, last = faces, None
+            for _ in range(MOST):
+                vertex = here.farthest(sign * np.eye(n)[k])
+                if vertex is None or not np.isfinite(vertex[0]).all() or affine:
+                    break
+                if last is not None and np.abs(vertex[0] - last).max() <= VANISHING:
+                    break
+                last = vertex[0]
+                again = _faces(system, mode, last * scale, values, memory)
+                if which >= len(again):
+                    vertex = None
+                    break
+                here = again[which]
+            if vertex is None:
+                break
+            u, keys = vertex
+            (upper if sign > 0 else lower)[k] = u[k] * scale[k] * (1.0 if np.isfinite(u[k]) else sign)
+            if np.isfinite(u).all():
+                extremes.append(Extreme(u * scale, mode, (k, sign), keys))
+        else:
+            found.append(
+                Polytope(mode, scale, faces.origin, faces.ways, faces.slopes, faces.room, lower, upper, tuple(extremes))
+            )
+    return found
+
+
+def _faces(system: System, mode: int, u: FloatArray, values: FloatArray, memory: FloatArray) -> list[_Faces]:
+    """What bounds the equilibria of a mode that lie next to a state, found by Newton's method; empty: there are none."""
+    scale = system.scale_vector()
+    for _ in range(MOST):
+        here = local(system, mode, u, values, memory)
+        if here is None or not len(here.own):
+            return []
+        own = scale[here.own]
+        step = np.linalg.lstsq(here.matrix * own, here.right, rcond=FREE)[0]
+        size = float(np.abs(step).max())
+        if size <= VANISHING:
+            break
+        u = np.zeros(len(scale))
+        u[here.own] = here.there + step * own
+    if size > VANISHING or (np.abs(here.right) > VANISHING * (np.abs(here.matrix) @ (own + np.abs(here.there)))).any():
+        return []
+    _, sizes, right = np.linalg.svd(here.matrix * own)
+    free = right[int((sizes > FREE * max(float(sizes[0]), FREE)).sum()) :].T
+    ways = np.zeros((len(scale), free.shape[1]))
+    ways[here.own] = free
+    choices: list[list[tuple[FloatArray, float, tuple[int, int]]]] = []
+    for conditions in here.ways:
+        bounds, holds = [], 0
+        for one in conditions:
+            slopes = (one.slopes * own) @ free
+            length = float(np.linalg.norm(slopes))
+            if length > FREE * float(np.abs(one.slopes * own).sum()):
+                bounds.append((slopes / length, -one.top / length, one.key))
+            elif one.top <= -VANISHING * one.size:  # it never holds
+                break
+            else:
+                holds += one.bottom > VANISHING * one.size  # else zero: others decide
+        else:
+            if bounds:
+                choices.append([b for i, b in enumerate(bounds) if not any(_alike(b, a) for a in bounds[:i])])
+            elif holds:  # it always holds: a transition leads away
+                return []
+    found, u = [], u / scale
+    for chosen in product(*choices):
+        rows = [b for i, b in enumerate(chosen) if not any(_alike(b, a) for a in chosen[:i])]
+        slopes = np.array([row for row, _, _ in rows]).reshape(len(rows), free.shape[1])
+        room = np.array([limit for _, limit, _ in rows])
+        found.append(_Faces(u, ways, slopes, room, tuple(key for _, _, key in rows)))
+    return found
+
+
+def _alike(a: tuple[FloatArray, float, tuple[int, int]], b: tuple[FloatArray, float, tuple[int, int]]) -> bool:
+    return bool(np.abs(a[0] - b[0]).max() < FREE and abs(a[1] - b[1]) <= FREE * max(1.0, abs(a[1])))
+
+
+def _best(cost: FloatArray, slopes: FloatArray, room: FloatArray) -> FloatArray | None:
+    """Minimise cost @ z where slopes @ z <= room; infinite where it has no bound, None where nothing fulfils that."""
+    from scipy.optimize import linprog
+
+    exact = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
+    found = linprog(cost, slopes, room, bounds=(None, None), method="highs-ds", options=exact)
+    if found.status == 0:
+        return np.asarray(found.x)
+    if found.status == 2:
+        return None
+    # the solver may not tell an unbounded problem from an empty one: is there any solution?
+    some = linprog(np.zeros(len(cost)), slopes, room, bounds=(None, None), method="highs-ds", options=exact)
+    return np.full(len(cost), np.inf) if some.status == 0 else None
+
+
+def _joined(parts: list[Polytope]) -> list[EquilibriumSet]:
+    """Polytopes that touch as one set each."""
+    groups: list[list[Polytope]] = []
+    for part in parts:
+        near = [group for group in groups if any(_touch(part, other) for other in group)]
+        groups = [group for group in groups if not any(group is one for one in near)]
+        groups.append([*(other for group in near for other in group), part])
+    return [_set_of(group) for group in groups]
+
+
+def _touch(a: Polytope, b: Polytope) -> bool:
+    off = TOUCHING * a.scale
+    return bool((a.lower <= b.upper + off).all() and (b.lower <= a.upper + off).all() and a.distance(b) <= TOUCHING)
+
+
+def _set_of(parts: list[Polytope]) -> EquilibriumSet:
+    scale = parts[0].scale
+    kept: list[Polytope] = []  # none within another, as slipping that has just stopped is within sticking
+    for part in sorted(parts, key=lambda one: -one.ways.shape[1]):
+        ends = np.array([one.u for one in part.extremes])
+        if not (len(ends) and any(other.holds(ends, TOUCHING).all() for other in kept)):
+            kept.append(part)
+    lower, upper = np.min([one.lower for one in kept], axis=0), np.max([one.upper for one in kept], axis=0)
+    ends = [end for one in kept for end in one.extremes]
+    sides = [(k, sign) for k, sign in sorted({end.side for end in ends}) if np.isfinite((lower, upper)[sign > 0][k])]
+    chosen = [
+        replace(min(ends, key=lambda end: (-round(sign * end.u[k] / scale[k], 9), end.side != (k, sign))), side=(k, sign))
+        for k, sign in sides
+    ]  # fmt: skip
+    return EquilibriumSet(tuple(kept), tuple(chosen), lower, upper)
