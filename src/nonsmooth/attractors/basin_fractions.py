@@ -164,16 +164,17 @@ def _dataset(
     fraction, error = share_errors(count, n_starts)
     period = np.full(count.shape, -1, dtype=np.int64)
     exponent, spread = np.full(count.shape, np.nan), np.full(count.shape, np.nan)
-    chaotic = np.zeros(count.shape, dtype=np.int8)
+    chaotic, kind = np.zeros(count.shape, dtype=np.int8), np.zeros(count.shape, dtype=object)
+    kind[:] = ""
     maximum, minimum, section = (np.full((*count.shape, n), np.nan) for _ in range(3))
     for i, found in enumerate(per_value):
         for k, item in found.items():
-            period[i, k], chaotic[i, k] = item.period_number, item.chaotic
+            period[i, k], chaotic[i, k], kind[i, k] = item.period_number, item.chaotic, item.name
             exponent[i, k], spread[i, k] = item.exponent, item.exponent_error
             maximum[i, k], minimum[i, k], section[i, k] = item.maximum, item.minimum, item.points[0]
     arrays = {
         "fraction": fraction, "fraction_error": error, "period_number": period, "lyapunov": exponent,
-        "lyapunov_error": spread, "chaotic": chaotic,
+        "lyapunov_error": spread, "chaotic": chaotic, "name": kind.astype(str),
         "maximum": maximum, "minimum": minimum, "section": section,
         "not_converged": (labels == -1).mean(axis=1), "diverged": (labels == -2).mean(axis=1),
         "failed": (failed(status) & (labels == -1)).mean(axis=1),

@@ -16,6 +16,7 @@ import numpy as np
 from nonsmooth.attractors.basins_candidate import Search, among
 from nonsmooth.attractors.basins_found import Attractor, Patience
 from nonsmooth.attractors.basins_newton import Cycle, confirmed_cycle, exponent_on
+from nonsmooth.attractors.basins_standing import label_standing
 from nonsmooth.attractors.settled import Settled
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
@@ -52,7 +53,9 @@ def find_attractors(
     labels = np.full(len(runs.status), NOT_CONVERGED, dtype=np.int64)
     status = runs.status.copy()
     labels[status == codes.DIVERGED] = DIVERGED
-    _label_cycles(settler, point, runs, np.arange(len(labels)), found, labels)
+    every = np.arange(len(labels))
+    label_standing(settler, point, runs, every, found, labels, status)
+    _label_cycles(settler, point, runs, every, found, labels)
     wandering = np.flatnonzero(np.isin(status, STILL))
     places, modes = runs.last[wandering].copy(), runs.mode[wandering].copy()
     search = Search(replace(settler, device="cpu"), point, patience, found)  # it makes single runs
@@ -69,6 +72,7 @@ def find_attractors(
         )
         status[wandering] = on.status
         labels[wandering[on.status == codes.DIVERGED]] = DIVERGED
+        label_standing(settler, point, on, wandering, found, labels, status)
         _label_cycles(settler, point, on, wandering, found, labels)
         left = np.isin(on.status, STILL)
         places, modes, wandering = on.last[left], on.mode[left], wandering[left]
@@ -79,9 +83,9 @@ def _label_cycles(
     settler: Settler, point: FloatArray, runs: Settled, which: IntArray, found: list[Attractor], labels: IntArray
 ) -> None:
     """Label the runs that ended on a cycle; cycles not met before become attractors."""
-    open_ = np.isin(runs.status, (codes.OK, codes.NOT_GUARANTEED)) & (runs.period_number > 0)
+    open_ = np.isin(runs.status, (codes.OK, codes.NOT_GUARANTEED)) & (runs.period_number > 0) & (labels[which] < 0)
     for number, attractor in enumerate(found):
-        if attractor.period_number:
+        if attractor.period_number and attractor.standing is None:
             same = open_ & _on_cycle(attractor, runs)
             labels[which[same]] = number
             open_ &= ~same
@@ -92,14 +96,21 @@ def _label_cycles(
         same[first] = True
         labels[which[same]] = len(found)
         open_ &= ~same
+        if np.any(attractor.held):  # the extent of all that were met
+            maximum, minimum = runs.maximum[same].max(axis=0), runs.minimum[same].min(axis=0)
+            attractor = replace(attractor, maximum=maximum, minimum=minimum)
         found.append(attractor)
 
 
 def _on_cycle(attractor: Attractor, runs: Settled) -> Any:
     """Marks of runs that ended on this cycle: on one of its points, in the mode that it has there.
 
-    Extremes would not tell: the cycle that is shifted by a part of its period has the same ones."""
+    Cycles on which friction holds the same states are one attractor, wherever it holds them. Extremes would not tell: the cycle that is shifted by a part of its period has the same ones."""
     n = attractor.points.shape[1]
+    if np.any(attractor.held):
+        return (runs.period_number == attractor.period_number) & (_held(runs) == attractor.held).all(axis=1) & np.isin(
+            runs.mode, attractor.modes
+        )
     gap = np.abs(np.nan_to_num(runs.last[:, None, :n] - attractor.points) / attractor.size).max(axis=2)
     k = gap.argmin(axis=1)
     return (
@@ -108,13 +119,19 @@ def _on_cycle(attractor: Attractor, runs: Settled) -> Any:
     )  # fmt: skip
 
 
+def _held(runs: Settled) -> Any:
+    """Marks of states that do not move at all (J, n)."""
+    return runs.maximum == runs.minimum
+
+
 def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:
     """The attractor of one run that ended on a cycle."""
     p, place, mode = int(run.period_number[0]), run.last[0], int(run.mode[0])
     n = run.maximum.shape[1]
     least = settler.least_at(run.maximum[0], run.minimum[0])
     size = np.maximum(0.5 * (run.maximum[0] - run.minimum[0]), least)
-    cycle = confirmed_cycle(settler, point, place, mode, p, size)
+    held = _held(run)[0]
+    cycle = None if held.any() else confirmed_cycle(settler, point, place, mode, p, size)
     confirmed = cycle is not None
     if cycle is None:
         once = settler.trace(point, place, mode, 0, p)
@@ -124,7 +141,7 @@ def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:
             cycle = Cycle(place[None, :n], run.mode[:1], float(run.multiplier[0]), np.nan, place, mode)
     return Attractor(
         p, cycle.points, cycle.modes, cycle.end, cycle.mode, run.maximum[0], run.minimum[0], cycle.multiplier,
-        exponent_on(cycle), 0.0, least, confirmed,
+        exponent_on(cycle), 0.0, least, confirmed, held=held,
     )  # fmt: skip
 
 

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
+from nonsmooth.flow.equilibrium_sets import EquilibriumSet
+from nonsmooth.results.labels import kind_of
 
 __all__ = ["Attractor", "Patience"]
 
@@ -30,7 +32,7 @@ class Attractor:
     ``period_number`` is 0 where it is no cycle; ``points`` are its section points (a sample of them then) with their
     ``modes``, and ``end``, ``mode`` a place on it from which a run can go on. ``exponent`` is the largest Lyapunov
     exponent per unit time, ``multiplier`` the largest multiplier of a cycle (else NaN); ``confirmed`` says that
-    Newton's method has found the cycle.
+    Newton's method has found the cycle. Of a set of equilibria the extremes are its extent.
     """
 
     period_number: int
@@ -48,6 +50,16 @@ class Attractor:
     chaotic: bool = False  # its exponent is above zero beyond doubt
     near: float = 0.0  # of its size: section points nearer than this belong to it
     tree: Any = field(default=None, repr=False, compare=False)
+    held: Any = False  # (n,) states of a cycle that do not move at all, and may stand elsewhere on others beside it
+    standing: EquilibriumSet | None = field(default=None, repr=False, compare=False)
+    places: tuple[str, ...] = ()  # of a set of equilibria, its modes
+
+    @property
+    def name(self) -> str:
+        """The attractor in a few words."""
+        if self.standing is None:
+            return kind_of(self.period_number, self.chaotic)
+        return f"{'equilibria' if self.standing.free else 'equilibrium'} in {', '.join(self.places)}"
 
     @property
     def size(self) -> FloatArray:

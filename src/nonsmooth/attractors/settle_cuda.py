@@ -103,8 +103,8 @@ class Rounds:
             self._beside(jobs, state + 1, state, self.rules.difference)
         gpu.run_beside(jobs, self.others, period, self.cycle, self.arrived, self.extremes)
         gpu.launch(
-            gpu.module.measure, jobs, len(period), self.rules.difference, sizes, self.others.u, self.cycle.status,
-            self.arrived.status, self.mu,
+            gpu.module.measure, jobs, len(period), self.rules.difference, sizes, self.states.u, self.others.u,
+            self.cycle.status, self.arrived.status, self.mu,
         )  # fmt: skip
 
     def _beside(self, jobs: IntArray, leg: int, state: int, factor: float) -> None:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -81,12 +81,12 @@ class Polytope:
     upper: FloatArray
     extremes: tuple[Extreme, ...]
 
-    def holds(self, u: FloatArray, tolerance: float) -> NDArray[np.bool_]:
-        """Marks of the states (J, n) that lie in it."""
+    def holds(self, u: FloatArray, tolerance: Any) -> NDArray[np.bool_]:
+        """Marks of the states (J, n) that lie in it, or nearer than a distance."""
         off = u / self.scale - self.origin
         z = off @ self.ways
         apart = np.abs(off - z @ self.ways.T).max(axis=1, initial=0.0)
-        return np.asarray((apart <= tolerance) & (z @ self.slopes.T <= self.room + tolerance).all(axis=1))
+        return np.asarray(np.maximum(apart, (z @ self.slopes.T - self.room).max(axis=1, initial=0.0)) <= tolerance)
 
     def distance(self, other: Polytope | FloatArray) -> float:
         """The distance to another polytope, or to a state, in the largest of all states."""
@@ -138,7 +138,7 @@ class EquilibriumSet:
             return largest.origin * largest.scale
         return np.asarray(np.mean([one.u for one in largest.extremes], axis=0))
 
-    def holds(self, u: FloatArray, tolerance: float = TOUCHING) -> NDArray[np.bool_]:
+    def holds(self, u: FloatArray, tolerance: Any = TOUCHING) -> NDArray[np.bool_]:
         """Marks of the states (J, n) that belong to it."""
         return np.any([one.holds(u, tolerance) for one in self.polytopes], axis=0)
 

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.plot import palette, style
-from nonsmooth.plot.basins import kind_of, told_apart
+from nonsmooth.plot.basins import told_apart
 from nonsmooth.plot.labels import name_and_unit, name_axes, only_states, variable_along
+from nonsmooth.results.labels import kind_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,10 +64,14 @@ def basin_fractions(result: xr.Dataset, ax: Axes | None = None, *, y: str | None
 def _names(result: xr.Dataset, k: int) -> str:
     """Kinds of an attractor along the parameter, each once, in the order met."""
     there = np.flatnonzero(result["period_number"].values[:, k] >= 0)
-    kinds = [kind_of(int(result["period_number"].values[i, k]), bool(result["chaotic"].values[i, k])) for i in there]
+    if "name" in result:
+        kinds = [str(result["name"].values[i, k]) for i in there]
+    else:
+        periods, chaotic = (result[key].values[:, k] for key in ("period_number", "chaotic"))
+        kinds = [kind_of(int(periods[i]), bool(chaotic[i])) for i in there]
     distinct = list(dict.fromkeys(kinds))
-    periods = [kind.removeprefix("period ") for kind in distinct if kind.startswith("period")]
-    words = [f"period {', '.join(periods)}"] if periods else []
+    numbers = [kind.removeprefix("period ") for kind in distinct if kind.startswith("period")]
+    words = [f"period {', '.join(numbers)}"] if numbers else []
     return ", ".join(words + [kind for kind in distinct if not kind.startswith("period")])
 
 

@@ -9,12 +9,13 @@ import numpy as np
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.cells import cell_edges
 from nonsmooth.plot.labels import name_and_unit, name_axes, variable_along
+from nonsmooth.results.labels import kind_of
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["basins", "kind_of", "names_of", "section_mark", "told_apart"]
+__all__ = ["basins", "names_of", "section_mark", "told_apart"]
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
 
@@ -80,6 +81,8 @@ def basins(result: xr.Dataset, ax: Axes | None = None, *, size: float = 3.6) -> 
 
 def names_of(result: xr.Dataset) -> list[str]:
     """Each attractor by its kind, ``period 3`` or ``chaos``; of several of one kind (a), (b), ..."""
+    if "name" in result:
+        return told_apart([str(name) for name in result["name"].values])
     pairs = zip(result["period_number"].values, result["chaotic"].values, strict=True)
     return told_apart([kind_of(int(period), bool(chaotic)) for period, chaotic in pairs])
 
@@ -101,10 +104,3 @@ def section_mark(result: xr.Dataset, k: int, size: float) -> dict[str, Any]:
         "marker": "o", "markersize": 0.3 * size, "color": style.COLORS["section"], "markeredgewidth": 0, "zorder": 4,
         "rasterized": True,
     }  # fmt: skip
-
-
-def kind_of(period: int, chaotic: bool) -> str:
-    """An attractor in a word or two."""
-    if period > 0:
-        return f"period {period}"
-    return "chaos" if chaotic else "no period"

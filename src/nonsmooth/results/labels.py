@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["Labels", "Quantity", "labels_of"]
+__all__ = ["Labels", "Quantity", "labels_of", "kind_of"]
 
 
 @dataclass(frozen=True)
@@ -70,3 +70,10 @@ def labels_of(system: Any) -> Labels:
         is_map=system.is_map,
         text=system.to_text(),
     )
+
+
+def kind_of(period: int, chaotic: bool) -> str:
+    """An attractor in a word or two."""
+    if period > 0:
+        return f"period {period}"
+    return "chaos" if chaotic else "no period"

@@ -40,8 +40,8 @@ def beside(jobs, apart, only, factor, offsets, states, others):
 
 
 @entry
-def measure(jobs, apart, difference, sizes, u, codes_of_job, codes, mu):
-    """mu[j]: the largest multiplier, from where job j (row j of u) and its neighbours (j + apart, ...) have come."""
+def measure(jobs, apart, difference, sizes, starts, u, codes_of_job, codes, mu):
+    """mu[j]: the largest multiplier, from where job j (row j of u, begun at its start) and its neighbours (j + apart, ...) have come."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return
@@ -55,7 +55,7 @@ def measure(jobs, apart, difference, sizes, u, codes_of_job, codes, mu):
         good = good and (code == OK or code == NOT_GUARANTEED)
         for d in range(N_STATES):
             images[leg, d] = u[row, d]
-    mu[j] = multiplier(images, sizes[j], difference, matrices) if good else nan
+    mu[j] = multiplier(images, starts[j], sizes[j], difference, matrices) if good else nan
 
 
 @entry

@@ -11,10 +11,10 @@ from numba import types
 from nonsmooth.kernels.compile.cache import kernel, once
 from nonsmooth.kernels.compile.pointers import stored
 from nonsmooth.kernels.hybrid.blocks import call_at, growth_at, kept_at, log_at
-from nonsmooth.kernels.hybrid.codes import LOG_FULL, NOT_GUARANTEED, OK, PAUSED
+from nonsmooth.kernels.hybrid.codes import LOG_FULL, NO_CONVERGENCE, NOT_GUARANTEED, OK, PAUSED
 from nonsmooth.kernels.hybrid.kept import Section
 from nonsmooth.kernels.hybrid.loop import leave, march
-from nonsmooth.kernels.hybrid.places import BEGUN, LOGGED, NO_END, RETURNS_OF_SECTION, STARTS
+from nonsmooth.kernels.hybrid.places import BEGUN, LOGGED, MODE, NO_END, RETURNS_OF_SECTION, STARTS, TIME
 from nonsmooth.kernels.hybrid.record import last_samples
 from nonsmooth.kernels.hybrid.records import (
     AFTER,
@@ -38,7 +38,7 @@ from nonsmooth.kernels.hybrid.records import (
     Goal,
     Seen,
 )
-from nonsmooth.kernels.hybrid.sections import window_of
+from nonsmooth.kernels.hybrid.sections import keep_point, window_of
 from nonsmooth.kernels.linear.extremes import finish
 from nonsmooth.kernels.linear.stepper import STEPPER
 
@@ -77,7 +77,8 @@ def run(system, call, kept, log, growth):
 
     PAUSED and LOG_FULL ask to be called again: ``BEGIN`` is then the point that waits. For section returns each point
     goes on from where the last good one ended, or from its own start; one that fails leaves the motion where it was,
-    and its status stands in its row of ``Kept`` (of its own number, or ``ROW``). Else the last point's is returned."""
+    and its status stands in its row of ``Kept`` (of its own number, or ``ROW``), with the place where it has found no
+    return as its first point. Else the last point's is returned."""
     form, net, tables, work = system_at(system)
     orders, reals, limit, starts, motion = call_at(call)
     kind, code = orders[KIND], OK
@@ -101,6 +102,8 @@ def run(system, call, kept, log, growth):
             finish(form, tables, work, seen.kept)
             seen.kept.status[0] = code
             good = code == OK or code == NOT_GUARANTEED
+            if code == NO_CONVERGENCE and seen.kept.section.shape[0] > 0:  # where it rests
+                keep_point(0, work.w, work.tally[MODE], work.memo[TIME], seen.kept)
             code = OK
         elif kind == LOGGED and code == OK:
             last_samples(goal.until, form, seen.log, work)

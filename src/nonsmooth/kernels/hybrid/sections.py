@@ -191,7 +191,7 @@ def arrive_at_section(i, code, source, t, sense, state, form, section, goal, see
     if section.indicator >= 0:
         note_side(t, sense, section, tables, work)
         waited = memo[WAITED] >= section.t_max * (1.0 - 1e-12)
-        if code == OK and (waited or memo[WAITED] > 1e100 or at_rest(form, section, tables, work)):
+        if code == OK and (waited or memo[WAITED] > 1e100 or at_rest(form, section, goal, tables, work)):
             code = NO_CONVERGENCE
     if code == OK and tally[TRIES] > MOST_STEPS:
         code = NO_CONVERGENCE

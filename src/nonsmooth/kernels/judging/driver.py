@@ -12,7 +12,7 @@ from numba import types
 
 from nonsmooth.kernels.compile.cache import device, kernel
 from nonsmooth.kernels.compile.pointers import function_at
-from nonsmooth.kernels.hybrid.codes import NOT_GUARANTEED, OK, PAUSED
+from nonsmooth.kernels.hybrid.codes import NO_CONVERGENCE, NOT_GUARANTEED, OK, PAUSED
 from nonsmooth.kernels.hybrid.places import BEGUN, NO_END
 from nonsmooth.kernels.hybrid.records import (
     BEGIN,
@@ -137,7 +137,7 @@ def slowest(row, p, size, rules, strobed, runs, work):
     """The largest modulus of the multipliers of p returns, from the cycle and its neighbours (``probe``)."""
     images, matrices = work
     if strobed:
-        return multiplier(images, size, rules.difference, matrices)
+        return multiplier(images, runs.motion.u, size, rules.difference, matrices)
     passes = p * runs.every
     points = runs.kept.section[row] if runs.every == 1 else runs.cycle.section[0, :passes]
     return contraction(points, runs.window.section[0], size, passes, rules.tolerance)
@@ -219,6 +219,10 @@ def settle_many(starts, phase, carried, extremes, rules, jobs, runs, at, work, r
                 last[j, k] = motion.memory[k - n]
             if last.shape[1] > whole:
                 last[j, whole] = motion.clock[0]
+            if jobs.status[j] == NO_CONVERGENCE:  # it meets the section no more: where it rests
+                mode[j] = runs.kept.section_mode[row, 0]
+                for k in range(n):
+                    last[j, k] = runs.kept.section[row, 0, k]
             if good and p == 0 and extremes != 0 and runs.extremes == 0:
                 at[STAGE] = EXTENT
                 continue

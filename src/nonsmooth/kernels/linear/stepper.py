@@ -7,7 +7,7 @@ A segment is one step of the mode, or its part up to the first crossing, section
 from math import cos, fabs, sin
 
 from nonsmooth.kernels.compile.cache import inline, once
-from nonsmooth.kernels.hybrid.places import FIRED, MODE, NO_END, TIME
+from nonsmooth.kernels.hybrid.places import FIRED, MODE, NO_END, TIME, TRIES
 from nonsmooth.kernels.hybrid.records import FORM, TABLES, WORK
 from nonsmooth.kernels.linear.build import build
 from nonsmooth.kernels.linear.limits import sign_after
@@ -19,6 +19,9 @@ from nonsmooth.kernels.linear.values import NODE, at_ends, bound_at, dense, turn
 STEPPER = FORM, TABLES, WORK  # the types of this stepper's records: model, tables, work
 
 AT_ONCE = 1e-13  # of a node spacing: rounding of a root
+STEPS_AT_REST = 1000  # without a return, before a state without forcing may count as an equilibrium
+RATE_AT_REST = 1e-15  # of the terms of a rate
+SCALE_OF_LIMIT = 1e-9  # the scale of a state, of the size beyond which it has diverged
 SAME = 1e-9  # of a node spacing: the section is met by the transition that is so close
 
 
@@ -298,9 +301,23 @@ def note_side(t, sense, section, tables, work):
 
 
 @once
-def at_rest(form, section, tables, work):
-    """No state of rest ends a run: a return is waited for as long as is said."""
-    return False
+def at_rest(form, section, goal, tables, work):
+    """Return whether a state without forcing no longer moves, so that no section is met again: its rates are rounding,
+    many steps after the last return."""
+    n, m, w, mode = states_of(tables.field), width_of(tables.field), work.w, work.tally[MODE]
+    if form.period[0] < NO_END or work.tally[TRIES] <= STEPS_AT_REST:
+        return False
+    for i in range(n):
+        rate, size = 0.0, 0.0
+        for j in range(m):
+            term = tables.field[mode, i, j] * w[j]
+            rate += term
+            size += fabs(term)
+            if j < goal.limit.shape[0]:
+                size += fabs(tables.field[mode, i, j]) * SCALE_OF_LIMIT * goal.limit[j]
+        if fabs(rate) > RATE_AT_REST * size:
+            return False
+    return True
 
 
 @once

@@ -340,7 +340,7 @@ def note_side(t, sense, section, tables, work):
 
 
 @once
-def at_rest(form, section, tables, work):
+def at_rest(form, section, goal, tables, work):
     """Return whether a state without forcing no longer moves, so that no section is met again: ``AT_REST`` steps in a
     row, and no return among them, have left it where it was within a hundred tolerances."""
     tally, mode = work.tally, work.tally[MODE]

@@ -1,0 +1,81 @@
+"""Runs that stand: equilibria, and sets of them as dry friction leaves them, as attractors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nonsmooth.attractors.basins_found import Attractor
+from nonsmooth.attractors.settled import Settled
+from nonsmooth.attractors.settler import Settler
+from nonsmooth.flow.engines.engine import FloatArray, IntArray
+from nonsmooth.flow.equilibria import mode_field, sorted_eigenvalues
+from nonsmooth.flow.equilibrium_sets import EquilibriumSet, equilibrium_sets
+from nonsmooth.kernels.hybrid import codes
+
+__all__ = ["label_standing"]
+
+STANDS = 1e2  # tolerances of a return: a run that moves less, and ends as near to an equilibrium, stands there
+CREEPS = 1e-5  # of the scales: the same of one that creeps towards the end of a set, ever more slowly
+TRIES = 20  # states of a nonlinear system beside which equilibria are looked for in vain
+
+
+def label_standing(
+    settler: Settler, point: FloatArray, runs: Settled, which: IntArray, found: list[Attractor], labels: IntArray,
+    status: IntArray,
+) -> None:  # fmt: skip
+    """Label the runs that ended at equilibria; sets of them not met before become attractors.
+
+    Under a forcing such a run repeats itself with nothing moving; without one it meets no section any more."""
+    system, tolerance = settler.system, STANDS * settler.tolerance
+    u, scale = runs.last[:, : len(system.states)], system.scale_vector()
+    with np.errstate(invalid="ignore"):
+        still = (runs.maximum - runs.minimum <= tolerance * (scale + np.abs(u))).all(axis=1)
+    still &= (runs.period_number == 1) | (runs.status == codes.SLOW)
+    if system.period() is None:
+        still |= (runs.status == codes.NO_CONVERGENCE) & np.isfinite(u).all(axis=1)
+    near = np.where(runs.status == codes.SLOW, CREEPS, tolerance)
+    for number, attractor in enumerate(found):
+        if attractor.standing is not None and still.any():
+            _label(attractor.standing, number, u, still, near, which, labels, status)
+    affine, known, tried = False, [], 0
+    while still.any() and tried < TRIES:
+        first = int(np.argmax(still))
+        if not affine:
+            known = equilibrium_sets(system, u[first], values=point[0])
+            traced = system.traced
+            affine = all(mode_field(traced, mode).affine for mode in range(len(traced.mode_names)))
+        stood = next((one for one in known if one.holds(u[first : first + 1], near[first])[0]), None)
+        if stood is None:
+            still[first], tried = False, tried + (not affine)
+            continue
+        _label(stood, len(found), u, still, near, which, labels, status)
+        found.append(_attractor(settler, point, runs[first : first + 1], stood))
+
+
+def _label(
+    stood: EquilibriumSet, number: int, u: FloatArray, still: FloatArray, near: FloatArray, which: IntArray,
+    labels: IntArray, status: IntArray,
+) -> None:  # fmt: skip
+    here = still.copy()
+    here[still] = stood.holds(u[still], near[still])
+    labels[which[here]], status[which[here]] = number, codes.OK
+    still &= ~here
+
+
+def _attractor(settler: Settler, point: FloatArray, run: Settled, stood: EquilibriumSet) -> Attractor:
+    """The attractor of a run that has ended at an equilibrium; neighbours within a set neither part nor meet."""
+    system, mode = settler.system, stood.modes[0]
+    points = np.array([stood.point, *(one.u for one in stood.extremes)]) if stood.free else stood.point[None, :]
+    multiplier, exponent, period = 1.0, 0.0, system.period_at(point[0])
+    if not stood.free and period is None:
+        J = mode_field(system.traced, mode).evaluate(stood.point, point[0], system.memory_vector())[1]
+        multiplier, exponent = np.nan, float(sorted_eigenvalues(J)[0].real)
+    elif not stood.free:
+        multiplier = float(run.multiplier[0])
+        with np.errstate(divide="ignore"):
+            exponent = float(np.log(multiplier) / period)
+    return Attractor(
+        1, points, np.array([mode] * len(points)), run.last[0], int(run.mode[0]), stood.upper, stood.lower, multiplier,
+        exponent, 0.0, settler.least_at(run.last[0, : len(system.states)], run.last[0, : len(system.states)]), True,
+        standing=stood, places=tuple(system.modes[k] for k in stood.modes),
+    )  # fmt: skip
