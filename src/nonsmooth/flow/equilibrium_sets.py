@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -25,6 +26,7 @@ from nonsmooth.system.symbolic.traced import FOUND, NOT_UNIQUE, TOGETHER
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from nonsmooth.system.derived.patterns import Patterns, Rows
     from nonsmooth.system.system import System
 
 __all__ = ["EquilibriumSet", "Extreme", "Local", "equilibrium_sets", "local"]
@@ -172,6 +174,13 @@ def local(system: System, mode: int, u: FloatArray, values: FloatArray, memory: 
     times = np.zeros(1) if period is None else np.linspace(0.0, period, TIMES, endpoint=False)
     found = [field.evaluate(u, values, memory, t)[:2] for t in times]
     matrix, right = np.vstack([J for _, J in found]), -np.concatenate([f for f, _ in found])
+    if traced.decider is not None:  # a field holds what is independent: of the others too nothing moves
+        rows = _rows(traced.decider, values.tobytes())
+        held = rows.held(traced.decider.visited[mode])
+        kept = np.array([one for k in held for one in (rows.parts[k].where.values, rows.rate(k, traced.decider.mode).values)])
+        for t in times if held else ():
+            matrix = np.vstack([matrix, kept[:, field.own]])
+            right = np.append(right, -kept @ rows.augmented(u, t))
     if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
         return None
     h, h_u = field.indicators(u, values, memory)
@@ -193,6 +202,12 @@ def local(system: System, mode: int, u: FloatArray, values: FloatArray, memory: 
         if jump.source == mode and jump.rows and jump.kind not in (TOGETHER, FOUND)
     ]  # fmt: skip
     return Local(field.own, u[field.own], matrix, right, ways)
+
+
+@lru_cache(maxsize=16)
+def _rows(decider: Patterns, values: bytes) -> Rows:
+    """The calculus of a system's elements at values of the parameters."""
+    return decider.rows(decider.form.evaluate(np.frombuffer(values)[None, :]), 0)
 
 
 def _peaks(at: FloatArray) -> FloatArray:
