@@ -51,15 +51,12 @@ class Attractor:
     near: float = 0.0  # of its size: section points nearer than this belong to it
     tree: Any = field(default=None, repr=False, compare=False)
     held: Any = False  # (n,) states of a cycle that do not move at all, and may stand elsewhere on others beside it
+    name: str = ""
     standing: EquilibriumSet | None = field(default=None, repr=False, compare=False)
-    places: tuple[str, ...] = ()  # of a set of equilibria, its modes
 
-    @property
-    def name(self) -> str:
-        """The attractor in a few words."""
-        if self.standing is None:
-            return kind_of(self.period_number, self.chaotic)
-        return f"{'equilibria' if self.standing.free else 'equilibrium'} in {', '.join(self.places)}"
+    def __post_init__(self) -> None:
+        if not self.name:
+            object.__setattr__(self, "name", kind_of(self.period_number, self.chaotic))
 
     @property
     def size(self) -> FloatArray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from nonsmooth.attractors.settle import longest_period, warn_if_small
 from nonsmooth.attractors.settler import Settler
+from nonsmooth.attractors.standing import standing_in_sweep
 from nonsmooth.diagrams.density import bin_edges, coarse_values, given_ranges
 from nonsmooth.diagrams.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
 from nonsmooth.flow.arguments import check_options, check_system, swept_values, whole_number
@@ -106,7 +107,9 @@ def sweep(
     xarray.Dataset
         Over the parameter (and ``direction``, ``start``): ``section(..., iterate, state)``, true extremes ``maximum``,
         ``minimum``, ``period_number`` (0: none found), ``residual``, ``crossings_per_period``,
-        ``contacts_per_period``, ``clearance``, extremes of the outputs, ``status``. With ``density``, in place of
+        ``contacts_per_period``, ``clearance``, extremes of the outputs, ``status``. Where some point stands:
+        ``equilibrium``, its name (empty where it moves), and the extent of the set of equilibria that it belongs to,
+        ``equilibrium_minimum`` and ``equilibrium_maximum``. With ``density``, in place of
         ``section``: ``density(..., state, bin)`` (section points in each bin), ``outside(..., state)`` (those beyond
         the range) and ``bin_edge(state, edge)``.
 
@@ -245,6 +248,10 @@ def _dataset(
         "output_minimum": whole(gather(lambda s: s.extremes()[5])),
         "status": gather(lambda s: s.status),
     }
+    settler = slots[0, 0].settler
+    if judge and slots[0, 0].counter is None and settler.device == "cpu":
+        first = gather(lambda s: s.kept.section[:, 0])
+        arrays |= standing_in_sweep(settler, system.parameter_points({parameter: numbers}), arrays, first)
     if not system.outputs or arrays["output_maximum"].shape[-1] != len(system.outputs):
         del arrays["output_maximum"], arrays["output_minimum"]
     if not judge:

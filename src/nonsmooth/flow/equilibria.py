@@ -59,22 +59,23 @@ class ModeField:
         self.affine = self.linear and not any(e.free_symbols & moving for e in slopes)
 
     def evaluate(
-        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: float = 0.0
+        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """f (n,), its Jacobian (n, n) and its derivatives in the parameters (n, n_places), of the mode's own states."""
-        with np.errstate(all="ignore"):
-            found: Any = np.array(self._field(t, u, values, memory), dtype=float)
-        n = len(self.own)
-        return found[:n], found[n : n + n * n].reshape(n, n), found[n + n * n :].reshape(n, self._n_places)
+        """f (n,), its Jacobian (n, n) and its derivatives in the parameters (n, n_places), of the mode's own states; at
+        several times each with a leading dim."""
+        found, n = _numbers(self._field, t, u, values, memory), len(self.own)
+        shape = found.shape[:-1]
+        return (
+            found[..., :n], found[..., n : n + n * n].reshape(*shape, n, n),
+            found[..., n + n * n :].reshape(*shape, n, self._n_places),
+        )  # fmt: skip
 
     def indicators(
-        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: float = 0.0
+        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
     ) -> tuple[FloatArray, FloatArray]:
-        """Indicators (n_indicators,) and their gradients (n_indicators, n_u)."""
-        with np.errstate(all="ignore"):
-            found: Any = np.array(self._indicators(t, u, values, memory), dtype=float)
-        n, n_u = len(self.traced.indicators), len(self.traced.u)
-        return found[:n], found[n:].reshape(n, n_u)
+        """Indicators (n_indicators,) and their gradients (n_indicators, n_u); at several times with a leading dim."""
+        found, n, n_u = _numbers(self._indicators, t, u, values, memory), len(self.traced.indicators), len(self.traced.u)
+        return found[..., :n], found[..., n:].reshape(*found.shape[:-1], n, n_u)
 
     def margins(self, h: FloatArray, edge: FloatArray | float = 0.0) -> FloatArray:
         """Margins by which conditions of transitions hold (n_transitions,), -inf for those that are not of the mode.
@@ -198,6 +199,15 @@ def refuse_resting(system: System, starts: FloatArray, points: FloatArray, verb:
 def mode_field(traced: Traced, mode: int) -> ModeField:
     """The functions of a mode, made once."""
     return ModeField(traced, mode)
+
+
+def _numbers(function: Any, t: Any, u: FloatArray, values: FloatArray, memory: FloatArray) -> FloatArray:
+    """What a function of numbers gives at a time (m,), or at several (T, m)."""
+    with np.errstate(all="ignore"):
+        found = function(t, u, values, memory)
+    if np.ndim(t) == 0:
+        return np.array(found, dtype=float)
+    return np.array([np.broadcast_to(one, np.shape(t)) for one in found], dtype=float).reshape(len(found), -1).T
 
 
 def _arguments(traced: Traced) -> list[Any]:

@@ -29,12 +29,13 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.patterns import Patterns, Rows
     from nonsmooth.system.system import System
 
-__all__ = ["EquilibriumSet", "Extreme", "Local", "equilibrium_sets", "local"]
+__all__ = ["EquilibriumSet", "Extreme", "equilibrium_sets"]
 
 FREE = 1e-9  # a singular value as small as this, beside the largest, leaves its direction free
 TOUCHING = 1e-8  # of the states' scales: polytopes nearer than this are one set
 MOST = 20  # linear problems, each beside the solution of the one before
-TIMES = 64  # of a forcing period
+TIMES = 64  # of a forcing period, at which conditions are asked
+INSTANTS = np.array([0.0, 0.137, 0.262, 0.419, 0.548, 0.683, 0.811, 0.943])  # and at which a field must vanish
 
 
 class Condition(NamedTuple):
@@ -45,17 +46,6 @@ class Condition(NamedTuple):
     top: float
     bottom: float
     size: float  # of the terms
-
-
-@dataclass(frozen=True)
-class Local:
-    """A mode beside a state: the equations ``matrix @ (u - there) = right`` and the conditions of each way out."""
-
-    own: list[int]
-    there: FloatArray
-    matrix: FloatArray
-    right: FloatArray
-    ways: list[list[Condition]]
 
 
 @dataclass(frozen=True)
@@ -132,6 +122,10 @@ class EquilibriumSet:
         """The modes that it lies in; the first is that of its largest polytope."""
         return tuple(dict.fromkeys(one.mode for one in self.polytopes))
 
+    def name(self, modes: Sequence[str]) -> str:
+        """The set in a few words."""
+        return f"{'equilibria' if self.free else 'equilibrium'} in {', '.join(modes[k] for k in self.modes)}"
+
     @property
     def point(self) -> FloatArray:
         """The mean of the extreme points of its largest polytope; any state of it where it has none."""
@@ -166,42 +160,45 @@ def equilibrium_sets(
     return _joined(parts)
 
 
-def local(system: System, mode: int, u: FloatArray, values: FloatArray, memory: FloatArray) -> Local | None:
-    """A mode beside a state."""
+def _equations(
+    system: System, mode: int, u: FloatArray, values: FloatArray, memory: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Linear equations ``matrix @ step = right`` of a mode beside a state, at some times of a forcing period."""
     traced, field = system.traced, mode_field(system.traced, mode)
-    u = np.where(np.array(traced.lacking[mode], dtype=bool), 0.0, u)
     period = system.period_at(values)
-    times = np.zeros(1) if period is None else np.linspace(0.0, period, TIMES, endpoint=False)
-    found = [field.evaluate(u, values, memory, t)[:2] for t in times]
-    matrix, right = np.vstack([J for _, J in found]), -np.concatenate([f for f, _ in found])
+    times = np.zeros(1) if period is None else period * INSTANTS
+    f, J, _ = field.evaluate(u, values, memory, times)
+    matrix, right = [*J], [*-f]
     if traced.decider is not None:  # a field holds what is independent: of the others too nothing moves
         rows = _rows(traced.decider, values.tobytes())
-        held = rows.held(traced.decider.visited[mode])
-        kept = np.array([one for k in held for one in (rows.parts[k].where.values, rows.rate(k, traced.decider.mode).values)])
-        for t in times if held else ():
-            matrix = np.vstack([matrix, kept[:, field.own]])
-            right = np.append(right, -kept @ rows.augmented(u, t))
-    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
-        return None
+        for k in rows.held(traced.decider.visited[mode]):
+            kept = np.array([rows.parts[k].where.values, rows.rate(k, traced.decider.mode).values])
+            matrix += [kept[:, field.own]] * len(times)
+            right += [-kept @ rows.augmented(u, t) for t in times]
+    return np.vstack(matrix), np.concatenate(right)
+
+
+def _conditions(
+    system: System, mode: int, u: FloatArray, values: FloatArray, memory: FloatArray
+) -> list[list[Condition]]:
+    """The conditions of each way out of a mode, beside a state."""
+    traced, field, period = system.traced, mode_field(system.traced, mode), system.period_at(values)
     h, h_u = field.indicators(u, values, memory)
-    size = np.abs(h_u) @ (system.scale_vector() + np.abs(u))
-    tops, bottoms = h, h
+    size, slopes = np.abs(h_u) @ (system.scale_vector() + np.abs(u)), h_u[:, field.own]
+    both = np.array([h, h])
     if period is not None:
-        at = np.array([field.indicators(u, values, memory, t)[0] for t in times])
-        tops, bottoms = _peaks(at), -_peaks(-at)
-    ways = [
+        at = field.indicators(u, values, memory, np.linspace(0.0, period, TIMES + 1)[:-1])[0]
+        both = np.array([-_peaks(-at), _peaks(at)])
+    return [
         [
             Condition(
-                (row.indicator, row.sign), row.sign * h_u[row.indicator][field.own],
-                *sorted((row.sign * tops[row.indicator], row.sign * bottoms[row.indicator]), reverse=True),
-                size[row.indicator],
+                (i, sign), sign * slopes[i], float((sign * both[:, i]).max()), float((sign * both[:, i]).min()), size[i]
             )
-            for row in jump.rows
+            for i, sign in ((row.indicator, row.sign) for row in jump.rows)
         ]
         for jump in traced.transitions
         if jump.source == mode and jump.rows and jump.kind not in (TOGETHER, FOUND)
     ]  # fmt: skip
-    return Local(field.own, u[field.own], matrix, right, ways)
 
 
 @lru_cache(maxsize=16)
@@ -283,26 +280,27 @@ def _polytopes(system: System, mode: int, near: FloatArray, values: FloatArray, 
 
 def _faces(system: System, mode: int, u: FloatArray, values: FloatArray, memory: FloatArray) -> list[_Faces]:
     """What bounds the equilibria of a mode that lie next to a state, found by Newton's method; empty: there are none."""
-    scale = system.scale_vector()
+    scale, lacking = system.scale_vector(), np.array(system.traced.lacking[mode], dtype=bool)
+    own, u = scale[~lacking], np.where(lacking, 0.0, u)
+    if not len(own):
+        return []
     for _ in range(MOST):
-        here = local(system, mode, u, values, memory)
-        if here is None or not len(here.own):
+        matrix, right = _equations(system, mode, u, values, memory)
+        if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
             return []
-        own = scale[here.own]
-        step = np.linalg.lstsq(here.matrix * own, here.right, rcond=FREE)[0]
+        step = np.linalg.lstsq(matrix * own, right, rcond=FREE)[0]
+        u[~lacking] += step * own
         size = float(np.abs(step).max())
         if size <= VANISHING:
             break
-        u = np.zeros(len(scale))
-        u[here.own] = here.there + step * own
-    if size > VANISHING or (np.abs(here.right) > VANISHING * (np.abs(here.matrix) @ (own + np.abs(here.there)))).any():
+    if size > VANISHING or (np.abs(right) > VANISHING * (np.abs(matrix) @ (own + np.abs(u[~lacking])))).any():
         return []
-    _, sizes, right = np.linalg.svd(here.matrix * own)
-    free = right[int((sizes > FREE * max(float(sizes[0]), FREE)).sum()) :].T
+    _, sizes, across = np.linalg.svd(matrix * own)
+    free = across[int((sizes > FREE * max(float(sizes[0]), FREE)).sum()) :].T
     ways = np.zeros((len(scale), free.shape[1]))
-    ways[here.own] = free
+    ways[~lacking] = free
     choices: list[list[tuple[FloatArray, float, tuple[int, int]]]] = []
-    for conditions in here.ways:
+    for conditions in _conditions(system, mode, u, values, memory):
         bounds, holds = [], 0
         for one in conditions:
             slopes = (one.slopes * own) @ free
@@ -333,6 +331,11 @@ def _alike(a: tuple[FloatArray, float, tuple[int, int]], b: tuple[FloatArray, fl
 
 def _best(cost: FloatArray, slopes: FloatArray, room: FloatArray) -> FloatArray | None:
     """Minimise cost @ z where slopes @ z <= room; infinite where it has no bound, None where nothing fulfils that."""
+    if len(cost) == 1 and cost[0]:
+        way = -slopes[:, 0] * np.sign(cost[0])
+        ends = room / np.where(way, np.abs(way), np.nan)
+        least, most = -np.min(ends[way < 0], initial=np.inf), np.min(ends[way > 0], initial=np.inf)
+        return None if least > most + TOUCHING else np.array([-np.sign(cost[0]) * most])
     from scipy.optimize import linprog
 
     exact = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}

@@ -54,6 +54,9 @@ _SWEEP_ARRAYS: dict[str, tuple[str, ...]] = {
     "clearance": ("indicator",),
     "output_maximum": ("output",),
     "output_minimum": ("output",),
+    "equilibrium": (),
+    "equilibrium_minimum": ("state",),
+    "equilibrium_maximum": ("state",),
     "status": (),
     "density": ("state", "bin"),
     "outside": ("state",),
@@ -69,6 +72,9 @@ _LONG_NAMES = {
     "contacts_per_period": "entries into contact per return",
     "density": "section points in each bin",
     "outside": "section points beyond the bins",
+    "equilibrium": "what the point stands at (empty: it moves)",
+    "equilibrium_minimum": "smallest value over the set of equilibria",
+    "equilibrium_maximum": "largest value over the set of equilibria",
     "clearance": "smallest distance kept from the indicator's zero (negative: crossed)",
 }
 

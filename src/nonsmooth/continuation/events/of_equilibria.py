@@ -8,14 +8,14 @@ import numpy as np
 
 from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
-from nonsmooth.continuation.problems.equilibrium import Equilibria, Rest, equilibria_near
+from nonsmooth.continuation.problems.equilibrium import Equilibria, Rest, equilibria_near, goes_on
 from nonsmooth.continuation.problems.multipliers import pairs
 
 __all__ = ["AlongEquilibria", "beyond"]
 
 BEYOND = 1e-6  # along the branch: the first equilibrium behind a boundary
 NEAR = 1e-4  # of the states' scales: equilibria so little behind a boundary are as near
-MEETS = 1e-9  # of an indicator: a condition farther from holding is not met
+LOCATED = 1e-9  # of a step: the place where two sets touch
 
 
 class Hopf(Event):
@@ -68,6 +68,21 @@ class AlongEquilibria(Policy):
         "interrupted": f"{INTERRUPTED}.",
     }
 
+    def unseen(self, step: Step) -> Met | None:
+        """The place on a step where another set of equilibria runs into this one."""
+        curve, near, far = step.curve, 0.0, step.end
+        if curve.alone(step.b):
+            return None
+        point = step.b
+        while far - near > LOCATED * step.end:
+            s = 0.5 * (near + far)
+            there = curve.between(step.a, step.b, s)
+            if there is not None and curve.alone(there):
+                near = s
+            else:
+                far, point = s, there or point
+        return Met(self.boundaries[0], far, point, self.boundaries[0].name)
+
     def behind(self, found: March, curve: Equilibria, met: list[Met]) -> tuple[Equilibria, Rest] | None:
         """Record the boundary, and whether the branch goes on behind it or turns back; the equilibrium there, or None.
 
@@ -77,7 +92,8 @@ class AlongEquilibria(Policy):
         after = beyond(curve, rest)
         if after is None:
             found.ending = "boundary"
-        if after is None or rest.margins[: len(curve.system.transitions)].max(initial=-np.inf) > -MEETS:
+        corner = rest.margins[len(curve.system.transitions) :].max(initial=-np.inf) >= 0.0
+        if after is None or not corner:  # else another point of the set is its extreme from here on
             ahead = after is not None and float(rest.tangent[-1]) * float(after[1].tangent[-1]) > 0.0
             graze = "" if after is None else "persistence" if ahead else "non_smooth_fold"
             found.mark(met[0].name, curve, rest, graze=graze)
@@ -93,8 +109,6 @@ def beyond(curve: Equilibria, rest: Rest) -> tuple[Equilibria, Rest] | None:
         for other, first in equilibria_near(system, parameter, width, rest.u, value):
             if other.word() == curve.word():
                 continue  # back lies the branch that has come here
-            off = [(getattr(rest, side) - getattr(first, side)) / scale for side in ("lower", "upper")]
-            off = [one[np.isfinite(one)] for one in off]
-            if max(np.abs(one).max(initial=0.0) for one in off) <= NEAR and (first.margins < 0.0).all():
+            if goes_on(rest, first, NEAR * scale) and (first.margins < 0.0).all():
                 return other, first.facing(ahead)
     return None

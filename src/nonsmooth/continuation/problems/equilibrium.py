@@ -14,11 +14,12 @@ from nonsmooth.flow.equilibria import ModeField, sorted_eigenvalues
 from nonsmooth.flow.equilibrium_sets import EquilibriumSet, Extreme, equilibrium_sets
 from nonsmooth.system.system import System
 
-__all__ = ["Equilibria", "Rest", "equilibria_near"]
+__all__ = ["Equilibria", "Rest", "equilibria_near", "goes_on"]
 
 EDGE = 1e-12  # of an indicator's size: zero
 CLOSE = 1e-11
 FREE = 1e-9  # a singular value as small as this leaves its direction free
+ALIKE = 1e-7  # of the states' scales: extents this near are those of one set
 STEP = 1e-6  # of differences, of the parameter's range
 
 
@@ -58,6 +59,7 @@ class Equilibria(Curve[Rest]):
     """
 
     most, longest, grows = 20, 1e6, np.inf
+    watched: tuple[int, ...] = ()  # modes in which lie sets of equilibria that may run into this one
 
     def __init__(self, system: System, mode: int, parameter: str, width: float) -> None:
         self.system, self.mode, self.parameter, self.width = system, mode, parameter, width
@@ -118,6 +120,18 @@ class Equilibria(Curve[Rest]):
     def margins(self, point: Rest) -> FloatArray:
         """The least distance to a transition out of the mode."""
         return np.array([-point.margins.max(initial=-np.inf)])
+
+    def alone(self, rest: Rest) -> bool:
+        """Return whether no other set of equilibria has run into this one."""
+        if not self.watched:
+            return True
+        found = equilibrium_sets(self.system, rest.u, values=self._at(rest.X)[1], modes=self.watched)
+        size = ALIKE * self.system.scale_vector()
+        return any(
+            _within(rest.lower, rest.upper, one.lower, one.upper, size)
+            and _within(one.lower, one.upper, rest.lower, rest.upper, size)
+            for one in found
+        )
 
     def at(self, u: FloatArray, value: float) -> Rest | None:
         """The equilibrium at a value of the parameter, by Newton from a state."""
@@ -236,10 +250,23 @@ def equilibria_near(
     values = system.parameter_vector()
     values[list(system.values).index(parameter)] = value
     found = equilibrium_sets(system, u, values=values, modes=modes)
+    watched = tuple(sorted({mode for one in found for mode in one.modes}))
     for one in sorted(found, key=lambda one: one.distance(u)):
-        curve = SetOfEquilibria(system, parameter, width, one) if one.free else Equilibria(
-            system, one.modes[0], parameter, width
-        )
-        rest = curve.at(one.extremes[0].u if not one.free else curve.corners[0].u, value)
+        curve = Equilibria(system, one.modes[0], parameter, width)
+        if one.free:
+            curve = SetOfEquilibria(system, parameter, width, one)
+        if any(other.free for other in found):
+            curve.watched = watched
+        rest = curve.at(curve.corners[0].u if isinstance(curve, SetOfEquilibria) else one.point, value)
         if rest is not None:
             yield curve, rest
+
+
+def goes_on(rest: Rest, other: Rest, size: FloatArray) -> bool:
+    """Return whether of two sets beside each other one is part of the other."""
+    ends = rest.lower, rest.upper, other.lower, other.upper
+    return _within(*ends, size) or _within(*ends[2:], *ends[:2], size)
+
+
+def _within(low: FloatArray, high: FloatArray, lower: FloatArray, upper: FloatArray, size: FloatArray) -> bool:
+    return bool((low >= lower - size).all() and (high <= upper + size).all())

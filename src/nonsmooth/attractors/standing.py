@@ -1,6 +1,11 @@
-"""Runs that stand: equilibria, and sets of them as dry friction leaves them, as attractors."""
+"""Runs that stand: equilibria, and sets of them as dry friction leaves them, as attractors.
+
+Under a forcing such a run repeats itself with nothing moving; without one it meets no section any more.
+"""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,7 +17,10 @@ from nonsmooth.flow.equilibria import mode_field, sorted_eigenvalues
 from nonsmooth.flow.equilibrium_sets import EquilibriumSet, equilibrium_sets
 from nonsmooth.kernels.hybrid import codes
 
-__all__ = ["label_standing"]
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["label_standing", "standing_in_sweep"]
 
 STANDS = 1e2  # tolerances of a return: a run that moves less, and ends as near to an equilibrium, stands there
 CREEPS = 1e-5  # of the scales: the same of one that creeps towards the end of a set, ever more slowly
@@ -23,16 +31,10 @@ def label_standing(
     settler: Settler, point: FloatArray, runs: Settled, which: IntArray, found: list[Attractor], labels: IntArray,
     status: IntArray,
 ) -> None:  # fmt: skip
-    """Label the runs that ended at equilibria; sets of them not met before become attractors.
-
-    Under a forcing such a run repeats itself with nothing moving; without one it meets no section any more."""
+    """Label the runs that ended at equilibria; sets of them not met before become attractors."""
     system, tolerance = settler.system, STANDS * settler.tolerance
-    u, scale = runs.last[:, : len(system.states)], system.scale_vector()
-    with np.errstate(invalid="ignore"):
-        still = (runs.maximum - runs.minimum <= tolerance * (scale + np.abs(u))).all(axis=1)
-    still &= (runs.period_number == 1) | (runs.status == codes.SLOW)
-    if system.period() is None:
-        still |= (runs.status == codes.NO_CONVERGENCE) & np.isfinite(u).all(axis=1)
+    u = runs.last[:, : len(system.states)]
+    still = _stands(system, tolerance, u, runs.maximum, runs.minimum, runs.period_number, runs.status)
     near = np.where(runs.status == codes.SLOW, CREEPS, tolerance)
     for number, attractor in enumerate(found):
         if attractor.standing is not None and still.any():
@@ -50,6 +52,45 @@ def label_standing(
             continue
         _label(stood, len(found), u, still, near, which, labels, status)
         found.append(_attractor(settler, point, runs[first : first + 1], stood))
+
+
+def standing_in_sweep(settler: Settler, points: FloatArray, arrays: dict[str, Any], first: FloatArray) -> dict[str, Any]:
+    """Complete the arrays of a sweep (directions, starts, values) where its points stand, and return what else is known
+    of them: the name of the equilibrium, or of the set of them, and its extent. ``first`` are the first kept points."""
+    system, tolerance = settler.system, STANDS * settler.tolerance
+    shape, n = first.shape[:-1], first.shape[-1]
+    status, period = arrays["status"], arrays["period_number"]
+    stands = _stands(system, tolerance, first, arrays["maximum"], arrays["minimum"], period, status)
+    names, extent = np.full(shape, "", dtype=object), np.full((2, *shape, n), np.nan)
+    for d, k, i in np.argwhere(stands):
+        u = first[d, k, i]
+        known = equilibrium_sets(system, u, values=points[i])
+        stood = next((one for one in known if one.holds(u[None, :], tolerance)[0]), None)
+        if stood is None:
+            continue
+        names[d, k, i], extent[:, d, k, i] = stood.name(system.modes), (stood.lower, stood.upper)
+        if status[d, k, i] == codes.NO_CONVERGENCE:
+            status[d, k, i], period[d, k, i] = codes.OK, 1
+            for key in ("section", "maximum", "minimum"):
+                arrays[key][d, k, i] = u
+            for key in ("residual", "crossings_per_period", "contacts_per_period"):
+                arrays[key][d, k, i] = 0.0
+    if not names.any():
+        return {}
+    return {"equilibrium": names.astype(str), "equilibrium_minimum": extent[0], "equilibrium_maximum": extent[1]}
+
+
+def _stands(
+    system: System, tolerance: float, u: FloatArray, maximum: FloatArray, minimum: FloatArray, period: IntArray,
+    status: IntArray,
+) -> Any:  # fmt: skip
+    """Marks of runs that do not move any more, or hardly, at places u (..., n)."""
+    with np.errstate(invalid="ignore"):
+        still = (maximum - minimum <= tolerance * (system.scale_vector() + np.abs(u))).all(axis=-1)
+    still &= (period == 1) | (status == codes.SLOW)
+    if system.period() is None and not system.explicit_time:
+        still |= (status == codes.NO_CONVERGENCE) & np.isfinite(u).all(axis=-1)
+    return still
 
 
 def _label(
@@ -77,5 +118,5 @@ def _attractor(settler: Settler, point: FloatArray, run: Settled, stood: Equilib
     return Attractor(
         1, points, np.array([mode] * len(points)), run.last[0], int(run.mode[0]), stood.upper, stood.lower, multiplier,
         exponent, 0.0, settler.least_at(run.last[0, : len(system.states)], run.last[0, : len(system.states)]), True,
-        standing=stood, places=tuple(system.modes[k] for k in stood.modes),
+        name=stood.name(system.modes), standing=stood,
     )  # fmt: skip
