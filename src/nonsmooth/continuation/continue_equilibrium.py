@@ -73,6 +73,7 @@ def continue_equilibrium(
     from nonsmooth.results.branches import EQUILIBRIUM, SPECIAL_EQUILIBRIUM
 
     check_system(system, "continue_equilibrium")
+    system.refuse_patterns("continue_equilibrium")
     if system.depends_on_time:
         raise ValueError(f"{system.name!r} depends on time: it has no equilibria; find_orbit finds its periodic orbits")
     low, high = limits(system, parameter, range, system.values.get(parameter), what="the system")

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
 
-__all__ = ["AT_REST", "ROUNDING", "Equilibrium", "ModeField", "equilibrium_at", "refuse_resting", "sorted_eigenvalues"]
+__all__ = ["AT_REST", "ROUNDING", "Equilibrium", "ModeField", "equilibrium_at", "mode_field", "refuse_resting",
+           "sorted_eigenvalues"]  # fmt: skip
 
 AT_REST = 1e-7  # of a state's size: nearer to an equilibrium than this is at it
 ROUNDING = 1e-14  # and nearer than this nothing but rounding leads away

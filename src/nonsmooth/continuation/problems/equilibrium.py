@@ -10,7 +10,7 @@ import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.curve import Curve, Point
-from nonsmooth.flow.equilibria import ModeField, sorted_eigenvalues
+from nonsmooth.flow.equilibria import ModeField, mode_field, sorted_eigenvalues
 from nonsmooth.flow.equilibrium_sets import EquilibriumSet, Extreme, equilibrium_sets
 from nonsmooth.system.system import System
 
@@ -20,6 +20,7 @@ EDGE = 1e-12  # of an indicator's size: zero
 CLOSE = 1e-11
 FREE = 1e-9  # a singular value as small as this leaves its direction free
 ALIKE = 1e-7  # of the states' scales: extents this near are those of one set
+FARTHEST = 1.0  # of the states' scales: an extreme point that moves more on a step may be another one
 STEP = 1e-6  # of differences, of the parameter's range
 
 
@@ -141,7 +142,8 @@ class Equilibria(Curve[Rest]):
 class _Corner:
     """An extreme point of a set: the independent equations of its mode's field and the conditions that vanish there."""
 
-    def __init__(self, curve: Equilibria, extreme: Extreme) -> None:
+    def __init__(self, curve: Equilibria, extreme: Extreme, value: float) -> None:
+        self.known = {value: extreme.u}  # by the parameter
         self.curve, self.u, self.side, self.keys = curve, extreme.u, extreme.side, [i for i, _ in extreme.keys]
         place, traced = curve.place, curve.system.traced
         same = extreme.mode == curve.mode
@@ -173,14 +175,18 @@ class _Corner:
         return f, J
 
     def solved(self, values: FloatArray) -> FloatArray | None:
-        """The corner at other values of the parameters, from where it was last."""
-        u = self.u.copy()
+        """The corner at other values of the parameters, from the nearest where it is known."""
+        value = float(values[self.curve.place])
+        begun = self.known[min(self.known, key=lambda one: abs(one - value))]
+        u = begun.copy()
         for _ in range(self.curve.most):
             f, J = self.equations(u, values)
             step = np.linalg.lstsq(J[:, :-1], -f, rcond=None)[0]
             u[self.own] += step * self.scale
+            if np.abs((u - begun)[self.own] / self.scale).max() > FARTHEST:
+                return None
             if np.abs(step).max() < CLOSE:
-                self.u = u
+                self.known[value] = u
                 return u
         return None
 
@@ -194,18 +200,18 @@ class _Corner:
         (k, sign), J = self.side, self.equations(u, values)[1][:, :-1]
         pushes = np.linalg.lstsq(J.T, sign * np.eye(len(J))[self.own.index(k)], rcond=None)[0]
         own = (pushes * np.abs(J).max(axis=1))[len(self.across) :][: len(self.keys)] * self.signs
-        return margins, -float(own.min() / np.abs(own).max()) - FREE
+        return margins, -float(own.min() / max(np.abs(own).max(), FREE)) - FREE
 
 
 class SetOfEquilibria(Equilibria):
     """A set of equilibria, as dry friction leaves it: one of its extreme points is followed, the others beside it."""
 
-    def __init__(self, system: System, parameter: str, width: float, found: EquilibriumSet) -> None:
+    def __init__(self, system: System, parameter: str, width: float, found: EquilibriumSet, value: float) -> None:
         super().__init__(system, found.modes[0], parameter, width)
         self.found = found
         first = min(found.extremes, key=lambda one: one.mode != self.mode, default=None)
         first = first or Extreme(found.point, self.mode)
-        self.corners = [_Corner(self, one) for one in (first, *(e for e in found.extremes if e is not first))]
+        self.corners = [_Corner(self, one, value) for one in (first, *(e for e in found.extremes if e is not first))]
         self.scale = np.append(self.corners[0].scale, width)
 
     def evaluate(self, Y: FloatArray) -> _Field:
@@ -254,8 +260,8 @@ def equilibria_near(
     for one in sorted(found, key=lambda one: one.distance(u)):
         curve = Equilibria(system, one.modes[0], parameter, width)
         if one.free:
-            curve = SetOfEquilibria(system, parameter, width, one)
-        if any(other.free for other in found):
+            curve = SetOfEquilibria(system, parameter, width, one, value)
+        if any(other.free for other in found) and all(mode_field(system.traced, k).affine for k in watched):
             curve.watched = watched
         rest = curve.at(curve.corners[0].u if isinstance(curve, SetOfEquilibria) else one.point, value)
         if rest is not None:

@@ -1,0 +1,110 @@
+"""Equilibria and sets of them as attractors, against the force balances that define them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+E = ns.elements
+MU, K = 0.5, 2.0
+GRID = {"q": np.linspace(-1.4, 0.9, 13), "v_q": np.linspace(-1.5, 1.5, 13)}
+
+
+def rubbed(**forcing: Any) -> ns.System:
+    return ns.mechanical(
+        1.0, 0.1, K, parameters={"mu": MU, "F": 0.3, "w": 1.0}, elements={"f": E.Coulomb(at="q", friction="mu")},
+        coordinates=["q"], **forcing,
+    )  # fmt: skip
+
+
+FREE = rubbed()
+FORCED = rubbed(forcing={"q": lambda t, p: p.F * np.cos(p.w * t)})
+STOPPED = ns.Poincare("f_speed")
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor"])
+def test_every_start_of_a_friction_oscillator_comes_to_stand(method: str) -> None:
+    """The ends are +-mu / k; a start within that is there already."""
+    found = ns.basins(FREE, GRID, section=STOPPED, method=method, progress=False)
+    assert (found["label"].values == 0).all() and (found["status"].values == 0).all()
+    assert found["fraction"].values.tolist() == [1.0] and found["name"].values.tolist() == ["equilibria in f_stick"]
+    assert found["period_number"].values.tolist() == [1] and found["lyapunov"].values.tolist() == [0.0]
+    assert found["minimum"].values[0] == pytest.approx([-MU / K, 0.0], abs=1e-12)
+    assert found["maximum"].values[0] == pytest.approx([MU / K, 0.0], abs=1e-12)
+    assert ns.plot.basins(found) is not None
+
+
+def test_shares_over_the_friction() -> None:
+    mu = np.array([0.2, 0.5, 0.8])
+    found = ns.basin_fractions(
+        FREE, "mu", mu, n_starts=300, box={"q": (-2, 2), "v_q": (-2, 2)}, section=STOPPED, progress=False
+    )
+    assert found["fraction"].values.ravel().tolist() == [1.0] * 3
+    assert set(found["name"].values.ravel()) == {"equilibria in f_stick"}
+    assert found["maximum"].values[:, 0, 0] == pytest.approx(mu / K, abs=1e-12)
+    assert (found["not_converged"].values == 0).all()
+    assert ns.plot.basin_fractions(found) is not None
+
+
+def test_a_forcing_below_friction() -> None:
+    """Where it stands, |F cos wt - k q| <= mu at all times: |q| <= (mu - F) / k. Some creep to the ends."""
+    found = ns.basins(FORCED, GRID, progress=False)
+    assert (found["label"].values == 0).all()
+    assert found["maximum"].values[0, 0] == pytest.approx((MU - 0.3) / K, abs=1e-7)
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor", "rkf45"])
+def test_a_mass_that_stands_has_period_1(method: str) -> None:
+    """From rest it does not move at all; above F = mu it does."""
+    swept = ns.sweep(FORCED, "F", [0.1, 0.4, 0.7], method=method, direction=None, progress=False)
+    assert swept["period_number"].values.tolist() == [1, 1, 1] and (swept["status"].values == 0).all()
+    assert swept["equilibrium"].values.tolist() == ["equilibria in f_stick"] * 2 + [""]
+    ends = swept["equilibrium_maximum"].values[:2, 0]
+    assert ends == pytest.approx((MU - swept["F"].values[:2]) / K, abs=1e-7)
+    assert np.isnan(swept["equilibrium_maximum"].values[2]).all()
+    assert (swept["maximum"].values[:2] == 0.0).all() and swept["maximum"].values[2, 0] > 0.1
+
+
+def test_a_sweep_without_forcing_ends_at_rest() -> None:
+    """Undamped, from q0 within 3 mu / k it swings once about mu / k, to 2 mu / k - q0, and stays."""
+    bare = ns.mechanical(
+        1.0, 0.0, K, parameters={"mu": MU}, elements={"f": E.Coulomb(at="q", friction="mu")}, coordinates=["q"]
+    )
+    swept = ns.sweep(bare, "mu", [0.4, MU], start={"q": 0.4}, section=STOPPED, direction=None, progress=False)
+    assert swept["section"].values[:, -1, 0] == pytest.approx(2 * swept["mu"].values / K - 0.4, abs=1e-9)
+    assert swept["period_number"].values.tolist() == [1, 1]
+    assert swept["equilibrium_minimum"].values[:, 0] == pytest.approx(-swept["mu"].values / K)
+
+
+def test_what_sticks_for_good_beside_what_moves() -> None:
+    """One mass sticks, one is driven: cycles that differ in where the first one stands are one attractor."""
+    system = ns.mechanical(
+        np.eye(2), 0.1 * np.eye(2), [[3.0, -1.0], [-1.0, 2.0]], parameters={"F": 0.3, "w": 1.0},
+        forcing={"q2": lambda t, p: p.F * np.cos(p.w * t)}, elements={"f": E.Coulomb(at="q1", friction=1.5)},
+    )  # fmt: skip
+    grid = {"q1": np.linspace(-0.2, 0.2, 5), "q2": np.linspace(-0.2, 0.2, 3)}
+    found = ns.basins(system, grid, progress=False)
+    assert (found["label"].values == 0).all() and found["name"].values.tolist() == ["period 1"]
+    assert found["maximum"].values[0, 0] >= 0.2 and found["minimum"].values[0, 0] <= -0.2
+    # q2'' + .1 q2' + 2 q2 = F cos wt + q1: its own decay
+    assert found["lyapunov"].values[0] == pytest.approx(-0.05, abs=1e-6)
+
+
+def test_rest_against_either_of_two_stops() -> None:
+    """q'' = q - .1 q' between stops: the middle is unstable, both stops draw in."""
+    system = ns.mechanical(
+        1.0, 0.1, -1.0, coordinates=["q"],
+        elements={
+            "a": E.Stop(at="q", position=1.0, restitution=0.5),
+            "b": E.Stop(at="q", position=-1.5, side=-1, restitution=0.5),
+        },
+    )  # fmt: skip
+    grid = {"q": np.linspace(-1.4, 0.9, 8), "v_q": np.linspace(-0.4, 0.4, 6)}
+    found = ns.basins(system, grid, section=ns.Poincare("a_gap"), progress=False)
+    assert sorted(found["name"].values) == ["equilibrium in a_open_b_rest", "equilibrium in a_rest_b_open"]
+    assert sorted(found["section"].values[:, 0]) == pytest.approx([-1.5, 1.0], abs=1e-9)
+    assert found["fraction"].values.sum() == pytest.approx(1.0)
