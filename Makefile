@@ -13,7 +13,7 @@ PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward coverage-fit check \
-	contacts bench gpu gpu-compiler docs screenshots clean distclean versions
+	contacts equilibria bench gpu gpu-compiler docs screenshots clean distclean versions
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26
@@ -47,6 +47,9 @@ coverage-awkward: $(VENV)/.compiled-run  ## the same on rigs where much goes wro
 
 coverage-fit: $(VENV)/.compiled-test  ## fit ten systems to data of SciPy, 40 seeds each; writes docs/measured_coverage_fit.md
 	$(BIN)/python -m tests.identification.fit_coverage --seeds 0-39 --out docs/measured_coverage_fit.md
+
+equilibria: $(VENV)/.compiled-test  ## equilibria of 200 random systems beside their enumeration (half an hour)
+	$(BIN)/python tests/independent/equilibria_campaign.py 0 200
 
 contacts: $(VENV)/.compiled-test  ## 1000 random systems with contacts and friction beside an independent reference (hours)
 	$(BIN)/python tests/independent/contact_campaign.py 0 1000 --rows out/contacts.jsonl

@@ -102,3 +102,77 @@ def test_two_equilibria_that_vanish_at_a_boundary() -> None:
     assert special["boundary"].values.tolist() == ["non_smooth_fold"]
     assert float(special["mu"][0]) == pytest.approx(0.0, abs=1e-12)
     assert branch["u"].values[[0, -1], 0] == pytest.approx([1.0, -1.0]) and (branch["mu"].values >= -1e-12).all()
+
+
+def test_two_frictions_are_followed_by_their_extreme_points() -> None:
+    """K q = P e_1 + lambda_1 (1, 0) + lambda_2 (0, 1): the extent is |K^-1| times the bounds, about K^-1 P e_1."""
+    stiffness, bounds = np.array([[3.0, -1.0], [-1.0, 2.0]]), np.array([0.5, 0.3])
+    system = ns.mechanical(
+        np.diag([1.0, 2.0]), 0.1 * np.eye(2), stiffness, parameters={"P": 0.0}, forcing={"q1": lambda t, p: p.P},
+        elements={"f": E.Coulomb(at="q1", friction=bounds[0]), "g": E.Coulomb(at="q2", friction=bounds[1])},
+    )  # fmt: skip
+    branch = ns.continue_equilibrium(system, "P", (-1.0, 2.0))
+    whole(branch, -1.0, 2.0)
+    inverse = np.linalg.inv(stiffness)
+    middle, half = branch["P"].values[:, None] * inverse[0], np.abs(inverse) @ bounds
+    assert branch["u_lower"].values[:, :2] == pytest.approx(middle - half, abs=1e-10)
+    assert branch["u_upper"].values[:, :2] == pytest.approx(middle + half, abs=1e-10)
+    assert branch["u"].values[:, :2] == pytest.approx(middle, abs=1e-10) and branch["stable"].values.all()
+    assert not boundaries(branch)
+
+
+def test_another_extreme_point_is_no_boundary() -> None:
+    """The coupling c changes its sign, and with it the corner at which q1 is largest: (3 m + |c| n) / (6 - c^2)."""
+    m, n = 0.5, 0.4
+    system = ns.mechanical(
+        np.eye(2), 0.1 * np.eye(2), lambda p: [[2.0, p.c], [p.c, 3.0]], parameters={"c": -1.0},
+        elements={"f": E.Coulomb(at="q1", friction=m), "g": E.Coulomb(at="q2", friction=n)},
+    )  # fmt: skip
+    branch = ns.continue_equilibrium(system, "c", (-1.5, 1.5))
+    c = branch["c"].values
+    assert c[[0, -1]] == pytest.approx([-1.5, 1.5])
+    assert branch["u_upper"].values[:, 0] == pytest.approx((3 * m + np.abs(c) * n) / (6 - c**2), abs=1e-9)
+    assert not ns.special_points(branch).sizes["special"]
+
+
+def test_a_set_that_runs_into_another() -> None:
+    """k < 0: beyond |P + |k| q| <= mu the stop at g holds the mass too; both are one where P + mu = |k| g."""
+    k, mu, g = 0.5, 0.4, 1.0
+    system = ns.mechanical(
+        1.0, 0.1, -k, parameters={"P": 0.5}, forcing={"q": lambda t, p: p.P}, coordinates=["q"],
+        elements={"f": E.Coulomb(at="q", friction=mu), "s": E.Stop(at="q", position=g)},
+    )  # fmt: skip
+    branch = ns.continue_equilibrium(system, "P", (-0.6, 0.6), start={"q": g})
+    ((name, P),) = boundaries(branch)
+    assert name == "persistence" and pytest.approx(mu - k * g, abs=1e-7) == P
+    P = branch["P"].values
+    low, high = branch["u_lower"].values[:, 0], branch["u_upper"].values[:, 0]
+    joined = P < mu - k * g - 1e-5
+    assert high == pytest.approx(g, abs=1e-9) and joined.any()
+    assert low[joined] == pytest.approx((-P[joined] - mu) / k, abs=1e-9)
+    assert low[~joined & (P > mu - k * g + 1e-5)] == pytest.approx(g, abs=1e-9)
+
+
+def test_a_pendulum_with_friction() -> None:
+    """|T - sin q| <= mu about q = 0: asin(T - mu) to asin(T + mu), up to where one end turns."""
+    pendulum = ns.System(
+        states=["q", "v"], parameters={"T": 0.2}, modes={"swing": lambda t, u, p: (u.v, p.T - np.sin(u.q))},
+        elements={"f": E.Coulomb(speed=lambda t, u, p: u.v, on={"v": 1.0}, friction=MU)},
+    )  # fmt: skip
+    branch = ns.continue_equilibrium(pendulum, "T", (-0.45, 0.45))
+    whole_range = branch["T"].values[[0, -1]]
+    assert whole_range == pytest.approx([-0.45, 0.45])
+    assert branch["u_lower"].values[:, 0] == pytest.approx(np.arcsin(branch["T"].values - MU), abs=1e-9)
+    assert branch["u_upper"].values[:, 0] == pytest.approx(np.arcsin(branch["T"].values + MU), abs=1e-9)
+
+
+def test_a_mass_that_is_pulled_away() -> None:
+    """Without a spring it stands anywhere as long as |P| <= mu."""
+    system = ns.mechanical(
+        1.0, 0.1, 0.0, parameters={"P": 0.1}, forcing={"q": lambda t, p: p.P}, coordinates=["q"],
+        elements={"f": E.Coulomb(at="q", friction=MU)},
+    )  # fmt: skip
+    branch = ns.continue_equilibrium(system, "P", (-1.0, 1.0), start={"q": 0.7})
+    assert branch["P"].values[[0, -1]] == pytest.approx([-MU, MU], abs=1e-9)
+    assert np.isinf(branch["u_upper"].values[:, 0]).all()
+    assert all("boundary" in str(text) for text in branch["ended_because"].values)

@@ -147,10 +147,20 @@ def test_multipliers_are_those_of_the_map() -> None:
             size = 10.0 ** rng.uniform(-3, 3, n)
             matrix = np.diag(size) @ basis @ normal @ np.linalg.inv(basis) @ np.diag(1.0 / size)
             images = np.array([np.zeros(n), *(0.5 * matrix.T * size[:, None])])
-            found = multiplier(images, size, 0.5, np.zeros((2, n, n)))
+            found = multiplier(images, np.ones(n), size, 0.5, np.zeros((2, n, n)))
             defective = normal[0, 0] in (0.6, 0.0)  # differences over 1e-6, to 1e-16, move an n-fold eigenvalue so far
             assert found == pytest.approx(radius, abs=1e-10 ** (1.0 / n) if defective else 1e-8)
-    assert np.isnan(multiplier(np.full((4, 3), np.nan), np.ones(3), 1e-6, np.zeros((2, 3, 3))))
+    assert np.isnan(multiplier(np.full((4, 3), np.nan), np.ones(3), np.ones(3), 1e-6, np.zeros((2, 3, 3))))
+
+
+def test_what_is_held_has_no_multiplier() -> None:
+    """(x, v) -> (x + .3 v, .5 v): x stands wherever it is, v dies out; a start that moves is not held."""
+    start, size = np.array([0.7, 0.0]), np.array([2.0, 3.0])
+    nudged = start + 1e-6 * np.diag(size)
+    for shift, radius in ((0.0, 0.5), (1e-9, 1.0)):
+        images = np.array([[x + 0.3 * v + shift, 0.5 * v] for x, v in (start, *nudged)])
+        found = multiplier(images, start, size, 1e-6, np.zeros((2, 2, 2)))
+        assert found == pytest.approx(radius, abs=1e-8)
 
 
 @pytest.mark.parametrize("p", [1, 3])

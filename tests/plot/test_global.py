@@ -114,7 +114,7 @@ def test_runs_that_diverge_have_a_colour_of_their_own() -> None:
     found = ns.basins(system, {"x": [-1.5, 0.5, 1.5], "y": [0.0, 1.0]}, transient=50, keep=20, progress=False)
     axes = draw_basins(found)
     names = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert names == ["period 1: 33.3 %", "diverged"]
+    assert names == ["equilibrium in only: 33.3 %", "diverged"]
     drawn = axes.collections[0]
     colours = drawn.to_rgba(drawn.get_array()).reshape(2, 3, 4)
     assert (colours[:, 0] == colours[:, 2]).all() and (colours[:, 0] != colours[:, 1]).any()

@@ -130,8 +130,8 @@ def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:
     n = run.maximum.shape[1]
     least = settler.least_at(run.maximum[0], run.minimum[0])
     size = np.maximum(0.5 * (run.maximum[0] - run.minimum[0]), least)
-    held = _held(run)[0]
-    cycle = None if held.any() else confirmed_cycle(settler, point, place, mode, p, size)
+    cycle = confirmed_cycle(settler, point, place, mode, p, size)
+    held = _held(run)[0] & (cycle is None)  # neighbours stand beside it
     confirmed = cycle is not None
     if cycle is None:
         once = settler.trace(point, place, mode, 0, p)

@@ -13,7 +13,7 @@ __all__ = ["Cycle", "confirmed_cycle", "exponent_on"]
 
 MOST = 8  # Newton steps
 STEP = 1e-5  # of the differences that give the map's derivative, in units of the motion's size
-ROUNDING = 1e-8  # multipliers below this are differences of rounding errors
+ROUNDING = 1e-8  # multipliers below this, or as near to 1, are differences of rounding errors
 NEAR = 5e-6  # of the motion's size: farther from the run's end than this lies another orbit
 
 
@@ -84,7 +84,7 @@ def confirmed_cycle(
             return None
     scaled = derivative * size[None, :] / size[:, None]
     multiplier = float(np.abs(np.linalg.eigvals(scaled)).max())
-    if not (multiplier < 1.0 and min(before, left) <= settler.tolerance):
+    if not (multiplier < 1.0 - ROUNDING and min(before, left) <= settler.tolerance):
         return None
     start = place.copy()
     start[:n] = u

@@ -208,7 +208,7 @@ def _numbers(function: Any, t: Any, u: FloatArray, values: FloatArray, memory: F
         found = function(t, u, values, memory)
     if np.ndim(t) == 0:
         return np.array(found, dtype=float)
-    return np.array([np.broadcast_to(one, np.shape(t)) for one in found], dtype=float).reshape(len(found), -1).T
+    return np.array([np.broadcast_to(one, np.shape(t)) for one in found], dtype=float).reshape(len(found), np.size(t)).T
 
 
 def _arguments(traced: Traced) -> list[Any]:

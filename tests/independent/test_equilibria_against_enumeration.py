@@ -1,0 +1,41 @@
+"""Equilibria of random piecewise-linear systems beside their enumeration from force balances alone.
+
+``python tests/independent/equilibria_campaign.py 0 200`` (``make equilibria``) is the whole campaign.
+"""
+
+from __future__ import annotations
+
+import equilibria_campaign
+import equilibria_enumeration
+import numpy as np
+import pytest
+
+SOME = (0, 1, 2, 3, 9, 13, 18, 25, 26, 29, 33, 44, 68, 76, 79, 105, 112, 211, 213, 245)
+
+
+@pytest.mark.parametrize("seed", SOME)
+def test_all_components_and_no_other(seed: int) -> None:
+    """By random starts, along branches, at their ends, and by runs from neighbours."""
+    components, faults = equilibria_campaign.check(seed)
+    assert not faults and components >= 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(0, 200, 20))
+def test_two_hundred_systems(first: int) -> None:
+    faults = {seed: equilibria_campaign.check(seed)[1] for seed in range(first, first + 20)}
+    assert {seed: told for seed, told in faults.items() if told} == {}
+
+
+def test_the_enumeration_knows_an_interval_and_a_stop() -> None:
+    """|P - 2 q| <= .5 up to a stop at 1: from P = 1.5 on the upper end is the stop."""
+    one = equilibria_enumeration.Draw(
+        0, np.eye(1), 0.3 * np.eye(1), 2.0 * np.eye(1), np.zeros(1), np.ones(1),
+        (
+            equilibria_enumeration.Part("friction", np.ones(1), mu=0.5),
+            equilibria_enumeration.Part("stop", np.ones(1), position=1.0),
+        ),
+    )  # fmt: skip
+    for P, low, high in ((0.0, -0.25, 0.25), (1.7, 0.6, 1.0), (3.0, 1.0, 1.0)):
+        (found,) = equilibria_enumeration.components(one, P)
+        assert [found.lower[0], found.upper[0]] == pytest.approx([low, high], abs=1e-9)
