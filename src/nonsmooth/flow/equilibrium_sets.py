@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.patterns import Patterns, Rows
     from nonsmooth.system.system import System
 
-__all__ = ["EquilibriumSet", "Extreme", "equilibrium_sets"]
+__all__ = ["EquilibriumSet", "Extreme", "equilibrium_sets", "modes_of_sets"]
 
 FREE = 1e-9  # a singular value as small as this, beside the largest, leaves its direction free
 TOUCHING = 1e-8  # of the states' scales: polytopes nearer than this are one set
@@ -158,6 +158,21 @@ def equilibrium_sets(
         if not timed and not traced.mode_names[mode].endswith(NOT_UNIQUE):
             parts += _polytopes(system, mode, near, values, memory)
     return _joined(parts)
+
+
+@lru_cache(maxsize=16)
+def modes_of_sets(system: System) -> tuple[int, ...]:
+    """The modes that leave some direction free; none where fields or indicators are not affine in the states."""
+    u, values, memory = np.zeros(len(system.states)), system.parameter_vector(), system.memory_vector()
+    found, scale = [], system.scale_vector()
+    for mode in range(len(system.modes)):
+        field = mode_field(system.traced, mode)
+        if not field.affine:
+            return ()
+        matrix = _equations(system, mode, u, values, memory)[0] * scale[field.own]
+        if len(field.own) and np.linalg.matrix_rank(matrix, tol=FREE * max(np.abs(matrix).max(), FREE)) < len(field.own):
+            found.append(mode)
+    return tuple(found)
 
 
 def _equations(

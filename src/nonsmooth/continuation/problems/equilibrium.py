@@ -10,8 +10,8 @@ import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.curve import Curve, Point
-from nonsmooth.flow.equilibria import ModeField, mode_field, sorted_eigenvalues
-from nonsmooth.flow.equilibrium_sets import EquilibriumSet, Extreme, equilibrium_sets
+from nonsmooth.flow.equilibria import ModeField, sorted_eigenvalues
+from nonsmooth.flow.equilibrium_sets import EquilibriumSet, Extreme, equilibrium_sets, modes_of_sets
 from nonsmooth.system.system import System
 
 __all__ = ["Equilibria", "Rest", "equilibria_near", "goes_on"]
@@ -256,13 +256,13 @@ def equilibria_near(
     values = system.parameter_vector()
     values[list(system.values).index(parameter)] = value
     found = equilibrium_sets(system, u, values=values, modes=modes)
-    watched = tuple(sorted({mode for one in found for mode in one.modes}))
+    watched = modes_of_sets(system)
     for one in sorted(found, key=lambda one: one.distance(u)):
         curve = Equilibria(system, one.modes[0], parameter, width)
         if one.free:
             curve = SetOfEquilibria(system, parameter, width, one, value)
-        if any(other.free for other in found) and all(mode_field(system.traced, k).affine for k in watched):
-            curve.watched = watched
+        if watched:
+            curve.watched = tuple({*watched, *one.modes})
         rest = curve.at(curve.corners[0].u if isinstance(curve, SetOfEquilibria) else one.point, value)
         if rest is not None:
             yield curve, rest
