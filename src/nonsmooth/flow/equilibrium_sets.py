@@ -169,8 +169,7 @@ def modes_of_sets(system: System) -> tuple[int, ...]:
         field = mode_field(system.traced, mode)
         if not field.affine:
             return ()
-        matrix = _equations(system, mode, u, values, memory)[0] * scale[field.own]
-        if len(field.own) and np.linalg.matrix_rank(matrix, tol=FREE * max(np.abs(matrix).max(), FREE)) < len(field.own):
+        if field.own and _free(_equations(system, mode, u, values, memory)[0] * scale[field.own]).size:
             found.append(mode)
     return tuple(found)
 
@@ -234,7 +233,7 @@ def _peaks(at: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Faces:
-    """The equilibria of a mode beside a state, in units of the scales: ``origin + ways @ z``, ``slopes @ z <= room``."""
+    """The equilibria of a mode beside a state: ``origin + ways @ z``, ``slopes @ z <= room``, scaled."""
 
     origin: FloatArray
     ways: FloatArray
@@ -294,7 +293,7 @@ def _polytopes(system: System, mode: int, near: FloatArray, values: FloatArray, 
 
 
 def _faces(system: System, mode: int, u: FloatArray, values: FloatArray, memory: FloatArray) -> list[_Faces]:
-    """What bounds the equilibria of a mode that lie next to a state, found by Newton's method; empty: there are none."""
+    """The bounds of the equilibria of a mode next to a state, found by Newton's method; empty: there are none."""
     scale, lacking = system.scale_vector(), np.array(system.traced.lacking[mode], dtype=bool)
     own, u = scale[~lacking], np.where(lacking, 0.0, u)
     if not len(own):
@@ -310,8 +309,7 @@ def _faces(system: System, mode: int, u: FloatArray, values: FloatArray, memory:
             break
     if size > VANISHING or (np.abs(right) > VANISHING * (np.abs(matrix) @ (own + np.abs(u[~lacking])))).any():
         return []
-    _, sizes, across = np.linalg.svd(matrix * own)
-    free = across[int((sizes > FREE * max(float(sizes[0]), FREE)).sum()) :].T
+    free = _free(matrix * own)
     ways = np.zeros((len(scale), free.shape[1]))
     ways[~lacking] = free
     choices: list[list[tuple[FloatArray, float, tuple[int, int]]]] = []
@@ -338,6 +336,12 @@ def _faces(system: System, mode: int, u: FloatArray, values: FloatArray, memory:
         room = np.array([limit for _, limit, _ in rows])
         found.append(_Faces(u, ways, slopes, room, tuple(key for _, _, key in rows)))
     return found
+
+
+def _free(matrix: FloatArray) -> FloatArray:
+    """The directions (n, d) that a matrix takes to zero."""
+    _, sizes, across = np.linalg.svd(matrix)
+    return across[int((sizes > FREE * max(float(sizes[0]), FREE)).sum()) :].T
 
 
 def _alike(a: tuple[FloatArray, float, tuple[int, int]], b: tuple[FloatArray, float, tuple[int, int]]) -> bool:
@@ -389,8 +393,9 @@ def _set_of(parts: list[Polytope]) -> EquilibriumSet:
     lower, upper = np.min([one.lower for one in kept], axis=0), np.max([one.upper for one in kept], axis=0)
     ends = [end for one in kept for end in one.extremes]
     sides = [(k, sign) for k, sign in sorted({end.side for end in ends}) if np.isfinite((lower, upper)[sign > 0][k])]
-    chosen = [
-        replace(min(ends, key=lambda end: (-round(sign * end.u[k] / scale[k], 9), end.side != (k, sign))), side=(k, sign))
-        for k, sign in sides
-    ]  # fmt: skip
+    chosen = []
+    for side in sides:
+        k, sign = side
+        best = min(ends, key=lambda end: (-round(sign * end.u[k] / scale[k], 9), end.side != side))
+        chosen.append(replace(best, side=side))
     return EquilibriumSet(tuple(kept), tuple(chosen), lower, upper)
