@@ -105,8 +105,8 @@ def basins(
         extent), ``period_number`` (0: no cycle; 1 of an equilibrium), ``confirmed`` (1 where Newton's method has found
         the cycle), ``fraction`` of the starts with its binomial ``fraction_error``, ``lyapunov`` with its error,
         ``chaotic`` (1 where that is above zero beyond doubt), ``multiplier``, ``maximum``, ``minimum``, a point
-        on the ``section``, and ``minimal_shock``: the least jump of the state, in units of the states' scales, that leads
-        from the section to a start of this plane in another basin or one that diverges.
+        on the ``section``, and ``minimal_shock``: the least jump of the state, in units of the states' scales, that
+        leads from the section to a start of this plane in another basin or one that diverges.
         ``section_points`` holds the attractors' points one after the other, with ``point_attractor``.
         Of the picture: ``entropy``, ``boundary_entropy``, ``boundary_dimension``, ``uncertain`` over ``distance``,
         and ``n_starts_99``, the number of random starts that meet every one of these attractors with 99 %.

@@ -96,7 +96,7 @@ def _stands(
 
 
 def _label(
-    stood: EquilibriumSet, number: int, u: FloatArray, still: FloatArray, near: FloatArray, which: IntArray,
+    stood: EquilibriumSet, number: int, u: FloatArray, still: Any, near: FloatArray, which: IntArray,
     labels: IntArray, status: IntArray,
 ) -> None:  # fmt: skip
     here = still.copy()

@@ -249,7 +249,7 @@ class _Faces:
         slack = self.room - self.slopes @ z
         chosen: list[int] = []
         for i in np.flatnonzero(slack <= TOUCHING):
-            if np.linalg.matrix_rank(self.slopes[[*chosen, i]], tol=FREE) > len(chosen):
+            if np.linalg.matrix_rank(self.slopes[np.array([*chosen, i])], tol=FREE) > len(chosen):
                 chosen.append(int(i))
         z = z + np.linalg.lstsq(self.slopes[chosen], slack[chosen], rcond=None)[0]
         return self.origin + self.ways @ z, tuple(self.keys[i] for i in chosen)
@@ -387,8 +387,8 @@ def _set_of(parts: list[Polytope]) -> EquilibriumSet:
     scale = parts[0].scale
     kept: list[Polytope] = []  # none within another, as slipping that has just stopped is within sticking
     for part in sorted(parts, key=lambda one: -one.ways.shape[1]):
-        ends = np.array([one.u for one in part.extremes])
-        if not (len(ends) and any(other.holds(ends, TOUCHING).all() for other in kept)):
+        corners = np.array([one.u for one in part.extremes])
+        if not (len(corners) and any(other.holds(corners, TOUCHING).all() for other in kept)):
             kept.append(part)
     lower, upper = np.min([one.lower for one in kept], axis=0), np.max([one.upper for one in kept], axis=0)
     ends = [end for one in kept for end in one.extremes]
