@@ -14,7 +14,7 @@ from nonsmooth.flow.equilibria import ModeField, sorted_eigenvalues
 from nonsmooth.flow.equilibrium_sets import EquilibriumSet, Extreme, equilibrium_sets, modes_of_sets
 from nonsmooth.system.system import System
 
-__all__ = ["Equilibria", "Rest", "equilibria_near", "goes_on"]
+__all__ = ["FREE", "Equilibria", "Rest", "equilibria_near", "goes_on"]
 
 EDGE = 1e-12  # of an indicator's size: zero
 CLOSE = 1e-11
