@@ -51,7 +51,7 @@ def test_shares_over_the_friction() -> None:
 
 
 def test_a_forcing_below_friction() -> None:
-    """Where it stands, |F cos wt - k q| <= mu at all times: |q| <= (mu - F) / k. Some creep to the ends."""
+    """It stands where |F cos wt - k q| <= mu at all times: |q| <= (mu - F) / k. Some creep to the ends."""
     found = ns.basins(FORCED, GRID, progress=False)
     assert (found["label"].values == 0).all()
     assert found["maximum"].values[0, 0] == pytest.approx((MU - 0.3) / K, abs=1e-7)

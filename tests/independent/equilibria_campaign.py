@@ -43,7 +43,8 @@ def found_from_starts(one: Draw, system: Any, known: list[Component]) -> tuple[l
     n, faults, hit = len(one.K), [], {}
     for q in starts(one, known):
         try:
-            branch = ns.continue_equilibrium(system, "P", (-1.5, 1.5), start=[*map(float, q), *[0.0] * n], step=0.1, points=2000)
+            start = [*map(float, q), *[0.0] * n]
+            branch = ns.continue_equilibrium(system, "P", (-1.5, 1.5), start=start, step=0.1, points=2000)
         except ns.SolveError:
             if known:
                 faults.append(f"nothing found from {q}")

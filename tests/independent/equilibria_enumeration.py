@@ -90,14 +90,16 @@ def draw(seed: int) -> Draw:
                 belt = float(rng.choice([0.0, 0.4, -0.4], p=[0.7, 0.15, 0.15]))
                 parts.append(Part("friction", w, mu=float(rng.uniform(0.1, 0.8)), belt=belt))
             else:
-                parts.append(Part(str(kind), w, side * float(rng.uniform(0.05, 1.0)), side, float(rng.uniform(0.5, 5.0))))
+                position = side * float(rng.uniform(0.05, 1.0))
+                parts.append(Part(str(kind), w, position, side, float(rng.uniform(0.5, 5.0))))
         # a friction must not stand on two belts, nor a body between two stops at one place
         rests = [(tuple(p.w), p.side) for p in parts if p.kind == "stop"]
         belts = [tuple(p.w) for p in parts if p.kind == "friction"]
         if len(set(rests)) == len(rests) and len(set(belts)) == len(belts):
             break
     M = np.diag(rng.uniform(0.5, 2.0, n))
-    return Draw(seed, M, 0.3 * np.eye(n), 0.5 * (K + K.T), rng.uniform(-0.5, 0.5, n), rng.uniform(0.3, 1.0, n), tuple(parts))
+    load, push = rng.uniform(-0.5, 0.5, n), rng.uniform(0.3, 1.0, n)
+    return Draw(seed, M, 0.3 * np.eye(n), 0.5 * (K + K.T), load, push, tuple(parts))
 
 
 @dataclass
@@ -178,7 +180,7 @@ def pieces(one: Draw, P: float) -> Iterator[Piece]:
 
 
 def _meet(a: Piece, b: Piece) -> bool:
-    """Whether two pieces share a q, each with forces of its own."""
+    """Return whether two pieces share a q, each with forces of its own."""
     n, m, o = len(a.lower), a.A.shape[1], b.A.shape[1]
     if (a.lower > b.upper + TOUCH).any() or (b.lower > a.upper + TOUCH).any():
         return False

@@ -78,7 +78,8 @@ def basin_fractions(
     Returns
     -------
     xarray.Dataset
-        Over the parameter and ``attractor``: ``fraction`` with its binomial ``fraction_error``, ``period_number`` (0:
+        Over the parameter and ``attractor``: ``name`` (empty: not there), ``fraction`` with its binomial
+        ``fraction_error``, ``period_number`` (0:
         no cycle, -1: not there), ``chaotic``, ``lyapunov`` with its error, ``maximum``, ``minimum``, a point on the
         ``section``. A number stays with an attractor along the parameter: one that a run carried over ends on, and is
         carried back from. A share of 0 beside a period number is an attractor that only a run

@@ -102,11 +102,12 @@ def basins(
     xarray.Dataset
         ``label`` over the two states: the attractor's number, in the order of falling share; -1 not converged, -2
         diverged; ``status`` says why a start has no label (one beyond a stop, say). Over ``attractor``:
-        ``period_number`` (0: no cycle), ``confirmed`` (1 where Newton's method has found the cycle), ``fraction`` of
-        the starts with its binomial ``fraction_error``, ``lyapunov`` with its error, ``chaotic`` (1 where that is above
-        zero beyond doubt), ``multiplier``, ``maximum``, ``minimum``, a point on the ``section``, and
-        ``minimal_shock``: the least jump of the state, in units of the states' scales,
-        that leads from the section to a start of this plane in another basin or one that diverges.
+        ``name`` (``period 3``, ``chaos``, ``equilibria in f_stick``; of a set of equilibria the extremes are its
+        extent), ``period_number`` (0: no cycle; 1 of an equilibrium), ``confirmed`` (1 where Newton's method has found
+        the cycle), ``fraction`` of the starts with its binomial ``fraction_error``, ``lyapunov`` with its error,
+        ``chaotic`` (1 where that is above zero beyond doubt), ``multiplier``, ``maximum``, ``minimum``, a point
+        on the ``section``, and ``minimal_shock``: the least jump of the state, in units of the states' scales, that
+        leads from the section to a start of this plane in another basin or one that diverges.
         ``section_points`` holds the attractors' points one after the other, with ``point_attractor``.
         Of the picture: ``entropy``, ``boundary_entropy``, ``boundary_dimension``, ``uncertain`` over ``distance``,
         and ``n_starts_99``, the number of random starts that meet every one of these attractors with 99 %.
@@ -125,7 +126,9 @@ def basins(
     returns neither settles nor leaves the places it has visited, and where runs that begin beside it come back
     (:mod:`nonsmooth.attractors.basins_candidate`); so motion without damping, and a slow transient, keep the label -1.
     A start exactly on a boundary, as at a saddle, is pushed off it to one side. Cycles whose multipliers are nearer
-    than 0.002 to the unit circle are not certified; their starts keep -1 with the status ``slow``.
+    than 0.002 to the unit circle are not certified; their starts keep -1 with the status ``slow``. What friction holds,
+    so that it repeats exactly, beside it too, is no multiplier. A run that has stopped, or creeps towards the end of a
+    set of equilibria and is nearer than 1e-5 of the scales, belongs to it (:mod:`nonsmooth.attractors.standing`).
 
     ``lyapunov`` of a cycle is minus infinity where its multipliers are zero, NaN where they are not zero but lost in
     rounding (below 1e-8). Where a Poincare section is used, ``lyapunov`` and ``multiplier`` are those of its map: the

@@ -19,6 +19,7 @@ from nonsmooth.attractors.basins_newton import Cycle, confirmed_cycle, exponent_
 from nonsmooth.attractors.standing import label_standing
 from nonsmooth.attractors.settled import Settled
 from nonsmooth.attractors.settler import Settler
+from nonsmooth.attractors.standing import label_standing
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.kernels.hybrid import codes
 
@@ -105,11 +106,14 @@ def _label_cycles(
 def _on_cycle(attractor: Attractor, runs: Settled) -> Any:
     """Marks of runs that ended on this cycle: on one of its points, in the mode that it has there.
 
-    Cycles on which friction holds the same states are one attractor, wherever it holds them. Extremes would not tell: the cycle that is shifted by a part of its period has the same ones."""
+    Cycles on which friction holds the same states are one attractor, wherever it holds them. Extremes would not tell:
+    the cycle that is shifted by a part of its period has the same ones."""
     n = attractor.points.shape[1]
     if np.any(attractor.held):
-        return (runs.period_number == attractor.period_number) & (_held(runs) == attractor.held).all(axis=1) & np.isin(
-            runs.mode, attractor.modes
+        return (
+            (runs.period_number == attractor.period_number)
+            & (_held(runs) == attractor.held).all(axis=1)
+            & np.isin(runs.mode, attractor.modes)
         )
     gap = np.abs(np.nan_to_num(runs.last[:, None, :n] - attractor.points) / attractor.size).max(axis=2)
     k = gap.argmin(axis=1)

@@ -54,7 +54,9 @@ def label_standing(
         found.append(_attractor(settler, point, runs[first : first + 1], stood))
 
 
-def standing_in_sweep(settler: Settler, points: FloatArray, arrays: dict[str, Any], first: FloatArray) -> dict[str, Any]:
+def standing_in_sweep(
+    settler: Settler, points: FloatArray, arrays: dict[str, Any], first: FloatArray
+) -> dict[str, Any]:
     """Complete the arrays of a sweep (directions, starts, values) where its points stand, and return what else is known
     of them: the name of the equilibrium, or of the set of them, and its extent. ``first`` are the first kept points."""
     system, tolerance = settler.system, STANDS * settler.tolerance
@@ -94,7 +96,7 @@ def _stands(
 
 
 def _label(
-    stood: EquilibriumSet, number: int, u: FloatArray, still: FloatArray, near: FloatArray, which: IntArray,
+    stood: EquilibriumSet, number: int, u: FloatArray, still: Any, near: FloatArray, which: IntArray,
     labels: IntArray, status: IntArray,
 ) -> None:  # fmt: skip
     here = still.copy()

@@ -46,7 +46,7 @@ def continue_equilibrium(
     start : state, optional
         A guess; zeros where not given.
     mode : str, optional
-        The mode it lies in; the first one with an admissible equilibrium near the guess where not given.
+        The mode it lies in; that of the equilibrium nearest to the guess where not given.
     step : float
         The largest step, in units of the range and of the states' scales.
     points : int
@@ -56,9 +56,10 @@ def continue_equilibrium(
     -------
     xarray.Dataset
         Over ``point``: the parameter, ``u(point, state)``, ``eigenvalues``, ``stable``, ``mode``; of a set of
-        equilibria, as one dry friction leaves it, ``u`` is the middle, and ``u_lower`` and ``u_upper`` are its
-        extent. Special points as in :func:`nonsmooth.special_points`: ``fold``, ``pitchfork``, ``transcritical``,
-        ``hopf`` (a row given to ``continue_orbit`` gives the cycles that emanate from it), ``boundary_equilibrium``.
+        equilibria, as dry friction leaves it, ``u`` is the mean of its extreme points, and ``u_lower`` and
+        ``u_upper`` are its extent in each state (infinite where it has no end). Special points as in
+        :func:`nonsmooth.special_points`: ``fold``, ``pitchfork``, ``transcritical``, ``hopf`` (a row given to
+        ``continue_orbit`` gives the cycles that emanate from it), ``boundary_equilibrium``.
         Over ``end`` how the branch ends: ``ended`` and, in a sentence, ``ended_because``.
 
     Raises

@@ -75,7 +75,8 @@ class ModeField:
         self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
     ) -> tuple[FloatArray, FloatArray]:
         """Indicators (n_indicators,) and their gradients (n_indicators, n_u); at several times with a leading dim."""
-        found, n, n_u = _numbers(self._indicators, t, u, values, memory), len(self.traced.indicators), len(self.traced.u)
+        found = _numbers(self._indicators, t, u, values, memory)
+        n, n_u = len(self.traced.indicators), len(self.traced.u)
         return found[..., :n], found[..., n:].reshape(*found.shape[:-1], n, n_u)
 
     def margins(self, h: FloatArray, edge: FloatArray | float = 0.0) -> FloatArray:
@@ -203,7 +204,7 @@ def mode_field(traced: Traced, mode: int) -> ModeField:
 
 
 def _numbers(function: Any, t: Any, u: FloatArray, values: FloatArray, memory: FloatArray) -> FloatArray:
-    """What a function of numbers gives at a time (m,), or at several (T, m)."""
+    """The numbers that a function gives at a time (m,), or at several (T, m)."""
     with np.errstate(all="ignore"):
         found = function(t, u, values, memory)
     if np.ndim(t) == 0:

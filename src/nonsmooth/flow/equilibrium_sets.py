@@ -169,8 +169,7 @@ def modes_of_sets(system: System) -> tuple[int, ...]:
         field = mode_field(system.traced, mode)
         if not field.affine:
             return ()
-        matrix = _equations(system, mode, u, values, memory)[0] * scale[field.own]
-        if len(field.own) and np.linalg.matrix_rank(matrix, tol=FREE * max(np.abs(matrix).max(), FREE)) < len(field.own):
+        if field.own and _free(_equations(system, mode, u, values, memory)[0] * scale[field.own]).size:
             found.append(mode)
     return tuple(found)
 
@@ -184,11 +183,10 @@ def _equations(
     times = np.zeros(1) if period is None else period * INSTANTS
     f, J, _ = field.evaluate(u, values, memory, times)
     matrix, right = [*J], [*-f]
-    if traced.decider is not None and traced.decider.rows is not None:
-        # a field holds what is independent: of the others too nothing moves
-        rows, (base, pattern) = _rows(traced.decider.rows, values.tobytes()), traced.decider.modes[mode]
-        for k in rows.held(pattern):
-            kept = np.array([rows.parts[k].where.values, rows.rate(k, base).values])
+    if traced.decider is not None:  # a field holds what is independent: of the others too nothing moves
+        rows = _rows(traced.decider, values.tobytes())
+        for k in rows.held(traced.decider.visited[mode]):
+            kept = np.array([rows.parts[k].where.values, rows.rate(k, traced.decider.mode).values])
             matrix += [kept[:, field.own]] * len(times)
             right += [-kept @ rows.augmented(u, t) for t in times]
     return np.vstack(matrix), np.concatenate(right)
@@ -218,9 +216,9 @@ def _conditions(
 
 
 @lru_cache(maxsize=16)
-def _rows(patterns: Patterns, values: bytes) -> Rows:
+def _rows(decider: Patterns, values: bytes) -> Rows:
     """The calculus of a system's elements at values of the parameters."""
-    return patterns.rows(patterns.form.evaluate(np.frombuffer(values)[None, :]), 0)
+    return decider.rows(decider.form.evaluate(np.frombuffer(values)[None, :]), 0)
 
 
 def _peaks(at: FloatArray) -> FloatArray:
@@ -235,7 +233,7 @@ def _peaks(at: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Faces:
-    """The equilibria of a mode beside a state, in units of the scales: ``origin + ways @ z``, ``slopes @ z <= room``."""
+    """The equilibria of a mode beside a state: ``origin + ways @ z``, ``slopes @ z <= room``, scaled."""
 
     origin: FloatArray
     ways: FloatArray
@@ -251,7 +249,7 @@ class _Faces:
         slack = self.room - self.slopes @ z
         chosen: list[int] = []
         for i in np.flatnonzero(slack <= TOUCHING):
-            if np.linalg.matrix_rank(self.slopes[[*chosen, i]], tol=FREE) > len(chosen):
+            if np.linalg.matrix_rank(self.slopes[np.array([*chosen, i])], tol=FREE) > len(chosen):
                 chosen.append(int(i))
         z = z + np.linalg.lstsq(self.slopes[chosen], slack[chosen], rcond=None)[0]
         return self.origin + self.ways @ z, tuple(self.keys[i] for i in chosen)
@@ -295,7 +293,7 @@ def _polytopes(system: System, mode: int, near: FloatArray, values: FloatArray, 
 
 
 def _faces(system: System, mode: int, u: FloatArray, values: FloatArray, memory: FloatArray) -> list[_Faces]:
-    """What bounds the equilibria of a mode that lie next to a state, found by Newton's method; empty: there are none."""
+    """The bounds of the equilibria of a mode next to a state, found by Newton's method; empty: there are none."""
     scale, lacking = system.scale_vector(), np.array(system.traced.lacking[mode], dtype=bool)
     own, u = scale[~lacking], np.where(lacking, 0.0, u)
     if not len(own):
@@ -311,8 +309,7 @@ def _faces(system: System, mode: int, u: FloatArray, values: FloatArray, memory:
             break
     if size > VANISHING or (np.abs(right) > VANISHING * (np.abs(matrix) @ (own + np.abs(u[~lacking])))).any():
         return []
-    _, sizes, across = np.linalg.svd(matrix * own)
-    free = across[int((sizes > FREE * max(float(sizes[0]), FREE)).sum()) :].T
+    free = _free(matrix * own)
     ways = np.zeros((len(scale), free.shape[1]))
     ways[~lacking] = free
     choices: list[list[tuple[FloatArray, float, tuple[int, int]]]] = []
@@ -339,6 +336,12 @@ def _faces(system: System, mode: int, u: FloatArray, values: FloatArray, memory:
         room = np.array([limit for _, limit, _ in rows])
         found.append(_Faces(u, ways, slopes, room, tuple(key for _, _, key in rows)))
     return found
+
+
+def _free(matrix: FloatArray) -> FloatArray:
+    """The directions (n, d) that a matrix takes to zero."""
+    _, sizes, across = np.linalg.svd(matrix)
+    return across[int((sizes > FREE * max(float(sizes[0]), FREE)).sum()) :].T
 
 
 def _alike(a: tuple[FloatArray, float, tuple[int, int]], b: tuple[FloatArray, float, tuple[int, int]]) -> bool:
@@ -384,14 +387,15 @@ def _set_of(parts: list[Polytope]) -> EquilibriumSet:
     scale = parts[0].scale
     kept: list[Polytope] = []  # none within another, as slipping that has just stopped is within sticking
     for part in sorted(parts, key=lambda one: -one.ways.shape[1]):
-        ends = np.array([one.u for one in part.extremes])
-        if not (len(ends) and any(other.holds(ends, TOUCHING).all() for other in kept)):
+        corners = np.array([one.u for one in part.extremes])
+        if not (len(corners) and any(other.holds(corners, TOUCHING).all() for other in kept)):
             kept.append(part)
     lower, upper = np.min([one.lower for one in kept], axis=0), np.max([one.upper for one in kept], axis=0)
     ends = [end for one in kept for end in one.extremes]
     sides = [(k, sign) for k, sign in sorted({end.side for end in ends}) if np.isfinite((lower, upper)[sign > 0][k])]
-    chosen = [
-        replace(min(ends, key=lambda end: (-round(sign * end.u[k] / scale[k], 9), end.side != (k, sign))), side=(k, sign))
-        for k, sign in sides
-    ]  # fmt: skip
+    chosen = []
+    for side in sides:
+        k, sign = side
+        best = min(ends, key=lambda end: (-round(sign * end.u[k] / scale[k], 9), end.side != side))
+        chosen.append(replace(best, side=side))
     return EquilibriumSet(tuple(kept), tuple(chosen), lower, upper)

@@ -75,7 +75,7 @@ STEMS = {column.name: column.name.removeprefix("special_") for column in SPECIAL
 STEMS |= {"special_boundary": "boundary", "special_indicator": "touched"}  # beside the dim of the clearances
 CURVE = tuple(c for c in ORBIT if c.name in ("section", "maximum", "minimum", "period", "floquet_multipliers"))
 EQUILIBRIUM = (
-    Column("u", "u", ("state",), "", "equilibrium (the middle of a set of equilibria)"),
+    Column("u", "u", ("state",), "", "equilibrium (the mean of the extreme points of a set)"),
     Column("u_lower", "lower", ("state",), "", "smallest value over the set of equilibria"),
     Column("u_upper", "upper", ("state",), "", "largest value over the set of equilibria"),
     Column("eigenvalues", "eigenvalues", ("eigenvalue",), "complex", "eigenvalues"),

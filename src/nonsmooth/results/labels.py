@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["Labels", "Quantity", "labels_of", "kind_of"]
+__all__ = ["Labels", "Quantity", "kind_of", "labels_of"]
 
 
 @dataclass(frozen=True)

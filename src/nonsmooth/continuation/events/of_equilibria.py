@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
-from nonsmooth.continuation.problems.equilibrium import Equilibria, Rest, equilibria_near, goes_on
+from nonsmooth.continuation.problems.equilibrium import FREE, Equilibria, Rest, equilibria_near, goes_on
 from nonsmooth.continuation.problems.multipliers import pairs
 
 __all__ = ["AlongEquilibria", "beyond"]
@@ -92,7 +92,7 @@ class AlongEquilibria(Policy):
         after = beyond(curve, rest)
         if after is None:
             found.ending = "boundary"
-        corner = rest.margins[len(curve.system.transitions) :].max(initial=-np.inf) >= 0.0
+        corner = rest.margins[len(curve.system.transitions) :].max(initial=-np.inf) > -0.5 * FREE
         if after is None or not corner:  # else another point of the set is its extreme from here on
             ahead = after is not None and float(rest.tangent[-1]) * float(after[1].tangent[-1]) > 0.0
             graze = "" if after is None else "persistence" if ahead else "non_smooth_fold"

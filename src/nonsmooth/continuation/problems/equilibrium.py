@@ -14,7 +14,7 @@ from nonsmooth.flow.equilibria import ModeField, sorted_eigenvalues
 from nonsmooth.flow.equilibrium_sets import EquilibriumSet, Extreme, equilibrium_sets, modes_of_sets
 from nonsmooth.system.system import System
 
-__all__ = ["Equilibria", "Rest", "equilibria_near", "goes_on"]
+__all__ = ["FREE", "Equilibria", "Rest", "equilibria_near", "goes_on"]
 
 EDGE = 1e-12  # of an indicator's size: zero
 CLOSE = 1e-11
@@ -156,7 +156,7 @@ class _Corner:
         self.across = np.zeros((0, 0))  # the independent equations among those of the field
 
     def equations(self, u: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """As many equations as states, and their derivatives in scaled unknowns; directions that nothing bounds rest."""
+        """As many equations as states, and their derivatives in scaled unknowns; what nothing bounds rests."""
         curve, keys = self.curve, self.keys
         f, J, f_p = self.field.evaluate(u, values, curve.memory)
         J = np.column_stack([J * self.scale, f_p * curve.width])
@@ -231,13 +231,12 @@ class SetOfEquilibria(Equilibria):
             ends.append(end)
         both = [corner.margins(u, values) for corner, u in zip(self.corners, ends, strict=True)]
         margins = np.append(np.max([one for one, _ in both], axis=0), max(other for _, other in both))
-        lower, upper = np.min(ends, axis=0), np.max(ends, axis=0)
-        lower, upper = np.where(np.isinf(self.found.lower), -np.inf, lower), np.where(np.isinf(self.found.upper), np.inf, upper)
+        lower = np.where(np.isinf(self.found.lower), -np.inf, np.min(ends, axis=0))
+        upper = np.where(np.isinf(self.found.upper), np.inf, np.max(ends, axis=0))
         middle = np.mean(ends, axis=0)
         jacobian = self.field.evaluate(middle, values, self.memory)[1]
-        return Rest(
-            Y, tangent, orientation, iterations, solved, middle, jacobian, sorted_eigenvalues(jacobian), margins, lower, upper
-        )  # fmt: skip
+        eigenvalues = sorted_eigenvalues(jacobian)
+        return Rest(Y, tangent, orientation, iterations, solved, middle, jacobian, eigenvalues, margins, lower, upper)
 
     def word(self) -> Any:
         """The conditions at the extreme points, and their modes."""

@@ -41,7 +41,8 @@ def beside(jobs, apart, only, factor, offsets, states, others):
 
 @entry
 def measure(jobs, apart, difference, sizes, starts, u, codes_of_job, codes, mu):
-    """mu[j]: the largest multiplier, from where job j (row j of u, begun at its start) and its neighbours (j + apart, ...) have come."""
+    """mu[j]: the largest multiplier, from where job j (row j of u, from its start) and its neighbours (j + apart, ...)
+    have come."""
     k = cuda.grid(1)
     if k >= jobs.shape[0]:
         return

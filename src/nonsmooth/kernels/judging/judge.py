@@ -161,8 +161,8 @@ def spectral_radius(A, B):
 def multiplier(images, start, size, difference, work):
     """Largest modulus of the multipliers of the map whose images (n + 1, n) of a point and its neighbours these are.
 
-    Neighbour j is ``difference`` * size[j] away in state j; ``work`` (2, n, n) is scratch. A state that repeats exactly,
-    beside it too, is held, as by friction: along it lie other solutions of a set, and its 1 is no multiplier."""
+    Neighbour j is ``difference`` * size[j] away in state j; ``work`` (2, n, n) is scratch. A state that repeats its
+    start exactly, beside it too, is held, as by friction: along it lie others of a set, and its 1 is no multiplier."""
     n = size.shape[0]
     A, B = work[0], work[1]
     for j in range(n):
