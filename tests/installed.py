@@ -16,7 +16,7 @@ import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-MOST = 20.0  # seconds of processor time for the ten lines, with nothing in any cache; a compiled march takes as much more
+MOST = 20.0  # seconds of processor time for the ten lines, with nothing in any cache; a compiled march adds as much
 IN_SIGHT = ("PYTHONPATH", "VIRTUAL_ENV", "NONSMOOTH_CACHE_DIR", "HATCH_BUILD_NO_HOOKS", "PYTHONDONTWRITEBYTECODE")
 
 

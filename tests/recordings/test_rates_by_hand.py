@@ -53,10 +53,11 @@ def test_runs_of_missing_values() -> None:
 
 
 def test_the_step_of_a_sensor_is_read_off_whole_multiples() -> None:
-    """Spacings of 1, 2 and 3 steps of 0.3 mm, rounded by the file to 1e-7 m."""
-    step = 3.0e-4
-    values = np.round(np.cumsum([0, 1, 2, 1, 3, 2, 1]) * step + 0.01, 7)
-    assert found_resolution(values) == pytest.approx(step, rel=1e-4)
+    """Spacings of 1, 2 and 3 steps, rounded by the file to 1e-6 m: over all of them better than by the least one."""
+    step = 3.0744e-4
+    values = np.round(np.cumsum([0, 1, 2, 1, 3, 2, 1, 2, 3, 1]) * step + 0.01, 6)
+    assert found_resolution(values) == pytest.approx(step, rel=3e-4)
+    assert np.diff(values).min() != pytest.approx(step, rel=1e-3)
     assert resolution(distance_per_turn=-0.072, counts_per_turn=360) == pytest.approx(2e-4)
     with pytest.raises(ValueError, match="not multiples of one step"):
         found_resolution(np.array([0.0, 1.0, 2.4, 3.9]))
