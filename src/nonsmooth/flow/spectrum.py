@@ -58,7 +58,8 @@ class Frame:
 
     def __init__(self, system: System, engine: Engine, tables: Any, i: int) -> None:
         self.system, self.engine, self.tables, self.i = system, engine, tables, i
-        self.is_smooth, self.behind = isinstance(engine, SeriesEngine) and engine.is_smooth, None
+        self.is_smooth = isinstance(engine, SeriesEngine) and engine.is_smooth
+        self.behind: Any = None  # what carries the frame of a series
         self.own, memory = len(engine.scale), len(engine.traced.m)
         self.scale = np.concatenate([system.scale_vector(), np.ones(memory)])
         self.lacking = engine.lacking.astype(bool)
@@ -123,6 +124,7 @@ class Frame:
         from nonsmooth.kernels.tangent.following import FOLLOWER, frame_across, frame_along, put_follower
 
         if self.behind is None:
+            assert isinstance(self.engine, SeriesEngine)
             flow, tolerance = VariationalFlow.of(self.system), max(min(FINER * self.engine.rtol, FINEST), 1e-16)
             flow.catch_up()
             self.behind = (
@@ -135,8 +137,8 @@ class Frame:
         return record
 
     def _widen(self, Q: FloatArray, taken: Any, mode: int) -> bool:
-        """Whether the part just marched, begun with the frame Q, is to be done again: with directions for the states of
-        the modes now visited and for the memory now written, and with transitions that are new."""
+        """Add directions for the states of the modes now visited and for the memory now written, to the frame Q with
+        which the part just marched began; return whether it is to be done again: with them, or with new transitions."""
         jumps = self.engine.traced.transitions
         if self.active.all() and not isinstance(self.engine, SeriesEngine):
             return False
