@@ -30,6 +30,7 @@ from nonsmooth.diagrams.chart_refine import labels_of_points
 from nonsmooth.flow.engines.devices import gpu_name
 from nonsmooth.kernels.hybrid import codes
 from own_process import SCRIPTS, printed
+from ptxas import resources_of
 
 HERE = Path(__file__).parent
 # FP64 units of a multiprocessor, by compute capability; each makes a multiplication and an addition per clock.
@@ -52,8 +53,6 @@ def counted() -> dict[str, Any]:
 
 def compiled() -> list[str]:
     """Return what the compiler makes of every kernel, for the argument types of a simulated run."""
-    from nonsmooth.kernels.cuda.ptx import resources_of
-
     simulated = printed(str(SCRIPTS / "gpu_script.py"), NUMBA_ENABLE_CUDASIM="1")
     launched = json.loads(simulated.splitlines()[-1])["launched"]
     lines = [

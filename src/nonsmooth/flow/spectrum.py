@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Frame", "Growth"]
 
-CHUNK = 250  # units of time at once, where to stop and go on changes nothing: sums of few numbers round little
 FINER = 0.1  # of the engine's tolerance: a step of the frame
 FINEST = 1e-11  # and no coarser than this
 
@@ -59,7 +58,8 @@ class Frame:
 
     def __init__(self, system: System, engine: Engine, tables: Any, i: int) -> None:
         self.system, self.engine, self.tables, self.i = system, engine, tables, i
-        self.is_smooth, self.behind = isinstance(engine, SeriesEngine) and engine.is_smooth, None
+        self.is_smooth = isinstance(engine, SeriesEngine) and engine.is_smooth
+        self.behind: Any = None  # what carries the frame of a series
         self.own, memory = len(engine.scale), len(engine.traced.m)
         self.scale = np.concatenate([system.scale_vector(), np.ones(memory)])
         self.lacking = engine.lacking.astype(bool)
@@ -71,17 +71,17 @@ class Frame:
         if not np.isfinite(self.tables.period[self.i]) and not self.system.depends_on_time:
             state.clock[0] = 0.0  # no digits are lost in long runs
         total = Growth(np.zeros((count, len(self.scale))), 0.0, 0.0, 1.0, codes.OK)
-        done, most = 0, CHUNK if self.is_smooth else count
+        done = 0
         while done < count and total.status in (codes.OK, codes.NOT_GUARANTEED):
             # Where a direction is new the part is done again: the first parts are short.
-            some = min(count - done, most if self.active.all() else max(1, done))
+            some = count - done if self.active.all() else min(count - done, max(1, done))
             before, Q = state.copy(), self.Q.copy()
             status, record = self._march(state, some, unit)
             if self._widen(Q, record.taken, int(state.counters[0])):
                 state.u[:], state.memory[:], state.clock[:] = before.u, before.memory, before.clock
                 state.counters[:], state.settled = before.counters, before.settled
                 continue
-            divergence, determinants, _, nearest = record.sums.tolist()
+            divergence, determinants, _, nearest, _ = record.sums.tolist()
             total.logarithms[done : done + some, : record.growth.shape[1]] = record.growth
             total.divergence += divergence
             total.determinants += determinants
@@ -100,9 +100,9 @@ class Frame:
         noted = len(engine.traced.transitions) if series or not self.active.all() else 0
         none, square = np.zeros(0), np.zeros((n, n))
         record = Record(
-            self.scale, self.Q, np.zeros((count, columns)), np.ones(columns), np.array([0.0, 0.0, 0.0, 1.0]), square,
-            square.copy(), square.copy(), np.zeros((3, n)), np.zeros(n), np.zeros(n), np.zeros(noted, dtype=np.int64),
-            np.zeros(0, dtype=np.int64), 0, none, none,
+            self.scale, self.Q, np.zeros((count, columns)), np.ones(columns), np.array([0.0, 0.0, 0.0, 1.0, 0.0]),
+            square, square.copy(), square.copy(), np.zeros((3, n)), np.zeros(n), np.zeros(n),
+            np.zeros(noted, dtype=np.int64), np.zeros(0, dtype=np.int64), 0, none, none,
         )  # fmt: skip
         if series:
             record = self._followed(record)
@@ -124,6 +124,7 @@ class Frame:
         from nonsmooth.kernels.tangent.following import FOLLOWER, frame_across, frame_along, put_follower
 
         if self.behind is None:
+            assert isinstance(self.engine, SeriesEngine)
             flow, tolerance = VariationalFlow.of(self.system), max(min(FINER * self.engine.rtol, FINEST), 1e-16)
             flow.catch_up()
             self.behind = (
@@ -136,8 +137,8 @@ class Frame:
         return record
 
     def _widen(self, Q: FloatArray, taken: Any, mode: int) -> bool:
-        """Whether the part just marched, begun with the frame Q, is to be done again: with directions for the states of
-        the modes now visited and for the memory now written, and with transitions that are new."""
+        """Add directions for the states of the modes now visited and for the memory now written, to the frame Q with
+        which the part just marched began; return whether it is to be done again: with them, or with new transitions."""
         jumps = self.engine.traced.transitions
         if self.active.all() and not isinstance(self.engine, SeriesEngine):
             return False

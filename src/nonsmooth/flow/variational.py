@@ -209,11 +209,11 @@ class VariationalFlow:
 
         columns, width = self.n + self.n_active, order + 1
         rows, changes = 2 * self.n_u + len(self.model.entries), np.zeros((self.n_u, columns))
-        return Steps(*one_block(
+        return Steps._make([*one_block(
             np.zeros((rows, width)), np.zeros((width, columns, -(-columns // FOUR) * FOUR)),
             np.zeros((self.model.n_scratch, width)), changes, changes, changes,
             np.zeros(width), np.zeros(self.n_u), np.zeros(self.n_p + len(self.traced.m)),
-        ), accuracy)  # fmt: skip
+        ), accuracy])  # fmt: skip
 
 
 def _floats(x: Any) -> FloatArray:

@@ -22,10 +22,15 @@ from typing import Any
 
 from nonsmooth.kernels.compile.target import AHEAD, level
 
-STEPPERS = ("linear", "series", "planar")
 JOINED = ("kernels.hybrid.run", "kernels.linear.modes")  # texts of modules that are made for a stepper
 _ROOT = Path(__file__).parents[2]
 _Task = tuple[str, str, tuple[Any, ...]]  # a module, or a function in it that makes one and its arguments
+MARCHES: dict[str, _Task] = {  # the longest first
+    "linear": ("nonsmooth.kernels.linear.module", "linear_module", (False,)),
+    "series": ("nonsmooth.kernels.series.module", "series_module", ()),
+    "planar": ("nonsmooth.kernels.linear.module", "linear_module", (True,)),
+}
+STEPPERS = tuple(MARCHES)
 
 
 def plain_files() -> Iterator[str]:
@@ -38,16 +43,8 @@ def plain_files() -> Iterator[str]:
 
 
 def tasks(steppers: Sequence[str] = STEPPERS) -> list[_Task]:
-    """The list of modules to compile, each by one process: the marches of these steppers, then the plain files.
-
-    The longest come first."""
-    linear, series = (f"nonsmooth.kernels.{stepper}.module" for stepper in ("linear", "series"))
-    made: dict[str, _Task] = {
-        "series": (series, "series_module", ()),
-        "planar": (linear, "linear_module", (True,)),
-        "linear": (linear, "linear_module", (False,)),
-    }
-    return [made[name] for name in STEPPERS if name in steppers] + [(name, "", ()) for name in plain_files()]
+    """The list of modules to compile, each by one process: the marches of these steppers, then the plain files."""
+    return [MARCHES[name] for name in STEPPERS if name in steppers] + [(name, "", ()) for name in plain_files()]
 
 
 def _module(task: _Task) -> ModuleType:

@@ -24,7 +24,7 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager
 from numba.core.registry import CPUDispatcher, CPUTarget, cpu_target
 from numba.core.typed_passes import InlineOverloads, NopythonTypeInference, PreLowerStripPhis
-from numba.core.types import unliteral
+from numba.core.types.misc import unliteral
 
 AHEAD = Path(__file__).parents[1] / "ahead"  # a folder for each level; what they hold comes with the package
 

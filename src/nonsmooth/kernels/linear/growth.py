@@ -1,4 +1,4 @@
-"""What a frame of small changes needs of the exact flow: a segment multiplies it by exp(A tau), from the tables of the
+"""Steps of a frame of small changes along the exact flow: a segment multiplies it by exp(A tau), from the tables of the
 segment itself, a transition by its saltation (``tangent.frame``)."""
 
 from math import fabs, sqrt

@@ -1,4 +1,4 @@
-"""What a frame of small changes needs of the series methods: its own Taylor series, which ``tangent.legs`` marches.
+"""Steps of a frame of small changes along the series methods, by Taylor series of its own (``tangent.following``).
 
 The frame lies behind: it is carried from where the trajectory was (``seen.u``, ``seen.q``) over several of its segments
 at once, by steps as long as its own series allow. Where nothing can happen to a motion the two are one."""
@@ -28,7 +28,7 @@ def shape_of(seen):
 
 @once
 def anchor_frame(seen, work):
-    """Where the trajectory is, the frame begins."""
+    """Begin the frame where the trajectory is."""
     copied(work.w, seen.u)
     for j in range(seen.q.shape[0]):
         seen.q[j] = work.q[j]

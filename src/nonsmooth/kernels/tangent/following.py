@@ -1,6 +1,6 @@
 """A frame of small changes that follows a march of the series, which calls these kernels by their addresses.
 
-It goes by its own Taylor series, those of an orbit's legs (``legs``) at the march's accuracy."""
+It goes by its own Taylor series, taken as in ``legs``, at the march's accuracy."""
 
 from math import fabs, inf
 
@@ -52,7 +52,9 @@ def frame_along(follower, mode, t0, tau, guess, unit):
         h, divergence, reach = step_along(jet, field, mode, t0 + done, remaining, 1.0, False, equations, work, reach)
         if not (h > 1e-15 * tau):
             return -1.0
-        seen.sums[0] += divergence
+        part = divergence - seen.sums[4]  # Kahan's sum: what rounding has added stands in the last place
+        whole = seen.sums[0] + part
+        seen.sums[4], seen.sums[0] = (whole - seen.sums[0]) - part, whole
         for c in range(columns):
             for i in range(n_u):
                 Q[i, c] = X[i, c] / scale[i]

@@ -22,7 +22,7 @@ class Segments(NamedTuple):
     def room(cls, m: int, n: int, n_active: int) -> Segments:
         """Room for so many."""
         sizes = (m, n), (m, n, n), (m, n, n_active), (m, n), (m, n), m
-        return cls(*map(np.empty, sizes), np.empty(m, dtype=np.int64))
+        return cls._make([*(np.empty(size) for size in sizes), np.empty(m, dtype=np.int64)])
 
     def start_time(self) -> Any:
         """dz/dt0 at fixed tau (m, n): f_end - Phi f_begin."""
