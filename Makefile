@@ -14,8 +14,9 @@ export PYTHONDONTWRITEBYTECODE :=
 PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-full test slow mutants fuzz altered coverage coverage-awkward coverage-fit check \
-	contacts equilibria bench gpu gpu-compiler docs screenshots clean distclean versions
+.PHONY: help reproduce reproduce-full test slow installed test-times mutants mutants-sample fuzz altered coverage \
+	coverage-awkward coverage-fit check contacts equilibria bench gpu gpu-compiler docs screenshots clean distclean \
+	versions
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 26

@@ -183,10 +183,11 @@ def _equations(
     times = np.zeros(1) if period is None else period * INSTANTS
     f, J, _ = field.evaluate(u, values, memory, times)
     matrix, right = [*J], [*-f]
-    if traced.decider is not None:  # a field holds what is independent: of the others too nothing moves
-        rows = _rows(traced.decider, values.tobytes())
-        for k in rows.held(traced.decider.visited[mode]):
-            kept = np.array([rows.parts[k].where.values, rows.rate(k, traced.decider.mode).values])
+    if traced.decider is not None and traced.decider.rows is not None:
+        # a field holds what is independent: of the others too nothing moves
+        rows, (base, pattern) = _rows(traced.decider.rows, values.tobytes()), traced.decider.modes[mode]
+        for k in rows.held(pattern):
+            kept = np.array([rows.parts[k].where.values, rows.rate(k, base).values])
             matrix += [kept[:, field.own]] * len(times)
             right += [-kept @ rows.augmented(u, t) for t in times]
     return np.vstack(matrix), np.concatenate(right)
@@ -216,9 +217,9 @@ def _conditions(
 
 
 @lru_cache(maxsize=16)
-def _rows(decider: Patterns, values: bytes) -> Rows:
+def _rows(patterns: Patterns, values: bytes) -> Rows:
     """The calculus of a system's elements at values of the parameters."""
-    return decider.rows(decider.form.evaluate(np.frombuffer(values)[None, :]), 0)
+    return patterns.rows(patterns.form.evaluate(np.frombuffer(values)[None, :]), 0)
 
 
 def _peaks(at: FloatArray) -> FloatArray:
