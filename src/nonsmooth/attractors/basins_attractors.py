@@ -16,7 +16,6 @@ import numpy as np
 from nonsmooth.attractors.basins_candidate import Search, among
 from nonsmooth.attractors.basins_found import Attractor, Patience
 from nonsmooth.attractors.basins_newton import Cycle, confirmed_cycle, exponent_on
-from nonsmooth.attractors.standing import label_standing
 from nonsmooth.attractors.settled import Settled
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.attractors.standing import label_standing

@@ -30,34 +30,33 @@ def output_values(
         columns = (time[here], *u[here].T, *memory[here].T, *parameters)
         for i, function in enumerate(_functions(traced, int(m))):
             result[here, i] = function(*columns)
-    return result if traced.decider is None else _shared(traced, parameters, time, u, memory, mode, result)
+    names = [] if traced.decider is None else [f"{part.name}_force" for part in traced.decider.make.parts]
+    if names and len(result) and all(name in traced.output_names for name in names):
+        forces = np.array([traced.output_names.index(name) for name in names])
+        result[:, forces] = _shared(traced, traced.decider, parameters, time, u, memory, mode, result[:, forces])
+    return result
 
 
 def _shared(
-    traced: Traced, parameters: FloatArray, time: FloatArray, u: FloatArray, memory: FloatArray, mode: Any,
-    result: FloatArray,
+    traced: Traced, decider: Any, parameters: FloatArray, time: FloatArray, u: FloatArray, memory: FloatArray,
+    mode: Any, forces: FloatArray,
 ) -> FloatArray:  # fmt: skip
-    """The outputs, with forces of elements that are not unique within their bounds."""
+    """The forces of elements (N, elements), those that are not unique within their bounds."""
     from sympy import lambdify
 
-    decider = traced.decider
-    names = [f"{part.name}_force" for part in decider.make.parts]
-    if not len(result) or any(name not in traced.output_names for name in names):
-        return result
-    forces, rows = [traced.output_names.index(name) for name in names], decider.rows
-    make = decider.make if rows is None else rows.rows(rows.form.evaluate(parameters[None, :]), 0)
+    rows = None if decider.rows is None else decider.rows.rows(decider.rows.form.evaluate(parameters[None, :]), 0)
     for m in np.unique(mode):
         here = np.flatnonzero(mode == m)
-        at = np.ix_(here, forces)
 
         def value(law: Any, here: Any = here) -> FloatArray:
             if rows is not None:
-                return make.augmented_all(u[here], time[here]) @ law.values
+                found: FloatArray = rows.augmented_all(u[here], time[here]) @ law.values
+                return found
             of = lambdify([traced.t, *traced.u, *traced.m, *traced.p], law, modules="numpy")
             return np.broadcast_to(of(time[here], *u[here].T, *memory[here].T, *parameters), here.shape)
 
-        result[at] = make.shared(*decider.modes[int(m)], result[at], value)
-    return result
+        forces[here] = (rows or decider.make).shared(*decider.modes[int(m)], forces[here], value)
+    return forces
 
 
 @lru_cache(maxsize=128)

@@ -194,7 +194,8 @@ class Assembler(ABC):
     def basis(self, held: Sequence[int], mode: str, pattern: Pattern) -> tuple[list[int], FloatArray]:
         """Held elements whose rates are independent, and the forces of all of them as sums of those."""
         chosen, sums = self._basis(held, mode, pattern, 0)
-        if len(chosen) < len(held) and not np.allclose(sums, self._basis(held, mode, pattern, 1)[1], rtol=1e-9, atol=1e-9):
+        again = sums if len(chosen) == len(held) else self._basis(held, mode, pattern, 1)[1]
+        if not np.allclose(sums, again, rtol=1e-9, atol=1e-9):
             names = ", ".join(repr(self.parts[k].name) for k in held)
             raise SystemDefinitionError(
                 f"elements {names} hold together, and by which sum of forces depends on the state: take fewer elements"

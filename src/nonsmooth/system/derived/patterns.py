@@ -12,7 +12,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -375,6 +375,12 @@ class Patterns:
             for k, force in rows.flow(self.mode, pattern)[1].items():
                 if isinstance(force, Row):
                     found[here, k] = w[here] @ force.values
-            found[here] = rows.shared(self.mode, pattern, found[here], lambda law, at=w[here]: at @ law.values)
+            found[here] = rows.shared(self.mode, pattern, found[here], partial(_values, w[here]))
             rows.forget()
         return found
+
+
+def _values(w: FloatArray, law: Row) -> FloatArray:
+    """The values of a row at N instants."""
+    found: FloatArray = w @ law.values
+    return found

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from nonsmooth.system.derived.elements.element import SLOW, Condition, Contact, Element, Law, Leaving
+from nonsmooth.system.derived.elements.element import Condition, Contact, Element, Law, Leaving
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Place
