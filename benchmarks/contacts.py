@@ -1,6 +1,6 @@
 """Every verb on three systems of elements, each with its time: ``python benchmarks/contacts.py``.
 
-A friction oscillator, a stop at which a mass comes to rest, and two masses with six elements. First calls compile what
+A friction oscillator, a stop with rest, and two masses with six elements. First calls compile what
 their system needs; the second column is the same call again.
 """
 

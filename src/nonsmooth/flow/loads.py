@@ -64,7 +64,7 @@ class Meter:
 
     @cached_property
     def rubs(self) -> FloatArray:
-        """Which of those are frictions."""
+        """Marks of those that are frictions."""
         return np.array([bool(self.elements[k].rubs) for k in self.striking], dtype=bool)
 
     @cached_property
