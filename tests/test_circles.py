@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import tomllib
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -13,6 +14,7 @@ SOURCE = Path(__file__).parent.parent / "src"
 WITHOUT = ("nonsmooth.continuation",)
 
 
+@cache
 def imports(source: Path) -> dict[str, set[str]]:
     """The modules of a package that each of its modules imports, wherever the import stands."""
     files = {".".join(path.relative_to(source).with_suffix("").parts): path for path in source.rglob("*.py")}
