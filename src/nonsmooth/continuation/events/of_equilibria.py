@@ -57,6 +57,7 @@ class AlongEquilibria(Policy):
 
     kinds = (Fold(), Crossing(), Hopf())
     boundaries = (Edge(),)
+    unseen_on = ("", "range")
     endings: ClassVar = {
         "range": "The branch reached the edge of the range.",
         "points": "The largest number of points was reached.",

@@ -76,12 +76,15 @@ class Policy(ABC):
         Special points that every step is searched for.
     boundaries : sequence of Event
         Events at which the equations stop to hold; what explains the others first.
+    unseen_on : sequence of str
+        Causes of a step's end with which it is searched for what margins do not tell.
     endings : mapping
         The ways in which a branch can end, with the sentence for each.
     """
 
     kinds: Sequence[Event] = ()
     boundaries: Sequence[Event] = ()
+    unseen_on: Sequence[str] = ("",)
     endings: ClassVar[Mapping[str, str]] = {}
 
     def record(self, found: March, step: Step, met: Met) -> None:
@@ -145,7 +148,7 @@ class _Marching:
                     found.ending = "no_convergence"
                     return
                 continue
-            if not met and not step.cause and (unseen := self.policy.unseen(step)):
+            if not met and step.cause in self.policy.unseen_on and (unseen := self.policy.unseen(step)):
                 met = [unseen]
             if met:
                 step.ends("change", met[0].s, met[0].point)
