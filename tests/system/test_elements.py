@@ -391,7 +391,7 @@ def test_messages_name_the_element_and_what_is_allowed() -> None:
     below = ns.mechanical(1.0, 0.1, 1.0, parameters={}, elements=floor, coordinates=["x"])
     with pytest.raises(ns.SolveError, match=r"a stop: 'floor', Stop\(at=\"x\", position=-1.0\).*-1 there.*side=-1"):
         ns.simulate(below, duration=1.0)
-    with pytest.raises(TypeError, match=r"`pos` is not an option of Stop; nearest: position; all: at, belt, creep, friction, gap"):
+    with pytest.raises(TypeError, match=r"`pos` is not an option of Stop; nearest: position; all: at, belt, creep"):
         Stop(pos=1)  # type: ignore[call-arg]
     with pytest.raises(TypeError, match=r"Coulomb takes no arguments by position"):
         Coulomb("q")  # type: ignore[misc]
