@@ -109,6 +109,8 @@ def _followed(
             forces += push @ np.linalg.lstsq(matrix, -(free + G @ forces)[rows], rcond=1e-12)[0]
         a = free + G @ forces
         size = sizes + np.abs(G) @ np.abs(forces)
+        if (np.abs(a[rows]) > SAME * size[rows]).any():
+            return None  # dependent rates that cannot all be held
         a[rows] = 0.0
         found.append((a, size))
         for k, s in list(pending):
