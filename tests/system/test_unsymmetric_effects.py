@@ -9,7 +9,7 @@ E = ns.elements
 
 
 def follower(first, second, bound):
-    """v1' = first + a, v2' = second + a/2 + b: friction a within 1 on v1 acts on v2 too, b within a bound on v2 only."""
+    """v1' = first + a, v2' = second + a/2 + b: friction a, within 1, acts on v2 too; b, within a bound, on v2 only."""
     return ns.System(
         states=["v1", "v2"], parameters={}, modes={"all": lambda t, u, p: (first + 0 * u.v1, second + 0 * u.v2)},
         elements={
