@@ -47,11 +47,11 @@ def first_event(c: Array, order: int, zero: float) -> float | None:
     previous = 0.0
     for x in [*turns, 1.0]:
         if value(x) <= 0:
-            return float(brentq(value, previous, x, xtol=1e-300, rtol=8.9e-16))
+            return float(brentq(value, previous, x, xtol=1e-300, rtol=8.9e-16, maxiter=5000))
         if x < 1 and value(x) * x**order <= zero:
             low, high = x * (1 - 1e-6), x * (1 + 1e-6)
             if slope_at(low) < 0 < slope_at(high):
-                return float(brentq(slope_at, low, high, xtol=1e-300, rtol=8.9e-16))
+                return float(brentq(slope_at, low, high, xtol=1e-300, rtol=8.9e-16, maxiter=5000))
         previous = x
     return None
 
