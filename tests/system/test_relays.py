@@ -68,3 +68,23 @@ def test_a_saved_run_is_read_back(tmp_path):
     run = ns.simulate(twisting(), duration=0.1, start={"x2": 1.0})
     ns.save(run, tmp_path / "run.nc")
     assert ns.load(tmp_path / "run.nc").equals(run)
+
+
+def test_a_relay_that_would_push_away_is_refused():
+    def field(a, b):
+        return lambda t, u, p: (u.x2, -p.r1 * a - p.r2 * b)
+
+    system = ns.System(
+        states=["x1", "x2"], parameters={"r1": 10.0, "r2": 3.0},
+        modes={"pp": field(1, 1), "pm": field(1, -1), "mp": field(-1, 1), "mm": field(-1, -1)},
+        indicators={"h1": lambda t, u, p: u.x1, "h2": lambda t, u, p: u.x2},
+        transitions=[
+            ns.Surface("h1", below="mp", above="pp"), ns.Surface("h1", below="mm", above="pm"),
+            ns.Surface("h2", below="pm", above="pp"), ns.Surface("h2", below="mm", above="mp"),
+        ],
+    )  # fmt: skip
+    assert system.with_parameters(r1=4.0).values["r1"] == 4.0
+    with pytest.raises(ns.SystemDefinitionError, match="relay at 'h1' pushes towards its surface"):
+        system.with_parameters(r1=-1.0)
+    again = ns.System.from_text(system.to_text())
+    assert again.to_text() == system.to_text()

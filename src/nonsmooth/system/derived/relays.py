@@ -41,11 +41,13 @@ class SecondOrderRelay(PreloadedSpring):
 
 @dataclass(frozen=True)
 class Relays:
-    """The field between all surfaces, the relays by their indicators, and the user's mode for each choice of signs."""
+    """The field between all surfaces, the relays by their indicators, the user's mode for each choice of signs, and
+    what must not be negative for relays to push towards their surfaces, each with its sentence."""
 
     field: Any
     elements: Mapping[str, Element]
     modes: Mapping[Signs, str]
+    ranges: Sequence[tuple[sp.Expr, str]] = ()
 
     def name(self, phases: Sequence[str]) -> str:
         """The name of a combination of their phases."""
@@ -94,6 +96,7 @@ def relays_of(
         pushes.append(halves.pop())
     degrees: list[int] = []
     elements: dict[str, Element] = {}
+    ranges: list[tuple[sp.Expr, str]] = []
     for key, b in zip(keys, pushes, strict=True):
         h = call_scalar(indicators[key], arguments, f"indicator {key!r}")  # type: ignore[index]
         slopes = [sp.diff(h, symbol) for symbol in u]
@@ -101,9 +104,13 @@ def relays_of(
         first, second = (
             sp.simplify(sum(sp.diff(e, symbol) * part for symbol, part in zip(u, b, strict=True))) for e in (h, rate)
         )
-        acts = (first if first != 0 else second).subs(values)
-        if not acts.is_number or not acts < 0:
+        acts = first if first != 0 else second
+        now = acts.subs(values)
+        if not now.is_number or not now < 0:
             return None
+        if acts.free_symbols:
+            says = f"the relay at {key!r} pushes towards its surface; where it does not, define another system"
+            ranges.append((-acts, says))
         degrees.append(1 if first != 0 else 2)
         on = {name: _given(-part) for name, part in zip(symbols.u, b, strict=True) if part != 0}
         if degrees[-1] == 1:
@@ -113,7 +120,7 @@ def relays_of(
     if 2 not in degrees:
         return None
     entries = [Scalar(sp.sympify(e)) for e in middle]
-    return Relays(lambda t, u, p: entries, elements, signs)
+    return Relays(lambda t, u, p: entries, elements, signs, ranges)
 
 
 def _signs(keys: Sequence[str], modes: Mapping[str, Any], surfaces: Sequence[Surface]) -> dict[Signs, str] | None:
