@@ -23,9 +23,9 @@ GRAZES = {"fig09": (FIGURE_9, 2), "fig10": (FIGURE_10, 2), "fig17": (FIGURE_17, 
 
 
 @pytest.fixture(scope="module")
-def data() -> dict[str, dict]:
-    """The branches of every figure that has them."""
-    return {figure: branches(figure) for figure in BEGINNINGS}
+def data(quick: Reproduction) -> dict[str, dict]:
+    """The branches of every figure that has them; the quick run has made some."""
+    return {figure: quick.data.get(figure) or branches(figure) for figure in BEGINNINGS}
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ from nonsmooth.studies.savi2007.claims.verdicts import Verdict
 from nonsmooth.studies.savi2007.findings import estimates_of
 from nonsmooth.studies.savi2007.finished import finish, finished, just_made
 from nonsmooth.studies.savi2007.flows import Settings
+from nonsmooth.studies.savi2007.laboratory import Laboratory
 from nonsmooth.studies.savi2007.printed import TABLE_1
 from nonsmooth.studies.savi2007.study import figures_of_the_study
 
@@ -121,6 +122,22 @@ def test_a_failed_measurement_says_where_to_look(tmp_path, monkeypatch: pytest.M
         bench.wait(print)
 
 
+def test_a_figure_by_itself_has_its_own_procedures_with_the_same_records(quick: Reproduction, tmp_path: Path) -> None:
+    """Fig. 11: six of eight."""
+    (figure,) = (one for one in quick.figures if one.name == "fig11_rig")
+    alone = Laboratory(tmp_path, True, figure.procedures).session
+    whole = load_session(quick.out / "rig" / "identification")
+    assert set(alone.procedures) == set(figure.procedures) < set(whole.procedures)
+    for procedure in alone.procedures:
+        mine, beside = alone.recordings(procedure), whole.recordings(procedure)
+        assert [item.settings for item in mine] == [item.settings for item in beside] != []
+        for item, other in zip(mine, beside, strict=True):
+            for channel in item.recording.channels:
+                one, two = (each.recording.channel(channel, each.run) for each in (item, other))
+                np.testing.assert_array_equal(one.values, two.values)
+
+
+@pytest.mark.slow
 def test_what_a_figure_needs_is_all_that_is_measured(quick: Reproduction, tmp_path: Path) -> None:
     """Fig. 11 by itself: the records of six procedures, and the same data as beside Table 1 with all of them."""
     alone = reproduce(tmp_path, figures=["fig11_rig"], quick=True, progress=False)

@@ -128,21 +128,21 @@ def test_linear_oscillator_with_forcing_at_high_order():
 
 
 @pytest.mark.parametrize(
-    "fields",
+    ("fields", "order"),
     [
-        (10 * (Y - X), X * (28 - Z) - Y, X * Y - sp.Rational(8, 3) * Z),
-        (Y, -A * Y - (X + 10) + Z, 20 * (8 - X * sp.sqrt(Z))),
-        (Y + sp.cos(T) ** 2, -sp.sin(X) * sp.exp(-Y / 3) + sp.cos(3 * T + B), sp.tanh(X * Y) / (1 + Z**2) + T),
+        ((10 * (Y - X), X * (28 - Z) - Y, X * Y - sp.Rational(8, 3) * Z), 4),
+        ((Y, -A * Y - (X + 10) + Z, 20 * (8 - X * sp.sqrt(Z))), 4),
+        ((Y + sp.cos(T) ** 2, -sp.sin(X) * sp.exp(-Y / 3) + sp.cos(3 * T + B), sp.tanh(X * Y) / (1 + Z**2) + T), 3),
     ],
     ids=["Lorenz", "relief valve", "forced"],
 )
-def test_nonlinear_fields_against_lie_derivatives(fields):
+def test_nonlinear_fields_against_lie_derivatives(fields, order):
     u = (X, Y, Z)
     start, t = (1.5, -0.4, 9.0), 0.2
     indicator = X * Z - Y**2
-    got = series(make(fields, indicators=[indicator]), start, t, order=4)
+    got = series(make(fields, indicators=[indicator]), start, t, order=order)
     for row, g in enumerate([*u, indicator]):
-        for k in range(5):  # the derivatives' length grows very fast
+        for k in range(order + 1):  # the derivatives' length grows very fast
             function = sp.lambdify((X, Y, Z, T, A, B), g, "mpmath")
             with mpmath.workdps(40):
                 exact = function(*map(mpmath.mpf, (*start, t, *PARAMETERS.values()))) / math.factorial(k)
