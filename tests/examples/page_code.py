@@ -36,16 +36,21 @@ def blocks(text: str) -> list[tuple[str, str, str | None, int]]:
     return result
 
 
-def run_page(page: Path, folder: Path) -> Iterator[tuple[str, str, str | None, int]]:
+def run_page(
+    page: Path, folder: Path, shorter: tuple[str, str] | None = None
+) -> Iterator[tuple[str, str, str | None, int]]:
     """Run every block of a page in ``folder``, as the cells of a notebook.
 
-    Yields (what it printed or raised, what a notebook shows below it, what is expected, line)."""
+    Yields (what it printed or raised, what a notebook shows below it, what is expected, line). ``shorter``: text of one
+    block, and what stands in its place; of that block nothing is expected."""
     names: dict[str, Any] = {"__name__": "page"}
     text = page.read_text(encoding="utf-8")
     with contextlib.chdir(folder):
         for name, content in _FILE.findall(text):
             Path(name).write_text(content, encoding="utf-8")
         for language, code, expected, line in blocks(text):
+            if shorter is not None and shorter[0] in code:
+                code, expected = code.replace(*shorter), None
             if language == "python":
                 parsed = ast.parse("\n" * line + code, str(page))
                 yield *_python(parsed, str(page), names, may_raise=expected is not None), expected, line

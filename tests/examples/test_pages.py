@@ -18,17 +18,33 @@ ELSEWHERE = {"recordings", "your_rig", "from_a_paper"}
 PAGES = [page for page in PAGES if page.stem not in ELSEWHERE and blocks(page.read_text(encoding="utf-8"))]
 LONGEST = 60  # lines of an output: in a notebook the next cell stays in sight
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+#: What a page of more than ten seconds does in place of its own; what that block prints is compared where it does all.
+SHORTER = {"control_based_continuation": ("step=0.3, points=60", "step=0.3, points=3")}
+LONG = [page for page in PAGES if page.stem in SHORTER]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).with_suffix("").as_posix())
+def name_of(page: Path) -> str:
+    return page.relative_to(ROOT).with_suffix("").as_posix()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_code_of_page(page: Path, tmp_path: Path) -> None:
-    import matplotlib.pyplot as plt
-
     if 'os.environ["NONSMOOTH_DATA"]' in page.read_text(encoding="utf-8") and not os.environ.get("NONSMOOTH_DATA"):
         pytest.skip("NONSMOOTH_DATA names no folder with measurements of other laboratories")
+    judge(page, tmp_path, SHORTER.get(page.stem))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", LONG, ids=name_of)
+def test_whole_code_of_page(page: Path, tmp_path: Path) -> None:
+    judge(page, tmp_path)
+
+
+def judge(page: Path, folder: Path, shorter: tuple[str, str] | None = None) -> None:
+    import matplotlib.pyplot as plt
 
     checker = doctest.OutputChecker()
-    for printed, shown, expected, line in run_page(page, tmp_path):
+    for printed, shown, expected, line in run_page(page, folder, shorter):
         assert printed.count("\n") + shown.count("\n") < LONGEST, f"{page.name}, block at line {line}: a long output"
         if expected is not None:
             assert checker.check_output(expected, printed, FLAGS), (
