@@ -32,14 +32,13 @@ def test_a_motion_of_period_4_has_lines_at_quarters_and_its_power_is_that_of_its
     np.testing.assert_allclose(found.order.values[:9], np.arange(9) / 4, rtol=1e-14)
     assert (found.amplitude.sel(state="x").values[1:5] > 1e-4).all()
     period = 2 * np.pi / system.values["omega"]
-    nodes, weights = np.polynomial.legendre.leggauss(4000)
-    times = 500 * period + 2 * period * (nodes + 1)
+    times = 500 * period + 4 * period * np.arange(8000) / 8000
     run = ns.simulate(system, duration=4 * period, transient=500 * period, samples=times)
     values = run.u.values[np.searchsorted(run.time.values, times)]
-    for k, state in enumerate(("x", "v")):  # the mean of the square, by the lines and by a quadrature
+    for k, state in enumerate(("x", "v")):  # the mean of the square, by the lines and by the rule of trapezia
         lines = found.amplitude.sel(state=state).values
         power = lines[0] ** 2 + 0.5 * (lines[1:-1] ** 2).sum() + lines[-1] ** 2
-        assert power == pytest.approx(0.5 * weights @ values[:, k] ** 2, rel=1e-5)
+        assert power == pytest.approx((values[:, k] ** 2).mean(), rel=1e-5)
 
 
 def test_a_cycle_without_forcing_is_counted_by_its_returns() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import runpy
 import subprocess
 import sys
 from dataclasses import replace
@@ -47,6 +49,19 @@ def write(folder: Path, view: str, kind: str, results: Any, state: Any = STATE) 
     return folder / name
 
 
+def run(script: Path) -> None:
+    """Run a script as a process of its own would, in this one."""
+    import matplotlib.pyplot as plt
+
+    with contextlib.chdir(script.parent):
+        runpy.run_path(script.name, run_name="__main__")
+    plt.close("all")
+
+
+def in_a_process(script: Path) -> None:
+    subprocess.run([sys.executable, script.name], cwd=script.parent, check=True)
+
+
 def same(path: Path, shown: Any) -> None:
     made = ns.load(path)
     assert made.drop_attrs().identical(shown.drop_attrs())
@@ -60,7 +75,7 @@ def test_the_script_and_the_study_file_make_what_was_shown(
     view: str, key: str, results: dict[str, Any], tmp_path: Path
 ) -> None:
     script = write(tmp_path, view, "py", results)
-    subprocess.run([sys.executable, script.name], cwd=tmp_path, check=True)
+    run(script)
     data = script.with_suffix(".nc")
     same(data, results[key])
     data.unlink()
@@ -72,14 +87,14 @@ def test_the_script_and_the_study_file_make_what_was_shown(
 
 
 def test_a_system_of_ones_own_and_a_smoothed_one_are_written_whole(results: dict[str, Any], tmp_path: Path) -> None:
-    run = ns.simulate(SYSTEM.smoothed(1e-4), periods=1, start=[0.0, 0.0])
+    made = ns.simulate(SYSTEM.smoothed(1e-4), periods=1, start=[0.0, 0.0])
     own = replace(STATE, model="given")
-    for state in (STATE, own):
-        script = write(tmp_path, "history", "py", {"run": run}, state)
-        subprocess.run([sys.executable, script.name], cwd=tmp_path, check=True)
-        same(script.with_suffix(".nc"), run)
+    for state, by in (STATE, run), (own, in_a_process):
+        script = write(tmp_path, "history", "py", {"run": made}, state)
+        by(script)
+        same(script.with_suffix(".nc"), made)
     with pytest.raises(ValueError, match="save the Python script"):
-        exported("history", "toml", {"run": run}, own)
+        exported("history", "toml", {"run": made}, own)
 
 
 @pytest.mark.parametrize("view", ["branches", "spectrum"])
@@ -88,7 +103,7 @@ def test_what_has_no_table_in_a_study_file_is_saved_as_the_script_that_makes_it(
         SYSTEM, "rho", (0.26, 0.3), start=[0.0, 0.0], transient=100, progress=False
     ) if view == "branches" else ns.amplitude_spectrum(SYSTEM, **SHORT)  # fmt: skip
     script = write(tmp_path, view, "py", {view: shown})
-    subprocess.run([sys.executable, script.name], cwd=tmp_path, check=True)
+    run(script)
     same(script.with_suffix(".nc"), shown)
     assert script.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
     with pytest.raises(ValueError, match="no table in a study file"):
