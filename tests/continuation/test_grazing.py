@@ -38,8 +38,7 @@ def from_both_sides(figure: str, **more: float) -> tuple[xr.Dataset, xr.Dataset]
     return ns.continue_orbit(one, "omega", limits), ns.continue_orbit(other, "omega", limits)
 
 
-@pytest.mark.parametrize("figure", SOFT)
-@pytest.mark.parametrize("c_s", [0.6, 0.0])
+@pytest.mark.parametrize(("figure", "c_s"), [("figure 9", 0.6), ("figure 10", 0.0), ("figure 17", 0.6)])
 def test_both_directions_agree(figure: str, c_s: float) -> None:
     """A contact gained or lost: special points to 1e-9, branch points to 1e-8 at equal parameters."""
     one, other = from_both_sides(figure, c_s=c_s)
@@ -49,7 +48,7 @@ def test_both_directions_agree(figure: str, c_s: float) -> None:
     apart = []
     # Orbits at equal parameters: those of one branch, solved from its own points, are points of the other.
     folds = [value for kind, value in b if kind == "fold"]
-    for i in np.linspace(1, other.sizes["point"] - 2, 20).astype(int):
+    for i in np.linspace(1, other.sizes["point"] - 2, 10).astype(int):
         row = other.isel(point=int(i))
         if min((abs(float(row["omega"]) - fold) for fold in folds), default=1.0) < 1e-6:
             continue  # no orbit is solved at the parameter of a fold; these are compared above

@@ -39,7 +39,7 @@ def measured(theory):
     model = ns.models.discontinuous_support(g=0.02, rho=0.14, omega=5.72)
     rig = ns.SimulatedRig(model, start=start.tolist(), **CONTROLLED)
     return ns.control_based_continuation(
-        rig, "frequency", (5.5, 5.9), frequency=5.72, amplitude=0.14, step=0.25, holding=ns.Holding(transient=20),
+        rig, "frequency", (5.6, 5.9), frequency=5.72, amplitude=0.14, step=0.25, holding=ns.Holding(transient=20),
         progress=False,
     )
 
