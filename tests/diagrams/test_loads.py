@@ -114,7 +114,7 @@ def test_a_ball_that_rests_on_its_table_for_a_part_of_the_period_gets_no_energy_
     assert found["stop_force_maximum"].attrs["units"] == "1"  # of a number in on= nothing is known
 
 
-@pytest.mark.parametrize("w", [0.7, 1.3])
+@pytest.mark.parametrize("w", [0.7, 0.8, 1.3, 2.0])
 def test_dry_friction_takes_four_times_friction_and_amplitude(w: float) -> None:
     """Continuous sliding under cos(w t) with friction 0.3 (Den Hartog 1931), k = m = 1."""
     rig = ns.mechanical(
@@ -123,7 +123,9 @@ def test_dry_friction_takes_four_times_friction_and_amplitude(w: float) -> None:
     )  # fmt: skip
     turn = np.pi / w
     amplitude = np.sqrt((1 / (1 - w**2)) ** 2 - (0.3 * np.sin(turn) / (w * (1 + np.cos(turn)))) ** 2)
-    loads = ns.find_orbit(rig, loads=True, progress=False).loads
+    orbit = ns.find_orbit(rig, loads=True, progress=False)
+    assert float(orbit.to_dataset()["maximum"].sel(state="q")) == pytest.approx(amplitude, rel=1e-13)
+    loads = orbit.loads
     assert loads["rub_energy"] == pytest.approx(4 * 0.3 * amplitude, rel=1e-12)
     assert loads["work_of_forcing"] == pytest.approx(4 * 0.3 * amplitude, rel=1e-12)
     assert loads["rub_force_maximum"] == pytest.approx(0.3, rel=1e-14) and "rub_impacts" not in loads

@@ -98,19 +98,6 @@ def test_a_start_on_the_stop(method: str, start: tuple[float, float], mode: str,
         ns.simulate(system, periods=1, start={"x": 0.4}, method=method)
 
 
-@pytest.mark.parametrize("w", [0.7, 0.8, 1.3, 2.0])
-def test_dry_friction_without_stops(w: float) -> None:
-    """Amplitude of continuous sliding under P cos(w t) with friction mu P (Den Hartog 1931), k = m = 1."""
-    rig = ns.mechanical(
-        1.0, 0.0, 1.0, parameters={"w": w}, forcing={"q": lambda t, p: np.cos(p.w * t)},
-        elements={"rub": Coulomb(at="q", friction=0.3)},
-    )  # fmt: skip
-    turn = np.pi / w
-    amplitude = np.sqrt((1 / (1 - w**2)) ** 2 - (0.3 * np.sin(turn) / (w * (1 + np.cos(turn)))) ** 2)
-    orbit = ns.find_orbit(rig).to_dataset()
-    assert float(orbit["maximum"].sel(state="q")) == pytest.approx(amplitude, rel=1e-13)
-
-
 def test_friction_sticks_below_its_static_force_and_slips_with_its_kinetic_one() -> None:
     """Under a slowly rising force P sin(w t) the mass holds until P sin(w t) = static, then feels the kinetic one."""
     rig = ns.mechanical(
