@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+import nonsmooth as ns
+from nonsmooth.continuation.branches.begin import curve_of
 from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step, locate
 from nonsmooth.continuation.march.march import Limits, March, Policy, march
 from nonsmooth.continuation.problems.curve import Curve, Point, tangents
@@ -194,3 +196,22 @@ def test_no_point_follows_where_the_curve_ends() -> None:
 def test_problems_share_predictor_and_corrector(problem: type, step: str) -> None:
     """A second one would have limits of its own."""
     assert getattr(problem, step) is getattr(Curve, step)
+
+
+def test_nothing_lands_at_the_section() -> None:
+    """Margins of an orbit between a wall and a spring, but for the lengths of its visits, are those of the motion.
+
+    At the second phase the section lies nearer to the wall than the mass is to anything behind its impact."""
+    found = []
+    for phase in (0.0, 1.0):
+        system = ns.mechanical(
+            1.0, 0.2, 1.0, parameters={"w": 0.8, "s": phase}, forcing={"q": lambda t, p: np.cos(p.w * t + p.s)},
+            elements={
+                "wall": ns.elements.Stop(at="q", position=0.5, restitution=0.6),
+                "spring": ns.elements.ElasticStop(at="q", position=-3.0, side=-1, stiffness=2.0),
+            },
+        )  # fmt: skip
+        curve, X = curve_of(ns.find_orbit(system, progress=False), "w", 1.0)
+        path = curve.walk.along(curve.shooting.evaluate(X), curve.shooting.split(X)[1].copy())
+        found.append(path.margins[1:])
+    assert np.isfinite(found[0]).all() and found[1] == pytest.approx(found[0], abs=1e-9)

@@ -32,7 +32,7 @@ def beginning(found):
     return [note for note in found.notes if "begins in mode" in note]
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 @pytest.mark.parametrize("mode", ["up", "down"])
 def test_a_relay_with_hysteresis_begins_in_either_mode(mode, seed):
     system = guess(cases.relay(), cases.RELAY, seed)
@@ -42,9 +42,9 @@ def test_a_relay_with_hysteresis_begins_in_either_mode(mode, seed):
 
 
 def test_runs_begin_in_modes_of_their_own():
-    runs = [relay_run(mode, seed, 15.0) for seed, mode in enumerate(["down", "up", "down"])]
+    runs = [relay_run(mode, seed, 15.0) for seed, mode in enumerate(["down", "up"])]
     found = ns.fit(guess(cases.relay(), cases.RELAY, 1), runs, FIND, progress=False)
-    assert [note.split("'")[1] for note in beginning(found)] == ["down", "up", "down"]
+    assert [note.split("'")[1] for note in beginning(found)] == ["down", "up"]
     assert not found.anomalies and np.abs(far(found, cases.RELAY)).max() < 3.5
 
 
