@@ -105,9 +105,9 @@ def test_a_gap_is_crossed_in_seconds():
     assert not found.anomalies and np.max(np.abs(far)) < 3.5
 
 
-@pytest.mark.parametrize(("name", "kind"), [("gear pair", "AR .9"), ("bilinear oscillator", "white")])
-def test_a_term_that_the_model_lacks_is_said(name, kind):
-    found, effect = noise_cases.lacking(name, kind)
+def test_a_term_that_the_model_lacks_is_said():
+    """With coloured noise, and of other systems: the next one, among the slow campaigns."""
+    found, effect = noise_cases.lacking("bilinear oscillator", "white")
     assert effect > 5 and any(MODEL in one for one in found.anomalies)
 
 
@@ -118,6 +118,7 @@ def test_every_term_that_the_model_lacks_is_said(name, kind):
     found, effect = noise_cases.lacking(name, kind)
     print(f"{name}, {kind}: {effect:.0f} noise deviations; {found.anomalies[0]}")
     assert effect > 5 and found.anomalies
+    assert (name, kind) != ("gear pair", "AR .9") or any(MODEL in one for one in found.anomalies)
 
 
 @pytest.mark.slow
