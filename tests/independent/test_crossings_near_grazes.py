@@ -107,7 +107,7 @@ def test_conditions_that_become_true_together(gate: ns.System) -> None:
         ],
     )
     rng = np.random.default_rng(5)
-    for k in [1.0] * 300 + [*10.0 ** rng.uniform(-1.0, 3.0, 300)]:
+    for k in [1.0] * 120 + [*10.0 ** rng.uniform(-1.0, 3.0, 120)]:
         c = 1.0 - 10.0 ** rng.uniform(-6.0, -3.0)
         phi = rng.uniform(-np.pi, 0.0)
         run = ns.simulate(
