@@ -10,7 +10,7 @@ import equilibria_enumeration
 import numpy as np
 import pytest
 
-SOME = (0, 1, 2, 4, 6, 8, 9, 18, 26, 29, 33, 44, 68, 76, 79, 105, 106, 112, 213, 245)
+SOME = (0, 2, 6, 9, 33, 44, 68, 76, 79, 105, 106, 112, 213, 245)  # those that take less
 
 
 @pytest.mark.parametrize("seed", SOME)

@@ -1,4 +1,7 @@
-"""The exact flow of the paper's oscillator against heyoka: 40 parameter sets, 50 forcing periods each, from rest."""
+"""The exact flow of the paper's oscillator against heyoka: 14 parameter sets, 50 forcing periods each, from rest.
+
+Two near each of seven figures; 40 run with the slow campaigns.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +11,17 @@ from heyoka_agreement import Agreement, compare_all, report
 pytestmark = pytest.mark.physics
 
 
-@pytest.fixture(scope="module")
-def results() -> list[Agreement]:
-    results = compare_all()
+@pytest.fixture(scope="module", params=[14, pytest.param(40, marks=pytest.mark.slow)])
+def results(request: pytest.FixtureRequest) -> list[Agreement]:
+    results = compare_all(request.param)
+    assert len(results) == request.param
     print("\n" + report(results))
     return results
 
 
 def test_enough_sets_have_contacts_and_no_graze(results: list[Agreement]) -> None:
-    assert len(results) == 40
-    assert sum(r.n_contacts >= 20 for r in results) >= 30
-    assert sum(r.nearest_graze >= 1e-9 for r in results) >= 30
+    assert sum(r.n_contacts >= 20 for r in results) >= 0.75 * len(results)
+    assert sum(r.nearest_graze >= 1e-9 for r in results) >= 0.75 * len(results)
 
 
 def test_states_agree_over_fifty_periods(results: list[Agreement]) -> None:
@@ -41,5 +44,5 @@ def test_crossing_times_agree(results: list[Agreement]) -> None:
 def test_touches_agree(results: list[Agreement]) -> None:
     """Every maximum below the gap is recorded, with its clearance."""
     assert all(r.n_touches >= 0 for r in results)
-    assert sum(r.n_touches for r in results) > 100
+    assert sum(r.n_touches for r in results) > 2.5 * len(results)
     assert max(r.clearance / r.allowance for r in results) <= 1.0
