@@ -148,13 +148,17 @@ def test_no_value_of_any_key_ends_in_a_traceback(
         (("show", "odd.toml"), r"odd\.toml: is a study file and no result; `nonsmooth run odd\.toml`"),
     ],
 )
-def test_odd_arguments_are_one_message(arguments: tuple[str | bytes, ...], message: str, tmp_path: Path) -> None:
+def test_odd_arguments_are_one_message(
+    arguments: tuple[str | bytes, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "wrong.py").write_text("raise BaseException('x')\n")
     (tmp_path / "odd.nc").touch()
     (tmp_path / "odd.toml").write_text('[system]\nmodel = "a"\n[measured]\nsession = 3\nprocedure = 4\n')
-    done = process(*arguments, cwd=tmp_path)
-    assert done.returncode == 2 and not done.stdout
-    assert re.match(rf"nonsmooth: .*{message}", done.stderr) and "Traceback" not in done.stderr
+    assert cli.main([os.fsdecode(word) for word in arguments]) == 2
+    out, err = capfd.readouterr()
+    assert not out and re.match(rf"nonsmooth: .*{message}", err) and "Traceback" not in err
 
 
 @pytest.mark.parametrize(

@@ -36,8 +36,8 @@ oscillator = ns.models.discontinuous_support()
 planar_cuda.SLICE = 16  # so that a transient takes several launches
 results = {
     "chart": counted(
-        ns.chart, oscillator.with_parameters(g=-0.0045), {"omega": [3.2, 3.69], "rho": [0.15, 0.3]}, transient=40, keep=12,
-        max_period=4, lyapunov=40,
+        ns.chart, oscillator.with_parameters(g=-0.0045), {"omega": [3.2, 3.69], "rho": [0.15, 0.3]}, transient=40,
+        keep=12, max_period=4, lyapunov=40,
     ),
     "every_period": counted(
         ns.chart, oscillator.with_parameters(g=-0.0045), {"omega": [3.69], "rho": [0.3, 0.47]}, transient=20, keep=12,

@@ -1,13 +1,15 @@
 """A newcomer's first quarter of an hour: the README, typed line by line in a fresh folder.
 
-The blocks of Python go into an interactive interpreter, those of a shell to the installed program ``nonsmooth``, on a
-terminal; what the page says is printed must be printed, in that order, and the files it names must be there. The first
-tutorial, which begins with the same lines, is run by ``test_pages``.
+The blocks of Python go into an interactive interpreter, the commands to the program ``nonsmooth``, the one that
+computes to the installed one, on a terminal. What the page says is printed must be printed, in that order, and the
+files it names must be there. The first tutorial, which begins with the same lines, is run by ``test_pages``.
 """
 
 from __future__ import annotations
 
+import contextlib
 import doctest
+import io
 import os
 import re
 import subprocess
@@ -66,6 +68,16 @@ def on_a_terminal(words: list[str], folder: Path) -> str:
     return text
 
 
+def here(words: list[str], folder: Path) -> str:
+    """The output of a command in this process."""
+    from nonsmooth.cli.main import main
+
+    said = io.StringIO()
+    with contextlib.chdir(folder), contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        assert main(words[1:]) == 0, said.getvalue()
+    return said.getvalue()
+
+
 def study(page: Path) -> str:
     """The study file that a page shows."""
     [code] = [code for language, code, _, _ in blocks(page.read_text(encoding="utf-8")) if language == "toml"]
@@ -93,7 +105,8 @@ def test_commands(tmp_path: Path) -> None:
     (tmp_path / "fig11.toml").write_text(study(README), encoding="utf-8")
     shell = [code for language, code, _, _ in blocks(README.read_text(encoding="utf-8")) if language == "sh"]
     commands = [line.split("#")[0].split() for code in shell for line in code.splitlines()]
-    said = {words[1]: on_a_terminal(words, tmp_path) for words in commands if words[:1] == ["nonsmooth"]}
+    commands = [words for words in commands if words[:1] == ["nonsmooth"]]
+    said = {words[1]: (on_a_terminal if words[1] == "run" else here)(words, tmp_path) for words in commands}
     assert list(said) == ["models", "init", "run", "show"]
     assert "discontinuous_support" in said["models"] and "Savi" in said["models"]
     assert "sweep over rho:" in said["run"] and "/601 [" in said["run"]  # a bar

@@ -87,11 +87,11 @@ CASES: dict[str, tuple[Any, ...]] = {
 def test_duffing_masses_move_as_in_the_reference(name: str) -> None:
     mass, load, rate, start, *pairs = CASES[name]
     reference, system = duffing(mass, load, rate, *pairs)
-    times = np.linspace(0.0, 4 * 2 * np.pi / rate, 161)
+    times = np.linspace(0.0, 2 * 2 * np.pi / rate, 81)
     n = len(mass)
     expected = reference.run(np.array(start), np.zeros(n), times)
     run = ns.simulate(system, duration=times[-1], samples=times, start=[*start, *[0.0] * n], rtol=1e-12)
-    assert len(run["crossing_time"]) > 8
+    assert len(run["crossing_time"]) > 4
     at = np.searchsorted(run["time"].values, times, side="right") - 1
     assert np.abs(run["u"].values[at] - expected).max() < 1e-8
 
