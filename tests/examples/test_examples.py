@@ -10,7 +10,7 @@ import pytest
 
 #: Sizes that show the same in less time than those of the pictures.
 SMALL = {
-    "basins": {"points": 60}, "chart": {"points": 60}, "basin_fractions": {"points": 26, "starts": 60},
+    "basins": {"points": 40}, "chart": {"points": 40}, "basin_fractions": {"points": 14, "starts": 60},
     "element_loads": {"points": 41},
 }  # fmt: skip
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
