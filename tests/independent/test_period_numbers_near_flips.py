@@ -38,7 +38,7 @@ def cascade(rho: np.ndarray) -> np.ndarray:
     return np.where((rho > 0.3) & (rho < 0.34), -1, period)
 
 
-@pytest.mark.parametrize(("points", "longer"), [(80, 20), pytest.param(200, 50, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("points", "longer"), [(40, 20), pytest.param(200, 50, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("n", list(known.FLIPS_FIGURE_11))
 def test_never_a_wrong_period_number(n: int, points: int, longer: int) -> None:
     flip = known.FLIPS_FIGURE_11[n]
