@@ -111,8 +111,10 @@ class VariationalFlow:
         return _floats(values), self.scratch()
 
     @classmethod
-    def of(cls, system: System, active: Sequence[str] = ()) -> VariationalFlow:
+    def of(cls, system: System, active: Sequence[str] = (), rows: bool = True) -> VariationalFlow:
         """The flow of a system's equations; made once for the same equations and names.
+
+        Where everything is linear it is one of rows of numbers, unless it must not be (``rows``).
 
         Raises
         ------
@@ -128,7 +130,7 @@ class VariationalFlow:
                 raise ValueError(unknown(name, "a parameter", repr(system.name), units))
         traced, scale = system.traced, tuple(system.scale_vector().tolist())
         if traced.patterns is None:
-            return _flow(traced, names, scale)
+            return _flow(traced, names, scale, rows and not system.is_smoothed)
         from nonsmooth.flow.variational_patterns import pattern_flow
 
         found: VariationalFlow = pattern_flow(traced.patterns, names, scale)
@@ -231,6 +233,11 @@ class VariationalFlow:
         assert period is not None
         return sp.lambdify(p, [period, *(period.diff(p[i]) for i in self.places)], modules="math")
 
+    @property
+    def n_moving(self) -> int:
+        """Numbers that the kernels take for states: memory is constant and stands beside them."""
+        return self.n_u
+
     def scratch(self) -> Any:
         """The thread's scratch memory."""
         found = getattr(self._local, "work", None)
@@ -246,12 +253,12 @@ class VariationalFlow:
         from nonsmooth.kernels.compile.lanes import FOUR
         from nonsmooth.kernels.tangent.legs import Steps
 
-        columns, width = self.n + self.n_active, order + 1
-        rows, changes = 2 * self.n_u + len(self.model.entries), np.zeros((max(self.n_u, 2), columns))
+        n, columns, width = self.n_moving, self.n + self.n_active, order + 1
+        rows, changes = 2 * n + len(self.model.entries), np.zeros((max(n, 2), columns))
         return Steps._make([*one_block(
             np.zeros((rows, width)), np.zeros((width, columns, -(-columns // FOUR) * FOUR)),
-            np.zeros((self.model.n_scratch, width)), changes[: self.n_u], changes, changes[: self.n_u],
-            np.zeros(width), np.zeros(self.n_u), np.zeros(self.n_p + len(self.traced.m)),
+            np.zeros((self.model.n_scratch, width)), changes[:n], changes, changes[:n],
+            np.zeros(width), np.zeros(n), np.zeros(self.n_p + len(self.traced.m)),
         ), accuracy])  # fmt: skip
 
 
@@ -260,5 +267,11 @@ def _floats(x: Any) -> FloatArray:
 
 
 @lru_cache(maxsize=32)  # as many as of what it is made of
-def _flow(traced: Traced, names: tuple[str, ...], scale: tuple[float, ...]) -> VariationalFlow:
-    return VariationalFlow(traced, names, np.array(scale))
+def _flow(traced: Traced, names: tuple[str, ...], scale: tuple[float, ...], rows: bool) -> VariationalFlow:
+    from nonsmooth.flow.engines.linear import is_linear
+    from nonsmooth.flow.variational_rows import LinearFlow
+    from nonsmooth.system.codegen.linear import linear_form
+
+    plain = traced.without_answers()[0]
+    linear = rows and is_linear(plain, linear_form(plain))
+    return (LinearFlow if linear else VariationalFlow)(traced, names, np.array(scale))

@@ -15,68 +15,52 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.flow.saltation import Touch
-from nonsmooth.flow.variational import VariationalFlow
+from nonsmooth.flow.variational_rows import NONE, SIZES, RowsFlow
 from nonsmooth.system.derived.deciding import decide
 from nonsmooth.system.derived.instants import RowNumbers
 from nonsmooth.system.derived.patterns import STEP, Change, Patterns, Row, Rows
 
 if TYPE_CHECKING:
+    from nonsmooth.system.derived.assembly import Pattern
     from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["PatternFlow", "pattern_flow"]
 
-NONE = np.zeros(0)
 OFF = 1e-5  # of a parameter, for the differences by which an impact with friction depends on it
-KEPT = 4  # parameter points whose rows are kept by a thread
 
 
-class PatternFlow(VariationalFlow):
+class PatternFlow(RowsFlow):
     """Segments and jumps of the modes and transitions that were visited so far."""
 
     def __init__(self, patterns: Patterns, active: tuple[str, ...], scale: FloatArray) -> None:
-        self.patterns = patterns
+        self.patterns, self.harmonics = patterns, len(patterns.form.multiples)
         super().__init__(patterns.seen(), active, scale)
 
     def known(self) -> Traced:
         return self.patterns.seen()
 
-    def path(self) -> tuple[Any, int]:
-        return self.model.path, self.model.n_scratch
-
-    def _compiled(self) -> tuple[Any, Sequence[int]]:
-        return _model(self.n_u, len(self.patterns.form.multiples), len(self.traced.mode_names)), range(
-            len(self.traced.transitions)
-        )
+    def _at(self, values: FloatArray) -> Packed:
+        last = next(reversed(self._local.rows.values()), None)
+        return Packed(self.patterns, self.traced, values, self.places, last)
 
     def on_path(self, values: FloatArray, modes: Any) -> FloatArray:
-        return self._packed(values).array(modes, watched=True)
-
-    def _ready(self, values: FloatArray, modes: Any) -> tuple[FloatArray, Any]:
-        return NONE, self.scratch()._replace(q=self._packed(values).array(modes))
-
-    def _ready_to_jump(self, values: FloatArray, k: int, t: float, z: FloatArray) -> tuple[FloatArray, Any]:
-        return NONE, self.scratch()._replace(q=self._packed(values).of_jump(k, t, z))
-
-    def _packed(self, values: FloatArray) -> Packed:
-        kept = self._local.__dict__.setdefault("packed", {})
-        key = np.asarray(values).tobytes()
-        if key not in kept:
-            last = next(reversed(kept.values()), None)
-            while len(kept) >= KEPT:
-                del kept[next(iter(kept))]
-            kept[key] = Packed(self.patterns, self.traced, np.array(values), self.places, last)
-        found: Packed = kept[key]
+        found: FloatArray = self.kept(values).array(modes, watched=True)
         return found
 
-    def indicator(self, values: Any, i: int, mode: int, t: float, z: Any) -> Touch:
-        packed = self._packed(values)
-        every = packed.every
-        rows = [every[0].row(mode, i), *(one.row(mode, i) for one in every[1:])]
-        slopes = [one.rows.along(row, one.flow(mode)) for one, row in zip(every, rows, strict=True)]
-        own, at = every[0], packed.at(t, z)
-        second = own.rows.along(slopes[0], own.flow(mode))
-        return Touch(*at.taken(rows), *at.taken(slopes), float(second.values @ at.w))
+    def _ready(self, values: FloatArray, modes: Any) -> tuple[FloatArray, Any]:
+        return NONE, self.scratch()._replace(q=self.kept(values).array(modes))
+
+    def _ready_to_jump(self, values: FloatArray, k: int, t: float, z: FloatArray) -> tuple[FloatArray, Any]:
+        return NONE, self.scratch()._replace(q=self.kept(values).of_jump(k, t, z))
+
+    def _taken(self, at: Packed, i: int, mode: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        rows = parts([one.row(mode, i).values for one in at.every])
+        return rows, parts([one.flow(mode) for one in at.every]), at.rates
+
+
+def parts(every: Sequence[FloatArray]) -> FloatArray:
+    """Numbers, and their derivatives, which the imaginary parts of others carry."""
+    return np.array([every[0], *(np.imag(one) / STEP for one in every[1:])])
 
 
 @dataclass
@@ -87,19 +71,25 @@ class Calculus:
     rows: Rows
     fields: dict[int, FloatArray] = field(default_factory=dict)
     conditions: dict[tuple[int, int], dict[int, FloatArray]] = field(default_factory=dict)
+    last: int = -1  # the mode whose neighbours' fields the rows keep
+
+    def pattern(self, mode: int) -> Pattern:
+        """The pattern of a mode that is now looked at."""
+        if mode != self.last:
+            self.rows.forget()
+            self.last = mode
+        return self.patterns.visited[mode]
 
     def flow(self, mode: int) -> FloatArray:
         """The field of a mode."""
         if mode not in self.fields:
-            self.fields[mode] = self.rows.flow(self.patterns.mode, self.patterns.visited[mode])[0]
-            self.rows.forget()
+            self.fields[mode] = self.rows.flow(self.patterns.mode, self.pattern(mode))[0]
         return self.fields[mode]
 
     def of_element(self, mode: int, k: int) -> dict[int, FloatArray]:
         """The conditions of an element in a mode."""
         if (mode, k) not in self.conditions:
-            self.conditions[mode, k] = self.patterns.ways_of(self.rows, self.patterns.visited[mode], k)[1]
-            self.rows.forget()
+            self.conditions[mode, k] = self.patterns.ways_of(self.rows, self.pattern(mode), k)[1]
         return self.conditions[mode, k]
 
     def row(self, mode: int, slot: int) -> Row:
@@ -126,9 +116,8 @@ class Calculus:
         if change.way < 0:
             found: FloatArray = self.rows.impact(change.elements, self.patterns.mode)
             return found
-        k, pattern = change.elements[0], self.patterns.visited[mode]
-        states: FloatArray = self.rows.leaving(k, self.patterns.mode, pattern)[change.way].states
-        self.rows.forget()
+        ways = self.rows.leaving(change.elements[0], self.patterns.mode, self.pattern(mode))
+        states: FloatArray = ways[change.way].states
         return states
 
     def rubbed(self, mode: int, change: Change, w: FloatArray) -> FloatArray:
@@ -144,22 +133,6 @@ class Calculus:
         return moved
 
 
-@dataclass
-class At:
-    """The vector w of rows at an instant, and its derivatives in time and in the active parameters."""
-
-    n: int
-    w: FloatArray
-    w_t: FloatArray
-    w_p: list[FloatArray]
-
-    def taken(self, rows: list[Row]) -> tuple[float, FloatArray, float, FloatArray]:
-        """Value and derivatives (states, time, parameters) of a row; behind it those with its derivatives."""
-        row, *derived = (one.values for one in rows)
-        of_p = [d.imag / STEP @ self.w + row @ w_p for d, w_p in zip(derived, self.w_p, strict=True)]
-        return float(row @ self.w), row[: self.n].copy(), float(row @ self.w_t), np.array(of_p)
-
-
 class Packed:
     """A system at one parameter point, as the kernels read it."""
 
@@ -173,29 +146,16 @@ class Packed:
         self.rates = np.array(rates).reshape(1 + len(places), -1)
         self.wanted: set[int] = set() if last is None else set(last.wanted)
         self.watched: set[int] = set()
-        self.jumps: dict[int, FloatArray] = {}
+        self.jumps: dict[int, tuple[FloatArray, FloatArray]] = {}
         self.q = NONE
 
     def of_jump(self, k: int, t: float, z: FloatArray) -> FloatArray:
         """The numbers of a transition and of the modes beside it; those of an impact that rubs are of the instant."""
         jump, change = self.traced.transitions[k], self.patterns.changes[k]
         if k not in self.jumps or (change is not None and change.rubs):
-            conditions = [[one.row(jump.source, row.indicator).values for row in jump.rows] for one in self.every]
-            shown = np.array([conditions[0], *(np.imag(of_p) / STEP for of_p in conditions[1:])])
-            self.jumps[k] = np.concatenate([[len(jump.rows)], self._map(k, t, z).ravel(), np.real(shown).ravel()])
+            rows = [np.array([one.row(jump.source, row.indicator).values for row in jump.rows]) for one in self.every]
+            self.jumps[k] = parts(rows).reshape(len(self.every), -1), self._map(k, t, z)
         return self._array({jump.source, jump.target}, (), (k,))
-
-    def at(self, t: float, z: FloatArray) -> At:
-        """The vector of rows at an instant."""
-        n, rates = self.n, self.rates[0]
-        w = self.every[0].rows.augmented(np.asarray(z, dtype=float)[:n], t)
-
-        def turned(speeds: FloatArray) -> FloatArray:
-            found = np.zeros_like(w)
-            found[n + 1 :: 2], found[n + 2 :: 2] = -speeds * w[n + 2 :: 2], speeds * w[n + 1 :: 2]
-            return found
-
-        return At(n, w, turned(rates), [turned(t * of_p) for of_p in self.rates[1:]])
 
     def array(self, modes: Any, watched: bool = False) -> FloatArray:
         """All numbers of some modes, with all their conditions where they are ``watched``, and of those asked for
@@ -211,9 +171,8 @@ class Packed:
         """The map of a transition, and its derivatives in the active parameters."""
         mode, change = self.traced.transitions[k].source, self.patterns.changes[k]
         if change is None or not change.rubs:
-            maps = [one.map(mode, change) for one in self.every]
-            return np.array([maps[0], *(np.imag(one) / STEP for one in maps[1:])])
-        w, maps = self.at(t, z).w, []
+            return parts([one.map(mode, change) for one in self.every])
+        w, maps = self.every[0].rows.augmented(z, t), []
         for place in self.places:
             by = OFF * max(abs(self.values[place]), OFF)
             sides = []
@@ -225,50 +184,29 @@ class Packed:
         return np.array([self.every[0].rubbed(mode, change, w), *maps])
 
     def _array(self, modes: Iterable[int], watched: Iterable[int], taken: Iterable[int]) -> FloatArray:
-        count, jumps = len(self.traced.mode_names), len(self.traced.transitions)
-        sizes = [self.n, self.rates.shape[1], len(self.places), len(self.patterns.slots), count]
-        place = len(sizes) + self.rates.size + 2 * count + jumps
-        places = np.full(2 * count, -1.0), np.full(jumps, -1.0)
+        count, width = len(self.traced.mode_names), self.n + 1 + 2 * self.rates.shape[1]
+        sizes = [self.n, self.rates.shape[1], len(self.places), len(self.patterns.slots), count, self.n * width]
+        places = np.full(2 * count + len(self.traced.transitions), -1.0)
+        place = SIZES + self.rates.size + len(places)
         blocks: list[FloatArray] = []
 
-        def put(kind: int, k: int, *some: FloatArray) -> None:
+        def put(k: int, *some: FloatArray) -> None:
             nonlocal place
-            places[kind][k] = place
+            places[k] = place
             blocks.extend(some)
             place += sum(map(len, some))
 
         for mode in sorted(modes):
-            own, *of_p = (one.flow(mode) for one in self.every)
-            put(0, mode, own.ravel(), *((one.imag / STEP).ravel() for one in of_p))
+            put(mode, parts([one.flow(mode) for one in self.every]).ravel())
         for mode in sorted(watched):
-            put(0, count + mode, self.every[0].watched(mode).ravel())
+            put(count + mode, self.every[0].watched(mode).ravel())
         for k in taken:
-            put(1, k, self.jumps[k])
-        return np.concatenate([np.array(sizes, dtype=float), self.rates.ravel(), *places, *blocks])
-
-
-@dataclass(frozen=True)
-class RowsModel:
-    """The functions of ``kernels.tangent.rows``, as those of a model (``codegen.variations.VariationalModel``)."""
-
-    jet: Any
-    field: Any
-    switch: Any
-    path: Any
-    entries: Any
-    kinds: Any
-    n_scratch: int
-
-
-def _model(n: int, harmonics: int, modes: int) -> RowsModel:
-    from nonsmooth.kernels.compile.cache import compiled
-    from nonsmooth.kernels.tangent import rows
-
-    jet, field, switch, path = map(compiled, (rows.jet, rows.field, rows.switch, rows.path))
-    entries = np.repeat(np.arange(n, dtype=np.int64)[:, None], 2, axis=1)
-    return RowsModel(
-        jet, field, switch, path, entries, np.ones((modes, n), dtype=np.int64), max(1, 2 * harmonics)
-    )
+            rows, maps = self.jumps[k]
+            number = rows.shape[1] // width
+            at = place + 4 + number
+            begin = [number, rows.shape[1], self.n * width, at + rows.size, *(at + width * np.arange(number))]
+            put(2 * count + k, np.array(begin, dtype=float), rows.ravel(), maps.ravel())
+        return np.concatenate([np.array(sizes, dtype=float), self.rates.ravel(), places, *blocks])
 
 
 @lru_cache(maxsize=32)

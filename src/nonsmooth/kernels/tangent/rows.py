@@ -3,8 +3,9 @@ the generated text of a model has as formulas.
 
 They read as the functions of a model (``legs.JET``, ``FIELD``): q is the packed system (``system.derived.packed``), in
 which a mode has a block of rows over w = (u, 1, cos k_1 w t, sin k_1 w t, ...) and a transition one of its map. At its
-head stand the numbers of states, harmonics, active parameters, conditions and modes, the harmonics' rates, their
-derivatives in each active parameter, and the places of the blocks of all modes and of all transitions."""
+head stand the numbers of states, harmonics, active parameters, conditions and modes, by how much each parameter's
+derivative of a field stands behind it, the harmonics' rates, their derivatives in each active parameter, and the places
+of the blocks: of the fields of all modes, of their conditions, of all transitions."""
 
 from math import cos, sin
 
@@ -14,6 +15,7 @@ from nonsmooth.kernels.compile.cache import device, inline, kernel
 
 _i, _f = types.int64, types.float64
 _f1, _f2, _f3 = _f[::1], _f[:, ::1], _f[:, :, ::1]
+RATES = 6  # where the harmonics' rates begin
 
 
 @inline
@@ -24,17 +26,17 @@ def sizes(q):
 
 @inline
 def block(q, kind, k):
-    """Where a block begins: of a mode's field and that of each active parameter's derivative (kind 0), of a mode's
-    conditions (1), of a transition (2): the number of its conditions, its map, its conditions, each of the two with
-    that of each active parameter's derivative behind it."""
-    return int(q[5 + int(q[1]) * (1 + int(q[2])) + kind * int(q[4]) + k])
+    """Where a block begins: of a mode's field (kind 0), of a mode's conditions (1), of a transition (2): the number of
+    its conditions, by how much each parameter's derivative stands behind each of them, and behind its map, where the
+    map stands, and where the conditions do."""
+    return int(q[RATES + int(q[1]) * (1 + int(q[2])) + kind * int(q[4]) + k])
 
 
 @device
 def waves(q, n, harmonics, t, order, W):
     """Series of the cosines and sines of the harmonics, two rows for each."""
     for h in range(harmonics):
-        rate = q[5 + h]
+        rate = q[RATES + h]
         W[2 * h, 0], W[2 * h + 1, 0] = cos(rate * t), sin(rate * t)
         for k in range(order):
             W[2 * h, k + 1] = -rate * W[2 * h + 1, k] / (k + 1)
@@ -59,7 +61,7 @@ def term_of_rates(q, row, n, harmonics, p, t, W, k):
     """Coefficient k of what the change of the harmonics' rates with active parameter p does to a row."""
     total = 0.0
     for h in range(harmonics):
-        rate = q[5 + harmonics * (1 + p) + h]
+        rate = q[RATES + harmonics * (1 + p) + h]
         if rate != 0.0:
             cosine, sine = t * W[2 * h, k], t * W[2 * h + 1, k]
             if k > 0:
@@ -111,7 +113,7 @@ def jet(mode, order, t, u, q, C, W, D):
                     for c in range(columns):
                         D[k + 1, i, c] += a * D[k, j, c]
             for p in range(active):
-                row = field + ((1 + p) * n + i) * width
+                row = field + (1 + p) * int(q[5]) + i * width
                 change = term(q, row, n, harmonics, C, W, k)
                 change += term_of_rates(q, field + i * width, n, harmonics, p, t, W, k)
                 for c in range(columns):
@@ -127,7 +129,7 @@ def value(q, row, n, harmonics, t, u):
     for j in range(n):
         total += q[row + j] * u[j]
     for h in range(harmonics):
-        total += q[row + n + 1 + 2 * h] * cos(q[5 + h] * t) + q[row + n + 2 + 2 * h] * sin(q[5 + h] * t)
+        total += q[row + n + 1 + 2 * h] * cos(q[RATES + h] * t) + q[row + n + 2 + 2 * h] * sin(q[RATES + h] * t)
     return total
 
 
@@ -137,7 +139,7 @@ def change_of_waves(q, row, n, harmonics, t, rates, time):
     total = 0.0
     for h in range(harmonics):
         factor = time * q[rates + h]
-        angle = q[5 + h] * t
+        angle = q[RATES + h] * t
         total += factor * (q[row + n + 2 + 2 * h] * cos(angle) - q[row + n + 1 + 2 * h] * sin(angle))
     return total
 
@@ -156,26 +158,26 @@ def switch(transition, t, u, q, out):
     """State behind a transition, its derivatives in states, time and active parameters; of each condition the value and
     the same derivatives, the time's before the parameters'."""
     n, harmonics, active = sizes(q)
-    width, first = n + 1 + 2 * harmonics, block(q, 2, transition) + 1
-    rows = int(q[first - 1])
+    width, first = n + 1 + 2 * harmonics, block(q, 2, transition)
+    rows, stride, stride_of_map, place = int(q[first]), int(q[first + 1]), int(q[first + 2]), int(q[first + 3])
+    at = n + n * n + n + n * active
     for i in range(n):
-        row = first + i * width
+        row = place + i * width
         out[i] = value(q, row, n, harmonics, t, u)
         for j in range(n):
             out[n + i * n + j] = q[row + j]
-        out[n + n * n + i] = change_of_waves(q, row, n, harmonics, t, 5, 1.0)
+        out[n + n * n + i] = change_of_waves(q, row, n, harmonics, t, RATES, 1.0)
         for p in range(active):
-            of_p = value(q, first + ((1 + p) * n + i) * width, n, harmonics, t, u)
-            of_p += change_of_waves(q, row, n, harmonics, t, 5 + harmonics * (1 + p), t)
+            of_p = value(q, row + (1 + p) * stride_of_map, n, harmonics, t, u)
+            of_p += change_of_waves(q, row, n, harmonics, t, RATES + harmonics * (1 + p), t)
             out[n + n * n + n + i * active + p] = of_p
-    at = n + n * n + n + n * active
     for r in range(rows):
-        row = first + ((1 + active) * n + r) * width
+        row = int(q[first + 4 + r])
         out[at] = value(q, row, n, harmonics, t, u)
         for j in range(n):
             out[at + 1 + j] = q[row + j]
-        out[at + 1 + n] = change_of_waves(q, row, n, harmonics, t, 5, 1.0)
+        out[at + 1 + n] = change_of_waves(q, row, n, harmonics, t, RATES, 1.0)
         for p in range(active):
-            of_p = value(q, row + (1 + p) * rows * width, n, harmonics, t, u)
-            out[at + 2 + n + p] = of_p + change_of_waves(q, row, n, harmonics, t, 5 + harmonics * (1 + p), t)
+            of_p = value(q, row + (1 + p) * stride, n, harmonics, t, u)
+            out[at + 2 + n + p] = of_p + change_of_waves(q, row, n, harmonics, t, RATES + harmonics * (1 + p), t)
         at += 2 + n + active

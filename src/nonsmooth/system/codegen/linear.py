@@ -99,16 +99,28 @@ class LinearForm:
         """The derivatives of all entries in one parameter, at fixed states and time (``omega``: of the frequency)."""
         return self._filled(points, place)
 
-    def _filled(self, points: FloatArray, place: int | None) -> LinearTables:
+    def fill(self, values: FloatArray, place: int | None, tables: dict[str, FloatArray]) -> None:
+        """Write the entries that are not zero, or their derivatives in one parameter, into tables for one point.
+
+        Those of ``LinearTables`` that are not given are left out."""
+        shapes = self._code.shapes(len(self.multiples))
+        rest = {name: np.empty((1, *shape)) for name, shape in shapes.items() if name not in tables}
+        with np.errstate(all="ignore"):
+            self._filler(place)(values[:, None], **tables, **rest)
+
+    def _filler(self, place: int | None) -> Callable[..., None]:
         if place not in self._fills:
             namespace: dict[str, Any] = {"np": np}
             exec(compile(self._code.source(self.multiples, place), "<linear form>", "exec"), namespace)
             self._fills[place] = namespace["fill"]
+        return self._fills[place]
+
+    def _filled(self, points: FloatArray, place: int | None) -> LinearTables:
         points = np.asarray(points, dtype=np.float64)
         shapes = self._code.shapes(len(self.multiples))
         tables = {name: np.zeros((len(points), *shape)) for name, shape in shapes.items()}
         with np.errstate(all="ignore"):
-            self._fills[place](np.ascontiguousarray(points.T), **tables)
+            self._filler(place)(np.ascontiguousarray(points.T), **tables)
         return LinearTables(**tables)
 
 

@@ -10,6 +10,7 @@ visited so far are numbered in the order of their first visit; that numbering is
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -123,6 +124,7 @@ class Rows(Assembler):
         self._every, self._at = every, patterns.at
         self.parts = [self._part(k, name, patterns) for k, name in enumerate(patterns.elements)]
         self.known: dict[Any, Any] = {}  # of what elements decide together
+        self._bases: dict[Any, tuple[list[int], FloatArray]] = {}
         self._approaches: dict[int, Row] = {}
         self._rates: dict[int, Row] = {}
         self._flows: dict[Pattern, tuple[FloatArray, dict[int, Any]]] = {}
@@ -180,6 +182,18 @@ class Rows(Assembler):
         terms = expression.values[: self.n] * part.direction
         total: float = terms.sum().item()
         return total if abs(total) > ROUNDING * float(np.abs(terms).sum()) else 0.0
+
+    def effects(self, some: Sequence[int], mode: str, parts: Sequence[Part] | None = None) -> Any:
+        rates = np.array([self.rate(i, mode).values[: self.n] for i in some]).reshape(len(some), 1, self.n)
+        terms = rates * np.array([part.direction for part in parts or [self.parts[k] for k in some]])
+        total = terms.sum(axis=-1)
+        return np.where(np.abs(total) > ROUNDING * np.abs(terms).sum(axis=-1), total, 0.0)
+
+    def basis(self, held: Sequence[int], mode: str, pattern: Pattern) -> tuple[list[int], FloatArray]:
+        key = tuple(held), tuple(pattern[r] for r in self.rubbing.values())
+        if key not in self._bases:
+            self._bases[key] = super().basis(held, mode, pattern)
+        return self._bases[key]
 
     def identity(self) -> FloatArray:
         return np.eye(self.n, self.field.shape[1])
