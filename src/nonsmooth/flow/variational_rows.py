@@ -64,7 +64,7 @@ class RowsFlow(VariationalFlow):
         jet, field, switch, path = map(compiled, (rows.jet, rows.field, rows.switch, rows.path))
         entries = np.repeat(np.arange(n, dtype=np.int64)[:, None], 2, axis=1)  # the diagonal, of which the sum is asked
         kinds = np.ones((modes, n), dtype=np.int64)
-        model = RowsModel(jet, field, switch, path, entries, kinds, max(1, 2 * self.harmonics))
+        model = RowsModel(jet, field, switch, path, entries, kinds, 2 * self.harmonics + max(1, self.n_active))
         return model, range(len(self.traced.transitions))
 
     @property
@@ -149,6 +149,7 @@ class LinearFlow(RowsFlow):
         self.empty[:SIZES] = n, h, a, conditions, modes, sizes[0]
         gone = [[*t.lacking[jump.target], *([False] * len(t.m))] for jump in t.transitions]
         self.gone = np.array(gone, dtype=bool).reshape(jumps, n)
+        self.some_gone = bool(self.gone.any())
 
     def _views(self, q: FloatArray, d: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Fields, conditions and maps in the array, or their derivatives in a parameter."""
@@ -158,26 +159,38 @@ class LinearFlow(RowsFlow):
         )
         return fields.reshape(-1, self.n, width), conditions.reshape(-1, width), maps.reshape(-1, self.n, width)
 
+    def _buffer(self) -> tuple[FloatArray, list[dict[str, FloatArray]]]:
+        """The thread's array, and the tables of the linear form in it: its entries, their derivatives."""
+        found: tuple[FloatArray, list[dict[str, FloatArray]]] | None = getattr(self._local, "buffer", None)
+        if found is None:
+            q, n, tables = self.empty.copy(), self.n, []
+            for d in range(1 + self.n_active):
+                fields, conditions, maps = self._views(q, d)
+                of_conditions = conditions[None]
+                tables.append({
+                    "omega": np.zeros(1), **dict(zip("Abcs", _split(fields, n), strict=True)),
+                    "ia": of_conditions[..., :n], "ib": of_conditions[..., n],
+                    "ic": of_conditions[..., n + 1 :: 2], "is_": of_conditions[..., n + 2 :: 2],
+                    **dict(zip(("ra", "rb", "rc", "rs"), _split(maps, n), strict=True)),
+                })  # fmt: skip
+            found = self._local.buffer = q, tables
+        return found
+
     def _at(self, values: FloatArray) -> FloatArray:
-        q, n, h = self.empty.copy(), self.n, self.harmonics
-        for d, place in enumerate((None, *self.places)):
-            fields, conditions, maps = self._views(q, d)
-            omega = np.zeros(1)
-            self.form.fill(
-                values, place, {
-                    "omega": omega, **_split(fields, n, "Abcs"), **_split(maps, n, ["ra", "rb", "rc", "rs"]),
-                    "ia": conditions[None, :, :n], "ib": conditions[None, :, n],
-                    "ic": conditions[None, :, n + 1 :: 2], "is_": conditions[None, :, n + 2 :: 2],
-                },
-            )  # fmt: skip
-            q[SIZES + d * h : SIZES + (d + 1) * h] = omega * self.form.multiples
-            maps[self.gone] = 0.0
+        again = hasattr(self._local, "buffer")
+        (q, tables), h = self._buffer(), self.harmonics
+        for d, (place, into) in enumerate(zip((None, *self.places), tables, strict=True)):
+            self.form.fill(values, place, into, again)
+            if h:
+                q[SIZES + d * h : SIZES + (d + 1) * h] = into["omega"] * self.form.multiples
+            if self.some_gone:
+                self._views(q, d)[2][self.gone] = 0.0
         for mode in self.sliding:
             at = int(q[SIZES + h * (1 + self.n_active) + len(self.plain.mode_names) + mode])
-            watched = q[at : at + self.sizes[1]].reshape(-1, n + 1 + 2 * h)
+            watched = q[at : at + self.sizes[1]].reshape(-1, self.n + 1 + 2 * h)
             watched[:] = self._views(q, 0)[1]
             watched[list(self.plain.along[mode])] = 0.0
-        return q
+        return q.copy()
 
     def on_path(self, values: FloatArray, modes: Any) -> FloatArray:
         found: FloatArray = self.kept(values)
@@ -195,8 +208,8 @@ class LinearFlow(RowsFlow):
         return np.array([one[1][i] for one in every]), np.array([one[0][mode] for one in every]), rates
 
 
-def _split(rows: FloatArray, n: int, names: Sequence[str]) -> dict[str, FloatArray]:
-    """Rows as the tables of a linear form: of the states, constants, cosines, sines, with a leading dim."""
+def _split(rows: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Rows (..., n, M) as tables of a linear form, with a leading dim: of the states, constants, cosines, sines."""
     rows = rows[None]
-    waves = (np.swapaxes(rows[..., n + k :: 2], -1, -2) for k in (1, 2))
-    return dict(zip(names, (rows[..., :n], rows[..., n], *waves), strict=True))
+    cosines, sines = (np.swapaxes(rows[..., n + k :: 2], -1, -2) for k in (1, 2))
+    return rows[..., :n], rows[..., n], cosines, sines

@@ -12,6 +12,7 @@ from math import cos, sin
 from numba import types
 
 from nonsmooth.kernels.compile.cache import device, inline, kernel
+from nonsmooth.kernels.compile.lanes import FOUR, load, plus, store, times
 
 _i, _f = types.int64, types.float64
 _f1, _f2, _f3 = _f[::1], _f[:, ::1], _f[:, :, ::1]
@@ -43,7 +44,7 @@ def waves(q, n, harmonics, t, order, W):
             W[2 * h + 1, k + 1] = rate * W[2 * h, k] / (k + 1)
 
 
-@device
+@inline
 def term(q, row, n, harmonics, C, W, k):
     """Coefficient k of a row along the series of the states and the waves."""
     total = q[row + n] if k == 0 else 0.0
@@ -56,7 +57,7 @@ def term(q, row, n, harmonics, C, W, k):
     return total
 
 
-@device
+@inline
 def term_of_rates(q, row, n, harmonics, p, t, W, k):
     """Coefficient k of what the change of the harmonics' rates with active parameter p does to a row."""
     total = 0.0
@@ -98,49 +99,51 @@ def path(mode, order, t, u, q, C, W):
 def jet(mode, order, t, u, q, C, W, D):
     """Series of the states, the diagonal of the Jacobian, and in D those of the small changes from ``D[0]``."""
     n, harmonics, active = sizes(q)
-    width, field, columns = n + 1 + 2 * harmonics, block(q, 0, mode), D.shape[2]
+    width, first, numbers, columns = n + 1 + 2 * harmonics, block(q, 0, mode), D.shape[1], D.shape[2]
     waves(q, n, harmonics, t, order, W)
-    states_along(q, field, n, width, harmonics, order, u, C, W)
+    states_along(q, first, n, width, harmonics, order, u, C, W)
     for i in range(n):
-        C[n + i, 0] = q[field + i * width + i]
+        C[n + i, 0] = q[first + i * width + i]
     for k in range(order):
+        share = 1.0 / (k + 1)
         for i in range(n):
-            for c in range(columns):
-                D[k + 1, i, c] = 0.0
-            for j in range(n):
-                a = q[field + i * width + j]
-                if a != 0.0:
-                    for c in range(columns):
-                        D[k + 1, i, c] += a * D[k, j, c]
+            row = first + i * width
             for p in range(active):
-                row = field + (1 + p) * int(q[5]) + i * width
-                change = term(q, row, n, harmonics, C, W, k)
-                change += term_of_rates(q, field + i * width, n, harmonics, p, t, W, k)
-                for c in range(columns):
-                    D[k + 1, i, c] += change * D[0, n + p, c]
-            for c in range(columns):
-                D[k + 1, i, c] /= k + 1
+                change = term(q, row + (1 + p) * int(q[5]), n, harmonics, C, W, k)
+                W[2 * harmonics + p, 0] = change + term_of_rates(q, row, n, harmonics, p, t, W, k)
+            for c in range(0, columns, FOUR):
+                x = times(0.0, load(D, c))
+                for j in range(n):
+                    if q[row + j] != 0.0:
+                        x = plus(x, q[row + j], load(D, (k * numbers + j) * columns + c))
+                for p in range(active):
+                    x = plus(x, W[2 * harmonics + p, 0], load(D, (n + p) * columns + c))
+                store(D, ((k + 1) * numbers + i) * columns + c, times(share, x))
 
 
-@device
+@inline
 def value(q, row, n, harmonics, t, u):
     """The value of a row."""
     total = q[row + n]
     for j in range(n):
         total += q[row + j] * u[j]
     for h in range(harmonics):
-        total += q[row + n + 1 + 2 * h] * cos(q[RATES + h] * t) + q[row + n + 2 + 2 * h] * sin(q[RATES + h] * t)
+        cosine, sine = q[row + n + 1 + 2 * h], q[row + n + 2 + 2 * h]
+        if cosine != 0.0 or sine != 0.0:
+            angle = q[RATES + h] * t
+            total += cosine * cos(angle) + sine * sin(angle)
     return total
 
 
-@device
+@inline
 def change_of_waves(q, row, n, harmonics, t, rates, time):
     """The change of a row by that of its harmonics' angles: rates that stand at a place of q, times a time."""
     total = 0.0
     for h in range(harmonics):
-        factor = time * q[rates + h]
-        angle = q[RATES + h] * t
-        total += factor * (q[row + n + 2 + 2 * h] * cos(angle) - q[row + n + 1 + 2 * h] * sin(angle))
+        cosine, sine = q[row + n + 1 + 2 * h], q[row + n + 2 + 2 * h]
+        if cosine != 0.0 or sine != 0.0:
+            angle = q[RATES + h] * t
+            total += time * q[rates + h] * (sine * cos(angle) - cosine * sin(angle))
     return total
 
 

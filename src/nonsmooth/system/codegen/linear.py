@@ -78,7 +78,7 @@ class LinearForm:
     affine_outputs: bool
     affine_resets: bool
     _code: _TablesCode = field(repr=False, compare=False)
-    _fills: dict[int | None, Callable[..., None]] = field(default_factory=dict, repr=False, compare=False)
+    _fills: dict[Any, Callable[..., None]] = field(default_factory=dict, repr=False, compare=False)
 
     def evaluate(self, points: FloatArray) -> LinearTables:
         """Evaluate all matrices.
@@ -99,28 +99,26 @@ class LinearForm:
         """The derivatives of all entries in one parameter, at fixed states and time (``omega``: of the frequency)."""
         return self._filled(points, place)
 
-    def fill(self, values: FloatArray, place: int | None, tables: dict[str, FloatArray]) -> None:
+    def fill(self, values: FloatArray, place: int | None, tables: dict[str, FloatArray], again: bool = False) -> None:
         """Write the entries that are not zero, or their derivatives in one parameter, into tables for one point.
 
-        Those of ``LinearTables`` that are not given are left out."""
-        shapes = self._code.shapes(len(self.multiples))
-        rest = {name: np.empty((1, *shape)) for name, shape in shapes.items() if name not in tables}
+        Those of ``LinearTables`` that are not given are left out; ``again``: entries that are constants stand there."""
         with np.errstate(all="ignore"):
-            self._filler(place)(values[:, None], **tables, **rest)
+            self._filler(place, tuple(tables), again)(values[:, None], **tables)
 
-    def _filler(self, place: int | None) -> Callable[..., None]:
-        if place not in self._fills:
+    def _filler(self, place: int | None, names: tuple[str, ...], again: bool = False) -> Callable[..., None]:
+        if (place, names, again) not in self._fills:
             namespace: dict[str, Any] = {"np": np}
-            exec(compile(self._code.source(self.multiples, place), "<linear form>", "exec"), namespace)
-            self._fills[place] = namespace["fill"]
-        return self._fills[place]
+            exec(compile(self._code.source(self.multiples, place, names, again), "<linear form>", "exec"), namespace)
+            self._fills[place, names, again] = namespace["fill"]
+        return self._fills[place, names, again]
 
     def _filled(self, points: FloatArray, place: int | None) -> LinearTables:
         points = np.asarray(points, dtype=np.float64)
         shapes = self._code.shapes(len(self.multiples))
         tables = {name: np.zeros((len(points), *shape)) for name, shape in shapes.items()}
         with np.errstate(all="ignore"):
-            self._filler(place)(np.ascontiguousarray(points.T), **tables)
+            self._filler(place, tuple(tables))(np.ascontiguousarray(points.T), **tables)
         return LinearTables(**tables)
 
 
@@ -299,10 +297,13 @@ class _TablesCode:
         """The harmonics that occur."""
         return tuple(sorted({k for _, _, k, _, _ in self.entries if isinstance(k, int)}))
 
-    def source(self, multiples: tuple[int, ...], place: int | None) -> str:
-        """The function that fills the tables, or those of the derivatives in one parameter."""
+    def source(self, multiples: tuple[int, ...], place: int | None, names: tuple[str, ...], again: bool) -> str:
+        """The function that fills some tables, or those of the derivatives in one parameter; ``again``: all that
+        depends on parameters."""
         targets: list[tuple[str, Expr]] = [] if self.base is None else [("omega[:]", self.base)]
         for table, index, k, split, coefficient in self.entries:
+            if table not in names:
+                continue
             if isinstance(k, int):
                 h = multiples.index(k)
                 index = (*index[:-1], h, index[-1]) if split else (*index, h)
@@ -310,10 +311,11 @@ class _TablesCode:
         if place is not None:
             targets = [(target, sympy.diff(e, self.traced.p[place])) for target, e in targets]
             targets = [(target, e) for target, e in targets if e != 0]
+        if again:
+            targets = [(target, e) for target, e in targets if e.free_symbols]
         printer = Printer({symbol: f"p[{i}]" for i, symbol in enumerate(self.traced.p)}, arrays=True)
         lines = assignments(targets, printer, "g") or ["pass"]
-        arguments = ", ".join(self.shapes(len(multiples)))
-        return f"def fill(p, {arguments}):\n" + "".join(f"    {line}\n" for line in lines)
+        return f"def fill(p, {', '.join(names)}):\n" + "".join(f"    {line}\n" for line in lines)
 
     def shapes(self, h: int) -> dict[str, tuple[int, ...]]:
         t = self.traced
