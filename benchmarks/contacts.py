@@ -1,7 +1,8 @@
-"""Every verb on three systems of elements, each with its time: ``python benchmarks/contacts.py``.
+"""Every verb on systems of elements, each with its time: ``python benchmarks/contacts.py [name ...]``.
 
-A friction oscillator, a stop with rest, and two masses with six elements. First calls compile what
-their system needs; the second column is the same call again.
+A friction oscillator, a stop with rest, and two masses with six elements; a row of fifty masses with 25 elements and
+six stops that rub, by the verbs of ``LARGE``. First calls compile what their system needs; the second column is the
+same call again.
 """
 
 from __future__ import annotations
@@ -53,8 +54,40 @@ def six(load: Any = None) -> ns.System:
     )  # fmt: skip
 
 
-def verbs(s: ns.System, still: ns.System) -> dict[str, Callable[[dict[str, Any]], Any]]:
-    """The calls in order, each given the results of those before it; ``still`` has a constant load."""
+def fifty(load: Any = None) -> ns.System:
+    n = 50
+    chain = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    elements: dict[str, Any] = {}
+    for i in range(1, n - 2, 6):
+        elements[f"s{i}"] = E.Stop(at=f"q{i}", position=0.5, restitution=0.6)
+        elements[f"f{i}"] = E.Coulomb(at=f"q{i + 1}", friction="mu")
+        elements[f"e{i}"] = E.ElasticStop(at=f"q{i + 2}", position=-0.5, side=-1, stiffness=20.0)
+    elements["last"] = E.Stop(at=f"q{n}", position=0.2, restitution=0.3)
+    return ns.mechanical(
+        np.eye(n), 0.1 * np.eye(n) + 0.1 * chain, 10.0 * chain, parameters={"F": 2.0, "w": 0.5, "mu": 0.02},
+        forcing={"q1": load or harmonic}, elements=elements,
+    )  # fmt: skip
+
+
+def rubbing(load: Any = None) -> ns.System:
+    n = 6
+    names = [f"{axis}{i}" for i in range(1, n + 1) for axis in "xy"]
+    chain = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    elements = {
+        f"s{i}": E.Stop(at=f"y{i}", side=-1, restitution=0.4, friction="mu", tangent=f"x{i}") for i in range(1, n + 1)
+    }
+    forcing: dict[str, Any] = {f"y{i}": lambda t, p: -1.0 - 0.8 * np.sin(p.w * t) for i in range(1, n + 1)}
+    return ns.mechanical(
+        np.eye(2 * n), 0.2 * np.eye(2 * n), np.kron(chain, np.diag([4.0, 1.0])), coordinates=names,
+        parameters={"F": 1.5, "w": 1.1, "mu": 0.3}, forcing={**forcing, "x1": load or harmonic}, elements=elements,
+    )  # fmt: skip
+
+
+LARGE = ("simulate", "sweep", "find_orbit", "continue_orbit", "lyapunov", "sensitivity")
+
+
+def verbs(s: ns.System, make: Callable[..., ns.System]) -> dict[str, Callable[[dict[str, Any]], Any]]:
+    """The calls in order, each given the results of those before it; ``make`` makes the system with another load."""
     q, w = next(iter(s.states)), s.values["w"]
     v = f"v_{q}"
     some = np.linspace(0.95 * w, 1.05 * w, 5)
@@ -81,7 +114,7 @@ def verbs(s: ns.System, still: ns.System) -> dict[str, Callable[[dict[str, Any]]
         "find_orbit": lambda _: ns.find_orbit(s),
         "continue_orbit": lambda found: ns.continue_orbit(found["find_orbit"], "w", (0.97 * w, 1.03 * w)),
         "special_points": lambda found: ns.special_points(found["continue_orbit"]),
-        "continue_equilibrium": lambda _: ns.continue_equilibrium(still, "F", (0.0, 0.6)),
+        "continue_equilibrium": lambda _: ns.continue_equilibrium(make(lambda t, p: p.F), "F", (0.0, 0.6)),
         "bifurcation_diagram": lambda _: ns.bifurcation_diagram(s, "w", (0.97 * w, 1.03 * w), **QUIET),
         "fit": fit,
     }
@@ -89,15 +122,17 @@ def verbs(s: ns.System, still: ns.System) -> dict[str, Callable[[dict[str, Any]]
 
 def main(names: list[str]) -> None:
     warnings.simplefilter("ignore")
-    for name, make in (("friction", friction), ("rest", rest), ("six", six)):
+    for name, make in {"friction": friction, "rest": rest, "six": six, "fifty": fifty, "rubbing": rubbing}.items():
         if names and name not in names:
             continue
         begun = time.perf_counter()
         system = make()
         print(f"{name}: {len(system.modes)} modes, made in {time.perf_counter() - begun:.2f} s")
         found: dict[str, Any] = {}
-        for verb, call in verbs(system, make(lambda t, p: p.F)).items():
-            times = []
+        for verb, call in verbs(system, make).items():
+            times: list[float] = []
+            if name in ("fifty", "rubbing") and verb not in LARGE:
+                continue
             try:
                 for _ in range(2):
                     begun = time.perf_counter()

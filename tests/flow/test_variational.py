@@ -323,9 +323,9 @@ def test_saltation_of_the_papers_oscillator() -> None:
     flow, values = VariationalFlow.of(system, ("g",)), system.parameter_vector()
     entry = flow.jump(values, 0, 0.3, [v["g"], 0.05])
     assert entry.indicator == 0 and entry.transversality > 0.05
-    assert np.abs(entry.saltation - [[1.0, 0.0], [-v["c_s"] / v["m"], 1.0]]).max() < 1e-14
+    assert np.abs(entry.saltation - [[1.0, 0.0], [-v["c_s"] / v["m"], 1.0]]).max() < 3e-14
     # a later gap delays the entry by dg / v, and the push by as much
-    assert np.abs(entry.parameter_column[:, 0] - [0.0, v["c_s"] / v["m"]]).max() < 1e-14
+    assert np.abs(entry.parameter_column[:, 0] - [0.0, v["c_s"] / v["m"]]).max() < 3e-14
     assert abs(entry.t_p[0] - 1 / 0.05) < 1e-12
     release = flow.jump(values, 1, 0.3, [v["g"] + v["c_s"] / v["k_s"] * 0.05, -0.05])
     assert abs(release.h) < 1e-18 and np.abs(release.saltation - np.eye(2)).max() < 1e-12

@@ -16,10 +16,6 @@ if TYPE_CHECKING:
 
 __all__ = ["check_options", "check_system", "float_array", "real_number", "swept_values", "whole_number", "yes_or_no"]
 
-WITH_PATTERNS = (  # verbs for which a mode may be made on the way
-    "simulate", "poincare", "sweep", "frequency_response", "amplitude_spectrum", "chart", "basins", "basin_fractions",
-    "lyapunov",
-)  # fmt: skip
 _MOST = 2**53  # whole numbers up to here are exact in floating point
 
 
@@ -28,8 +24,6 @@ def check_system(system: Any, verb: str) -> None:
     from nonsmooth.system.system import System
 
     if isinstance(system, System):
-        if verb not in WITH_PATTERNS:
-            system.refuse_patterns(verb)
         return
     name = getattr(system, "__name__", None)
     hint = f"; call it: {name}()" if callable(system) and name else ""

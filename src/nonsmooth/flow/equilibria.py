@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.system.symbolic.traced import FOUND, TOGETHER
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
@@ -87,7 +86,7 @@ class ModeField:
         h = np.where(np.abs(h) <= edge, 0.0, h)
         found = np.full(len(self.traced.transitions), -np.inf)
         for k, jump in enumerate(self.traced.transitions):
-            if jump.source == self.mode and jump.rows and jump.kind not in (TOGETHER, FOUND):
+            if jump.source == self.mode and jump.rows and jump.fires:
                 rows = [row.sign * float(h[row.indicator]) for row in jump.rows]
                 found[k] = min((x for x in rows if x), default=0.0)
         return found

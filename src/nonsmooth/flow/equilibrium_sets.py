@@ -21,7 +21,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.equilibria import VANISHING, mode_field
-from nonsmooth.system.symbolic.traced import FOUND, NOT_UNIQUE, TOGETHER
+from nonsmooth.system.symbolic.traced import NOT_UNIQUE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -212,7 +212,7 @@ def _conditions(
             for i, sign in ((row.indicator, row.sign) for row in jump.rows)
         ]
         for jump in traced.transitions
-        if jump.source == mode and jump.rows and jump.kind not in (TOGETHER, FOUND)
+        if jump.source == mode and jump.rows and jump.fires
     ]  # fmt: skip
 
 

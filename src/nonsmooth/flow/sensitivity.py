@@ -47,6 +47,7 @@ class Variation:
     def __init__(self, flow: VariationalFlow, values: FloatArray, log: Log, start: tuple[int, FloatArray],
                  t_begin: float, t_end: float) -> None:  # fmt: skip
         first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
+        flow.catch_up()
         self.start = settled(flow, values, start, first, t_begin)
         self.modes, starts, self.times, self.transitions, before = apart(flow, log, first, t_begin)
         taus = np.diff([*self.times, t_end])
@@ -81,6 +82,7 @@ def apart(
 ) -> tuple[list[int], list[FloatArray], list[float], list[tuple[int, ...]], list[FloatArray]]:
     """Segments of a run that begins in ``first`` = (mode, z): their modes, starts and times; the transitions between
     them, those at one instant as one, and the state before each."""
+    flow.catch_up()
     n_u, targets = flow.n_u, [jump.target for jump in flow.traced.transitions]
     modes, starts, times = [first[0]], [first[1]], [t_begin]
     transitions: list[tuple[int, ...]] = []
@@ -110,7 +112,7 @@ def settled(
     What elements decide together at a start needs none, but for an impact."""
     if start[0] == first[0]:
         return None
-    if flow.traced.decider is not None:
+    if flow.traced.asks:
         if not (np.abs(start[1] - first[1]) <= 1e-10 * (flow.scale + np.abs(first[1]))).all():
             raise ValueError("the run begins with an impact of several contacts: give a start just before or behind it")
         return None

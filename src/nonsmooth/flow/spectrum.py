@@ -125,7 +125,8 @@ class Frame:
 
         if self.behind is None:
             assert isinstance(self.engine, SeriesEngine)
-            flow, tolerance = VariationalFlow.of(self.system), max(min(FINER * self.engine.rtol, FINEST), 1e-16)
+            flow = VariationalFlow.of(self.system, rows=False)
+            tolerance = max(min(FINER * self.engine.rtol, FINEST), 1e-16)
             flow.catch_up()
             self.behind = (
                 Block(FOLLOWER, put_follower), addresses(compiled(frame_along), compiled(frame_across)), flow,

@@ -47,17 +47,22 @@ class VariationalFlow:
     """
 
     def __init__(self, traced: Traced, active: tuple[str, ...], scale: FloatArray) -> None:
-        from nonsmooth.kernels.compile.pointers import addresses
-        from nonsmooth.kernels.tangent.legs import Equations
-        from nonsmooth.system.codegen.variations import variational_model
-
-        self.traced, self.active = traced, active
-        self.places = tuple(traced.parameter_names.index(name) for name in active)
-        plain, stands = traced.without_answers(rows=True)
-        self.model = variational_model(plain, self.places)
+        self.active, self.places = active, tuple(traced.parameter_names.index(name) for name in active)
         self.n_u, self.n = len(traced.u), len(traced.u) + len(traced.m)
         self.n_active, self.n_p = len(active), len(traced.p)
         self.scale = np.concatenate([scale, np.ones(len(traced.m))])
+        self._local = threading.local()
+        self._touches: dict[tuple[int, int], Any] = {}
+        self._no_timing = np.zeros(self.n_active)
+        self._take(traced)
+
+    def _take(self, traced: Traced) -> None:
+        """Take equations, the same as before but for transitions that were found since."""
+        from nonsmooth.kernels.compile.pointers import addresses
+        from nonsmooth.kernels.tangent.legs import Equations
+
+        self.traced = traced
+        self.model, stands = self._compiled()
         self.equations = Equations(
             addresses(self.model.jet, self.model.field, self.model.switch), self.model.entries, self.model.kinds,
             np.array(
@@ -65,22 +70,51 @@ class VariationalFlow:
                 dtype=np.int64,
             ).reshape(-1, 4),
         )  # fmt: skip
-        self._local = threading.local()
-        self._touches: dict[tuple[int, int], Any] = {}
         rows = max([0, *(len(jump.rows) for jump in traced.transitions)])
         n, a = self.n, self.n_active
         self.n_out = n + n * n + n + n * a + rows * (2 + n + a)
-        self._no_timing = np.zeros(a)
+        self._local = threading.local()
+
+    def _compiled(self) -> tuple[Any, Sequence[int]]:
+        """The functions of the model, and for each transition the one of them that it is."""
+        from nonsmooth.system.codegen.variations import variational_model
+
+        plain, stands = self.traced.without_answers(rows=True)
+        return variational_model(plain, self.places), stands
+
+    def path(self) -> tuple[Any, int]:
+        """The jet of states and conditions, without small changes; rows of its scratch."""
+        from nonsmooth.system.codegen.generate import compile_model
+
+        model = compile_model(self.traced.without_answers()[0])
+        return model.jet, model.n_scratch
+
+    def known(self) -> Traced:
+        """The equations as far as they are known by now (:mod:`.deciding`)."""
+        decider = self.traced.decider
+        return self.traced if decider is None else decider.known()
 
     def catch_up(self) -> None:
-        """Take in the transitions to which questions of elements have led since (:mod:`.deciding`)."""
-        decider = self.traced.decider
-        if decider is not None and decider.known() is not self.traced:
-            self.__init__(decider.known(), self.active, self.scale[: self.n_u])  # type: ignore[misc]
+        """Take in the modes and transitions that were found since."""
+        if (known := self.known()) is not self.traced:
+            self._take(known)
+
+    def on_path(self, values: FloatArray, modes: Any) -> FloatArray:
+        """The constants of the model of :meth:`path` at these parameters, for these modes."""
+        return _floats(values)
+
+    def _ready(self, values: FloatArray, modes: Any) -> tuple[FloatArray, Any]:
+        """The parameters that the kernels put into their working memory, and that memory, for some modes."""
+        return _floats(values), self.scratch()
+
+    def _ready_to_jump(self, values: FloatArray, k: int, t: float, z: FloatArray) -> tuple[FloatArray, Any]:
+        return _floats(values), self.scratch()
 
     @classmethod
-    def of(cls, system: System, active: Sequence[str] = ()) -> VariationalFlow:
+    def of(cls, system: System, active: Sequence[str] = (), rows: bool = True) -> VariationalFlow:
         """The flow of a system's equations; made once for the same equations and names.
+
+        Where everything is linear it is one of rows of numbers, unless it must not be (``rows``).
 
         Raises
         ------
@@ -94,7 +128,14 @@ class VariationalFlow:
 
                 units = {key: parameter.unit for key, parameter in system.parameters.items()}
                 raise ValueError(unknown(name, "a parameter", repr(system.name), units))
-        return _flow(system.traced, names, tuple(system.scale_vector().tolist()))
+        traced, scale = system.traced, tuple(system.scale_vector().tolist())
+        if traced.patterns is None:
+            return _flow(traced, names, scale, rows and not system.is_smoothed)
+        from nonsmooth.flow.variational_patterns import pattern_flow
+
+        found: VariationalFlow = pattern_flow(traced.patterns, names, scale)
+        found.catch_up()
+        return found
 
     def segments(self, values: Any, modes: Any, t0: Any, tau: Any, z0: Any) -> Segments:
         """March segments, each in one mode, with derivatives; accurate to rounding.
@@ -111,10 +152,8 @@ class VariationalFlow:
         from nonsmooth.kernels.tangent.legs import march_legs
 
         modes = np.ascontiguousarray(modes, dtype=np.int64)
-        out = Segments.room(len(modes), self.n, self.n_active)
-        march_legs(
-            self.equations, modes, _floats(t0), _floats(tau), _floats(z0), _floats(values), out, self.scratch()
-        )  # fmt: skip
+        out, (values, work) = Segments.room(len(modes), self.n, self.n_active), self._ready(values, modes)
+        march_legs(self.equations, modes, _floats(t0), _floats(tau), _floats(z0), values, out, work)
         return out
 
     def jump(self, values: Any, k: int | Sequence[int], t: float, z: Any, row: int = -1) -> Jump:
@@ -141,7 +180,9 @@ class VariationalFlow:
             np.empty(self.n_out),
             Crossing(np.empty(square), np.empty(square), np.empty(square), np.empty((3, n + a)), np.empty(n + a)),
         )
-        row = cross(self.equations, k, row, t, _floats(z), values, timing, self.scale, seen, out, self.scratch())
+        z = _floats(z)
+        values, work = self._ready_to_jump(values, int(k), t, z)
+        row = cross(self.equations, k, row, t, z, values, timing, self.scale, seen, out, work)
         at = n + n * n + n + n * a + row * (2 + n + a)
         h = out[at : at + 2 + n + a] if row >= 0 else np.zeros(2 + n + a)
         return Jump(
@@ -192,6 +233,11 @@ class VariationalFlow:
         assert period is not None
         return sp.lambdify(p, [period, *(period.diff(p[i]) for i in self.places)], modules="math")
 
+    @property
+    def n_moving(self) -> int:
+        """Numbers that the kernels take for states: memory is constant and stands beside them."""
+        return self.n_u
+
     def scratch(self) -> Any:
         """The thread's scratch memory."""
         found = getattr(self._local, "work", None)
@@ -207,12 +253,12 @@ class VariationalFlow:
         from nonsmooth.kernels.compile.lanes import FOUR
         from nonsmooth.kernels.tangent.legs import Steps
 
-        columns, width = self.n + self.n_active, order + 1
-        rows, changes = 2 * self.n_u + len(self.model.entries), np.zeros((self.n_u, columns))
+        n, columns, width = self.n_moving, self.n + self.n_active, order + 1
+        rows, changes = 2 * n + len(self.model.entries), np.zeros((max(n, 2), columns))
         return Steps._make([*one_block(
             np.zeros((rows, width)), np.zeros((width, columns, -(-columns // FOUR) * FOUR)),
-            np.zeros((self.model.n_scratch, width)), changes, changes, changes,
-            np.zeros(width), np.zeros(self.n_u), np.zeros(self.n_p + len(self.traced.m)),
+            np.zeros((self.model.n_scratch, width)), changes[:n], changes, changes[:n],
+            np.zeros(width), np.zeros(n), np.zeros(self.n_p + len(self.traced.m)),
         ), accuracy])  # fmt: skip
 
 
@@ -221,5 +267,11 @@ def _floats(x: Any) -> FloatArray:
 
 
 @lru_cache(maxsize=32)  # as many as of what it is made of
-def _flow(traced: Traced, names: tuple[str, ...], scale: tuple[float, ...]) -> VariationalFlow:
-    return VariationalFlow(traced, names, np.array(scale))
+def _flow(traced: Traced, names: tuple[str, ...], scale: tuple[float, ...], rows: bool) -> VariationalFlow:
+    from nonsmooth.flow.engines.linear import is_linear
+    from nonsmooth.flow.variational_rows import LinearFlow
+    from nonsmooth.system.codegen.linear import linear_form
+
+    plain = traced.without_answers()[0]
+    linear = rows and is_linear(plain, linear_form(plain))
+    return (LinearFlow if linear else VariationalFlow)(traced, names, np.array(scale))

@@ -77,8 +77,8 @@ class Variant:
         """Raise SystemDefinitionError where the modes are made when they are first visited."""
         if self.traced.patterns is not None:
             raise SystemDefinitionError(
-                f"{name!r}: its elements {self.traced.patterns.why}; a mode is made when a run first visits it, for "
-                f"runs, sweeps, charts, basins and exponents. Not so for {verb}: take fewer elements for it"
+                f"{name!r}: its elements {self.traced.patterns.why}; a mode is made when a run first visits it. Not so "
+                f"for {verb}: take fewer elements for it"
             )
 
     @cached_property

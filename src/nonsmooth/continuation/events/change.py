@@ -177,16 +177,15 @@ def is_tolerance(curve: Orbits, indicator: int) -> bool:
     """Return whether an indicator only sets a tolerance: below the creep of a stop impacts are completed as rest.
 
     It differs from another one of its condition, with the other sign, by a small number."""
-    system = curve.shooting.system
-    traced = system.traced
-    for jump in traced.transitions:
+    flow, values = curve.shooting.flow, curve.shooting.values
+    z = np.linspace(0.3, 0.7, flow.n) * flow.scale
+    for jump in flow.traced.transitions:
         signs = {row.indicator: row.sign for row in jump.rows}
         for other, sign in signs.items():
             if sign * signs.get(indicator, 0) >= 0:
                 continue
-            h = traced.indicators[other]
-            width = traced.indicators[indicator] - h
-            size = sum(abs(h.diff(u)) * scale for u, scale in zip(traced.u, system.scale_vector(), strict=True))
-            if width.is_number and size.is_number and 0.0 < abs(float(width)) < TOLERANCE * float(size):
+            one, two = (flow.indicator(values, i, jump.source, 0.0, z) for i in (indicator, other))
+            size = float(np.abs(two.h_z) @ flow.scale)
+            if np.allclose(one.h_z, two.h_z, rtol=1e-9, atol=0.0) and 0.0 < abs(one.h - two.h) < TOLERANCE * size:
                 return True
     return False

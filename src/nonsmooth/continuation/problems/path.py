@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.signature import AT_ONCE
-from nonsmooth.system.symbolic.traced import FOUND, TOGETHER
+from nonsmooth.system.symbolic.traced import FOUND
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.problems.shooting import Shooting, Solved
@@ -69,12 +69,13 @@ class Walk:
     """Walks along orbits of one system with one signature."""
 
     def __init__(self, shooting: Shooting) -> None:
+        from nonsmooth.flow.engines.loop import pack_net
         from nonsmooth.kernels.compile.pointers import addresses
 
         self.shooting, system = shooting, shooting.system
         traced: Traced = system.traced
-        self.model, self.net = _compiled(traced)
-        self.functions = addresses(self.model.jet)
+        self.net, (jet, n_scratch) = pack_net(traced), shooting.flow.path()
+        self.functions = addresses(jet)
         n_t = len(traced.transitions)
         n, m = len(traced.u), shooting.m + 1
         visits = shooting.signature.visits
@@ -85,13 +86,14 @@ class Walk:
         self.weight = system.scale_vector() * 1e-3
         rows = n + len(traced.indicators) + len(traced.outputs)
         self.scratch = (
-            np.zeros((rows, ORDER + 1)), np.zeros((self.model.n_scratch, ORDER + 1)), np.zeros(n),
-            np.zeros(len(traced.p) + len(traced.m)), np.zeros(len(traced.indicators)),
+            np.zeros((rows, ORDER + 1)), np.zeros((n_scratch, ORDER + 1)), np.zeros(n),
+            np.zeros(len(traced.indicators)),
         )  # fmt: skip
+        self.memory = len(traced.m)
         self.shape = (m, n_t)
         self.n = n
-        asked = np.array([jump.kind in (TOGETHER, FOUND) for jump in traced.transitions], dtype=bool)
-        conditions = (self.net.at < 0) & ~asked
+        fires = np.array([jump.fires for jump in traced.transitions], dtype=bool)
+        conditions = (self.net.at < 0) & fires
         armed = [[traced.transitions[k].source == mode for k in range(n_t)] for mode in self.modes]
         self.armed = np.array(armed, dtype=bool).reshape(m, n_t)
         self.armed &= conditions[None, :]
@@ -102,7 +104,7 @@ class Walk:
                 self.elsewhere[i, k] = False
                 behind = traced.transitions[k:]
                 self.elsewhere[i, k:] &= np.array([not (jump.rows and set(jump.rows) <= own) for jump in behind])
-            if traced.decider is not None and r >= 0:  # what several decide fires with what one does
+            if traced.asks and r >= 0:  # what several decide fires with what one does
                 self.elsewhere[i] &= [all(one.indicator != self.net.rows[r, 0] for one in jump.rows)
                                       for jump in traced.transitions]  # fmt: skip
         self.conditional = np.flatnonzero(self.fired_row[:-1] >= 0)
@@ -146,10 +148,13 @@ class Walk:
         slope = np.empty((m, 2))
         tau = solved.times[1:] - solved.times[:-1]
         tau[self.at_once | ((tau < 0.0) & (tau > -NOTHING * float(solved.times[-1])))] = 0.0
+        q = self.shooting.flow.on_path(solved.values, self.modes)
+        *room, sizes = self.scratch
         status = follow(
-            self.functions, ORDER, RTOL, self.weight, self.lacking, self.net, solved.values,
+            self.functions, ORDER, RTOL, self.weight, self.lacking, self.net, q,
             Visits(self.modes, solved.times[:-1], tau, np.ascontiguousarray(states), self.fired, self.fired_row),
-            self.scratch, extremes, Margins(inner, place, which, begin, begin_row, size, end, slope),
+            (*room, np.zeros(len(q) + self.memory), sizes), extremes,
+            Margins(inner, place, which, begin, begin_row, size, end, slope),
         )  # fmt: skip
         if status:
             return None
@@ -208,15 +213,6 @@ def _in_net(traced: Traced, net: Any, k: int, row: int) -> tuple[int, int]:
     if jump is not None and jump.kind == FOUND:
         fired = jump.rows[max(row, 0)]
         for j, other in enumerate(traced.transitions):
-            if other.source == jump.source and other.kind not in (TOGETHER, FOUND) and fired in other.rows:
+            if other.source == jump.source and other.fires and fired in other.rows:
                 return j, int(net.row_start[j]) + other.rows.index(fired) if row >= 0 else -1
     return k, -1 if row < 0 else int(net.row_start[k]) + row
-
-
-@lru_cache(maxsize=32)
-def _compiled(traced: Traced) -> tuple[Any, Any]:
-    """The model and the transition table of a system."""
-    from nonsmooth.flow.engines.loop import pack_net
-    from nonsmooth.system.codegen.generate import compile_model
-
-    return compile_model(traced.without_answers()[0]), pack_net(traced)

@@ -80,7 +80,8 @@ class Rounds:
     @cached_property
     def second(self) -> Engine:
         """The engine that is asked where the first one denies a signature."""
-        return self.engine if self.engine.name != "exact" else engine_for(self.system, "taylor", rtol=RTOL)
+        alone = self.engine.name != "exact" or self.system.traced.patterns is not None
+        return self.engine if alone else engine_for(self.system, "taylor", rtol=RTOL)
 
     def _middle(self, shooting: Shooting, X: FloatArray, values: FloatArray) -> tuple[int, float, FloatArray, float]:
         """The longest visit of an orbit, time and state in its middle, and the period."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, lru_cache
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,7 @@ from nonsmooth.kernels.hybrid.stopping import flag
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.derived.deciding import begun, decide
 from nonsmooth.system.phases import phases, varying_phases
-from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, FOUND, OWN, TOGETHER
+from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, OWN, TOGETHER
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced, TracedTransition
@@ -315,6 +315,7 @@ def _change(traced: Traced, jump: TracedTransition) -> int:
     return 0 if jump.reset is None and not jump.writes else 2
 
 
+@lru_cache(maxsize=32)
 def pack_net(traced: Traced) -> Any:
     """The transition table (``kernels.records.Net``), with two more rows for a section.
 
@@ -333,9 +334,9 @@ def pack_net(traced: Traced) -> Any:
         ],
         dtype=integer,
     ).reshape(-1, 5)  # fmt: skip
-    rows = [(r.indicator, r.sign, r.strict) for t in jumps for r in t.rows if t.kind not in (TOGETHER, FOUND)]
-    row_start = np.cumsum([0] + [0 if t.kind in (TOGETHER, FOUND) else len(t.rows) for t in jumps], dtype=integer)
-    leaving = [[j for j, t in enumerate(jumps) if t.source == m and t.kind not in (TOGETHER, FOUND)] for m in modes]
+    rows = [(r.indicator, r.sign, r.strict) for t in jumps for r in t.rows if t.fires]
+    row_start = np.cumsum([0] + [len(t.rows) if t.fires else 0 for t in jumps], dtype=integer)
+    leaving = [[j for j, t in enumerate(jumps) if t.source == m and t.fires] for m in modes]
     mode_start = np.cumsum([0] + [len(one) for one in leaving], dtype=integer)
     mode_list = np.array([j for one in leaving for j in one], dtype=integer)
     both = np.array([*rows, (0, 1, 1), (0, -1, 1)], dtype=integer).reshape(-1, 3)

@@ -70,7 +70,8 @@ def engine_for(
             raise ValueError(f'order is that of method="taylor"; method={method!r} has its own')
     equations = system.traced if traced is None else traced
     if equations.patterns is not None:
-        return _of_patterns(system, method, rtol is not None or atol is not None or step is not None or bool(expert))
+        tolerances = method == "exact" and (rtol is not None or atol is not None)
+        return _of_patterns(system, method, tolerances or step is not None or bool(expert))
     form = None
     if method in ("auto", "exact") and traced is None:
         from nonsmooth.system.codegen.linear import linear_form
@@ -119,13 +120,14 @@ def _of_patterns(system: System, method: str, options: bool) -> Engine:
     """The engine of a system whose patterns of phases are made when they are visited."""
     from nonsmooth.flow.engines.patterns import PatternEngine
 
-    if method not in ("auto", "exact") or options:
-        raise ValueError(
-            f"{system.name!r} has so many elements that a pattern of their phases is made when it is first visited; "
-            "that is done by the exact flow alone: leave out method, rtol, atol, step, order and locate"
-        )
     traced = system.traced
     assert traced.patterns is not None
+    if method not in ("auto", "exact") or options:
+        raise ValueError(
+            f"the elements of {system.name!r} {traced.patterns.why}, so that a pattern of their phases is made when it "
+            "is first visited; that is done by the exact flow alone: leave out method, rtol, atol, step, order and "
+            "locate"
+        )
     return PatternEngine(traced, traced.patterns, system.scale_vector())
 
 

@@ -8,7 +8,6 @@ they come; what leaves the engine has the numbers that all points share.
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -24,19 +23,18 @@ from nonsmooth.kernels.hybrid.places import DEAD_END, MODE, RESET, STARTS, TIME,
 from nonsmooth.results.memory import free_memory, room_for
 from nonsmooth.system.derived.deciding import Outcome, begun, decide
 from nonsmooth.system.derived.instants import RowNumbers
-from nonsmooth.system.symbolic.traced import ALONE, ASKED, FOUND, TOGETHER
+from nonsmooth.system.derived.patterns import Change
+from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, FOUND, TOGETHER
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearTables
     from nonsmooth.system.derived.assembly import Pattern
-    from nonsmooth.system.derived.elements.element import Condition
     from nonsmooth.system.derived.patterns import Patterns
     from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["PatternEngine"]
 
 MOST = 1024  # patterns for which room is made at first
-ENDS = ("not_unique", "no_motion")  # statuses of a question without an answer, in the order of their codes
 SECTION = np.array([(0, 1, 1), (0, -1, 1)], dtype=np.int64)  # the last rows of a transition table
 
 
@@ -128,13 +126,14 @@ class PatternEngine(Engine):
 
 
 class Lead(NamedTuple):
-    """A transition's source and target, by the conditions of which element."""
+    """A transition: its number among all that are known, its source here, its target, its conditions."""
 
+    number: int
     source: int
     target: Pattern
     element: str
     rows: tuple[tuple[int, int, int], ...]
-    kind: str  # ASKED, TOGETHER, FOUND, or ""
+    kind: str  # ASKED, TOGETHER, FOUND, one of ENDS, or ""
 
 
 class PatternTables:
@@ -152,7 +151,6 @@ class PatternTables:
         self.points, self.period = tables.points[i : i + 1], tables.period[i : i + 1]
         self.omega = np.ascontiguousarray(tables.linear.omega[i : i + 1])
         self.multiples = np.array(patterns.form.multiples, dtype=np.int64)
-        self.slots = {name: k for k, name in enumerate(patterns.conditions)}
         self.own_outputs = self._outputs(tables.linear, i)
         self.index: dict[Pattern, int] = {}
         self.numbers: list[int] = []  # of the patterns here among all that were visited
@@ -195,13 +193,7 @@ class PatternTables:
 
     def transitions_of(self, taken: IntArray) -> IntArray:
         """The numbers that all points share of the transitions here."""
-        every = np.zeros(len(self.leads), dtype=np.int64)
-        for t in np.unique(taken):
-            lead = self.leads[t]
-            ends = self.numbers[lead.source], self.numbers[self.index[lead.target]]
-            status = lead.kind if lead.kind in ENDS else ""
-            every[t] = self.patterns.transition(*ends, lead.element, lead.rows, status)
-        return every[taken]
+        return np.array([lead.number for lead in self.leads], dtype=np.int64)[taken]
 
     def complete(self) -> None:
         """Make the mode for which a run waits, or say where what it has asked leads."""
@@ -245,8 +237,8 @@ class PatternTables:
             contact = ENDS.index(found.ends) + DEAD_END if found.ends else contact
             way = (key[1], RESET if struck else 0, contact, number, 0)
             self.transitions = np.concatenate([self.transitions, np.array([way], dtype=np.int64)])
-            element = found.names or lead.element
-            self.leads.append(Lead(lead.source, found.pattern, element, lead.rows, found.ends or FOUND))
+            change = Change(struck, rubs=found.rubbed is not None) if struck else None
+            self._lead(lead.source, found.pattern, found.names or lead.element, lead.rows, found.ends or FOUND, change)
             self.lengths.append(0)
             self.form, self.net = self.form._replace(**self._maps()), self._net()
         taken = self.answers[key]
@@ -271,43 +263,29 @@ class PatternTables:
         here = len(self.numbers)
         self.index[pattern] = here
         self.numbers.append(self.patterns.number(pattern))
-        rows, mode = self.rows, self.patterns.mode
+        rows, mode, ways = self.rows, self.patterns.mode, []
         flow, forces = rows.flow(mode, pattern)
-        conditions = np.zeros((len(self.slots), flow.shape[1]))
-        conditions[:, rows.n] = np.nan  # one that is not asked for in this pattern takes no part in extremes
-        ways, armed = [], []
+        conditions, outs, meets = self.patterns.ways_out(rows, pattern)
         first = len(self.leads)
-
-        def lead(target: Pattern, element: str, given: Sequence[Condition], kind: str, change: Any = None) -> None:
-            these = []
-            for one in given:
-                name = f"{element}_{one.name}"
-                slot = self.slots[name if name in self.slots else one.name]
-                conditions[slot] = one.value.values
-                these.append((slot, one.sign, int(one.strict)))
-            to = -1 if kind in (ASKED, TOGETHER) else self.index.get(target, -1)
-            if to < 0 and kind in ("", ALONE):
+        for k, i, way, given in outs:
+            part, asked = rows.parts[k], way.phase is None
+            target = pattern if way.phase is None else rows.place(k, mode, pattern).put(way.phase).pattern
+            alone, change = not asked and bool(part.element.held), None if way.states is None else Change((k,), i)
+            to = -1 if asked else self.index.get(target, -1)
+            if to < 0 and not asked:
                 self.waiting.setdefault(target, []).append(len(self.leads))
+            number = 0 if way.states is None else self._map(way.states)
             contact = change is not None or self.numbers[here] == 0
-            number = 0 if change is None else self._map(change)
-            ways.append((to, 0 if change is None else RESET, int(contact), number, int(kind == ALONE)))
-            self.leads.append(Lead(here, target, element, tuple(these), "" if kind == ALONE else kind))
-            self.lengths.append(len(these))
-            armed.extend(these)
-
-        for k, part in enumerate(rows.parts):
-            for way in rows.leaving(k, mode, pattern):
-                if way.phase is None:
-                    lead(pattern, part.name, way.conditions, ASKED)
-                    continue
-                target = rows.place(k, mode, pattern).put(way.phase).pattern
-                lead(target, part.name, way.conditions, ALONE if part.element.held else "", way.states)
+            ways.append((to, 0 if change is None else RESET, int(contact), number, int(alone)))
+            self._lead(here, target, part.name, given, ASKED if asked else ALONE if alone else "", change)
+            self.lengths.append(len(given))
+        armed = [row for out in outs for row in out.rows]
         self.lists.append([*range(first, len(self.leads))])
         self.together.append(len(self.leads))
         ways.append((-1, 0, 0, 0, 0))
-        self.leads.append(Lead(here, pattern, "", (), TOGETHER))
+        self._lead(here, pattern, "", tuple((slot, 1, 1) for slot in dict.fromkeys(meets)), TOGETHER)
         self.lengths.append(0)
-        self.meets.append(self._meetings(pattern, conditions))
+        self.meets.append(meets)
         rows.forget()
         self.transitions = np.concatenate([self.transitions, np.array(ways, dtype=np.int64).reshape(-1, 5)])
         self.conditions = np.concatenate([self.conditions, np.array(armed, dtype=np.int64).reshape(-1, 3)])
@@ -316,16 +294,12 @@ class PatternTables:
         self._stand(flow, conditions, self._output_rows(forces))
         self.net = self._net()
 
-    def _meetings(self, pattern: Pattern, conditions: FloatArray) -> list[int]:
-        """The conditions at which elements meet what they may be held by."""
-        rows, found = self.rows, []
-        for k in range(len(rows.parts)):
-            here = rows.place(k, self.patterns.mode, pattern)
-            for ways in here.element.meeting(here) if here.phase not in here.element.held else ():
-                slot = self.slots[f"{here.name}_{ways[0].name}"]
-                conditions[slot] = ways[0].value.values
-                found.append(slot)
-        return found
+    def _lead(
+        self, here: int, target: Pattern, element: str, rows: Any, kind: str, change: Change | None = None
+    ) -> None:
+        ends = self.numbers[here], self.patterns.number(target)
+        number = self.patterns.transition(*ends, element, rows, kind, change)
+        self.leads.append(Lead(number, here, target, element, rows, "" if kind == ALONE else kind))
 
     def _map(self, states: FloatArray) -> int:
         """The number of a map among those of the form; equal ones are kept once."""

@@ -28,6 +28,8 @@ from nonsmooth.kernels.tangent.segments import Segments
 ORDER = 24  # of the series of an orbit's legs
 ACCURACY = 1e-17  # of the last two terms of a series against its largest one, there
 MOST_STEPS = 100_000  # in one leg
+SLIGHT = 1e-6  # of the largest number: what is smaller need not be known better
+NEAR = 1e-13  # of an indicator's size: it is zero
 
 _i, _f = types.int64, types.float64
 _f1, _f2, _f3, _i1, _i2 = _f[::1], _f[:, ::1], _f[:, :, ::1], _i[::1], _i[:, ::1]
@@ -52,7 +54,7 @@ class Steps(NamedTuple):
     D: Any  # (order + 1, N, columns in whole blocks) series of the small changes, zero in columns without one
     W: Any  # scratch of the jet
     X: Any  # (n_u, N) small changes at the end of a step
-    Y: Any  # (n_u, N) scratch
+    Y: Any  # (n_u, N), two rows at least, scratch
     total: Any  # (n_u, N) products of X
     powers: Any  # (order + 1,) of a step
     u: Any  # (n_u,)
@@ -77,15 +79,23 @@ CROSSING = type_of(Crossing, *[_f2] * 4, _f1)
 
 
 @device
-def excess(C, D, n_u, columns, powers):
+def excess(C, D, n_u, columns, powers, tops):
     """The last two terms of every series against the largest of its first ones: the worst of them.
 
-    Small changes of one number are judged together in the columns of the states, and alone in the others."""
+    Small changes of one number are judged together in the columns of the states, and alone in the others; what is less
+    than ``SLIGHT`` of the largest of its kind, as that. ``tops``: room for a row of small changes."""
     order = C.shape[1] - 1
-    half, worst = order // 2, 0.0
+    half, worst, largest = order // 2, 0.0, 0.0
     high, low = powers[order], powers[order - 1]
+    for c in range(n_u, columns):
+        tops[1, c] = 0.0
     for i in range(n_u):
-        top, last = 0.0, 0.0
+        for k in range(half):
+            largest = max(largest, fabs(C[i, k]) * powers[k])
+            for c in range(n_u, columns):
+                tops[1, c] = max(tops[1, c], fabs(D[k, i, c]) * powers[k])
+    for i in range(n_u):
+        top, last = SLIGHT * largest, 0.0
         for k in range(half):
             size = fabs(C[i, k]) * powers[k]
             top = size if size > top else top
@@ -94,11 +104,15 @@ def excess(C, D, n_u, columns, powers):
             return inf
         if top > 0.0:
             worst = max(worst, last / top)
+        for c in range(columns):
+            tops[0, c] = fabs(D[0, i, c]) if c < n_u else max(SLIGHT * tops[1, c], fabs(D[0, i, c]))
+        for k in range(1, half):
+            for c in range(columns):
+                size = fabs(D[k, i, c]) * powers[k]
+                tops[0, c] = size if size > tops[0, c] else tops[0, c]
         top, last = 0.0, 0.0
         for c in range(columns):
-            for k in range(half):
-                size = fabs(D[k, i, c]) * powers[k]
-                top = size if size > top else top
+            top = max(top, tops[0, c])
             last = max(last, fabs(D[order, i, c]) * high + fabs(D[order - 1, i, c]) * low)
             if c >= n_u - 1:
                 if not (last < inf):
@@ -110,13 +124,13 @@ def excess(C, D, n_u, columns, powers):
 
 
 @device
-def step_for(C, D, n_u, columns, remaining, guess, powers, accuracy):
+def step_for(C, D, n_u, columns, remaining, guess, powers, accuracy, tops):
     """A step on which all series have converged, at most ``remaining``; negative where there is none."""
     order = C.shape[1] - 1
     h = min(guess, remaining)
     for _ in range(60):
         fill_powers(h, order, powers)
-        worst = excess(C, D, n_u, columns, powers)
+        worst = excess(C, D, n_u, columns, powers, tops)
         if not (worst < inf):
             return -1.0
         if worst <= accuracy and (h >= remaining or worst > 1e-3 * accuracy):
@@ -165,7 +179,7 @@ def step_along(jet, field, mode, t, remaining, sign, compared, equations, work, 
     C, D, X, u = work.C, work.D, work.X, work.u
     n_u, n_c, order = X.shape[0], X.shape[1], C.shape[1] - 1
     jet(mode, order, t, u, work.q, C, work.W, D)
-    h = step_for(C, D, n_u, n_c, remaining, guess, work.powers, work.accuracy)
+    h = step_for(C, D, n_u, n_c, remaining, guess, work.powers, work.accuracy, work.Y)
     if not h > 0.0:
         return 0.0, 0.0, guess
     if h < remaining:
@@ -285,8 +299,9 @@ def jump_at(k, t, n, equations, seen, out, work):
 def instant_of(n_rows, row, scale, timing, seen, out):
     """Derivative of the instant of a transition whose ``out`` and field before are known, to ``t_z``.
 
-    ``row``: the row of the condition that is zero, or -1: the one nearest to zero. ``timing``: dt/dp where there are no
-    rows. Returns the row and |h'| / (|h_z| |f|), 1 without rows."""
+    ``row``: the row of the condition that is zero, or -1: the one nearest to zero, of several that are zero the one
+    that changes fastest. ``timing``: dt/dp where there are no rows. Returns the row and |h'| / (|h_z| |f|), 1 without
+    rows."""
     t_z, f = seen.t_z, seen.fields[0]
     n, n_a = scale.shape[0], timing.shape[0]
     if n_rows == 0:
@@ -296,28 +311,31 @@ def instant_of(n_rows, row, scale, timing, seen, out):
             t_z[n + c] = timing[c]
         return row, 1.0
     rows, width = n + n * n + n + n * n_a, 2 + n + n_a
-    if row < 0:
-        best = inf
-        for r in range(n_rows):
-            at = rows + r * width
-            size = 0.0
-            for i in range(n):
-                size += fabs(out[at + 1 + i]) * scale[i]
-            distance = fabs(out[at]) / size if size > 0.0 else inf
-            if row < 0 or distance < best:
-                row, best = r, distance
-    at = rows + row * width
-    rate, across, speed = out[at + 1 + n], 0.0, 0.0
+    given, best, steep, rate, speed = row, inf, 0.0, 0.0, 0.0
     for i in range(n):
-        h_z = out[at + 1 + i]
-        rate += h_z * f[i]
-        across += h_z * h_z
         speed += f[i] * f[i]
+    for r in range(n_rows):
+        if given >= 0 and r != given:
+            continue
+        at = rows + r * width
+        size, across, change = 0.0, 0.0, out[at + 1 + n]
+        for i in range(n):
+            h_z = out[at + 1 + i]
+            size += fabs(h_z) * scale[i]
+            change += h_z * f[i]
+            across += h_z * h_z
+        steepness = fabs(change) / sqrt(across * speed) if across * speed > 0.0 else inf
+        distance = fabs(out[at]) / size if size > 0.0 else inf
+        if distance <= NEAR:
+            distance = -min(steepness, 1.0)
+        if row < 0 or r == given or distance < best:
+            row, best, steep, rate = r, distance, steepness, change
+    at = rows + row * width
     for i in range(n):
         t_z[i] = -out[at + 1 + i] / rate
     for c in range(n_a):
         t_z[n + c] = -out[at + 2 + n + c] / rate
-    return row, (fabs(rate) / sqrt(across * speed) if across * speed > 0.0 else inf)
+    return row, steep
 
 
 @device

@@ -71,17 +71,14 @@ class LinearForm:
         The harmonics k_h >= 1 that occur anywhere, ascending.
     affine_indicators, affine_outputs, affine_resets : bool
         Whether all of them have the form above.
-    source : str
-        The generated NumPy code.
     """
 
     multiples: tuple[int, ...]
     affine_indicators: bool
     affine_outputs: bool
     affine_resets: bool
-    source: str
-    _shapes: dict[str, tuple[int, ...]] = field(repr=False)
-    _fill: Callable[..., None] = field(repr=False)
+    _code: _TablesCode = field(repr=False, compare=False)
+    _fills: dict[Any, Callable[..., None]] = field(default_factory=dict, repr=False, compare=False)
 
     def evaluate(self, points: FloatArray) -> LinearTables:
         """Evaluate all matrices.
@@ -96,10 +93,32 @@ class LinearForm:
         LinearTables
             C-contiguous arrays of doubles; not finite where a formula is not (a division by a zero parameter).
         """
-        points = np.asarray(points, dtype=np.float64)
-        tables = {name: np.zeros((len(points), *shape)) for name, shape in self._shapes.items()}
+        return self._filled(points, None)
+
+    def slopes(self, points: FloatArray, place: int) -> LinearTables:
+        """The derivatives of all entries in one parameter, at fixed states and time (``omega``: of the frequency)."""
+        return self._filled(points, place)
+
+    def fill(self, values: FloatArray, place: int | None, tables: dict[str, FloatArray], again: bool = False) -> None:
+        """Write the entries that are not zero, or their derivatives in one parameter, into tables for one point.
+
+        Those of ``LinearTables`` that are not given are left out; ``again``: entries that are constants stand there."""
         with np.errstate(all="ignore"):
-            self._fill(np.ascontiguousarray(points.T), **tables)
+            self._filler(place, tuple(tables), again)(values[:, None], **tables)
+
+    def _filler(self, place: int | None, names: tuple[str, ...], again: bool = False) -> Callable[..., None]:
+        if (place, names, again) not in self._fills:
+            namespace: dict[str, Any] = {"np": np}
+            exec(compile(self._code.source(self.multiples, place, names, again), "<linear form>", "exec"), namespace)
+            self._fills[place, names, again] = namespace["fill"]
+        return self._fills[place, names, again]
+
+    def _filled(self, points: FloatArray, place: int | None) -> LinearTables:
+        points = np.asarray(points, dtype=np.float64)
+        shapes = self._code.shapes(len(self.multiples))
+        tables = {name: np.zeros((len(points), *shape)) for name, shape in shapes.items()}
+        with np.errstate(all="ignore"):
+            self._filler(place, tuple(tables))(np.ascontiguousarray(points.T), **tables)
         return LinearTables(**tables)
 
 
@@ -124,12 +143,7 @@ def linear_form(traced: Traced) -> LinearForm | None:
         code.add(row or [], "oa", "ob", "oc", "os", (i,), split=False)
     for i, vector in enumerate(resets):
         code.add((vector if affine_resets else None) or taking.identity(), "ra", "rb", "rc", "rs", (i,), split=True)
-    multiples, source, shapes = code.finished()
-    namespace: dict[str, Any] = {"np": np}
-    exec(compile(source, "<linear form>", "exec"), namespace)
-    return LinearForm(
-        multiples, indicators is not None, affine_outputs, affine_resets, source, shapes, namespace["fill"]
-    )
+    return LinearForm(code.multiples(), indicators is not None, affine_outputs, affine_resets, code)
 
 
 def _map_of(transition: TracedTransition, traced: Traced) -> tuple[Expr, ...]:
@@ -279,22 +293,31 @@ class _TablesCode:
                 elif isinstance(key, tuple):
                     self.entries.append((c if key[0] == "cos" else s, (*lead, i), key[1], split, coefficient))
 
-    def finished(self) -> tuple[tuple[int, ...], str, dict[str, tuple[int, ...]]]:
-        """(multiples, source, shapes without the points' axis)."""
-        multiples = tuple(sorted({k for _, _, k, _, _ in self.entries if isinstance(k, int)}))
+    def multiples(self) -> tuple[int, ...]:
+        """The harmonics that occur."""
+        return tuple(sorted({k for _, _, k, _, _ in self.entries if isinstance(k, int)}))
+
+    def source(self, multiples: tuple[int, ...], place: int | None, names: tuple[str, ...], again: bool) -> str:
+        """The function that fills some tables, or those of the derivatives in one parameter; ``again``: all that
+        depends on parameters."""
         targets: list[tuple[str, Expr]] = [] if self.base is None else [("omega[:]", self.base)]
         for table, index, k, split, coefficient in self.entries:
+            if table not in names:
+                continue
             if isinstance(k, int):
                 h = multiples.index(k)
                 index = (*index[:-1], h, index[-1]) if split else (*index, h)
             targets.append((f"{table}[{', '.join([':', *map(str, index)])}]", coefficient))
+        if place is not None:
+            targets = [(target, sympy.diff(e, self.traced.p[place])) for target, e in targets]
+            targets = [(target, e) for target, e in targets if e != 0]
+        if again:
+            targets = [(target, e) for target, e in targets if e.free_symbols]
         printer = Printer({symbol: f"p[{i}]" for i, symbol in enumerate(self.traced.p)}, arrays=True)
         lines = assignments(targets, printer, "g") or ["pass"]
-        shapes = self._shapes(len(multiples))
-        source = f"def fill(p, {', '.join(shapes)}):\n" + "".join(f"    {line}\n" for line in lines)
-        return multiples, source, shapes
+        return f"def fill(p, {', '.join(names)}):\n" + "".join(f"    {line}\n" for line in lines)
 
-    def _shapes(self, h: int) -> dict[str, tuple[int, ...]]:
+    def shapes(self, h: int) -> dict[str, tuple[int, ...]]:
         t = self.traced
         n, m, i, o, r = len(t.u) + len(t.m), len(t.fields), len(t.indicators), len(t.outputs), len(t.transitions)
         return {

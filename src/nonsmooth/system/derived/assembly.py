@@ -246,7 +246,7 @@ class Assembler(ABC):
                 forces |= dict(zip(held, needed, strict=True))
             else:
                 for k, of in zip(held, np.linalg.pinv(sums.T), strict=True):  # of least norm
-                    forces[k] = sum((float(share) * force for share, force in zip(of, needed, strict=True) if share), 0)
+                    forces[k] = sum((share.item() * force for share, force in zip(of, needed, strict=True) if share), 0)
             for k, r in self.rubbing.items():
                 if k in held and (side := self.place(r, mode, pattern).side):
                     forces[r] = -side * self.constant(r, "friction") * forces[k]
@@ -297,8 +297,11 @@ class Assembler(ABC):
                 edges.append(row)
             one_sided += [most is None] * (len(edges) - len(one_sided))
         for edge in _faces(np.array(edges), one_sided):
-            beyond = sum((float(p) * forces[j] for p, j in zip(sums @ edge, group, strict=True) if p), 0)
-            beyond -= sum((abs(float(row @ edge)) * most for row, most in bounds if row @ edge), 0)
+            beyond = sum((p.item() * forces[j] for p, j in zip(sums @ edge, group, strict=True) if p), 0)
+            for row, most in bounds:
+                reach = (row @ edge).item()
+                if reach:
+                    beyond -= (reach if reach.real > 0.0 else -reach) * most
             found.append(Leaving(None, [Condition(beyond, 1, names.pop(0))]))
         return found
 
@@ -330,13 +333,17 @@ def _faces(sums: FloatArray, one_sided: Sequence[bool]) -> list[FloatArray]:
     found: list[FloatArray] = []
     for some in combinations(range(len(sums)), size - 1):
         edges = sums[list(some)]
-        if size > 1 and np.linalg.matrix_rank(edges, tol=1e-9) < size - 1:
+        if size > 1 and np.linalg.matrix_rank(edges.real, tol=1e-9) < size - 1:
             continue
-        normal = np.linalg.svd(edges)[2][-1] if size > 1 else np.ones(1)
-        normal = np.where(np.abs(normal) < 1e-12, 0.0, normal)
-        normal /= np.abs(normal).max()
+        normal = np.ones(1, dtype=sums.dtype)
+        if size > 1:
+            m = int(np.abs(np.linalg.svd(edges.real)[2][-1]).argmax())
+            others = [i for i in range(size) if i != m]
+            normal = np.ones(size, dtype=sums.dtype)
+            normal[others] = np.linalg.solve(edges[:, others], -edges[:, m])
+            normal = np.where(np.abs(normal) < 1e-12, 0.0, normal)
         for side in (normal, -normal):
-            reach = sums @ side
+            reach = (sums @ side).real
             if (reach[list(one_sided)] > 1e-9).any() or any(np.allclose(side, other, atol=1e-9) for other in found):
                 continue
             found.append(side)

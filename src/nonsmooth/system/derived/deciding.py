@@ -289,7 +289,8 @@ class _Instant:
             if tried:
                 rubbing = {k: self.make.rubbing[k] for k in candidates if k in self.make.rubbing}
                 shares = {r: self.share(r) for r in rubbing.values()}
-                who = Candidates(every, {*self.contacts} & {*candidates}, rubbing, shares, slips, kinetic)
+                held = {*self.contacts} & {*candidates}
+                who = Candidates(every, held, rubbing, shares, slips, kinetic, self.numbers.known)
                 states, self.ends = moving_by_trial(who, G, lambda: self._ahead(every))
             else:
                 moving = self._moving(candidates, kinetic, G)

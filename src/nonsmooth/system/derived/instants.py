@@ -50,6 +50,7 @@ class Numbers(ABC):
     make: Assembler
     mode: str
     u: FloatArray
+    known: dict[Any, Any]  # what follows from the effects of forces alone
 
     @abstractmethod
     def copy(self) -> Numbers:
@@ -89,7 +90,7 @@ class RowNumbers(Numbers):
     """Numbers of an affine system."""
 
     def __init__(self, rows: Rows, mode: str, w: FloatArray, step: float = 0.0) -> None:
-        self.make, self.rows, self.mode, self.w = rows, rows, mode, w
+        self.make, self.rows, self.mode, self.w, self.known = rows, rows, mode, w, rows.known
         self.u = w[: rows.n]
         self.size = np.abs(w)
         self.size[: rows.n] += 0.25 * step * np.abs(rows.base(mode)) @ self.size
@@ -238,6 +239,7 @@ class SeriesNumbers(Numbers):
     ) -> None:
         self.make, self.code, self.mode, self.u, self.size = code.make, code, mode, u.copy(), np.abs(u)
         self.constants = np.array([t, *constants])
+        self.known = {}
         self.lanes = self._lanes()
         if step:
             self.size = self.size + 0.25 * step * np.abs([self.value(e) for e in code.make.base(mode)])
@@ -282,7 +284,7 @@ class SeriesNumbers(Numbers):
         return np.where(np.abs(found[0]) > ROUNDING * sizes(found), found[0], 0.0)
 
     def shift(self, change: FloatArray) -> None:
-        self.u = self.u + change
+        self.u, self.known = self.u + change, {}
         self.lanes = self._lanes()
 
     def ahead(self, some: Sequence[int], pattern: Pattern, forces: Sequence[tuple[int, Any]], laws: Any) -> Ahead:

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import sympy as sp
@@ -22,17 +22,40 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
 from nonsmooth.system.symbolic.period import forcing_period
+from nonsmooth.system.symbolic.traced import ENDS, Traced, TracedTransition
 from nonsmooth.system.symbolic.traced import Row as Condition
-from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 from nonsmooth.system.symbolic.tracing import call_scalar
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearForm, LinearTables
     from nonsmooth.system.derived.combinations import Expressions
+    from nonsmooth.system.derived.elements.element import Leaving
 
 __all__ = ["Patterns", "Row", "Rows"]
 
 ROUNDING = 1e-12  # of the terms of a sum: below it the sum is zero
+STEP = 1e-30  # of the imaginary parts that carry derivatives: its square is nothing
+
+Rows_ = tuple[tuple[int, int, int], ...]  # indicator, sign, strict of each condition
+
+
+class Out(NamedTuple):
+    """The ``way``-th way of an element out of its phase, and its conditions by their numbers."""
+
+    element: int
+    way: int
+    leaving: Leaving
+    rows: Rows_
+
+
+class Change(NamedTuple):
+    """What a transition does to the states: the ``way``-th way of an element out of its phase, or an impact of several
+    of them, with friction or one after the other where it ``rubs``."""
+
+    elements: tuple[int, ...]
+    way: int = -1
+    rubs: bool = False
+
 
 
 class Row:
@@ -47,7 +70,7 @@ class Row:
     @property
     def number(self) -> float | None:
         """Its value where it is a constant."""
-        return None if np.count_nonzero(self.values) > (self.values[self.one] != 0) else float(self.values[self.one])
+        return None if np.count_nonzero(self.values) > (self.values[self.one] != 0) else self.values[self.one].item()
 
     def __add__(self, other: Row | float) -> Row:
         if isinstance(other, Row):
@@ -85,19 +108,23 @@ class Row:
 
 
 class Rows(Assembler):
-    """The calculus of rows at one parameter point: a vector of states is an array (n, M)."""
+    """The calculus of rows at one parameter point: a vector of states is an array (n, M).
+
+    With complex numbers it is that of derivatives in a parameter, too (:meth:`Patterns.rows`)."""
 
     def __init__(self, patterns: Patterns, tables: LinearTables, i: int) -> None:
         self.n, harmonics = tables.A.shape[-1], tables.c.shape[-2]
         self.rates = tables.omega[i] * np.array(patterns.form.multiples, dtype=float)
         self.scale, self.asks, self.mode = patterns.scale, True, patterns.mode
         self.sequential = patterns.make.sequential
-        self.field = np.zeros((self.n, self.n + 1 + 2 * harmonics))
+        self.field = np.zeros((self.n, self.n + 1 + 2 * harmonics), dtype=tables.A.dtype)
         self._fill(self.field, tables.A[i, 0], tables.b[i, 0], tables.c[i, 0].T, tables.s[i, 0].T)
-        every = np.zeros((len(tables.ib[i]), self.field.shape[1]))
+        every = np.zeros((len(tables.ib[i]), self.field.shape[1]), dtype=self.field.dtype)
         self._fill(every, tables.ia[i], tables.ib[i], tables.ic[i], tables.is_[i])
         self._every, self._at = every, patterns.at
         self.parts = [self._part(k, name, patterns) for k, name in enumerate(patterns.elements)]
+        self.known: dict[Any, Any] = {}  # of what elements decide together
+        self._bases: dict[Any, tuple[list[int], FloatArray]] = {}
         self._approaches: dict[int, Row] = {}
         self._rates: dict[int, Row] = {}
         self._flows: dict[Pattern, tuple[FloatArray, dict[int, Any]]] = {}
@@ -118,7 +145,7 @@ class Rows(Assembler):
         return np.hstack([u, np.ones((len(time), 1)), waves])
 
     def _part(self, k: int, name: str, patterns: Patterns) -> Part:
-        direction = np.zeros(self.n)
+        direction = np.zeros(self.n, dtype=self.field.dtype)
         for i in patterns.acts_on[k]:
             number = Row(self._every[self._at[k, "on", i]], self.n).number
             if number is None:
@@ -153,8 +180,20 @@ class Rows(Assembler):
 
     def across(self, expression: Row, part: Part) -> float:
         terms = expression.values[: self.n] * part.direction
-        total = float(terms.sum())
+        total: float = terms.sum().item()
         return total if abs(total) > ROUNDING * float(np.abs(terms).sum()) else 0.0
+
+    def effects(self, some: Sequence[int], mode: str, parts: Sequence[Part] | None = None) -> Any:
+        rates = np.array([self.rate(i, mode).values[: self.n] for i in some]).reshape(len(some), 1, self.n)
+        terms = rates * np.array([part.direction for part in parts or [self.parts[k] for k in some]])
+        total = terms.sum(axis=-1)
+        return np.where(np.abs(total) > ROUNDING * np.abs(terms).sum(axis=-1), total, 0.0)
+
+    def basis(self, held: Sequence[int], mode: str, pattern: Pattern) -> tuple[list[int], FloatArray]:
+        key = tuple(held), tuple(pattern[r] for r in self.rubbing.values())
+        if key not in self._bases:
+            self._bases[key] = super().basis(held, mode, pattern)
+        return self._bases[key]
 
     def identity(self) -> FloatArray:
         return np.eye(self.n, self.field.shape[1])
@@ -179,13 +218,13 @@ class Rows(Assembler):
         return [Row(values, self.n) for values in np.linalg.solve(np.array(matrix), np.array(rows))]
 
     def slopes(self, expression: Row, draw: int = 0) -> FloatArray:
-        return expression.values[: self.n]
+        return expression.values[: self.n].real
 
     def pushes(self, part: Part, draw: int = 0) -> FloatArray:
-        return np.asarray(part.direction)
+        return np.asarray(part.direction).real
 
     def vanishes(self, expression: Any) -> bool:
-        return not (expression.values.any() if isinstance(expression, Row) else expression)
+        return not (expression.values.real.any() if isinstance(expression, Row) else expression)
 
     def size(self, expression: Row) -> float:
         return float(max(self.scale[expression.values[: self.n] != 0], default=1.0))
@@ -233,6 +272,7 @@ class Patterns:
     at: dict[tuple[int, str, int | None], int] = field(default_factory=dict)
     visited: list[Pattern] = field(default_factory=list)
     jumps: list[TracedTransition] = field(default_factory=list)
+    changes: list[Change | None] = field(default_factory=list)  # of the states, by each of the transitions
     equations: Traced = field(init=False)  # without elements; the expressions are its indicators
 
     def __post_init__(self) -> None:
@@ -247,6 +287,7 @@ class Patterns:
         self._lock = threading.Lock()
         self._known: dict[Pattern, int] = {}
         self._jumped: dict[Any, int] = {}
+        self._seen: tuple[tuple[int, int], Any] = (0, 0), None
         self.number((0,) * len(self.make.parts))
 
     def _keep(self, key: tuple[int, str, int | None], expression: Any) -> None:
@@ -272,6 +313,49 @@ class Patterns:
     def conditions(self) -> tuple[str, ...]:
         """Names of the conditions of all elements, the indicators of the system."""
         return tuple(f"{name}_{one}" for name, element in self.elements.items() for one in element.conditions)
+
+    @cached_property
+    def slots(self) -> dict[str, int]:
+        """The numbers of the conditions."""
+        return {name: k for k, name in enumerate(self.conditions)}
+
+    @cached_property
+    def owners(self) -> list[int]:
+        """The element of each condition."""
+        return [k for k, element in enumerate(self.elements.values()) for _ in element.conditions]
+
+    def ways_of(self, rows: Rows, pattern: Pattern, k: int) -> tuple[list[Out], dict[int, FloatArray], list[int]]:
+        """The ways of an element out of its phase in a pattern, the rows of its conditions by their numbers, and those
+        at which it meets what it may be held by."""
+        name, conditions = rows.parts[k].name, {}
+
+        def armed(one: Any) -> int:
+            own = f"{name}_{one.name}"
+            slot = self.slots[own if own in self.slots else one.name]
+            conditions[slot] = one.value.values
+            return slot
+
+        outs = [
+            Out(k, i, way, tuple((armed(one), one.sign, int(one.strict)) for one in way.conditions))
+            for i, way in enumerate(rows.leaving(k, self.mode, pattern))
+        ]
+        here = rows.place(k, self.mode, pattern)
+        ways = here.element.meeting(here) if here.phase not in here.element.held else []
+        return outs, conditions, [armed(way[0]) for way in ways]
+
+    def ways_out(self, rows: Rows, pattern: Pattern) -> tuple[FloatArray, list[Out], list[int]]:
+        """The rows (conditions, M) of a pattern, NaN where one is not asked for; the ways out; the conditions at which
+        elements meet what they may be held by."""
+        every = np.zeros((len(self.slots), rows.field.shape[1]), dtype=rows.field.dtype)
+        every[:, rows.n] = np.nan
+        found, meets = [], []
+        for k in range(len(rows.parts)):
+            outs, conditions, met = self.ways_of(rows, pattern, k)
+            found += outs
+            meets += met
+            for slot, values in conditions.items():
+                every[slot] = values
+        return every, found, meets
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
@@ -326,6 +410,17 @@ class Patterns:
         """The calculus at one parameter point."""
         return Rows(self, tables, i)
 
+    def rows_at(self, values: FloatArray, place: int | None = None) -> Rows:
+        """The calculus at given parameters; with a parameter's ``place`` that of numbers whose imaginary parts are
+        ``STEP`` times their derivatives in it."""
+        point = values[None, :]
+        tables = self.form.evaluate(point)
+        if place is None:
+            return Rows(self, tables, 0)
+        slopes = self.form.slopes(point, place)
+        both = {one.name: getattr(tables, one.name) + 1j * STEP * getattr(slopes, one.name) for one in fields(tables)}
+        return Rows(self, replace(tables, **both), 0)
+
     def number(self, pattern: Pattern) -> int:
         """The number of a pattern; the next one where it is visited for the first time."""
         with self._lock:
@@ -335,17 +430,20 @@ class Patterns:
             return self._known[pattern]
 
     def transition(
-        self, source: int, target: int, element: str, rows: Sequence[tuple[int, int, int]], ends: str = ""
+        self, source: int, target: int, element: str, rows: Rows_, kind: str, change: Change | None = None
     ) -> int:
-        """The number of a transition between numbered patterns; ``ends`` is the status of a run that ends there."""
+        """The number of a transition between numbered patterns, by the conditions of an element (of one in ``ENDS`` the
+        elements for which there is no answer); made where it is new."""
         with self._lock:
-            key = source, target, f"{element} {rows} {ends}"
+            key = source, target, element, rows, kind, change
             if key not in self._jumped:
                 names = self.name(self.visited[source]), self.name(self.visited[target])
                 conditions = tuple(Condition(indicator, sign, bool(strict)) for indicator, sign, strict in rows)
                 self._jumped[key] = len(self.jumps)
-                label = element if ends else " -> ".join(names)
-                self.jumps.append(TracedTransition(source, target, conditions, label=label, kind=ends))
+                label = element if kind in ENDS else " -> ".join(names)
+                contact = change is not None or source == 0
+                self.jumps.append(TracedTransition(source, target, conditions, contact=contact, label=label, kind=kind))
+                self.changes.append(change)
             return self._jumped[key]
 
     def name(self, pattern: Pattern) -> str:
@@ -354,20 +452,30 @@ class Patterns:
         return "_".join(f"{name}_{element.phases[k]}" for (name, element), k in phases)
 
     def seen(self) -> Traced:
-        """The equations as far as they are known: names and transitions of the patterns visited, no expressions."""
-        traced, modes = self.equations, list(self.visited)
+        """The equations as far as they are known: names and transitions of the patterns visited; what elements add has
+        no expressions."""
+        size = len(self.visited), len(self.jumps)
+        if self._seen[0] != size:
+            self._seen = size, self._as_seen(*size)
+        return self._seen[1]
+
+    def _as_seen(self, count: int, jumps: int) -> Traced:
+        traced, unknown = self.equations, sp.nan
         names = (*traced.output_names, *self.outputs)
-        unknown = sp.nan
+        acted = {i for some in self.acts_on for i in some}
+        field = tuple(unknown if i in acted else e for i, e in enumerate(traced.fields[0]))
+        own = tuple((output[0],) * count for output in traced.outputs)
         return replace(
-            traced, patterns=self, mode_names=tuple(map(self.name, modes)), indicator_names=self.conditions,
-            indicators=(unknown,) * len(self.conditions), transitions=tuple(self.jumps), output_names=names,
-            outputs=((unknown,) * len(modes),) * len(names), fields=((unknown,) * len(traced.u),) * len(modes),
-            lacking=(traced.lacking[0],) * len(modes),
+            traced, patterns=self, mode_names=tuple(map(self.name, self.visited[:count])),
+            indicator_names=self.conditions, indicators=(unknown,) * len(self.conditions),
+            transitions=tuple(self.jumps[:jumps]), output_names=names,
+            outputs=(*own, *(((unknown,) * count,) * len(self.outputs))), fields=(field,) * count,
+            lacking=(traced.lacking[0],) * count,
         )  # fmt: skip
 
     def forces(self, parameters: FloatArray, time: FloatArray, u: FloatArray, mode: Any) -> FloatArray:
         """Forces (N, elements) at N samples, each in the pattern of its mode."""
-        rows = self.rows(self.form.evaluate(parameters[None, :]), 0)
+        rows = self.rows_at(parameters)
         w = rows.augmented_all(u, time)
         found = np.zeros((len(time), len(self.elements)))
         for m in np.unique(mode):

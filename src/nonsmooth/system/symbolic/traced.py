@@ -16,10 +16,12 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.patterns import Patterns
 
 __all__ = [
-    "ALONE", "ASKED", "ASKS_BEHIND", "FOUND", "NOT_UNIQUE", "OWN", "TOGETHER", "Row", "Traced", "TracedTransition",
+    "ALONE", "ASKED", "ASKS_BEHIND", "ENDS", "FOUND", "NOT_UNIQUE", "OWN", "TOGETHER", "Row", "Traced",
+    "TracedTransition",
 ]  # fmt: skip
 
 ALONE, ASKED, TOGETHER, FOUND = "alone", "asked", "together", "found"  # kinds of transitions of elements
+ENDS = ("not_unique", "no_motion")  # of a question without an answer, in the order of their statuses' codes
 OWN, ASKS_BEHIND = "own", "asks behind"  # of the system's own beside elements that are asked
 NOT_UNIQUE = "_not_unique"  # ends the name of a derived mode from which motion has no unique way on
 
@@ -47,8 +49,9 @@ class TracedTransition:
     ``contact`` marks the transitions counted as contacts: those with a reset, and those that leave the first mode.
     ``kind`` is that of a transition of elements: ``ALONE`` where one decides by itself what it does next, ``ASKED``
     where several do so together (where it leads is found when it happens), ``TOGETHER`` what is asked where those of
-    the rows vanish together with another; ``FOUND`` where such a question has led: it never fires by its rows. Beside
-    these the system's own are ``OWN``, or ``ASKS_BEHIND`` where they have a reset: behind it elements are asked.
+    the rows vanish together with another; ``FOUND`` where such a question has led, one of ``ENDS`` where it has no
+    answer: it never fires by its rows. Beside these the system's own are ``OWN``, or ``ASKS_BEHIND`` where they have a
+    reset: behind it elements are asked.
     """
 
     source: int
@@ -60,6 +63,11 @@ class TracedTransition:
     contact: bool = False
     label: str = ""
     kind: str = ""
+
+    @property
+    def fires(self) -> bool:
+        """Return whether it happens by its rows or at its phase: an answer to a question follows another one."""
+        return self.kind not in (TOGETHER, FOUND, *ENDS)
 
 
 @dataclass(frozen=True)
@@ -96,6 +104,11 @@ class Traced:
     def is_map(self) -> bool:
         """Return whether the states change by transitions alone, and the period is 1."""
         return self.period == 1 and all(entry == 0 for field in self.fields for entry in field)
+
+    @property
+    def asks(self) -> bool:
+        """Return whether elements are asked what they do together (:mod:`nonsmooth.system.derived.deciding`)."""
+        return self.decider is not None or self.patterns is not None
 
     def without_answers(self, rows: bool = False) -> tuple[Traced, tuple[int, ...]]:
         """The system without the answers that change states as a transition before them, with ``rows`` one by the same

@@ -1,0 +1,215 @@
+"""The variational flow of systems whose modes are made when they are visited: rows of numbers in place of formulas.
+
+The rows of a mode and of a transition at given parameters, with their derivatives in the active ones (by the same
+algebra, :meth:`nonsmooth.system.derived.patterns.Patterns.rows_at`), are packed into one array, which the kernels read
+as the constants of a model (:mod:`nonsmooth.kernels.tangent.rows`): nothing is compiled for such a system.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.arrays import FloatArray
+from nonsmooth.flow.variational_rows import NONE, SIZES, RowsFlow
+from nonsmooth.system.derived.deciding import decide
+from nonsmooth.system.derived.instants import RowNumbers
+from nonsmooth.system.derived.patterns import STEP, Change, Patterns, Row, Rows
+
+if TYPE_CHECKING:
+    from nonsmooth.system.derived.assembly import Pattern
+    from nonsmooth.system.symbolic.traced import Traced
+
+__all__ = ["PatternFlow", "pattern_flow"]
+
+OFF = 1e-5  # of a parameter, for the differences by which an impact with friction depends on it
+
+
+class PatternFlow(RowsFlow):
+    """Segments and jumps of the modes and transitions that were visited so far."""
+
+    def __init__(self, patterns: Patterns, active: tuple[str, ...], scale: FloatArray) -> None:
+        self.patterns, self.harmonics = patterns, len(patterns.form.multiples)
+        super().__init__(patterns.seen(), active, scale)
+
+    def known(self) -> Traced:
+        return self.patterns.seen()
+
+    def _at(self, values: FloatArray) -> Packed:
+        last = next(reversed(self._local.rows.values()), None)
+        return Packed(self.patterns, self.traced, values, self.places, last)
+
+    def on_path(self, values: FloatArray, modes: Any) -> FloatArray:
+        found: FloatArray = self.kept(values).array(modes, watched=True)
+        return found
+
+    def _ready(self, values: FloatArray, modes: Any) -> tuple[FloatArray, Any]:
+        return NONE, self.scratch()._replace(q=self.kept(values).array(modes))
+
+    def _ready_to_jump(self, values: FloatArray, k: int, t: float, z: FloatArray) -> tuple[FloatArray, Any]:
+        return NONE, self.scratch()._replace(q=self.kept(values).of_jump(k, t, z))
+
+    def _taken(self, at: Packed, i: int, mode: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        rows = parts([one.row(mode, i).values for one in at.every])
+        return rows, parts([one.flow(mode) for one in at.every]), at.rates
+
+
+def parts(every: Sequence[FloatArray]) -> FloatArray:
+    """Numbers, and their derivatives, which the imaginary parts of others carry."""
+    return np.array([every[0], *(np.imag(one) / STEP for one in every[1:])])
+
+
+@dataclass
+class Calculus:
+    """Rows at one parameter point, of which those that were looked at are kept."""
+
+    patterns: Patterns
+    rows: Rows
+    fields: dict[int, FloatArray] = field(default_factory=dict)
+    conditions: dict[tuple[int, int], dict[int, FloatArray]] = field(default_factory=dict)
+    last: int = -1  # the mode whose neighbours' fields the rows keep
+
+    def pattern(self, mode: int) -> Pattern:
+        """The pattern of a mode that is now looked at."""
+        if mode != self.last:
+            self.rows.forget()
+            self.last = mode
+        return self.patterns.visited[mode]
+
+    def flow(self, mode: int) -> FloatArray:
+        """The field of a mode."""
+        if mode not in self.fields:
+            self.fields[mode] = self.rows.flow(self.patterns.mode, self.pattern(mode))[0]
+        return self.fields[mode]
+
+    def of_element(self, mode: int, k: int) -> dict[int, FloatArray]:
+        """The conditions of an element in a mode."""
+        if (mode, k) not in self.conditions:
+            self.conditions[mode, k] = self.patterns.ways_of(self.rows, self.pattern(mode), k)[1]
+        return self.conditions[mode, k]
+
+    def row(self, mode: int, slot: int) -> Row:
+        """One condition in a mode; those of forces that several share are told by the first of them."""
+        owner = self.patterns.owners[slot]
+        for k in (owner, *range(len(self.rows.parts))):
+            if slot in (found := self.of_element(mode, k)):
+                return Row(found[slot], self.rows.n)
+        return Row(np.full(self.rows.field.shape[1], np.nan, dtype=self.rows.field.dtype), self.rows.n)
+
+    def watched(self, mode: int) -> FloatArray:
+        """All conditions of a mode."""
+        every = np.zeros((len(self.patterns.slots), self.rows.field.shape[1]))
+        every[:, self.rows.n] = np.nan
+        for k in range(len(self.rows.parts)):
+            for slot, values in self.of_element(mode, k).items():
+                every[slot] = values
+        return every
+
+    def map(self, mode: int, change: Change | None) -> FloatArray:
+        """What a transition does to the states, but for an impact that rubs."""
+        if change is None:
+            return self.rows.identity()
+        if change.way < 0:
+            found: FloatArray = self.rows.impact(change.elements, self.patterns.mode)
+            return found
+        ways = self.rows.leaving(change.elements[0], self.patterns.mode, self.pattern(mode))
+        states: FloatArray = ways[change.way].states
+        return states
+
+    def rubbed(self, mode: int, change: Change, w: FloatArray) -> FloatArray:
+        """What an impact that rubs does to the states: its impulses are homogeneous functions of the rates."""
+        numbers = RowNumbers(self.rows, self.patterns.mode, w.copy())
+        found = decide(numbers, self.patterns.visited[mode], change.elements).rubbed
+        if found is None:
+            return self.rows.identity()
+        some, slopes = found
+        ways = np.array([self.rows.parts[k].direction for k in some]).T
+        rates = np.array([self.rows.rate(k, self.patterns.mode).values for k in some])
+        moved: FloatArray = self.rows.identity() + ways @ slopes @ rates
+        return moved
+
+
+class Packed:
+    """A system at one parameter point, as the kernels read it."""
+
+    def __init__(
+        self, patterns: Patterns, traced: Traced, values: FloatArray, places: tuple[int, ...], last: Packed | None
+    ) -> None:
+        self.patterns, self.traced, self.values, self.places = patterns, traced, values, places
+        self.every = [Calculus(patterns, patterns.rows_at(values, place)) for place in (None, *places)]
+        self.n = self.every[0].rows.n
+        rates = [self.every[0].rows.rates, *(one.rows.rates.imag / STEP for one in self.every[1:])]
+        self.rates = np.array(rates).reshape(1 + len(places), -1)
+        self.wanted: set[int] = set() if last is None else set(last.wanted)
+        self.watched: set[int] = set()
+        self.jumps: dict[int, tuple[FloatArray, FloatArray]] = {}
+        self.q = NONE
+
+    def of_jump(self, k: int, t: float, z: FloatArray) -> FloatArray:
+        """The numbers of a transition and of the modes beside it; those of an impact that rubs are of the instant."""
+        jump, change = self.traced.transitions[k], self.patterns.changes[k]
+        if k not in self.jumps or (change is not None and change.rubs):
+            rows = [np.array([one.row(jump.source, row.indicator).values for row in jump.rows]) for one in self.every]
+            self.jumps[k] = parts(rows).reshape(len(self.every), -1), self._map(k, t, z)
+        return self._array({jump.source, jump.target}, (), (k,))
+
+    def array(self, modes: Any, watched: bool = False) -> FloatArray:
+        """All numbers of some modes, with all their conditions where they are ``watched``, and of those asked for
+        before."""
+        some = set(map(int, modes))
+        if not len(self.q) or not some <= self.wanted or (watched and not some <= self.watched):
+            self.wanted |= some
+            self.watched |= some if watched else set()
+            self.q = self._array(self.wanted, self.watched, ())
+        return self.q
+
+    def _map(self, k: int, t: float, z: FloatArray) -> FloatArray:
+        """The map of a transition, and its derivatives in the active parameters."""
+        mode, change = self.traced.transitions[k].source, self.patterns.changes[k]
+        if change is None or not change.rubs:
+            return parts([one.map(mode, change) for one in self.every])
+        w, maps = self.every[0].rows.augmented(z, t), []
+        for place in self.places:
+            by = OFF * max(abs(self.values[place]), OFF)
+            sides = []
+            for side in (by, -by):
+                values = self.values.copy()
+                values[place] += side
+                sides.append(Calculus(self.patterns, self.patterns.rows_at(values)).rubbed(mode, change, w))
+            maps.append((sides[0] - sides[1]) / (2 * by))
+        return np.array([self.every[0].rubbed(mode, change, w), *maps])
+
+    def _array(self, modes: Iterable[int], watched: Iterable[int], taken: Iterable[int]) -> FloatArray:
+        count, width = len(self.traced.mode_names), self.n + 1 + 2 * self.rates.shape[1]
+        sizes = [self.n, self.rates.shape[1], len(self.places), len(self.patterns.slots), count, self.n * width]
+        places = np.full(2 * count + len(self.traced.transitions), -1.0)
+        place = SIZES + self.rates.size + len(places)
+        blocks: list[FloatArray] = []
+
+        def put(k: int, *some: FloatArray) -> None:
+            nonlocal place
+            places[k] = place
+            blocks.extend(some)
+            place += sum(map(len, some))
+
+        for mode in sorted(modes):
+            put(mode, parts([one.flow(mode) for one in self.every]).ravel())
+        for mode in sorted(watched):
+            put(count + mode, self.every[0].watched(mode).ravel())
+        for k in taken:
+            rows, maps = self.jumps[k]
+            number = rows.shape[1] // width
+            at = place + 4 + number
+            begin = [number, rows.shape[1], self.n * width, at + rows.size, *(at + width * np.arange(number))]
+            put(2 * count + k, np.array(begin, dtype=float), rows.ravel(), maps.ravel())
+        return np.concatenate([np.array(sizes, dtype=float), self.rates.ravel(), places, *blocks])
+
+
+@lru_cache(maxsize=32)
+def pattern_flow(patterns: Patterns, names: tuple[str, ...], scale: tuple[float, ...]) -> PatternFlow:
+    """The flow of a system's patterns; made once for the same names."""
+    return PatternFlow(patterns, names, np.array(scale))

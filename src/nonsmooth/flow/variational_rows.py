@@ -1,0 +1,215 @@
+"""The variational flow of systems whose modes are linear: rows of numbers in place of compiled formulas.
+
+The rows of modes, conditions and transitions over w = (u, memory, 1, cos k_1 w t, sin k_1 w t, ...), with their
+derivatives in the active parameters, stand in one array, which the kernels read as the constants of a model
+(:mod:`nonsmooth.kernels.tangent.rows`): nothing is compiled for such a system.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.arrays import FloatArray
+from nonsmooth.flow.saltation import Touch
+from nonsmooth.flow.variational import VariationalFlow
+from nonsmooth.system.codegen.linear import linear_form
+
+if TYPE_CHECKING:
+    from nonsmooth.system.symbolic.traced import Traced
+
+__all__ = ["NONE", "SIZES", "LinearFlow", "RowsFlow"]
+
+NONE = np.zeros(0)
+KEPT = 4  # parameter points whose rows are kept by a thread
+SIZES = 6  # numbers at the head
+
+
+@dataclass(frozen=True)
+class RowsModel:
+    """The functions of ``kernels.tangent.rows``, as those of a model (``codegen.variations.VariationalModel``)."""
+
+    jet: Any
+    field: Any
+    switch: Any
+    path: Any
+    entries: Any
+    kinds: Any
+    n_scratch: int
+
+
+class RowsFlow(VariationalFlow):
+    """Segments and jumps by rows of numbers."""
+
+    harmonics: int
+
+    @abstractmethod
+    def _at(self, values: FloatArray) -> Any:
+        """The rows at parameters."""
+
+    @abstractmethod
+    def _taken(self, at: Any, i: int, mode: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Of a condition in a mode, of the mode's field and of the harmonics' rates: the rows, and in the order of the
+        active parameters their derivatives: (1 + n_active, M), (1 + n_active, n, M), (1 + n_active, harmonics)."""
+
+    def _compiled(self) -> tuple[Any, Sequence[int]]:
+        from nonsmooth.kernels.compile.cache import compiled
+        from nonsmooth.kernels.tangent import rows
+
+        n, modes = self.n, len(self.traced.mode_names)
+        jet, field, switch, path = map(compiled, (rows.jet, rows.field, rows.switch, rows.path))
+        entries = np.repeat(np.arange(n, dtype=np.int64)[:, None], 2, axis=1)  # the diagonal, of which the sum is asked
+        kinds = np.ones((modes, n), dtype=np.int64)
+        model = RowsModel(jet, field, switch, path, entries, kinds, 2 * self.harmonics + max(1, self.n_active))
+        return model, range(len(self.traced.transitions))
+
+    @property
+    def n_moving(self) -> int:
+        return self.n
+
+    def path(self) -> tuple[Any, int]:
+        return self.model.path, self.model.n_scratch
+
+    def kept(self, values: FloatArray) -> Any:
+        """The rows at parameters: those of the last few are kept."""
+        kept = self._local.__dict__.setdefault("rows", {})
+        key = np.asarray(values, dtype=float).tobytes()
+        if key not in kept:
+            found = self._at(np.array(values, dtype=float))
+            while len(kept) >= KEPT:
+                del kept[next(iter(kept))]
+            kept[key] = found
+        return kept[key]
+
+    def indicator(self, values: Any, i: int, mode: int, t: float, z: Any) -> Touch:
+        rows, fields, rates = self._taken(self.kept(values), i, mode)
+        n, angles = self.n, rates[0] * t
+        w = np.concatenate([z, [1.0], np.stack([np.cos(angles), np.sin(angles)], axis=-1).ravel()])
+
+        def turned(row: FloatArray, speeds: FloatArray) -> FloatArray:
+            found = np.zeros_like(row)
+            found[n + 1 :: 2], found[n + 2 :: 2] = speeds * row[n + 2 :: 2], -speeds * row[n + 1 :: 2]
+            return found
+
+        def taken(row: FloatArray, of_p: Sequence[FloatArray]) -> tuple[float, FloatArray, float, FloatArray]:
+            slopes = [d @ w + t * (turned(row, speeds) @ w) for d, speeds in zip(of_p, rates[1:], strict=True)]
+            return float(row @ w), row[:n].copy(), float(turned(row, rates[0]) @ w), np.array(slopes)
+
+        row, *of_p = rows
+        slope = row[:n] @ fields[0] + turned(row, rates[0])
+        slope_p = [
+            d[:n] @ fields[0] + row[:n] @ field_p + turned(d, rates[0]) + turned(row, speeds)
+            for d, field_p, speeds in zip(of_p, fields[1:], rates[1:], strict=True)
+        ]
+        second = slope[:n] @ fields[0] + turned(slope, rates[0])
+        return Touch(*taken(row, of_p), *taken(slope, slope_p), float(second @ w))
+
+
+class LinearFlow(RowsFlow):
+    """The flow of a system whose modes, indicators and resets are affine, by its linear form.
+
+    In its array the fields of all modes stand behind each other, then their derivatives in each parameter; so do the
+    conditions and the maps of all transitions."""
+
+    def _take(self, traced: Traced) -> None:
+        plain, self.stands = traced.without_answers(rows=True)
+        form = linear_form(plain)
+        assert form is not None
+        self.form, self.plain, self.harmonics = form, plain, len(form.multiples)
+        self._lay_out()
+        super()._take(traced)
+
+    def _compiled(self) -> tuple[Any, Sequence[int]]:
+        return super()._compiled()[0], self.stands
+
+    def _lay_out(self) -> None:
+        """Make the array without its numbers, and find what stands where."""
+        t, n, h, a = self.plain, self.n, self.harmonics, self.n_active
+        modes, jumps, conditions, width = len(t.mode_names), len(t.transitions), len(t.indicators), n + 1 + 2 * h
+        sizes = modes * n * width, conditions * width, jumps * n * width
+        places, head = np.zeros(2 * modes + jumps), SIZES + h * (1 + a)
+        fields = head + len(places)
+        self.begin = fields, fields + (1 + a) * sizes[0], fields + (1 + a) * (sizes[0] + sizes[1])
+        self.sizes, at = sizes, fields + (1 + a) * sum(sizes)
+        places[:modes] = fields + np.arange(modes) * n * width
+        places[modes : 2 * modes] = self.begin[1]
+        self.sliding = [mode for mode, kept in enumerate(t.along) if kept]  # along surfaces, which say nothing there
+        for mode in self.sliding:
+            places[modes + mode], at = at, at + sizes[1]
+        lists: list[float] = []
+        for k, jump in enumerate(t.transitions):
+            places[2 * modes + k] = at + len(lists)
+            rows = [self.begin[1] + row.indicator * width for row in jump.rows]
+            lists += [len(rows), sizes[1], sizes[2], self.begin[2] + k * n * width, *rows]
+        self.empty = np.concatenate([np.zeros(head), places, np.zeros(at - fields), lists])
+        self.empty[:SIZES] = n, h, a, conditions, modes, sizes[0]
+        gone = [[*t.lacking[jump.target], *([False] * len(t.m))] for jump in t.transitions]
+        self.gone = np.array(gone, dtype=bool).reshape(jumps, n)
+        self.some_gone = bool(self.gone.any())
+
+    def _views(self, q: FloatArray, d: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Fields, conditions and maps in the array, or their derivatives in a parameter."""
+        width = self.n + 1 + 2 * self.harmonics
+        fields, conditions, maps = (
+            q[at + d * size : at + (d + 1) * size] for at, size in zip(self.begin, self.sizes, strict=True)
+        )
+        return fields.reshape(-1, self.n, width), conditions.reshape(-1, width), maps.reshape(-1, self.n, width)
+
+    def _buffer(self) -> tuple[FloatArray, list[dict[str, FloatArray]]]:
+        """The thread's array, and the tables of the linear form in it: its entries, their derivatives."""
+        found: tuple[FloatArray, list[dict[str, FloatArray]]] | None = getattr(self._local, "buffer", None)
+        if found is None:
+            q, n, tables = self.empty.copy(), self.n, []
+            for d in range(1 + self.n_active):
+                fields, conditions, maps = self._views(q, d)
+                of_conditions = conditions[None]
+                tables.append({
+                    "omega": np.zeros(1), **dict(zip("Abcs", _split(fields, n), strict=True)),
+                    "ia": of_conditions[..., :n], "ib": of_conditions[..., n],
+                    "ic": of_conditions[..., n + 1 :: 2], "is_": of_conditions[..., n + 2 :: 2],
+                    **dict(zip(("ra", "rb", "rc", "rs"), _split(maps, n), strict=True)),
+                })  # fmt: skip
+            found = self._local.buffer = q, tables
+        return found
+
+    def _at(self, values: FloatArray) -> FloatArray:
+        again = hasattr(self._local, "buffer")
+        (q, tables), h = self._buffer(), self.harmonics
+        for d, (place, into) in enumerate(zip((None, *self.places), tables, strict=True)):
+            self.form.fill(values, place, into, again)
+            if h:
+                q[SIZES + d * h : SIZES + (d + 1) * h] = into["omega"] * self.form.multiples
+            if self.some_gone:
+                self._views(q, d)[2][self.gone] = 0.0
+        for mode in self.sliding:
+            at = int(q[SIZES + h * (1 + self.n_active) + len(self.plain.mode_names) + mode])
+            watched = q[at : at + self.sizes[1]].reshape(-1, self.n + 1 + 2 * h)
+            watched[:] = self._views(q, 0)[1]
+            watched[list(self.plain.along[mode])] = 0.0
+        return q.copy()
+
+    def on_path(self, values: FloatArray, modes: Any) -> FloatArray:
+        found: FloatArray = self.kept(values)
+        return found
+
+    def _ready(self, values: FloatArray, modes: Any) -> tuple[FloatArray, Any]:
+        return NONE, self.scratch()._replace(q=self.kept(values))
+
+    def _ready_to_jump(self, values: FloatArray, k: int, t: float, z: FloatArray) -> tuple[FloatArray, Any]:
+        return NONE, self.scratch()._replace(q=self.kept(values))
+
+    def _taken(self, at: FloatArray, i: int, mode: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        every = [self._views(at, d) for d in range(1 + self.n_active)]
+        rates = at[SIZES : SIZES + self.harmonics * (1 + self.n_active)].reshape(1 + self.n_active, -1)
+        return np.array([one[1][i] for one in every]), np.array([one[0][mode] for one in every]), rates
+
+
+def _split(rows: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Rows (..., n, M) as tables of a linear form, with a leading dim: of the states, constants, cosines, sines."""
+    rows = rows[None]
+    cosines, sines = (np.swapaxes(rows[..., n + k :: 2], -1, -2) for k in (1, 2))
+    return rows[..., :n], rows[..., n], cosines, sines

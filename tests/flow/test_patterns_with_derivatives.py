@@ -1,0 +1,124 @@
+"""Derivatives of systems whose modes are made when visited: against differences, and against the same written out."""
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.system.derived import combinations
+
+E = ns.elements
+START = {"q1": -0.4, "q2": 0.2, "q3": 0.3, "v_q1": 0.1, "v_q2": 0.33, "v_q3": 0.2}
+VALUES = {"m": 1.0, "k": 1.0, "c": 0.05, "F": 1.2, "omega": 0.9, "mu": 0.05, "e": 0.6, "pos": 0.35, "belt": 0.2,
+          "phi": 0.1, "fr": 0.1, "kc": 3.0}  # fmt: skip
+
+
+def row(n, elements, used, impacts="simultaneous"):
+    """A row of n masses between walls, the first one driven, as a function of values other than ``VALUES``."""
+
+    def stiffness(p):
+        return p.k * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+
+    mass = [[("m" if i == 0 else 0.838 if i == 1 else 1.0) if i == j else 0 for j in range(n)] for i in range(n)]
+    damping = [["c" if i == j else 0 for j in range(n)] for i in range(n)]
+    names = {"m", "k", "c", "F", "omega", "phi", *used}
+
+    def make(**other):
+        values = {name: value for name, value in {**VALUES, **other}.items() if name in names}
+        return ns.mechanical(
+            mass, damping, stiffness, parameters=values, elements=elements, impacts=impacts,
+            forcing={"q1": lambda t, p: p.F * np.cos(p.omega * t + p.phi)},
+        )  # fmt: skip
+
+    return make
+
+
+def many(n=4):
+    """A stop, a friction and an elastic stop at each of four masses: 20 736 combinations of phases."""
+    elements = {}
+    for i in range(1, n + 1):
+        elements[f"s{i}"] = E.Stop(at=f"q{i}", position="pos", restitution="e")
+        elements[f"f{i}"] = E.Coulomb(at=f"q{i}", friction="fr")
+        elements[f"e{i}"] = E.ElasticStop(at=f"q{i}", side=-1, position=-0.3, stiffness="kc")
+    return row(n, elements, {"pos", "e", "fr", "kc"})
+
+
+RUBS = {
+    "stop": E.Stop(at="q1", position="pos", restitution="e", friction="mu", tangent="q2", belt="belt"),
+    "friction": E.Coulomb(at="q2", friction="fr"),
+}
+SLIPS = {"stop": E.Stop(at="q1", position="pos", restitution="e", friction="mu", tangent={"q2": 1, "q1": 0.2},
+                        belt=1.5)}  # fmt: skip
+CRADLE = {
+    "a": E.Stop(at={"q1": 1, "q2": -1}, restitution="e"),
+    "b": E.Stop(at={"q2": 1, "q3": -1}, position=0.1, restitution="e"),
+    "c": E.Stop(at="q3", position="pos", restitution="e"), "friction": E.Coulomb(at="q2", friction="fr"),
+}  # fmt: skip
+CASES = {
+    "rubs": (row(2, RUBS, {"pos", "e", "mu", "belt", "fr"}), ("m", "k", "mu", "e", "pos", "omega", "phi", "fr")),
+    "slips": (row(2, SLIPS, {"pos", "e", "mu"}), ("m", "k", "mu", "e", "pos", "omega", "phi")),
+    "in sequence": (row(3, CRADLE, {"pos", "e", "fr"}, "sequential"), ("m", "k", "e", "pos", "omega", "phi", "fr")),
+    "many": (many(), ("m", "k", "e", "pos", "omega", "phi", "fr", "kc")),
+}
+
+
+def end(system, start):
+    return ns.simulate(system, duration=23.1, start=start, samples=2).u.values[-1]
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize("case", CASES)
+def test_a_run_answers_to_parameters_and_start_as_differences_say(case):
+    make, names = CASES[case]
+    system, step = make(), 1e-6
+    start = {name: START.get(name, 0.21) for name in system.states}
+    if case == "in sequence":
+        start["v_q3"] = 0.0
+    found = ns.sensitivity(system, duration=23.1, start=start, parameters=names)
+    np.testing.assert_allclose(found.end.values, end(system, start), atol=1e-13)
+    for j, name in enumerate(names):
+        value = system.values[name]
+        sides = [end(make(**{name: value + by}), start) for by in (step, -step)]
+        slope = (sides[0] - sides[1]) / (2 * step)
+        assert np.abs(found.P.values[:, j] - slope).max() < 1e-6 * max(1.0, np.abs(slope).max())
+    for j, name in enumerate(system.states):
+        sides = [end(system, {**start, name: start[name] + by}) for by in (step, -step)]
+        slope = (sides[0] - sides[1]) / (2 * step)
+        np.testing.assert_allclose(found.Phi.values[:, j], slope, atol=1e-6)
+
+
+@pytest.mark.physics
+def test_friction_and_impacts_that_accumulate_at_one_coordinate():
+    """A mass comes to rest at a stop under friction; where both hold, nothing of the start is left."""
+    system = ns.mechanical(
+        1.0, 0.05, 1.0, coordinates=["q"], parameters={"pos": -0.35, "F": 0.5, "w": 0.9},
+        forcing={"q": lambda t, p: p.F * np.cos(p.w * t + 0.1)},
+        elements={"stop": E.Stop(at="q", position="pos", restitution=0.6), "f": E.Coulomb(at="q", friction=0.1)},
+    )  # fmt: skip
+    found = ns.sensitivity(system, duration=23.1, start={"q": -0.5, "v_q": 0.2}, parameters=["pos", "F"])
+    assert found.sizes["crossing"] > 50
+    np.testing.assert_allclose(found.P.sel(parameter="pos"), [1.0, 0.0], atol=1e-10)
+    np.testing.assert_allclose(found.P.sel(parameter="F"), 0.0, atol=1e-10)
+    np.testing.assert_allclose(found.Phi, 0.0, atol=1e-10)
+
+
+def pair():
+    return ns.mechanical(
+        np.diag([1.0, 0.8]), [[0.1, -0.02], [-0.02, 0.1]], [[3.0, -1.0], [-1.0, 2.0]],
+        parameters={"F": 1.2, "w": 1.1, "mu": 0.1}, forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
+        elements={"f": E.Coulomb(at="q2", friction="mu"), "s": E.Stop(at="q1", position=0.4, restitution=0.5)},
+    )  # fmt: skip
+
+
+def test_orbits_and_branches_are_those_of_the_system_written_out(monkeypatch):
+    written = pair()
+    assert len(written.modes) > 1
+    monkeypatch.setattr(combinations, "MOST", 1)
+    visited = pair()
+    orbits = [ns.find_orbit(one) for one in (written, visited)]
+    values = [np.sort_complex(np.asarray(orbit.floquet_multipliers)) for orbit in orbits]
+    np.testing.assert_allclose(values[1], values[0], atol=1e-11)
+    branches = [ns.continue_orbit(orbit, "w", (1.05, 1.3)) for orbit in orbits]
+    kinds = [list(map(str, branch.special_kind.values)) for branch in branches]
+    assert kinds[0] == kinds[1]
+    assert kinds[0]
+    np.testing.assert_allclose(branches[1].special_value, branches[0].special_value, rtol=1e-9)
