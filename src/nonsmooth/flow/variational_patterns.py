@@ -39,6 +39,13 @@ class PatternFlow(RowsFlow):
     def known(self) -> Traced:
         return self.patterns.seen()
 
+    def look_at(self, modes: Any, values: FloatArray) -> None:
+        new = [pattern for mode in modes if (pattern := self.patterns.visited[mode]) not in self.patterns.led]
+        rows = self.patterns.rows_at(values) if new else None
+        for pattern in new:
+            self.patterns.leads_of(rows, pattern)
+        self.catch_up()
+
     def _at(self, values: FloatArray) -> Packed:
         last = next(reversed(self._local.rows.values()), None)
         return Packed(self.patterns, self.traced, values, self.places, last)

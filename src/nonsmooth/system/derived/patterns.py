@@ -22,7 +22,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
 from nonsmooth.system.symbolic.period import forcing_period
-from nonsmooth.system.symbolic.traced import ENDS, Traced, TracedTransition
+from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, TOGETHER, Traced, TracedTransition
 from nonsmooth.system.symbolic.traced import Row as Condition
 from nonsmooth.system.symbolic.tracing import call_scalar
 
@@ -46,6 +46,17 @@ class Out(NamedTuple):
     way: int
     leaving: Leaving
     rows: Rows_
+
+
+class Lead(NamedTuple):
+    """A transition: its number, its ends, the element and the conditions by which it happens, its kind."""
+
+    number: int
+    source: Pattern
+    target: Pattern
+    element: str
+    rows: Rows_
+    kind: str
 
 
 class Change(NamedTuple):
@@ -273,6 +284,7 @@ class Patterns:
     visited: list[Pattern] = field(default_factory=list)
     jumps: list[TracedTransition] = field(default_factory=list)
     changes: list[Change | None] = field(default_factory=list)  # of the states, by each of the transitions
+    led: set[Pattern] = field(default_factory=set)  # patterns whose ways out are known
     equations: Traced = field(init=False)  # without elements; the expressions are its indicators
 
     def __post_init__(self) -> None:
@@ -356,6 +368,25 @@ class Patterns:
             for slot, values in conditions.items():
                 every[slot] = values
         return every, found, meets
+
+    def leads_of(self, rows: Rows, pattern: Pattern) -> tuple[FloatArray, list[Lead], list[Any], list[int]]:
+        """The rows of a pattern's conditions; its ways out as transitions, what is asked where several elements meet
+        last; the states behind each; the conditions at which elements meet what they may be held by."""
+        conditions, outs, meets = self.ways_out(rows, pattern)
+        found, states, here = [], [], self.number(pattern)
+        for k, i, way, given in outs:
+            part = rows.parts[k]
+            target = pattern if way.phase is None else rows.place(k, self.mode, pattern).put(way.phase).pattern
+            kind = ASKED if way.phase is None else ALONE if part.element.held else ""
+            change = None if way.states is None else Change((k,), i)
+            number = self.transition(here, self.number(target), part.name, given, kind, change)
+            found.append(Lead(number, pattern, target, part.name, given, kind))
+            states.append(way.states)
+        together = tuple((slot, 1, 1) for slot in dict.fromkeys(meets))
+        number = self.transition(here, here, "", together, TOGETHER)
+        found.append(Lead(number, pattern, pattern, "", together, TOGETHER))
+        self.led.add(pattern)
+        return conditions, found, [*states, None], meets
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
@@ -445,6 +476,28 @@ class Patterns:
                 self.jumps.append(TracedTransition(source, target, conditions, contact=contact, label=label, kind=kind))
                 self.changes.append(change)
             return self._jumped[key]
+
+    def told_mode(self, mode: int) -> Pattern:
+        """A mode as data, as :meth:`told`."""
+        return self.visited[mode]
+
+    def retold_mode(self, data: Sequence[Any]) -> int:
+        """The number of a mode that was told."""
+        if len(data) != len(self.make.parts):
+            raise ValueError(f"{len(data)} phases of {len(self.make.parts)} elements")
+        return self.number(tuple(map(int, data)))
+
+    def told(self, k: int) -> list[Any]:
+        """A transition as data, by the contact states of its ends: its number is that of one process."""
+        source, target, *others, change = list(self._jumped)[k]
+        return [self.visited[source], self.visited[target], *others, change]
+
+    def retold(self, source: Any, target: Any, element: str, rows: Any, kind: str, change: Any) -> int:
+        """The number of a transition that was told."""
+        ends = (self.retold_mode(phases) for phases in (source, target))
+        given = tuple(tuple(map(int, row)) for row in rows)
+        change = change and Change(tuple(map(int, change[0])), int(change[1]), bool(change[2]))
+        return self.transition(*ends, element, given, kind, change)
 
     def name(self, pattern: Pattern) -> str:
         """The phases of all elements as one name."""
