@@ -41,9 +41,10 @@ class PatternFlow(RowsFlow):
 
     def look_at(self, modes: Any, values: FloatArray) -> None:
         new = [pattern for mode in modes if (pattern := self.patterns.visited[mode]) not in self.patterns.led]
-        rows = self.patterns.rows_at(values) if new else None
-        for pattern in new:
-            self.patterns.leads_of(rows, pattern)
+        if new:
+            rows = self.patterns.rows_at(values)
+            for pattern in new:
+                self.patterns.leads_of(rows, pattern)
         self.catch_up()
 
     def _at(self, values: FloatArray) -> Packed:

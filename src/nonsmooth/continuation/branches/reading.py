@@ -149,7 +149,7 @@ def layout_attributes(signatures: Iterable[Signature], system: System) -> dict[s
 
 def layouts_of(dataset: xr.Dataset, system: System) -> list[Signature]:
     """The table of signatures, each one a way that the system's transitions allow."""
-    known = system.traced.patterns or system.traced.decider
+    known: Any = system.traced.patterns or system.traced.decider
     told = ({}, {}) if known is None else json.loads(dataset.attrs.get("visited", "[{}, {}]"))
     modes = {int(k): known.retold_mode(data) for k, data in told[0].items()}
     jumps = {int(k): known.retold(*data) for k, data in told[1].items()}

@@ -227,10 +227,8 @@ class PatternTables:
             way = (key[1], RESET if struck else 0, contact, number, 0)
             self.transitions = np.concatenate([self.transitions, np.array([way], dtype=np.int64)])
             change = Change(struck, rubs=found.rubbed is not None) if struck else None
-            ends, name = (lead.source, found.pattern), found.names or lead.element
-            kind, between = found.ends or FOUND, map(self.patterns.number, ends)
-            taken = self.patterns.transition(*between, name, lead.rows, kind, change)
-            self.leads.append(Lead(taken, *ends, name, lead.rows, kind))
+            way_of = lead.source, found.pattern, found.names or lead.element, lead.rows, found.ends or FOUND
+            self.leads.append(Lead(self.patterns.transition(*way_of, change), *way_of))
             self.lengths.append(0)
             self.form, self.net = self.form._replace(**self._maps()), self._net()
         taken = self.answers[key]
@@ -255,7 +253,8 @@ class PatternTables:
         here = len(self.numbers)
         self.index[pattern] = here
         self.numbers.append(self.patterns.number(pattern))
-        rows, ways, armed = self.rows, [], []
+        rows, ways = self.rows, []
+        armed: list[tuple[int, int, int]] = []
         flow, forces = rows.flow(self.patterns.mode, pattern)
         conditions, leads, states, meets = self.patterns.leads_of(rows, pattern)
         first = len(self.leads)

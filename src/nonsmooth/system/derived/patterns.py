@@ -373,17 +373,17 @@ class Patterns:
         """The rows of a pattern's conditions; its ways out as transitions, what is asked where several elements meet
         last; the states behind each; the conditions at which elements meet what they may be held by."""
         conditions, outs, meets = self.ways_out(rows, pattern)
-        found, states, here = [], [], self.number(pattern)
+        found, states = [], []
         for k, i, way, given in outs:
             part = rows.parts[k]
             target = pattern if way.phase is None else rows.place(k, self.mode, pattern).put(way.phase).pattern
             kind = ASKED if way.phase is None else ALONE if part.element.held else ""
             change = None if way.states is None else Change((k,), i)
-            number = self.transition(here, self.number(target), part.name, given, kind, change)
+            number = self.transition(pattern, target, part.name, given, kind, change)
             found.append(Lead(number, pattern, target, part.name, given, kind))
             states.append(way.states)
         together = tuple((slot, 1, 1) for slot in dict.fromkeys(meets))
-        number = self.transition(here, here, "", together, TOGETHER)
+        number = self.transition(pattern, pattern, "", together, TOGETHER)
         found.append(Lead(number, pattern, pattern, "", together, TOGETHER))
         self.led.add(pattern)
         return conditions, found, [*states, None], meets
@@ -461,19 +461,20 @@ class Patterns:
             return self._known[pattern]
 
     def transition(
-        self, source: int, target: int, element: str, rows: Rows_, kind: str, change: Change | None = None
+        self, source: Pattern, target: Pattern, element: str, rows: Rows_, kind: str, change: Change | None = None
     ) -> int:
-        """The number of a transition between numbered patterns, by the conditions of an element (of one in ``ENDS`` the
-        elements for which there is no answer); made where it is new."""
+        """The number of a transition between patterns, by the conditions of an element (of one in ``ENDS`` the elements
+        for which there is no answer); made where it is new."""
+        ends = self.number(source), self.number(target)
         with self._lock:
-            key = source, target, element, rows, kind, change
+            key = *ends, element, rows, kind, change
             if key not in self._jumped:
-                names = self.name(self.visited[source]), self.name(self.visited[target])
+                names = self.name(source), self.name(target)
                 conditions = tuple(Condition(indicator, sign, bool(strict)) for indicator, sign, strict in rows)
                 self._jumped[key] = len(self.jumps)
                 label = element if kind in ENDS else " -> ".join(names)
-                contact = change is not None or source == 0
-                self.jumps.append(TracedTransition(source, target, conditions, contact=contact, label=label, kind=kind))
+                contact = change is not None or ends[0] == 0
+                self.jumps.append(TracedTransition(*ends, conditions, contact=contact, label=label, kind=kind))
                 self.changes.append(change)
             return self._jumped[key]
 
@@ -494,10 +495,10 @@ class Patterns:
 
     def retold(self, source: Any, target: Any, element: str, rows: Any, kind: str, change: Any) -> int:
         """The number of a transition that was told."""
-        ends = (self.retold_mode(phases) for phases in (source, target))
-        given = tuple(tuple(map(int, row)) for row in rows)
+        ends = [self.visited[self.retold_mode(phases)] for phases in (source, target)]
+        given = tuple((int(i), int(sign), int(strict)) for i, sign, strict in rows)
         change = change and Change(tuple(map(int, change[0])), int(change[1]), bool(change[2]))
-        return self.transition(*ends, element, given, kind, change)
+        return self.transition(ends[0], ends[1], element, given, kind, change)
 
     def name(self, pattern: Pattern) -> str:
         """The phases of all elements as one name."""
