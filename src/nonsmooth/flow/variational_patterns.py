@@ -40,11 +40,11 @@ class PatternFlow(RowsFlow):
         return self.patterns.seen()
 
     def look_at(self, modes: Any, values: FloatArray) -> None:
-        new = [pattern for mode in modes if (pattern := self.patterns.visited[mode]) not in self.patterns.led]
+        new = {self.patterns.visited[mode] for mode in modes} - self.patterns.led
         if new:
             rows = self.patterns.rows_at(values)
-            for pattern in new:
-                self.patterns.leads_of(rows, pattern)
+            for pattern in sorted(new):
+                self.patterns.look_at(rows, pattern)
         self.catch_up()
 
     def _at(self, values: FloatArray) -> Packed:

@@ -182,7 +182,10 @@ class PatternTables:
 
     def transitions_of(self, taken: IntArray) -> IntArray:
         """The numbers that all points share of the transitions here."""
-        return np.array([lead.number for lead in self.leads], dtype=np.int64)[taken]
+        every = np.zeros(len(self.leads), dtype=np.int64)
+        for t in np.unique(taken):
+            every[t] = self.patterns.transition(self.leads[t])
+        return every[taken]
 
     def complete(self) -> None:
         """Make the mode for which a run waits, or say where what it has asked leads."""
@@ -227,8 +230,8 @@ class PatternTables:
             way = (key[1], RESET if struck else 0, contact, number, 0)
             self.transitions = np.concatenate([self.transitions, np.array([way], dtype=np.int64)])
             change = Change(struck, rubs=found.rubbed is not None) if struck else None
-            way_of = lead.source, found.pattern, found.names or lead.element, lead.rows, found.ends or FOUND
-            self.leads.append(Lead(self.patterns.transition(*way_of, change), *way_of))
+            names, kind = found.names or lead.element, found.ends or FOUND
+            self.leads.append(Lead(lead.source, found.pattern, names, lead.rows, kind, change))
             self.lengths.append(0)
             self.form, self.net = self.form._replace(**self._maps()), self._net()
         taken = self.answers[key]

@@ -48,17 +48,6 @@ class Out(NamedTuple):
     rows: Rows_
 
 
-class Lead(NamedTuple):
-    """A transition: its number, its ends, the element and the conditions by which it happens, its kind."""
-
-    number: int
-    source: Pattern
-    target: Pattern
-    element: str
-    rows: Rows_
-    kind: str
-
-
 class Change(NamedTuple):
     """What a transition does to the states: the ``way``-th way of an element out of its phase, or an impact of several
     of them, with friction or one after the other where it ``rubs``."""
@@ -66,6 +55,18 @@ class Change(NamedTuple):
     elements: tuple[int, ...]
     way: int = -1
     rubs: bool = False
+
+
+class Lead(NamedTuple):
+    """A transition between patterns: by the conditions of which element (of one in ``ENDS``, the elements for which
+    there is no answer), of what kind, and what it does to the states."""
+
+    source: Pattern
+    target: Pattern
+    element: str
+    rows: Rows_
+    kind: str
+    change: Change | None = None
 
 
 
@@ -284,7 +285,7 @@ class Patterns:
     visited: list[Pattern] = field(default_factory=list)
     jumps: list[TracedTransition] = field(default_factory=list)
     changes: list[Change | None] = field(default_factory=list)  # of the states, by each of the transitions
-    led: set[Pattern] = field(default_factory=set)  # patterns whose ways out are known
+    led: set[Pattern] = field(default_factory=set)  # patterns whose ways out all have numbers
     equations: Traced = field(init=False)  # without elements; the expressions are its indicators
 
     def __post_init__(self) -> None:
@@ -298,7 +299,7 @@ class Patterns:
                 self._keep((k, name, side), self.make.law(k, name, side))
         self._lock = threading.Lock()
         self._known: dict[Pattern, int] = {}
-        self._jumped: dict[Any, int] = {}
+        self._jumped: dict[Lead, int] = {}
         self._seen: tuple[tuple[int, int], Any] = (0, 0), None
         self.number((0,) * len(self.make.parts))
 
@@ -378,15 +379,16 @@ class Patterns:
             part = rows.parts[k]
             target = pattern if way.phase is None else rows.place(k, self.mode, pattern).put(way.phase).pattern
             kind = ASKED if way.phase is None else ALONE if part.element.held else ""
-            change = None if way.states is None else Change((k,), i)
-            number = self.transition(pattern, target, part.name, given, kind, change)
-            found.append(Lead(number, pattern, target, part.name, given, kind))
+            found.append(Lead(pattern, target, part.name, given, kind, None if way.states is None else Change((k,), i)))
             states.append(way.states)
         together = tuple((slot, 1, 1) for slot in dict.fromkeys(meets))
-        number = self.transition(pattern, pattern, "", together, TOGETHER)
-        found.append(Lead(number, pattern, pattern, "", together, TOGETHER))
+        return conditions, [*found, Lead(pattern, pattern, "", together, TOGETHER)], [*states, None], meets
+
+    def look_at(self, rows: Rows, pattern: Pattern) -> None:
+        """Give all ways out of a pattern their numbers."""
+        for lead in self.leads_of(rows, pattern)[1]:
+            self.transition(lead)
         self.led.add(pattern)
-        return conditions, found, [*states, None], meets
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
@@ -460,23 +462,19 @@ class Patterns:
                 self.visited.append(pattern)
             return self._known[pattern]
 
-    def transition(
-        self, source: Pattern, target: Pattern, element: str, rows: Rows_, kind: str, change: Change | None = None
-    ) -> int:
-        """The number of a transition between patterns, by the conditions of an element (of one in ``ENDS`` the elements
-        for which there is no answer); made where it is new."""
-        ends = self.number(source), self.number(target)
+    def transition(self, lead: Lead) -> int:
+        """The number of a transition; the next one where it is new."""
+        ends = self.number(lead.source), self.number(lead.target)
         with self._lock:
-            key = *ends, element, rows, kind, change
-            if key not in self._jumped:
-                names = self.name(source), self.name(target)
-                conditions = tuple(Condition(indicator, sign, bool(strict)) for indicator, sign, strict in rows)
-                self._jumped[key] = len(self.jumps)
-                label = element if kind in ENDS else " -> ".join(names)
-                contact = change is not None or ends[0] == 0
-                self.jumps.append(TracedTransition(*ends, conditions, contact=contact, label=label, kind=kind))
-                self.changes.append(change)
-            return self._jumped[key]
+            if lead not in self._jumped:
+                names = self.name(lead.source), self.name(lead.target)
+                conditions = tuple(Condition(indicator, sign, bool(strict)) for indicator, sign, strict in lead.rows)
+                self._jumped[lead] = len(self.jumps)
+                label = lead.element if lead.kind in ENDS else " -> ".join(names)
+                contact = lead.change is not None or ends[0] == 0
+                self.jumps.append(TracedTransition(*ends, conditions, contact=contact, label=label, kind=lead.kind))
+                self.changes.append(lead.change)
+            return self._jumped[lead]
 
     def told_mode(self, mode: int) -> Pattern:
         """A mode as data, as :meth:`told`."""
@@ -490,15 +488,14 @@ class Patterns:
 
     def told(self, k: int) -> list[Any]:
         """A transition as data, by the contact states of its ends: its number is that of one process."""
-        source, target, *others, change = list(self._jumped)[k]
-        return [self.visited[source], self.visited[target], *others, change]
+        return [*list(self._jumped)[k]]
 
     def retold(self, source: Any, target: Any, element: str, rows: Any, kind: str, change: Any) -> int:
         """The number of a transition that was told."""
         ends = [self.visited[self.retold_mode(phases)] for phases in (source, target)]
         given = tuple((int(i), int(sign), int(strict)) for i, sign, strict in rows)
         change = change and Change(tuple(map(int, change[0])), int(change[1]), bool(change[2]))
-        return self.transition(ends[0], ends[1], element, given, kind, change)
+        return self.transition(Lead(ends[0], ends[1], str(element), given, str(kind), change))
 
     def name(self, pattern: Pattern) -> str:
         """The phases of all elements as one name."""
