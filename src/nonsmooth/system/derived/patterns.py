@@ -49,8 +49,8 @@ class Out(NamedTuple):
 
 
 class Change(NamedTuple):
-    """What a transition does to the states: the ``way``-th way of an element out of its phase, or an impact of several
-    of them, with friction or one after the other where it ``rubs``."""
+    """The change of the states by a transition: the ``way``-th way of an element out of its phase, or an impact of
+    several of them, with friction or one after the other where it ``rubs``."""
 
     elements: tuple[int, ...]
     way: int = -1
