@@ -91,6 +91,7 @@ def verbs(s: ns.System, make: Callable[..., ns.System]) -> dict[str, Callable[[d
     q, w = next(iter(s.states)), s.values["w"]
     v = f"v_{q}"
     some = np.linspace(0.95 * w, 1.05 * w, 5)
+    near = 0.03 if len(s.states) < 10 else 0.0003
     plane = {"w": some[:3], "F": np.array([0.9, 1.0]) * s.values["F"]}
     clock = np.arange(0.0, 20.0, 0.05)
 
@@ -112,10 +113,10 @@ def verbs(s: ns.System, make: Callable[..., ns.System]) -> dict[str, Callable[[d
         "lyapunov": lambda _: ns.lyapunov(s, periods=200, transient=100, **QUIET),
         "sensitivity": lambda _: ns.sensitivity(s, periods=2, parameters=["mu", "F"]),
         "find_orbit": lambda _: ns.find_orbit(s),
-        "continue_orbit": lambda found: ns.continue_orbit(found["find_orbit"], "w", (0.97 * w, 1.03 * w)),
+        "continue_orbit": lambda found: ns.continue_orbit(found["find_orbit"], "w", ((1 - near) * w, (1 + near) * w)),
         "special_points": lambda found: ns.special_points(found["continue_orbit"]),
-        "continue_equilibrium": lambda _: ns.continue_equilibrium(make(lambda t, p: p.F), "F", (0.0, 0.6)),
-        "bifurcation_diagram": lambda _: ns.bifurcation_diagram(s, "w", (0.97 * w, 1.03 * w), **QUIET),
+        "continue_equilibrium": lambda _: ns.continue_equilibrium(make(lambda t, p: p.F), "F", (0.0, 2.0)),
+        "bifurcation_diagram": lambda _: ns.bifurcation_diagram(s, "w", ((1 - near) * w, (1 + near) * w), **QUIET),
         "fit": fit,
     }
 

@@ -109,6 +109,28 @@ def pair():
     )  # fmt: skip
 
 
+def rubs():
+    return CASES["rubs"][0](mu=0.3)
+
+
+def test_an_orbit_and_its_branch_go_on_from_a_file(tmp_path):
+    """Modes and transitions are numbered as they are met: another process reads them by what they are."""
+    orbit = ns.find_orbit(rubs())
+    branch = ns.continue_orbit(orbit, "omega", (0.88, 0.93))
+    assert "special" in branch.sizes
+    ns.save(orbit.to_dataset(), tmp_path / "orbit.nc")
+    ns.save(branch, tmp_path / "branch.nc")
+    again = ns.Orbit.from_dataset(ns.load(tmp_path / "orbit.nc"))  # its system has visited nothing yet
+    names = [[one.system.modes[visit.mode] for visit in one.signature.visits] for one in (orbit, again)]
+    assert names[0] == names[1]
+    assert len(set(names[0])) > 2
+    np.testing.assert_array_equal(again.floquet_multipliers, orbit.floquet_multipliers)
+    longer = ns.continue_orbit(ns.load(tmp_path / "branch.nc"), range=(0.88, 0.96))
+    shorter = ns.continue_orbit(orbit, "omega", (0.88, 0.96))
+    assert list(longer.special_kind.values) == list(shorter.special_kind.values)
+    np.testing.assert_allclose(longer.special_value, shorter.special_value, rtol=1e-8)
+
+
 def test_orbits_and_branches_are_those_of_the_system_written_out(monkeypatch):
     written = pair()
     assert len(written.modes) > 1

@@ -94,6 +94,10 @@ class VariationalFlow:
         decider = self.traced.decider
         return self.traced if decider is None else decider.known()
 
+    def look_at(self, modes: Any, values: FloatArray) -> None:
+        """Find the transitions out of some modes."""
+        self.catch_up()
+
     def catch_up(self) -> None:
         """Take in the modes and transitions that were found since."""
         if (known := self.known()) is not self.traced:

@@ -39,6 +39,14 @@ class PatternFlow(RowsFlow):
     def known(self) -> Traced:
         return self.patterns.seen()
 
+    def look_at(self, modes: Any, values: FloatArray) -> None:
+        new = {self.patterns.visited[mode] for mode in modes} - self.patterns.led
+        if new:
+            rows = self.patterns.rows_at(values)
+            for pattern in sorted(new):
+                self.patterns.look_at(rows, pattern)
+        self.catch_up()
+
     def _at(self, values: FloatArray) -> Packed:
         last = next(reversed(self._local.rows.values()), None)
         return Packed(self.patterns, self.traced, values, self.places, last)
@@ -110,7 +118,7 @@ class Calculus:
         return every
 
     def map(self, mode: int, change: Change | None) -> FloatArray:
-        """What a transition does to the states, but for an impact that rubs."""
+        """The map of the states by a transition, but for an impact that rubs."""
         if change is None:
             return self.rows.identity()
         if change.way < 0:
@@ -121,7 +129,7 @@ class Calculus:
         return states
 
     def rubbed(self, mode: int, change: Change, w: FloatArray) -> FloatArray:
-        """What an impact that rubs does to the states: its impulses are homogeneous functions of the rates."""
+        """The map of an impact that rubs at an instant: its impulses are homogeneous functions of the rates."""
         numbers = RowNumbers(self.rows, self.patterns.mode, w.copy())
         found = decide(numbers, self.patterns.visited[mode], change.elements).rubbed
         if found is None:

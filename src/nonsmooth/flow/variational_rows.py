@@ -88,25 +88,32 @@ class RowsFlow(VariationalFlow):
     def indicator(self, values: Any, i: int, mode: int, t: float, z: Any) -> Touch:
         rows, fields, rates = self._taken(self.kept(values), i, mode)
         n, angles = self.n, rates[0] * t
-        w = np.concatenate([z, [1.0], np.stack([np.cos(angles), np.sin(angles)], axis=-1).ravel()])
+        waves = np.array([np.cos(angles), np.sin(angles)])
+        w = np.concatenate([z, [1.0], waves.T.ravel()])
 
         def turned(row: FloatArray, speeds: FloatArray) -> FloatArray:
-            found = np.zeros_like(row)
-            found[n + 1 :: 2], found[n + 2 :: 2] = speeds * row[n + 2 :: 2], -speeds * row[n + 1 :: 2]
+            """The row of the change of a row whose harmonics turn; of each row, or at each of several speeds."""
+            found = np.zeros((*(row.shape if row.ndim > 1 else speeds.shape)[:-1], row.shape[-1]))
+            found[..., n + 1 :: 2] = speeds * row[..., n + 2 :: 2]
+            found[..., n + 2 :: 2] = -speeds * row[..., n + 1 :: 2]
             return found
 
-        def taken(row: FloatArray, of_p: Sequence[FloatArray]) -> tuple[float, FloatArray, float, FloatArray]:
-            slopes = [d @ w + t * (turned(row, speeds) @ w) for d, speeds in zip(of_p, rates[1:], strict=True)]
-            return float(row @ w), row[:n].copy(), float(turned(row, rates[0]) @ w), np.array(slopes)
-
-        row, *of_p = rows
-        slope = row[:n] @ fields[0] + turned(row, rates[0])
-        slope_p = [
-            d[:n] @ fields[0] + row[:n] @ field_p + turned(d, rates[0]) + turned(row, speeds)
-            for d, field_p, speeds in zip(of_p, fields[1:], rates[1:], strict=True)
-        ]
-        second = slope[:n] @ fields[0] + turned(slope, rates[0])
-        return Touch(*taken(row, of_p), *taken(slope, slope_p), float(second @ w))
+        slopes = np.empty_like(rows)  # the same of its derivative along the flow
+        slopes[0] = rows[0, :n] @ fields[0]
+        for p in range(1, len(rows)):
+            slopes[p] = rows[p, :n] @ fields[0] + rows[0, :n] @ fields[p]
+        if self.harmonics:
+            slopes += turned(rows, rates[0])
+            slopes[1:] += turned(rows[0], rates[1:])
+        second = float(slopes[0, :n] @ (fields[0] @ w))
+        found: list[Any] = []
+        for every in (rows, slopes):
+            own, changing = every @ w, np.zeros(len(rows))
+            if self.harmonics and every[0, n + 1 :].any():
+                changing = turned(every[0], rates) @ w
+            second += float(changing[0]) if every is slopes else 0.0
+            found += [float(own[0]), every[0, :n].copy(), float(changing[0]), own[1:] + t * changing[1:]]
+        return Touch(*found, second)
 
 
 class LinearFlow(RowsFlow):

@@ -237,6 +237,9 @@ def diagram(
     })  # fmt: skip
     result = result.assign_coords(direction=swept["direction"].variable)
     result.attrs = dict(attrs) | {"parameter": parameter, "layouts": f"[{', '.join(layouts)}]"}
+    if "visited" in branches[0].attrs:
+        told = [json.loads(one.attrs["visited"]) for one in branches]
+        result.attrs["visited"] = json.dumps([{k: v for one in told for k, v in one[i].items()} for i in (0, 1)])
     return with_short_record(result)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.continuation.arguments import allowed_range, limits
+from nonsmooth.continuation.branches.reading import layout_attributes
 from nonsmooth.continuation.branches.records import BranchRecord, PointRecord, SpecialRecord, record_of
 from nonsmooth.continuation.events.leaving import AlongOrbits
 from nonsmooth.continuation.march.event import BESIDE, Step
@@ -183,7 +183,7 @@ def orbits_dataset(
         "period_number": ((), np.int64(period_number), {"long_name": f"{turn}s (0: autonomous)"}),
         "status": ("point", np.zeros(len(points), np.int8), status_attributes()),
     }
-    attrs = {"parameter": branch.name, "layouts": json.dumps([one.data for one in layouts])}
+    attrs = {"parameter": branch.name, **layout_attributes(layouts, branch.system)}
     values = {branch.name: [point.value for point in points]}
     tables = ORBIT, SPECIAL_ORBIT
     return dataset(branch.system, "continue_orbit", values, tables, record, policy, options, more, attrs)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.continuation.branches.reading import layouts_of, recorded, undamaged
+from nonsmooth.continuation.branches.reading import layout_attributes, layouts_of, recorded, undamaged
 from nonsmooth.continuation.problems.multipliers import stability, stable_by
 from nonsmooth.continuation.problems.path import Path
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
@@ -192,7 +191,7 @@ class Orbit:
 
         labels = labels_of(self.system)
         attrs: dict[str, Any] = dict(provenance(labels, "find_orbit", self.options, method="multiple shooting"))
-        attrs["layouts"] = json.dumps([self.signature.data])
+        attrs |= layout_attributes([self.signature], self.system)
         values = vars(self) | {"clearance": np.array(list(self.clearance.values()), dtype=float)}
         variables = {column.name: (column.dims, values[column.field], attributes(labels, column)) for column in FOUND}
         if self.loads:

@@ -7,8 +7,9 @@ are checked against the system, and the unknowns against the signatures.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +24,10 @@ from nonsmooth.system.system import System
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["hopf_row", "layouts_of", "mark_of", "one_row", "read_branch", "recorded", "special_row", "undamaged"]
+__all__ = [
+    "hopf_row", "layout_attributes", "layouts_of", "mark_of", "one_row", "read_branch", "recorded", "special_row",
+    "undamaged",
+]  # fmt: skip
 
 
 @contextmanager
@@ -131,12 +135,31 @@ def hopf_row(start: xr.Dataset) -> tuple[System, str, float, int, FloatArray, tu
     return system.with_parameters({name: value}), name, value, mode, u, (low, high)
 
 
+def layout_attributes(signatures: Iterable[Signature], system: System) -> dict[str, str]:
+    """The table of signatures as attributes; of transitions that were found on the way what they are, by number."""
+    layouts = [one.data for one in signatures]
+    attrs, known = {"layouts": json.dumps(layouts)}, system.traced.patterns or system.traced.decider
+    if known is not None:
+        visits = [Visit(*data) for one in layouts for data in one]
+        modes = {v.mode: known.told_mode(v.mode) for v in visits}
+        jumps = {v.transition: known.told(v.transition) for v in visits if v.transition != SECTION}
+        attrs["visited"] = json.dumps([modes, {k: data for k, data in jumps.items() if data is not None}])
+    return attrs
+
+
 def layouts_of(dataset: xr.Dataset, system: System) -> list[Signature]:
     """The table of signatures, each one a way that the system's transitions allow."""
+    known: Any = system.traced.patterns or system.traced.decider
+    told = ({}, {}) if known is None else json.loads(dataset.attrs.get("visited", "[{}, {}]"))
+    modes = {int(k): known.retold_mode(data) for k, data in told[0].items()}
+    jumps = {int(k): known.retold(*data) for k, data in told[1].items()}
     traced = system.traced
     found = []
     for data in json.loads(dataset.attrs["layouts"]):
         visits = tuple(Visit(*map(int, visit)) for visit in data)
+        visits = tuple(  # with the numbers that modes and transitions have in this process
+            replace(v, mode=modes.get(v.mode, v.mode), transition=jumps.get(v.transition, v.transition)) for v in visits
+        )
         for here, after in pairwise(visits):
             jump = traced.transitions[_place(here.transition, len(traced.transitions), "transition")]
             rows = (-1,) if jump.at is not None else (AT_ONCE, *range(len(jump.rows)))
@@ -170,7 +193,7 @@ def _point(
     if not known[:size].all() or known[size:].any() or not np.isfinite(found["tangent"][:size]).all():
         raise ValueError(f"a point has not the {size} unknowns of its signature")
     found["X"], found["tangent"] = found["X"][:size], found["tangent"][:size]
-    found["mode"] = _place(int(found["mode"]), len(system.modes), "mode")
+    found["mode"] = signature.visits[0].mode
     for column in ORBIT:
         if column.rule in ("flag", "time"):
             found[column.field] = (bool if column.rule == "flag" else float)(found[column.field])

@@ -96,8 +96,9 @@ class Shooting:
 
     def __init__(self, system: System, signature: Signature, period_number: int, active: tuple[str, ...] = ()) -> None:
         self.system, self.signature, self.period_number, self.active = system, signature, period_number, active
-        traced = system.traced
         self.flow = VariationalFlow.of(system, active)
+        self.flow.look_at([v.mode for v in signature.visits], system.parameter_vector())
+        traced = system.traced
         n, m, a = self.flow.n, len(signature.crossings), len(active)
         self.n, self.m, self.n_active = n, m, a
         self.forced = period_number > 0

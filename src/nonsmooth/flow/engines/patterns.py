@@ -10,7 +10,7 @@ from __future__ import annotations
 import threading
 from dataclasses import dataclass, field
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from nonsmooth.kernels.hybrid.places import DEAD_END, MODE, RESET, STARTS, TIME,
 from nonsmooth.results.memory import free_memory, room_for
 from nonsmooth.system.derived.deciding import Outcome, begun, decide
 from nonsmooth.system.derived.instants import RowNumbers
-from nonsmooth.system.derived.patterns import Change
+from nonsmooth.system.derived.patterns import Change, Lead
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, FOUND, TOGETHER
 
 if TYPE_CHECKING:
@@ -125,17 +125,6 @@ class PatternEngine(Engine):
         return found
 
 
-class Lead(NamedTuple):
-    """A transition: its number among all that are known, its source here, its target, its conditions."""
-
-    number: int
-    source: int
-    target: Pattern
-    element: str
-    rows: tuple[tuple[int, int, int], ...]
-    kind: str  # ASKED, TOGETHER, FOUND, one of ENDS, or ""
-
-
 class PatternTables:
     """The tables of one parameter point: those of the patterns that were visited there, and room for more."""
 
@@ -193,7 +182,10 @@ class PatternTables:
 
     def transitions_of(self, taken: IntArray) -> IntArray:
         """The numbers that all points share of the transitions here."""
-        return np.array([lead.number for lead in self.leads], dtype=np.int64)[taken]
+        every = np.zeros(len(self.leads), dtype=np.int64)
+        for t in np.unique(taken):
+            every[t] = self.patterns.transition(self.leads[t])
+        return every[taken]
 
     def complete(self) -> None:
         """Make the mode for which a run waits, or say where what it has asked leads."""
@@ -202,7 +194,7 @@ class PatternTables:
         if waits < 0:
             return
         lead, rows, mode = self.leads[waits], self.rows, self.patterns.mode
-        if not lead.kind:
+        if lead.kind in ("", ALONE):
             if self.transitions[waits, 0] < 0:
                 self.add(lead.target)
             return
@@ -233,12 +225,13 @@ class PatternTables:
                 self.maps.append(self.maps[0])
             elif struck:
                 number = self._map(self.rows.impact(struck, self.patterns.mode))
-            contact = int(bool(struck) or self.numbers[lead.source] == 0)
+            contact = int(bool(struck) or self.patterns.number(lead.source) == 0)
             contact = ENDS.index(found.ends) + DEAD_END if found.ends else contact
             way = (key[1], RESET if struck else 0, contact, number, 0)
             self.transitions = np.concatenate([self.transitions, np.array([way], dtype=np.int64)])
             change = Change(struck, rubs=found.rubbed is not None) if struck else None
-            self._lead(lead.source, found.pattern, found.names or lead.element, lead.rows, found.ends or FOUND, change)
+            names, kind = found.names or lead.element, found.ends or FOUND
+            self.leads.append(Lead(lead.source, found.pattern, names, lead.rows, kind, change))
             self.lengths.append(0)
             self.form, self.net = self.form._replace(**self._maps()), self._net()
         taken = self.answers[key]
@@ -263,28 +256,25 @@ class PatternTables:
         here = len(self.numbers)
         self.index[pattern] = here
         self.numbers.append(self.patterns.number(pattern))
-        rows, mode, ways = self.rows, self.patterns.mode, []
-        flow, forces = rows.flow(mode, pattern)
-        conditions, outs, meets = self.patterns.ways_out(rows, pattern)
+        rows, ways = self.rows, []
+        armed: list[tuple[int, int, int]] = []
+        flow, forces = rows.flow(self.patterns.mode, pattern)
+        conditions, leads, states, meets = self.patterns.leads_of(rows, pattern)
         first = len(self.leads)
-        for k, i, way, given in outs:
-            part, asked = rows.parts[k], way.phase is None
-            target = pattern if way.phase is None else rows.place(k, mode, pattern).put(way.phase).pattern
-            alone, change = not asked and bool(part.element.held), None if way.states is None else Change((k,), i)
-            to = -1 if asked else self.index.get(target, -1)
+        for lead, change in zip(leads, states, strict=True):
+            asked = lead.kind in (ASKED, TOGETHER)
+            to = -1 if asked else self.index.get(lead.target, -1)
             if to < 0 and not asked:
-                self.waiting.setdefault(target, []).append(len(self.leads))
-            number = 0 if way.states is None else self._map(way.states)
-            contact = change is not None or self.numbers[here] == 0
-            ways.append((to, 0 if change is None else RESET, int(contact), number, int(alone)))
-            self._lead(here, target, part.name, given, ASKED if asked else ALONE if alone else "", change)
-            self.lengths.append(len(given))
-        armed = [row for out in outs for row in out.rows]
-        self.lists.append([*range(first, len(self.leads))])
-        self.together.append(len(self.leads))
-        ways.append((-1, 0, 0, 0, 0))
-        self._lead(here, pattern, "", tuple((slot, 1, 1) for slot in dict.fromkeys(meets)), TOGETHER)
-        self.lengths.append(0)
+                self.waiting.setdefault(lead.target, []).append(len(self.leads))
+            contact = lead.kind != TOGETHER and (change is not None or self.numbers[here] == 0)
+            number = 0 if change is None else self._map(change)
+            ways.append((to, 0 if change is None else RESET, int(contact), number, int(lead.kind == ALONE)))
+            own = () if lead.kind == TOGETHER else lead.rows
+            armed.extend(own)
+            self.lengths.append(len(own))
+            self.leads.append(lead)
+        self.lists.append([*range(first, len(self.leads) - 1)])
+        self.together.append(len(self.leads) - 1)
         self.meets.append(meets)
         rows.forget()
         self.transitions = np.concatenate([self.transitions, np.array(ways, dtype=np.int64).reshape(-1, 5)])
@@ -293,13 +283,6 @@ class PatternTables:
             self.transitions[t, 0] = here
         self._stand(flow, conditions, self._output_rows(forces))
         self.net = self._net()
-
-    def _lead(
-        self, here: int, target: Pattern, element: str, rows: Any, kind: str, change: Change | None = None
-    ) -> None:
-        ends = self.numbers[here], self.patterns.number(target)
-        number = self.patterns.transition(*ends, element, rows, kind, change)
-        self.leads.append(Lead(number, here, target, element, rows, "" if kind == ALONE else kind))
 
     def _map(self, states: FloatArray) -> int:
         """The number of a map among those of the form; equal ones are kept once."""

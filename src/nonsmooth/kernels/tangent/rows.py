@@ -27,9 +27,9 @@ def sizes(q):
 
 @inline
 def block(q, kind, k):
-    """Where a block begins: of a mode's field (kind 0), of a mode's conditions (1), of a transition (2): the number of
-    its conditions, by how much each parameter's derivative stands behind each of them, and behind its map, where the
-    map stands, and where the conditions do."""
+    """The place where a block begins: of a mode's field (kind 0), of a mode's conditions (1), of a transition (2): the
+    number of its conditions, by how much each parameter's derivative stands behind each of them, and behind its map,
+    where the map stands, and where the conditions do."""
     return int(q[RATES + int(q[1]) * (1 + int(q[2])) + kind * int(q[4]) + k])
 
 

@@ -104,6 +104,20 @@ class Decider:
                 self._written = replace(written, transitions=(*written.transitions, jump))
             return self._found[key]
 
+    def told_mode(self, mode: int) -> int:
+        """A mode as data: all of them are there from the first."""
+        return mode
+
+    retold_mode = told_mode
+
+    def told(self, k: int) -> list[Any] | None:
+        """An answer as data: its number is that of one process; None for a transition that stands from the first."""
+        return next(([*key] for key, number in self._found.items() if number == k), None)
+
+    def retold(self, asked: int, target: int, struck: Any) -> int:
+        """The number of an answer that was told."""
+        return self.found(int(asked), int(target), tuple(map(int, struck)))
+
     def _impact(self, mode: str, struck: tuple[int, ...]) -> tuple[Any, ...]:
         key = mode, struck
         if key not in self._impacts:

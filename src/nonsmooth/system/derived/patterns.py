@@ -22,7 +22,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
 from nonsmooth.system.symbolic.period import forcing_period
-from nonsmooth.system.symbolic.traced import ENDS, Traced, TracedTransition
+from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, TOGETHER, Traced, TracedTransition
 from nonsmooth.system.symbolic.traced import Row as Condition
 from nonsmooth.system.symbolic.tracing import call_scalar
 
@@ -49,12 +49,24 @@ class Out(NamedTuple):
 
 
 class Change(NamedTuple):
-    """What a transition does to the states: the ``way``-th way of an element out of its phase, or an impact of several
-    of them, with friction or one after the other where it ``rubs``."""
+    """The change of the states by a transition: the ``way``-th way of an element out of its phase, or an impact of
+    several of them, with friction or one after the other where it ``rubs``."""
 
     elements: tuple[int, ...]
     way: int = -1
     rubs: bool = False
+
+
+class Lead(NamedTuple):
+    """A transition between patterns: by the conditions of which element (of one in ``ENDS``, the elements for which
+    there is no answer), of what kind, and what it does to the states."""
+
+    source: Pattern
+    target: Pattern
+    element: str
+    rows: Rows_
+    kind: str
+    change: Change | None = None
 
 
 
@@ -273,6 +285,7 @@ class Patterns:
     visited: list[Pattern] = field(default_factory=list)
     jumps: list[TracedTransition] = field(default_factory=list)
     changes: list[Change | None] = field(default_factory=list)  # of the states, by each of the transitions
+    led: set[Pattern] = field(default_factory=set)  # patterns whose ways out all have numbers
     equations: Traced = field(init=False)  # without elements; the expressions are its indicators
 
     def __post_init__(self) -> None:
@@ -286,7 +299,7 @@ class Patterns:
                 self._keep((k, name, side), self.make.law(k, name, side))
         self._lock = threading.Lock()
         self._known: dict[Pattern, int] = {}
-        self._jumped: dict[Any, int] = {}
+        self._jumped: dict[Lead, int] = {}
         self._seen: tuple[tuple[int, int], Any] = (0, 0), None
         self.number((0,) * len(self.make.parts))
 
@@ -356,6 +369,26 @@ class Patterns:
             for slot, values in conditions.items():
                 every[slot] = values
         return every, found, meets
+
+    def leads_of(self, rows: Rows, pattern: Pattern) -> tuple[FloatArray, list[Lead], list[Any], list[int]]:
+        """The rows of a pattern's conditions; its ways out as transitions, what is asked where several elements meet
+        last; the states behind each; the conditions at which elements meet what they may be held by."""
+        conditions, outs, meets = self.ways_out(rows, pattern)
+        found, states = [], []
+        for k, i, way, given in outs:
+            part = rows.parts[k]
+            target = pattern if way.phase is None else rows.place(k, self.mode, pattern).put(way.phase).pattern
+            kind = ASKED if way.phase is None else ALONE if part.element.held else ""
+            found.append(Lead(pattern, target, part.name, given, kind, None if way.states is None else Change((k,), i)))
+            states.append(way.states)
+        together = tuple((slot, 1, 1) for slot in dict.fromkeys(meets))
+        return conditions, [*found, Lead(pattern, pattern, "", together, TOGETHER)], [*states, None], meets
+
+    def look_at(self, rows: Rows, pattern: Pattern) -> None:
+        """Give all ways out of a pattern their numbers."""
+        for lead in self.leads_of(rows, pattern)[1]:
+            self.transition(lead)
+        self.led.add(pattern)
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
@@ -429,22 +462,40 @@ class Patterns:
                 self.visited.append(pattern)
             return self._known[pattern]
 
-    def transition(
-        self, source: int, target: int, element: str, rows: Rows_, kind: str, change: Change | None = None
-    ) -> int:
-        """The number of a transition between numbered patterns, by the conditions of an element (of one in ``ENDS`` the
-        elements for which there is no answer); made where it is new."""
+    def transition(self, lead: Lead) -> int:
+        """The number of a transition; the next one where it is new."""
+        ends = self.number(lead.source), self.number(lead.target)
         with self._lock:
-            key = source, target, element, rows, kind, change
-            if key not in self._jumped:
-                names = self.name(self.visited[source]), self.name(self.visited[target])
-                conditions = tuple(Condition(indicator, sign, bool(strict)) for indicator, sign, strict in rows)
-                self._jumped[key] = len(self.jumps)
-                label = element if kind in ENDS else " -> ".join(names)
-                contact = change is not None or source == 0
-                self.jumps.append(TracedTransition(source, target, conditions, contact=contact, label=label, kind=kind))
-                self.changes.append(change)
-            return self._jumped[key]
+            if lead not in self._jumped:
+                names = self.name(lead.source), self.name(lead.target)
+                conditions = tuple(Condition(indicator, sign, bool(strict)) for indicator, sign, strict in lead.rows)
+                self._jumped[lead] = len(self.jumps)
+                label = lead.element if lead.kind in ENDS else " -> ".join(names)
+                contact = lead.change is not None or ends[0] == 0
+                self.jumps.append(TracedTransition(*ends, conditions, contact=contact, label=label, kind=lead.kind))
+                self.changes.append(lead.change)
+            return self._jumped[lead]
+
+    def told_mode(self, mode: int) -> Pattern:
+        """A mode as data, as :meth:`told`."""
+        return self.visited[mode]
+
+    def retold_mode(self, data: Sequence[Any]) -> int:
+        """The number of a mode that was told."""
+        if len(data) != len(self.make.parts):
+            raise ValueError(f"{len(data)} phases of {len(self.make.parts)} elements")
+        return self.number(tuple(map(int, data)))
+
+    def told(self, k: int) -> list[Any]:
+        """A transition as data, by the contact states of its ends: its number is that of one process."""
+        return [*list(self._jumped)[k]]
+
+    def retold(self, source: Any, target: Any, element: str, rows: Any, kind: str, change: Any) -> int:
+        """The number of a transition that was told."""
+        ends = [self.visited[self.retold_mode(phases)] for phases in (source, target)]
+        given = tuple((int(i), int(sign), int(strict)) for i, sign, strict in rows)
+        change = change and Change(tuple(map(int, change[0])), int(change[1]), bool(change[2]))
+        return self.transition(Lead(ends[0], ends[1], str(element), given, str(kind), change))
 
     def name(self, pattern: Pattern) -> str:
         """The phases of all elements as one name."""
