@@ -141,11 +141,15 @@ class Readout:
     """
 
     def __init__(self, system: System, name: str, places: Sequence[int]) -> None:
-        self.traced, self.places = system.traced, tuple(places)
-        self.state = (
-            self.traced.u.index(self.traced.u[list(system.states).index(name)]) if name in system.states else -1
-        )
+        self.system, self.places = system, tuple(places)
+        self.state = list(system.states).index(name) if name in system.states else -1
         self.output = -1 if self.state >= 0 else list(system.outputs).index(name)
+        patterns = system.traced.patterns
+        if patterns is not None and name in patterns.outputs:
+            raise ValueError(
+                f"{name!r} is the force of an element of a system whose modes are made when they are visited: such a "
+                "force cannot be fitted; measure a state or an output of your own"
+            )
 
     def value(self, t: FloatArray, z: FloatArray, mode: Any, p: FloatArray) -> FloatArray:
         """Values (N,) at N samples."""
@@ -165,7 +169,7 @@ class Readout:
         out = np.zeros((len(t), 1 if which == 0 else z.shape[1] + len(self.places) + 1))
         for m in np.unique(mode):
             here = np.flatnonzero(mode == m)
-            functions = _output(self.traced, self.output, int(m), self.places)[which]
+            functions = _output(self.system.traced, self.output, int(m), self.places)[which]
             columns = (t[here], *z[here].T, *p)
             for k, function in enumerate(functions):
                 out[here, k] = function(*columns)
