@@ -21,7 +21,14 @@ from nonsmooth.flow.variational import VariationalFlow
 
 compiled = []
 kernels.before_compiling.append(compiled.append)
-system = ns.models.discontinuous_support()
+def field(stiffness):
+    return lambda t, u, p: (u.v, p.rho * np.cos(t) - u.x**3 - stiffness * (u.x + 0.0045))
+
+system = ns.System(  # not linear: of these the equations are compiled
+    states=["x", "v"], parameters={"rho": 0.3}, modes={"free": field(0.0), "contact": field(50.0)},
+    indicators={"depth": lambda t, u, p: u.x + 0.0045},
+    transitions=[ns.Transition("free", "contact", when="depth > 0"), ns.Transition("contact", "free", when="depth < 0")],
+)
 flow = VariationalFlow.of(system, ("rho",))
 values = system.parameter_vector()
 legs = flow.segments(values, [0, 1], [0.1, 0.4], [0.3, 0.02], [[-0.006, 0.03], [-0.0045, 0.04]])
