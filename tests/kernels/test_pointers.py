@@ -27,7 +27,9 @@ def field(stiffness):
 system = ns.System(  # not linear: of these the equations are compiled
     states=["x", "v"], parameters={"rho": 0.3}, modes={"free": field(0.0), "contact": field(50.0)},
     indicators={"depth": lambda t, u, p: u.x + 0.0045},
-    transitions=[ns.Transition("free", "contact", when="depth > 0"), ns.Transition("contact", "free", when="depth < 0")],
+    transitions=[
+        ns.Transition("free", "contact", when="depth > 0"), ns.Transition("contact", "free", when="depth < 0"),
+    ],
 )
 flow = VariationalFlow.of(system, ("rho",))
 values = system.parameter_vector()
