@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,7 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.results.labels import Labels
 from nonsmooth.results.provenance import with_short_record
-from nonsmooth.results.schema import floats, parameter_coords, quantity_attributes, state_coords, strings, varied
+from nonsmooth.results.schema import (
+    Column,
+    attributes,
+    floats,
+    parameter_coords,
+    quantity_attributes,
+    state_coords,
+    strings,
+    typed,
+    varied,
+)
 from nonsmooth.results.statuses import flag_attributes
 
 __all__ = [
@@ -21,22 +31,6 @@ __all__ = [
 ]  # fmt: skip
 
 
-class Column(NamedTuple):
-    """A variable of a branch: its name, the field of the records that hold it, its dims beside the first, the rule for
-    its numbers and their unit, and its long name."""
-
-    name: str
-    field: str
-    dims: tuple[str, ...]
-    rule: str
-    words: str
-
-
-#: Types of the numbers by rule; of "time" the unit is that of time, "mode" has a table of words.
-_TYPES: dict[str, Any] = {
-    "": float, "time": float, "complex": complex, "flag": bool, "text": str, "place": np.int64, "id": np.int32,
-    "mode": np.int16,
-}  # fmt: skip
 #: One orbit of a branch; builder, writer and reader go by these tables.
 ORBIT = (
     Column("section", "section", ("state",), "", "state at the section"),
@@ -143,25 +137,14 @@ def line(
 
 def _array(column: Column, values: list[Any], sizes: dict[str, int]) -> Any:
     """Values of a column; those of different lengths are filled with NaN, ``sizes`` are those of dims met before."""
-    if column.rule == "text":
-        return strings(values)
-    kind = _TYPES[column.rule]
     if not column.dims:
-        return np.array(values, dtype=kind)
+        return typed(column, values)
     (dim,) = column.dims
     sizes.setdefault(dim, max(map(len, values), default=0))
-    array = np.full((len(values), sizes[dim]), np.nan, dtype=kind)
+    array = np.full((len(values), sizes[dim]), np.nan, typed(column, ()).dtype)
     for row, value in zip(array, values, strict=True):
         row[: len(value)] = value
     return array
-
-
-def attributes(d: Labels, column: Column) -> dict[str, Any]:
-    """Long name, unit and table of words of a column."""
-    words = {"long_name": column.words.replace("forcing period", d.turn)}
-    if column.rule == "time":
-        words["units"] = d.time_unit
-    return words | flag_attributes(d.modes, dtype=np.int16) if column.rule == "mode" else words
 
 
 def diagram(

@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -35,103 +35,131 @@ from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.results.labels import Labels, Quantity
 from nonsmooth.results.provenance import with_short_record
-from nonsmooth.results.statuses import flag_attributes, status_attributes
+from nonsmooth.results.statuses import EQUILIBRIA, flag_attributes, status_attributes
 
 __all__ = [
-    "floats", "parameter_coords", "quantity_attributes", "response", "section_points", "start_coords", "state_coords",
-    "strings", "sweep", "trajectory", "varied", "with_impacts",
+    "Column", "attributes", "columns", "floats", "parameter_coords", "quantity_attributes", "response",
+    "section_points", "start_coords", "state_coords", "strings", "sweep", "table", "trajectory", "typed",
+    "varied", "with_impacts",
 ]  # fmt: skip
 
-#: Trailing dims of each array a sweep may bring, after (direction, start, parameter).
-_SWEEP_ARRAYS: dict[str, tuple[str, ...]] = {
-    "section": ("iterate", "state"),
-    "maximum": ("state",),
-    "minimum": ("state",),
-    "period_number": (),
-    "residual": (),
-    "crossings_per_period": (),
-    "contacts_per_period": (),
-    "clearance": ("indicator",),
-    "output_maximum": ("output",),
-    "output_minimum": ("output",),
-    "equilibrium": (),
-    "equilibrium_minimum": ("state",),
-    "equilibrium_maximum": ("state",),
-    "status": (),
-    "density": ("state", "bin"),
-    "outside": ("state",),
-}
 
-_LONG_NAMES = {
-    "section": "section points",
-    "maximum": "largest value over the kept returns",
-    "minimum": "smallest value over the kept returns",
-    "period_number": "period number (0: none found)",
-    "residual": "scaled distance between a point and its period_number-th return",
-    "crossings_per_period": "transitions per return",
-    "contacts_per_period": "entries into contact per return",
-    "density": "section points in each bin",
-    "outside": "section points beyond the bins",
-    "equilibrium": "what the point stands at (empty: it moves)",
-    "equilibrium_minimum": "smallest value over the set of equilibria",
-    "equilibrium_maximum": "largest value over the set of equilibria",
-    "clearance": "smallest distance kept from the indicator's zero (negative: crossed)",
-}
+class Column(NamedTuple):
+    """A variable of a result: its name, the field of what holds it, its dims beside those of the result, the rule for
+    its numbers and their unit, and its long name."""
+
+    name: str
+    field: str
+    dims: tuple[str, ...]
+    rule: str
+    words: str
+
+
+#: Types of the numbers by rule; None: as they come. "time" and "rate" have units, integers of a name a table of words.
+_TYPES: dict[str, Any] = {
+    "": float, "time": float, "rate": float, "complex": complex, "flag": bool, "text": str, "place": np.int64,
+    "id": np.int32, "mode": np.int16, "transition": np.int16, "indicator": np.int16, "status": np.int8,
+    "equilibrium": np.int8, "yes": np.int8, "own": None,
+}  # fmt: skip
+
+
+def table(*rows: tuple[str, str, str, str]) -> tuple[Column, ...]:
+    """Columns of (name, dims, rule, words), whose fields have their names."""
+    return tuple(Column(name, name, tuple(dims.split()), rule, words) for name, dims, rule, words in rows)
+
+
+def typed(column: Column, values: Any) -> NDArray[Any]:
+    """A copy of the values in the type of the column, also where there are none."""
+    return np.array(values, dtype=_TYPES[column.rule])
+
+
+def attributes(labels: Labels, column: Column) -> dict[str, Any]:
+    """Long name, unit and table of words of a column."""
+    words = {"long_name": column.words.replace("forcing period", labels.turn)}
+    meanings: Mapping[str, Sequence[str]] = {
+        "mode": labels.modes, "transition": labels.transition_labels, "indicator": labels.indicators,
+        "equilibrium": EQUILIBRIA,
+    }  # fmt: skip
+    match column.rule:
+        case "status":
+            return status_attributes()
+        case "time":
+            return words | {"units": labels.time_unit}
+        case "rate":
+            return words | {"units": "1" if labels.time_unit == "1" else f"1/{labels.time_unit}"}
+        case rule if rule in meanings:
+            return words | flag_attributes(meanings[rule], dtype=_TYPES[rule])
+    return words
+
+
+def columns(labels: Labels, known: Sequence[Column], arrays: Mapping[str, Any], *lead: str) -> dict[str, Any]:
+    """Variables of a table for those of its fields that there are; their dims come behind ``lead``."""
+    by_field = {column.field: column for column in known}
+    found = {by_field[field]: values for field, values in arrays.items() if field in by_field}
+    return {
+        column.name: ((*lead, *column.dims), typed(column, values), attributes(labels, column))
+        for column, values in found.items()
+    }
+
+
+_TRAJECTORY = table(
+    ("u", "time state", "", "state"),
+    ("mode", "time", "mode", "mode"),
+    ("crossing_time", "crossing", "time", "time of the crossing"),
+    ("crossing_transition", "crossing", "transition", "transition"),
+    ("u_before", "crossing state", "", "state before the crossing"),
+    ("u_after", "crossing state", "", "state after the crossing"),
+    ("touch_time", "touch", "time", "time of the touch"),
+    ("touch_indicator", "touch", "indicator", "indicator"),
+    ("touch_u", "touch state", "", "state at the touch"),
+    ("touch_clearance", "touch", "", "distance left to the crossing"),
+    ("status", "", "status", ""),
+)
+#: Behind (direction, start, parameter).
+_SWEEP = table(
+    ("section", "iterate state", "own", "section points"),
+    ("maximum", "state", "own", "largest value over the kept returns"),
+    ("minimum", "state", "own", "smallest value over the kept returns"),
+    ("period_number", "", "own", "period number (0: none found)"),
+    ("residual", "", "own", "scaled distance between a point and its period_number-th return"),
+    ("crossings_per_period", "", "own", "transitions per return"),
+    ("contacts_per_period", "", "own", "entries into contact per return"),
+    ("clearance", "indicator", "own", "smallest distance kept from the indicator's zero (negative: crossed)"),
+    ("equilibrium", "", "own", "what the point stands at (empty: it moves)"),
+    ("equilibrium_minimum", "state", "own", "smallest value over the set of equilibria"),
+    ("equilibrium_maximum", "state", "own", "largest value over the set of equilibria"),
+    ("status", "", "status", ""),
+    ("density", "state bin", "own", "section points in each bin"),
+    ("outside", "state", "own", "section points beyond the bins"),
+)
+_POINTS = table(
+    ("section", "start iterate state", "", "section points"),
+    ("time", "start iterate", "time", "time of the return"),
+    ("mode", "start iterate", "mode", "mode"),
+    ("status", "start", "status", ""),
+)
+_JUMPS = {
+    "direction": "direction in which the jump is met", "variable": "state or output whose amplitude jumps",
+}  # fmt: skip
 
 
 def trajectory(
-    labels: Labels,
-    attrs: Mapping[str, str],
-    *,
-    time: ArrayLike,
-    u: ArrayLike,
-    mode: ArrayLike,
-    segment: ArrayLike,
-    crossing_time: ArrayLike,
-    crossing_transition: ArrayLike,
-    u_before: ArrayLike,
-    u_after: ArrayLike,
-    touch_time: ArrayLike,
-    touch_indicator: ArrayLike,
-    touch_u: ArrayLike,
-    touch_clearance: ArrayLike,
-    outputs: ArrayLike | None = None,
-    memory: ArrayLike | None = None,
-    status: int = 0,
-) -> xr.Dataset:
+    labels: Labels, attrs: Mapping[str, str], *, time: ArrayLike, segment: ArrayLike, outputs: ArrayLike | None = None,
+    memory: ArrayLike | None = None, status: int = 0, **arrays: Any,
+) -> xr.Dataset:  # fmt: skip
     """The result of ``simulate``: samples over ``time``, crossings and touches as flat lists."""
     d = labels
-    t_unit = {"units": d.time_unit}
-    modes = flag_attributes(d.modes, dtype=np.int16)
-    transitions = flag_attributes(d.transition_labels, dtype=np.int16)
-    indicators = flag_attributes(d.indicators, dtype=np.int16)
-    variables: dict[str, Any] = {
-        "u": (("time", "state"), floats(u), {"long_name": "state"}),
-        "mode": ("time", np.asarray(mode, np.int16), {"long_name": "mode", **modes}),
-        "crossing_time": ("crossing", floats(crossing_time), {"long_name": "time of the crossing", **t_unit}),
-        "crossing_transition": (
-            "crossing", np.asarray(crossing_transition, np.int16), {"long_name": "transition", **transitions},
-        ),
-        "u_before": (("crossing", "state"), floats(u_before), {"long_name": "state before the crossing"}),
-        "u_after": (("crossing", "state"), floats(u_after), {"long_name": "state after the crossing"}),
-        "touch_time": ("touch", floats(touch_time), {"long_name": "time of the touch", **t_unit}),
-        "touch_indicator": ("touch", np.asarray(touch_indicator, np.int16), {"long_name": "indicator", **indicators}),
-        "touch_u": (("touch", "state"), floats(touch_u), {"long_name": "state at the touch"}),
-        "touch_clearance": ("touch", floats(touch_clearance), {"long_name": "distance left to the crossing"}),
-        "status": ((), np.int8(status), status_attributes()),
-    }  # fmt: skip
-    for names, columns in ((d.outputs, outputs), (d.memory, memory)):
-        if columns is None:
-            continue
-        table = floats(columns)
-        for i, (name, quantity) in enumerate(names.items()):
-            variables[name] = ("time", table[:, i], quantity_attributes(name, quantity))
+    variables = columns(d, _TRAJECTORY, {**arrays, "status": status})
+    for names, found in ((d.outputs, outputs), (d.memory, memory)):
+        if found is not None:
+            for (name, quantity), column in zip(names.items(), floats(found).T, strict=True):
+                variables[name] = ("time", column, quantity_attributes(name, quantity))
+    along = {"long_name": "time", "units": d.time_unit, **({"symbol": "n"} if d.is_map else {})}
     coords: dict[str, Any] = {
-        "time": ("time", floats(time), {"long_name": "time", **t_unit, **({"symbol": "n"} if d.is_map else {})}),
+        "time": ("time", floats(time), along),
         "segment": ("time", np.asarray(segment, np.int64), {"long_name": "number of crossings before this sample"}),
-        **state_coords(d),
-        **parameter_coords(d),
-    }
+        **state_coords(d), **parameter_coords(d),
+    }  # fmt: skip
     return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
 
 
@@ -167,22 +195,17 @@ def sweep(
     their long names and units. See the module's text.
     """
     d = labels
-    unknown = set(arrays) - set(_SWEEP_ARRAYS)
-    if unknown:
-        raise ValueError(f"no such array in a sweep: {sorted(unknown)}; known: {sorted(_SWEEP_ARRAYS)}")
     leading = ("direction", "start", parameter)
-    variables: dict[str, Any] = {}
-    for name, array in arrays.items():
-        dims = leading + _SWEEP_ARRAYS[name]
-        if name.startswith("output_"):
-            stem = name.removeprefix("output_")
-            for i, (output, quantity) in enumerate(d.outputs.items()):
-                attributes = {"long_name": f"{stem} of {output}", "units": quantity.unit}
-                variables[f"{output}_{stem}"] = (leading, np.asarray(array)[..., i], attributes)
-        elif name == "status":
-            variables[name] = (dims, np.asarray(array, np.int8), status_attributes())
-        else:
-            variables[name] = (dims, _own(array), {"long_name": _LONG_NAMES[name]})
+    stems = {"output_maximum": "maximum", "output_minimum": "minimum"}
+    known = [*(column.name for column in _SWEEP), *stems]
+    if unknown := set(arrays) - set(known):
+        raise ValueError(f"no such array in a sweep: {sorted(unknown)}; known: {sorted(known)}")
+    variables = columns(d, _SWEEP, arrays, *leading)
+    for i, (output, quantity) in enumerate(d.outputs.items()):
+        for name, stem in stems.items():
+            if name in arrays:
+                told = {"long_name": f"{stem} of {output}", "units": quantity.unit}
+                variables[f"{output}_{stem}"] = (leading, np.asarray(arrays[name])[..., i], told)
     for name, (array, words, unit) in (loads or {}).items():  # a maximum of an output is there already
         variables.setdefault(name, (leading, floats(array), {"long_name": words, "units": unit}))
     coords: dict[str, Any] = {
@@ -218,41 +241,19 @@ def response(swept: xr.Dataset, *, amplitude: ArrayLike, jumps: Mapping[str, Arr
         "amplitude": labelled.transpose(*maximum.dims).assign_attrs(long_name="half the peak-to-peak value")
     }
     for name, values in jumps.items():
-        if name == "direction":
-            attributes = {"long_name": "direction in which the jump is met"}
-            variables["jump_direction"] = ("jump", strings(np.asarray(values, dtype=str)), attributes)
-        elif name == "value":
-            attributes = {"long_name": f"{parameter} at the jump", "units": swept[parameter].attrs.get("units", "1")}
-            variables["jump_value"] = ("jump", floats(values), attributes)
-        elif name == "variable":
-            attributes = {"long_name": "state or output whose amplitude jumps"}
-            variables["jump_variable"] = ("jump", strings(np.asarray(values, dtype=str)), attributes)
-        else:
-            variables[f"jump_{name}"] = ("jump", np.asarray(values))
+        told = {"long_name": _JUMPS[name]} if name in _JUMPS else {}
+        if name == "value":
+            told = {"long_name": f"{parameter} at the jump", "units": swept[parameter].attrs.get("units", "1")}
+        variables[f"jump_{name}"] = ("jump", np.array(values, dtype=str if name in _JUMPS else None), told)
     return swept.assign(variables)
 
 
 def section_points(
-    labels: Labels,
-    attrs: Mapping[str, str],
-    *,
-    section: ArrayLike,
-    time: ArrayLike,
-    mode: ArrayLike,
-    status: ArrayLike,
-    starts: ArrayLike,
-    squeeze: Sequence[str] = (),
+    labels: Labels, attrs: Mapping[str, str], *, starts: ArrayLike, squeeze: Sequence[str] = (), **arrays: Any
 ) -> xr.Dataset:
     """The result of ``poincare``: the points in which trajectories meet the section, one trajectory per start."""
-    d = labels
-    modes = flag_attributes(d.modes, dtype=np.int16)
-    variables: dict[str, Any] = {
-        "section": (("start", "iterate", "state"), floats(section), {"long_name": _LONG_NAMES["section"]}),
-        "time": (("start", "iterate"), floats(time), {"long_name": "time of the return", "units": d.time_unit}),
-        "mode": (("start", "iterate"), np.asarray(mode, np.int16), {"long_name": "mode", **modes}),
-        "status": ("start", np.asarray(status, np.int8), status_attributes()),
-    }
-    coords = {**start_coords(starts), **state_coords(d), **parameter_coords(d)}
+    coords = {**start_coords(starts), **state_coords(labels), **parameter_coords(labels)}
+    variables = columns(labels, _POINTS, arrays)
     return with_short_record(xr.Dataset(variables, coords, dict(attrs))).squeeze(list(squeeze))
 
 
@@ -312,6 +313,3 @@ def floats(values: ArrayLike) -> NDArray[np.float64]:
     """A copy, so that a kernel's buffer that is used again does not change a result."""
     return np.array(values, dtype=np.float64)
 
-
-def _own(values: ArrayLike) -> NDArray[Any]:
-    return np.array(values)
