@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.cells import cell_edges
-from nonsmooth.plot.labels import name_and_unit, name_axes, variable_along
+from nonsmooth.plot.labels import name_plane, variable_along
 from nonsmooth.results.labels import kind_of
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def basins(result: xr.Dataset, ax: Axes | None = None, *, size: float = 3.6) -> 
             handleheight=1.2, columnspacing=1.0, handler_map={tuple: HandlerTuple(ndivide=1)},
         )  # fmt: skip
         drawn.set(xlim=xlim, ylim=ylim)
-        name_axes(drawn, name_and_unit(result, first), name_and_unit(result, second))
+        name_plane(drawn, result, first, second)
     return drawn
 
 

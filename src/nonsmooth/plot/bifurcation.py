@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.branch import draw_branch
-from nonsmooth.plot.labels import column, first_states, name_and_unit, name_axes, variable_along
+from nonsmooth.plot.labels import column, first_states, name_plane, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,21 +62,21 @@ def bifurcation(
     directions = [str(word) for word in np.atleast_1d(result["direction"].values)]
     with style.axes(ax) as drawn:
         for i, direction in enumerate(directions):
-            cloud = points.isel(direction=i) if "direction" in points.dims else points
-            values = np.broadcast_to(result[parameter].values, cloud.transpose(..., parameter).shape)
+            mine = points.isel(direction=i) if "direction" in points.dims else points
+            cloud = mine.transpose(..., parameter).values
+            values = np.broadcast_to(result[parameter].values, cloud.shape)
             under = direction == "up" and "down" in directions
-            drawn.plot(
-                values.ravel(), cloud.transpose(..., parameter).values.ravel(), ".", rasterized=True,
-                markersize=size * (_SEAM if under else 1.0), markeredgewidth=0,
-                color=color or style.COLORS["pale" if under else _COLORS[direction]],
-                label=direction if len(directions) > 1 else None,
+            style.cloud(
+                drawn, (values, cloud), size * (_SEAM if under else 1.0),
+                color or style.COLORS["pale" if under else _COLORS[direction]],
+                direction if len(directions) > 1 else None,
             )  # fmt: skip
         for k, one in enumerate(branches):
             draw_branch(drawn, one, y=name, color=style.COLORS[_LINES[k % len(_LINES)]], behind=True)
         # The whole sweep shows, its ends too where every point diverged.
         drawn.dataLim.update_from_data_x(result[parameter].values, ignore=False)
         drawn.margins(x=0)
-        name_axes(drawn, name_and_unit(result, parameter), name_and_unit(result, name))
+        name_plane(drawn, result, parameter, name)
         if len(directions) > 1 or branches:
             style.even_dots(style.clear_legend(drawn))
     return drawn

@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.branch import draw_branch
-from nonsmooth.plot.labels import first_states, name_and_unit, name_axes, variable_along
+from nonsmooth.plot.labels import first_states, name_plane, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,15 +46,12 @@ def bifurcation_diagram(
     swept = result["swept_section"].sel(state=name).transpose("direction", "sample", "iterate").values
     values = np.broadcast_to(result["swept_value"].values[None, :, None], swept.shape)
     with style.axes(ax) as drawn:
-        drawn.plot(
-            values.ravel(), swept.ravel(), ".", rasterized=True, markersize=size, markeredgewidth=0,
-            color=style.COLORS["pale"], label="sweeps",
-        )  # fmt: skip
+        style.cloud(drawn, (values, swept), size, style.COLORS["pale"], "sweeps")
         for k in range(result.sizes["branch_id"]):
             draw_branch(drawn, one_branch(result, k), y=name, special=special)
         drawn.dataLim.update_from_data_x(result["swept_value"].values, ignore=False)
         drawn.margins(x=0)
-        name_axes(drawn, name_and_unit(result, parameter), name_and_unit(result, name))
+        name_plane(drawn, result, parameter, name)
         style.even_dots(style.clear_legend(drawn))
     return drawn
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-__all__ = ["MARKS", "branch", "draw_branch", "lines_of", "ordinates_of", "with_breaks"]
+__all__ = ["MARKS", "branch", "draw_branch", "lines_of", "mark_special", "ordinates_of", "with_breaks"]
 
 #: Marker and words of each kind of special point.
 MARKS = {
@@ -68,9 +69,9 @@ def branch(
     variable_along(result, "stable", "continue_orbit")
     with style.axes(ax) as drawn:
         draw_branch(drawn, result, y=y, quantity=quantity, special=special, color=color)
-        parameter = _parameter(result)
         (name,) = only_states(result, y)
-        name_axes(drawn, name_and_unit(result, parameter), _ordinate(result, name, quantity))
+        text, unit = name_and_unit(result, name)
+        name_axes(drawn, name_and_unit(result, result.attrs["parameter"]), (_WORDS[quantity] + text, unit))
         style.clear_legend(drawn)
     return drawn
 
@@ -94,23 +95,18 @@ def draw_branch(
     if quantity not in _WORDS:
         raise ValueError(f"quantity = {quantity!r}; allowed: {', '.join(map(repr, _WORDS))}")
     (name,) = only_states(result, y)
-    values = result[_parameter(result)].values
+    values = result[result.attrs["parameter"]].values
     ordinates = ordinates_of(result, name, quantity)
     shade = color or style.COLORS["first"]
     for line, at in lines_of(result):
-        under = behind and line == "-"
         looks: dict[str, Any] = {"linewidth": width, "zorder": 3}
-        if under:
+        if behind and line == "-":
             looks = {"linewidth": 3 * width, "alpha": _SEAM, "zorder": 0.5}
-        words = f"{_STATES[line]} branch"
         for row in ordinates:
-            known = ax.get_legend_handles_labels()[1]
-            ax.plot(
-                with_breaks(values, at), with_breaks(row, at), line, color=shade,
-                label=None if words in known else words, **looks,
-            )  # fmt: skip
-    if special:
-        _mark(ax, result, ordinates)
+            label = style.once(ax, f"{_STATES[line]} branch")
+            ax.plot(with_breaks(values, at), with_breaks(row, at), line, color=shade, label=label, **looks)
+    if special and result.sizes.get("special", 0):
+        mark_special(ax, result, values, ordinates, MARKS)
 
 
 def ordinates_of(result: xr.Dataset, name: str, quantity: str) -> NDArray[np.float64]:
@@ -127,39 +123,18 @@ def ordinates_of(result: xr.Dataset, name: str, quantity: str) -> NDArray[np.flo
     return np.asarray(chosen.transpose(*others, "point").values, dtype=float).reshape(-1, result.sizes["point"])
 
 
-def _mark(ax: Axes, result: xr.Dataset, ordinates: NDArray[np.float64]) -> None:
-    """The special points on each of the lines."""
-    if not result.sizes.get("special", 0):
-        return
-    values = result[_parameter(result)].values[result["special_point"].values]
-    kinds = [str(kind) for kind in result["special_kind"].values]
-    heights = ordinates[:, result["special_point"].values]
-    known = ax.get_legend_handles_labels()[1]
-    for kind in dict.fromkeys(kinds):
-        here = np.array([one == kind for one in kinds])
-        marker, words = MARKS.get(kind, (_OTHER, kind.replace("_", " ")))
+def mark_special(
+    ax: Axes, result: xr.Dataset, x: Any, heights: NDArray[np.float64], marks: Mapping[str, tuple[str, str]]
+) -> None:
+    """The special points on each of the lines (lines, point), every kind with its own sign and words."""
+    at = result["special_point"].values.astype(int)
+    kinds = result["special_kind"].values.astype(str)
+    for kind in dict.fromkeys(kinds.tolist()):
+        here = at[kinds == kind]
+        marker, words = marks.get(kind, (_OTHER, kind.replace("_", " ")))
         size = _SIZES.get(kind, _SIZE)
-        ax.plot(
-            np.tile(values[here], len(heights)), heights[:, here].ravel(), marker, markersize=size,
-            zorder=5.7 - 0.1 * size, linestyle="none", markerfacecolor="white",
-            markeredgecolor=style.COLORS["section"], markeredgewidth=0.8, label=None if words in known else words,
-        )  # fmt: skip
-
-
-def _parameter(result: xr.Dataset) -> str:
-    """The parameter of the branch: the coordinate over ``point`` with its own name."""
-    return str(result.attrs["parameter"])
-
-
-def _ordinate(result: xr.Dataset, name: str, quantity: str) -> tuple[str, str]:
-    text, unit = name_and_unit(result, name)
-    return _WORDS[quantity] + text, unit
-
-
-def _virtual(result: xr.Dataset) -> NDArray[np.bool_]:
-    if "virtual" not in result:
-        return np.zeros(result.sizes["point"], dtype=bool)
-    return np.asarray(result["virtual"].values, dtype=bool)
+        rows = heights[:, here]
+        style.mark(ax, (np.broadcast_to(x[here], rows.shape), rows), marker, words, size, zorder=5.7 - 0.1 * size)
 
 
 def lines_of(result: xr.Dataset) -> list[tuple[str, NDArray[np.intp]]]:
@@ -168,7 +143,8 @@ def lines_of(result: xr.Dataset) -> list[tuple[str, NDArray[np.intp]]]:
     A segment that begins at a special point, where stability changes, is of the kind of its end.
     """
     kind = np.where(result["stable"].values.astype(bool), 0, 1)
-    kind[_virtual(result)] = 2
+    if "virtual" in result:
+        kind[result["virtual"].values.astype(bool)] = 2
     first, last = kind[:-1].copy(), kind[1:]
     if result.sizes.get("special", 0):
         at = result["special_point"].values.astype(int)

@@ -8,15 +8,13 @@ import numpy as np
 
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.cells import cell_edges
-from nonsmooth.plot.labels import name_and_unit, name_axes, only_states, variable_along
+from nonsmooth.plot.labels import in_words, name_axes, name_plane, only_states, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["chart"]
-
-_NOT_PERIODIC = "not_periodic"
+__all__ = ["chart", "classes_of", "legend_of"]
 
 
 def chart(
@@ -59,37 +57,46 @@ def chart(
                 (name,) = only_states(result, y)
                 values = values.sel(state=name)
             _numbers(values, drawn, first, second, show)
-        name_axes(drawn, name_and_unit(result, first), name_and_unit(result, second))
+        name_plane(drawn, result, first, second)
     return drawn
+
+
+def classes_of(result: xr.Dataset) -> tuple[Any, list[tuple[str, str]]]:
+    """Classes of a chart as numbers, and the words and the colour of each."""
+    period, told = result["period_number"].values.astype(int), in_words(result["status"])
+    most = max(int(period.max(initial=0)), len(palette.PERIODS))
+    colors = [*palette.PERIODS, *[palette.LONGER] * (most - len(palette.PERIODS))]
+    entries = [(f"period {p}", color) for p, color in enumerate(colors, start=1)]
+    unknown = np.where(told == "not_periodic", most, most + 1)
+    return np.where(period > 0, period - 1, unknown), [
+        *entries, ("no period", palette.NO_PERIOD), ("not settled", palette.UNKNOWN)
+    ]  # fmt: skip
+
+
+def legend_of(classes: Any, entries: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Words and colour of the classes that are there; long periods are one."""
+    above = f"above {len(palette.PERIODS)}"
+    there = (entries[k] for k in np.unique(classes))
+    return [
+        (above if color == palette.LONGER else words.removeprefix("period "), color)
+        for color, words in {color: words for words, color in there}.items()
+    ]
 
 
 def _periods(result: xr.Dataset, drawn: Axes, first: str, second: str) -> None:
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    flags = result["status"].attrs
-    words = dict(zip(flags["flag_values"], flags["flag_meanings"].split(), strict=True))
-    period = result["period_number"].transpose(second, first).values
-    status = result["status"].transpose(second, first).values
-    classes: list[tuple[str, str, Any]] = [
-        (str(p), color, period == p) for p, color in enumerate(palette.PERIODS, start=1)
-    ]
-    classes.append((f"above {len(palette.PERIODS)}", palette.LONGER, period > len(palette.PERIODS)))
-    names = np.array([words.get(code, "") for code in range(int(max(words)) + 1)])[np.clip(status, 0, None)]
-    classes.append(("none", palette.NO_PERIOD, (period == 0) & (names == _NOT_PERIODIC)))
-    classes.append(("not settled", palette.UNKNOWN, (period == 0) & (names != _NOT_PERIODIC)))
-    there = [item for item in classes if item[2].any()]
-    number = np.zeros(period.shape, dtype=int)
-    for k, (_, _, mask) in enumerate(there):
-        number[mask] = k
+    classes, entries = classes_of(result.transpose(second, first, ...))
     drawn.pcolormesh(
-        cell_edges(result[first].values), cell_edges(result[second].values), number, shading="flat", rasterized=True,
-        cmap=ListedColormap([color for _, color, _ in there]), vmin=-0.5, vmax=len(there) - 0.5,
+        cell_edges(result[first].values), cell_edges(result[second].values), classes, shading="flat", rasterized=True,
+        cmap=ListedColormap([color for _, color in entries]), vmin=-0.5, vmax=len(entries) - 0.5,
     )  # fmt: skip
-    patches = [Patch(facecolor=color, edgecolor="black", linewidth=0.4, label=text) for text, color, _ in there]
+    looks: dict[str, Any] = {"edgecolor": "black", "linewidth": 0.4}
+    shown = {words.replace("no period", "none"): color for words, color in legend_of(classes, entries)}
     drawn.legend(
-        handles=patches, title="period", loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0,
-        handlelength=1.0, handleheight=1.0,
+        handles=[Patch(facecolor=color, label=words, **looks) for words, color in shown.items()], title="period",
+        loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, handlelength=1.0, handleheight=1.0,
     )  # fmt: skip
 
 
@@ -101,15 +108,8 @@ def _numbers(values: xr.DataArray, drawn: Axes, first: str, second: str, show: s
         finite = np.abs(table[np.isfinite(table)])
         limit = float(np.percentile(finite, 98)) if len(finite) else 1.0
         options = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
-    mesh = drawn.pcolormesh(
-        cell_edges(values[first].values),
-        cell_edges(values[second].values),
-        table,
-        shading="flat",
-        rasterized=True,
-        **options,
-    )
-    unit = values.attrs.get("units", "1")
-    text = values.attrs.get("long_name", show)
+    edges = (cell_edges(values[name].values) for name in (first, second))
+    mesh = drawn.pcolormesh(*edges, table, shading="flat", rasterized=True, **options)
     extend = "both" if show == "lyapunov" else "neither"
-    name_axes(drawn.figure.colorbar(mesh, ax=drawn, extend=extend).ax, y=(text, unit))
+    named = values.attrs.get("long_name", show), values.attrs.get("units", "1")
+    name_axes(drawn.figure.colorbar(mesh, ax=drawn, extend=extend).ax, y=named)

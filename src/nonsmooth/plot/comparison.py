@@ -9,8 +9,9 @@ from nonsmooth.plot.style import ABOVE
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
 
-__all__ = ["ABOVE", "MEASURED", "THEORY", "check_kind", "measured_label"]
+__all__ = ["ABOVE", "MEASURED", "THEORY", "check_kind", "measured_label", "one_phase", "shade_reach"]
 
 #: Theory is a blue line or cloud with a pale band, the experiment black points.
 THEORY = style.COLORS["first"]
@@ -29,3 +30,15 @@ def check_kind(result: xr.Dataset, *kinds: str) -> None:
     if kind not in kinds:
         what = f"a comparison of a {kind}" if kind else "no result of compare"
         raise ValueError(f"this picture needs a comparison of a {' or '.join(kinds)}; this is {what}")
+
+
+def shade_reach(ax: Axes, result: xr.Dataset, x: Any, **looks: Any) -> None:
+    """Shade the band of drawn parameters, where the comparison of one state and direction has one."""
+    if "theory_low" in result:
+        ax.fill_between(x, result["theory_low"], result["theory_high"], linewidth=0, **looks)
+
+
+def one_phase(result: xr.Dataset, name: str, phase: int = 0) -> xr.DataArray:
+    """A variable at one of the sections that were compared."""
+    array = result[name]
+    return array.isel(section_phase=phase) if "section_phase" in array.dims else array

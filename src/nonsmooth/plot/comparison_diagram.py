@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.comparison import ABOVE, MEASURED, THEORY, check_kind, measured_label
-from nonsmooth.plot.labels import first_states, name_and_unit, name_axes
+from nonsmooth.plot.comparison import ABOVE, MEASURED, THEORY, check_kind, measured_label, shade_reach
+from nonsmooth.plot.labels import first_states, name_plane
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,24 +37,15 @@ def comparison_diagram(result: xr.Dataset, ax: Axes | None = None, *, y: str | N
     with style.axes(ax) as drawn:
         points = result["theory_section"].sel(state=name).transpose(..., parameter)
         at = np.broadcast_to(result[parameter].values, points.shape)
-        drawn.plot(
-            at.ravel(), points.values.ravel(), ".", color=THEORY, markersize=0.9, markeredgewidth=0, rasterized=True,
-            label="theory",
-        )  # fmt: skip
-        if "theory_low" in result:
-            low, high = (result[f"theory_{edge}"].sel(state=name).values for edge in ("low", "high"))
-            drawn.fill_between(
-                result[parameter].values, low, high, color=THEORY, alpha=0.12, linewidth=0, zorder=0,
-                label="reach for drawn parameters",
-            )  # fmt: skip
-        drawn.plot(
-            result[f"measured_{parameter}"].values, result["measured_section"].sel(state=name).values, ".",
-            color=MEASURED, markersize=size, markeredgewidth=0, rasterized=True, label=measured_label(result),
-        )  # fmt: skip
+        style.cloud(drawn, (at, points.values), 0.9, THEORY, "theory")
+        looks = {"color": THEORY, "alpha": 0.12, "zorder": 0, "label": "reach for drawn parameters"}
+        shade_reach(drawn, result.sel(state=name), result[parameter].values, **looks)
+        read = result[f"measured_{parameter}"], result["measured_section"].sel(state=name)
+        style.cloud(drawn, read, size, MEASURED, measured_label(result))
         _flips(drawn, result)
         drawn.margins(x=0)
         style.even_dots(drawn.legend(**ABOVE, ncols=2, columnspacing=1.0))
-        name_axes(drawn, name_and_unit(result, parameter), name_and_unit(result, name))
+        name_plane(drawn, result, parameter, name)
     return drawn
 
 
@@ -71,26 +62,20 @@ def _flips(ax: Axes, result: xr.Dataset) -> None:
         for kind in ("theory_flip", "measured_flip_read", "measured_flip", "measured_flip_error")
     }
     word = measured_label(result)
-
-    def once(words: str) -> str | None:
-        return None if words in ax.get_legend_handles_labels()[1] else words
-
+    tick: dict[str, Any] = {"transform": top, "zorder": 6, "solid_capstyle": "butt"}
     for expected, read, still, error in zip(*found.values(), strict=True):
-        if np.isfinite(expected):
-            ax.plot([expected] * 2, [0.93, 1.0], color=THEORY, linewidth=2.0, transform=top, zorder=6,
-                    solid_capstyle="butt", label=once("flip, theory"))  # fmt: skip
-        moved = np.isfinite(read) and np.isfinite(still) and read != still
-        if np.isfinite(read):
-            ax.plot([read] * 2, [0.93, 1.0], color=MEASURED, linewidth=1.2, transform=top, zorder=6,
-                    solid_capstyle="butt", label=once(f"flip, {word}"))  # fmt: skip
-        if moved:
+        for place, color, width, words in ((expected, THEORY, 2.0, "theory"), (read, MEASURED, 1.2, word)):
+            if np.isfinite(place):
+                label = style.once(ax, f"flip, {words}")
+                ax.plot([place] * 2, [0.93, 1.0], color=color, linewidth=width, label=label, **tick)
+        if np.isfinite(read) and np.isfinite(still) and read != still:
             ax.annotate(
                 "", (still, 0.965), (read, 0.965), xycoords=top, textcoords=top, zorder=5,
                 arrowprops={"arrowstyle": "->", "color": MEASURED, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 3},
             )  # fmt: skip
-        if np.isfinite(still) and (moved or not np.isfinite(read)):
+        if np.isfinite(still) and read != still:
             ax.errorbar(
                 [still], [0.965], xerr=[error] if np.isfinite(error) else None, fmt="D", color=MEASURED, markersize=3.5,
                 markerfacecolor="white", markeredgewidth=0.8, elinewidth=0.8, capsize=1.5, transform=top, zorder=6,
-                label=once(f"flip, {word}, delay taken out"),
+                label=style.once(ax, f"flip, {word}, delay taken out"),
             )  # fmt: skip

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.comparison import ABOVE, check_kind, measured_label
+from nonsmooth.plot.comparison import ABOVE, check_kind, measured_label, shade_reach
 from nonsmooth.plot.labels import first_states, name_and_unit, name_axes, with_unit
 
 if TYPE_CHECKING:
@@ -43,11 +43,8 @@ def comparison_response(result: xr.Dataset, ax: Axes | None = None, *, digits: i
         for i, direction in enumerate(result["direction"].values.astype(str)):
             color, marker, line, name = _LOOKS[direction]
             color = style.COLORS[color]
-            curve = result["theory_amplitude"].values[:, i]
-            if "theory_low" in result:
-                low, high = (result[f"theory_{edge}"].values[:, i] for edge in ("low", "high"))
-                drawn.fill_between(values, low, high, color=color, alpha=0.2, linewidth=0)
-            drawn.plot(values, curve, line, color=color, label=f"theory, {name}")
+            shade_reach(drawn, result.isel(direction=i), values, color=color, alpha=0.2)
+            drawn.plot(values, result["theory_amplitude"].values[:, i], line, color=color, label=f"theory, {name}")
             mine = runs == direction
             error = result["measured_amplitude_error"].values[mine]
             at, heights = result[f"measured_{parameter}"].values[mine], result["measured_amplitude"].values[mine]
@@ -76,13 +73,10 @@ def _jumps(ax: Axes, result: xr.Dataset, digits: int) -> None:
         direction = str(result["jump_direction"].values[row])
         color = style.COLORS[_LOOKS[direction][0]]
         seen, expected = (float(result[name].values[row]) for name in ("measured_jump", "theory_jump"))
-        if np.isfinite(seen):
-            ax.plot([seen], [0.03], "D", color=color, markersize=3.5, transform=foot, clip_on=False, zorder=6)
-        if np.isfinite(expected):
-            ax.plot(
-                [expected], [0.03], "D", color=color, markerfacecolor="white", markersize=3.5, transform=foot,
-                clip_on=False, zorder=6,
-            )  # fmt: skip
+        for place, face in ((seen, color), (expected, "white")):
+            if np.isfinite(place):
+                looks: dict[str, Any] = {"markersize": 3.5, "transform": foot, "clip_on": False, "zorder": 6}
+                ax.plot([place], [0.03], "D", color=color, markerfacecolor=face, **looks)
         if np.isfinite(seen) and np.isfinite(expected):
             number = f"{expected - seen:+.{digits}f}".replace("-", "\N{MINUS SIGN}")
             ax.annotate(

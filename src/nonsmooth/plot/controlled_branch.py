@@ -74,10 +74,10 @@ def _amplitudes(ax: Axes, result: xr.Dataset, parameter: str, theory: xr.Dataset
         here = result["stability"].values == kind
         if not here.any():
             continue
-        looks: dict[str, Any] = {"markersize": 3.5, "markeredgewidth": 0.7, "elinewidth": 0.6, "zorder": 4}
         ax.errorbar(
-            values[here], amplitude[here], yerr=2 * result["amplitude_uncertainty"].values[here], fmt="o",
-            color=style.COLORS["first"], markerfacecolor=style.COLORS.get(color, color), label=words, **looks,
+            values[here], amplitude[here], yerr=2 * result["amplitude_uncertainty"].values[here], fmt="o", zorder=4,
+            color=style.COLORS["first"], markerfacecolor=style.COLORS.get(color, color), label=words, markersize=3.5,
+            markeredgewidth=0.7, elinewidth=0.6,
         )  # fmt: skip
     if result.sizes["special"]:
         at = result["special_point"].values

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import name_and_unit, name_axes, variable_along
+from nonsmooth.plot.branch import mark_special
+from nonsmooth.plot.labels import name_plane, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,14 +62,13 @@ def curve(result: xr.Dataset, ax: Axes | None = None, *, special: bool = True, c
     x, y = names
     shade, line, words = KINDS[str(result["kind"].values)]
     with style.axes(ax) as drawn:
-        known = drawn.get_legend_handles_labels()[1]
         drawn.plot(
             result[x].values, result[y].values, line, color=color or style.COLORS[shade], linewidth=1.0, zorder=3,
-            label=None if words in known else words, path_effects=style.halo(1.8) if _over_chart(drawn) else None,
+            label=style.once(drawn, words), path_effects=style.halo(1.8) if _over_chart(drawn) else None,
         )  # fmt: skip
         if special:
-            _mark(drawn, result, x, y)
-        name_axes(drawn, name_and_unit(result, x), name_and_unit(result, y))
+            mark_special(drawn, result, result[x].values, result[y].values[None], POINTS)
+        name_plane(drawn, result, x, y)
         _legend(drawn)
     return drawn
 
@@ -91,17 +89,3 @@ def _legend(ax: Axes) -> None:
         ax.legend(loc="lower left", bbox_to_anchor=(1.01, 0.0), borderaxespad=0.0)
     else:
         ax.legend(loc="best")
-
-
-def _mark(ax: Axes, result: xr.Dataset, x: str, y: str) -> None:
-    kinds = np.array([str(kind) for kind in result["special_kind"].values])
-    places = result["special_point"].values
-    known = ax.get_legend_handles_labels()[1]
-    for kind in dict.fromkeys(kinds.tolist()):
-        at = places[kinds == kind]
-        marker, words = POINTS.get(kind, ("*", kind.replace("_", " ")))
-        ax.plot(
-            result[x].values[at], result[y].values[at], marker, linestyle="none", markersize=4.5, zorder=5,
-            markerfacecolor="white", markeredgecolor=style.COLORS["section"], markeredgewidth=0.8,
-            label=None if words in known else words,
-        )  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.cells import cell_edges
-from nonsmooth.plot.labels import name_and_unit, name_axes, only_states, variable_along
+from nonsmooth.plot.labels import name_plane, only_states, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,5 +61,5 @@ def density(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None,
             norm=LogNorm(lowest, max(highest, 1.01 * lowest)),
         )  # fmt: skip
         drawn.figure.colorbar(mesh, ax=drawn, label="share of the points (%)")
-        name_axes(drawn, name_and_unit(result, parameter), name_and_unit(result, name))
+        name_plane(drawn, result, parameter, name)
     return drawn

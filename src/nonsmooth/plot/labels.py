@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from nonsmooth.system.parameter import latex_name
 
@@ -11,8 +13,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
-    "column", "first_states", "name_and_unit", "name_axes", "only_states", "symbol_of", "variable_along", "with_unit",
-    "words_of_flags",
+    "column", "first_states", "in_words", "name_and_unit", "name_axes", "name_plane", "only_states", "symbol_of",
+    "variable_along", "with_unit", "words_of_flags",
 ]  # fmt: skip
 
 
@@ -41,6 +43,11 @@ def name_axes(ax: Axes, x: tuple[str, str] | None = None, y: tuple[str, str] | N
     for axis, named in ((ax.xaxis, x), (ax.yaxis, y)):
         if named is not None:
             name_axis(axis, *named)
+
+
+def name_plane(ax: Axes, result: xr.Dataset, x: str, y: str) -> None:
+    """Label the axes with two states, parameters or outputs of a result."""
+    name_axes(ax, name_and_unit(result, x), name_and_unit(result, y))
 
 
 def symbol_of(name: str, symbol: str = "") -> str:
@@ -111,3 +118,9 @@ def only_states(result: xr.Dataset, *names: str | None) -> list[str]:
 def words_of_flags(array: xr.DataArray) -> list[str]:
     """The words of a variable's ``flag_meanings``: the modes' names, the transitions' labels."""
     return str(array.attrs["flag_meanings"]).split()
+
+
+def in_words(array: xr.DataArray) -> Any:
+    """The values of a variable as the words of its ``flag_meanings``; "?" for a number that has none."""
+    words = dict(zip(np.atleast_1d(array.attrs["flag_values"]).tolist(), words_of_flags(array), strict=True))
+    return np.vectorize(lambda code: words.get(int(code), "?"), otypes=[object])(array.values)

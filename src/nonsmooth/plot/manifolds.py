@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import name_and_unit, name_axes, only_states, variable_along, words_of_flags
+from nonsmooth.plot.labels import name_plane, only_states, variable_along, words_of_flags
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
 __all__ = ["manifolds"]
-
-_LOOK = {"unstable": ("second", "-"), "stable": ("first", "-")}
 
 
 def manifolds(
@@ -47,24 +45,18 @@ def manifolds(
                 continue
             breaks = np.flatnonzero(np.diff(piece[chosen]) > 0) + 1
             kind = kinds[int(code)]
-            color, line = _LOOK[kind]
+            color = "second" if kind == "unstable" else "first"
             # Each arc begins at the orbit itself.
             j = int(result["orbit_point"].values[number])
             xs, ys = (
                 np.insert(np.insert(values[chosen], breaks, np.nan), 0, own[j])
                 for values, own in zip(columns, saddle, strict=True)
             )
-            words = f"{kind} manifold"
-            known = drawn.get_legend_handles_labels()[1]
             drawn.plot(
-                xs, ys, line, color=style.COLORS[color], linewidth=linewidth, zorder=3 if kind == "unstable" else 2,
-                label=None if words in known else words,
+                xs, ys, color=style.COLORS[color], linewidth=linewidth, zorder=3 if kind == "unstable" else 2,
+                label=style.once(drawn, f"{kind} manifold"),
             )  # fmt: skip
-        drawn.plot(
-            *saddle, "o", markersize=4, markerfacecolor="white", markeredgecolor=style.COLORS["section"],
-            markeredgewidth=0.9, zorder=5,
-            label=None if "saddle" in drawn.get_legend_handles_labels()[1] else "saddle",
-        )  # fmt: skip
-        name_axes(drawn, name_and_unit(result, names[0]), name_and_unit(result, names[1]))
+        style.mark(drawn, saddle, "o", "saddle", zorder=5)
+        name_plane(drawn, result, *names)
         style.clear_legend(drawn)
     return drawn

@@ -11,7 +11,6 @@ from nonsmooth.plot.labels import first_states
 from nonsmooth.plot.phase_portrait import phase_portrait
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.axes import Axes
 
 __all__ = ["orbit"]
@@ -40,41 +39,22 @@ def orbit(result: Any, ax: Axes | None = None, *, x: str | None = None, y: str |
     names = first_states(run, x, y)
     with style.axes(ax, ratio=0.85) as drawn:
         phase_portrait(run, drawn, x=names[0], y=names[1])
-        _dots(drawn, [_sides(run, name) for name in names], "o", "white", "crossing")
-        _dots(drawn, [_section(result, run, name) for name in names], "o", style.COLORS["section"], "section")
-        near = _nearest(run)
-        if near is not None:
-            words = f"least clearance {near[1]:.2g}"
-            at = [run["touch_u"].sel(state=name).values[near[0]] for name in names]
-            drawn.plot(*at, "x", color=style.COLORS["fourth"], markersize=5, markeredgewidth=1.1, zorder=6, label=words)
+        mark: dict[str, Any] = {"size": 3.4, "zorder": 5, "markeredgewidth": 0.7}
+        if run.sizes["crossing"]:
+            sides = (np.concatenate([run[key].sel(state=name) for key in ("u_before", "u_after")]) for name in names)
+            style.mark(drawn, sides, "o", "crossing", **mark)
+        # Phase 0 of each forcing period; of an autonomous orbit the one state it is held by.
+        returns = max(result.period_number, 1)
+        time = run["time"].values
+        at = [int(np.abs(time - k * result.period / returns).argmin()) for k in range(returns)]
+        points = (run["u"].sel(state=name).values[at] for name in names)
+        style.mark(drawn, points, "o", "section", **mark, markerfacecolor=style.COLORS["section"])
+        clearance = run["touch_clearance"].values
+        if np.isfinite(clearance).any():
+            near = int(np.nanargmin(clearance))
+            words = f"least clearance {clearance[near]:.2g}"
+            place = [run["touch_u"].sel(state=name).values[near] for name in names]
+            cross: dict[str, Any] = {"color": style.COLORS["fourth"], "markersize": 5, "markeredgewidth": 1.1}
+            drawn.plot(*place, "x", zorder=6, label=words, **cross)
         style.clear_legend(drawn)
     return drawn
-
-
-def _sides(run: xr.Dataset, name: str) -> Any:
-    return np.concatenate([run[side].sel(state=name).values for side in ("u_before", "u_after")])
-
-
-def _section(found: Any, run: xr.Dataset, name: str) -> Any:
-    """The states at phase 0 of each forcing period; of an autonomous orbit the one state it is held by."""
-    returns = max(found.period_number, 1)
-    along = run["time"].values
-    at = np.arange(returns) * found.period / returns
-    return np.array([run["u"].sel(state=name).values[int(np.abs(along - t).argmin())] for t in at])
-
-
-def _dots(ax: Axes, points: list[Any], marker: str, face: str, words: str) -> None:
-    if len(points[0]):
-        ax.plot(
-            *points, marker, linestyle="none", markersize=3.4, markerfacecolor=face, zorder=5,
-            markeredgecolor=style.COLORS["section"], markeredgewidth=0.7, label=words,
-        )  # fmt: skip
-
-
-def _nearest(run: xr.Dataset) -> tuple[int, float] | None:
-    """Touch that leaves the least distance, and this distance; None where the orbit comes near no other transition."""
-    clearance = run["touch_clearance"].values
-    if not np.isfinite(clearance).any():
-        return None
-    at = int(np.nanargmin(clearance))
-    return at, float(clearance[at])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import column, first_states, name_and_unit, name_axes, variable_along, words_of_flags
+from nonsmooth.plot.labels import column, first_states, name_plane, variable_along, words_of_flags
 from nonsmooth.plot.segments import pieces_by_mode, with_gaps
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def phase_portrait(
             )  # fmt: skip
         if zone is not None:
             shade_zone(drawn, float(result[zone]) if isinstance(zone, str) else zone)
-        name_axes(drawn, name_and_unit(result, names[0]), name_and_unit(result, names[1]))
+        name_plane(drawn, result, *names)
     return drawn
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import column, first_states, name_and_unit, name_axes, variable_along
+from nonsmooth.plot.labels import column, first_states, name_plane, variable_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,9 +30,7 @@ def section(
     variable_along(result, "section", "poincare or sweep")
     names = first_states(result, x, y)
     with style.axes(ax, ratio=0.85) as drawn:
-        drawn.plot(
-            *(column(result, "section", name).values.ravel() for name in names), ".",
-            markersize=size, markeredgewidth=0, rasterized=True, color=color or style.COLORS["section"],
-        )  # fmt: skip
-        name_axes(drawn, name_and_unit(result, names[0]), name_and_unit(result, names[1]))
+        points = (column(result, "section", name).values for name in names)
+        style.cloud(drawn, points, size, color or style.COLORS["section"])
+        name_plane(drawn, result, *names)
     return drawn

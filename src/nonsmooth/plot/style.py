@@ -9,11 +9,13 @@ get the whole style.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
 
 __all__ = [
-    "ABOVE", "COLORS", "COLUMN", "PAGE", "axes", "clear_legend", "even_dots", "halo", "journal", "save_figure", "small",
+    "ABOVE", "COLORS", "COLUMN", "PAGE", "axes", "clear_legend", "cloud", "even_dots", "halo", "journal", "make_room",
+    "mark", "once", "save_figure", "small",
 ]  # fmt: skip
 
 #: Widths of one column (84 mm) and of the page (174 mm), in inches.
@@ -131,6 +134,29 @@ def halo(width: float = 2.0) -> list[Any]:
     from matplotlib import patheffects
 
     return [patheffects.withStroke(linewidth=width, foreground="white")]
+
+
+def once(ax: Axes, words: str) -> str | None:
+    """Return the words, or None where the axes' legend has them already."""
+    return None if words in ax.get_legend_handles_labels()[1] else words
+
+
+def cloud(ax: Axes, points: Iterable[Any], size: float, color: str, label: str | None = None) -> None:
+    """Draw many points (x, y) as dots without edges; they are pixels in a vector figure."""
+    looks: dict[str, Any] = {"markersize": size, "markeredgewidth": 0, "rasterized": True}
+    ax.plot(*map(np.ravel, points), ".", color=color, label=label, **looks)
+
+
+def mark(ax: Axes, points: Iterable[Any], marker: str, words: str, size: float = 4.0, **looks: Any) -> None:
+    """Draw white marks at points (x, y), with a dark edge, named in the legend once."""
+    looks = {"markerfacecolor": "white", "markeredgecolor": COLORS["section"], "markeredgewidth": 0.8, **looks}
+    ax.plot(*map(np.ravel, points), marker, linestyle="none", markersize=size, label=once(ax, words), **looks)
+
+
+def make_room(ax: Axes, share: float) -> None:
+    """Raise the upper end of the ordinate by a share of its length: room for a legend."""
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + share * (high - low))
 
 
 def even_dots(legend: Legend) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nonsmooth.plot import style
-from nonsmooth.plot.labels import column, first_states, name_and_unit, name_axes, variable_along
+from nonsmooth.plot.labels import column, first_states, name_plane, variable_along
 from nonsmooth.plot.segments import with_gaps
 
 if TYPE_CHECKING:
@@ -32,5 +32,5 @@ def time_history(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = 
                 color=style.COLORS["zone"], alpha=0.25, linewidth=0,
             )  # fmt: skip
         drawn.margins(x=0)
-        name_axes(drawn, name_and_unit(result, "time"), name_and_unit(result, name))
+        name_plane(drawn, result, "time", name)
     return drawn

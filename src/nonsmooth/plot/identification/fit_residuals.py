@@ -7,10 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.comparison import ABOVE, MEASURED, measured_label
-from nonsmooth.plot.identification.findings import data_of
-from nonsmooth.plot.identification.residuals import residual_strip
-from nonsmooth.plot.labels import name_axes
+from nonsmooth.plot.identification.picture import data_of, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,30 +58,22 @@ def _chosen(data: Any, name: str, given: str | None) -> int:
 def _over_time(data: Any, ax: Axes | None, quantity: str | None, run: str | None) -> Axes:
     q, r = _chosen(data, "quantity", quantity), _chosen(data, "run", run)
     part = data.isel(sample=np.flatnonzero((data["quantity"].values == q) & (data["run"].values == r)))
-    time, modes, place = part["time"].values, _words(data, "mode"), part["place"].values
-    n_modes = len(modes)
-    with style.axes(ax, ratio=0.9) as drawn:
-        drawn.plot(
-            time, part["measured"].values, ".", color=MEASURED, markersize=2.5, rasterized=True,
-            label=measured_label(data),
-        )  # fmt: skip
-        colors = {int(m): style.COLORS[_COLORS[k % len(_COLORS)]] for k, m in enumerate(np.unique(part["mode"].values))}
-        for m, color in colors.items():
-            inside = (part["mode"].values == m) & np.append(np.diff(part["window"].values) == 0, False)
+    modes, unit = _words(data, "mode"), str(part["measured"].attrs.get("units", ""))
+    labels, numbers = (("time", ""), (_words(data, "quantity")[q], unit)), np.unique(part["mode"].values)
+    looks: dict[str, Any] = {"columns": min(3, len(numbers) + 1), "margin": 0.05, "ratio": 0.9}
+    with picture(part, ax, "", *labels, strip="standard deviations", **looks) as one:
+        time, mode, window, residual = one.values("time", "mode", "window", "residual")
+        one.cloud(time, part["measured"].values)
+        for k, m in enumerate(numbers):
+            inside = (mode == m) & np.append(np.diff(window) == 0, False)
             line = np.where(inside | np.roll(inside, 1), part["fitted"].values, np.nan)
-            drawn.plot(time, line, color=color, linewidth=0.9, label=f"fit: {modes[m]}")
-        near = place >= n_modes
+            one.line(time, line, f"fit: {modes[int(m)]}", _COLORS[k % len(_COLORS)], linewidth=0.9)
+        one.residual(time, residual)
+        near = part["place"].values >= len(modes)
         if near.any():
-            drawn.plot([], [], ".", color=style.COLORS["second"], label="residual at a transition or graze")
-        drawn.legend(**ABOVE, ncols=min(3, len(colors) + 1), columnspacing=1.0)
-        unit = str(part["measured"].attrs.get("units", ""))
-        name_axes(drawn, ("time", ""), (_words(data, "quantity")[q], unit))
-        residual = part["residual"].values
-        rows: list[tuple[Any, Any, dict[str, Any]]] = [(time, residual, {"markersize": 2.0})]
-        if near.any():
-            rows.append((time[near], residual[near], {"color": style.COLORS["second"], "markersize": 3.5}))
-        residual_strip(drawn, "standard deviations", *rows)
-    return drawn
+            color = style.COLORS["second"]
+            one.residual(time[near], residual[near], "residual at a transition or graze", color=color, markersize=3.5)
+    return one.ax
 
 
 def _by_place(data: Any, ax: Axes | None) -> Axes:

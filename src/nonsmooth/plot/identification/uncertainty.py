@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.comparison import measured_label
-from nonsmooth.plot.identification.findings import data_of, number
-from nonsmooth.plot.labels import name_axes, symbol_of
+from nonsmooth.plot.identification.picture import data_of, number, picture
+from nonsmooth.plot.labels import symbol_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,32 +31,20 @@ def profile(finding: Any, ax: Axes | None = None) -> Axes:
         Where to draw; a new one-column figure if None.
     """
     data = data_of(finding, "value", "cost")
-    value, cost = data["value"].values, data["cost"].values
     unit = str(data["value"].attrs.get("units", data.attrs.get("units", "")))
-    with style.axes(ax) as drawn:
-        low, high = number(data, "low"), number(data, "high")
-        if np.isfinite(low) and np.isfinite(high):
-            drawn.axvspan(
-                low, high, ymax=0.74, color=style.COLORS["zone"], alpha=0.25, linewidth=0, label="95 % interval"
-            )
-        drawn.plot(
-            value, cost, color=style.COLORS["first"], marker=".", markersize=3,
-            label=f"profile, {measured_label(data)}",
-        )  # fmt: skip
-        drawn.axhline(
-            CHI_SQUARE_95, color=style.COLORS["muted"], linestyle="--", linewidth=0.7, label="95 % bound, 3.84"
-        )
+    labels = (symbol_of(str(data.attrs.get("parameter", "value"))), unit), (r"$\chi^2$ above its least", "")
+    with picture(data, ax, "", *labels, loc="upper center", margin=0) as one:
+        value, cost = one.values("value", "cost")
+        one.span(number(data, "low"), number(data, "high"), "95 % interval", ymax=0.74)
+        one.line(value, cost, f"profile, {one.word}", marker="o", markersize=1.5)
+        bound: dict[str, Any] = {"color": style.COLORS["muted"], "linestyle": "--", "linewidth": 0.7}
+        one.ax.axhline(CHI_SQUARE_95, label="95 % bound, 3.84", **bound)
         if np.isfinite(best := number(data, "best")):
-            drawn.axvline(best, ymax=0.74, color=style.COLORS["second"], linewidth=0.9, label="best fit")
-        drawn.set_ylim(0, max(1.1 * CHI_SQUARE_95, min(float(np.nanmax(cost)), 5 * CHI_SQUARE_95)) * 1.35)
+            one.ax.axvline(best, ymax=0.74, color=style.COLORS["second"], linewidth=0.9, label="best fit")
+        one.ax.set_ylim(0, max(1.1 * CHI_SQUARE_95, min(float(np.nanmax(cost)), 5 * CHI_SQUARE_95)) * 1.35)
         if value.min() > 0 and value.max() > 20 * value.min():
-            drawn.set_xscale("log")
-        drawn.margins(x=0)
-        drawn.legend(loc="upper center", ncols=2, columnspacing=1.0)
-        name = str(data.attrs.get("parameter", "value"))
-        drawn.set_ylabel(r"$\chi^2$ above its least")
-        name_axes(drawn, (symbol_of(name), unit))
-    return drawn
+            one.ax.set_xscale("log")
+    return one.ax
 
 
 def coverage(finding: Any, ax: Axes | None = None) -> Axes:
@@ -90,9 +77,8 @@ def coverage(finding: Any, ax: Axes | None = None) -> Axes:
         drawn.axhspan(-1.96, 1.96, color=style.COLORS["first"], alpha=0.10, linewidth=0)
         drawn.axhline(0, color=style.COLORS["muted"], linewidth=0.6)
         for k in range(len(names)):
-            for inside, color in ((True, style.COLORS["section"]), (False, style.COLORS["second"])):
-                mine = held[:, k] == inside
-                drawn.plot(k + spread[mine], off[mine, k], ".", color=color, markersize=3)
+            for mine, color in ((held[:, k], "section"), (~held[:, k], "second")):
+                drawn.plot(k + spread[mine], off[mine, k], ".", color=style.COLORS[color], markersize=3)
             rms = float(np.sqrt(np.nanmean(off[:, k] ** 2)))
             drawn.annotate(
                 f"{np.count_nonzero(held[:, k])}/{rigs}\nrms {rms:.2f}", (k, 1.02), xycoords=("data", "axes fraction"),

@@ -1,0 +1,163 @@
+"""Damping: amplitudes over frequency with their fits, half-power bandwidth, complex responses, free decays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.plot import style
+from nonsmooth.plot.comparison import MEASURED
+from nonsmooth.plot.identification.picture import number, picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["amplitude_fit", "drop_decay", "free_decay", "half_power", "nyquist"]
+
+_OMEGA, _AMPLITUDE = (r"$\omega$", "rad/s"), ("amplitude of $x$", "m")
+_MARKERS = {"up": "^", "down": "v"}
+_FITS = (("joint", "$c$ beside dry friction", "first", "-", "s"), ("viscous", "$c$ alone", "second", "--", "D"))
+_ENVELOPES = (("both", "viscous and dry", "first", "-"), ("viscous", "viscous alone", "second", "--"))
+_CRANKS = (("first", "o"), ("second", "s"), ("third", "^"), ("fourth", "D"))
+
+
+def amplitude_fit(finding: Any, ax: Axes | None = None) -> Axes:
+    """Draw measured amplitudes over frequency with the fits; below, what each fit leaves.
+
+    The fit that knows no friction puts all losses into c; its bias is written beside it.
+
+    Parameters
+    ----------
+    finding
+        A viscous damping, or its data: ``amplitude`` over ``run`` with ``omega``; ``joint_amplitude`` and
+        ``viscous_amplitude`` over ``omega_fine``.
+    ax
+        Where to draw; a new one-column figure if None.
+    """
+    with picture(finding, ax, "amplitude omega omega_fine", _OMEGA, _AMPLITUDE, ratio=0.85) as one:
+        omega, heights, fine = one.values("omega", "amplitude", "omega_fine")
+        words = one.data["direction"].values.astype(str) if "direction" in one.data else np.full(len(omega), "")
+        for word in dict.fromkeys(words):
+            label, mark = f"{one.word}, steps {word}" if word else "", _MARKERS.get(word, "o")
+            one.points("omega", "amplitude", label, where=words == word, mark=mark, face="white")
+        error = one.data["amplitude_error"].values if "amplitude_error" in one.data else None
+        for name, word, color, line, mark in _FITS:
+            if f"{name}_amplitude" in one.data:
+                curve = one.data[f"{name}_amplitude"].values
+                one.line(fine, curve, word + one.text(f"c_{name}", "N s/m", before=": "), color, line)
+                left, error = error, None  # bars on the first residuals alone
+                one.residual(
+                    omega, heights - np.interp(omega, fine, curve), f"residual, {word}", error=left, marker=mark,
+                    color=style.COLORS[color],
+                )  # fmt: skip
+        one.ax.set_ylim(bottom=0)
+    return one.ax
+
+
+def half_power(finding: Any, ax: Axes | None = None) -> Axes:
+    """Draw amplitudes over frequency, the half-power level and the bandwidth.
+
+    Parameters
+    ----------
+    finding
+        A damping by half power, or its data: ``omega``, ``amplitude`` over ``run``; ``omega_low``, ``omega_high``,
+        ``largest``, ``damping_ratio``.
+    ax
+        Where to draw; a new one-column figure if None.
+    """
+    with picture(finding, ax, "omega amplitude omega_low omega_high largest", _OMEGA, _AMPLITUDE) as one:
+        low, high, top = (number(one.data, name) for name in ("omega_low", "omega_high", "largest"))
+        one.span(low, high, f"bandwidth, {low:.3f} to {high:.3f} rad/s")
+        one.level(top / np.sqrt(2), r"largest amplitude$/\sqrt{2}$")
+        one.points("omega", "amplitude", face="white")
+        one.note(0.97, 0.95, one.text("damping_ratio", before=r"$\xi$ = "), one.text("c", "N s/m", before="$c$ = "))
+        one.ax.set_ylim(bottom=0)
+    return one.ax
+
+
+def nyquist(finding: Any, ax: Axes | None = None) -> Axes:
+    """Draw the response over the crank's length, X/a, in the complex plane, each crank with its fitted curve.
+
+    Without friction all lengths lie on one curve. The natural frequency is where the car lags by a quarter of a turn.
+
+    Parameters
+    ----------
+    finding
+        A damping by the complex response, or its data: ``real``, ``imaginary``, ``crank`` over ``run``;
+        ``fitted_real``, ``fitted_imaginary`` over ``crank_length`` and ``omega_fine``.
+    ax
+        Where to draw; a new one-column figure if None.
+    """
+    needed = "real imaginary crank fitted_real fitted_imaginary crank_length"
+    with picture(finding, ax, needed, (r"Re $X/a$", ""), (r"Im $X/a$", ""), ratio=0.95) as one:
+        lengths, crank, real, imaginary = one.values("crank_length", "crank", "fitted_real", "fitted_imaginary")
+        for k, length in enumerate(lengths):
+            color, mark = _CRANKS[k % len(_CRANKS)]
+            one.line(real[k], imaginary[k], f"fitted, crank {1e3 * length:.4g} mm", color, linewidth=0.9)
+            here, label = np.isclose(crank, length), f"{one.word}, {1e3 * length:.4g} mm"
+            one.points("real", "imaginary", label, where=here, mark=mark, face="white")
+        for axis in (one.ax.axhline, one.ax.axvline):
+            axis(0, color=style.COLORS["muted"], linewidth=0.5)
+        natural = one.text("omega_0", "rad/s", before=r"$\omega_0$ = ")
+        one.note(0.5, 0.5, natural, one.text("c", "N s/m", before="$c$ = "))
+        one.ax.set_aspect("equal", adjustable="datalim")
+    return one.ax
+
+
+def free_decay(finding: Any, ax: Axes | None = None) -> Axes:
+    r"""Draw the heights of a free decay's peaks on a logarithmic scale, with the fitted envelopes.
+
+    Viscous damping alone gives a straight line. Dry friction takes a constant part from each half cycle and bends it
+    down towards the end.
+
+    Parameters
+    ----------
+    finding
+        A damping found from free decays, or its data: ``peak_time``, ``peak_height`` over ``peak`` (and
+        ``peak_run``); ``envelope_viscous``, ``envelope_both`` over ``fine_time``.
+    ax
+        Where to draw; a new one-column figure if None.
+    """
+    labels = ("time", "s"), ("peak height (mm)", "")
+    with picture(finding, ax, "peak_time peak_height", *labels, loc="upper right", columns=1) as one:
+        height = 1e3 * one.data["peak_height"].values
+        one.points("peak_time", "peak_height", f"peaks, {one.word}", scale=1e3)
+        for name, word, color, line in _ENVELOPES:
+            if f"envelope_{name}" in one.data:
+                time, curve = one.values("fine_time", f"envelope_{name}")
+                one.line(time[curve > 0], 1e3 * curve[curve > 0], word, color, line)
+        one.ax.set_yscale("log")
+        one.ax.set_ylim(0.5 * np.nanmin(height[height > 0]), 1.6 * np.nanmax(height))
+        friction = one.text("friction_force", "mN", 1e3, "friction ")
+        one.note(0.04, 0.06, one.text("c", "N s/m", before="$c$ = "), friction)
+    return one.ax
+
+
+def drop_decay(finding: Any, ax: Axes | None = None) -> Axes:
+    """Draw the logarithm of the peaks' heights of the support's free decay with its regression line.
+
+    Parameters
+    ----------
+    finding
+        The support's damping, or its data: ``peak_time``, ``log_height`` (and ``log_height_error``, ``used``) over
+        ``peak``; ``slope``, ``intercept``, ``damping_ratio``. Of several runs (``peak_run``) each has its own
+        ``intercept``.
+    ax
+        Where to draw; a new one-column figure if None.
+    """
+    needed, labels = "peak_time log_height slope intercept", (("time", "s"), ("ln (peak height / m)", ""))
+    with picture(finding, ax, needed, *labels, loc="upper right", columns=1) as one:
+        time, data = one.data["peak_time"].values, one.data
+        used = data["used"].values.astype(bool) if "used" in data else np.ones(len(time), dtype=bool)
+        runs = data["peak_run"].values if "peak_run" in data else np.zeros(len(time), dtype=int)
+        for chosen, face, word in ((used, MEASURED, ", used"), (~used, "white", ", left out")):
+            label = one.word + word * bool((~used).any())
+            one.points("peak_time", "log_height", label, where=chosen, face=face)
+        slope, intercepts = float(data["slope"].values.mean()), np.atleast_1d(data["intercept"].values)
+        for k, run in enumerate(np.unique(runs[used])):
+            mine = time[used & (runs == run)]
+            ends = np.array([mine.min(), mine.max()])
+            height = intercepts[min(k, len(intercepts) - 1)] + slope * ends
+            one.line(ends, height, one.text("damping_ratio", before=r"regression, $\xi_s$ = "), "second", zorder=4)
+    return one.ax

@@ -1,0 +1,181 @@
+"""One picture of what was measured and fitted: points with errors, curves, bands, residuals at its foot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.plot import style
+from nonsmooth.plot.comparison import MEASURED, measured_label
+from nonsmooth.plot.labels import name_axes
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+__all__ = ["Picture", "data_of", "number", "picture", "with_error"]
+
+_SHARE = 0.30  # of the height of the axes, for residuals
+
+
+def data_of(finding: Any, *needed: str) -> xr.Dataset:
+    """The Dataset of a ``Finding``, or the Dataset itself, with the variables that a picture needs.
+
+    Raises
+    ------
+    ValueError
+        No data, or a variable that is missing: this is the picture of another procedure.
+    """
+    data: Any = finding if hasattr(finding, "data_vars") else getattr(finding, "data", None)
+    if data is None:
+        raise ValueError("this finding kept no data to draw")
+    if missing := [name for name in needed if name not in data.variables]:
+        held = ", ".join(sorted(map(str, data.variables)))
+        raise ValueError(f"this picture needs {', '.join(missing)}; the data of this finding hold {held}")
+    return data
+
+
+def number(data: xr.Dataset, name: str) -> float:
+    """A number of the data, the first of several; NaN where it is not there."""
+    return float(data[name].values.flat[0]) if name in data.variables else float("nan")
+
+
+def with_error(value: float, error: float, unit: str = "") -> str:
+    """``8.470 ± 0.012 N/m``: two digits of the error; without a finite one, four digits of the value."""
+    tail = f" {unit}" if unit else ""
+    if not (np.isfinite(error) and error > 0):
+        return f"{value:.4g}{tail}"
+    digits = max(0, 1 - int(np.floor(np.log10(error))))
+    return f"{value:.{digits}f} ± {error:.{digits}f}{tail}"
+
+
+@contextmanager
+def picture(
+    finding: Any, ax: Axes | None, needed: str, x: tuple[str, str] | str, y: tuple[str, str] | str, *, loc: str = "",
+    columns: int = 2, margin: float = 0.02, strip: str | None = None, **size: float,
+) -> Iterator[Picture]:  # fmt: skip
+    """Draw within the block; then axes are named, residuals drawn below and the legend set, ``loc`` or above the axes.
+
+    ``x`` and ``y`` are names with units, or a variable of the data that has them. The unit of the residuals is that of
+    ``y``, or ``strip``.
+    """
+    data = data_of(finding, *needed.split())
+    with style.axes(ax, **size) as drawn:
+        one = Picture(drawn, data)
+        yield one
+        drawn.margins(x=margin)
+        named = [
+            name if isinstance(name, tuple) else
+            (str(data[name].attrs.get("long_name", name)), str(data[name].attrs.get("units", ""))) for name in (x, y)
+        ]
+        name_axes(drawn, *named)
+        if one.left:
+            one.draw_residuals(named[1][1] if strip is None else strip)
+        above = {**style.ABOVE, "handlelength": 1.6}
+        style.even_dots(drawn.legend(**({"loc": loc} if loc else above), ncols=columns, columnspacing=1.0))
+
+
+class Picture:
+    """Axes, the data that are drawn in them, and the words for what was measured."""
+
+    def __init__(self, ax: Axes, data: xr.Dataset) -> None:
+        self.ax, self.data, self.word = ax, data, measured_label(data)
+        self.left: list[tuple[Any, Any, Any, Any, dict[str, Any]]] = []
+
+    def values(self, *names: str) -> list[Any]:
+        """The values of variables."""
+        return [self.data[name].values for name in names]
+
+    def text(self, name: str, unit: str = "", scale: float = 1.0, before: str = "") -> str:
+        """A number of the data with its error, behind some words; nothing where it is not there."""
+        value, error = (scale * number(self.data, key) for key in (name, f"{name}_error"))
+        return before + with_error(value, error, unit) if np.isfinite(value) else ""
+
+    def points(
+        self, x: str, y: str, label: str = "", *, where: Any = True, scale: float = 1.0, mark: str = "o",
+        face: str = MEASURED,
+    ) -> None:  # fmt: skip
+        """Measured points of two variables, with the error of the second where the data have one."""
+        here = np.broadcast_to(where, self.data[y].shape)
+        if here.size and not here.any():
+            return
+        error = scale * self.data[f"{y}_error"].values[here] if f"{y}_error" in self.data else np.nan
+        at, heights = (self.data[name].values[here] for name in (x, y))
+        self.ax.errorbar(
+            at, scale * heights, yerr=error if np.isfinite(error).any() else None, fmt=mark, color=MEASURED,
+            markerfacecolor=face, markersize=2.8, markeredgewidth=0.7, elinewidth=0.6, zorder=4,
+            label=style.once(self.ax, label or self.word),
+        )  # fmt: skip
+
+    def cloud(self, x: Any, y: Any, label: str = "", color: str = MEASURED) -> None:
+        """Small dots of many samples."""
+        looks: dict[str, Any] = {"markersize": 3.0, "markeredgewidth": 0, "rasterized": True}
+        self.ax.plot(x, y, ".", color=color, label=label or self.word, **looks)
+
+    def line(self, x: Any, y: Any, label: str = "", color: str = "first", line: str = "-", **looks: Any) -> None:
+        """A curve; its words stand in the legend once."""
+        words = style.once(self.ax, label) if label else None
+        self.ax.plot(x, y, line, color=style.COLORS[color], label=words, **looks)
+
+    def span(self, low: float, high: float, label: str, **looks: Any) -> None:
+        """An interval of the abscissa; nothing where it is not known."""
+        if np.isfinite([low, high]).all():
+            looks = {"color": style.COLORS["zone"], "alpha": 0.25, "linewidth": 0, "zorder": 0, **looks}
+            self.ax.axvspan(low, high, label=label, **looks)
+
+    def level(self, value: float, label: str) -> None:
+        """A level of the ordinate; nothing where it is not known."""
+        if np.isfinite(value):
+            self.ax.axhline(value, color=style.COLORS["second"], linestyle="--", linewidth=0.9, label=label)
+
+    def note(self, x: float, y: float, *lines: str) -> None:
+        """Words in the axes, at a place in their own units."""
+        sides = "left" if x < 0.5 else "right" if x > 0.5 else "center", "top" if y > 0.5 else "bottom"
+        self.ax.annotate(
+            "\n".join(filter(None, lines)), (x, y), xycoords="axes fraction", ha=sides[0],
+            va="center" if y == 0.5 else sides[1], fontsize=style.small(self.ax),
+        )  # fmt: skip
+
+    def residual(
+        self, x: Any, left: Any, label: str = "", *, error: Any = None, band: Any = None, **looks: Any
+    ) -> None:
+        """Residuals for the foot of the picture: ``band`` (x, low, high) less the fit, ``looks`` unlike black dots."""
+        usual = {"linestyle": "none", "marker": ".", "color": MEASURED, "markersize": 2.4, "markeredgewidth": 0}
+        looks = {**usual, **looks}
+        self.left.append((x, left, error, band, looks))
+        if label:
+            self.ax.plot([], [], label=label, **looks)
+
+    def draw_residuals(self, unit: str) -> None:
+        """Make room below what is drawn, and draw residuals there against an axis of their own on the right."""
+        from matplotlib.ticker import FixedLocator, MaxNLocator
+
+        from nonsmooth.plot.units import name_axis
+
+        ax = self.ax
+        low, high = ax.get_ylim()
+        ticks = [tick for tick in ax.get_yticks() if low <= tick <= high]
+        ax.set_ylim(low - _SHARE / (1 - _SHARE) * (high - low), high)
+        ax.yaxis.set_major_locator(FixedLocator(ticks))
+        ax.axhline(low, color=style.COLORS["section"], linewidth=0.5)
+        strip = ax.twinx()
+        far = 0.0
+        for x, left, error, band, looks in self.left:
+            if band is not None:
+                strip.fill_between(*band, color=style.COLORS["first"], alpha=0.25, linewidth=0)
+                far = max(far, float(np.nanmax(np.abs(band[1:]))))
+            strip.plot(x, left, rasterized=True, **looks)
+            if error is not None:
+                strip.errorbar(x, left, yerr=error, fmt="none", ecolor=looks["color"], elinewidth=0.6)
+            far = max(far, float(np.nanmax(np.abs(left) + (0.0 if error is None else error))))
+        strip.axhline(0, color=style.COLORS["muted"], linewidth=0.5)
+        reach = 1.15 * far or 1.0
+        strip.set_ylim(-reach, -reach + 2 * reach / _SHARE)
+        inside = [tick for tick in MaxNLocator(3, symmetric=True).tick_values(-reach, reach) if abs(tick) < reach]
+        strip.yaxis.set_major_locator(FixedLocator(inside))
+        name_axis(strip.yaxis, "residual", unit, max(inside))
+        strip.yaxis.label.set(y=_SHARE / 2, horizontalalignment="center")
+        ax.tick_params(right=False)
