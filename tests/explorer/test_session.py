@@ -90,8 +90,8 @@ def test_nothing_of_a_model_stands_under_the_name_of_the_next(tabs: list[Session
     tab.say("model", "", "bilinear_oscillator")
     assert {name for name, n in tab.drawn().items() if n} == set()
     assert tab.told("readout") == []
-    assert not tab.session.sheet.portrait.zone.visible
-    for plot in tab.session.sheet.plots[1:]:
+    assert not tab.session.sheet.views["portrait"].zone.visible
+    for plot in [tab.session.sheet.views[name].figure.plot for name in ("portrait", "history", "section")]:
         assert [axis.axis_label for axis in plot.axis] == [None, None]
 
 

@@ -55,15 +55,15 @@ def test_a_click_in_the_plane_is_a_start(page: Session) -> None:
     """x of the click belongs to the state on the x axis; the other states stay as they are."""
     names = list(page.system.states)
     page.past.put(replace(page.state, x=names[1], y=names[0], start=(0.0, 0.0)))
-    page._tap_plane(at(0.3, -0.2))
+    page._tap(page.sheet.views["portrait"], at(0.3, -0.2))
     assert dict(zip(names, page.state.start, strict=True)) == {names[1]: 0.3, names[0]: -0.2}
 
 
 def test_a_zoom_is_the_range_of_the_diagram_and_can_be_undone(page: Session) -> None:
-    page._zoom_diagram(over(0.22, 0.27))
+    page._zoom(page.sheet.views["diagram"], over(0.22, 0.27))
     assert (page.state.low, page.state.high) == (0.22, 0.27)
     for empty in (over(0.25, 0.25), over(0.27, 0.22)):
-        page._zoom_diagram(empty)
+        page._zoom(page.sheet.views["diagram"], empty)
         assert (page.state.low, page.state.high) == (0.22, 0.27)
     say(page, "undo")
     assert (page.state.low, page.state.high) == (0.2, 0.3)
@@ -99,7 +99,7 @@ def test_reset_is_the_first_state_of_the_same_model(page: Session) -> None:
     say(page, "model", value=other)
     first = page.state
     assert first.model == other
-    page._tap_plane(at(0.123, 0.456))
+    page._tap(page.sheet.views["portrait"], at(0.123, 0.456))
     assert page.state != first
     say(page, "reset")
     assert page.state == first

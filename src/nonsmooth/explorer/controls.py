@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from nonsmooth.explorer.export import KINDS
-from nonsmooth.explorer.figures import CLOUDS
+from nonsmooth.explorer.kinds import SETTINGS, setting
 from nonsmooth.explorer.labels import html_of, plain_of, symbols_of
 from nonsmooth.explorer.presets import GIVEN, PAPER, first_state, presets_of, slider_range
 from nonsmooth.explorer.state import CHOICES, to_query
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import State
-    from nonsmooth.explorer.views import View
+    from nonsmooth.explorer.views.view import View
     from nonsmooth.system.system import System
 
 __all__ = ["controls"]
 
 
-def controls(system: System, state: State, models: Iterable[str], stage: str, views: Iterable[View]) -> dict[str, Any]:
-    """Content of the controls for a state; ``stage`` is that of the diagram."""
-    views = list(views)
-    settings = {name: (view, one) for view in views for name, one in view.settings.items() if one.label}
+def controls(system: System, state: State, models: Iterable[str], views: Mapping[str, View]) -> dict[str, Any]:
+    """Content of the controls for a state."""
+    fields = {name: one for name, one in SETTINGS.items() if one.label}
     symbols, first = symbols_of(system), first_state(state.model, system)
     rows = []
     for name, parameter in system.parameters.items():
@@ -33,10 +32,6 @@ def controls(system: System, state: State, models: Iterable[str], stage: str, vi
             "name": name, "html": html_of(symbols[name]), "unit": parameter.unit, "value": value, "low": low,
             "high": high,
         })  # fmt: skip
-    words = list(CLOUDS)[:1]
-    if stage == "judged":
-        words = ["up", "down"] if state.direction == "both" else [state.direction]
-    names = {"first look": "first look, from rest, not judged", **CHOICES["direction"]}
     return {
         "models": {name: "your system" if name == GIVEN else name.replace("_", " ") for name in models},
         "presets": list(presets_of(state)), "paper": state.model == PAPER, "parameters": rows,
@@ -49,10 +44,7 @@ def controls(system: System, state: State, models: Iterable[str], stage: str, vi
         "choices": CHOICES, "kinds": KINDS,
         "state": {key: value for key, value in vars(state).items() if key not in ("values", "settings")},
         "query": to_query(state), "forced": system.period() is not None,
-        "legends": {
-            "diagram": [[names[word], CLOUDS[word][0]] for word in words],
-            **{view.name: view.legend(system, state) for view in views},
-        },
-        "settings": {name: view.value(name.partition(".")[2], system, state) for name, (view, _) in settings.items()},
-        "words": {name: one.choices(system, state) for name, (_, one) in settings.items() if one.choices is not None},
+        "legends": {name: view.legend() for name, view in views.items()},
+        "settings": {name: setting(name, system, state) for name in fields},
+        "words": {name: one.choices(system, state) for name, one in fields.items() if one.choices is not None},
     }  # fmt: skip

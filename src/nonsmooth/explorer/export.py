@@ -15,16 +15,12 @@ from typing import Any
 import numpy as np
 
 import nonsmooth as ns
-from nonsmooth.explorer.views import VIEWS as CHOSEN
+from nonsmooth.explorer.kinds import KINDS as VIEWS
 from nonsmooth.results.provenance import read_provenance
 
-__all__ = ["KINDS", "VIEWS", "exported"]
+__all__ = ["KINDS", "exported"]
 
-#: Views that can be saved: the result that each shows, and the function of ``nonsmooth.plot`` that draws it.
-VIEWS = {
-    "diagram": ("diagram", "bifurcation"), "portrait": ("run", "phase_portrait"), "history": ("run", "time_history"),
-    "section": ("section", "section"), **{view.name: (view.name, view.saved[1]) for view in CHOSEN if view.saved},
-}  # fmt: skip
+#: Kinds of files.
 KINDS = {"pdf": "PDF", "png": "PNG", "svg": "SVG", "nc": "NetCDF", "py": "Python script", "toml": "study file"}
 
 
@@ -36,16 +32,14 @@ def exported(view: str, kind: str, results: Mapping[str, Any], state: Any) -> tu
     ValueError
         A view that is not computed yet, a kind that does not exist, and a study file of a system that has no name.
     """
-    if view not in VIEWS or kind not in KINDS:
-        raise ValueError(f"{view!r} cannot be saved as {kind!r}; views: {', '.join(VIEWS)}; kinds: {', '.join(KINDS)}")
-    key, plot = VIEWS[view]
+    known = {name: one for name, one in VIEWS.items() if one.saved is not None}
+    if view not in known or kind not in KINDS:
+        raise ValueError(f"{view!r} cannot be saved as {kind!r}; views: {', '.join(known)}; kinds: {', '.join(KINDS)}")
+    key, plot = known[view].saved or ("", "")
     result = results.get(key)
     if result is None or (view == "diagram" and "period_number" not in result):
         raise ValueError(f"the view {view!r} has no result to save yet; show it, and wait until it is computed")
-    axes: dict[str, str] = {
-        "diagram": {"y": state.shown}, "portrait": {"x": state.x, "y": state.y}, "history": {"y": state.x},
-        "section": {"x": state.x, "y": state.y}, **{one.name: one.axes(state) for one in CHOSEN},
-    }[view]  # fmt: skip
+    axes = {name: getattr(state, field) for name, field in known[view].axes.items()}
     stem = f"{state.model}_{view}"
     if kind == "py":
         return f"{stem}.py", python_of(result, plot, axes, state.model, stem).encode()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,7 @@ from nonsmooth.recordings.load import parse_recording
 from nonsmooth.recordings.reading import Options
 
 if TYPE_CHECKING:
-    from nonsmooth.system.system import System
+    from nonsmooth.explorer.work import Job
 
 __all__ = ["fitted", "laid_over", "read", "strand_distance"]
 
@@ -49,9 +49,7 @@ def read(job: Mapping[str, Any]) -> dict[str, Any]:
     return {"recorded": Recorded(name, runs, tuple(recording.warnings), recording.synthetic, axis)}
 
 
-def laid_over(
-    system: System, job: Mapping[str, Any], options: dict[str, Any], heard: Callable[[float], bool]
-) -> dict[str, Any]:
+def laid_over(job: Job) -> dict[str, Any]:
     """A recording beside the motion from a start: curve, section points at a phase, and the distance of the two.
 
     Returns
@@ -62,8 +60,8 @@ def laid_over(
         ``periods`` compared; ``drive``, the recorded forcing period where turns of the drive were recorded. Without a
         distance ``why`` says why.
     """
-    samples: Samples = job["samples"]
-    heard(0.0)
+    samples, system = job["samples"], job.system
+    job.heard(0.0)
     curve = _with_rates(job["text"], samples)
     found: dict[str, Any] = {"curve": curve, "section": {}, "history": {}, "distance": None, "why": ""}
     period = system.period()
@@ -84,7 +82,7 @@ def laid_over(
         return {**found, "why": "no distance: every forcing period of the record lacks readings"}
     count = job["period"] or _STRANDS
     run = ns.simulate(
-        system, periods=count, transient=job["transient"], start=list(job["start"]), samples=count * _GRID, **options
+        system, periods=count, transient=job["transient"], start=job["start"], samples=count * _GRID, **job.options
     )
     at = [list(system.states).index(state) for state in states]
     size = recorded.reshape(-1, len(states)).std(axis=0)
@@ -180,9 +178,7 @@ def strand_distance(
     return np.sqrt(nearest(shift)) * size, (shift + 0.5) % 1.0 - 0.5
 
 
-def fitted(
-    system: System, job: Mapping[str, Any], options: dict[str, Any], heard: Callable[[float], bool]
-) -> dict[str, Any]:
+def fitted(job: Job) -> dict[str, Any]:
     """The parameters that the recording tells, by ``nonsmooth.fit``, with sentences on what it does not tell."""
     samples: Samples = job["samples"]
     step = -(-len(samples.time) // _FITTED)
@@ -191,8 +187,8 @@ def fitted(
         state: (samples.time[take][ok], column[take][ok])
         for state, column in samples.columns.items() for ok in [np.isfinite(column[take])]
     }  # fmt: skip
-    unknown = [*job["parameters"], *(["phase"] if system.period() is not None else [])]
-    found = ns.fit(system, table, unknown, window=job.get("window"), progress=heard)
+    unknown = [*job["parameters"], *(["phase"] if job.forced else [])]
+    found = ns.fit(job.system, table, unknown, progress=job.heard)
     return {
         "values": dict(found), "told": {
             name: str(one) if np.isfinite(one.uncertainty) else found.identifiability[name]

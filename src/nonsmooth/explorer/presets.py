@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from nonsmooth.explorer.kinds import USUAL
 from nonsmooth.explorer.state import State
 from nonsmooth.studies.savi2007 import printed
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["GIVEN", "PAPER", "USUAL", "first_state", "presets_of", "slider_range"]
+__all__ = ["GIVEN", "PAPER", "first_state", "presets_of", "slider_range"]
 
 PAPER = "discontinuous_support"
 GIVEN = "given"  # the name of a model of one's own
@@ -35,8 +36,6 @@ _FIGURES: Mapping[str, Mapping[str, Any]] = {
     "Fig. 17": {**_FREQUENCY, "omega": 9.55},
     **{f"Fig. 18 {'abc'[i]}": {**_FREQUENCY, "omega": omega} for i, omega in enumerate(printed.FIGURE_18)},
 }  # fmt: skip
-#: What is varied first, where a model has it.
-USUAL = ("rho", "omega", "A", "g", "alpha", "mu", "r", "q", "v_b", "V_in", "gamma")
 
 
 def presets_of(state: State) -> dict[str, State]:

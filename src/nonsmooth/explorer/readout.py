@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.explorer.figures import MOST, words_of
+from nonsmooth.explorer.figures import MOST
 from nonsmooth.explorer.labels import number, plain_of, symbols_of
+from nonsmooth.plot.labels import in_words
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import State
@@ -17,11 +18,13 @@ if TYPE_CHECKING:
 __all__ = ["distinct", "readout"]
 
 
-def readout(system: System, state: State, results: Mapping[str, Any]) -> list[tuple[str, str]]:
+def readout(
+    system: System, state: State, results: Mapping[str, Any], stability: Mapping[str, Any]
+) -> list[tuple[str, str]]:
     """Headings and texts: period number, section points, contacts, extremes, and the largest multiplier or exponent."""
     judged = results["judged"]
     period = int(judged["period_number"].values[0])
-    status = str(np.ravel(words_of(judged["status"]))[0])
+    status = str(np.ravel(in_words(judged["status"]))[0])
     fields = [("motion", f"period {period}" if period else "no period found")]
     if status not in ("ok", "not_periodic"):
         fields.append(("status", status.replace("_", " ")))
@@ -32,18 +35,15 @@ def readout(system: System, state: State, results: Mapping[str, Any]) -> list[tu
     contacts = float(judged["contacts_per_period"].values[0])
     if np.isfinite(contacts):
         fields.append(("contacts per period", f"{contacts:.3g}"))
-    at = [str(name) for name in judged["state"].values].index(state.x)
-    ends = [float(judged[name].values[0, at]) for name in ("minimum", "maximum")]
+    ends = [float(judged[name].sel(state=state.x).values[0]) for name in ("minimum", "maximum")]
     if np.isfinite(ends).all():
         unit = system.states[state.x]
         fields.append((plain_of(symbols_of(system)[state.x]), f"{number(ends[0], unit)} … {number(ends[1], unit)}"))
-    stability = results.get("stability")
-    if stability and "multipliers" in stability:
-        largest = float(np.abs(stability["multipliers"]).max())
-        fields.append(("largest |multiplier|", f"{largest:.4f}"))
+    if "multipliers" in stability:
+        fields.append(("largest |multiplier|", f"{float(np.abs(stability['multipliers']).max()):.4f}"))
     elif stability:
-        exponents = stability["exponents"]
-        largest, error = (float(exponents[name].values.max()) for name in ("exponents", "standard_error"))
+        names = "exponents", "standard_error"
+        largest, error = (float(stability["exponents"][name].values.max()) for name in names)
         fields.append(("largest exponent", f"{number(largest)} ± {error:.1g}"))
     return fields
 

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
-
-from nonsmooth.explorer.presets import first_state
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import State
-    from nonsmooth.system.system import System
 
-__all__ = ["key_of", "motion_of", "requests_of", "stability_request"]
+__all__ = ["base_of", "key_of", "motion_of"]
 
 
-def requests_of(system: System, text: str, state: State) -> dict[str, dict[str, Any]]:
-    """The request of every view that a state determines; ``text`` is the system's."""
+def base_of(text: str, state: State, start: Sequence[float]) -> dict[str, dict[str, Any]]:
+    """Requests for the orbit and for a sweep from ``start``, of which views make theirs; ``text`` is the system's."""
     base = {
         "text": text, "values": dict(state.values), "method": state.method,
         "eta": state.eta if state.method == "smoothed" else 0.0, "transient": state.transient, "keep": state.keep,
@@ -25,24 +22,16 @@ def requests_of(system: System, text: str, state: State) -> dict[str, dict[str, 
     sweep = {
         **base, "view": "first look", "values": {**state.values, state.over: state.low}, "over": state.over,
         "low": state.low, "high": state.high, "columns": state.columns,
-        "begin": list(first_state(state.model, system).start),
+        "begin": list(start),
     }  # fmt: skip
-    return {
-        "orbit": orbit, "section": {**orbit, "view": "section", "phase": state.phase}, "first look": sweep,
-        "diagram": {**sweep, "view": "diagram", "direction": state.direction},
-    }  # fmt: skip
-
-
-def stability_request(orbit: Mapping[str, Any], results: Mapping[str, Any]) -> dict[str, Any]:
-    """The request for multipliers or exponents, once the orbit is there."""
-    return {**motion_of(orbit, results), "view": "stability"}
+    return {"orbit": orbit, "first look": sweep}
 
 
 def motion_of(orbit: Mapping[str, Any], results: Mapping[str, Any]) -> dict[str, Any]:
     """The request of the orbit, with its period number and the time that its record takes."""
     run = results["run"]["time"].values
     return {
-        **orbit, "period": int(results["judged"]["period_number"].values[0]), "begin": float(run[0]),
+        **orbit, "period": int(results["judged"]["period_number"].values[0]),
         "span": float(run[-1] - run[0]),
     }  # fmt: skip
 

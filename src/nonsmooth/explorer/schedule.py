@@ -7,23 +7,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from nonsmooth.explorer.kinds import ORDER, QUICK
 from nonsmooth.explorer.requests import key_of
-from nonsmooth.explorer.views import CHOSEN, VIEWS
 from nonsmooth.explorer.worker import Answer, Worker
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.session import Session
 
-__all__ = ["ORDER", "Asked", "Schedule"]
+__all__ = ["Asked", "Schedule"]
 
-_STAGES = {stage: quick for view in VIEWS for stage, quick in view.stages.items()}
-#: Requests in the order in which they are computed.
-ORDER = (
-    "orbit", "recording", "first look", "section", *(stage for stage in _STAGES if _STAGES[stage]),
-    "diagram", "stability", *(stage for stage in _STAGES if not _STAGES[stage]),
-)  # fmt: skip
-#: Short work: a newer request of the same view waits for it, so that a drawing follows a hand that moves.
-_CHEAP = ("orbit", "recording", "first look", "section", *(stage for stage in _STAGES if _STAGES[stage]))
 _BLINK = 0.4  # seconds: a first look that took no longer the last time comes before the orbit, for a hand that moves
 _PATIENCE = 1.0  # seconds after which short work is cancelled like any other
 _DEAF = 10.0  # seconds in which cancelled work must end by itself
@@ -32,11 +24,6 @@ _NOT_STARTED = (
     f"The process that computes cannot be started: {_VAIN} times in a row it ended at once. The terminal of nonsmooth "
     "explore shows its error; mend that, and load this page again: its address holds what you set."
 )
-#: The view in which a message on a request appears.
-_PLACE = {
-    "orbit": "portrait", "first look": "diagram", "section": "section", "diagram": "diagram", "stability": "readout",
-    "recording": "recording", **{stage: view.name for stage, view in CHOSEN.items()},
-}  # fmt: skip
 
 
 @dataclass
@@ -95,11 +82,11 @@ class Schedule:
         ]  # fmt: skip
         if "first look" in missing and self._looked[0] == self.page.subject[0] and self._looked[1] < _BLINK:
             missing.sort(key=lambda view: view != "first look")
-        now, running = time.monotonic(), self._running
+        now, running, order = time.monotonic(), self._running, [*ORDER]
         if running is not None:
             stale = running.view not in wanted or wanted[running.view][1] != running.key
-            quick = running.view in _CHEAP and now - running.since < _PATIENCE
-            overtaken = bool(missing) and ORDER.index(missing[0]) < ORDER.index(running.view)
+            quick = running.view in QUICK and now - running.since < _PATIENCE
+            overtaken = bool(missing) and order.index(missing[0]) < order.index(running.view)
             if (stale or overtaken) and not quick and running.cancelled is None:
                 running.cancelled = now
                 self.worker.cancel(running.number)
@@ -112,12 +99,12 @@ class Schedule:
         self._running = Asked(self._count, view, wanted[view][1], self.page.subject, now)
         self.worker.ask(self._count, wanted[view][0])
         starting = not self.done and not self._failed
-        self.page.tell("busy", {"view": view, "fraction": 0, "long": starting or view not in _CHEAP})
+        self.page.tell("busy", {"view": view, "fraction": 0, "long": starting or view not in QUICK})
 
     def _tell_notes(self, wanted: Mapping[str, str]) -> None:
         """A sentence on a request is shown as long as that request is the one of the page."""
         for view, (key, sentence) in self._said.items():
-            place = _PLACE[view]
+            place = ORDER[view]
             if wanted.get(view) == key:
                 self.page.notes[place] = sentence
             elif self.page.notes.get(place) == sentence:

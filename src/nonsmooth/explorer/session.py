@@ -22,16 +22,18 @@ from nonsmooth.explorer.catalogue import Catalogue
 from nonsmooth.explorer.controls import controls
 from nonsmooth.explorer.export import exported
 from nonsmooth.explorer.figures import theme
+from nonsmooth.explorer.kinds import KINDS as VIEWS
+from nonsmooth.explorer.kinds import PANELS
 from nonsmooth.explorer.presets import presets_of, slider_range
-from nonsmooth.explorer.requests import key_of, motion_of, requests_of, stability_request
+from nonsmooth.explorer.requests import base_of, key_of, motion_of
 from nonsmooth.explorer.schedule import Schedule
 from nonsmooth.explorer.sheet import Sheet
 from nonsmooth.explorer.state import History, State, changed
-from nonsmooth.explorer.views import PANELS, VIEWS, View
 from nonsmooth.explorer.worker import Answer
 from nonsmooth.explorer.workshop import Workshop
 
 if TYPE_CHECKING:
+    from nonsmooth.explorer.views.view import View
     from nonsmooth.system.system import System
 
 __all__ = ["Session"]
@@ -115,36 +117,21 @@ class Session:
         folder = files("nonsmooth.explorer")
         texts = {name: folder.joinpath(name).read_text(encoding="utf-8") for name in TEXTS}
         document.template = Environment(loader=DictLoader(texts)).get_template("page.html")
-        document.template_variables.update(link=LINK, kinds=KINDS)
-        document.template_variables["style"] = texts["page.css"]
-        document.template_variables["program"] = "\n".join(text for name, text in texts.items() if name.endswith(".js"))
-        document.template_variables["panels"] = PANELS
-        document.template_variables["views"] = VIEWS
-        self._on_click(self.sheet.diagram.plot, self._tap_diagram)
-        self.sheet.diagram.plot.on_event(RangesUpdate, self._zoom_diagram)
-        self.sheet.diagram.plot.on_change("inner_height", lambda attr, old, new: self._resized(int(new)))
-        for one in (self.sheet.portrait, self.sheet.section):
-            self._on_click(one.plot, self._tap_plane)
-        own = []
-        for view in self.sheet.views:
-            plot = view.build(self)
-            if plot is not None:
-                own.append(plot)
-                self._on_click(plot, partial(self._tap_view, view))
-                plot.on_event(RangesUpdate, partial(self._zoom_view, view))
-                plot.on_event(Reset, partial(self._reset_view, view))
-        for plot in (*self.sheet.plots, *own):
-            document.add_root(plot)  # events are heard of what had a callback by now
+        program = "\n".join(text for name, text in texts.items() if name.endswith(".js"))
+        document.template_variables.update(
+            link=LINK, kinds=KINDS, style=texts["page.css"], program=program, panels=PANELS, views=VIEWS
+        )
+        for view in self.sheet.views.values():
+            if view.figure is not None:
+                for kind in (Tap, DoubleTap):  # a second click soon after the first is a double one, wherever it lies
+                    view.figure.plot.on_event(kind, partial(self._tap, view))
+                view.figure.plot.on_event(RangesUpdate, partial(self._zoom, view))
+                view.figure.plot.on_event(Reset, partial(self._reset_view, view))
+                document.add_root(view.figure.plot)  # events are heard of what had a callback by now
         for channel in (self._act, *self._say.values()):
             document.add_root(channel)
         document.theme = theme(self.dark, self.large)
         self._act.on_change("value", lambda attr, old, new: self._told(new))
-
-    @staticmethod
-    def _on_click(plot: Any, act: Callable[[Any], None]) -> None:
-        """Hear clicks; a second one soon after the first is a double click to Bokeh, wherever it lies."""
-        for kind in (Tap, DoubleTap):
-            plot.on_event(kind, act)
 
     def _begin(self) -> None:
         """The page is there: work begins, where not too many others are at it."""
@@ -271,63 +258,33 @@ class Session:
         self.document.theme = theme(self.dark, self.large)
         self.sheet.paint(self.dark)
 
-    def _tap_diagram(self, event: Any) -> None:
-        value, start = self.sheet.diagram.nearest(event.x, event.y, self.state)
-        state = self.state.with_value(self.state.over, value)
-        self.past.put(state if start is None else replace(state, start=start))
+    def _tap(self, view: View, event: Any) -> None:
+        self.past.put(view.tapped(float(event.x), float(event.y)))
         self.refresh()
 
-    def _tap_plane(self, event: Any) -> None:
-        start = dict(zip(self.system.states, self.state.start, strict=True))
-        start[self.state.x], start[self.state.y] = float(event.x), float(event.y)
-        self.past.put(replace(self.state, start=tuple(start.values())))
-        self.refresh()
-
-    def _resized(self, pixels: int) -> None:
-        self.sheet.diagram.pixels = max(pixels, 50)
-        self.sheet.diagram.redraw(self.state)
-
-    def _zoom_diagram(self, event: Any) -> None:
-        if event.x1 > event.x0:
-            self.past.put(replace(self.state, low=float(event.x0), high=float(event.x1)), "zoom")
-        self.sheet.diagram.redraw(self.state)
-        self.refresh()
-
-    def _tap_view(self, view: View, event: Any) -> None:
-        self.past.put(view.tapped(float(event.x), float(event.y), self.system, self.state))
-        self.refresh()
-
-    def _zoom_view(self, view: View, event: Any) -> None:
+    def _zoom(self, view: View, event: Any) -> None:
         if event.x1 > event.x0 and event.y1 > event.y0:
             x, y = (float(event.x0), float(event.x1)), (float(event.y0), float(event.y1))
-            self.past.put(view.zoomed(x, y, self.system, self.state), f"zoom {view.name}")
+            self.past.put(view.zoomed(x, y), f"zoom {view.name}")
         self.refresh()
 
     def _reset_view(self, view: View, event: Any) -> None:
-        self.past.put(view.unzoomed(self.system, self.state))
+        self.past.put(view.unzoomed())
         self.refresh()
 
     # --- what is to be computed
 
     def wanted(self) -> dict[str, dict[str, Any]]:
         """The request of every view that is shown, for the state of the page."""
-        state = self.state
-        found = requests_of(self.system, self.text, state)
-        base = dict(found)
-        if "judged" in self.sheet.results and self.work.done.get("orbit") == key_of(found["orbit"]):
-            base["motion"] = motion = motion_of(found["orbit"], self.sheet.results)
-            if not self.system.is_map:
-                found["stability"] = stability_request(found["orbit"], self.sheet.results)
-            if (request := self.bench.request(found["orbit"], motion["period"])) is not None:
-                found["recording"] = request
-        if self.work.done.get("diagram") == key_of(found["diagram"]):
-            del found["first look"]
-        if state.upper != "diagram":
-            found = {view: request for view, request in found.items() if view not in ("first look", "diagram")}
-        for view in self.sheet.views:
-            asked = view.requests(self.system, state, base) if view.shown(self.system, state) else {}
-            for stage in [*asked][-1:]:
-                found |= {stage: asked[stage]} if self.work.done.get(stage) == key_of(asked[stage]) else asked
+        start = self.catalogue.first_state(self.state.model).start
+        base, found = base_of(self.text, self.state, start), dict[str, dict[str, Any]]()
+        done, results = self.work.done, self.sheet.results
+        if "judged" in results and done.get("orbit") == key_of(base["orbit"]):
+            base["motion"] = motion_of(base["orbit"], results)
+        for view in self.sheet.views.values():
+            asked = view.requests(base) if view.shown else {}
+            for stage in [*asked][-1:]:  # of what is there in its finest form nothing coarser is asked for
+                found |= {stage: asked[stage]} if done.get(stage) == key_of(asked[stage]) else asked
         return found
 
     # --- what the browser hears
@@ -340,7 +297,7 @@ class Session:
 
     def tell_ui(self) -> None:
         """The controls as the state has them."""
-        found = controls(self.system, self.state, self.catalogue, self.sheet.diagram.stage, self.sheet.views)
+        found = controls(self.system, self.state, self.catalogue, self.sheet.views)
         look = {"dark": self.dark, "large": self.large}
         self.tell("ui", {**found, **look, "heard": self._heard, "can": self.past.can, "tabs": len(self.tabs)})
 

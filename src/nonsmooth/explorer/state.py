@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 from urllib.parse import parse_qsl, urlencode
 
-from nonsmooth.explorer.views import PANELS, SETTINGS
+from nonsmooth.explorer.kinds import PANELS, SETTINGS
 
 __all__ = ["CHOICES", "History", "State", "from_query", "to_query", "within"]
 
@@ -46,7 +46,7 @@ class State:
     upper, plane, lower : str
         The view that each of these panels shows.
     settings : mapping
-        Of the views, by name (see :class:`nonsmooth.explorer.views.view.Setting`); what is not held is the default.
+        Of the views, by name (see :class:`nonsmooth.explorer.kinds.Setting`); what is not held is the default.
     """
 
     model: str

@@ -1,8 +1,10 @@
-"""Computations of the views by the public verbs, one function each; they run in the worker's process."""
+"""Computations of the views by the public verbs, one function for each request; they run in the worker's process."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -10,9 +12,8 @@ import numpy as np
 
 import nonsmooth as ns
 from nonsmooth.explorer.measured import fitted, laid_over, read
-from nonsmooth.explorer.views import CHOSEN
 
-__all__ = ["VIEWS", "Heard", "compute", "periods_shown"]
+__all__ = ["Heard", "Job", "compute", "periods_shown"]
 
 #: Hears the fraction done and says whether the work is still wanted.
 Heard = Callable[[float], bool]
@@ -22,26 +23,65 @@ _LONGEST = 12  # periods drawn of one that has a long one
 _POINTS = 3000  # of a section
 _STARTS = 8
 _MEASURED = 1000  # periods over which exponents are measured
+_CHARTS = {"first chart": (40, 30), "chart": (144, 108), "exponents": (48, 36), "fine chart": (288, 216)}
+_RETURNS = 200  # over which an exponent of a chart is measured
+_BASINS = {"first basins": 24, "basins": 72, "fine basins": 180}
+_BUDGET = 60.0  # seconds of processor time for branches; what is found by then is shown
 
 
-def compute(job: Mapping[str, Any], heard: Heard) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Job:
+    """A request with the system that it is of, and the options of its integrator."""
+
+    system: ns.System
+    asked: Mapping[str, Any]
+    heard: Heard
+
+    def __getitem__(self, name: str) -> Any:
+        return self.asked[name]
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Options of every verb that integrates."""
+        return {"method": "rkf45"} if self["method"] == "rkf45" else {}
+
+    @property
+    def forced(self) -> bool:
+        """Return whether the system has a forcing period."""
+        return self.system.period() is not None
+
+    @property
+    def values(self) -> Any:
+        """Values of the parameter that is varied."""
+        return np.linspace(self["low"], self["high"], self["columns"])
+
+    def section(self, phase: float = 0.0) -> Any:
+        """Stroboscopic at a phase; where nothing forces the system, its first indicator rising."""
+        return ns.Stroboscopic(phase) if self.forced else ns.Poincare(self.system.indicators[0])
+
+    def run(self, verb: Callable[..., Any], *given: Any, **named: Any) -> Any:
+        """The result of a verb on the system, with what all of them are given unless ``named`` says otherwise."""
+        usual = {"section": self.section(), "transient": self["transient"], "progress": self.heard, **self.options}
+        return verb(self.system, *given, **{**usual, **named})
+
+
+def compute(asked: Mapping[str, Any], heard: Heard) -> dict[str, Any]:
     """The results of a view, by name; Datasets as the verbs return them.
 
     Parameters
     ----------
-    job : mapping
+    asked : mapping
         ``view``, the ``text`` of the system, its ``values``, ``method``, ``eta`` and the view's own options; a file
         that is to be read has its ``content`` and ``name``.
     heard : function
         Hears the fraction done; False cancels.
     """
-    if job["view"] == "read":
-        return read(job)
-    system = _system(job["text"]).with_parameters(job["values"])
-    if job["method"] == "smoothed":
-        system = system.smoothed(job["eta"])
-    options = {"method": "rkf45"} if job["method"] == "rkf45" else {}
-    return VIEWS[job["view"]](system, job, options, heard)
+    if asked["view"] == "read":
+        return read(asked)
+    system = _system(asked["text"]).with_parameters(asked["values"])
+    if asked["method"] == "smoothed":
+        system = system.smoothed(asked["eta"])
+    return _WORK[asked["view"]](Job(system, asked, heard))
 
 
 @lru_cache(maxsize=8)
@@ -49,29 +89,25 @@ def _system(text: str) -> ns.System:
     return ns.System.from_text(text)
 
 
-def section_of(system: ns.System, phase: float = 0.0) -> Any:
-    """Stroboscopic at a phase; where nothing forces the system, its first indicator rising."""
-    return ns.Stroboscopic(phase) if system.period() is not None else ns.Poincare(system.indicators[0])
+def _at_one_point(job: Job, **named: Any) -> Any:
+    """A sweep of the parameters as they are."""
+    name, value = next(iter(job.system.values.items()))
+    return job.run(ns.sweep, name, [value], direction=None, **named)
 
 
-def _orbit(system: ns.System, job: Mapping[str, Any], options: dict[str, Any], heard: Heard) -> dict[str, Any]:
+def _orbit(job: Job) -> dict[str, Any]:
     """The motion reached from a start: its period number and residual, and a record of it."""
-    start, transient = list(job["start"]), job["transient"]
-    name = next(iter(system.parameters))
-    judged = ns.sweep(
-        system, name, [system.values[name]], direction=None, start=start, section=section_of(system),
-        transient=transient, keep=job["keep"], progress=heard, **options,
-    )  # fmt: skip
-    period = int(judged["period_number"].values[0])
-    shown = periods_shown(period)
-    if system.period() is not None:
-        run = ns.simulate(system, periods=shown, transient=transient, start=start, **options)
+    system, start, transient = job.system, job["start"], job["transient"]
+    judged = _at_one_point(job, start=start, keep=job["keep"])
+    shown = periods_shown(int(judged["period_number"].values[0]))
+    if job.forced:
+        span: dict[str, Any] = {"periods": shown, "transient": transient}
     else:
-        section = section_of(system)
-        times = ns.poincare(system, section=section, n=shown + 1, transient=transient, start=start, **options)
-        begin, end = (float(times["time"].values[k]) for k in (0, -1))
-        run = ns.simulate(system, duration=end - begin, transient=begin, start=start, **options)
-    return {"judged": judged, "run": run}
+        times = ns.poincare(
+            system, section=job.section(), n=shown + 1, transient=transient, start=start, **job.options
+        )["time"].values
+        span = {"duration": float(times[-1] - times[0]), "transient": float(times[0])}
+    return {"judged": judged, "run": ns.simulate(system, start=start, **span, **job.options)}
 
 
 def periods_shown(period: int) -> int:
@@ -79,69 +115,114 @@ def periods_shown(period: int) -> int:
     return 2 * min(period, _LONGEST) if period else _CHAOTIC
 
 
-def _section(system: ns.System, job: Mapping[str, Any], options: dict[str, Any], heard: Heard) -> dict[str, Any]:
+def _section(job: Job) -> dict[str, Any]:
     """Section points of the motion from a start, at a phase."""
-    heard(0.0)
-    points = ns.poincare(
-        system, section=section_of(system, job["phase"]), n=_POINTS if _is_exact(system, options) else _POINTS // 5,
-        transient=job["transient"], start=list(job["start"]), **options,
-    )  # fmt: skip
-    return {"section": points}
+    from nonsmooth.flow.engines.methods import engine_for
+
+    job.heard(0.0)
+    exact = engine_for(job.system, **job.options).name == "exact"
+    return {"section": ns.poincare(
+        job.system, section=job.section(job["phase"]), n=_POINTS if exact else _POINTS // 5,
+        transient=job["transient"], start=job["start"], **job.options,
+    )}  # fmt: skip
 
 
-def _stability(system: ns.System, job: Mapping[str, Any], options: dict[str, Any], heard: Heard) -> dict[str, Any]:
+def _stability(job: Job) -> dict[str, Any]:
     """Floquet multipliers of a periodic orbit, or the Lyapunov exponents of a motion without a period."""
     if job["period"]:
         orbit = ns.find_orbit(
-            system, start=list(job["start"]), period_number=job["period"] if system.period() is not None else None,
-            transient=job["transient"], budget=10.0, progress=heard,
+            job.system, start=job["start"], period_number=job["period"] if job.forced else None,
+            transient=job["transient"], budget=10.0, progress=job.heard,
         )  # fmt: skip
         return {"multipliers": np.asarray(orbit.floquet_multipliers)}
-    forced = system.period() is not None
-    found = ns.lyapunov(
-        system, start=list(job["start"]), transient=job["transient"] if forced else job["span"], progress=heard,
-        periods=_MEASURED if forced else None, duration=None if forced else _MEASURED / _CHAOTIC * job["span"],
-        **options,
+    span: dict[str, Any] = (
+        {"transient": job["transient"], "periods": _MEASURED} if job.forced
+        else {"transient": job["span"], "duration": _MEASURED / _CHAOTIC * job["span"]}
     )  # fmt: skip
-    return {"exponents": found}
+    return {"exponents": ns.lyapunov(job.system, start=job["start"], progress=job.heard, **span, **job.options)}
 
 
-def _first_look(system: ns.System, job: Mapping[str, Any], options: dict[str, Any], heard: Heard) -> dict[str, Any]:
+def _first_look(job: Job) -> dict[str, Any]:
     """A diagram that nothing judged yet, every column from the same state, on all cores."""
-    return {"diagram": ns.sweep(
-        system, job["over"], _values(job), direction=None, start=list(job["begin"]), section=section_of(system),
-        transient=job["transient"], keep=job["keep"], judge=False, extremes=False, progress=heard,
-        **options,
-    )}  # fmt: skip
+    fast: dict[str, Any] = {"direction": None, "judge": False, "extremes": False}
+    return {"diagram": job.run(ns.sweep, job["over"], job.values, start=job["begin"], keep=job["keep"], **fast)}
 
 
-def _diagram(system: ns.System, job: Mapping[str, Any], options: dict[str, Any], heard: Heard) -> dict[str, Any]:
+def _diagram(job: Job) -> dict[str, Any]:
     """The diagram with period numbers and statuses."""
-    direction, start = job["direction"], list(job["begin"])
-    common = {"section": section_of(system), "transient": job["transient"], "keep": job["keep"], **options}
+    over, direction, start, keep = (job[name] for name in ("over", "direction", "begin", "keep"))
     if direction == "many":
-        few = _values({**job, "columns": 12})
-        look = ns.sweep(system, job["over"], few, direction=None, start=start, judge=False, progress=False, **common)
-        low, high = look["minimum"].min(job["over"]).values, look["maximum"].max(job["over"]).values
+        few = np.linspace(job["low"], job["high"], 12)
+        look = job.run(
+            ns.sweep, over, few, direction=None, start=start, keep=keep, judge=False, progress=False
+        )
+        low, high = look["minimum"].min(over).values, look["maximum"].max(over).values
         start = ns.random_starts(_STARTS, (1.5 * low - 0.5 * high).tolist(), (1.5 * high - 0.5 * low).tolist(), seed=1)
-    return {"diagram": ns.sweep(
-        system, job["over"], _values(job), direction=None if direction in ("many", "rest") else direction, start=start,
-        progress=heard, **common,
-    )}  # fmt: skip
+    direction = None if direction in ("many", "rest") else direction
+    return {"diagram": job.run(ns.sweep, over, job.values, direction=direction, start=start, keep=keep)}
 
 
-def _values(job: Mapping[str, Any]) -> np.ndarray:
-    return np.linspace(job["low"], job["high"], job["columns"])
+def _branches(job: Job) -> dict[str, Any]:
+    """A ``bifurcation_diagram``; of a system without forcing the branch of one cycle."""
+    over, ends = job["over"], (job["low"], job["high"])
+    common = {"transient": job["transient"], "budget": _BUDGET, "progress": job.heard}
+    if "start" not in job.asked:
+        return {"branches": ns.bifurcation_diagram(job.system, over, ends, start=job["begin"], **common)}
+    return {"cycle": ns.continue_orbit(ns.find_orbit(job.system, start=job["start"], **common), over, ends)}
 
 
-def _is_exact(system: ns.System, options: Mapping[str, Any]) -> bool:
-    from nonsmooth.flow.engines.methods import engine_for
+def _response(job: Job) -> dict[str, Any]:
+    """A ``frequency_response``."""
+    named = {"parameter": job["over"], "start": job["begin"], "keep": job["keep"]}
+    return {"response": job.run(ns.frequency_response, job.values, **named)}
 
-    return engine_for(system, **options).name == "exact"
+
+def _chart(job: Job) -> dict[str, Any]:
+    """A ``chart``; the finer ones infer what lies far from all boundaries."""
+    view = job["view"]
+    if not job["across"]:
+        raise ValueError(f"{job.system.name!r} has one parameter; a chart needs two")
+    n, m = _CHARTS[view]
+    grid = {job["over"]: np.linspace(job["low"], job["high"], n),
+            job["across"]: np.linspace(job["bottom"], job["top"], m)}  # fmt: skip
+    if view == "exponents":
+        return {view: job.run(ns.chart, grid, start=job["begin"], lyapunov=_RETURNS, extremes=False)}
+    return {"chart": job.run(ns.chart, grid, start=job["begin"], refine=view != "first chart")}
 
 
-VIEWS: dict[str, Callable[..., dict[str, Any]]] = {
+def _basins(job: Job) -> dict[str, Any]:
+    """``basins`` of the window; where none is given, of one around the motion from rest."""
+    names, window = (job["x"], job["y"]), job["window"]
+    if names[0] == names[1]:
+        raise ValueError("both axes of the phase plane show one state; choose two for its basins")
+    if None in window:
+        window = _around(job, names)
+    ends = {name: window[2 * k : 2 * k + 2] for k, name in enumerate(names)}
+    grid = {name: np.linspace(low, high, _BASINS[job["view"]]) for name, (low, high) in ends.items()}
+    return {"basins": job.run(ns.basins, grid, fixed=job["fixed"] or None)}
+
+
+def _around(job: Job, names: tuple[str, str]) -> list[float]:
+    """A window about the motion from rest, with room as wide as it is on each side, its ends rounded."""
+    run = _at_one_point(job, start=job["begin"], keep=40, judge=False, progress=False)
+    ends: list[float] = []
+    for state in names:
+        low, high = (float(run[which].sel(state=state).values.ravel()[0]) for which in ("minimum", "maximum"))
+        if not (np.isfinite([low, high]).all() and high > low):
+            high = float(job.system.scale[state])
+            low = -high
+        step = 10.0 ** math.floor(math.log10(high - low)) / 2  # so that it stays while a parameter is moved
+        ends += [math.floor((2 * low - high) / step) * step, math.ceil((2 * high - low) / step) * step]
+    return ends
+
+
+def _spectrum(job: Job) -> dict[str, Any]:
+    """An ``amplitude_spectrum``."""
+    return {"spectrum": job.run(ns.amplitude_spectrum, start=job["start"])}
+
+
+_WORK: dict[str, Callable[[Job], dict[str, Any]]] = {
     "orbit": _orbit, "section": _section, "stability": _stability, "first look": _first_look, "diagram": _diagram,
-    **{stage: view.compute for stage, view in CHOSEN.items()},
-    "recording": laid_over, "fit": fitted,
+    "branches": _branches, "first response": _response, "response": _response, **dict.fromkeys(_CHARTS, _chart),
+    **dict.fromkeys(_BASINS, _basins), "spectrum": _spectrum, "recording": laid_over, "fit": fitted,
 }  # fmt: skip

@@ -1,142 +1,131 @@
-"""The form of a view that a page can show in one of its panels: its settings, requests, computation and drawing.
-
-One class per file beside this one. Its ``compute`` runs in the worker's process, which needs no Bokeh; everything else
-in the page's. Bokeh is therefore imported where a view is built.
-"""
+"""The common part of all views: a figure, results, and what a person does to it. Their data are in ``kinds``."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from nonsmooth.explorer.kinds import KINDS, setting
+from nonsmooth.explorer.labels import symbols_of
+
 if TYPE_CHECKING:
-    from nonsmooth.explorer.session import Session
+    from nonsmooth.explorer.sheet import Sheet
     from nonsmooth.explorer.state import State
-    from nonsmooth.explorer.work import Heard
     from nonsmooth.system.system import System
 
-__all__ = ["Given", "Setting", "View"]
+__all__ = ["View"]
 
-#: Value of a setting: a number, one of some words, or None where the view chooses.
-Given = float | str | None
+Request = dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Setting:
-    """A value that a page holds for one view.
+class View:
+    """A view of a sheet; see :data:`nonsmooth.explorer.kinds.KINDS` for its requests and settings.
 
     Attributes
     ----------
-    label : str
-        Text before its field; no field where empty.
-    default : function of system and state
-    choices : function of system and state, optional
-        Allowed words, each with the text that a person reads; a number where not given.
-    also : tuple of str
-        Settings that return to their defaults when this one changes.
-    """
-
-    label: str
-    default: Callable[[System, State], Given]
-    choices: Callable[[System, State], Mapping[str, str]] | None = None
-    also: tuple[str, ...] = ()
-
-
-class View(ABC):
-    """A view; the base has the common part.
-
-    Attributes
-    ----------
-    name, title, panel : str
-        ``panel`` is the field of the state that says which view that panel shows.
-    stages : mapping
-        Names of its requests in the order of computing; True for short work.
-    settings : mapping
-        By full name, ``view.setting``.
-    saved : tuple of str, optional
-        Name of the result that it saves, and the function of ``nonsmooth.plot`` that draws it.
+    results : dict
+        By name, as the worker gave them.
+    figure : Panel, optional
+        None where the view lies in another one's.
     """
 
     name: ClassVar[str]
-    title: ClassVar[str]
-    panel: ClassVar[str]
-    stages: ClassVar[Mapping[str, bool]]
-    settings: ClassVar[Mapping[str, Setting]] = {}
-    saved: ClassVar[tuple[str, str] | None] = None
-    hint: ClassVar[str] = ""
 
-    def __init__(self) -> None:
-        self.results: dict[str, Any] = {}
+    def __init__(self, sheet: Sheet) -> None:
+        self.page, self.kind, self.results = sheet.page, KINDS[self.name], dict[str, Any]()
+        self.sheet = sheet
+        self.figure: Any = None
+        self._inked: list[tuple[Any, str, tuple[str, str]]] = []
+        self.build()
+        self.paint(dark=False)
 
-    @staticmethod
-    def depends(old: tuple[str, str], new: tuple[str, str]) -> bool:
+    @property
+    def state(self) -> State:
+        """The state of the page."""
+        return self.page.state
+
+    @property
+    def system(self) -> System:
+        """The system of the page, at its own parameters."""
+        return self.page.system
+
+    def setting(self, name: str) -> Any:
+        """The value of a setting, by its name without the view's."""
+        return setting(f"{self.name}.{name}", self.system, self.state)
+
+    def quantity(self, name: str) -> tuple[str, str]:
+        """Symbol and unit of a state or a parameter."""
+        parameter = self.system.parameters.get(name)
+        return symbols_of(self.system)[name], self.system.states[name] if parameter is None else parameter.unit
+
+    def name_axes(self, x: str, y: str) -> None:
+        """Label the axes with states or parameters."""
+        for axis, name in ((self.figure.x, x), (self.figure.y, y)):
+            axis.name(*self.quantity(name))
+
+    def ink(self, colors: tuple[str, str], *renderers: Any, field: str = "line_color") -> None:
+        """Draw in one colour on a light ground, and in another on a dark one."""
+        self._inked += [(renderer.glyph, field, colors) for renderer in renderers]
+
+    def paint(self, dark: bool) -> None:
+        """Take the colours that show on a light or a dark ground."""
+        for glyph, field, colors in self._inked:
+            glyph.update(**{field: colors[dark]})
+
+    def depends(self, old: tuple[str, str], new: tuple[str, str]) -> bool:
         """Return whether its results are of no use after a change of the model or of the diagram's parameter."""
         return old[0] != new[0]
 
-    def shown(self, system: System, state: State) -> bool:
+    @property
+    def shown(self) -> bool:
         """Return whether the page shows this view."""
-        return bool(getattr(state, self.panel) == self.name)
+        return not self.kind.panel or getattr(self.state, self.kind.panel) == self.name
 
-    @classmethod
-    def value(cls, name: str, system: System, state: State) -> Any:
-        """The value of a setting, by its name without the view's."""
-        full = f"{cls.name}.{name}"
-        setting, value = cls.settings[full], state.settings.get(full)
-        if value is None or (setting.choices is not None and value not in setting.choices(system, state)):
-            return setting.default(system, state)
-        return value
-
-    @abstractmethod
-    def requests(self, system: System, state: State, base: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
         """Requests by stage, the quick first; ``base`` holds what all of them have."""
+        return {}
 
-    @staticmethod
-    @abstractmethod
-    def compute(system: System, job: Mapping[str, Any], options: Mapping[str, Any], heard: Heard) -> dict[str, Any]:
-        """Results by name, in the worker."""
+    def each(self, request: Request) -> dict[str, Request]:
+        """The same request for every stage."""
+        return {stage: {**request, "view": stage} for stage in (*self.kind.quick, *self.kind.slow)}
 
-    @abstractmethod
-    def build(self, page: Session) -> Any:
-        """Make the figure, and return its plot; None where the view lies in another one's."""
+    def build(self) -> None:
+        """Make the figure."""
 
-    def show(self, job: Mapping[str, Any], found: Mapping[str, Any], system: System, state: State) -> None:
+    def show(self, job: Request, found: Mapping[str, Any]) -> None:
         """Take results, and draw them."""
         self.results.update(found)
-        self.redraw(system, state)
+        self.redraw()
 
-    @abstractmethod
-    def redraw(self, system: System, state: State) -> None:
+    def redraw(self) -> None:
         """Draw what is there, as for other axes."""
 
-    def place(self, system: System, state: State) -> None:  # noqa: B027  most views mark nothing
+    def place(self) -> None:
         """Mark where the page is."""
 
     def clear(self) -> None:
         """Show nothing, as when another model was chosen."""
         self.results.clear()
+        if self.figure is not None:
+            self.figure.clear()
 
-    def paint(self, dark: bool) -> None:  # noqa: B027  most colours show on either ground
-        """Take the colours that show on a light or a dark ground."""
-
-    def legend(self, system: System, state: State) -> list[tuple[str, str]]:
+    def legend(self) -> list[tuple[str, str]]:
         """Words and colours."""
         return []
 
-    @staticmethod
-    def axes(state: State) -> dict[str, str]:
-        """Options of the function that draws a saved figure."""
-        return {}
-
-    def tapped(self, x: float, y: float, system: System, state: State) -> State:
+    def tapped(self, x: float, y: float) -> State:
         """The state after a click."""
-        return state
+        return self.state
 
-    def zoomed(self, x: tuple[float, float], y: tuple[float, float], system: System, state: State) -> State:
+    def started(self, **values: float) -> State:
+        """The state with other initial values of some states."""
+        start = dict(zip(self.system.states, self.state.start, strict=True)) | values
+        return self.state.but("start", tuple(start.values()))
+
+    def zoomed(self, x: tuple[float, float], y: tuple[float, float]) -> State:
         """The state after a zoom."""
-        return state
+        return self.state
 
-    def unzoomed(self, system: System, state: State) -> State:
+    def unzoomed(self) -> State:
         """The state after the zoom was reset."""
-        return state
+        return self.state

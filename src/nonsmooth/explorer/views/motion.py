@@ -1,0 +1,181 @@
+"""The motion from the initial state: in the phase plane, over time, and its section points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from bokeh.models import BoxAnnotation
+
+from nonsmooth.explorer.figures import BLUE, MOST, Panel, extent
+from nonsmooth.explorer.readout import distinct
+from nonsmooth.explorer.views.view import Request, View
+from nonsmooth.plot.labels import column
+from nonsmooth.plot.segments import pieces_by_mode, with_gaps
+from nonsmooth.plot.style import COLORS
+
+if TYPE_CHECKING:
+    from nonsmooth.explorer.state import State
+
+__all__ = ["History", "Portrait", "Section"]
+
+_MODES = [COLORS[name] for name in ("first", "second", "third", "fourth")]
+_MANY_MODES = 8
+
+
+class _Curves(View):
+    """Lines in one colour per mode."""
+
+
+    def build(self) -> None:
+        self.figure = Panel(self.name)
+        self.sources = [self.figure.source("x", "y") for _ in range(_MANY_MODES)]
+        self.lines = [
+            self.figure.plot.line("x", "y", source=source, line_color=_MODES[k % len(_MODES)], line_width=1.6)
+            for k, source in enumerate(self.sources)
+        ]
+        self.ink(BLUE, self.lines[0])
+
+    def put(self, run: Any, xs: Any, ys: Any) -> None:
+        """Draw a curve of a trajectory."""
+        mode, *cut = with_gaps(run, run["mode"].values.astype(float), xs, ys)
+        pieces = pieces_by_mode(np.nan_to_num(mode, nan=-1).astype(int), *cut)
+        for k, source in enumerate(self.sources):
+            x, y = pieces[k] if k < len(pieces) else ([], [])
+            source.data = {"x": x, "y": y}
+
+
+class Portrait(_Curves):
+    """The orbit in the plane of two states, with its section points and the contact zone."""
+
+    name = "portrait"
+
+    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+        """The orbit, whatever the panel shows: other views need it."""
+        return {"orbit": base["orbit"]}
+
+    @property
+    def shown(self) -> bool:
+        """Return True: the orbit is always wanted."""
+        return True
+
+    def build(self) -> None:
+        """Lines, the zone below them and points above."""
+        super().build()
+        self.zone = BoxAnnotation(
+            fill_color=COLORS["zone"], fill_alpha=0.14, line_alpha=0, level="underlay", visible=False
+        )
+        self.figure.plot.add_layout(self.zone)
+        self.points = self.figure.source("x", "y")
+        self.figure.plot.scatter(
+            "x", "y", source=self.points, size=7, fill_color=COLORS["zone"], line_color="#1B1F24", line_width=1.0
+        )
+
+    def show(self, job: Request, found: Mapping[str, Any]) -> None:
+        """Its exponents are not known yet."""
+        self.sheet.views["readout"].results.clear()
+        super().show(job, found)
+        self.sheet.views["history"].redraw()
+
+    def redraw(self) -> None:
+        """Draw the trajectory; the axes stay where they are as long as they show it well."""
+        if "run" not in self.results:
+            return
+        run, state, figure = self.results["run"], self.state, self.figure
+        curves = [column(run, "u", name).values for name in (state.x, state.y)]
+        self.put(run, *curves)
+        for line in self.lines:  # of a map the iterates alone
+            line.visible = not self.system.is_map
+        for axis, values, also in zip((figure.x, figure.y), curves, figure.beside, strict=True):
+            low, high = extent(np.concatenate([values, also]))
+            start, end = axis.range.start, axis.range.end
+            inside = start <= low + 0.05 * (high - low) and high - 0.05 * (high - low) <= end
+            if not (inside and high - low > 0.5 * (end - start)):
+                axis.range.update(start=low, end=high, reset_start=low, reset_end=high)
+        self.name_axes(state.x, state.y)
+        zone = self._zone()
+        self.zone.update(left=zone, visible=zone is not None)
+
+    def _zone(self) -> float | None:
+        """The gap behind which contact lies, where an indicator is ``x`` less a parameter."""
+        traced, names = self.system.traced, list(self.system.parameters)
+        shown = traced.u[list(self.system.states).index(self.state.x)]
+        edges = {shown - symbol: name for symbol, name in zip(traced.p, names, strict=True)}
+        found = next((edges[indicator] for indicator in traced.indicators if indicator in edges), None)
+        return None if found is None else float(self.state.values[found])
+
+    def clear(self) -> None:
+        """Show nothing, the contact zone included."""
+        super().clear()
+        self.zone.visible = False
+
+    def tapped(self, x: float, y: float) -> State:
+        """Start there."""
+        return self.started(**{self.state.x: x, self.state.y: y})
+
+
+class History(_Curves):
+    """A state over time, with its crossings."""
+
+    name = "history"
+
+    def build(self) -> None:
+        """Lines, and rings at the crossings."""
+        super().build()
+        self.crossings = self.figure.source("x", "y")
+        self.figure.plot.scatter("x", "y", source=self.crossings, size=5, fill_color=None, line_color=COLORS["muted"])
+
+    def redraw(self) -> None:
+        """Draw the last of the trajectory."""
+        run = self.sheet.results.get("run")
+        if run is None:
+            return
+        time, values = run["time"].values, column(run, "u", self.state.x).values
+        self.put(run, time, values)
+        self.crossings.data = {"x": run["crossing_time"].values, "y": run["u_before"].sel(state=self.state.x).values}
+        ends = extent(np.concatenate([values, self.figure.beside[1]]))
+        self.figure.show((float(time[0]), float(time[-1])), ends)
+        self.figure.x.name("t", str(run["time"].attrs.get("units", "1")))
+        self.figure.y.name(*self.quantity(self.state.x))
+
+
+class Section(View):
+    """Section points in the phase plane."""
+
+    name = "section"
+
+    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+        """Points at a phase of the orbit."""
+        return self.each({**base["orbit"], "phase": self.state.phase})
+
+    def build(self) -> None:
+        """Points over the orbit."""
+        self.figure = Panel("section")
+        plot = self.figure.plot
+        self.orbit = self.figure.source("x", "y")
+        plot.line("x", "y", source=self.orbit, line_color=COLORS["muted"], line_alpha=0.6, line_width=1)
+        self.points = self.figure.source("x", "y", name="section points")
+        self.dots = plot.scatter("x", "y", source=self.points, size=4, line_color=None, fill_alpha=0.75)
+        self.ink(BLUE, self.dots, field="fill_color")
+
+    def redraw(self) -> None:
+        """Draw the points: a few as large dots on the whole orbit, so that they move in it with the phase."""
+        if "section" not in self.results:
+            return
+        every, names = self.results["section"]["section"], (self.state.x, self.state.y)
+        points = every.sel(state=list(names)).values
+        apart = distinct(every.values)
+        points = points[-len(apart) :][apart] if apart.sum() <= MOST else points
+        few = len(points) <= MOST
+        self.points.data = dict(zip("xy", points.T, strict=True))
+        self.dots.glyph.update(size=9 if few else 2.5, fill_alpha=1.0 if few else 0.75)
+        run = self.sheet.results.get("run") if few else None
+        curves = [np.empty(0) if run is None else column(run, "u", name).values for name in names]
+        self.orbit.data = dict(zip("xy", curves, strict=True))
+        drawn = zip(points.T, curves, self.figure.beside, strict=True)
+        self.figure.show(*(extent(np.concatenate(all_of_it), 0.08) for all_of_it in drawn))
+        self.name_axes(*names)
+        self.sheet.views["portrait"].points.data = dict(self.points.data)
+
+    tapped = Portrait.tapped
