@@ -16,7 +16,7 @@ import nonsmooth as ns
 from nonsmooth import plot
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import column, name_and_unit
-from nonsmooth.plot.segments import with_gaps
+from nonsmooth.plot.trajectories import with_gaps
 
 CASES = [
     ("time_history", "trajectory"), ("phase_portrait", "trajectory"), ("bifurcation", "swept"),

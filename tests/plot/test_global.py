@@ -10,11 +10,11 @@ import nonsmooth as ns
 from nonsmooth.attractors.basin_fractions import basin_fractions
 from nonsmooth.attractors.basins import basins
 from nonsmooth.diagrams.chart import chart
-from nonsmooth.plot.basin_fractions import basin_fractions as draw_fractions
-from nonsmooth.plot.basins import basins as draw_basins
-from nonsmooth.plot.basins import told_apart
-from nonsmooth.plot.chart import chart as draw_chart
 from nonsmooth.plot.palette import PERIODS, attractor_color
+from nonsmooth.plot.planes import basin_fractions as draw_fractions
+from nonsmooth.plot.planes import basins as draw_basins
+from nonsmooth.plot.planes import chart as draw_chart
+from nonsmooth.plot.planes import told_apart
 
 mpl.use("Agg")
 QUIET = {"progress": False}
@@ -88,7 +88,7 @@ def test_shares_add_up_to_all(support: ns.System) -> None:
 
 
 def test_a_density_diagram_shows_the_shares_of_the_bins() -> None:
-    from nonsmooth.plot.density import density
+    from nonsmooth.plot.sweeps import density
 
     system = ns.models.discontinuous_support(omega=3.69, g=-0.0045)
     swept = ns.sweep(system, "rho", [0.3, 0.32, 0.36], transient=40, keep=20, density=True, bins=10, **QUIET)

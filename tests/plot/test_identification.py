@@ -17,14 +17,14 @@ import xarray as xr
 import nonsmooth as ns
 from nonsmooth.identification.compare import compare
 from nonsmooth.plot import identification
-from nonsmooth.plot.comparison_diagram import comparison_diagram
-from nonsmooth.plot.comparison_motion import (
+from nonsmooth.plot.comparison import (
+    comparison_diagram,
     comparison_distances,
     comparison_phase_portrait,
+    comparison_response,
     comparison_section,
     comparison_time,
 )
-from nonsmooth.plot.comparison_response import comparison_response
 
 SYNTHETIC = {"synthetic": "yes"}
 

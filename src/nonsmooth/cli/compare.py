@@ -9,29 +9,26 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.cli.keep import keep, kept_whatever_comes
-from nonsmooth.cli.tables import read_tables, with_folder
-from nonsmooth.errors import shortened
-from nonsmooth.system.names import check_keys, unknown
+from nonsmooth.cli.keep import write
+from nonsmooth.cli.study import SYSTEM, system_of
+from nonsmooth.cli.tables import ANY, TEXT, read_tables
+from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["add"]
 
-_TABLES = ("system", "identified", "measured", "compare", "output")
-_KEYS = {
-    "system": ("model", "parameters", "smoothed"), "identified": ("data", "session"),
-    "measured": ("session", "procedure", "run", "crank_force", "gap_offset", "referred"),
-    "output": ("data", "figure", "picture", "x", "y"),
-}  # fmt: skip
-_TEXTS = ("model", "session", "procedure", *_KEYS["output"])
-_PICTURES = {
-    "motion": {
-        "phase_portrait": "comparison_phase_portrait", "time": "comparison_time", "section": "comparison_section",
-        "distances": "comparison_distances",
+_TABLES: dict[str, Any] = {
+    "system": SYSTEM, "identified": {"data": TEXT, "session": TEXT},
+    "measured": {
+        "session": TEXT, "procedure": TEXT, "run": ANY, "crank_force": ANY, "gap_offset": ANY, "referred": ANY,
     },
-    "response": {"response": "comparison_response"}, "diagram": {"diagram": "comparison_diagram"},
+    "output": dict.fromkeys(("data", "figure", "picture", "x", "y"), TEXT),
+}  # fmt: skip
+#: Pictures by what is compared: the functions ``comparison_NAME`` of ``nonsmooth.plot``, the usual one first.
+_PICTURES = {
+    "motion": ("phase_portrait", "time", "section", "distances"), "response": ("response",), "diagram": ("diagram",),
 }  # fmt: skip
 
 
@@ -121,7 +118,8 @@ def _run_study(
         given.setdefault("parameter", "rho")
         given.setdefault("direction", "up")
     result = compare(measured, system, parameters=parameters, settings=settings, **given)
-    written = _write(result, study.get("output", {}), folder)
+    output = study.get("output", {})
+    written = write(result, output, folder, folder / "comparison.nc", lambda plot: _draw(plot, result, output))
     if not quiet:
         print(_summary(result))
         for path in written:
@@ -145,66 +143,33 @@ def _offset(study: Mapping[str, Any], parameters: Any, session: Any, folder: Pat
 def _read(path: Path) -> dict[str, Any]:
     from nonsmooth.identification.compare import compare
 
-    document = read_tables(path, _TABLES)
-    ours = ("measured", "theory", "parameters")
+    ours = ("measured", "theory", "parameters", "options")
     allowed = [name for name in inspect.signature(compare).parameters if name not in ours]
-    for name, table in document.items():
-        keys = [*(key for key in allowed if key != "options"), "method", "rtol", "atol"]
-        check_keys(table, keys if name == "compare" else _KEYS[name], f"{path}, table [{name}]", "a key")
-        for key in _TEXTS if name != "compare" else ():
-            if key in table and not isinstance(table[key], str):
-                raise ValueError(f"{path}, table [{name}]: {key} = {shortened(table[key])} must be a text")
-    for name, needed in (("system", ("model",)), ("measured", ("session", "procedure"))):
-        if missing := [key for key in needed if key not in document.get(name, {})]:
-            raise ValueError(f"{path}: table [{name}] needs {', '.join(missing)}")
-    if "identified" in document and "data" not in document["identified"]:
+    known = {**_TABLES, "compare": dict.fromkeys([*allowed, "method", "rtol", "atol"], ANY)}
+    document = read_tables(path, known, needed={"system": ("model",), "measured": ("session", "procedure")})
+    if "data" not in document.get("identified", {"data": ""}):
         raise ValueError(f'{path}: table [identified] needs data = "..." (a file that `nonsmooth identify` wrote)')
     return document
 
 
 def _theory(study: Mapping[str, Any], folder: Path) -> tuple[Any, Any]:
-    from nonsmooth.cli.study import load_model
+    from nonsmooth.identification.parameter_set import ParameterSet
     from nonsmooth.results.store import load
 
-    table = study["system"]
-    system = load_model(table["model"], folder)
-    if "parameters" in table:
-        system = system.with_parameters(table["parameters"])
-    if "smoothed" in table:
-        system = system.smoothed(table["smoothed"])
-    if "identified" not in study:
-        return system, None
-    from nonsmooth.identification.parameter_set import ParameterSet
-
-    return system, ParameterSet.from_dataset(load(folder / study["identified"]["data"]))
+    found = study.get("identified")
+    parameters = None if found is None else ParameterSet.from_dataset(load(folder / found["data"]))
+    return system_of(study["system"], folder), parameters
 
 
-def _write(result: xr.Dataset, output: Mapping[str, str], folder: Path) -> list[Path]:
-    written = []
-    if "data" in output:
-        written.append(keep(result, folder / output["data"]))
-    if "figure" in output:
-        with kept_whatever_comes(result, written, folder / "comparison.nc"):
-            written.append(_draw(result, output, folder / output["figure"]))
-    return written
-
-
-def _draw(result: xr.Dataset, output: Mapping[str, str], path: Path) -> Path:
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    from nonsmooth import plot
-    from nonsmooth.plot import comparison_diagram, comparison_motion, comparison_response
-
-    pictures = _PICTURES[result.attrs["comparison"]]
-    wanted = output.get("picture", next(iter(pictures)))
-    if wanted not in pictures:
-        raise ValueError(unknown(wanted, "a picture", f"a comparison of a {result.attrs['comparison']}", pictures))
-    module = {"motion": comparison_motion, "response": comparison_response, "diagram": comparison_diagram}
-    draw = getattr(module[result.attrs["comparison"]], pictures[wanted])
+def _draw(plot: Any, result: xr.Dataset, output: Mapping[str, str]) -> Any:
+    kind = result.attrs["comparison"]
+    wanted = output.get("picture", _PICTURES[kind][0])
+    if wanted not in _PICTURES[kind]:
+        raise ValueError(unknown(wanted, "a picture", f"a comparison of a {kind}", _PICTURES[kind]))
+    draw = getattr(plot, f"comparison_{wanted}")
     axes = {key: output[key] for key in ("x", "y") if key in output and key in inspect.signature(draw).parameters}
     zone = {"zone": "g"} if wanted == "phase_portrait" and "g" in result.coords else {}
-    return plot.save_figure(draw(result, **axes, **zone), with_folder(path))
+    return draw(result, **axes, **zone)
 
 
 def _summary(result: xr.Dataset) -> str:

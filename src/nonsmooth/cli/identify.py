@@ -9,15 +9,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from nonsmooth.cli.keep import keep
-from nonsmooth.cli.tables import read_tables, with_folder
+from nonsmooth.cli.keep import keep, without_screen
+from nonsmooth.cli.tables import LENGTH, NAMES, QUANTITIES, TEXT, read_tables, with_folder
 from nonsmooth.system.names import check_keys, unknown
 
 __all__ = ["add"]
 
-_KEYS = {
-    "identify": ("session", "model", "parameters", "crank_length", "apparatus"),
-    "output": ("data", "table", "figures", "format"),
+_TABLES = {
+    "identify": {
+        "session": TEXT, "model": TEXT, "parameters": NAMES, "crank_length": LENGTH, "apparatus": QUANTITIES,
+    },
+    "output": dict.fromkeys(("data", "table", "figures", "format"), TEXT),
 }  # fmt: skip
 _FORMATS = ("pdf", "png", "svg")
 
@@ -94,11 +96,7 @@ def _read(path: Path) -> _Study:
         return _Study(path)
     if path.name == NOTEBOOK:
         return _Study(path.parent)
-    document = read_tables(path, _KEYS, "study file or session folder")
-    for name, table in document.items():
-        check_keys(table, _KEYS[name], f"{path}, table [{name}]", "a key")
-    if "session" not in document.get("identify", {}):
-        raise ValueError(f'{path}: needs a table [identify] with session = "..." (the folder of a {NOTEBOOK})')
+    document = read_tables(path, _TABLES, "study file or session folder", {"identify": ("session",)})
     return _study(path, document["identify"], document.get("output", {}))
 
 
@@ -107,33 +105,17 @@ def _study(path: Path, asked: Mapping[str, Any], output: Mapping[str, Any]) -> _
     from nonsmooth.recordings.session import APPARATUS
 
     where, folder = f"{path}, table [identify]", path.parent
-    for key, table, place in (
-        ("session", asked, where), ("model", asked, where),
-        *((key, output, f"{path}, table [output]") for key in _KEYS["output"]),
-    ):  # fmt: skip
-        if key in table and not isinstance(table[key], str):
-            raise ValueError(f"{place}: {key} = {table[key]!r} must be a text")
     session = folder / asked["session"]
     if not session.is_dir():
         raise ValueError(f"{where}: session = {asked['session']!r}: no such folder beside the study file ({session})")
-    parameters = asked.get("parameters", [])
-    if not isinstance(parameters, list) or not all(isinstance(name, str) for name in parameters):
-        raise ValueError(f'{where}: parameters = {parameters!r} must be a list of names, as ["k", "c", "g"]')
-    apparatus = asked.get("apparatus", {})
-    if not isinstance(apparatus, dict):
-        raise ValueError(f"{where}: apparatus must be a table of numbers or of {{ value = ..., uncertainty = ... }}")
+    apparatus, crank, style = asked.get("apparatus", {}), asked.get("crank_length"), output.get("format", "pdf")
     check_keys(apparatus, APPARATUS, f"{where}, apparatus", "a key")
-    crank = asked.get("crank_length")
-    if crank is not None and (isinstance(crank, bool) or not isinstance(crank, int | float)):
-        raise ValueError(f"{where}: crank_length = {crank!r} must be a length in m")
-    style = output.get("format", "pdf")
     if style not in _FORMATS:
         raise ValueError(f"{path}, table [output]: {unknown(style, 'a format', 'figures', _FORMATS)}")
-    places = {key: folder / output[key] if key in output else None for key in ("data", "table", "figures")}
     return _Study(
-        session, load_model(asked["model"], folder) if "model" in asked else None, tuple(parameters),
+        session, load_model(asked["model"], folder) if "model" in asked else None, tuple(asked.get("parameters", [])),
         None if crank is None else float(crank), {name: _quantity(value) for name, value in apparatus.items()},
-        **places, format=style,
+        **{key: folder / output[key] if key in output else None for key in ("data", "table", "figures")}, format=style,
     )  # fmt: skip
 
 
@@ -151,12 +133,9 @@ def _write(found: Any, study: _Study, data: Path | None) -> list[Path]:
         with_folder(study.table).write_text(report(found), encoding="utf-8")
         written.append(study.table)
     if study.figures is not None:
-        import matplotlib as mpl
-
-        mpl.use("Agg")
+        plot = without_screen()
         from matplotlib import pyplot as plt
 
-        from nonsmooth import plot
         from nonsmooth.plot.identification.pictures import pictures
 
         for name, ax in pictures(found):

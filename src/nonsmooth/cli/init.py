@@ -51,6 +51,8 @@ def _run(options: argparse.Namespace) -> int:
 
 def study_text(system: Any, model: str, verb: str, stem: str) -> str:
     """Return a study file for a model, named as study files name it, that writes ``stem.nc`` and ``stem.pdf``."""
+    from nonsmooth.explorer.export import as_toml
+
     known = options_of(verb)
     set_here = _settings(system, verb) | _start(system)
     set_here = {name: value for name, value in set_here.items() if name in known}
@@ -62,9 +64,9 @@ def study_text(system: Any, model: str, verb: str, stem: str) -> str:
         "# with this as the first line:  #:schema ./study.schema.json",
         "",
         "[system]",
-        f"model = {_toml(model)}",
+        f"model = {as_toml(model)}",
         "# Parameters, where they are to differ from the model's own values, which are",
-        f"# parameters = {_toml({name: value for name, value in values.items() if name != 'eta'})}",
+        f"# parameters = {as_toml({name: value for name, value in values.items() if name != 'eta'})}",
         "# Half width of a smoothed switch in place of the discontinuity, in the indicators' units:",
         "# smoothed = 1e-5",
         "",
@@ -76,16 +78,16 @@ def study_text(system: Any, model: str, verb: str, stem: str) -> str:
             lines += ["", *(f"# {line}" for line in textwrap.wrap(option.text or "No description.", _WIDTH - 2))]
             before = option.text
         if option.name in set_here:
-            lines.append(f"{option.name} = {_toml(set_here[option.name])}")
+            lines.append(f"{option.name} = {as_toml(set_here[option.name])}")
         else:
-            lines.append(f"# {option.name} = {_toml(_example(option, system))}")
+            lines.append(f"# {option.name} = {as_toml(_example(option, system))}")
     states = list(system.states)
     lines += [
         "",
         "[output]",
         "# Results are written beside this file: .nc (NetCDF) or .zarr; a figure as .pdf, .png or .svg.",
-        f"data = {_toml(f'{stem}.nc')}",
-        *([f"figure = {_toml(f'{stem}.pdf')}"] if len(states) > 1 else []),
+        f"data = {as_toml(f'{stem}.nc')}",
+        *([f"figure = {as_toml(f'{stem}.pdf')}"] if len(states) > 1 else []),
     ]
     return "\n".join(lines) + "\n"
 
@@ -164,16 +166,3 @@ def _example(option: Option, system: Any) -> Any:
         "box": {name: [-size, size] for name, size in system.scale.items()},
     }  # fmt: skip
     return examples[option.name]
-
-
-def _toml(value: Any) -> str:
-    """Plain data as TOML on one line."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }" if value else "{}"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return repr(value)

@@ -5,17 +5,16 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from nonsmooth.cli.tables import with_folder
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["keep", "keep_elsewhere", "kept_whatever_comes"]
+__all__ = ["keep", "without_screen", "write"]
 
 
 def keep(result: xr.Dataset, path: Path) -> Path:
@@ -32,35 +31,50 @@ def keep(result: xr.Dataset, path: Path) -> Path:
     try:
         return save(result, with_folder(path))
     except Exception as error:
-        raise DataFileError(f"{error}\n{keep_elsewhere(result, path)}") from error
+        raise DataFileError(f"{error}\n{_elsewhere(result, path)}") from error
 
 
-@contextmanager
-def kept_whatever_comes(result: xr.Dataset, saved: list[Path], name: Path) -> Iterator[None]:
-    """Make an error in further work on a result end with where the result is.
+def write(
+    result: xr.Dataset, output: Mapping[str, str], folder: Path, name: Path, draw: Callable[[Any], Any]
+) -> list[Path]:
+    """Save the data and the figure that ``[output]`` asks for; returns what was written.
 
     Parameters
     ----------
-    saved : list of Path
-        Where the result is saved already; empty if it is not.
     name : Path
-        What to call it where it must be kept elsewhere.
+        What to call the result where it must be kept elsewhere, because it was not saved and its figure fails.
+    draw : function
+        Draws the figure with ``nonsmooth.plot``, which it is given.
 
     Raises
     ------
     DataFileError
-        In place of any error.
+        In place of any error; it ends with where the result is.
     """
     from nonsmooth.errors import DataFileError
 
-    try:
-        yield
-    except Exception as error:
-        where = f"the result is in {saved[0]}" if saved else keep_elsewhere(result, name)
-        raise DataFileError(f"{error}\n{where}") from error
+    written = [keep(result, folder / output["data"])] if "data" in output else []
+    if "figure" in output:
+        try:
+            plot = without_screen()
+            written.append(plot.save_figure(draw(plot), with_folder(folder / output["figure"])))
+        except Exception as error:
+            where = f"the result is in {written[0]}" if written else _elsewhere(result, name)
+            raise DataFileError(f"{error}\n{where}") from error
+    return written
 
 
-def keep_elsewhere(result: xr.Dataset, path: Path) -> str:
+def without_screen() -> Any:
+    """``nonsmooth.plot``, for a process that shows no windows."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from nonsmooth import plot
+
+    return plot
+
+
+def _elsewhere(result: xr.Dataset, path: Path) -> str:
     """Save a result under a name of its own in the current folder, at home, or among temporary files; say where."""
     from nonsmooth.results.store import save
 

@@ -9,6 +9,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from nonsmooth.cli.keep import without_screen
+
 __all__ = ["add"]
 
 
@@ -52,14 +54,8 @@ def _run(options: argparse.Namespace) -> int:
     out = options.out or Path("out") / (options.study + "_quick" * options.quick)
     if not options.quiet and sys.stderr.isatty():  # what follows loads the numerics: that takes a second or more
         print(f"reproducing {options.study} into {out}", file=sys.stderr, flush=True)
-    _draw_without_screen()
+    without_screen()
     study = importlib.import_module(f"nonsmooth.studies.{options.study}")
     study.reproduce(out=out, figures=options.figure, quick=options.quick, full=options.full, progress=not options.quiet)
     print(f"written to {out}", file=sys.stderr)
     return 0
-
-
-def _draw_without_screen() -> None:
-    import matplotlib as mpl
-
-    mpl.use("Agg")

@@ -17,8 +17,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.cli.keep import keep, kept_whatever_comes
-from nonsmooth.cli.tables import read_tables, with_folder
+from nonsmooth.cli.keep import write
+from nonsmooth.cli.tables import ANY, TEXT, read_tables
 from nonsmooth.cli.verb_options import VERBS, options_of
 from nonsmooth.errors import shortened
 from nonsmooth.system.names import check_keys, unknown
@@ -26,9 +26,9 @@ from nonsmooth.system.names import check_keys, unknown
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["OUTPUT", "Study", "load_model", "named_model", "read_study"]
+__all__ = ["OUTPUT", "SYSTEM", "Study", "load_model", "named_model", "read_study", "system_of"]
 
-_SYSTEM_KEYS = ("model", "parameters", "smoothed")
+SYSTEM = {"model": TEXT, "parameters": ANY, "smoothed": ANY}
 _FORMATS = (".pdf", ".png", ".svg", ".eps", ".ps", ".pgf", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 #: Keys of the table [output], with the endings that a name may have.
 OUTPUT = {"data": (".nc", ".zarr"), "figure": _FORMATS, "store": (".zarr",), "x": (), "y": ()}
@@ -88,20 +88,12 @@ class Study:
 
     def write(self, result: xr.Dataset) -> list[Path]:
         """Save the data and draw the figure that ``[output]`` asks for; returns what was written."""
-        folder, written = self.path.parent, []
-        if "data" in self.output:
-            written.append(keep(result, folder / self.output["data"]))
-        if "figure" in self.output:
-            with kept_whatever_comes(result, written, self.path.with_suffix(".nc")):
-                import matplotlib as mpl
-
-                mpl.use("Agg")
-                from nonsmooth import plot
-
-                named = {axis: self.output[axis] for axis in ("x", "y") if axis in self.output}
-                ax = getattr(plot, _figure(self.verb, self.options))(result, **named)
-                written.append(plot.save_figure(ax, with_folder(folder / self.output["figure"])))
-        return written
+        axes = {axis: self.output[axis] for axis in ("x", "y") if axis in self.output}
+        figure = _figure(self.verb, self.options)
+        return write(
+            result, self.output, self.path.parent, self.path.with_suffix(".nc"),
+            lambda plot: getattr(plot, figure)(result, **axes),
+        )  # fmt: skip
 
 
 def read_study(path: Path) -> Study:
@@ -113,7 +105,8 @@ def read_study(path: Path) -> Study:
         Not TOML, an unknown table or key, no verb or two, a value that cannot be read; the message names the
         file and the table.
     """
-    document = read_tables(path, ("system", *VERBS, "output"))
+    known = {"system": SYSTEM, **dict.fromkeys(VERBS), "output": dict.fromkeys(OUTPUT, TEXT)}
+    document = read_tables(path, known)
     where = str(path)
     verbs = [name for name in document if name in VERBS]
     if len(verbs) != 1:
@@ -121,12 +114,13 @@ def read_study(path: Path) -> Study:
             f"{where}: a study runs exactly one verb, this one has {verbs or 'none'}; "
             f"keep one table of: {', '.join(VERBS)}"
         )
-    if "system" not in document:
-        raise ValueError(f'{where}: needs a table [system] with at least model = "..."')
     output = document.get("output", {})
-    check_keys(output, OUTPUT, f"{where}, table [output]", "a key")
     _check_output(output, path)
-    system = _system(document["system"], path)
+    if "model" not in document.get("system", {}):
+        raise ValueError(
+            f'{where}: needs a table [system] with model = "name" (see `nonsmooth models`) or model = "file.py:object"'
+        )
+    system = system_of(document["system"], path.parent)
     options = _options(verbs[0], document[verbs[0]], where)
     _check_axes(output, _figure(verbs[0], options), system, f"{where}, table [output]")
     return Study(path, system, verbs[0], options, output)
@@ -160,7 +154,8 @@ def load_model(text: str, folder: Path) -> Any:
     module = importlib.util.module_from_spec(spec)
     _told(source, partial(spec.loader.exec_module, module))
     if not hasattr(module, name):
-        raise ValueError(f"{source}: {unknown(name, 'an object', source.name, _public(module))}")
+        public = [one for one in vars(module) if not one.startswith("_")]
+        raise ValueError(f"{source}: {unknown(name, 'an object', source.name, public)}")
     found = getattr(module, name)
     system = _told(source, found) if callable(found) and not isinstance(found, System) else found
     if not isinstance(system, System):
@@ -192,9 +187,6 @@ def _check_output(output: Mapping[str, Any], path: Path) -> None:
     from nonsmooth.results.store import check_place, needs_zarr
 
     place = f"{path}, table [output]"
-    for name, value in output.items():
-        if not isinstance(value, str):
-            raise ValueError(f"{place}: {name} is {shortened(value)}; give a name in quotes")
     for name, endings in OUTPUT.items():
         if name not in output or not endings:
             continue
@@ -210,7 +202,7 @@ def _check_output(output: Mapping[str, Any], path: Path) -> None:
             check_place(target)
         elif name == "figure" and target.is_dir():
             raise ValueError(f"{place}: {name} = {output[name]!r} is a folder; give another name")
-    if "store" in output and "data" in output and _same(path.parent / output["store"], path.parent / output["data"]):
+    if "store" in output and len({(path.parent / output.get(key, "")).resolve() for key in ("store", "data")}) == 1:
         raise ValueError(
             f"{place}: data and store are both {output['data']!r}: the result would replace the chunks; give two names"
         )
@@ -239,21 +231,12 @@ def _check_axes(output: Mapping[str, Any], figure: str, system: Any, place: str)
         raise ValueError(f"{place}: the figure is of two states, and the system has one ({states[0]}); take it out")
 
 
-def _same(one: Path, other: Path) -> bool:
-    return one.resolve() == other.resolve()
-
-
-def _system(table: Mapping[str, Any], path: Path) -> Any:
-    where = f"{path}, table [system]"
-    check_keys(table, _SYSTEM_KEYS, where, "a key")
-    if not isinstance(table.get("model"), str):
-        raise ValueError(f'{where}: needs model = "name" (see `nonsmooth models`) or model = "file.py:object"')
-    system = load_model(table["model"], path.parent)
+def system_of(table: Mapping[str, Any], folder: Path) -> Any:
+    """The system of a table [system], its file relative to ``folder``."""
+    system = load_model(table["model"], folder)
     if "parameters" in table:
         system = system.with_parameters(table["parameters"])
-    if "smoothed" in table:
-        system = system.smoothed(table["smoothed"])
-    return system
+    return system.smoothed(table["smoothed"]) if "smoothed" in table else system
 
 
 def _options(verb: str, table: Mapping[str, Any], where: str) -> dict[str, Any]:
@@ -264,8 +247,10 @@ def _options(verb: str, table: Mapping[str, Any], where: str) -> dict[str, Any]:
     missing = [name for name, option in known.items() if option.required and name not in table]
     if missing:
         raise ValueError(f"{place}: needs {', '.join(missing)}; all keys: {', '.join(known)}")
-    readers = {"values": _values, "grid": _grid, "section": _section, "start": _start, "direction": _direction}
-    return {name: readers[name](value, place) if name in readers else value for name, value in table.items()}
+    readers = {"values": _values, "grid": _grid, "section": _section, "start": _start}
+    found = {name: readers[name](value, place) if name in readers else value for name, value in table.items()}
+    # TOML has no None: every point from its start is written "none", as results store it
+    return found | ({"direction": None} if found.get("direction") == "none" else {})
 
 
 def _values(value: Any, place: str) -> Any:
@@ -310,12 +295,3 @@ def _start(value: Any, place: str) -> Any:
         check_keys(value, ("n", "low", "high", "seed"), f"{place}, start", "a key")
         return nonsmooth.random_starts(**value)
     return value
-
-
-def _direction(value: Any, place: str) -> Any:
-    """TOML has no None: every point from its start is written ``"none"``, as results store it."""
-    return None if value == "none" else value
-
-
-def _public(module: Any) -> list[str]:
-    return [name for name in vars(module) if not name.startswith("_")]

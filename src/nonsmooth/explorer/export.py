@@ -18,7 +18,7 @@ import nonsmooth as ns
 from nonsmooth.explorer.kinds import KINDS as VIEWS
 from nonsmooth.results.provenance import read_provenance
 
-__all__ = ["KINDS", "exported"]
+__all__ = ["KINDS", "as_toml", "exported"]
 
 #: Kinds of files.
 KINDS = {"pdf": "PDF", "png": "PNG", "svg": "SVG", "nc": "NetCDF", "py": "Python script", "toml": "study file"}
@@ -91,11 +91,11 @@ def study_of(result: Any, axes: Mapping[str, str], model: str, stem: str) -> str
     record, system = read_provenance(result), ns.system_of(result)
     if record["verb"] in ("bifurcation_diagram", "amplitude_spectrum"):
         raise ValueError(f"{record['verb']} has no table in a study file; save the Python script instead")
-    lines = ["[system]", f'model = "{model}"', f"parameters = {_toml(_values(system, record))}"]
+    lines = ["[system]", f'model = "{model}"', f"parameters = {as_toml(_values(system, record))}"]
     if system.is_smoothed:
-        lines.append(f"smoothed = {_toml(system.eta)}")
+        lines.append(f"smoothed = {as_toml(system.eta)}")
     lines += ["", f"[{record['verb']}]"]
-    lines += [f"{name} = {_toml(value, name)}" for name, value in _options(record, result).items()]
+    lines += [f"{name} = {as_toml(value, name)}" for name, value in _options(record, result).items()]
     shown = {name: value for name, value in axes.items() if record["verb"] != "simulate" or axes.keys() >= {"x", "y"}}
     lines += ["", "[output]", f'data = "{stem}.nc"', f'figure = "{stem}.pdf"']
     lines += [f'{name} = "{value}"' for name, value in shown.items()]
@@ -146,15 +146,16 @@ def _python(value: Any) -> str:
     return repr(value)
 
 
-def _toml(value: Any, name: str = "") -> str:
+def as_toml(value: Any, name: str = "") -> str:
+    """Plain data as TOML on one line; ``name`` is that of an option of a verb."""
     if isinstance(value, np.ndarray):
         ends = _even(value)
-        return _toml(value.tolist()) if ends is None else f"{{ from = {ends[0]!r}, to = {ends[1]!r}, n = {ends[2]} }}"
+        return as_toml(value.tolist() if ends is None else dict(zip(("from", "to", "n"), ends, strict=True)))
     if isinstance(value, Mapping):
-        pairs = {k: v for k, v in value.items() if k != "type" and v is not None}
-        return "{ " + ", ".join(f"{k} = {_toml(v)}" for k, v in pairs.items()) + " }"
+        pairs = ", ".join(f"{k} = {as_toml(v)}" for k, v in value.items() if k != "type" and v is not None)
+        return f"{{ {pairs} }}" if pairs else "{}"
     if isinstance(value, list):
-        return "[" + ", ".join(map(_toml, value)) + "]"
+        return "[" + ", ".join(map(as_toml, value)) + "]"
     if value is None and name == "direction":
         return '"none"'
-    return json.dumps(value)
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

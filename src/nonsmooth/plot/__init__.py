@@ -6,34 +6,20 @@ Those of identified parameters stand in ``plot.identification``. Matplotlib is l
 from typing import Any
 
 from nonsmooth.plot import identification
-from nonsmooth.plot.amplitude_spectrum import amplitude_spectrum
-from nonsmooth.plot.basin_fractions import basin_fractions
-from nonsmooth.plot.basins import basins
-from nonsmooth.plot.bifurcation import bifurcation
-from nonsmooth.plot.bifurcation_diagram import bifurcation_diagram
-from nonsmooth.plot.branch import branch
-from nonsmooth.plot.chart import chart
-from nonsmooth.plot.comparison_diagram import comparison_diagram
-from nonsmooth.plot.comparison_motion import (
+from nonsmooth.plot.branches import branch, controlled_branch, curve, manifolds, multipliers
+from nonsmooth.plot.comparison import (
+    comparison_diagram,
     comparison_distances,
     comparison_phase_portrait,
+    comparison_response,
     comparison_section,
     comparison_time,
 )
-from nonsmooth.plot.comparison_response import comparison_response
-from nonsmooth.plot.controlled_branch import controlled_branch
-from nonsmooth.plot.curve import curve
-from nonsmooth.plot.density import density
-from nonsmooth.plot.frequency_response import frequency_response
-from nonsmooth.plot.manifolds import manifolds
-from nonsmooth.plot.multipliers import multipliers
-from nonsmooth.plot.orbit import orbit
-from nonsmooth.plot.phase_portrait import phase_portrait
+from nonsmooth.plot.planes import basin_fractions, basins, chart
 from nonsmooth.plot.regions import regions
-from nonsmooth.plot.section import section
-from nonsmooth.plot.smoothing_report import smoothing_report
 from nonsmooth.plot.style import COLORS, COLUMN, PAGE, journal, save_figure
-from nonsmooth.plot.time_history import time_history
+from nonsmooth.plot.sweeps import bifurcation, bifurcation_diagram, density, frequency_response, smoothing_report
+from nonsmooth.plot.trajectories import amplitude_spectrum, orbit, phase_portrait, section, time_history
 
 __all__ = [
     "COLORS",

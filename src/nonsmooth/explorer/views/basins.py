@@ -11,7 +11,7 @@ from nonsmooth.explorer.views.cells import Cells
 from nonsmooth.explorer.views.motion import Portrait
 from nonsmooth.explorer.views.view import Request
 from nonsmooth.plot import palette
-from nonsmooth.plot.basins import names_of
+from nonsmooth.plot.planes import names_of
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import State

@@ -10,8 +10,8 @@ import numpy as np
 from nonsmooth.explorer.figures import INK
 from nonsmooth.explorer.labels import number
 from nonsmooth.explorer.views.view import Request, View
-from nonsmooth.plot.bifurcation_diagram import one_branch
-from nonsmooth.plot.branch import MARKS, lines_of, ordinates_of, with_breaks
+from nonsmooth.plot.branches import MARKS, lines_of, ordinates_of, with_breaks
+from nonsmooth.plot.sweeps import one_branch
 
 __all__ = ["Branches"]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from nonsmooth.explorer.presets import first_state
 from nonsmooth.explorer.views.cells import Cells
 from nonsmooth.explorer.views.view import Request
-from nonsmooth.plot.chart import classes_of, legend_of
+from nonsmooth.plot.planes import classes_of, legend_of
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import State

@@ -12,8 +12,8 @@ from nonsmooth.explorer.figures import BLUE, MOST, Panel, extent
 from nonsmooth.explorer.readout import distinct
 from nonsmooth.explorer.views.view import Request, View
 from nonsmooth.plot.labels import column
-from nonsmooth.plot.segments import pieces_by_mode, with_gaps
 from nonsmooth.plot.style import COLORS
+from nonsmooth.plot.trajectories import pieces_by_mode, with_gaps
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import State

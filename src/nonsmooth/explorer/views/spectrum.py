@@ -9,7 +9,7 @@ import numpy as np
 from nonsmooth.explorer.figures import BLUE, Panel
 from nonsmooth.explorer.labels import axis_label, number
 from nonsmooth.explorer.views.view import Request, View
-from nonsmooth.plot.amplitude_spectrum import FLOOR
+from nonsmooth.plot.trajectories import FLOOR
 
 __all__ = ["Spectrum"]
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth import SolveError, chart, continue_curve, continue_orbit, find_orbit, plot
-from nonsmooth.plot.curve import KINDS
+from nonsmooth.plot.branches import KINDS
 from nonsmooth.results.statuses import by_code
 from nonsmooth.studies.savi2007.figures.branches import BEGINNINGS, branches, rows_of
 from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Figure, drawn

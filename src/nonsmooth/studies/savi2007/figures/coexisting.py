@@ -10,10 +10,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from nonsmooth import basins, plot, simulate
-from nonsmooth.plot.basins import names_of as kinds_of
-from nonsmooth.plot.basins import section_mark
 from nonsmooth.plot.palette import attractor_color
-from nonsmooth.plot.phase_portrait import ZONE, shade_zone
+from nonsmooth.plot.planes import names_of as kinds_of
+from nonsmooth.plot.planes import section_mark
+from nonsmooth.plot.trajectories import ZONE, shade_zone
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Figure, drawn
 from nonsmooth.studies.savi2007.flows import EXACT, Settings

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth import plot, sweep
-from nonsmooth.plot.branch import draw_branch
+from nonsmooth.plot.branches import draw_branch
 from nonsmooth.plot.style import even_dots, halo, small
 from nonsmooth.results.provenance import read_provenance
 from nonsmooth.studies.savi2007.figures.branches import branches_of

@@ -11,7 +11,7 @@ from nonsmooth import plot
 from nonsmooth.identification.compare.series import measured_sections, section_points
 from nonsmooth.plot.comparison import MEASURED, THEORY
 from nonsmooth.plot.labels import name_and_unit, name_axes
-from nonsmooth.plot.phase_portrait import shade_zone
+from nonsmooth.plot.trajectories import shade_zone
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
 from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Draw, drawn, only_outer

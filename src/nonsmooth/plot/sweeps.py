@@ -1,0 +1,387 @@
+"""Results over a parameter: section points, densities, amplitudes, with branches over them; effects of smoothing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.plot import style
+from nonsmooth.plot.branches import draw_branch
+from nonsmooth.plot.labels import (
+    column,
+    first_states,
+    name_and_unit,
+    name_axes,
+    name_plane,
+    only_states,
+    variable_along,
+)
+from nonsmooth.plot.planes import cell_edges
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+__all__ = [
+    "bifurcation", "bifurcation_diagram", "density", "frequency_response", "one_branch", "smoothing_report",
+    "sorted_out",
+]  # fmt: skip
+
+_LINES = ("section", "third", "fourth")
+_COLORS = {"up": "first", "down": "second", "none": "section"}
+_SEAM = 2.0  # a rising point over a falling one, which lies on it: both show
+
+
+def bifurcation(
+    result: xr.Dataset,
+    *over: xr.Dataset | Axes | None,
+    ax: Axes | None = None,
+    y: str | None = None,
+    size: float = 0.8,
+    color: str | None = None,
+) -> Axes:
+    """Draw the section points of a ``sweep`` over its parameter, up and down in two colours, and branches over them.
+
+    Parameters
+    ----------
+    result
+        A ``sweep`` (or ``frequency_response``); of one swept both ways, the falling one lies on the rising one, whose
+        points are larger and show round its own.
+    *over
+        Branches of ``continue_orbit`` over the same parameter: stable parts as a pale seam under the points, unstable
+        ones dashed, special points marked. Axes to draw on may stand here too, as in the other plots.
+    ax
+        Where to draw; a new one-column figure if None.
+    y
+        The state of the ordinate; by default the first.
+    size
+        Diameter of a point in typographic points; of a rising sweep under a falling one, half of it.
+    color
+        One colour for all points instead of one per direction.
+
+    Notes
+    -----
+    The points are pixels in a vector figure: a diagram holds 10^5 of them. A point that diverged has none.
+    """
+    if "section" not in result and "density" in result:
+        raise ValueError("this sweep counted its section points (density=...): draw it with plot.density")
+    variable_along(result, "section", "sweep")
+    (name,) = first_states(result, y)
+    parameter = str(result["maximum"].dims[0])
+    ax, branches = sorted_out(over, ax, parameter)
+    points = column(result, "section", name)
+    directions = [str(word) for word in np.atleast_1d(result["direction"].values)]
+    with style.axes(ax) as drawn:
+        for i, direction in enumerate(directions):
+            mine = points.isel(direction=i) if "direction" in points.dims else points
+            cloud = mine.transpose(..., parameter).values
+            values = np.broadcast_to(result[parameter].values, cloud.shape)
+            under = direction == "up" and "down" in directions
+            style.cloud(
+                drawn, (values, cloud), size * (_SEAM if under else 1.0),
+                color or style.COLORS["pale" if under else _COLORS[direction]],
+                direction if len(directions) > 1 else None,
+            )  # fmt: skip
+        for k, one in enumerate(branches):
+            draw_branch(drawn, one, y=name, color=style.COLORS[_LINES[k % len(_LINES)]], behind=True)
+        # The whole sweep shows, its ends too where every point diverged.
+        drawn.dataLim.update_from_data_x(result[parameter].values, ignore=False)
+        drawn.margins(x=0)
+        name_plane(drawn, result, parameter, name)
+        if len(directions) > 1 or branches:
+            style.even_dots(style.clear_legend(drawn))
+    return drawn
+
+
+def sorted_out(
+    over: tuple[xr.Dataset | Axes | None, ...], ax: Axes | None, parameter: str
+) -> tuple[Axes | None, list[xr.Dataset]]:
+    """Axes given in place of a branch, and the branches, which must be over the same parameter."""
+    import xarray as xr
+
+    branches: list[xr.Dataset] = []
+    for one in over:
+        if one is None:
+            continue
+        if not isinstance(one, xr.Dataset):
+            ax = one
+            continue
+        of = one.attrs.get("parameter")
+        if of != parameter:
+            raise ValueError(f"the diagram is over {parameter!r}, this branch over {of!r}: they share no axis")
+        branches.append(one)
+    return ax, branches
+
+
+def bifurcation_diagram(
+    result: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    y: str | None = None,
+    special: bool = True,
+    size: float = 0.8,
+) -> Axes:
+    """Draw all section points of every branch, stable parts solid and unstable ones dashed, over those of the sweeps.
+
+    Parameters
+    ----------
+    result
+        A ``bifurcation_diagram``.
+    ax
+        Where to draw; a new one-column figure if None.
+    y
+        The state of the ordinate; by default the first.
+    special
+        Mark the special points, each kind with its own sign, named in the legend.
+    size
+        Diameter of a point of the sweeps in typographic points.
+    """
+    variable_along(result, "swept_section", "bifurcation_diagram")
+    (name,) = first_states(result, y)
+    parameter = str(result.attrs["parameter"])
+    swept = result["swept_section"].sel(state=name).transpose("direction", "sample", "iterate").values
+    values = np.broadcast_to(result["swept_value"].values[None, :, None], swept.shape)
+    with style.axes(ax) as drawn:
+        style.cloud(drawn, (values, swept), size, style.COLORS["pale"], "sweeps")
+        for k in range(result.sizes["branch_id"]):
+            draw_branch(drawn, one_branch(result, k), y=name, special=special)
+        drawn.dataLim.update_from_data_x(result["swept_value"].values, ignore=False)
+        drawn.margins(x=0)
+        name_plane(drawn, result, parameter, name)
+        style.even_dots(style.clear_legend(drawn))
+    return drawn
+
+
+def one_branch(result: xr.Dataset, k: int) -> xr.Dataset:
+    """One of the branches, as ``draw_branch`` takes it."""
+    points = np.flatnonzero(result["branch"].values == k)
+    marks = np.flatnonzero(result["special_branch"].values == k)
+    number = max(int(result["period_number"][k]), 1)
+    one = result.isel({"point": points, "special": marks, "return": slice(0, number)})
+    return one.assign(special_point=one["special_point"] - points[0])
+
+
+_LOOKS: dict[str, dict[str, Any]] = {
+    "up": {"color": style.COLORS["first"], "linestyle": "-"},
+    "down": {"color": style.COLORS["second"], "linestyle": "--"},
+    "none": {"color": style.COLORS["section"], "linestyle": "none", "marker": ".", "markersize": 1.5},
+}
+_WORDS = {"up": "increasing", "down": "decreasing", "none": "each from its start"}
+
+
+def frequency_response(
+    result: xr.Dataset,
+    *over: xr.Dataset | Axes | None,
+    ax: Axes | None = None,
+    y: str | None = None,
+    quantity: str = "amplitude",
+    jumps: bool = True,
+    digits: int = 4,
+) -> Axes:
+    """Draw a ``frequency_response`` result.
+
+    Parameters
+    ----------
+    result
+        What ``frequency_response`` gave.
+    *over
+        Branches of ``continue_orbit`` over the same parameter: stable parts as a pale seam under the response, unstable
+        ones dashed, special points marked. Axes to draw on may stand here too, as in the other plots.
+    ax
+        Where to draw; a new one-column figure if None.
+    y
+        The state; by default the first. Or a variable over the parameter alone, such as a load (``"stop_energy"``).
+    quantity
+        ``"amplitude"`` (half the peak-to-peak value), ``"maximum"`` or ``"minimum"``.
+    jumps
+        Mark each jump of what is drawn by a dotted arrow and its value of the parameter with ``digits`` significant
+        digits.
+    """
+    variable_along(result, "amplitude", "frequency_response")
+    if quantity not in ("amplitude", "maximum", "minimum"):
+        raise ValueError(f"quantity is {quantity!r}; allowed: 'amplitude', 'maximum', 'minimum'")
+    (name,) = first_states(result, y)
+    parameter = str(result["maximum"].dims[0])
+    values = result[parameter].values
+    alone = name in result.data_vars and result[name].dims == result["status"].dims
+    heights = result[name] if alone else column(result, quantity, name)
+    ax, branches = sorted_out(over, ax, parameter)
+    with style.axes(ax) as drawn:
+        for i, direction in enumerate(np.atleast_1d(result["direction"].values).astype(str)):
+            one = heights.isel(direction=i) if "direction" in heights.dims else heights
+            curves = one.transpose(parameter, ...).values.reshape(len(values), -1)
+            for k, curve in enumerate(curves.T):
+                found = _intervals(values, curve, _jumps(result, name, direction, k))
+                at = [i for _, i in found]
+                broken = np.insert(values, at, np.nan), np.insert(curve, at, np.nan)
+                drawn.plot(*broken, label=_WORDS[direction] if k == 0 else None, **_LOOKS[direction])
+                if jumps:
+                    for place, i in found:
+                        _mark(drawn, curve, i, values[0] <= values[-1], place, direction, digits)
+        for behind in branches:
+            draw_branch(drawn, behind, y=name, quantity=quantity, color=style.COLORS["section"], width=0.7, behind=True)
+        drawn.margins(x=0)
+        name_axes(drawn, name_and_unit(result, parameter), _ordinate(result, name, "" if alone else quantity))
+        style.clear_legend(drawn)
+    return drawn
+
+
+def _jumps(result: xr.Dataset, name: str, direction: str, start: int) -> list[float]:
+    """The jumps of one curve: those of its state, its direction and, where there are several starts, of its start."""
+    first = str(result["state"].values[0])  # older results hold no others
+    if "jump_value" not in result or ("jump_variable" not in result and name != first):
+        return []
+    mine = result["jump_direction"].values == direction
+    if "jump_variable" in result:
+        mine = mine & (result["jump_variable"].values == name)
+    if "jump_start" in result:
+        mine = mine & (result["jump_start"].values == start)
+    return [float(value) for value in result["jump_value"].values[mine]]
+
+
+def _intervals(values: NDArray[np.float64], curve: NDArray[np.float64], places: list[float]) -> list[tuple[float, int]]:
+    """Each jump with the i such that it lies between the points i - 1 and i.
+
+    A jump may be reported at a point itself, on either side: of the intervals next to it the steepest is meant.
+    """
+    order = np.argsort(values)
+    steps = np.abs(np.diff(curve[order]))
+    found = []
+    for place in places:
+        low = int(np.searchsorted(values[order], place)) - 1
+        near = [i for i in (low - 1, low, low + 1) if 0 <= i < len(steps) and np.isfinite(steps[i])]
+        if near:
+            i = max(near, key=lambda k: steps[k])
+            found.append((place, int(max(order[i], order[i + 1]))))
+    return found
+
+
+def _mark(
+    ax: Axes, curve: NDArray[np.float64], at: int, rising: bool, place: float, direction: str, digits: int
+) -> None:
+    """An arrow from the height before the jump to the height after it, in the sense of the sweep."""
+    before, after = (curve[at - 1], curve[at]) if (direction == "up") == rising else (curve[at], curve[at - 1])
+    color = _LOOKS[direction]["color"]
+    arrow = {"arrowstyle": "->", "color": color, "linestyle": ":", "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
+    ax.annotate("", (place, after), (place, before), arrowprops=arrow)
+    side = 2 if direction == "up" else -2
+    small = abs(after - before) < 0.2 * np.ptp(curve[np.isfinite(curve)])  # no room beside the arrow: below it
+    where, offset = (min(before, after), (side, -3)) if small else ((before + after) / 2, (side, 0))
+    ax.annotate(
+        f"{place:.{digits}g}", (place, where), offset, textcoords="offset points", color=color, rotation=90,
+        fontsize=style.small(ax), va="top" if small else "center", ha="left" if side > 0 else "right", zorder=6,
+        path_effects=style.halo(),
+    )  # fmt: skip
+
+
+def _ordinate(result: xr.Dataset, name: str, quantity: str) -> tuple[str, str]:
+    text, unit = name_and_unit(result, name)
+    return f"{quantity} of {text}" if quantity else text, unit
+
+
+def density(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, cmap: str = "magma_r") -> Axes:
+    """Draw the histograms of a ``sweep(..., density=True)`` over its parameter, in a logarithmic scale of colour.
+
+    Parameters
+    ----------
+    result
+        Of ``sweep`` with ``density``; directions and starts are added up.
+    ax
+        Where to draw; a new one-column figure if None.
+    y
+        The state of the ordinate; by default the first.
+    cmap
+        A colour map of Matplotlib. Bins without a point are white.
+
+    Raises
+    ------
+    ValueError
+        A sweep without ``density``, a name that is no state.
+
+    Notes
+    -----
+    The colour is the share of a parameter value's points in one bin, in per cent. A point that failed has none.
+    """
+    variable_along(result, "density", "sweep(..., density=True)")
+    (name,) = only_states(result, y)
+    parameter = str(result["density"].dims[0])
+    one = result.sortby(parameter).sel(state=name)
+    counts = one["density"].sum([dim for dim in ("direction", "start") if dim in one["density"].dims])
+    table = counts.transpose("bin", parameter).values.astype(float)
+    total = table.sum(axis=0)
+    beyond = one["outside"].sum([dim for dim in ("direction", "start") if dim in one["outside"].dims]).values
+    total = total + beyond
+    share = np.full(table.shape, np.nan)
+    np.divide(100.0 * table, total, out=share, where=table > 0)
+    from matplotlib.colors import LogNorm
+
+    with style.axes(ax) as drawn:
+        there = share[np.isfinite(share)]
+        lowest, highest = (float(there.min()), float(there.max())) if len(there) else (1.0, 100.0)
+        mesh = drawn.pcolormesh(
+            cell_edges(one[parameter].values), one["bin_edge"].values, share, rasterized=True, cmap=cmap,
+            norm=LogNorm(lowest, max(highest, 1.01 * lowest)),
+        )  # fmt: skip
+        drawn.figure.colorbar(mesh, ax=drawn, label="share of the points (%)")
+        name_plane(drawn, result, parameter, name)
+    return drawn
+
+
+_QUANTITIES = {
+    "state": r"difference of the states, $d_u$", "multiplier": r"difference of the multipliers, $d_\mu$",
+    "exponent": "difference of the exponents", "period": "relative difference of the period",
+}  # fmt: skip
+_MARKS = {"linear": ("first", "o"), "tanh": ("second", "s"), "arctan": ("third", "^")}
+_LOST = 0.04  # height of the mark where there is no such orbit, in the axes
+
+
+def smoothing_report(result: xr.Dataset, ax: Axes | None = None, *, y: str = "state") -> Axes:
+    """Draw the result of ``smoothing_report``: one line for each band, with its order at the smallest widths.
+
+    Parameters
+    ----------
+    result
+        Of ``smoothing_report``.
+    ax
+        Where to draw; a new one-column figure if None.
+    y
+        ``"state"``, ``"multiplier"``, ``"exponent"`` or ``"period"``. An orbit that is unstable where the event-driven
+        one is stable, or the other way round, is hollow; a cross at the lower edge is a width at which a band
+        has no such orbit.
+
+    Raises
+    ------
+    ValueError
+        A result of another verb, or another quantity.
+    """
+    variable_along(result, "state_difference", "smoothing_report")
+    if y not in _QUANTITIES:
+        raise ValueError(f"y = {y!r} is one of {', '.join(_QUANTITIES)}")
+    with style.axes(ax) as drawn:
+        eta = result["eta"].values
+        lost: set[float] = set()
+        for band in result["band"].values:
+            one = result.sel(band=band)
+            color, mark = _MARKS[str(band)]
+            values = one[f"{y}_difference"].values
+            shown = np.isfinite(values) & (values > 0)
+            orders = one[f"{y}_order"].values
+            known = orders[np.isfinite(orders)]
+            name = str(band) + (f", order {known[0]:.2f}" if len(known) else "")
+            color = style.COLORS[color]
+            drawn.plot(eta[shown], values[shown], "-", color=color, linewidth=0.8)
+            drawn.plot([], [], mark, color=color, markersize=3.5, label=name)
+            changed = one["stable"].values != bool(one["reference_stable"])
+            for which, fill in ((shown & ~changed, color), (shown & changed, "none")):
+                drawn.plot(eta[which], values[which], mark, color=color, markerfacecolor=fill, markersize=3.5)
+            lost |= set(eta[one["status"].values != 0].tolist())
+        if lost:
+            drawn.plot(
+                sorted(lost), [_LOST] * len(lost), "x", color=style.COLORS["section"], markersize=4,
+                transform=drawn.get_xaxis_transform(), label="no such orbit",
+            )  # fmt: skip
+        drawn.set(xscale="log", yscale="log", xlabel=r"half width of the bands, $\eta$", ylabel=_QUANTITIES[y])
+        drawn.legend()
+    return drawn
