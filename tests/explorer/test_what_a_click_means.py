@@ -13,8 +13,7 @@ import pytest
 pytest.importorskip("bokeh", reason="the explorer needs bokeh")
 
 from nonsmooth.explorer.catalogue import Catalogue
-from nonsmooth.explorer.requests import key_of
-from nonsmooth.explorer.schedule import Schedule
+from nonsmooth.explorer.schedule import Schedule, key_of
 from nonsmooth.explorer.session import MOST_TABS, History, Session
 
 

@@ -9,9 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.cli.keep import write
+from nonsmooth.cli.files import ANY, TEXT, read_tables, write
 from nonsmooth.cli.study import SYSTEM, system_of
-from nonsmooth.cli.tables import ANY, TEXT, read_tables
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:

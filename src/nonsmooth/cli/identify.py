@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from nonsmooth.cli.keep import keep, without_screen
-from nonsmooth.cli.tables import LENGTH, NAMES, QUANTITIES, TEXT, read_tables, with_folder
+from nonsmooth.cli.files import LENGTH, NAMES, QUANTITIES, TEXT, keep, read_tables, with_folder, without_screen
 from nonsmooth.system.names import check_keys, unknown
 
 __all__ = ["add"]

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from nonsmooth.cli.keep import without_screen
+from nonsmooth.cli.files import without_screen
 
 __all__ = ["add"]
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from nonsmooth.cli.tables import with_folder
+from nonsmooth.cli.files import with_folder
 from nonsmooth.cli.verb_options import VERBS, Option, options_of
 
 __all__ = ["add", "study_schema"]

@@ -17,8 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.cli.keep import write
-from nonsmooth.cli.tables import ANY, TEXT, read_tables
+from nonsmooth.cli.files import ANY, TEXT, read_tables, write
 from nonsmooth.cli.verb_options import VERBS, options_of
 from nonsmooth.errors import shortened
 from nonsmooth.system.names import check_keys, unknown

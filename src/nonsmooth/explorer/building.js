@@ -1,27 +1,13 @@
 /* The form of a system of elements: numbers and choices go to the server, which writes the Python of them and says what is wrong. */
-(window.parts = window.parts || []).push(({act, file}) => {
-  const $ = id => document.getElementById(id);
+(window.parts = window.parts || []).push(({$, node, on, act, file}) => {
   let told = {link: {}, kinds: {}, most: 4, python: "", built: 0}, begun = false;
 
-  const node = (tag, given, ...within) => { const one = Object.assign(document.createElement(tag), given); one.append(...within); return one; };
-  const number = (key, value, label) => {
-    const one = node("input", {className: "short", inputMode: "decimal", value});
-    one.dataset.key = key;
-    one.setAttribute("aria-label", label);
-    one.addEventListener("change", changed);
-    return one;
-  };
-  const choice = (key, options, label) => {
-    const one = node("select", {}, ...options.map(([value, text]) => new Option(text, value)));
-    one.dataset.key = key;
-    one.setAttribute("aria-label", label);
-    one.addEventListener("change", changed);
-    return one;
-  };
+  const input = (key, one) => { one.dataset.key = key; on(one, "change", changed); return one; };
+  const number = (key, value, label) => input(key, node("input", {className: "short", inputMode: "decimal", value, ariaLabel: label}));
+  const choice = (key, options, label) => input(key, node("select", {ariaLabel: label}, ...options.map(([value, text]) => new Option(text, value))));
   const remove = row => {
-    const one = node("button", {textContent: "×", title: "remove"});
-    one.setAttribute("aria-label", "remove");
-    one.addEventListener("click", () => { row().remove(); arrange(); changed(); });
+    const one = node("button", {textContent: "×", title: "remove", ariaLabel: "remove"});
+    on(one, "click", () => { row().remove(); arrange(); changed(); });
     return one;
   };
   const values = row => Object.fromEntries([...row.querySelectorAll("[data-key]")].map(one => [one.dataset.key, one.value]));
@@ -65,18 +51,18 @@
       if (one.tagName === "BUTTON") one.disabled = $("building-elements").children.length >= told.most;
   }
 
-  document.addEventListener("build", () => {
+  on(document, "build", () => {
     if (!begun) { begun = true; addMass(0.5); addElement("stop"); }
     $("building").showModal();
     changed();
   });
-  $("building-close").addEventListener("click", () => $("building").close());
-  $("building-mass").addEventListener("click", () => { addMass(0); changed(); });
-  $("building-omega").addEventListener("change", changed);
+  on($("building-close"), "click", () => $("building").close());
+  on($("building-mass"), "click", () => { addMass(0); changed(); });
+  on($("building-omega"), "change", changed);
   for (const one of $("building").querySelectorAll("button[data-kind]"))
-    one.addEventListener("click", () => { addElement(one.dataset.kind); changed(); });
-  $("building-save").addEventListener("click", () => file({name: "system.py", content: btoa(told.python)}));
-  $("building-explore").addEventListener("click", () => act("build", "building", form()));
+    on(one, "click", () => { addElement(one.dataset.kind); changed(); });
+  on($("building-save"), "click", () => file({name: "system.py", content: btoa(told.python)}));
+  on($("building-explore"), "click", () => act("build", "building", form()));
 
   return {building(now) {
     if (now.built !== told.built) $("building").close();

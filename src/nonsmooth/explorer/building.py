@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import nonsmooth as ns
+from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.explorer.state import number_of
 
 if TYPE_CHECKING:
+    from nonsmooth.explorer.session import Session
     from nonsmooth.system.system import System
 
-__all__ = ["KINDS", "LINK", "MOST", "Plan", "read_plan"]
+__all__ = ["KINDS", "LINK", "MOST", "Plan", "Workshop", "read_plan"]
 
 MOST = 4  # masses, and elements
 
@@ -126,9 +128,7 @@ class Plan:
             at = {f"x{placed.at}": 1, f"x{placed.other}": -1} if placed.other else f"x{placed.at}"
             elements[f"{placed.kind}{i}"] = getattr(ns.elements, kind.element)(at=at, **given)
         return ns.mechanical(
-            lambda p: [[getattr(p, f"m{i}") if i == j else 0 for j in range(1, n + 1)] for i in range(1, n + 1)],
-            lambda p: [[_entry(p, "c", i, j, n) for j in range(1, n + 1)] for i in range(1, n + 1)],
-            lambda p: [[_entry(p, "k", i, j, n) for j in range(1, n + 1)] for i in range(1, n + 1)],
+            lambda p: _matrix(p, "m", n), lambda p: _matrix(p, "c", n), lambda p: _matrix(p, "k", n),
             parameters=self.parameters, coordinates={f"x{i}": "m" for i in range(1, n + 1)},
             forcing={f"x{i}": force(i) for i in self.forced}, elements=elements or None, name=self.name,
         )  # fmt: skip
@@ -146,9 +146,7 @@ class Plan:
         rows = range(1, n + 1)
         lines = [f'"""{self.name[0].upper()}{self.name[1:]}."""', ""]
         lines += ["import numpy as np", "", "import nonsmooth as ns", "", "system = ns.mechanical("]
-        lines += [f"    lambda p: {_matrix([[f'p.m{i}' if i == j else '0' for j in rows] for i in rows])},"]
-        for letter in "ck":
-            lines += [f"    lambda p: {_matrix([[_text(letter, i, j, n) for j in rows] for i in rows])},"]
+        lines += [f"    lambda p: {_matrix(_Names(), letter, n)}," for letter in "mck"]
         lines += ["    parameters={"]
         lines += [f'        "{name}": ({value!r}, "{unit}"),' for name, (value, unit) in self.parameters.items()]
         coordinates = ", ".join(f'"x{i}": "m"' for i in rows)
@@ -228,23 +226,77 @@ def _mass(value: Any, most: int, least: int, where: str) -> int:
     return int(number)
 
 
-def _entry(p: Any, letter: str, i: int, j: int, n: int) -> Any:
-    """Entry of the matrix of a chain, of the parameters ``letter1`` to ``letterN``."""
-    if abs(i - j) > 1:
-        return 0
-    if i != j:
-        return -getattr(p, f"{letter}{max(i, j)}")
-    own = getattr(p, f"{letter}{i}")
-    return own if i == n else own + getattr(p, f"{letter}{i + 1}")
+def _matrix(p: Any, letter: str, n: int) -> list[list[Any]]:
+    """The matrix of a chain, of the parameters ``letter1`` to ``letterN``; that of the masses is diagonal."""
+
+    def entry(i: int, j: int) -> Any:
+        own = getattr(p, f"{letter}{max(i, j)}")
+        if abs(i - j) > 1 or (letter == "m" and i != j):
+            return 0
+        if i != j:
+            return -own
+        return own if i == n or letter == "m" else own + getattr(p, f"{letter}{i + 1}")
+
+    return [[entry(i, j) for j in range(1, n + 1)] for i in range(1, n + 1)]
 
 
-def _text(letter: str, i: int, j: int, n: int) -> str:
-    if abs(i - j) > 1:
-        return "0"
-    if i != j:
-        return f"-p.{letter}{max(i, j)}"
-    return f"p.{letter}{i}" if i == n else f"p.{letter}{i} + p.{letter}{i + 1}"
+class _Names:
+    """Parameters as the Python of a form writes them."""
+
+    def __getattr__(self, name: str) -> Any:
+        from sympy import Symbol
+
+        return Symbol(f"p.{name}")
 
 
-def _matrix(rows: list[list[str]]) -> str:
-    return "[" + ", ".join("[" + ", ".join(row) + "]" for row in rows) + "]"
+_KEPT = 50  # models that a page may have made
+
+
+class Workshop:
+    """Models that were made in a page, as "built 1", "built 2" and so on."""
+
+    def __init__(self, page: Session) -> None:
+        self.page = page
+        self._made: dict[str, str] = {}  # the name of a model, by its Python
+        self._python, self._shown = "", 0
+
+    @property
+    def actions(self) -> dict[str, Callable[[str, Any], object]]:
+        """Messages of the page that concern the form."""
+        return {"form": self._write, "build": self._build}
+
+    def _write(self, name: str, value: Any) -> None:
+        """Show the Python of the form; none where something in it does not fit."""
+        self._python = ""
+        self._python = read_plan(value).python()
+
+    def _build(self, name: str, value: Any) -> None:
+        """Make the system, and show it."""
+        plan = read_plan(value)
+        python = plan.python()
+        if python not in self._made:
+            if len(self._made) >= _KEPT:
+                raise ValueError(f"this page has made {_KEPT} systems; save the Python, and open a page of its own")
+            try:
+                system = plan.system()
+            except SystemDefinitionError as error:
+                raise ValueError(str(error)) from None
+            name = self._made[python] = f"built_{len(self._made) + 1}"
+            self.page.catalogue.add(name, system)
+        self.page.show_model(self._made[python])
+        self._shown += 1
+
+    def tell(self) -> None:
+        """The form as it is now."""
+        def quantity(one: Any) -> dict[str, Any]:
+            return {"label": one.label, "unit": one.unit, "value": one.value}
+
+        self.page.tell("building", {
+            "python": self._python, "built": self._shown, "most": MOST,
+            "link": {key: quantity(one) for key, one in LINK.items()},
+            "kinds": {
+                key: {"label": kind.label, "sided": kind.sided,
+                      "arguments": {name: quantity(one) for name, one in kind.arguments.items()}}
+                for key, kind in KINDS.items()
+            },
+        })  # fmt: skip

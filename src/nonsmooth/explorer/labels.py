@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from nonsmooth.plot.units import power_for
+from nonsmooth.plot.units import PREFIXES, power_for
 from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ _GREEK: Mapping[str, str] = {
     "Lambda": "Λ", "Xi": "Ξ", "Pi": "Π", "Sigma": "Σ", "Phi": "Φ", "Psi": "Ψ", "Omega": "Ω",
 }  # fmt: skip
 _BELOW = dict(zip("0123456789aehijklmnoprstuvx", "₀₁₂₃₄₅₆₇₈₉ₐₑₕᵢⱼₖₗₘₙₒₚᵣₛₜᵤᵥₓ", strict=True))
-PREFIXES = {0: "", -3: "m", -6: "µ", -9: "n"}
 
 
 def symbols_of(system: System) -> dict[str, str]:

@@ -1,8 +1,10 @@
 /* The page's own controls. What a person does goes to the server as one line of JSON; what the page shows comes back so. */
 (() => {
   const $ = id => document.getElementById(id);
+  const all = which => [...document.querySelectorAll(which)];
+  const node = (tag, given, ...within) => { const one = Object.assign(document.createElement(tag), given); one.append(...within); return one; };
+  const on = (target, kind, hear) => target.addEventListener(kind, hear);
   const root = document.documentElement;
-  const say = {};
   let send = () => {}, count = 0, held = null, built = "", playing = 0, last = null;
 
   const act = (what, name, value) => { root.dataset.sent = ++count; send(JSON.stringify({do: what, name, value, n: count})); };
@@ -19,33 +21,21 @@
   /* A field is sent when its text is complete; until then the server's values leave it alone. */
   function field(input, commit) {
     const done = () => { if (input.dataset.open) { delete input.dataset.open; commit(input.value); } };
-    input.addEventListener("input", () => { input.dataset.open = "yes"; });
-    input.addEventListener("change", done);
-    input.addEventListener("keydown", event => { if (event.key === "Enter") done(); });
+    on(input, "input", () => { input.dataset.open = "yes"; });
+    on(input, "change", done);
+    on(input, "keydown", event => { if (event.key === "Enter") done(); });
+  }
+  /* A slider is followed while it moves, and leaves the server's values alone until it is let go. */
+  function slide(range, follow) {
+    on(range, "input", () => { held = range; follow(Number(range.value)); });
+    on(range, "change", () => { held = null; act("end"); });
   }
   const put = (input, value) => { if (!input.dataset.open && input.value !== String(value)) input.value = value; };
 
-  function row(name, label, unit, slider) {
-    const box = document.createElement("div");
-    box.className = "parameter";
-    box.dataset.name = name;
-    box.innerHTML = `<div class="name"><b>${label}</b><span class="unit"></span><input inputmode="decimal"></div>`;
-    box.querySelector(".unit").textContent = unit;
-    const text = box.querySelector("input");
-    text.setAttribute("aria-label", name + (unit ? " in " + unit : ""));
-    text.id = "v-" + name;
-    if (slider) {
-      const range = document.createElement("input");
-      range.type = "range";
-      range.id = "s-" + name;
-      range.setAttribute("aria-label", name + ", slider");
-      box.append(range);
-    }
-    const wrong = document.createElement("div");
-    wrong.className = "wrong";
-    wrong.id = "wrong-" + name;
-    box.append(wrong);
-    return box;
+  function row(name, {html, unit}, ...slider) {
+    const text = node("input", {id: "v-" + name, inputMode: "decimal", ariaLabel: name + (unit ? " in " + unit : "")});
+    const head = node("div", {className: "name"}, node("b", {innerHTML: html}), node("span", {className: "unit", textContent: unit}), text);
+    return node("div", {className: "parameter"}, head, ...slider, node("div", {className: "wrong", id: "wrong-" + name}));
   }
 
   function parameters(ui) {
@@ -53,19 +43,14 @@
     if (key !== built) {
       built = key;
       $("parameters").replaceChildren(...ui.parameters.map(one => {
-        const box = row("p." + one.name, one.html, one.unit, true);
-        const [text, range] = box.querySelectorAll("input");
-        field(text, value => { act("set", "p." + one.name, value); act("end"); });
-        range.addEventListener("input", () => {
-          held = range;
-          text.value = short(range.value);
-          act("set", "p." + one.name, Number(range.value));
-        });
-        range.addEventListener("change", () => { held = null; act("end"); });
+        const name = "p." + one.name, range = node("input", {type: "range", id: "s-" + name, ariaLabel: name + ", slider"});
+        const box = row(name, one, range), text = box.querySelector("input");
+        field(text, value => { act("set", name, value); act("end"); });
+        slide(range, value => { text.value = short(value); act("set", name, value); });
         return box;
       }));
       $("starts").replaceChildren(...ui.states.map(one => {
-        const box = row("start." + one.name, one.html, one.unit, false);
+        const box = row("start." + one.name, one);
         field(box.querySelector("input"), () =>
           act("set", "start", [...$("starts").querySelectorAll("input")].map(one => one.value)));
         return box;
@@ -84,7 +69,7 @@
 
   /* The tab that is chosen in each panel, with its controls and its figure. */
   function tabs(ui) {
-    for (const list of document.querySelectorAll("[data-panel]")) {
+    for (const list of all("[data-panel]")) {
       const chosen = ui.state[list.dataset.panel];
       for (const tab of list.children) {
         tab.setAttribute("aria-selected", tab.dataset.view === chosen);
@@ -114,11 +99,7 @@
     for (const [name, words] of Object.entries(ui.words)) fill($(name), Object.entries(words), ui.settings[name]);
     for (const [name, value] of Object.entries(ui.settings)) if (!(name in ui.words)) put($(name), short(value));
     for (const [name, legend] of Object.entries(ui.legends)) if ($("legend-" + name))
-      $("legend-" + name).replaceChildren(...legend.flatMap(([text, color]) => {
-        const dot = document.createElement("i");
-        dot.style.background = color;
-        return [dot, text];
-      }));
+      $("legend-" + name).replaceChildren(...legend.flatMap(([text, color]) => [node("i", {style: "background:" + color}), text]));
     $("tabs").hidden = ui.tabs < 2;
     $("tabs").textContent = `${ui.tabs} tabs`;
     tabs(ui);
@@ -129,41 +110,38 @@
   }
 
   function readout(fields) {
-    $("readout").replaceChildren(...fields.map(([name, value]) => {
-      const one = document.createElement("span"), bold = document.createElement("b");
-      bold.textContent = value;
-      one.append(name + " ", bold);
-      return one;
-    }));
+    $("readout").replaceChildren(...fields.map(([name, value]) => node("span", {}, name + " ", node("b", {textContent: value}))));
+  }
+
+  function progress(box, fraction, text) {
+    const bar = box.querySelector("progress");
+    if (fraction) bar.value = fraction; else bar.removeAttribute("value");
+    box.querySelector("span").textContent = text;
   }
 
   function busy(told) {
     root.dataset.busy = told.view;
     $("busy").hidden = !told.long;
     if (!told.long) return;
-    const bar = $("busy").querySelector("progress");
-    if (told.fraction) bar.value = told.fraction; else bar.removeAttribute("value");
-    $("busy").querySelector("span").textContent = told.compiling ? `${told.view}: compiling` : told.view;
+    progress($("busy"), told.fraction, told.compiling ? `${told.view}: compiling` : told.view);
   }
 
   function notes(told) {
-    for (const box of document.querySelectorAll(".note")) {
+    for (const box of all(".note")) {
       const text = told[box.id.slice(0, -5)];
       box.hidden = !text;
       box.textContent = text || "";
     }
-    for (const box of document.querySelectorAll(".wrong")) box.textContent = told[box.id.slice(6)] || "";
+    for (const box of all(".wrong")) box.textContent = told[box.id.slice(6)] || "";
     const rest = Object.keys(told).filter(name => !$(name + "-note") && !$("wrong-" + name));
     if (rest.length && !told.page) { $("page-note").hidden = false; $("page-note").textContent = told[rest[0]]; }
   }
 
   function file(told) {
     const bytes = Uint8Array.from(atob(told.content), letter => letter.charCodeAt(0));
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([bytes]));
-    link.download = told.name;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+    const href = URL.createObjectURL(new Blob([bytes]));
+    node("a", {href, download: told.name}).click();
+    setTimeout(() => URL.revokeObjectURL(href), 10000);
   }
 
   function look(dark, large) {
@@ -176,22 +154,22 @@
     const channel = doc && doc.get_model_by_name("act");
     if (!channel) return setTimeout(connect, 30);
     send = text => { channel.value = text; };
-    const parts = (window.parts || []).map(part => part({act, field, put, fill, short, file}));
+    const parts = (window.parts || []).map(part => part({$, node, on, act, field, put, fill, short, file, progress}));
     for (const [name, hear] of Object.entries(Object.assign({ui: render, readout, busy, notes, file}, ...parts))) {
       const model = doc.get_model_by_name(name);
       const told = () => { if (model.value) hear(JSON.parse(model.value)); };
       model.properties.value.change.connect(told);
       told();
     }
-    for (const one of document.querySelectorAll("[data-set]")) {
+    for (const one of all("[data-set]")) {
       const commit = () => { act("set", one.dataset.set, one.value); act("end"); };
-      if (one.tagName === "SELECT") one.addEventListener("change", commit); else field(one, commit);
+      if (one.tagName === "SELECT") on(one, "change", commit); else field(one, commit);
     }
-    for (const list of document.querySelectorAll("[data-panel]")) {
-      list.addEventListener("click", event => {
+    for (const list of all("[data-panel]")) {
+      on(list, "click", event => {
         if (event.target.dataset.view) { act("set", list.dataset.panel, event.target.dataset.view); act("end"); }
       });
-      list.addEventListener("keydown", event => {
+      on(list, "keydown", event => {
         const step = {ArrowRight: 1, ArrowLeft: -1}[event.key], all = [...list.children];
         if (!step) return;
         const next = all[(all.indexOf(event.target) + step + all.length) % all.length];
@@ -199,24 +177,23 @@
         next.click();
       });
     }
-    $("model").addEventListener("change", () => {
+    on($("model"), "change", () => {
       if ($("model").value) return act("model", "", $("model").value);
       $("model").value = last.state.model;
       document.dispatchEvent(new Event("build"));
     });
-    $("preset").addEventListener("change", () => { if ($("preset").value) act("preset", "", $("preset").value); });
-    $("phase-slider").addEventListener("input", () => { held = $("phase-slider"); act("set", "phase", Number(held.value)); });
-    $("phase-slider").addEventListener("change", () => { held = null; act("end"); });
-    $("play").addEventListener("click", () => {
+    on($("preset"), "change", () => { if ($("preset").value) act("preset", "", $("preset").value); });
+    slide($("phase-slider"), value => act("set", "phase", value));
+    on($("play"), "click", () => {
       if (playing) { clearInterval(playing); playing = 0; act("end"); } else
         playing = setInterval(() => act("set", "phase", Math.round((last.state.phase + 0.01) * 1e6 % 1e6) / 1e6), 80);
       $("play").textContent = playing ? "❚❚" : "▶";
     });
-    $("save").addEventListener("click", () => act("save", "", {view: $("save-view").value, kind: $("save-kind").value}));
-    for (const name of ["undo", "redo", "reset"]) $(name).addEventListener("click", () => act(name));
-    $("dark").addEventListener("click", () => look(!last.dark, last.large));
-    $("large").addEventListener("click", () => look(last.dark, !last.large));
-    document.addEventListener("keydown", event => {
+    on($("save"), "click", () => act("save", "", {view: $("save-view").value, kind: $("save-kind").value}));
+    for (const name of ["undo", "redo", "reset"]) on($(name), "click", () => act(name));
+    on($("dark"), "click", () => look(!last.dark, last.large));
+    on($("large"), "click", () => look(last.dark, !last.large));
+    on(document, "keydown", event => {
       const writing = /^(INPUT|SELECT|TEXTAREA)$/.test(document.activeElement.tagName) && document.activeElement.type !== "range";
       if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z" && !writing) {
         event.preventDefault();

@@ -1,6 +1,5 @@
 /* The panel of a recording: a file is read in the page as bytes and handed over; what they mean, the server's readers say. */
-(window.parts = window.parts || []).push(({act, field, put, fill, short}) => {
-  const $ = id => document.getElementById(id);
+(window.parts = window.parts || []).push(({$, node, on, act, field, put, fill, short, progress}) => {
   let most = 0, built = "", file = "";
 
   function take(file) {
@@ -11,46 +10,41 @@
     reader.onerror = () => act("unread", "recording", {file: file.name, size: file.size});
     reader.readAsDataURL(file);
   }
-  $("recording-open").addEventListener("click", () => $("recording-file").click());
-  $("recording-file").addEventListener("change", () => { take($("recording-file").files[0]); $("recording-file").value = ""; });
+  on($("recording-open"), "click", () => $("recording-file").click());
+  on($("recording-file"), "change", () => { take($("recording-file").files[0]); $("recording-file").value = ""; });
   let over = 0;
-  document.addEventListener("dragenter", event => { event.preventDefault(); over += 1; document.body.classList.add("dropping"); });
-  document.addEventListener("dragleave", () => { over -= 1; if (over <= 0) document.body.classList.remove("dropping"); });
-  document.addEventListener("dragover", event => event.preventDefault());
-  document.addEventListener("drop", event => {
+  on(document, "dragenter", event => { event.preventDefault(); over += 1; document.body.classList.add("dropping"); });
+  on(document, "dragleave", () => { over -= 1; if (over <= 0) document.body.classList.remove("dropping"); });
+  on(document, "dragover", event => event.preventDefault());
+  on(document, "drop", event => {
     event.preventDefault();
     over = 0;
     document.body.classList.remove("dropping");
     take(event.dataTransfer.files[0]);
   });
   for (const [id, what] of [["fit", "fit"], ["cancel", "cancel"], ["remove", "remove"], ["drive", "take drive"]])
-    $("recording-" + id).addEventListener("click", () => act(what, "recording"));
+    on($("recording-" + id), "click", () => act(what, "recording"));
   for (const name of ["run", "turns"])
-    $("recording-" + name).addEventListener("change", () => act("recording", "recording." + name, $("recording-" + name).value));
+    on($("recording-" + name), "change", () => act("recording", "recording." + name, $("recording-" + name).value));
   for (const name of ["begin", "end"]) field($("recording-" + name), value => act("recording", "recording." + name, value));
-
-  const node = (tag, given, ...within) => { const one = Object.assign(document.createElement(tag), given); one.append(...within); return one; };
 
   function rows(told) {
     const key = JSON.stringify(told.rows.map(one => one.name).concat(told.ticks.map(one => one.name)));
     if (key !== built) {
       built = key;
       $("recording-rows").replaceChildren(...told.rows.map(one => {
-        const name = node("b", {innerHTML: one.html}), channel = node("select", {id: "channel-" + one.name});
-        const factor = node("input", {id: "factor-" + one.name, inputMode: "decimal"});
-        const shift = node("input", {id: "shift-" + one.name, inputMode: "decimal"});
-        channel.setAttribute("aria-label", "channel of " + one.name);
-        factor.setAttribute("aria-label", "factor of " + one.name);
-        shift.setAttribute("aria-label", "shift of " + one.name);
-        channel.addEventListener("change", () => act("recording", "recording.channel." + one.name, channel.value));
-        field(factor, value => act("recording", "recording.factor." + one.name, value));
-        field(shift, value => act("recording", "recording.shift." + one.name, value));
+        const set = (what, value) => act("recording", "recording." + what + "." + one.name, value);
+        const [channel, factor, shift] = ["channel", "factor", "shift"].map(what => node(
+          what === "channel" ? "select" : "input", {id: what + "-" + one.name, inputMode: "decimal", ariaLabel: what + " of " + one.name}));
+        on(channel, "change", () => set("channel", channel.value));
+        field(factor, value => set("factor", value));
+        field(shift, value => set("shift", value));
         const scale = node("div", {className: "scale"}, "× ", factor, " + ", shift, node("span", {className: "unit", textContent: " " + one.unit}));
-        return node("div", {className: "measured"}, node("div", {}, name, " = ", channel), scale);
+        return node("div", {className: "measured"}, node("div", {}, node("b", {innerHTML: one.html}), " = ", channel), scale);
       }));
       $("recording-ticks").replaceChildren(...told.ticks.map(one => {
         const box = node("input", {type: "checkbox", id: "fit-" + one.name});
-        box.addEventListener("change", () => act("tick", "fit." + one.name, box.checked));
+        on(box, "change", () => act("tick", "fit." + one.name, box.checked));
         return node("label", {}, box, node("b", {innerHTML: one.html}));
       }));
     }
@@ -67,11 +61,7 @@
   function recording(told) {
     most = told.most;
     $("recording-doing").hidden = !told.doing;
-    if (told.doing) {
-      $("recording-doing").querySelector("span").textContent = told.doing + " …";
-      const bar = $("recording-doing").querySelector("progress");
-      if (told.fraction) bar.value = told.fraction; else bar.removeAttribute("value");
-    }
+    if (told.doing) progress($("recording-doing"), told.fraction, told.doing + " …");
     $("recording-body").hidden = !told.file;
     $("recording-hint").hidden = Boolean(told.file);
     if (!told.file) { file = ""; return; }

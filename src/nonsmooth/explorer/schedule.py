@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from nonsmooth.explorer.kinds import ORDER, QUICK
-from nonsmooth.explorer.requests import key_of
 from nonsmooth.explorer.worker import Answer, Worker
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.session import Session
 
-__all__ = ["Asked", "Schedule"]
+__all__ = ["Asked", "Schedule", "key_of"]
 
 _BLINK = 0.4  # seconds: a first look that took no longer the last time comes before the orbit, for a hand that moves
 _PATIENCE = 1.0  # seconds after which short work is cancelled like any other
@@ -24,6 +24,11 @@ _NOT_STARTED = (
     f"The process that computes cannot be started: {_VAIN} times in a row it ended at once. The terminal of nonsmooth "
     "explore shows its error; mend that, and load this page again: its address holds what you set."
 )
+
+
+def key_of(request: Mapping[str, Any]) -> str:
+    """Text by which two requests are the same; a recording stands in it as its ``key``."""
+    return json.dumps(request, sort_keys=True, default=lambda one: one.key)
 
 
 @dataclass

@@ -17,7 +17,7 @@ from bokeh.events import DoubleTap, RangesUpdate, Reset, Tap
 from bokeh.models import TextInput
 from jinja2 import DictLoader, Environment
 
-from nonsmooth.explorer.building import KINDS, LINK
+from nonsmooth.explorer.building import KINDS, LINK, Workshop
 from nonsmooth.explorer.catalogue import Catalogue
 from nonsmooth.explorer.controls import controls
 from nonsmooth.explorer.export import exported
@@ -25,12 +25,10 @@ from nonsmooth.explorer.figures import theme
 from nonsmooth.explorer.kinds import KINDS as VIEWS
 from nonsmooth.explorer.kinds import PANELS
 from nonsmooth.explorer.presets import presets_of, slider_range
-from nonsmooth.explorer.requests import base_of, key_of, motion_of
-from nonsmooth.explorer.schedule import Schedule
+from nonsmooth.explorer.schedule import Schedule, key_of
 from nonsmooth.explorer.sheet import Sheet
 from nonsmooth.explorer.state import History, State, changed
 from nonsmooth.explorer.worker import Answer
-from nonsmooth.explorer.workshop import Workshop
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.views.view import View
@@ -175,10 +173,10 @@ class Session:
             self._heard = message["n"]
             action, name, value = message["do"], str(message.get("name", "")), message.get("value")
             known: dict[str, Callable[[str, Any], object]] = {
-                "set": self._set, "model": self._model, "preset": self._preset, "end": self._end_step,
-                "undo": lambda *_: self.past.undo(), "redo": lambda *_: self.past.redo(), "look": self._look,
-                "reset": self._reset, "begin": lambda *_: None, "save": self._save, **self.bench.actions,
-                **self.workshop.actions,
+                "set": self._set, "model": lambda _, value: self.show_model(value), "preset": self._preset,
+                "end": lambda *_: self.past.end_step(), "undo": lambda *_: self.past.undo(), "look": self._look,
+                "redo": lambda *_: self.past.redo(), "reset": lambda *_: self.show_model(self.state.model),
+                "begin": lambda *_: None, "save": self._save, **self.bench.actions, **self.workshop.actions,
             }  # fmt: skip
             if action not in known:
                 raise ValueError(f"the page asked for {str(action)[:40]!r}, which does not exist")
@@ -204,14 +202,6 @@ class Session:
         if state.low == state.high:
             raise ValueError("the two ends of the range are equal; give two different numbers")
         return replace(state, low=min(state.low, state.high), high=max(state.low, state.high))
-
-    def _model(self, name: str, value: Any) -> None:
-        self.show_model(value)
-
-    def add_model(self, name: str, system: System) -> str:
-        """Offer a model that was made in the page; returns its name."""
-        self.catalogue.add(name, system)
-        return name
 
     def show_model(self, value: str) -> None:
         """Go on to a model, at its own parameters."""
@@ -247,12 +237,6 @@ class Session:
         else:
             self.tell("file", {**told, "n": self._saved})
 
-    def _reset(self, name: str, value: Any) -> None:
-        self.past.put(self.catalogue.first_state(self.state.model))
-
-    def _end_step(self, name: str, value: Any) -> None:
-        self.past.end_step()
-
     def _look(self, name: str, value: Any) -> None:
         self.dark, self.large = bool(value["dark"]), bool(value["large"])
         self.document.theme = theme(self.dark, self.large)
@@ -276,11 +260,21 @@ class Session:
 
     def wanted(self) -> dict[str, dict[str, Any]]:
         """The request of every view that is shown, for the state of the page."""
-        start = self.catalogue.first_state(self.state.model).start
-        base, found = base_of(self.text, self.state, start), dict[str, dict[str, Any]]()
-        done, results = self.work.done, self.sheet.results
-        if "judged" in results and done.get("orbit") == key_of(base["orbit"]):
-            base["motion"] = motion_of(base["orbit"], results)
+        state, done, results = self.state, self.work.done, self.sheet.results
+        begin = list(self.catalogue.first_state(state.model).start)
+        common = {
+            "text": self.text, "values": dict(state.values), "method": state.method, "transient": state.transient,
+            "eta": state.eta if state.method == "smoothed" else 0.0, "keep": state.keep,
+        }  # fmt: skip
+        orbit: dict[str, Any] = {**common, "view": "orbit", "start": list(state.start)}
+        base: dict[str, dict[str, Any]] = {"orbit": orbit, "first look": {
+            **common, "view": "first look", "values": {**state.values, state.over: state.low}, "over": state.over,
+            "low": state.low, "high": state.high, "columns": state.columns, "begin": begin,
+        }}  # fmt: skip
+        if "judged" in results and done.get("orbit") == key_of(orbit):  # its period number, and the time of its record
+            time, period = results["run"]["time"].values, int(results["judged"]["period_number"].values[0])
+            base["motion"] = {**orbit, "period": period, "span": float(time[-1] - time[0])}
+        found: dict[str, dict[str, Any]] = {}
         for view in self.sheet.views.values():
             asked = view.requests(base) if view.shown else {}
             for stage in [*asked][-1:]:  # of what is there in its finest form nothing coarser is asked for

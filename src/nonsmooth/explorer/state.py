@@ -132,32 +132,24 @@ def changed(state: State, name: str, value: Any, states: Sequence[str]) -> State
         return state.with_value(parameter, number_of(value, parameter))
     if name in SETTINGS:
         return _with_setting(state, name, value)
-    if name == "over":
-        return replace(state, over=_one_of(value, list(state.values), name))
-    if name in ("x", "y", "shown"):
-        return state.but(name, _one_of(value, states, name))
-    if name in CHOICES:
-        return state.but(name, _one_of(value, list(CHOICES[name]), name))
-    if name in _WHOLE:
-        least, most = _WHOLE[name]
-        number = number_of(value, name)
-        if number != int(number) or not least <= number <= most:
-            raise ValueError(f"{name} = {value}: give a whole number from {least} to {most}")
-        return state.but(name, int(number))
+    words = {**CHOICES, "over": state.values, **dict.fromkeys(("x", "y", "shown"), states)}
+    if name in words:
+        if value not in (allowed := [*words[name]]):
+            raise ValueError(f"{name} = {str(value)[:40]!r}; allowed: {', '.join(allowed)}")
+        return state.but(name, str(value))
     if name == "start":
         parts = value.split() if isinstance(value, str) else list(value)
         if len(parts) != len(states):
             raise ValueError(f"start: give {len(states)} numbers, of {', '.join(states)}")
-        return replace(state, start=tuple(number_of(part, "start") for part in parts))
-    if name == "phase":
-        return replace(state, phase=number_of(value, name) % 1.0)
-    if name == "eta":
-        eta = number_of(value, name)
-        if eta <= 0:
-            raise ValueError(f"eta = {eta:g}: half the width of the band must be greater than 0")
-        return replace(state, eta=eta)
-    if name in ("low", "high"):
-        return state.but(name, number_of(value, name))
+        return state.but(name, tuple(number_of(part, name) for part in parts))
+    if name in (*_WHOLE, "phase", "eta", "low", "high"):
+        number = number_of(value, name)
+        least, most = _WHOLE.get(name, (-math.inf, math.inf))
+        if name in _WHOLE and (number != int(number) or not least <= number <= most):
+            raise ValueError(f"{name} = {value}: give a whole number from {least} to {most}")
+        if name == "eta" and number <= 0:
+            raise ValueError(f"eta = {number:g}: half the width of the band must be greater than 0")
+        return state.but(name, int(number) if name in _WHOLE else number % 1.0 if name == "phase" else number)
     raise ValueError(f"{name!r} is nothing that a view holds")
 
 
@@ -190,12 +182,6 @@ def _with_setting(state: State, name: str, value: Any) -> State:
     found = {key: given for key, given in state.settings.items() if key not in setting.also}
     found[name] = number_of(value, name) if setting.choices is None else str(value)[:60]
     return replace(state, settings=found)
-
-
-def _one_of(value: Any, allowed: Sequence[str], name: str) -> str:
-    if value not in allowed:
-        raise ValueError(f"{name} = {str(value)[:40]!r}; allowed: {', '.join(allowed)}")
-    return str(value)
 
 
 class History:

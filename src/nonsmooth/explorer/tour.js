@@ -1,6 +1,6 @@
 /* Three steps for a first visit. The page stays usable beside them; Escape ends them, and ? begins again. */
-(window.parts = window.parts || []).push(() => {
-  const $ = id => document.getElementById(id), box = $("tour"), known = "nonsmooth-tour";
+(window.parts = window.parts || []).push(({$, on}) => {
+  const box = $("tour"), known = "nonsmooth-tour";
   const steps = [
     ["parameters", "Drag a parameter", "Move a slider, or type a value: diagram, orbit and section follow. Undo brings everything back, and the page's address keeps it."],
     ["upper", "Click a column", "The other views then show the motion there. Zoom, and the diagram is computed anew. The tabs hold a frequency response and a chart over two parameters."],
@@ -28,10 +28,10 @@
     box.style.top = Math.min(there.top + 24, innerHeight - own.height - 8) + "px";
     $("tour-next").focus();
   }
-  $("tour-next").addEventListener("click", () => show(at + 1));
-  $("tour-end").addEventListener("click", () => show(-1));
-  $("help").addEventListener("click", () => show(0));
-  document.addEventListener("keydown", event => { if (event.key === "Escape" && !box.hidden) show(-1); });
+  on($("tour-next"), "click", () => show(at + 1));
+  on($("tour-end"), "click", () => show(-1));
+  on($("help"), "click", () => show(0));
+  on(document, "keydown", event => { if (event.key === "Escape" && !box.hidden) show(-1); });
   let seen = "seen";
   try { seen = localStorage.getItem(known); } catch { /* private windows */ }
   if (!seen) show(0);

@@ -73,8 +73,7 @@ def branch(
     with style.axes(ax) as drawn:
         draw_branch(drawn, result, y=y, quantity=quantity, special=special, color=color)
         (name,) = only_states(result, y)
-        text, unit = name_and_unit(result, name)
-        name_axes(drawn, name_and_unit(result, result.attrs["parameter"]), (_WORDS[quantity] + text, unit))
+        name_plane(drawn, result, result.attrs["parameter"], name, _WORDS[quantity])
         style.clear_legend(drawn)
     return drawn
 
@@ -405,9 +404,7 @@ def _amplitudes(ax: Axes, result: xr.Dataset, parameter: str, theory: xr.Dataset
             color=style.COLORS["second"], markerfacecolor="none", markersize=6.5, elinewidth=0.8, zorder=5, fmt="D",
             label="fold",
         )  # fmt: skip
-    state = str(result["state"].values[0])
-    text, unit = name_and_unit(result, state)
-    name_axes(ax, name_and_unit(result, parameter), (f"amplitude of {text}", unit))
+    name_plane(ax, result, parameter, str(result["state"].values[0]), "amplitude of ")
 
 
 def _efforts(ax: Axes, result: xr.Dataset) -> None:

@@ -317,8 +317,7 @@ def comparison_response(result: xr.Dataset, ax: Axes | None = None, *, digits: i
         drawn.set_ylim(bottom=0)
         drawn.margins(x=0.02)
         drawn.legend(**ABOVE, ncols=2, handlelength=1.6, columnspacing=1.2)
-        text, unit = name_and_unit(result, state)
-        name_axes(drawn, name_and_unit(result, parameter), (f"amplitude of {text}", unit))
+        name_plane(drawn, result, parameter, state, "amplitude of ")
     return drawn
 
 

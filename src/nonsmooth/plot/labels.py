@@ -45,9 +45,10 @@ def name_axes(ax: Axes, x: tuple[str, str] | None = None, y: tuple[str, str] | N
             name_axis(axis, *named)
 
 
-def name_plane(ax: Axes, result: xr.Dataset, x: str, y: str) -> None:
-    """Label the axes with two states, parameters or outputs of a result."""
-    name_axes(ax, name_and_unit(result, x), name_and_unit(result, y))
+def name_plane(ax: Axes, result: xr.Dataset, x: str, y: str, before: str = "") -> None:
+    """Label the axes with two states, parameters or outputs of a result, words ``before`` the second."""
+    text, unit = name_and_unit(result, y)
+    name_axes(ax, name_and_unit(result, x), (before + text, unit))
 
 
 def symbol_of(name: str, symbol: str = "") -> str:

@@ -249,10 +249,11 @@ def basin_fractions(result: xr.Dataset, ax: Axes | None = None, *, y: str | None
             drawn.set(ylabel="share of starts (%)", ylim=(0, 100))
         else:
             _maxima(result, drawn, values, y)
-            text, unit = name_and_unit(result, y)
-            name_axes(drawn, y=(f"max {text}", unit))
         drawn.margins(x=0)
-        name_axes(drawn, name_and_unit(result, parameter))
+        if y is None:
+            name_axes(drawn, name_and_unit(result, parameter))
+        else:
+            name_plane(drawn, result, parameter, y, "max ")
         drawn.legend(  # above the axes, and above the power of ten of the ordinate
             loc="lower center", bbox_to_anchor=(0.5, 1.0 if y is None else 1.06), ncols=2, handlelength=1.0,
             handleheight=1.0, columnspacing=1.0,

@@ -9,15 +9,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.plot import style
 from nonsmooth.plot.branches import draw_branch
-from nonsmooth.plot.labels import (
-    column,
-    first_states,
-    name_and_unit,
-    name_axes,
-    name_plane,
-    only_states,
-    variable_along,
-)
+from nonsmooth.plot.labels import column, first_states, name_plane, only_states, variable_along
 from nonsmooth.plot.planes import cell_edges
 
 if TYPE_CHECKING:
@@ -223,7 +215,7 @@ def frequency_response(
         for behind in branches:
             draw_branch(drawn, behind, y=name, quantity=quantity, color=style.COLORS["section"], width=0.7, behind=True)
         drawn.margins(x=0)
-        name_axes(drawn, name_and_unit(result, parameter), _ordinate(result, name, "" if alone else quantity))
+        name_plane(drawn, result, parameter, name, "" if alone else f"{quantity} of ")
         style.clear_legend(drawn)
     return drawn
 
@@ -274,11 +266,6 @@ def _mark(
         fontsize=style.small(ax), va="top" if small else "center", ha="left" if side > 0 else "right", zorder=6,
         path_effects=style.halo(),
     )  # fmt: skip
-
-
-def _ordinate(result: xr.Dataset, name: str, quantity: str) -> tuple[str, str]:
-    text, unit = name_and_unit(result, name)
-    return f"{quantity} of {text}" if quantity else text, unit
 
 
 def density(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, cmap: str = "magma_r") -> Axes:

@@ -17,9 +17,9 @@ from matplotlib.ticker import ScalarFormatter
 
 from nonsmooth.plot.labels import with_unit
 
-__all__ = ["name_axis", "power_for", "prefixed"]
+__all__ = ["PREFIXES", "name_axis", "power_for", "prefixed"]
 
-_PREFIXES = {0: "", -3: "m", -6: "\N{MICRO SIGN}", -9: "n"}
+PREFIXES = {0: "", -3: "m", -6: "\N{MICRO SIGN}", -9: "n"}
 #: Units that take a prefix; the first one of a compound does: ``m``, ``m/s``, ``m s``, ``N/m``.
 _FIRST = re.compile(r"(m|s|N|V|A|Pa|W|J|rad)(?=$|[/ ])")
 #: Below this a prefix is used. Lengths and speeds are read in millimetres up to a metre.
@@ -35,13 +35,13 @@ def power_for(unit: str, largest: float) -> int:
     if largest >= _WHOLE.get(found[1], _ALMOST_WHOLE):
         return 0
     # 0.1 mm to 1 m are millimetres
-    return max(-3 * int(np.ceil((-np.log10(largest) - 1) / 3 - 1e-9)) or -3, min(_PREFIXES))
+    return max(-3 * int(np.ceil((-np.log10(largest) - 1) / 3 - 1e-9)) or -3, min(PREFIXES))
 
 
 def prefixed(value: float, unit: str) -> tuple[str, str]:
     """Return a value as an axis would write it, and its unit with the prefix: ``("−1.2", "mm")``."""
     power = power_for(unit, abs(value))
-    return f"{value / 10.0**power:g}".replace("-", "\N{MINUS SIGN}"), _PREFIXES[power] + unit
+    return f"{value / 10.0**power:g}".replace("-", "\N{MINUS SIGN}"), PREFIXES[power] + unit
 
 
 def name_axis(axis: Axis, name: str, unit: str, largest: float | None = None) -> None:
@@ -97,7 +97,7 @@ class _Ticks(Ticker):
             text = axis.get_label_text()
             old = _power_of(text, unit)
             if old is not None and old != power:
-                axis.set_label_text(text.replace(f"({_PREFIXES[old]}{unit})", f"({_PREFIXES[power]}{unit})"))
+                axis.set_label_text(text.replace(f"({PREFIXES[old]}{unit})", f"({PREFIXES[power]}{unit})"))
 
 
 class _Prefixed(ScalarFormatter):
@@ -132,7 +132,7 @@ class _Prefixed(ScalarFormatter):
         power = self._power()
         if not power:
             return super().format_data_short(value)
-        return f"{value / 10.0**power:.5g} {_PREFIXES[power]}{self.unit}"
+        return f"{value / 10.0**power:.5g} {PREFIXES[power]}{self.unit}"
 
 
 def _sharing(axis: Axis) -> list[Axis]:
@@ -145,4 +145,4 @@ def _sharing(axis: Axis) -> list[Axis]:
 
 def _power_of(text: str, unit: str) -> int | None:
     """The power of the prefix with which a label names the unit; None where it does not name it."""
-    return next((power for power, prefix in _PREFIXES.items() if f"({prefix}{unit})" in text), None)
+    return next((power for power, prefix in PREFIXES.items() if f"({prefix}{unit})" in text), None)

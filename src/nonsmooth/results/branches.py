@@ -1,4 +1,4 @@
-"""Builders of the labelled results of continuation: a branch of orbits, a curve of special points."""
+"""Builders of the labelled results of continuation: branches of orbits, curves of special points, manifolds."""
 
 from __future__ import annotations
 
@@ -15,21 +15,34 @@ from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.schema import (
     Column,
     attributes,
+    columns,
     floats,
     parameter_coords,
     quantity_attributes,
     state_coords,
     strings,
+    table,
     typed,
     varied,
 )
 from nonsmooth.results.statuses import flag_attributes
 
 __all__ = [
-    "CURVE", "EQUILIBRIUM", "FOUND", "ORBIT", "SPECIAL", "SPECIAL_EQUILIBRIUM", "SPECIAL_ORBIT", "STEMS", "Column",
-    "attributes", "diagram", "line",
+    "CURVE",
+    "EQUILIBRIUM",
+    "FOUND",
+    "KINDS",
+    "ORBIT",
+    "SPECIAL",
+    "SPECIAL_EQUILIBRIUM",
+    "SPECIAL_ORBIT",
+    "STEMS",
+    "Column",
+    "attributes",
+    "diagram",
+    "line",
+    "manifolds",
 ]  # fmt: skip
-
 
 #: One orbit of a branch; builder, writer and reader go by these tables.
 ORBIT = (
@@ -113,8 +126,8 @@ def line(
     """
     sizes = {"matrix": 4}
     variables: dict[str, Any] = {}
-    for dim, table, records in (("point", tables[0], points), ("special", tables[1], special)):
-        for column in table:
+    for dim, known, records in (("point", tables[0], points), ("special", tables[1], special)):
+        for column in known:
             array = _array(column, [getattr(one, column.field) for one in records], sizes)
             variables[column.name] = (dim, *column.dims), array, attributes(labels, column)
     if len(parameters) == 1:
@@ -229,3 +242,40 @@ def diagram(
 def _sentences(branches: Sequence[xr.Dataset]) -> NDArray[np.str_]:
     """Endings in words of several branches (branch, end)."""
     return strings(str(text) for one in branches for text in one["ended_because"].values).reshape(-1, 2)
+
+
+KINDS = ("unstable", "stable")
+_POINT = table(
+    ("section", "point state", "own", "state at the section"),
+    ("arc_length", "point", "own", "length from the orbit, in scaled states"),
+    ("iterate", "point", "own", "which image of the first segment"),
+    ("piece", "point", "own", "number of jumps of the section map before it"),
+    ("arc", "point", "own", "which arc"),
+    ("side", "arc", "yes", "side of the orbit"),
+    ("orbit_point", "arc", "place", "point of the orbit"),
+    ("multiplier", "arc", "", "multiplier once round"),
+    ("orbit_section", "return state", "", "points of the orbit"),
+    ("size", "state", "", "what a scaled state of 1 is"),
+    ("ended_because", "arc", "text", "sentence"),
+)
+
+
+def manifolds(
+    labels: Labels, attrs: Mapping[str, Any], arrays: Mapping[str, ArrayLike], *, kinds: Sequence[str],
+    sides: ArrayLike, orbit_points: ArrayLike, multipliers: ArrayLike, orbit_section: ArrayLike, scale: ArrayLike,
+    endings: Mapping[str, str], ended: Sequence[str],
+) -> xr.Dataset:  # fmt: skip
+    """The result of ``manifolds``: points over ``point`` in order along each arc, what they are over ``arc``."""
+    variables = columns(labels, _POINT, {
+        **arrays, "side": sides, "orbit_point": orbit_points, "multiplier": multipliers,
+        "orbit_section": orbit_section, "size": scale, "ended_because": [endings[word] for word in ended],
+    })  # fmt: skip
+    # The dim's own name would make an index of it.
+    variables["arc_number"] = variables.pop("arc")
+    for name, words, known, chosen in (
+        ("manifold", "manifold", KINDS, kinds), ("ended", "how the arc ends", tuple(endings), ended),
+    ):  # fmt: skip
+        codes = np.array([known.index(word) for word in chosen], dtype=np.int8)
+        variables[name] = ("arc", codes, {"long_name": words, **flag_attributes(known)})
+    coords = state_coords(labels) | parameter_coords(labels)
+    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))

@@ -193,8 +193,8 @@ def _dataset(
     orbit: Orbit, size: FloatArray, cycle: FloatArray, arcs: list[tuple[str, int, int, float, Arc]],
     options: dict[str, Any],
 ) -> xr.Dataset:  # fmt: skip
+    from nonsmooth.results.branches import manifolds as build
     from nonsmooth.results.labels import labels_of
-    from nonsmooth.results.manifolds import manifolds as build
     from nonsmooth.results.provenance import provenance
 
     n = len(size)

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from nonsmooth.explorer.views.basins import Basins
-from nonsmooth.explorer.views.branches import Branches
-from nonsmooth.explorer.views.chart import Chart
-from nonsmooth.explorer.views.diagram import Diagram
-from nonsmooth.explorer.views.motion import History, Portrait, Section
-from nonsmooth.explorer.views.readout import Readout
+from nonsmooth.explorer.views.motion import History, Portrait, Readout, Section
+from nonsmooth.explorer.views.over_parameters import Branches, Diagram, Response
+from nonsmooth.explorer.views.planes import Basins, Chart
 from nonsmooth.explorer.views.recording import Recording
-from nonsmooth.explorer.views.response import Response
 from nonsmooth.explorer.views.spectrum import Spectrum
 from nonsmooth.explorer.views.view import View
 

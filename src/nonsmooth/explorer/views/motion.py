@@ -1,4 +1,4 @@
-"""The motion from the initial state: in the phase plane, over time, and its section points."""
+"""The motion from the initial state: phase plane, history, section points, and the line above the views."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 from bokeh.models import BoxAnnotation
 
 from nonsmooth.explorer.figures import BLUE, MOST, Panel, extent
-from nonsmooth.explorer.readout import distinct
+from nonsmooth.explorer.labels import number, plain_of
 from nonsmooth.explorer.views.view import Request, View
-from nonsmooth.plot.labels import column
+from nonsmooth.plot.labels import column, in_words
 from nonsmooth.plot.style import COLORS
 from nonsmooth.plot.trajectories import pieces_by_mode, with_gaps
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import State
 
-__all__ = ["History", "Portrait", "Section"]
+__all__ = ["History", "Portrait", "Readout", "Section"]
 
 _MODES = [COLORS[name] for name in ("first", "second", "third", "fourth")]
 _MANY_MODES = 8
@@ -179,3 +179,56 @@ class Section(View):
         self.sheet.views["portrait"].points.data = dict(self.points.data)
 
     tapped = Portrait.tapped
+
+
+class Readout(View):
+    """A motion in a few words and numbers, with what is known of its stability."""
+
+    name = "readout"
+
+    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+        """Multipliers or exponents, once the orbit is there."""
+        return {} if "motion" not in base or self.system.is_map else self.each(base["motion"])
+
+    def redraw(self) -> None:
+        """Tell the period number, section points, contacts, extremes, and the largest multiplier or exponent."""
+        results, x = self.sheet.results, self.state.x
+        if "judged" not in results:
+            return
+        judged, section = results["judged"], results.get("section")
+        period, status = int(judged["period_number"].values[0]), str(np.ravel(in_words(judged["status"]))[0])
+        fields = [("motion", f"period {period}" if period else "no period found")]
+        if status not in ("ok", "not_periodic"):
+            fields.append(("status", status.replace("_", " ")))
+        if section is not None:
+            n = int(distinct(section["section"].values).sum())
+            fields.append(("section points", str(n) if n <= MOST else f"{section.sizes['iterate']}, no two alike"))
+        contacts = float(judged["contacts_per_period"].values[0])
+        if np.isfinite(contacts):
+            fields.append(("contacts per period", f"{contacts:.3g}"))
+        ends = [float(judged[name].sel(state=x).values[0]) for name in ("minimum", "maximum")]
+        if np.isfinite(ends).all():
+            latex, unit = self.quantity(x)
+            fields.append((plain_of(latex), " … ".join(number(end, unit) for end in ends)))
+        if "multipliers" in self.results:
+            fields.append(("largest |multiplier|", f"{float(np.abs(self.results['multipliers']).max()):.4f}"))
+        elif self.results:
+            names = "exponents", "standard_error"
+            largest, error = (float(self.results["exponents"][name].values.max()) for name in names)
+            fields.append(("largest exponent", f"{number(largest)} ± {error:.1g}"))
+        self.page.tell("readout", [*fields, *self.sheet.bench.readout()])
+
+    def clear(self) -> None:
+        """Tell nothing."""
+        super().clear()
+        self.page.tell("readout", [])
+
+
+def distinct(points: Any) -> Any:
+    """Marks of the points among the last 256 that differ from those before them by 1e-5 of their size or more."""
+    last = points[-256:]
+    close = 1e-5 * np.maximum(np.ptp(last, axis=0), np.abs(last).max(axis=0))
+    apart = np.ones(len(last), dtype=bool)
+    for k in range(1, len(last)):
+        apart[k] = not (np.abs(last[:k][apart[:k]] - last[k]) <= close).all(axis=1).any()
+    return apart

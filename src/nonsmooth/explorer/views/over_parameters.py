@@ -1,0 +1,362 @@
+"""Views over a parameter: section points as an image, branches over them, and the amplitude of the response."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.explorer.figures import BLUE, GREY, INK, Panel, extent
+from nonsmooth.explorer.labels import number
+from nonsmooth.explorer.raster import Layer, drawn
+from nonsmooth.explorer.schedule import key_of
+from nonsmooth.explorer.state import CHOICES
+from nonsmooth.explorer.views.view import Request, View
+from nonsmooth.plot.branches import MARKS, lines_of, ordinates_of, with_breaks
+from nonsmooth.plot.labels import in_words
+from nonsmooth.plot.style import COLORS
+from nonsmooth.plot.sweeps import one_branch
+
+if TYPE_CHECKING:
+    from nonsmooth.explorer.state import State
+
+__all__ = ["Branches", "Diagram", "Response"]
+
+_HEIGHT = 400  # pixels of an image before the page has said how large it is
+#: Names of a cloud in the legend, with their colours and the height of a dot.
+_CLOUDS = {
+    "first look": ("#7F7F7F", 2), "up": (COLORS["pale"], 4), "down": (COLORS["second"], 2),
+    "rest": (COLORS["first"], 2), "many": (COLORS["third"], 2),
+}  # fmt: skip
+
+
+class Diagram(View):
+    """A first look, then the diagram with period numbers."""
+
+    name = "diagram"
+
+    def depends(self, old: tuple[str, str], new: tuple[str, str]) -> bool:
+        """Return whether either changed."""
+        return old != new
+
+    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+        """A sweep that nothing judges, and one with a direction."""
+        sweep = base["first look"]
+        return {"first look": sweep, "diagram": {**sweep, "view": "diagram", "direction": self.state.direction}}
+
+    def build(self) -> None:
+        """The image, and bars that tell the period numbers of a column."""
+        self.figure = Panel("diagram")
+        plot, empty = self.figure.plot, np.zeros((1, 1), np.uint32)
+        ends: dict[str, Any] = {"x": [0.0], "y": [0.0], "dw": [1.0], "dh": [1.0]}
+        self._image = self.figure.source(name="diagram image", image=[empty], **ends, stage=[""], of=[""])
+        plot.image_rgba("image", "x", "y", "dw", "dh", source=self._image)
+        self._columns = self.figure.source("value", "low", "high", "words", "period", "status", name="columns")
+        bars = plot.segment(
+            "value", "low", "value", "high", source=self._columns, line_alpha=0.0, line_width=4, hover_line_alpha=0.25,
+            hover_line_color=COLORS["muted"],
+        )  # fmt: skip
+        self.figure.tell(bars, mode="vline", line_policy="interp", attachment="right", point_policy="follow_mouse")
+        self._here = self.figure.mark()
+        self._shown: dict[str, Any] = {}  # the request of what is drawn
+        self._pixels = _HEIGHT
+        self._fitted: tuple[str, ...] = ()
+        plot.on_change("inner_height", lambda attr, old, new: self._resize(int(new)))
+
+    def _resize(self, pixels: int) -> None:
+        self._pixels = max(pixels, 50)
+        self.redraw()
+
+    def show(self, job: Request, found: Mapping[str, Any]) -> None:
+        """Draw a sweep, and tell its period numbers where they were judged."""
+        self._shown = job
+        super().show(job, found)
+        if job["view"] == "first look":
+            return
+        result, over = found["diagram"], self.state.over
+        values, unit = result[over].values, self.quantity(over)[1]
+        arrays = (result["period_number"], result["status"].copy(data=in_words(result["status"])))
+        periods, names = (one.transpose(over, ...).values.reshape(len(values), -1) for one in arrays)
+        words = []
+        for value, some, told in zip(values, periods, names, strict=True):
+            kinds = dict.fromkeys(
+                f"period {p}" if p else ("no period" if w in ("ok", "not_periodic") else w.replace("_", " "))
+                for p, w in zip(some, told, strict=True)
+            )
+            words.append(f"{number(float(value), unit)}: {' / '.join(kinds)}")
+        low, high = self.figure.plot.y_range.start, self.figure.plot.y_range.end
+        self._columns.data = {
+            "value": values, "low": np.full(len(values), low - 10 * (high - low)),
+            "high": np.full(len(values), high + 10 * (high - low)), "words": words,
+            "period": periods[:, 0], "status": [str(row) for row in names[:, 0]],
+        }  # fmt: skip
+
+    def clear(self) -> None:
+        """Show nothing, as when another model or parameter was chosen."""
+        super().clear()
+        self._shown, self._fitted = {}, ()
+
+    def redraw(self) -> None:
+        """Draw the points anew, as at another zoom."""
+        result, state = self.results.get("diagram"), self.state
+        if result is None:
+            return
+        points, values = result["section"].sel(state=state.shown), result[state.over].values
+        finite = points.values[np.isfinite(points.values)]
+        key = (state.model, state.over, state.shown)
+        if finite.size and (key != self._fitted or not self._fits(finite)):
+            # a few points far out, of columns that have not settled, do not decide the axis
+            self.figure.show(y=extent(np.quantile(finite, [0.001, 0.999]), 0.08))
+            self._fitted = key
+        low, high = self.figure.plot.y_range.start, self.figure.plot.y_range.end
+        step = (values[-1] - values[0]) / max(len(values) - 1, 1) or 1.0
+        self._image.data = {
+            "image": [drawn(self._layers(points), low, high, self._pixels)], "x": [values[0] - step / 2], "y": [low],
+            "dw": [step * len(values)], "dh": [high - low], "of": [key_of(self._shown)],
+            "stage": ["judged" if self._shown["view"] == "diagram" else "first look"],
+        }  # fmt: skip
+        self.name_axes(state.over, state.shown)
+
+    def _fits(self, points: Any) -> bool:
+        """Return True if the present axis shows the points and they fill it well."""
+        low, high = np.quantile(points, [0.001, 0.999])
+        start, end = self.figure.plot.y_range.start, self.figure.plot.y_range.end
+        return bool(start <= low and high <= end and high - low > 0.55 * (end - start))
+
+    def _clouds(self, direction: str) -> list[str]:
+        """Names of the clouds that the diagram has, in a sweep of this direction."""
+        if self._shown.get("view") != "diagram":
+            return ["first look"]
+        return ["up", "down"] if direction == "both" else [direction]
+
+    def _layers(self, points: Any) -> list[Layer]:
+        # the state may have another direction by now
+        words = self._clouds(self._shown.get("direction", ""))
+        each = [points.sel(direction=word) for word in words] if "direction" in points.dims else [points]
+        over = self.state.over
+        flat = (one.transpose(over, ...).values.reshape(one.sizes[over], -1) for one in each)
+        return [(cloud, *_CLOUDS[word]) for cloud, word in zip(flat, words, strict=True)]
+
+    def place(self) -> None:
+        """Mark the value that the page is at, in the range that it has."""
+        state, shown = self.state, self.figure.plot.x_range
+        self._here.location = state.values[state.over]
+        if (shown.start, shown.end) != (state.low, state.high):
+            self.figure.show(x=(state.low, state.high))
+
+    def legend(self) -> list[tuple[str, str]]:
+        """Clouds in the direction of the page."""
+        names = {"first look": "first look, from rest, not judged", **CHOICES["direction"]}
+        return [(names[word], _CLOUDS[word][0]) for word in self._clouds(self.state.direction)]
+
+    def tapped(self, x: float, y: float) -> State:
+        """Go to the next column, and start at the section point of it next to the click."""
+        state, result = self.state, self.results.get("diagram")
+        if result is None:
+            return state.with_value(state.over, x)
+        one = result.sel({state.over: x}, method="nearest")
+        points = one["section"].transpose(..., "iterate", "state").values.reshape(-1, one.sizes["state"])
+        away = np.abs(points[:, list(self.system.states).index(state.shown)] - y)
+        state = state.with_value(state.over, float(one[state.over]))
+        if not np.isfinite(away).any():
+            return state
+        return replace(state, start=tuple(points[np.nanargmin(away)].tolist()))
+
+    def zoomed(self, x: tuple[float, float], y: tuple[float, float]) -> State:
+        """Compute the range that is seen."""
+        self.redraw()
+        return replace(self.state, low=x[0], high=x[1])
+
+
+#: Lines by their stability: name, dash and width.
+_LINES = {"-": ("stable", "solid", 1.8), "--": ("unstable", "dashed", 1.3), ":": ("virtual", "dotted", 1.3)}
+#: Markers of Bokeh for the kinds of special points.
+_SIGNS = dict(zip(MARKS, (
+    "circle", "square", "diamond", "triangle", "triangle_pin", "inverted_triangle", "x", "cross", "hex", "star",
+), strict=True))  # fmt: skip
+_WORDS = {"neimark_sacker": "Neimark-Sacker bifurcation", "flip": "flip (period doubling)"}
+
+
+class Branches(View):
+    """Lines over the diagram's points, from Newton's method and continuation."""
+
+    name = "branches"
+
+    def depends(self, old: tuple[str, str], new: tuple[str, str]) -> bool:
+        """Return whether either changed: branches lie over the diagram's parameter."""
+        return old != new
+
+    @property
+    def shown(self) -> bool:
+        """Return whether the diagram is shown, and its branches asked for."""
+        return self.sheet.views["diagram"].shown and bool(self.setting("show") == "yes")
+
+    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+        """Branches over the diagram's range; those of a system without forcing begin at its cycle."""
+        cycle = self.system.period() is None and not self.system.is_map
+        begin = {"start": list(self.state.start)} if cycle else {}
+        return self.each({**base["first look"], **begin, "columns": 0})
+
+    def build(self) -> None:
+        """Put lines and marks into the diagram."""
+        figure = self.sheet.views["diagram"].figure
+        self._lines = {line: figure.source("x", "y", name=f"{one[0]} branches") for line, one in _LINES.items()}
+        for line, (_, dash, width) in _LINES.items():
+            self.ink(INK, figure.plot.line("x", "y", source=self._lines[line], line_dash=dash, line_width=width))
+        self._points = figure.source("x", "y", "words")
+        near = figure.plot.scatter("x", "y", source=self._points, size=9, fill_alpha=0.0, line_alpha=0.0)
+        figure.tell(near, attachment="left", limit=1)
+        self._marks = figure.source("x", "y", "marker", "words", name="special points")
+        special = figure.plot.scatter("x", "y", marker="marker", source=self._marks, size=9, line_width=1.4)
+        self.ink(INK, special)
+        self.ink(("#FFFFFF", "#171B20"), special, field="fill_color")
+
+    def redraw(self) -> None:
+        """Draw all section points of every branch over the parameter."""
+        result = self.results.get("branches", self.results.get("cycle"))
+        if result is None:
+            return
+        parameter = str(result.attrs["parameter"])
+        unit = self.quantity(parameter)[1]
+        lines: dict[str, list[Any]] = {line: [np.empty((2, 0))] for line in self._lines}
+        points: dict[str, list[Any]] = {key: [] for key in self._points.data}
+        marks: dict[str, list[Any]] = {key: [] for key in self._marks.data}
+        whole = "branch" in result
+        for branch in [one_branch(result, k) for k in range(result.sizes["branch_id"])] if whole else [result]:
+            values, period = branch[parameter].values, branch.sizes.get("return", 1)
+            places = [number(float(value), unit, 6) for value in values]
+            orbits = [f"period {period}, {_multipliers(some)}" for some in branch["floquet_multipliers"].values]
+            told = [
+                f"{place}: {'' if good else 'un'}stable, {orbit}"
+                for place, good, orbit in zip(places, branch["stable"].values, orbits, strict=True)
+            ]
+            at = branch["special_point"].values.astype(int) if branch.sizes.get("special") else np.zeros(0, int)
+            kinds = [str(kind) for kind in branch["special_kind"].values] if len(at) else []
+            named = [
+                f"{_WORDS.get(kind, kind.replace('_', ' '))} at {places[i]}: {orbits[i]}"
+                for kind, i in zip(kinds, at, strict=True)
+            ]
+            for row in ordinates_of(branch, self.state.shown, "section"):
+                for line, some in lines_of(branch):
+                    lines[line] += [[with_breaks(values, some), with_breaks(row, some)], [[np.nan], [np.nan]]]
+                # of points at one place the first is told: the special ones
+                for some, of in ((np.arange(len(values)), told), (at, named)):
+                    for key, more in (("x", values[some].tolist()), ("y", row[some].tolist()), ("words", of)):
+                        points[key][:0] = more
+                signs = [_SIGNS.get(kind, "asterisk") for kind in kinds]
+                new = {"x": values[at].tolist(), "y": row[at].tolist(), "marker": signs, "words": named}
+                for key, more in new.items():
+                    marks[key] += more
+        for line, source in self._lines.items():
+            source.data = dict(zip("xy", np.concatenate(lines[line], axis=1), strict=True))
+        self._points.data, self._marks.data = points, marks
+
+    def clear(self) -> None:
+        """Show no branch."""
+        super().clear()
+        for source in (*self._lines.values(), self._points, self._marks):
+            source.data = {key: [] for key in source.data}
+
+
+def _multipliers(multipliers: Any) -> str:
+    """The multipliers in words: all where there are up to three, else the largest."""
+    some = sorted((complex(one) for one in multipliers if np.isfinite(one)), key=abs, reverse=True)
+    if not some:
+        return "no multipliers"
+    told = ", ".join(
+        f"{one.real:.3g}" if abs(one.imag) < 1e-9 * (1 + abs(one.real)) else f"{one.real:.3g} ± {abs(one.imag):.3g}i"
+        for one in some[:3] if one.imag >= -1e-9 * (1 + abs(one))
+    )  # fmt: skip
+    return f"multipliers {told}".replace("-", "\N{MINUS SIGN}") + (" …" if len(some) > 3 else "")
+
+
+_POINTS = {"first response": 81, "response": 401}
+
+
+class Response(View):
+    """Half the peak-to-peak value of a state over a parameter, in most models the forcing frequency."""
+
+    name = "response"
+
+    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+        """Few frequencies, then many."""
+        over, *ends = (self.setting(name) for name in ("over", "low", "high"))
+        job = {**base["first look"], "over": over, "low": min(ends), "high": max(ends)}
+        job["values"] = {**self.state.values, over: min(ends)}
+        return {stage: {**one, "columns": _POINTS[stage]} for stage, one in self.each(job).items()}
+
+    def build(self) -> None:
+        """Up solid, down dashed, and a line at the parameter's value."""
+        self.figure = Panel("response")
+        plot = self.figure.plot
+        self._curves = {word: self.figure.source("x", "y", "words", name=f"response {word}") for word in ("up", "down")}
+        self._up, down = (plot.line("x", "y", source=source, line_width=2) for source in self._curves.values())
+        down.glyph.update(line_color=COLORS["second"], line_dash="dashed")
+        self.figure.tell(self._up, down, mode="vline")
+        self._here = self.figure.mark()
+        self._measured = self.figure.source("x", "y", name="recorded response")
+        rings = plot.scatter("x", "y", source=self._measured, size=8, fill_color=None, line_width=1.3)
+        self.ink(BLUE, self._up)
+        self.ink(GREY, rings)
+
+    def redraw(self) -> None:
+        """Draw the amplitude of the state that the diagram shows."""
+        result, shown = self.results.get("response"), self.state.shown
+        if result is None:
+            return
+        over = str(result["maximum"].dims[0])
+        values, (_, unit), (_, units) = result[over].values, self.quantity(over), self.quantity(shown)
+        for word, source in self._curves.items():
+            one = result.sel(direction=word)
+            amplitude = one["amplitude"].sel(state=shown).values
+            words = [
+                f"{word}, {number(float(value), unit)}: {number(float(height), units)}, "
+                + (f"period {period}" if period else "no period")
+                for value, height, period in zip(values, amplitude, one["period_number"].values, strict=True)
+            ]
+            source.data = {"x": values, "y": amplitude, "words": words}
+        self.figure.show((float(values[0]), float(values[-1])))
+        self._fit()
+        self.name_axes(over, shown)
+        self.figure.y.axis.axis_label = f"amplitude of {self.figure.y.axis.axis_label}"
+        self.place()
+
+    def place(self) -> None:
+        """Mark the value that the page is at."""
+        over = self.setting("over")
+        self._here.location = self.state.values[over]
+        measured = dict(zip("xy", self.sheet.bench.response(over, self.state.shown), strict=True))
+        if not all(np.array_equal(self._measured.data[key], one) for key, one in measured.items()):
+            self._measured.data = measured
+            self._fit()
+
+    def _fit(self) -> None:
+        """Show all amplitudes, those of a recording too."""
+        drawn = [source.data["y"] for source in (*self._curves.values(), self._measured)]
+        self.figure.show(y=(0.0, extent(np.concatenate(drawn))[1]))
+
+    def legend(self) -> list[tuple[str, str]]:
+        """Directions of the sweep."""
+        return [("up", COLORS["first"]), ("down, dashed", COLORS["second"])]
+
+    def tapped(self, x: float, y: float) -> State:
+        """Go to the nearest frequency, on the curve that is nearer to the click."""
+        state, result = self.state, self.results.get("response")
+        if result is None:
+            return state
+        over = str(result["maximum"].dims[0])
+        one = result.sel({over: x}, method="nearest")
+        away = np.abs(one["amplitude"].sel(state=state.shown).values - y)
+        at = one["section"].transpose("direction", "iterate", "state").values[np.nan_to_num(away, nan=np.inf).argmin()]
+        state = state.with_value(over, float(one[over]))
+        return replace(state, start=tuple(at[-1].tolist())) if np.isfinite(at[-1]).all() else state
+
+    def zoomed(self, x: tuple[float, float], y: tuple[float, float]) -> State:
+        """Compute the range that is seen."""
+        return self.state.with_settings(response__low=x[0], response__high=x[1])
+
+    def unzoomed(self) -> State:
+        """Return to the first range."""
+        return self.state.with_settings(response__low=None, response__high=None)
