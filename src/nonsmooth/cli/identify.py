@@ -135,7 +135,7 @@ def _write(found: Any, study: _Study, data: Path | None) -> list[Path]:
         plot = without_screen()
         from matplotlib import pyplot as plt
 
-        from nonsmooth.plot.identification.pictures import pictures
+        from nonsmooth.plot.identification.picture import pictures
 
         for name, ax in pictures(found):
             written.append(plot.save_figure(ax, with_folder(study.figures / f"{name}.{study.format}")))

@@ -19,7 +19,6 @@ from jinja2 import DictLoader, Environment
 
 from nonsmooth.explorer.building import KINDS, LINK, Workshop
 from nonsmooth.explorer.catalogue import Catalogue
-from nonsmooth.explorer.controls import controls
 from nonsmooth.explorer.export import exported
 from nonsmooth.explorer.figures import theme
 from nonsmooth.explorer.kinds import KINDS as VIEWS
@@ -291,7 +290,7 @@ class Session:
 
     def tell_ui(self) -> None:
         """The controls as the state has them."""
-        found = controls(self.system, self.state, self.catalogue, self.sheet.views)
+        found = self.sheet.controls(self.catalogue)
         look = {"dark": self.dark, "large": self.large}
         self.tell("ui", {**found, **look, "heard": self._heard, "can": self.past.can, "tabs": len(self.tabs)})
 

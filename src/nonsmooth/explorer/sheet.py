@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from nonsmooth.explorer.bench import Bench
-from nonsmooth.explorer.kinds import KINDS, ORDER
+from nonsmooth.explorer.export import KINDS as FILES
+from nonsmooth.explorer.kinds import KINDS, ORDER, SETTINGS, setting
+from nonsmooth.explorer.labels import html_of, plain_of, symbols_of
+from nonsmooth.explorer.presets import GIVEN, presets_of, slider_range
+from nonsmooth.explorer.state import CHOICES, to_query
 from nonsmooth.explorer.views import VIEWS
 
 if TYPE_CHECKING:
@@ -81,3 +85,33 @@ class Sheet:
                 view.redraw()
         for view in self.views.values():
             view.place()
+
+    def controls(self, models: Iterable[str]) -> dict[str, Any]:
+        """Content of the page's controls: models, parameters with their sliders, choices, legends."""
+        system, state = self.page.system, self.page.state
+        fields = {name: one for name, one in SETTINGS.items() if one.label}
+        symbols, rows = symbols_of(system), []
+        for name, parameter in system.parameters.items():
+            value = state.values[name]
+            also = (value, state.low, state.high) if name == state.over else (value,)
+            low, high = slider_range(float(system.values[name]), also)
+            rows.append({
+                "name": name, "html": html_of(symbols[name]), "unit": parameter.unit, "value": value, "low": low,
+                "high": high,
+            })  # fmt: skip
+        return {
+            "models": {name: "your system" if name == GIVEN else name.replace("_", " ") for name in models},
+            "presets": list(presets_of(state)), "parameters": rows,
+            "states": [
+                {"name": name, "html": html_of(symbols[name]), "plain": plain_of(symbols[name]), "unit": unit,
+                 "value": value}
+                for (name, unit), value in zip(system.states.items(), state.start, strict=True)
+            ],
+            "plain": {name: plain_of(symbols[name]) for name in system.parameters},
+            "choices": CHOICES, "kinds": FILES,
+            "state": {key: value for key, value in vars(state).items() if key not in ("values", "settings")},
+            "query": to_query(state), "forced": system.period() is not None,
+            "legends": {name: view.legend() for name, view in self.views.items()},
+            "settings": {name: setting(name, system, state) for name in fields},
+            "words": {name: one.choices(system, state) for name, one in fields.items() if one.choices is not None},
+        }  # fmt: skip

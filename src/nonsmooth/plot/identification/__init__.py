@@ -1,8 +1,16 @@
 """Pictures of what identification found, one for each procedure: ``(finding, ax=None) -> ax``."""
 
-from nonsmooth.plot.identification.amplitude_dependent import backbone, forced_responses, modal_damping
-from nonsmooth.plot.identification.damping import amplitude_fit, drop_decay, free_decay, half_power, nyquist
-from nonsmooth.plot.identification.fit_residuals import fit_residuals
+from nonsmooth.plot.identification.damping import (
+    amplitude_fit,
+    backbone,
+    drop_decay,
+    forced_responses,
+    free_decay,
+    half_power,
+    modal_damping,
+    nyquist,
+)
+from nonsmooth.plot.identification.estimates import calibration, coverage, fit_residuals, force_displacement, profile
 from nonsmooth.plot.identification.motions import (
     grazing,
     impulse_history,
@@ -13,8 +21,6 @@ from nonsmooth.plot.identification.motions import (
     steady_phase,
     toss,
 )
-from nonsmooth.plot.identification.statics import calibration, force_displacement
-from nonsmooth.plot.identification.uncertainty import coverage, profile
 
 __all__ = [
     "amplitude_fit",

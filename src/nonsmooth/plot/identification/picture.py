@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["Picture", "data_of", "number", "picture", "with_error"]
+__all__ = ["Picture", "data_of", "number", "picture", "pictures", "with_error"]
 
 _SHARE = 0.30  # of the height of the axes, for residuals
 
@@ -179,3 +179,23 @@ class Picture:
         name_axis(strip.yaxis, "residual", unit, max(inside))
         strip.yaxis.label.set(y=_SHARE / 2, horizontalalignment="center")
         ax.tick_params(right=False)
+
+
+def pictures(found: Any) -> Iterator[tuple[str, Axes]]:
+    """The pictures of a parameter set's findings, each with a name for its file.
+
+    Parameters
+    ----------
+    found : ParameterSet
+        As ``identify`` returned it: a set that was read from a file has no data to draw.
+    """
+    from nonsmooth.plot import identification
+
+    drawn: list[Any] = []
+    for finding in found.findings:
+        if not finding.plot or finding.data is None or any(finding.data is data for data in drawn):
+            continue  # two findings of one fit share its picture
+        drawn.append(finding.data)
+        yield finding.name, getattr(identification, finding.plot)(finding)
+        if finding.plot == "impulse_response":
+            yield f"{finding.name}_history", identification.impulse_history(finding)

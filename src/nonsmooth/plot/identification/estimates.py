@@ -1,0 +1,256 @@
+"""Estimates with what they leave: lines through readings, fits by place, profiles of a likelihood, coverage."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.plot import style
+from nonsmooth.plot.identification.picture import Picture, data_of, number, picture
+from nonsmooth.plot.labels import symbol_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["calibration", "coverage", "fit_residuals", "force_displacement", "profile"]
+
+SHOWN = 600
+#: What the sign of ``pull`` means, and the colour of its residuals.
+_WAYS = {1: ("growing", "first"), -1: ("falling", "zone")}
+
+
+def force_displacement(finding: Any, ax: Axes | None = None) -> Axes:
+    """Draw the samples of slow pulls, the fitted lines and their slopes; below, what the mean line leaves.
+
+    Where the data say which way the car was moved, the two ways have two colours: they differ by twice the friction.
+
+    Parameters
+    ----------
+    finding
+        A stiffness (``k`` or ``k_s``), or its data: ``displacement``, ``force`` over ``sample`` and ``slope``,
+        ``intercept`` over ``line``.
+    ax
+        Where to draw; a new one-column figure if None.
+    """
+    needed, labels = "displacement force slope intercept", (("displacement", "m"), ("force", "N"))
+    with picture(finding, ax, needed, *labels, margin=0.03, ratio=0.85) as one:
+        x, force, slopes, intercepts = map(np.atleast_1d, one.values("displacement", "force", "slope", "intercept"))
+        # Thinned for the eye only: half of the samples lie on top of each other.
+        shown = np.linspace(0, len(x) - 1, min(SHOWN, len(x))).astype(int)
+        one.cloud(x[shown], force[shown])
+        ends = np.array([np.nanmin(x), np.nanmax(x)])
+        alike = len(slopes) == 1 or np.ptp(slopes) < 1e-9 * abs(slopes[0])  # one slope was fitted to all
+        many = f"{len(slopes)} lines, slopes {slopes.min():.4g} to {slopes.max():.4g} N/m"
+        label = one.text("slope", "N/m", before="slope ") if alike else many
+        for slope, intercept in zip(slopes, intercepts, strict=True):
+            one.line(ends, intercept + slope * ends, label, "second", linewidth=1.6, alpha=0.7)
+        one.note(0.97, 0.36, one.text("friction_force", "mN", 1e3, "friction "))
+        at, left = x[shown], (force - float(np.mean(slopes)) * x - float(np.mean(intercepts)))[shown]
+        if "pull" not in one.data:
+            one.residual(at, left)
+        else:
+            for way, (words, color) in _WAYS.items():
+                here = one.data["pull"].values[shown] * way > 0
+                one.residual(at[here], left[here], f"residual, displacement {words}", color=style.COLORS[color])
+    return one.ax
+
+
+def calibration(finding: Any, ax: Axes | None = None) -> Axes:
+    """Draw a calibration: frequency over motor voltage, or the forcing's amplitude over the crank's length.
+
+    Parameters
+    ----------
+    finding
+        A calibration, or its data: ``setting``, ``reading``, ``reading_error`` over ``run``; ``setting_fine`` with
+        ``fitted``, ``fitted_low``, ``fitted_high``; ``slope``, ``intercept``.
+    ax
+        Where to draw; a new one-column figure if None.
+    """
+    with picture(finding, ax, "setting reading", "setting", "reading", columns=3, margin=0.03, ratio=0.85) as one:
+        setting, reading = one.values("setting", "reading")
+        if "fitted" in one.data:
+            at, fitted = one.values("setting_fine", "fitted")
+            # No further than to zero: what is measured here has one sign.
+            there = fitted * np.sign(np.mean(reading)) >= 0
+            one.line(at[there], fitted[there], "fitted")
+            band = None
+            if "fitted_low" in one.data:
+                band = [at[there], *((one.data[f"fitted_{end}"].values - fitted)[there] for end in ("low", "high"))]
+                looks: dict[str, Any] = {"color": style.COLORS["first"], "alpha": 0.25, "linewidth": 0}
+                one.ax.fill_between([], [], label="its 95 % band (below)", **looks)
+            error = one.data["reading_error"].values if "reading_error" in one.data else None
+            one.residual(setting, reading - np.interp(setting, at, fitted), error=error, band=band, marker="o")
+        one.points("setting", "reading")
+        one.note(0.04, 0.96, _law(one))
+    return one.ax
+
+
+def _law(one: Picture) -> str:
+    slope, intercept, error = (number(one.data, name) for name in ("slope", "intercept", "intercept_error"))
+    units = [str(one.data[name].attrs.get("units", "")) for name in ("reading", "setting")]
+    text = one.text("slope", ("/" if all(units) and "/" not in units[0] else " per ").join(units), before="slope ")
+    # a line that does not pass through the origin: where it begins
+    away = abs(intercept) > 5 * error and np.isfinite(intercept / slope)
+    return f"{text},\nfrom {-intercept / slope:.4g} {units[1]} on" if away and text else text
+
+
+_COLORS = ("first", "second", "third", "fourth", "zone", "pale")
+_FEW = 3  # readings of a place, below which it has no bar
+
+
+def fit_residuals(
+    fitted: Any, ax: Axes | None = None, *, show: str = "time", quantity: str | None = None, run: str | None = None
+) -> Axes:
+    """Draw readings, fit and residuals over time, or the residuals' size at each place of the motion.
+
+    Parameters
+    ----------
+    fitted
+        A result of :func:`nonsmooth.fit`, or its ``residuals``.
+    ax
+        Where to draw; a new one-column figure if None.
+    show
+        ``"time"``: readings with the fit, coloured by mode, and residuals over their standard deviation below;
+        ``"places"``: their root mean square in each mode, at each transition and at grazes.
+    quantity, run
+        Of which measured quantity, and of which run; the first ones where not given.
+    """
+    data = data_of(getattr(fitted, "residuals", fitted), "measured", "fitted", "residual", "place")
+    if show not in ("time", "places"):
+        raise ValueError(f"show = {show!r}; allowed: 'time', 'places'")
+    return _over_time(data, ax, quantity, run) if show == "time" else _by_place(data, ax)
+
+
+def _words(data: Any, name: str) -> list[str]:
+    return [str(word) for word in data[name].attrs["flag_meanings"].split()]
+
+
+def _chosen(data: Any, name: str, given: str | None) -> int:
+    from nonsmooth.system.names import unknown
+
+    words = _words(data, name)
+    asked = words[0] if given is None else given.replace(" ", "_")
+    if asked not in words:
+        raise ValueError(unknown(given, f"a {name}", "this fit", words))
+    return words.index(asked)
+
+
+def _over_time(data: Any, ax: Axes | None, quantity: str | None, run: str | None) -> Axes:
+    q, r = _chosen(data, "quantity", quantity), _chosen(data, "run", run)
+    part = data.isel(sample=np.flatnonzero((data["quantity"].values == q) & (data["run"].values == r)))
+    modes, unit = _words(data, "mode"), str(part["measured"].attrs.get("units", ""))
+    labels, numbers = (("time", ""), (_words(data, "quantity")[q], unit)), np.unique(part["mode"].values)
+    looks: dict[str, Any] = {"columns": min(3, len(numbers) + 1), "margin": 0.05, "ratio": 0.9}
+    with picture(part, ax, "", *labels, strip="standard deviations", **looks) as one:
+        time, mode, window, residual = one.values("time", "mode", "window", "residual")
+        one.cloud(time, part["measured"].values)
+        for k, m in enumerate(numbers):
+            inside = (mode == m) & np.append(np.diff(window) == 0, False)
+            line = np.where(inside | np.roll(inside, 1), part["fitted"].values, np.nan)
+            one.line(time, line, f"fit: {modes[int(m)]}", _COLORS[k % len(_COLORS)], linewidth=0.9)
+        one.residual(time, residual)
+        near = part["place"].values >= len(modes)
+        if near.any():
+            color = style.COLORS["second"]
+            one.residual(time[near], residual[near], "residual at a transition or graze", color=color, markersize=3.5)
+    return one.ax
+
+
+def _by_place(data: Any, ax: Axes | None) -> Axes:
+    names, place, residual = _words(data, "place"), data["place"].values, data["residual"].values
+    held = [i for i in np.unique(place) if np.count_nonzero(place == i) >= _FEW]
+    n_modes = len(_words(data, "mode"))
+    with style.axes(ax) as drawn:
+        for row, i in enumerate(held):
+            r = residual[place == i]
+            size = float(np.sqrt(np.mean(r**2)))
+            error = size / np.sqrt(2.0 * len(r))
+            color = style.COLORS["first" if i < n_modes else "second"]
+            drawn.barh(row, size, xerr=error, color=color, height=0.6, error_kw={"elinewidth": 0.8})
+            drawn.text(0.0, row, f" {len(r)}", va="center", fontsize=style.small(drawn), color="white")
+        drawn.axvline(1.0, color=style.COLORS["muted"], linewidth=0.7)
+        drawn.set_yticks(
+            range(len(held)), [names[i].replace("->", " \N{RIGHTWARDS ARROW} ").replace("_", " ") for i in held]
+        )
+        drawn.invert_yaxis()
+        drawn.set_xlabel("rms of the residuals (standard deviations)")
+    return drawn
+
+
+CHI_SQUARE_95 = 3.841  # of one degree of freedom
+
+
+def profile(finding: Any, ax: Axes | None = None) -> Axes:
+    """Draw the profile of chi square over one parameter, with the interval that it gives.
+
+    A flat profile is a parameter that the data do not see.
+
+    Parameters
+    ----------
+    finding
+        A profile, or its data: ``cost`` (chi square above its least) over ``value``; ``best``, ``low``, ``high``.
+    ax
+        Where to draw; a new one-column figure if None.
+    """
+    data = data_of(finding, "value", "cost")
+    unit = str(data["value"].attrs.get("units", data.attrs.get("units", "")))
+    labels = (symbol_of(str(data.attrs.get("parameter", "value"))), unit), (r"$\chi^2$ above its least", "")
+    with picture(data, ax, "", *labels, loc="upper center", margin=0) as one:
+        value, cost = one.values("value", "cost")
+        one.span(number(data, "low"), number(data, "high"), "95 % interval", ymax=0.74)
+        one.line(value, cost, f"profile, {one.word}", marker="o", markersize=1.5)
+        bound: dict[str, Any] = {"color": style.COLORS["muted"], "linestyle": "--", "linewidth": 0.7}
+        one.ax.axhline(CHI_SQUARE_95, label="95 % bound, 3.84", **bound)
+        if np.isfinite(best := number(data, "best")):
+            one.ax.axvline(best, ymax=0.74, color=style.COLORS["second"], linewidth=0.9, label="best fit")
+        one.ax.set_ylim(0, max(1.1 * CHI_SQUARE_95, min(float(np.nanmax(cost)), 5 * CHI_SQUARE_95)) * 1.35)
+        if value.min() > 0 and value.max() > 20 * value.min():
+            one.ax.set_xscale("log")
+    return one.ax
+
+
+def coverage(finding: Any, ax: Axes | None = None) -> Axes:
+    """Draw the normalised errors of the identified parameters over many virtual rigs.
+
+    Each point is (estimate - truth) / standard uncertainty of one rig; in a fair statement they spread like a unit
+    normal law. The numbers above say how many of the 95 % intervals hold the truth.
+
+    Parameters
+    ----------
+    finding
+        Data over ``rig`` and ``parameter``: ``truth``, ``estimate``, ``uncertainty``, and ``low``, ``high`` (95 %).
+    ax
+        Where to draw; a new figure of page width if None.
+    """
+    data = data_of(finding, "truth", "estimate", "uncertainty", "parameter")
+    truth, estimate, error = (
+        data[name].transpose("rig", "parameter").values for name in ("truth", "estimate", "uncertainty")
+    )
+    names = data["parameter"].values.astype(str)
+    if "low" in data and "high" in data:
+        low, high = (data[name].transpose("rig", "parameter").values for name in ("low", "high"))
+        held = (low <= truth) & (truth <= high)
+    else:
+        held = np.abs(estimate - truth) <= 1.96 * error
+    off = (estimate - truth) / error
+    rigs = len(truth)
+    spread = (np.arange(rigs) / max(rigs - 1, 1) - 0.5) * 0.6
+    with style.axes(ax, width=style.PAGE, ratio=0.42) as drawn:
+        drawn.axhspan(-1.96, 1.96, color=style.COLORS["first"], alpha=0.10, linewidth=0)
+        drawn.axhline(0, color=style.COLORS["muted"], linewidth=0.6)
+        for k in range(len(names)):
+            for mine, color in ((held[:, k], "section"), (~held[:, k], "second")):
+                drawn.plot(k + spread[mine], off[mine, k], ".", color=style.COLORS[color], markersize=3)
+            rms = float(np.sqrt(np.nanmean(off[:, k] ** 2)))
+            drawn.annotate(
+                f"{np.count_nonzero(held[:, k])}/{rigs}\nrms {rms:.2f}", (k, 1.02), xycoords=("data", "axes fraction"),
+                ha="center", va="bottom", fontsize=style.small(drawn),
+            )  # fmt: skip
+        reach = max(3.0, 1.08 * float(np.nanmax(np.abs(off[np.isfinite(off)]), initial=0.0)))
+        drawn.set_ylim(-reach, reach)
+        drawn.set_xticks(range(len(names)), [symbol_of(name) for name in names])
+        drawn.tick_params(axis="x", top=False, length=0)
+        drawn.set_ylabel("(estimate − truth) / uncertainty")
+        drawn.set_xlabel(f"{rigs} virtual rigs (synthetic), by seed from left to right")
+    return drawn
