@@ -113,13 +113,12 @@ def _study(path: Path, asked: Mapping[str, Any], output: Mapping[str, Any]) -> _
         raise ValueError(f"{path}, table [output]: {unknown(style, 'a format', 'figures', _FORMATS)}")
     return _Study(
         session, load_model(asked["model"], folder) if "model" in asked else None, tuple(asked.get("parameters", [])),
-        None if crank is None else float(crank), {name: _quantity(value) for name, value in apparatus.items()},
+        None if crank is None else float(crank), {
+            name: (value.get("value"), value.get("uncertainty", 0.0)) if isinstance(value, dict) else value
+            for name, value in apparatus.items()
+        },
         **{key: folder / output[key] if key in output else None for key in ("data", "table", "figures")}, format=style,
     )  # fmt: skip
-
-
-def _quantity(value: Any) -> Any:
-    return (value.get("value"), value.get("uncertainty", 0.0)) if isinstance(value, dict) else value
 
 
 def _write(found: Any, study: _Study, data: Path | None) -> list[Path]:

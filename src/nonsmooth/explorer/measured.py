@@ -75,9 +75,10 @@ def laid_over(job: Job) -> dict[str, Any]:
         phase, found["drive"] = drive.phase(samples.time) / (2 * np.pi), drive.period
     states = list(samples.columns)
     try:
-        recorded = _whole(fold(phase, np.column_stack([curve[state] for state in states]), _GRID))[-_STRANDS:]
+        recorded = fold(phase, np.column_stack([curve[state] for state in states]), _GRID)
     except ValueError as error:
         return {**found, "why": f"no distance: {error}"}
+    recorded = recorded[np.isfinite(recorded).all(axis=(1, 2))][-_STRANDS:]
     if not len(recorded):
         return {**found, "why": "no distance: every forcing period of the record lacks readings"}
     count = job["period"] or _STRANDS
@@ -199,33 +200,12 @@ def fitted(job: Job) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _whole(folded: FloatArray) -> FloatArray:
-    return folded[np.isfinite(folded).all(axis=(1, 2))]
-
-
+@lru_cache(maxsize=2)
 def _with_rates(text: str, samples: Samples) -> dict[str, FloatArray]:
     """Columns by state: those recorded, and velocities of recorded positions."""
-    return _smoothed(text, _Held(samples))
-
-
-class _Held:
-    """Samples as the key of a cache."""
-
-    def __init__(self, samples: Samples) -> None:
-        self.samples = samples
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Held) and self.samples.key == other.samples.key
-
-    def __hash__(self) -> int:
-        return hash(self.samples.key)
-
-
-@lru_cache(maxsize=2)
-def _smoothed(text: str, held: _Held) -> dict[str, FloatArray]:
     from nonsmooth.recordings.signals.smoothing import smooth
 
-    system, samples = ns.System.from_text(text), held.samples
+    system = ns.System.from_text(text)
     names = list(system.states)
     columns = dict(samples.columns)
     for i, k in rates(system).items():

@@ -59,7 +59,8 @@ def _opened(system: System, options: Mapping[str, Any], output: Mapping[str, str
     if options.get("method") == "rkf45":
         state = state.but("method", "rkf45")
     section = options.get("section")
-    if isinstance(phase := getattr(section, "phase", None) or _item(section, "phase"), int | float):
+    phase = section.get("phase") if isinstance(section, Mapping) else getattr(section, "phase", None)
+    if isinstance(phase, int | float):
         state = state.but("phase", float(phase) % 1.0)
     start: Any = options.get("start")
     if isinstance(start, Mapping) and set(start) <= set(states):
@@ -80,10 +81,6 @@ def _ranges(options: Mapping[str, Any]) -> list[tuple[str, Any]]:
     if isinstance(values, np.ndarray | list | tuple):
         pairs.insert(0, (str(options.get("parameter", "omega")), values))
     return [(name, one) for name, one in pairs if isinstance(one, np.ndarray | list | tuple)]
-
-
-def _item(value: Any, key: str) -> Any:
-    return value.get(key) if isinstance(value, Mapping) else None
 
 
 def _name_of(system: System) -> str:

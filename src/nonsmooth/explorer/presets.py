@@ -63,25 +63,17 @@ def first_state(model: str, system: System) -> State:
     names, states = list(system.parameters), list(system.states)
     values = {name: float(system.values[name]) for name in names}
     over = next((name for name in USUAL if name in values), names[0])
-    low, high = (0.2, 0.5) if model == PAPER else _around(values[over])
-    y = states[_velocity(states)]
+    value = values[over]
+    around = (value - 0.4 * abs(value), value + 0.4 * abs(value)) if value else (-1.0, 1.0)
+    low, high = (0.2, 0.5) if model == PAPER else around
+    # the second axis of the phase plane: the velocity of the first state where its name says so
+    likely = (f"v_{states[0]}", states[0].replace("x", "v", 1), "v", *states[1:], states[0])
+    y = next(name for name in likely if name in (states[1:] or states))
     start = tuple(0.0 if system.period() is not None else 0.1 * s for s in system.scale_vector())
     return State(
         model=model, values=values, over=over, low=low, high=high, start=start, x=states[0], y=y,
         shown=y if model == PAPER else states[0],
     )  # fmt: skip
-
-
-def _velocity(states: list[str]) -> int:
-    """The second axis of the phase plane: the velocity of the first state where its name says so."""
-    for name in (f"v_{states[0]}", states[0].replace("x", "v", 1), "v"):
-        if name in states[1:]:
-            return states.index(name)
-    return min(1, len(states) - 1)
-
-
-def _around(value: float) -> tuple[float, float]:
-    return (value - 0.4 * abs(value), value + 0.4 * abs(value)) if value else (-1.0, 1.0)
 
 
 def slider_range(value: float, also: tuple[float, ...] = ()) -> tuple[float, float]:

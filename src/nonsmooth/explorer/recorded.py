@@ -141,6 +141,12 @@ class Samples:
             digest.update(name.encode() + b"\0" + np.ascontiguousarray(values).tobytes())
         object.__setattr__(self, "key", digest.hexdigest())
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Samples) and self.key == other.key
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
 
 def matched(recorded: Recorded, system: System, run: str = "") -> Setup:
     """The setup that names and units suggest."""

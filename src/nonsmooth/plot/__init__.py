@@ -1,4 +1,4 @@
-"""Figures of results, one file per kind: ``(result, ax=None, ...) -> ax``.
+"""Figures of results: ``(result, ax=None, ...) -> ax``, one file per concept.
 
 Those of identified parameters stand in ``plot.identification``. Matplotlib is loaded when the first figure is drawn.
 """

@@ -99,9 +99,10 @@ def phase_portrait(
         cut_mode, *cut = with_gaps(result, mode, *curves)
         modes = words_of_flags(result["mode"])
         pieces = pieces_by_mode(np.nan_to_num(cut_mode, nan=-1).astype(int), *cut)
-        for k, (color, (xs, ys)) in enumerate(zip(_cycle(len(pieces)), pieces, strict=True)):
+        for k, (xs, ys) in enumerate(pieces):
             if np.isfinite(xs).any():
-                drawn.plot(xs, ys, color=style.COLORS[color], label=modes[k].replace("_", " "), zorder=2 + 0.1 * k)
+                color = style.COLORS[_MODE_COLORS[k % len(_MODE_COLORS)]]
+                drawn.plot(xs, ys, color=color, label=modes[k].replace("_", " "), zorder=2 + 0.1 * k)
         if section is not None:
             variable_along(section, "section", "poincare or sweep")
             points = [column(section, "section", name).values.ravel() for name in names]
@@ -113,10 +114,6 @@ def phase_portrait(
             shade_zone(drawn, float(result[zone]) if isinstance(zone, str) else zone)
         name_plane(drawn, result, *names)
     return drawn
-
-
-def _cycle(count: int) -> list[str]:
-    return [_MODE_COLORS[k % len(_MODE_COLORS)] for k in range(count)]
 
 
 def shade_zone(ax: Axes, edge: float) -> None:

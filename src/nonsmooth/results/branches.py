@@ -16,6 +16,7 @@ from nonsmooth.results.schema import (
     Column,
     attributes,
     columns,
+    dataset,
     floats,
     parameter_coords,
     quantity_attributes,
@@ -145,7 +146,7 @@ def line(
     coords["end"] = "end", strings(["first", "last"]), {"long_name": "end"}
     if "clearance" in variables:
         coords["indicator"] = "indicator", strings(labels.indicators), {"long_name": "indicator"}
-    return with_short_record(xr.Dataset({**variables, **more}, coords, dict(attrs)))
+    return dataset({**variables, **more}, coords, attrs)
 
 
 def _array(column: Column, values: list[Any], sizes: dict[str, int]) -> Any:
@@ -216,11 +217,12 @@ def diagram(
     ):  # fmt: skip
         result[name].attrs["long_name"] = words
     column = {name: swept[name].transpose("direction", parameter, ...) for name in ("section", "period_number")}
+    sentences = np.array([one["ended_because"].values for one in branches], dtype=str)
     result = result.assign({
         "period_number": ("branch_id", [int(one["period_number"]) for one in branches], {"long_name": "period number"}),
         "parent": ("branch_id", np.array(parents), {"long_name": "branch that it leaves (-1: found in a sweep)"}),
         "ended": (("branch_id", "end"), [one["ended"].values for one in branches], branches[0]["ended"].attrs),
-        "ended_because": (("branch_id", "end"), _sentences(branches), branches[0]["ended_because"].attrs),
+        "ended_because": (("branch_id", "end"), sentences, branches[0]["ended_because"].attrs),
         "swept_value": ("sample", swept[parameter].values, dict(swept[parameter].attrs)),
         "swept_section": (
             ("direction", "sample", "iterate", "state"), column["section"].transpose(..., "iterate", "state").values,
@@ -237,11 +239,6 @@ def diagram(
         told = [json.loads(one.attrs["visited"]) for one in branches]
         result.attrs["visited"] = json.dumps([{k: v for one in told for k, v in one[i].items()} for i in (0, 1)])
     return with_short_record(result)
-
-
-def _sentences(branches: Sequence[xr.Dataset]) -> NDArray[np.str_]:
-    """Endings in words of several branches (branch, end)."""
-    return strings(str(text) for one in branches for text in one["ended_because"].values).reshape(-1, 2)
 
 
 KINDS = ("unstable", "stable")
@@ -278,4 +275,4 @@ def manifolds(
         codes = np.array([known.index(word) for word in chosen], dtype=np.int8)
         variables[name] = ("arc", codes, {"long_name": words, **flag_attributes(known)})
     coords = state_coords(labels) | parameter_coords(labels)
-    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
+    return dataset(variables, coords, attrs)

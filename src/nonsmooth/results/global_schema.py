@@ -16,10 +16,10 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.results.labels import Labels
-from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.schema import (
     Column,
     columns,
+    dataset,
     floats,
     parameter_coords,
     quantity_attributes,
@@ -98,7 +98,7 @@ def chart(
     for name, values in grid.items():
         coords |= varied(labels, name, values)
     coords |= state_coords(labels)
-    result = with_short_record(xr.Dataset(variables, coords | start_coords(starts), dict(attrs)))
+    result = dataset(variables, coords | start_coords(starts), attrs)
     return result.squeeze("start") if one_start else result
 
 
@@ -129,7 +129,7 @@ def basins(
         coords[name] = ((), float(value), quantity_attributes(name, labels.states[name]))
     coords["distance"] = ("distance", uncertain[0], {"long_name": "distance in grid steps"})
     coords["attractor"] = ("attractor", np.arange(len(attractors)), {"long_name": "attractor"})
-    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
+    return dataset(variables, coords, attrs)
 
 
 def attractor_variables(labels: Labels, attractors: Sequence[Any]) -> dict[str, Any]:
@@ -162,4 +162,4 @@ def basin_fractions(
     coords: dict[str, Any] = parameter_coords(labels, without=parameter) | state_coords(labels)
     coords |= varied(labels, parameter, values)
     coords["attractor"] = ("attractor", np.arange(np.shape(arrays["fraction"])[1]), {"long_name": "attractor"})
-    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
+    return dataset(variables, coords, attrs)

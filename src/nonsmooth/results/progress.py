@@ -43,7 +43,7 @@ def progress(total: int, label: str, enabled: Progress = True, done: int = 0) ->
         yield _Told(enabled, total, done, lock)
         return
     if not enabled or total <= 0 or not is_watched():
-        yield _count_nothing
+        yield _nothing
         return
     with _bar_type()(
         total=total, desc=label, initial=done, leave=False, miniters=1,
@@ -133,10 +133,6 @@ def _say_compiling(name: str) -> None:
     from nonsmooth.kernels.compile.folder import cache_folder
 
     say(f"nonsmooth: compiling (once; kept in {cache_folder()}) ...")
-
-
-def _count_nothing(n: int = 1) -> None:
-    pass
 
 
 def _nothing(*_: object) -> None:

@@ -38,7 +38,7 @@ from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.statuses import EQUILIBRIA, flag_attributes, status_attributes
 
 __all__ = [
-    "Column", "attributes", "columns", "floats", "parameter_coords", "quantity_attributes", "response",
+    "Column", "attributes", "columns", "dataset", "floats", "parameter_coords", "quantity_attributes", "response",
     "section_points", "start_coords", "state_coords", "strings", "sweep", "table", "trajectory", "typed",
     "varied", "with_impacts",
 ]  # fmt: skip
@@ -102,6 +102,11 @@ def columns(labels: Labels, known: Sequence[Column], arrays: Mapping[str, Any], 
     }
 
 
+def dataset(variables: Mapping[str, Any], coords: Mapping[str, Any], attrs: Mapping[str, Any]) -> xr.Dataset:
+    """A result, its record without what the coordinates hold."""
+    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
+
+
 _TRAJECTORY = table(
     ("u", "time state", "", "state"),
     ("mode", "time", "mode", "mode"),
@@ -160,7 +165,7 @@ def trajectory(
         "segment": ("time", np.asarray(segment, np.int64), {"long_name": "number of crossings before this sample"}),
         **state_coords(d), **parameter_coords(d),
     }  # fmt: skip
-    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
+    return dataset(variables, coords, attrs)
 
 
 def with_impacts(
@@ -219,7 +224,7 @@ def sweep(
         variables["bin_edge"] = (("state", "edge"), floats(edges), {"long_name": "edges of the bins, per state"})
     if "clearance" in arrays:
         coords["indicator"] = ("indicator", strings(d.indicators), {"long_name": "indicator"})
-    result = with_short_record(xr.Dataset(variables, coords, dict(attrs)))
+    result = dataset(variables, coords, attrs)
     order = (parameter, "direction", "start", ...)
     return result.transpose(*order).squeeze(list(squeeze))
 
@@ -254,7 +259,7 @@ def section_points(
     """The result of ``poincare``: the points in which trajectories meet the section, one trajectory per start."""
     coords = {**start_coords(starts), **state_coords(labels), **parameter_coords(labels)}
     variables = columns(labels, _POINTS, arrays)
-    return with_short_record(xr.Dataset(variables, coords, dict(attrs))).squeeze(list(squeeze))
+    return dataset(variables, coords, attrs).squeeze(list(squeeze))
 
 
 @lru_cache(maxsize=64)

@@ -11,23 +11,22 @@ from scipy.optimize import linear_sum_assignment
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.results.labels import Labels
-from nonsmooth.results.provenance import with_short_record
-from nonsmooth.results.schema import floats, parameter_coords, state_coords, strings
+from nonsmooth.results.schema import columns, dataset, floats, parameter_coords, state_coords, strings, table
 from nonsmooth.results.statuses import status_attributes
 
 __all__ = ["report"]
 
 
-#: Name, dim beside band and eta, long name, and what stands where there is no orbit.
-_ORBIT: dict[str, tuple[tuple[str, ...], str, Any]] = {
-    "section": (("state",), "state at phase 0, or in the middle of the first segment (autonomous)", np.nan),
-    "maximum": (("state",), "largest value along the orbit", np.nan),
-    "minimum": (("state",), "least value along the orbit", np.nan),
-    "period": ((), "period", np.nan),
-    "floquet_multipliers": (("multiplier",), "Floquet multipliers", complex(np.nan, np.nan)),
-    "stable": ((), "all multipliers inside the unit circle", False),
-    "exponents": (("exponent",), "Lyapunov exponents", np.nan),
-}
+_ORBIT = table(
+    ("section", "state", "", "state at phase 0, or in the middle of the first segment (autonomous)"),
+    ("maximum", "state", "", "largest value along the orbit"),
+    ("minimum", "state", "", "least value along the orbit"),
+    ("period", "", "time", "period"),
+    ("floquet_multipliers", "multiplier", "complex", "Floquet multipliers"),
+    ("stable", "", "flag", "all multipliers inside the unit circle"),
+    ("exponents", "exponent", "", "Lyapunov exponents"),
+)
+_NONE = {"complex": complex(np.nan, np.nan), "flag": False}  # what stands where there is no orbit; else NaN
 _COUNTS = {
     "n_attractors": "number of attractors that the starts reach",
     "missing": "attractors of the event-driven system without a counterpart",
@@ -48,20 +47,19 @@ def report(
     """The result of ``smoothing_report``: ``rows`` by (band, eta), with the names of the variables."""
     n, shape = len(labels.states), (len(bands), len(etas))
     variables: dict[str, Any] = {}
-    for name, (dims, long_name, empty) in _ORBIT.items():
-        table = np.full((*shape, *[n] * len(dims)), empty)
+    for column in _ORBIT:
+        name, empty = column.name, _NONE.get(column.rule, np.nan)
+        size = [n] * len(column.dims)
+        values, own = np.full((*shape, *size), empty), np.full(size, empty)
         for place, row in rows.items():
-            table[place] = row.get(name, empty)
-        own = np.full([n] * len(dims), empty)
+            values[place] = row.get(name, empty)
         own[...] = reference.get(name, empty)
-        variables[name] = (("band", "eta", *dims), table, {"long_name": long_name})
-        variables[f"reference_{name}"] = (dims, own, {"long_name": f"{long_name}, event-driven"})
-    for key in ("period", "reference_period"):
-        variables[key][2]["units"] = labels.time_unit
-    for key, table in _differences(variables, scale, forced).items():
-        variables[f"{key}_difference"] = (("band", "eta"), table, {"long_name": _DIFFERENCES[key]})
+        sharp = column._replace(name=f"reference_{name}", words=f"{column.words}, event-driven")
+        variables |= columns(labels, [column], {name: values}, "band", "eta") | columns(labels, [sharp], {name: own})
+    for key, far in _differences(variables, scale, forced).items():
+        variables[f"{key}_difference"] = (("band", "eta"), far, {"long_name": _DIFFERENCES[key]})
         words = {"long_name": f"order of {key}_difference in eta, against the next smaller one"}
-        variables[f"{key}_order"] = (("band", "eta"), _orders(etas, table), words)
+        variables[f"{key}_order"] = (("band", "eta"), _orders(etas, far), words)
     if "n_attractors" in reference:
         for name, long_name in _COUNTS.items():
             counts = np.array([[rows[i, j][name] for j in range(shape[1])] for i in range(shape[0])], np.int64)
@@ -79,7 +77,7 @@ def report(
         "exponent": ("exponent", np.arange(1, n + 1), {"long_name": "number of the exponent"}),
         **state_coords(labels), **parameter_coords(labels, without=["band", *variables]),
     }  # fmt: skip
-    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
+    return dataset(variables, coords, attrs)
 
 
 def _differences(variables: Mapping[str, Any], scale: FloatArray, forced: bool) -> dict[str, FloatArray]:
@@ -103,20 +101,20 @@ def _differences(variables: Mapping[str, Any], scale: FloatArray, forced: bool) 
     }  # fmt: skip
 
 
-def _of_multipliers(table: Any, reference: Any) -> FloatArray:
+def _of_multipliers(values: Any, reference: Any) -> FloatArray:
     """The largest distance of two sets of multipliers, each paired with one of the other so that the sum is least."""
-    found = np.full(table.shape[:-1], np.nan)
+    found = np.full(values.shape[:-1], np.nan)
     for place in np.ndindex(found.shape):
-        gaps = np.abs(table[place][:, None] - reference[None, :])
+        gaps = np.abs(values[place][:, None] - reference[None, :])
         if np.isfinite(gaps).all():
             found[place] = gaps[linear_sum_assignment(gaps)].max()
     return found
 
 
-def _orders(etas: FloatArray, table: FloatArray) -> FloatArray:
-    """Slopes of log table over log eta, against the next smaller eta; NaN at the smallest."""
-    orders = np.full(table.shape, np.nan)
+def _orders(etas: FloatArray, far: FloatArray) -> FloatArray:
+    """Slopes of the logarithm of a distance over that of log eta, against the next smaller eta; NaN at the smallest."""
+    orders = np.full(far.shape, np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
-        orders[:, 1:] = np.diff(np.log(table), axis=1) / np.diff(np.log(etas))
+        orders[:, 1:] = np.diff(np.log(far), axis=1) / np.diff(np.log(etas))
     orders[~np.isfinite(orders)] = np.nan
     return orders

@@ -175,10 +175,6 @@ def _suffix(path: Path) -> str:
     return path.suffix
 
 
-def _is_zarr(path: Path) -> bool:
-    return path.is_dir() and any((path / name).exists() for name in (".zgroup", "zarr.json"))
-
-
 def _is_result(path: Path) -> bool:
     """Return whether a Zarr store holds a result that :func:`save` has written."""
     for name in (".zattrs", "zarr.json"):
@@ -209,7 +205,7 @@ def _claimed(source: Path) -> int:
         if not bytes_as_written(source):
             raise DataFileError(f"{source}: {_ALTERED}")
         return claims.of_netcdf(source)
-    if not _is_zarr(source):
+    if not (source.is_dir() and any((source / name).exists() for name in (".zgroup", "zarr.json"))):
         raise DataFileError(f"{source}: is not a Zarr store; {_EXPECTED}")
     return claims.of_zarr(source)
 

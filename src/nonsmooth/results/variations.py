@@ -10,8 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.results.labels import Labels
-from nonsmooth.results.provenance import with_short_record
-from nonsmooth.results.schema import columns, parameter_coords, table, varied
+from nonsmooth.results.schema import columns, dataset, parameter_coords, table, varied
 
 __all__ = ["derivatives_of_run", "spectrum"]
 
@@ -55,7 +54,7 @@ def derivatives_of_run(
         "parameter": ("parameter", np.array(list(parameters), dtype=str)),
         **parameter_coords(labels, without=[*variables, "parameter", "initial_state"]),
     }
-    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
+    return dataset(variables, coords, attrs)
 
 
 def spectrum(
@@ -69,6 +68,6 @@ def spectrum(
         **parameter_coords(labels, without=[*variables, "batch", parameter or ""]),
     }
     if parameter is None:
-        return with_short_record(xr.Dataset(variables, coords, dict(attrs))).isel(point=0)
+        return dataset(variables, coords, attrs).isel(point=0)
     coords |= varied(labels, parameter, () if values is None else values)
-    return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
+    return dataset(variables, coords, attrs)

@@ -10,7 +10,7 @@ from bokeh.models import BoxAnnotation
 
 from nonsmooth.explorer.figures import BLUE, MOST, Panel, extent
 from nonsmooth.explorer.labels import number, plain_of
-from nonsmooth.explorer.views.view import Request, View
+from nonsmooth.explorer.views.view import Request, Requests, View
 from nonsmooth.plot.labels import column, in_words
 from nonsmooth.plot.style import COLORS
 from nonsmooth.plot.trajectories import pieces_by_mode, with_gaps
@@ -51,7 +51,7 @@ class Portrait(_Curves):
 
     name = "portrait"
 
-    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+    def requests(self, base: Requests) -> Requests:
         """The orbit, whatever the panel shows: other views need it."""
         return {"orbit": base["orbit"]}
 
@@ -145,7 +145,7 @@ class Section(View):
 
     name = "section"
 
-    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+    def requests(self, base: Requests) -> Requests:
         """Points at a phase of the orbit."""
         return self.each({**base["orbit"], "phase": self.state.phase})
 
@@ -186,7 +186,7 @@ class Readout(View):
 
     name = "readout"
 
-    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+    def requests(self, base: Requests) -> Requests:
         """Multipliers or exponents, once the orbit is there."""
         return {} if "motion" not in base or self.system.is_map else self.each(base["motion"])
 

@@ -13,7 +13,7 @@ from nonsmooth.explorer.labels import number
 from nonsmooth.explorer.raster import Layer, drawn
 from nonsmooth.explorer.schedule import key_of
 from nonsmooth.explorer.state import CHOICES
-from nonsmooth.explorer.views.view import Request, View
+from nonsmooth.explorer.views.view import Ends, Request, Requests, View
 from nonsmooth.plot.branches import MARKS, lines_of, ordinates_of, with_breaks
 from nonsmooth.plot.labels import in_words
 from nonsmooth.plot.style import COLORS
@@ -41,7 +41,7 @@ class Diagram(View):
         """Return whether either changed."""
         return old != new
 
-    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+    def requests(self, base: Requests) -> Requests:
         """A sweep that nothing judges, and one with a direction."""
         sweep = base["first look"]
         return {"first look": sweep, "diagram": {**sweep, "view": "diagram", "direction": self.state.direction}}
@@ -164,7 +164,7 @@ class Diagram(View):
             return state
         return replace(state, start=tuple(points[np.nanargmin(away)].tolist()))
 
-    def zoomed(self, x: tuple[float, float], y: tuple[float, float]) -> State:
+    def zoomed(self, x: Ends, y: Ends) -> State:
         """Compute the range that is seen."""
         self.redraw()
         return replace(self.state, low=x[0], high=x[1])
@@ -193,7 +193,7 @@ class Branches(View):
         """Return whether the diagram is shown, and its branches asked for."""
         return self.sheet.views["diagram"].shown and bool(self.setting("show") == "yes")
 
-    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+    def requests(self, base: Requests) -> Requests:
         """Branches over the diagram's range; those of a system without forcing begin at its cycle."""
         cycle = self.system.period() is None and not self.system.is_map
         begin = {"start": list(self.state.start)} if cycle else {}
@@ -280,7 +280,7 @@ class Response(View):
 
     name = "response"
 
-    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+    def requests(self, base: Requests) -> Requests:
         """Few frequencies, then many."""
         over, *ends = (self.setting(name) for name in ("over", "low", "high"))
         job = {**base["first look"], "over": over, "low": min(ends), "high": max(ends)}
@@ -353,7 +353,7 @@ class Response(View):
         state = state.with_value(over, float(one[over]))
         return replace(state, start=tuple(at[-1].tolist())) if np.isfinite(at[-1]).all() else state
 
-    def zoomed(self, x: tuple[float, float], y: tuple[float, float]) -> State:
+    def zoomed(self, x: Ends, y: Ends) -> State:
         """Compute the range that is seen."""
         return self.state.with_settings(response__low=x[0], response__high=x[1])
 

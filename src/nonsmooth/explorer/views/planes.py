@@ -13,7 +13,7 @@ from nonsmooth.explorer.figures import Panel
 from nonsmooth.explorer.labels import PREFIXES, power_of
 from nonsmooth.explorer.presets import first_state
 from nonsmooth.explorer.views.motion import Portrait
-from nonsmooth.explorer.views.view import Request, View
+from nonsmooth.explorer.views.view import Ends, Request, Requests, View
 from nonsmooth.plot import palette
 from nonsmooth.plot.planes import classes_of, legend_of, names_of
 from nonsmooth.plot.style import COLORS
@@ -97,7 +97,7 @@ class Chart(Cells):
         """Return whether either changed: the chart's abscissa is the diagram's."""
         return old != new
 
-    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+    def requests(self, base: Requests) -> Requests:
         """Each finer than the one before it, and exponents on a grid of their own."""
         across, low, high = (self.setting(name) for name in ("across", "low", "high"))
         sweep = base["first look"]
@@ -158,7 +158,7 @@ class Chart(Cells):
             state = state.with_value(str(dim), float(result[dim].sel({dim: value}, method="nearest")))
         return replace(state, start=first_state(state.model, self.system).start)
 
-    def zoomed(self, x: tuple[float, float], y: tuple[float, float]) -> State:
+    def zoomed(self, x: Ends, y: Ends) -> State:
         """Compute the range that is seen; the diagram's range is the same."""
         return replace(self.state, low=x[0], high=x[1]).with_settings(chart__low=y[0], chart__high=y[1])
 
@@ -177,7 +177,7 @@ class Basins(Cells):
 
     name = "basins"
 
-    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+    def requests(self, base: Requests) -> Requests:
         """Each finer than the one before it; initial values of states outside the plane are the page's."""
         state = self.state
         start = zip(self.system.states, state.start, strict=True)
@@ -260,7 +260,7 @@ class Basins(Cells):
 
     tapped = Portrait.tapped
 
-    def zoomed(self, x: tuple[float, float], y: tuple[float, float]) -> State:
+    def zoomed(self, x: Ends, y: Ends) -> State:
         """Compute the window that is seen."""
         return self.state.with_settings(**{f"basins__{end}": value for end, value in zip(_ENDS, (*x, *y), strict=True)})
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.explorer.figures import GREY, MOST
-from nonsmooth.explorer.views.view import Request, View
+from nonsmooth.explorer.views.view import Request, Requests, View
 
 __all__ = ["Recording"]
 
@@ -18,7 +18,7 @@ class Recording(View):
 
     name = "recording"
 
-    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+    def requests(self, base: Requests) -> Requests:
         """The distance of the recording from the motion, once that is there."""
         asked = self.sheet.bench.request(base["orbit"], base["motion"]["period"]) if "motion" in base else None
         return {} if asked is None else {"recording": asked}

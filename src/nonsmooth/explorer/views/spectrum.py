@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from nonsmooth.explorer.figures import BLUE, Panel
 from nonsmooth.explorer.labels import axis_label, number
-from nonsmooth.explorer.views.view import Request, View
+from nonsmooth.explorer.views.view import Requests, View
 from nonsmooth.plot.trajectories import FLOOR
 
 __all__ = ["Spectrum"]
@@ -21,7 +19,7 @@ class Spectrum(View):
 
     name = "spectrum"
 
-    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+    def requests(self, base: Requests) -> Requests:
         """One request, once the period number is known: that many periods have lines with no leakage."""
         return self.each(base["motion"]) if "motion" in base else {}
 

@@ -13,9 +13,11 @@ if TYPE_CHECKING:
     from nonsmooth.explorer.state import State
     from nonsmooth.system.system import System
 
-__all__ = ["View"]
+__all__ = ["Ends", "Request", "Requests", "View"]
 
 Request = dict[str, Any]
+Requests = Mapping[str, Request]
+Ends = tuple[float, float]
 
 
 class View:
@@ -81,11 +83,11 @@ class View:
         """Return whether the page shows this view."""
         return not self.kind.panel or getattr(self.state, self.kind.panel) == self.name
 
-    def requests(self, base: Mapping[str, Request]) -> dict[str, Request]:
+    def requests(self, base: Requests) -> Requests:
         """Requests by stage, the quick first; ``base`` holds what all of them have."""
         return {}
 
-    def each(self, request: Request) -> dict[str, Request]:
+    def each(self, request: Request) -> Requests:
         """The same request for every stage."""
         return {stage: {**request, "view": stage} for stage in (*self.kind.quick, *self.kind.slow)}
 
@@ -122,7 +124,7 @@ class View:
         start = dict(zip(self.system.states, self.state.start, strict=True)) | values
         return self.state.but("start", tuple(start.values()))
 
-    def zoomed(self, x: tuple[float, float], y: tuple[float, float]) -> State:
+    def zoomed(self, x: Ends, y: Ends) -> State:
         """The state after a zoom."""
         return self.state
 
