@@ -174,31 +174,36 @@ def diagram(
 
     ``returns`` (point, period number, state): all section points of each branch; ``parents`` the branches they leave.
     """
-    texts: dict[str, int] = {}
-    layouts: dict[str, int] = {}
+    # Words of the branches, each once, and of a branch's own numbers those in all.
+    known: dict[str, dict[str, int]] = {"signature": {}, "layout": {}}
+    kept = [*(column.name for column in (*ORBIT, *SPECIAL_ORBIT)), "status", "special_value"]
     width = max(one.sizes["unknown"] for one in branches)
     longest = max(points.shape[1] for points in returns)
     parts, offset = [], 0
     for k, (one, points) in enumerate(zip(branches, returns, strict=True)):
-        own = str(one["signature"].attrs["flag_meanings"]).split()
-        ids = np.array([texts.setdefault(text, len(texts)) for text in own], dtype=np.int32)
-        tables = [json.dumps(table) for table in json.loads(one.attrs["layouts"])]
-        kept = np.array([layouts.setdefault(table, len(layouts)) for table in tables], dtype=np.int32)
-        number = int(one["period_number"])
-        room = {"unknown": (0, width - one.sizes["unknown"])}
-        part = one[[*(column.name for column in (*ORBIT, *SPECIAL_ORBIT)), "status", "special_value"]]
-        part = part.pad(room, constant_values=np.nan)
-        part["signature"] = ("point", ids[one["signature"].values])
-        part["layout"] = ("point", kept[one["layout"].values])
-        part["special_point"] = ("special", one["special_point"].values + offset)
-        part["branch"] = ("point", np.full(one.sizes["point"], k))
-        part["special_branch"] = ("special", np.full(one.sizes["special"], k))
-        part["special_period_number"] = ("special", np.full(one.sizes["special"], number))
-        all_returns = np.full((len(points), longest, points.shape[2]), np.nan)
-        all_returns[:, : points.shape[1]] = points
-        part["returns"] = (("point", "return", "state"), all_returns)
-        parts.append(part)
-        offset += one.sizes["point"]
+        words = {
+            "signature": str(one["signature"].attrs["flag_meanings"]).split(),
+            "layout": [json.dumps(layout) for layout in json.loads(one.attrs["layouts"])],
+        }
+        ids = {
+            name: np.array([known[name].setdefault(text, len(known[name])) for text in own], dtype=np.int32)
+            for name, own in words.items()
+        }
+        n, special = one.sizes["point"], one.sizes["special"]
+        room = {"return": (0, longest - points.shape[1]), "unknown": (0, width - one.sizes["unknown"])}
+        every = xr.Variable(("point", "return", "state"), points, {"long_name": "section points"})
+        parts.append(one[kept].assign({
+            **{name: ("point", own[one[name].values], one[name].attrs) for name, own in ids.items()},
+            "special_point": ("special", one["special_point"].values + offset, one["special_point"].attrs),
+            "branch": ("point", np.full(n, k), {"long_name": "branch"}),
+            "special_branch": ("special", np.full(special, k), {"long_name": "branch of the special point"}),
+            "special_period_number": (
+                "special", np.full(special, int(one["period_number"])),
+                {"long_name": "period number of the special point's orbit"},
+            ),
+            "returns": every,
+        }).pad(room, constant_values=np.nan))  # fmt: skip
+        offset += n
     lines = [part.drop_dims("special") for part in parts]
     marks = [part[[name for name in part if "special" in part[name].dims]] for part in parts]
     result = xr.merge([
@@ -210,12 +215,7 @@ def diagram(
     for name in result.variables:
         if name in branches[0].variables:
             result[name].attrs = dict(branches[0][name].attrs)
-    result["signature"].attrs |= flag_attributes(list(texts), dtype=np.int32)
-    for name, words in (
-        ("branch", "branch"), ("special_branch", "branch of the special point"), ("returns", "section points"),
-        ("special_period_number", "period number of the special point's orbit"),
-    ):  # fmt: skip
-        result[name].attrs["long_name"] = words
+    result["signature"].attrs |= flag_attributes(list(known["signature"]), dtype=np.int32)
     column = {name: swept[name].transpose("direction", parameter, ...) for name in ("section", "period_number")}
     sentences = np.array([one["ended_because"].values for one in branches], dtype=str)
     result = result.assign({
@@ -234,7 +234,7 @@ def diagram(
         "complete": ((), np.int8(complete), {"long_name": "all branches were followed within the budget"}),
     })  # fmt: skip
     result = result.assign_coords(direction=swept["direction"].variable)
-    result.attrs = dict(attrs) | {"parameter": parameter, "layouts": f"[{', '.join(layouts)}]"}
+    result.attrs = dict(attrs) | {"parameter": parameter, "layouts": f"[{', '.join(known['layout'])}]"}
     if "visited" in branches[0].attrs:
         told = [json.loads(one.attrs["visited"]) for one in branches]
         result.attrs["visited"] = json.dumps([{k: v for one in told for k, v in one[i].items()} for i in (0, 1)])
