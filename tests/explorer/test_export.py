@@ -15,8 +15,8 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.cli import main as cli
+from nonsmooth.explorer.catalogue import first_state
 from nonsmooth.explorer.export import KINDS, exported
-from nonsmooth.explorer.presets import first_state
 
 SYSTEM = ns.models.discontinuous_support(rho=0.26)
 STATE = first_state("discontinuous_support", SYSTEM)

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.explorer.presets import first_state
+from nonsmooth.explorer.catalogue import first_state
 from nonsmooth.explorer.worker import Answer, Worker, _Cancelled
 
 SYSTEM = ns.models.discontinuous_support()

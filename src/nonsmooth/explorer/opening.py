@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.explorer.presets import GIVEN, first_state
+from nonsmooth.explorer.catalogue import GIVEN, first_state
 from nonsmooth.explorer.state import CHOICES, to_query, within
 
 if TYPE_CHECKING:

@@ -18,12 +18,11 @@ from bokeh.models import TextInput
 from jinja2 import DictLoader, Environment
 
 from nonsmooth.explorer.building import KINDS, LINK, Workshop
-from nonsmooth.explorer.catalogue import Catalogue
+from nonsmooth.explorer.catalogue import Catalogue, presets_of, slider_range
 from nonsmooth.explorer.export import exported
 from nonsmooth.explorer.figures import theme
 from nonsmooth.explorer.kinds import KINDS as VIEWS
 from nonsmooth.explorer.kinds import PANELS
-from nonsmooth.explorer.presets import presets_of, slider_range
 from nonsmooth.explorer.schedule import Schedule, key_of
 from nonsmooth.explorer.sheet import Sheet
 from nonsmooth.explorer.state import History, State, changed

@@ -7,18 +7,27 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from nonsmooth.explorer.bench import Bench
+from nonsmooth.explorer.catalogue import GIVEN, presets_of, slider_range
 from nonsmooth.explorer.export import KINDS as FILES
 from nonsmooth.explorer.kinds import KINDS, ORDER, SETTINGS, setting
 from nonsmooth.explorer.labels import html_of, plain_of, symbols_of
-from nonsmooth.explorer.presets import GIVEN, presets_of, slider_range
 from nonsmooth.explorer.state import CHOICES, to_query
-from nonsmooth.explorer.views import VIEWS
+from nonsmooth.explorer.views.motion import History, Portrait, Readout, Section
+from nonsmooth.explorer.views.over_parameters import Branches, Diagram, Response
+from nonsmooth.explorer.views.planes import Basins, Chart
+from nonsmooth.explorer.views.recording import Recording
+from nonsmooth.explorer.views.spectrum import Spectrum
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.schedule import Asked
     from nonsmooth.explorer.session import Session
 
 __all__ = ["Sheet"]
+
+#: Drawing of each of ``KINDS``; what draws into another's figure comes behind it.
+_VIEWS = (
+    Portrait, Diagram, Section, Readout, History, Branches, Response, Chart, Basins, Spectrum, Recording,
+)  # fmt: skip
 
 
 class Sheet:
@@ -27,7 +36,7 @@ class Sheet:
     def __init__(self, page: Session) -> None:
         self.page, self.bench = page, Bench(page)
         self.views: dict[str, Any] = {}
-        for one in VIEWS:
+        for one in _VIEWS:
             self.views[one.name] = one(self)
         self.views = {name: self.views[name] for name in KINDS}
         self._of = page.subject  # of what is drawn

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from bokeh.models import CustomJSHover, LinearColorMapper
 
+from nonsmooth.explorer.catalogue import first_state
 from nonsmooth.explorer.figures import Panel
 from nonsmooth.explorer.labels import PREFIXES, power_of
-from nonsmooth.explorer.presets import first_state
 from nonsmooth.explorer.views.motion import Portrait
 from nonsmooth.explorer.views.view import Ends, Request, Requests, View
 from nonsmooth.plot import palette
