@@ -1,4 +1,4 @@
-"""What continuation finds: branches, curves of special points, multipliers, manifolds, branches of experiments."""
+"""Results of continuation: branches, curves of special points, multipliers, manifolds, branches of experiments."""
 
 from __future__ import annotations
 
