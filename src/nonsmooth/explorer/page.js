@@ -86,18 +86,14 @@
     fill($("model"), [...Object.entries(ui.models), ["", "build one …"]], ui.state.model);
     fill($("preset"), [["", "choose …"], ...ui.presets.map(one => [one, one])], "");
     $("preset-label").hidden = !ui.presets.length;
-    for (const name of ["method", "direction"]) fill($(name), Object.entries(ui.choices[name]), ui.state[name]);
-    fill($("save-kind"), Object.entries(ui.kinds), $("save-kind").value || "pdf");
-    fill($("over"), Object.entries(ui.plain), ui.state.over);
-    for (const name of ["x", "y", "shown"]) fill($(name), ui.states.map(one => [one.name, one.plain]), ui.state[name]);
-    for (const name of ["low", "high", "phase", "eta"]) put($(name), short(ui.state[name]));
-    for (const name of ["transient", "keep", "columns"]) put($(name), ui.state[name]);
+    for (const one of all("[data-set]")) {
+      const name = one.dataset.set, value = ui.state[name];
+      if (name in ui.choices) fill(one, ui.choices[name], value); else put(one, short(value));
+    }
     if (held !== $("phase-slider")) $("phase-slider").value = ui.state.phase;
     $("phase-box").hidden = !ui.forced;
     $("eta-label").hidden = ui.state.method !== "smoothed";
     [$("undo").disabled, $("redo").disabled] = ui.can.map(can => !can);
-    for (const [name, words] of Object.entries(ui.words)) fill($(name), Object.entries(words), ui.settings[name]);
-    for (const [name, value] of Object.entries(ui.settings)) if (!(name in ui.words)) put($(name), short(value));
     for (const [name, legend] of Object.entries(ui.legends)) if ($("legend-" + name))
       $("legend-" + name).replaceChildren(...legend.flatMap(([text, color]) => [node("i", {style: "background:" + color}), text]));
     $("tabs").hidden = ui.tabs < 2;

@@ -19,6 +19,7 @@ from jinja2 import DictLoader, Environment
 
 from nonsmooth.explorer.building import KINDS, LINK, Workshop
 from nonsmooth.explorer.catalogue import Catalogue, presets_of, slider_range
+from nonsmooth.explorer.export import KINDS as FILES
 from nonsmooth.explorer.export import exported
 from nonsmooth.explorer.figures import theme
 from nonsmooth.explorer.kinds import KINDS as VIEWS
@@ -115,7 +116,7 @@ class Session:
         document.template = Environment(loader=DictLoader(texts)).get_template("page.html")
         program = "\n".join(text for name, text in texts.items() if name.endswith(".js"))
         document.template_variables.update(
-            link=LINK, kinds=KINDS, style=texts["page.css"], program=program, panels=PANELS, views=VIEWS
+            link=LINK, kinds=KINDS, style=texts["page.css"], program=program, panels=PANELS, views=VIEWS, files=FILES
         )
         for view in self.sheet.views.values():
             if view.figure is not None:

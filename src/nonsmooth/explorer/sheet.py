@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from nonsmooth.explorer.bench import Bench
 from nonsmooth.explorer.catalogue import GIVEN, presets_of, slider_range
-from nonsmooth.explorer.export import KINDS as FILES
 from nonsmooth.explorer.kinds import KINDS, ORDER, SETTINGS, setting
 from nonsmooth.explorer.labels import html_of, plain_of, symbols_of
 from nonsmooth.explorer.state import CHOICES, to_query
@@ -44,7 +43,7 @@ class Sheet:
 
     @property
     def results(self) -> dict[str, Any]:
-        """What all views hold, by name."""
+        """Results of all views, by name."""
         return {name: result for view in self.views.values() for name, result in view.results.items()}
 
     @property
@@ -100,6 +99,12 @@ class Sheet:
         system, state = self.page.system, self.page.state
         fields = {name: one for name, one in SETTINGS.items() if one.label}
         symbols, rows = symbols_of(system), []
+        plain = {name: plain_of(symbol) for name, symbol in symbols.items()}
+        choices = {
+            **CHOICES, "over": {name: plain[name] for name in system.parameters},
+            **{axis: {name: plain[name] for name in system.states} for axis in ("x", "y", "shown")},
+            **{name: one.choices(system, state) for name, one in fields.items() if one.choices is not None},
+        }  # fmt: skip
         for name, parameter in system.parameters.items():
             value = state.values[name]
             also = (value, state.low, state.high) if name == state.over else (value,)
@@ -112,15 +117,12 @@ class Sheet:
             "models": {name: "your system" if name == GIVEN else name.replace("_", " ") for name in models},
             "presets": list(presets_of(state)), "parameters": rows,
             "states": [
-                {"name": name, "html": html_of(symbols[name]), "plain": plain_of(symbols[name]), "unit": unit,
-                 "value": value}
+                {"name": name, "html": html_of(symbols[name]), "unit": unit, "value": value}
                 for (name, unit), value in zip(system.states.items(), state.start, strict=True)
             ],
-            "plain": {name: plain_of(symbols[name]) for name in system.parameters},
-            "choices": CHOICES, "kinds": FILES,
-            "state": {key: value for key, value in vars(state).items() if key not in ("values", "settings")},
+            "choices": {name: list(words.items()) for name, words in choices.items()},
+            "state": {key: value for key, value in vars(state).items() if key not in ("values", "settings")}
+            | {name: setting(name, system, state) for name in fields},
             "query": to_query(state), "forced": system.period() is not None,
             "legends": {name: view.legend() for name, view in self.views.items()},
-            "settings": {name: setting(name, system, state) for name in fields},
-            "words": {name: one.choices(system, state) for name, one in fields.items() if one.choices is not None},
         }  # fmt: skip
