@@ -25,6 +25,9 @@
     on(input, "change", done);
     on(input, "keydown", event => { if (event.key === "Enter") done(); });
   }
+  /* A choice or a field hands its value over, and takes that of the server. */
+  const bind = (one, commit) => one.tagName === "SELECT" ? on(one, "change", () => commit(one.value)) : field(one, commit);
+  const show = (one, choices, value) => choices ? fill(one, choices, value) : put(one, short(value));
   /* A slider is followed while it moves, and leaves the server's values alone until it is let go. */
   function slide(range, follow) {
     on(range, "input", () => { held = range; follow(Number(range.value)); });
@@ -87,8 +90,7 @@
     fill($("preset"), [["", "choose …"], ...ui.presets.map(one => [one, one])], "");
     $("preset-label").hidden = !ui.presets.length;
     for (const one of all("[data-set]")) {
-      const name = one.dataset.set, value = ui.state[name];
-      if (name in ui.choices) fill(one, ui.choices[name], value); else put(one, short(value));
+      show(one, ui.choices[one.dataset.set], ui.state[one.dataset.set]);
     }
     if (held !== $("phase-slider")) $("phase-slider").value = ui.state.phase;
     $("phase-box").hidden = !ui.forced;
@@ -150,7 +152,7 @@
     const channel = doc && doc.get_model_by_name("act");
     if (!channel) return setTimeout(connect, 30);
     send = text => { channel.value = text; };
-    const parts = (window.parts || []).map(part => part({$, node, on, act, field, put, fill, short, file, progress}));
+    const parts = (window.parts || []).map(part => part({$, node, on, act, bind, show, file, progress}));
     for (const [name, hear] of Object.entries(Object.assign({ui: render, readout, busy, notes, file}, ...parts))) {
       const model = doc.get_model_by_name(name);
       const told = () => { if (model.value) hear(JSON.parse(model.value)); };
@@ -158,8 +160,7 @@
       told();
     }
     for (const one of all("[data-set]")) {
-      const commit = () => { act("set", one.dataset.set, one.value); act("end"); };
-      if (one.tagName === "SELECT") on(one, "change", commit); else field(one, commit);
+      bind(one, value => { act("set", one.dataset.set, value); act("end"); });
     }
     for (const list of all("[data-panel]")) {
       on(list, "click", event => {

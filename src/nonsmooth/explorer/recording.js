@@ -1,5 +1,5 @@
 /* The panel of a recording: a file is read in the page as bytes and handed over; what they mean, the server's readers say. */
-(window.parts = window.parts || []).push(({$, node, on, act, field, put, fill, short, progress}) => {
+(window.parts = window.parts || []).push(({$, node, on, act, bind, show, progress}) => {
   let most = 0, built = "", file = "";
 
   function take(file) {
@@ -24,21 +24,17 @@
   });
   for (const [id, what] of [["fit", "fit"], ["cancel", "cancel"], ["remove", "remove"], ["drive", "take drive"]])
     on($("recording-" + id), "click", () => act(what, "recording"));
-  for (const name of ["run", "turns"])
-    on($("recording-" + name), "change", () => act("recording", "recording." + name, $("recording-" + name).value));
-  for (const name of ["begin", "end"]) field($("recording-" + name), value => act("recording", "recording." + name, value));
+  const own = ["run", "turns", "begin", "end"], parts = ["channel", "factor", "shift"];
+  for (const name of own) bind($("recording-" + name), value => act("recording", "recording." + name, value));
 
-  function rows(told) {
+  function rows(told, channels) {
     const key = JSON.stringify(told.rows.map(one => one.name).concat(told.ticks.map(one => one.name)));
     if (key !== built) {
       built = key;
       $("recording-rows").replaceChildren(...told.rows.map(one => {
-        const set = (what, value) => act("recording", "recording." + what + "." + one.name, value);
-        const [channel, factor, shift] = ["channel", "factor", "shift"].map(what => node(
+        const [channel, factor, shift] = parts.map(what => node(
           what === "channel" ? "select" : "input", {id: what + "-" + one.name, inputMode: "decimal", ariaLabel: what + " of " + one.name}));
-        on(channel, "change", () => set("channel", channel.value));
-        field(factor, value => set("factor", value));
-        field(shift, value => set("shift", value));
+        [channel, factor, shift].forEach((part, k) => bind(part, value => act("recording", "recording." + parts[k] + "." + one.name, value)));
         const scale = node("div", {className: "scale"}, "× ", factor, " + ", shift, node("span", {className: "unit", textContent: " " + one.unit}));
         return node("div", {className: "measured"}, node("div", {}, node("b", {innerHTML: one.html}), " = ", channel), scale);
       }));
@@ -49,11 +45,8 @@
       }));
     }
     for (const one of told.rows) {
-      const channel = $("channel-" + one.name);
-      fill(channel, [["", "not recorded"], ...told.channels], one.channel);
-      channel.closest(".measured").querySelector(".scale").hidden = !one.channel;
-      put($("factor-" + one.name), short(one.factor));
-      put($("shift-" + one.name), short(one.shift));
+      for (const what of parts) show($(what + "-" + one.name), what === "channel" && channels, one[what]);
+      $("channel-" + one.name).closest(".measured").querySelector(".scale").hidden = !one.channel;
     }
     for (const one of told.ticks) $("fit-" + one.name).checked = one.on;
   }
@@ -68,13 +61,11 @@
     if (file !== told.file) { file = told.file; $("recording-name").closest("div").scrollIntoView({block: "nearest"}); }
     $("recording-name").textContent = told.file;
     $("recording-name").title = told.more.join("\n");
-    fill($("recording-run"), told.runs.map(one => [one, one]), told.run);
+    const channels = [["", "not recorded"], ...told.channels], choices = {run: told.runs.map(one => [one, one]), turns: channels};
+    for (const name of own) show($("recording-" + name), choices[name], told[name]);
     $("recording-run").closest("label").hidden = told.runs.length < 2;
-    fill($("recording-turns"), [["", "not recorded"], ...told.channels], told.turns);
-    put($("recording-begin"), short(told.begin));
-    put($("recording-end"), short(told.end));
     $("recording-unit").textContent = told.unit;
-    rows(told);
+    rows(told, channels);
     $("recording-fit").disabled = Boolean(told.doing);
     $("recording-drive-box").hidden = !told.drive;
     $("recording-drive-text").textContent = told.drive;
