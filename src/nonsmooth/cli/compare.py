@@ -27,8 +27,10 @@ _TABLES: dict[str, Any] = {
 }  # fmt: skip
 #: Pictures by what is compared: the functions ``comparison_NAME`` of ``nonsmooth.plot``, the usual one first.
 _PICTURES = {
-    "motion": ("phase_portrait", "time", "section", "distances"), "response": ("response",), "diagram": ("diagram",),
-}  # fmt: skip
+    "motion": ("phase_portrait", "time", "section", "distances"),
+    "response": ("response",),
+    "diagram": ("diagram",),
+}
 
 
 def add(commands: Any) -> None:
@@ -41,15 +43,19 @@ def add(commands: Any) -> None:
         epilog="examples:\n  nonsmooth compare compare.toml\n  nonsmooth compare session/ --identified parameters.nc",
     )
     parser.add_argument(
-        "study", type=Path, metavar="STUDY.toml",
+        "study",
+        type=Path,
+        metavar="STUDY.toml",
         help="the study file; or a session folder: all that it holds is compared, run by run, and no file is written",
-    )  # fmt: skip
+    )
     parser.add_argument("--model", default="discontinuous_support", help="the model for a session folder")
     parser.add_argument("--identified", type=Path, metavar="FILE", help="identified parameters for a session folder")
     parser.add_argument(
-        "--identified-from", type=Path, metavar="SESSION",
+        "--identified-from",
+        type=Path,
+        metavar="SESSION",
         help="the session that they were identified from: its screw readings tell the screw's zero",
-    )  # fmt: skip
+    )
     parser.add_argument("--quiet", action="store_true", help="no summary")
     parser.set_defaults(run=_run)
 

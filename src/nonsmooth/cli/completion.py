@@ -44,13 +44,14 @@ class _Command:
 def add(commands: Any) -> None:
     """Declare the sub-command."""
     parser = commands.add_parser(
-        "completion", help="print the completion script of a shell",
+        "completion",
+        help="print the completion script of a shell",
         description="Print a script that lets a shell complete commands, options and names.",
         epilog="examples:\n"
         '  eval "$(nonsmooth completion bash)"       # in ~/.bashrc\n'
         '  eval "$(nonsmooth completion zsh)"        # in ~/.zshrc, after compinit\n'
         "  nonsmooth completion fish > ~/.config/fish/completions/nonsmooth.fish",
-    )  # fmt: skip
+    )
     parser.add_argument("shell", choices=sorted(_SCRIPTS), help="the shell")
     parser.set_defaults(run=_run)
 

@@ -27,9 +27,11 @@ def add(commands: Any) -> None:
         '  nonsmooth explore "http://127.0.0.1:5180/?model=..."  # a view that somebody shared',
     )
     parser.add_argument(
-        "model", nargs="?", metavar="MODEL",
+        "model",
+        nargs="?",
+        metavar="MODEL",
         help='a name of `nonsmooth models`, "file.py:object", a study file, a result, or the address of a view',
-    )  # fmt: skip
+    )
     parser.add_argument("--port", type=int, help="port on 127.0.0.1 (default: 5180, or any that is free)")
     parser.add_argument("--no-browser", action="store_true", help="print the address, open no browser")
     parser.set_defaults(run=_run)

@@ -31,14 +31,17 @@ NAMES: Kind = (
 )
 LENGTH: Kind = lambda value: isinstance(value, int | float) and not isinstance(value, bool), "a length in m"
 QUANTITIES: Kind = (
-    lambda value: isinstance(value, dict), "a table of numbers or of { value = ..., uncertainty = ... }"
-)  # fmt: skip
+    lambda value: isinstance(value, dict),
+    "a table of numbers or of { value = ..., uncertainty = ... }",
+)
 
 
 def read_tables(
-    path: Path, known: Mapping[str, Mapping[str, Kind] | None], what: str = "study file",
+    path: Path,
+    known: Mapping[str, Mapping[str, Kind] | None],
+    what: str = "study file",
     needed: Mapping[str, tuple[str, ...]] | None = None,
-) -> dict[str, dict[str, Any]]:  # fmt: skip
+) -> dict[str, dict[str, Any]]:
     """The tables of a TOML file.
 
     Parameters

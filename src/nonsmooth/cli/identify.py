@@ -63,9 +63,11 @@ def _run(options: argparse.Namespace) -> int:
 
     study = _read(options.study)
     found = identify(
-        study.session, study.model, apparatus=study.apparatus,
+        study.session,
+        study.model,
+        apparatus=study.apparatus,
         crank_length=study.crank_length if options.crank is None else options.crank,
-    )  # fmt: skip
+    )
     require(found, study.parameters)
     print(found)
     if not options.quiet:

@@ -21,14 +21,15 @@ _WIDTH = 100
 def add(commands: Any) -> None:
     """Declare the sub-command."""
     parser = commands.add_parser(
-        "init", help="write a study file to begin with",
+        "init",
+        help="write a study file to begin with",
         description="Write a study file for a model: it runs as it is, and holds every option of the verb as a comment "
         "with its default. An existing file is left alone.",
         epilog="examples:\n"
         "  nonsmooth init discontinuous_support\n"
         "  nonsmooth init impact_oscillator --verb sweep --out stop.toml\n"
         "  nonsmooth init my_oscillator.py:oscillator --verb basins",
-    )  # fmt: skip
+    )
     parser.add_argument("model", metavar="MODEL", help='a name of `nonsmooth models`, or "file.py:object"')
     parser.add_argument("--verb", choices=VERBS, default="simulate", help="what to compute (default: simulate)")
     parser.add_argument("--out", type=Path, metavar="STUDY.toml", help="the file (default: MODEL_VERB.toml)")

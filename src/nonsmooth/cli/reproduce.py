@@ -27,15 +27,19 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("study", metavar="STUDY", help="the study, for example savi2007")
     parser.add_argument(
-        "--figure", action="append", metavar="N",
+        "--figure",
+        action="append",
+        metavar="N",
         help="only this figure of the paper, by model and rig, or one by its name (fig11_rig, table1, eta, ...); "
         "may be repeated",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--out", type=Path, metavar="DIR",
+        "--out",
+        type=Path,
+        metavar="DIR",
         help="where to write (default: out/STUDY, with --quick out/STUDY_quick); what an earlier or an interrupted run "
         "finished there is used again",
-    )  # fmt: skip
+    )
     parser.add_argument("--quick", action="store_true", help="coarser grids and shorter runs: a first look")
     parser.add_argument(
         "--full", action="store_true", help="large charts over two parameters too; an interrupted run goes on"

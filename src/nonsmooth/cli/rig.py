@@ -25,14 +25,18 @@ def add(commands: Any) -> None:
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="draws the rig and its noise (default 0)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="the session folder, made if needed")
     parser.add_argument(
-        "--figure", type=int, metavar="N",
+        "--figure",
+        type=int,
+        metavar="N",
         help="what stands behind one of the paper's Figs. 4 to 18, on a rig with the published parameters",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--procedures", nargs="+", metavar="NAME",
+        "--procedures",
+        nargs="+",
+        metavar="NAME",
         help="which to record: springs, support, impulse, drop, response, voltage, crank, grazing, contact (all of "
         "these where not given), rise, section",
-    )  # fmt: skip
+    )
     parser.add_argument("--truth", type=Path, metavar="FILE", help="where the truth goes (default: DIR.truth.toml)")
     parser.add_argument("--quiet", action="store_true", help="no summary")
     parser.set_defaults(run=_run)

@@ -26,9 +26,11 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("study", type=Path, metavar="STUDY.toml", help="the study file")
     parser.add_argument(
-        "--store", type=Path, metavar="STORE.zarr",
+        "--store",
+        type=Path,
+        metavar="STORE.zarr",
         help="keep finished chunks of a chart or of basins there, and go on from what is there (or [output] store)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="compute the chunks on the workers of this Dask scheduler (tcp://...)"
     )

@@ -32,10 +32,12 @@ _WRITTEN: dict[str, dict[str, Any]] = {
     "values": {"allOf": [{"$ref": "#/definitions/values"}]},  # beside a $ref nothing else would count
     "start": {"allOf": [{"$ref": "#/definitions/start"}]},
     "grid": {
-        "type": "object", "additionalProperties": {"$ref": "#/definitions/values"}, "minProperties": 2,
+        "type": "object",
+        "additionalProperties": {"$ref": "#/definitions/values"},
+        "minProperties": 2,
         "maxProperties": 2,
     },
-}  # fmt: skip
+}
 _NUMBERS = {"type": "array", "items": {"type": "number"}}
 _STATE = {"anyOf": [_NUMBERS, _TYPES["Mapping[str, float]"]]}
 
@@ -43,13 +45,13 @@ _STATE = {"anyOf": [_NUMBERS, _TYPES["Mapping[str, float]"]]}
 def add(commands: Any) -> None:
     """Declare the sub-command."""
     parser = commands.add_parser(
-        "schema", help="write the JSON Schema of study files, for editors",
+        "schema",
+        help="write the JSON Schema of study files, for editors",
         description="Write the JSON Schema (draft 4) of the study files of `nonsmooth run`, made from the verbs' own "
         "options. An editor with a TOML language server (taplo; in VS Code: Even Better TOML) checks a study file "
         "whose first line is  #:schema ./study.schema.json",
-        epilog="examples:\n"
-        "  nonsmooth schema --out study.schema.json",
-    )  # fmt: skip
+        epilog="examples:\n  nonsmooth schema --out study.schema.json",
+    )
     parser.add_argument("--out", type=Path, metavar="FILE", help="where to write it (else it is printed)")
     parser.set_defaults(run=_run)
 
@@ -125,9 +127,10 @@ def _place(key: str, endings: tuple[str, ...]) -> dict[str, Any]:
         return {"type": "string", "description": f"State on the figure's {key} axis."}
     pattern = "|".join(re.escape(ending) for ending in endings)
     return {
-        "type": "string", "pattern": f"({pattern})$",
+        "type": "string",
+        "pattern": f"({pattern})$",
         "description": f"Name of a file that ends in {', '.join(endings)}; relative to the study file.",
-    }  # fmt: skip
+    }
 
 
 def _option(option: Option) -> dict[str, Any]:

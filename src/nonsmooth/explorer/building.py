@@ -49,9 +49,11 @@ class Kind:
 
 #: Of a mass: its own, and of the spring, the damper and the force at it.
 LINK: Mapping[str, Quantity] = {
-    "m": Quantity("mass", "kg", 1.0, "m", least=1e-12), "k": Quantity("stiffness", "N/m", 1.0, "k", least=0.0),
-    "c": Quantity("damping", "N s/m", 0.1, "c", least=0.0), "F": Quantity("force", "N", 0.0, "F"),
-}  # fmt: skip
+    "m": Quantity("mass", "kg", 1.0, "m", least=1e-12),
+    "k": Quantity("stiffness", "N/m", 1.0, "k", least=0.0),
+    "c": Quantity("damping", "N s/m", 0.1, "c", least=0.0),
+    "F": Quantity("force", "N", 0.0, "F"),
+}
 _POSITION = Quantity("position", "m", 0.5, "d")
 _STIFFNESS = Quantity("stiffness", "N/m", 20.0, "s", least=0.0)
 KINDS: Mapping[str, Kind] = {
@@ -98,8 +100,10 @@ class Plan:
         """Value and unit of every parameter, by its name: ``k2`` is the spring before the second mass."""
         found = {
             f"{quantity.letter}{i}": (link[key], quantity.unit)
-            for i, link in enumerate(self.links, 1) for key, quantity in LINK.items() if key != "F" or link["F"]
-        }  # fmt: skip
+            for i, link in enumerate(self.links, 1)
+            for key, quantity in LINK.items()
+            if key != "F" or link["F"]
+        }
         if self.forced:
             found["omega"] = (self.omega, "rad/s")
         for i, placed in enumerate(self.elements, 1):
@@ -288,6 +292,7 @@ class Workshop:
 
     def tell(self) -> None:
         """The form as it is now."""
+
         def quantity(one: Any) -> dict[str, Any]:
             return {"label": one.label, "unit": one.unit, "value": one.value}
 

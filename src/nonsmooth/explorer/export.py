@@ -105,9 +105,10 @@ def study_of(result: Any, axes: Mapping[str, str], model: str, stem: str) -> str
 def _values(system: Any, record: Mapping[str, Any]) -> dict[str, float]:
     """The parameters that the verb was given."""
     return {
-        name: float(record["system"]["parameters"][name] or system.values[name]) for name in system.parameters
+        name: float(record["system"]["parameters"][name] or system.values[name])
+        for name in system.parameters
         if name != "eta" or not system.is_smoothed
-    }  # fmt: skip
+    }
 
 
 def _options(record: Mapping[str, Any], result: Any) -> dict[str, Any]:
@@ -116,9 +117,10 @@ def _options(record: Mapping[str, Any], result: Any) -> dict[str, Any]:
     if record["verb"] == "frequency_response":  # which hands its further options on
         defaults = {**inspect.signature(ns.sweep).parameters, **defaults}
     found = {
-        name: value for name, value in record["options"].items()
+        name: value
+        for name, value in record["options"].items()
         if name not in defaults or value != defaults[name].default
-    }  # fmt: skip
+    }
     if "values" in found:
         found["values"] = result[record["options"]["parameter"]].values
     if "grid" in found:

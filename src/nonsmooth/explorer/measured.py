@@ -44,8 +44,9 @@ def read(job: Mapping[str, Any]) -> dict[str, Any]:
     for run, node in recording.tree.children.items():
         runs[str(run)] = {
             str(channel): Channel(str(array.attrs["units"]), array[array.dims[0]].values, array.values)
-            for leaf in node.children.values() for channel, array in leaf.to_dataset().data_vars.items()
-        }  # fmt: skip
+            for leaf in node.children.values()
+            for channel, array in leaf.to_dataset().data_vars.items()
+        }
     return {"recorded": Recorded(name, runs, tuple(recording.warnings), recording.synthetic, axis)}
 
 
@@ -172,9 +173,11 @@ def strand_distance(
     coarse = [float(nearest(i / 32).sum()) for i in range(32)]
     best = int(np.argmin(coarse)) / 32
     fine = minimize_scalar(
-        lambda s: float(nearest(s).sum()), bounds=(best - 1 / 32, best + 1 / 32), method="bounded",
+        lambda s: float(nearest(s).sum()),
+        bounds=(best - 1 / 32, best + 1 / 32),
+        method="bounded",
         options={"xatol": 1e-6},
-    )  # fmt: skip
+    )
     shift = float(fine.x) if fine.fun <= min(coarse) else best
     return np.sqrt(nearest(shift)) * size, (shift + 0.5) % 1.0 - 0.5
 
@@ -186,18 +189,21 @@ def fitted(job: Job) -> dict[str, Any]:
     take = slice(None, None, step)
     table = {
         state: (samples.time[take][ok], column[take][ok])
-        for state, column in samples.columns.items() for ok in [np.isfinite(column[take])]
-    }  # fmt: skip
+        for state, column in samples.columns.items()
+        for ok in [np.isfinite(column[take])]
+    }
     unknown = [*job["parameters"], *(["phase"] if job.forced else [])]
     found = ns.fit(job.system, table, unknown, progress=job.heard)
     return {
-        "values": dict(found), "told": {
+        "values": dict(found),
+        "told": {
             name: str(one) if np.isfinite(one.uncertainty) else found.identifiability[name]
             for name, one in found.estimates.items()
         },
         "anomalies": [*found.anomalies],
-        "samples": sum(len(t) for t, _ in table.values()), "step": step,
-    }  # fmt: skip
+        "samples": sum(len(t) for t, _ in table.values()),
+        "step": step,
+    }
 
 
 @lru_cache(maxsize=2)

@@ -27,7 +27,7 @@ def drawn(layers: list[Layer], low: float, high: float, height: int) -> NDArray[
         column = np.broadcast_to(np.arange(columns)[:, None], points.shape)[there]
         counts = np.bincount(
             rows[there].astype(np.int64).clip(0) * columns + column, minlength=height * columns
-        ).reshape(height, columns)  # fmt: skip
+        ).reshape(height, columns)
         thick = counts.copy()
         for k in range(1, size):
             shift = (k + 1) // 2 * (1 if k % 2 else -1)

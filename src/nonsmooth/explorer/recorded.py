@@ -256,9 +256,10 @@ def unlike(recorded: Recorded, setup: Setup, system: System) -> list[str]:
     return [
         f"{name} is in {channels[name].unit or 'no unit'}, {state} in {system.states[state]}: give the factor"
         for state, name in setup.channels.items()
-        if setup.factors.get(state, 1.0) == 1.0 and system.states[state] not in ("", "1")
+        if setup.factors.get(state, 1.0) == 1.0
+        and system.states[state] not in ("", "1")
         and not _factor(channels[name].unit, system.states[state])
-    ]  # fmt: skip
+    ]
 
 
 def _factor(unit: str, wanted: str) -> float | None:

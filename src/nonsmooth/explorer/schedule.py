@@ -82,9 +82,10 @@ class Schedule:
         wanted = {view: (spec, key_of(spec)) for view, spec in self.page.wanted().items()}
         self._tell_notes({view: key for view, (_, key) in wanted.items()})
         missing = [
-            view for view in ORDER
+            view
+            for view in ORDER
             if view in wanted and wanted[view][1] not in (self.done.get(view), self._failed.get(view))
-        ]  # fmt: skip
+        ]
         if "first look" in missing and self._looked[0] == self.page.subject[0] and self._looked[1] < _BLINK:
             missing.sort(key=lambda view: view != "first look")
         now, running, order = time.monotonic(), self._running, [*ORDER]

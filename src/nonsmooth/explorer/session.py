@@ -43,6 +43,7 @@ TEXTS = (
     "page.html", "recording.html", "building.html", "page.css", "recording.js", "building.js", "tour.js", "page.js",
 )  # fmt: skip
 
+
 class Session:
     """The page of one browser tab.
 
@@ -99,9 +100,11 @@ class Session:
         request = getattr(context, "request", None)
         arguments = getattr(request, "arguments", None) or {}
         pairs = [
-            (name, value.decode(errors="replace")) for name, values in arguments.items() if name != "token"
+            (name, value.decode(errors="replace"))
+            for name, values in arguments.items()
+            if name != "token"
             for value in values
-        ]  # fmt: skip
+        ]
         try:
             return self.catalogue.state_of(pairs or parse_qsl(query))
         except ValueError as error:

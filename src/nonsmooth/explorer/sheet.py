@@ -101,10 +101,11 @@ class Sheet:
         symbols, rows = symbols_of(system), []
         plain = {name: plain_of(symbol) for name, symbol in symbols.items()}
         choices = {
-            **CHOICES, "over": {name: plain[name] for name in system.parameters},
+            **CHOICES,
+            "over": {name: plain[name] for name in system.parameters},
             **{axis: {name: plain[name] for name in system.states} for axis in ("x", "y", "shown")},
             **{name: one.choices(system, state) for name, one in fields.items() if one.choices is not None},
-        }  # fmt: skip
+        }
         for name, parameter in system.parameters.items():
             value = state.values[name]
             also = (value, state.low, state.high) if name == state.over else (value,)
@@ -115,7 +116,8 @@ class Sheet:
             })  # fmt: skip
         return {
             "models": {name: "your system" if name == GIVEN else name.replace("_", " ") for name in models},
-            "presets": list(presets_of(state)), "parameters": rows,
+            "presets": list(presets_of(state)),
+            "parameters": rows,
             "states": [
                 {"name": name, "html": html_of(symbols[name]), "unit": unit, "value": value}
                 for (name, unit), value in zip(system.states.items(), state.start, strict=True)
@@ -123,6 +125,7 @@ class Sheet:
             "choices": {name: list(words.items()) for name, words in choices.items()},
             "state": {key: value for key, value in vars(state).items() if key not in ("values", "settings")}
             | {name: setting(name, system, state) for name in fields},
-            "query": to_query(state), "forced": system.period() is not None,
+            "query": to_query(state),
+            "forced": system.period() is not None,
             "legends": {name: view.legend() for name, view in self.views.items()},
-        }  # fmt: skip
+        }

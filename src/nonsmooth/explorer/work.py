@@ -136,9 +136,10 @@ def _stability(job: Job) -> dict[str, Any]:
         )  # fmt: skip
         return {"multipliers": np.asarray(orbit.floquet_multipliers)}
     span: dict[str, Any] = (
-        {"transient": job["transient"], "periods": _MEASURED} if job.forced
+        {"transient": job["transient"], "periods": _MEASURED}
+        if job.forced
         else {"transient": job["span"], "duration": _MEASURED / _CHAOTIC * job["span"]}
-    )  # fmt: skip
+    )
     return {"exponents": ns.lyapunov(job.system, start=job["start"], progress=job.heard, **span, **job.options)}
 
 
@@ -153,9 +154,7 @@ def _diagram(job: Job) -> dict[str, Any]:
     over, direction, start, keep = (job[name] for name in ("over", "direction", "begin", "keep"))
     if direction == "many":
         few = np.linspace(job["low"], job["high"], 12)
-        look = job.run(
-            ns.sweep, over, few, direction=None, start=start, keep=keep, judge=False, progress=False
-        )
+        look = job.run(ns.sweep, over, few, direction=None, start=start, keep=keep, judge=False, progress=False)
         low, high = look["minimum"].min(over).values, look["maximum"].max(over).values
         start = ns.random_starts(_STARTS, (1.5 * low - 0.5 * high).tolist(), (1.5 * high - 0.5 * low).tolist(), seed=1)
     direction = None if direction in ("many", "rest") else direction
@@ -183,8 +182,10 @@ def _chart(job: Job) -> dict[str, Any]:
     if not job["across"]:
         raise ValueError(f"{job.system.name!r} has one parameter; a chart needs two")
     n, m = _CHARTS[view]
-    grid = {job["over"]: np.linspace(job["low"], job["high"], n),
-            job["across"]: np.linspace(job["bottom"], job["top"], m)}  # fmt: skip
+    grid = {
+        job["over"]: np.linspace(job["low"], job["high"], n),
+        job["across"]: np.linspace(job["bottom"], job["top"], m),
+    }
     if view == "exponents":
         return {view: job.run(ns.chart, grid, start=job["begin"], lyapunov=_RETURNS, extremes=False)}
     return {"chart": job.run(ns.chart, grid, start=job["begin"], refine=view != "first chart")}

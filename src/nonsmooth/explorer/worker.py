@@ -52,9 +52,11 @@ class Worker:
     def start(self) -> None:
         """Start the process, in place of one that has ended."""
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "nonsmooth.explorer.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            [sys.executable, "-P", "-m", "nonsmooth.explorer.worker"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
             env={**os.environ, "MPLBACKEND": "Agg"},
-        )  # fmt: skip
+        )
         threading.Thread(target=self._listen, args=(self._process,), daemon=True).start()
 
     def ask(self, number: int, job: Mapping[str, Any]) -> None:

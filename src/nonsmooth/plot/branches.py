@@ -338,9 +338,10 @@ def manifolds(
 _LOOKS = {1: ("first", "came back when let go: stable"), 0: ("white", "left when let go: unstable"),
           -1: ("muted", "held; stability not known")}  # fmt: skip
 _EFFORTS = (
-    ("control_effort_first", "s", "before the first correction"), ("control_effort", "o", "converged"),
+    ("control_effort_first", "s", "before the first correction"),
+    ("control_effort", "o", "converged"),
     ("control_effort_noise", "_", "noise alone"),
-)  # fmt: skip
+)
 
 
 def controlled_branch(

@@ -81,8 +81,10 @@ def classes_of(result: xr.Dataset) -> tuple[Any, list[tuple[str, str]]]:
     entries = [(f"period {p}", color) for p, color in enumerate(colors, start=1)]
     unknown = np.where(told == "not_periodic", most, most + 1)
     return np.where(period > 0, period - 1, unknown), [
-        *entries, ("no period", palette.NO_PERIOD), ("not settled", palette.UNKNOWN)
-    ]  # fmt: skip
+        *entries,
+        ("no period", palette.NO_PERIOD),
+        ("not settled", palette.UNKNOWN),
+    ]
 
 
 def legend_of(classes: Any, entries: list[tuple[str, str]]) -> list[tuple[str, str]]:

@@ -72,10 +72,12 @@ def bifurcation(
             values = np.broadcast_to(result[parameter].values, cloud.shape)
             under = direction == "up" and "down" in directions
             style.cloud(
-                drawn, (values, cloud), size * (_SEAM if under else 1.0),
+                drawn,
+                (values, cloud),
+                size * (_SEAM if under else 1.0),
                 color or style.COLORS["pale" if under else _COLORS[direction]],
                 direction if len(directions) > 1 else None,
-            )  # fmt: skip
+            )
         for k, one in enumerate(branches):
             draw_branch(drawn, one, y=name, color=style.COLORS[_LINES[k % len(_LINES)]], behind=True)
         # The whole sweep shows, its ends too where every point diverged.
@@ -317,9 +319,11 @@ def density(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None,
 
 
 _QUANTITIES = {
-    "state": r"difference of the states, $d_u$", "multiplier": r"difference of the multipliers, $d_\mu$",
-    "exponent": "difference of the exponents", "period": "relative difference of the period",
-}  # fmt: skip
+    "state": r"difference of the states, $d_u$",
+    "multiplier": r"difference of the multipliers, $d_\mu$",
+    "exponent": "difference of the exponents",
+    "period": "relative difference of the period",
+}
 _MARKS = {"linear": ("first", "o"), "tanh": ("second", "s"), "arctan": ("third", "^")}
 _LOST = 0.04  # height of the mark where there is no such orbit, in the axes
 

@@ -196,7 +196,7 @@ FLOOR = 1e-7  # of the largest line: below it rounding and the tolerance rule
 
 def amplitude_spectrum(
     result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, highest: float = 20.0
-) -> Axes:  # fmt: skip
+) -> Axes:
     """Draw an ``amplitude_spectrum`` of the state ``y`` (by default the first) over multiples of the base frequency.
 
     ``highest``: the largest multiple drawn. Lines below 1e-7 of the largest are left out, and so is the mean.

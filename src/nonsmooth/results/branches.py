@@ -43,7 +43,7 @@ __all__ = [
     "diagram",
     "line",
     "manifolds",
-]  # fmt: skip
+]
 
 #: One orbit of a branch; builder, writer and reader go by these tables.
 ORBIT = (
@@ -89,7 +89,7 @@ EQUILIBRIUM = (
     Column("eigenvalues", "eigenvalues", ("eigenvalue",), "complex", "eigenvalues"),
     Column("stable", "stable", (), "flag", "all real parts negative"),
     Column("mode", "mode", (), "mode", "mode"),
-)  # fmt: skip
+)
 SPECIAL = SPECIAL_ORBIT[:2]
 SPECIAL_EQUILIBRIUM = (
     *SPECIAL,
@@ -270,8 +270,9 @@ def manifolds(
     # The dim's own name would make an index of it.
     variables["arc_number"] = variables.pop("arc")
     for name, words, known, chosen in (
-        ("manifold", "manifold", KINDS, kinds), ("ended", "how the arc ends", tuple(endings), ended),
-    ):  # fmt: skip
+        ("manifold", "manifold", KINDS, kinds),
+        ("ended", "how the arc ends", tuple(endings), ended),
+    ):
         codes = np.array([known.index(word) for word in chosen], dtype=np.int8)
         variables[name] = ("arc", codes, {"long_name": words, **flag_attributes(known)})
     coords = state_coords(labels) | parameter_coords(labels)

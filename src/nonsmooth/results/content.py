@@ -113,8 +113,10 @@ def sealed(record: Any) -> bool:
 
 
 def _attributes(owner: str, attributes: Mapping[Any, Any]) -> list[list[Any]]:
-    return sorted([_text(key, f"the name of an attribute of {owner}"), _entry(owner, key, value)]
-                  for key, value in attributes.items())  # fmt: skip
+    return sorted(
+        [_text(key, f"the name of an attribute of {owner}"), _entry(owner, key, value)]
+        for key, value in attributes.items()
+    )
 
 
 def _entry(owner: str, key: Hashable, value: Any) -> list[Any]:

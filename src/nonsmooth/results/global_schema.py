@@ -86,9 +86,7 @@ def chart(
     """The result of ``chart``: everything known per point of the plane of two parameters; ``loads`` are the long names
     and units of those among the arrays."""
     plane = tuple(grid)
-    known = [
-        *_CHART, *(Column(name, name, ("start",), "own", words) for name, (words, _) in (loads or {}).items())
-    ]  # fmt: skip
+    known = [*_CHART, *(Column(name, name, ("start",), "own", words) for name, (words, _) in (loads or {}).items())]
     if one_start:
         known = [one._replace(dims=tuple(dim for dim in one.dims if dim != "start")) for one in known]
     variables = columns(labels, known, arrays, *plane)

@@ -68,19 +68,21 @@ def provenance(
 
     With ``date`` the time of the run is recorded too; without it, equal input gives equal files.
     """
-    return attribute({
-        "version": package_version(),
-        "verb": verb,
-        "system": {
-            "name": labels.name,
-            "text": labels.text,
-            "parameters": {name: quantity.value for name, quantity in labels.parameters.items()},
-        },
-        "options": options_as_data(options),
-        "method": method,
-        "seed": seed,
-        "created": datetime.now(UTC).isoformat(timespec="seconds") if date else None,
-    })  # fmt: skip
+    return attribute(
+        {
+            "version": package_version(),
+            "verb": verb,
+            "system": {
+                "name": labels.name,
+                "text": labels.text,
+                "parameters": {name: quantity.value for name, quantity in labels.parameters.items()},
+            },
+            "options": options_as_data(options),
+            "method": method,
+            "seed": seed,
+            "created": datetime.now(UTC).isoformat(timespec="seconds") if date else None,
+        }
+    )
 
 
 def attribute(record: Mapping[str, Any]) -> dict[str, str]:

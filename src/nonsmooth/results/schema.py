@@ -77,9 +77,11 @@ def attributes(labels: Labels, column: Column) -> dict[str, Any]:
     """Long name, unit and table of words of a column."""
     words = {"long_name": column.words.replace("forcing period", labels.turn)}
     meanings: Mapping[str, Sequence[str]] = {
-        "mode": labels.modes, "transition": labels.transition_labels, "indicator": labels.indicators,
+        "mode": labels.modes,
+        "transition": labels.transition_labels,
+        "indicator": labels.indicators,
         "equilibrium": EQUILIBRIA,
-    }  # fmt: skip
+    }
     match column.rule:
         case "status":
             return status_attributes()
@@ -144,8 +146,9 @@ _POINTS = table(
     ("status", "start", "status", ""),
 )
 _JUMPS = {
-    "direction": "direction in which the jump is met", "variable": "state or output whose amplitude jumps",
-}  # fmt: skip
+    "direction": "direction in which the jump is met",
+    "variable": "state or output whose amplitude jumps",
+}
 
 
 def trajectory(
@@ -163,8 +166,9 @@ def trajectory(
     coords: dict[str, Any] = {
         "time": ("time", floats(time), along),
         "segment": ("time", np.asarray(segment, np.int64), {"long_name": "number of crossings before this sample"}),
-        **state_coords(d), **parameter_coords(d),
-    }  # fmt: skip
+        **state_coords(d),
+        **parameter_coords(d),
+    }
     return dataset(variables, coords, attrs)
 
 
@@ -317,4 +321,3 @@ def strings(words: Any) -> NDArray[np.str_]:
 def floats(values: ArrayLike) -> NDArray[np.float64]:
     """A copy, so that a kernel's buffer that is used again does not change a result."""
     return np.array(values, dtype=np.float64)
-

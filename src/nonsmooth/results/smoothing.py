@@ -65,8 +65,10 @@ def report(
             counts = np.array([[rows[i, j][name] for j in range(shape[1])] for i in range(shape[0])], np.int64)
             variables[name] = (("band", "eta"), counts, {"long_name": long_name})
         variables["reference_n_attractors"] = (
-            (), np.int64(reference["n_attractors"]), {"long_name": f"{_COUNTS['n_attractors']}, event-driven"},
-        )  # fmt: skip
+            (),
+            np.int64(reference["n_attractors"]),
+            {"long_name": f"{_COUNTS['n_attractors']}, event-driven"},
+        )
     status = [[rows[i, j]["status"] for j in range(shape[1])] for i in range(shape[0])]
     notes = [rows[i, j]["note"] for i in range(shape[0]) for j in range(shape[1])]
     variables["status"] = (("band", "eta"), np.array(status, np.int8), status_attributes())
@@ -75,8 +77,9 @@ def report(
         "band": ("band", strings(bands), {"long_name": "shape of the bands"}),
         "eta": ("eta", floats(etas), {"long_name": "half width of the bands"}),
         "exponent": ("exponent", np.arange(1, n + 1), {"long_name": "number of the exponent"}),
-        **state_coords(labels), **parameter_coords(labels, without=["band", *variables]),
-    }  # fmt: skip
+        **state_coords(labels),
+        **parameter_coords(labels, without=["band", *variables]),
+    }
     return dataset(variables, coords, attrs)
 
 
@@ -96,9 +99,11 @@ def _differences(variables: Mapping[str, Any], scale: FloatArray, forced: bool) 
         exponent = np.full(state.shape, np.nan)
     period, known = both("period")
     return {
-        "state": state, "multiplier": _of_multipliers(*both("floquet_multipliers")), "exponent": exponent,
+        "state": state,
+        "multiplier": _of_multipliers(*both("floquet_multipliers")),
+        "exponent": exponent,
         "period": np.abs(period / known - 1),
-    }  # fmt: skip
+    }
 
 
 def _of_multipliers(values: Any, reference: Any) -> FloatArray:

@@ -27,7 +27,6 @@ _MANY_MODES = 8
 class _Curves(View):
     """Lines in one colour per mode."""
 
-
     def build(self) -> None:
         self.figure = Panel(self.name)
         self.sources = [self.figure.source("x", "y") for _ in range(_MANY_MODES)]

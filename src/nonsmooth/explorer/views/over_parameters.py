@@ -267,8 +267,9 @@ def _multipliers(multipliers: Any) -> str:
         return "no multipliers"
     told = ", ".join(
         f"{one.real:.3g}" if abs(one.imag) < 1e-9 * (1 + abs(one.real)) else f"{one.real:.3g} ± {abs(one.imag):.3g}i"
-        for one in some[:3] if one.imag >= -1e-9 * (1 + abs(one))
-    )  # fmt: skip
+        for one in some[:3]
+        if one.imag >= -1e-9 * (1 + abs(one))
+    )
     return f"multipliers {told}".replace("-", "\N{MINUS SIGN}") + (" …" if len(some) > 3 else "")
 
 

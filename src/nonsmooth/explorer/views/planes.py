@@ -33,7 +33,6 @@ _MORE = "return value > -1e299 ? before + value.toPrecision(3).replace('-', '\\u
 class Cells(View):
     """An image in whose cells a number stands for a class, with marks over it."""
 
-
     def build(self) -> None:
         """The image, its words, marks, and the place of the page."""
         self.figure = Panel(self.name)
@@ -41,9 +40,7 @@ class Cells(View):
         ends: dict[str, Any] = {"x": [0.0], "y": [0.0], "dw": [1.0], "dh": [1.0]}
         self._image = self.figure.source(name=f"{self.name} cells", image=[empty], more=[empty], **ends, stage=[""])
         self._mapper = LinearColorMapper(palette=["#FFFFFF"], low=-0.5, high=0.5, nan_color="rgba(0,0,0,0)")
-        image = plot.image(
-            "image", "x", "y", "dw", "dh", source=self._image, color_mapper=self._mapper, level="image"
-        )
+        image = plot.image("image", "x", "y", "dw", "dh", source=self._image, color_mapper=self._mapper, level="image")
         self._places = {
             axis: CustomJSHover(args={"power": 0, "unit": ""}, code=f"value = special_vars.{axis}; {_PLACE}")
             for axis in "xy"
@@ -51,10 +48,11 @@ class Cells(View):
         self._words = CustomJSHover(args={"words": [""]}, code="return words[value] ?? '';")
         self._more = CustomJSHover(args={"before": "", "after": ""}, code=_MORE)
         self.figure.tell(
-            image, point_policy="follow_mouse",
+            image,
+            point_policy="follow_mouse",
             tooltips='<div style="font:13px system-ui">$x{custom}, $y{custom}: @image{custom}@more{custom}</div>',
             formatters={"$x": self._places["x"], "$y": self._places["y"], "@image": self._words, "@more": self._more},
-        )  # fmt: skip
+        )
         plot.grid.visible = False
         self.points = self.figure.source("x", "y", "marker", name=f"{self.name} points")
         plot.scatter("x", "y", marker="marker", source=self.points, size=8, fill_color="#FFFFFF", line_color="#1B1F24")
@@ -232,10 +230,11 @@ class Basins(Cells):
         numbers: list[int] = []
         for period, points in found:
             away = [
-                np.inf if period != old or k in numbers or not len(points) or not len(there)
+                np.inf
+                if period != old or k in numbers or not len(points) or not len(there)
                 else float(np.linalg.norm(points.mean(axis=0) - there.mean(axis=0)))
                 for k, (old, there) in enumerate(self._known)
-            ]  # fmt: skip
+            ]
             free = (k for k in range(len(self._known) + len(found) + 1) if k not in numbers and k >= len(self._known))
             best = int(np.argmin(away)) if away and min(away) < _NEAR else next(free)
             numbers.append(best)

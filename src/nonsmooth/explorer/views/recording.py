@@ -59,10 +59,12 @@ class Recording(View):
         points = found["section"].get(state.shown, np.empty(0))
         here = {"here": np.full(len(points), state.values[state.over]), state.shown: points}
         for key, columns, x, y in (
-            ("curve", found["curve"], state.x, state.y), ("history", found["history"], "time", state.x),
-            ("portrait", found["section"], state.x, state.y), ("section", found["section"], state.x, state.y),
+            ("curve", found["curve"], state.x, state.y),
+            ("history", found["history"], "time", state.x),
+            ("portrait", found["section"], state.x, state.y),
+            ("section", found["section"], state.x, state.y),
             ("diagram", here, "here", state.shown),
-        ):  # fmt: skip
+        ):
             there = x in columns and y in columns
             drawn = (columns[x], columns[y]) if there else (np.empty(0), np.empty(0))
             self._sources[key].data = dict(zip("xy", drawn, strict=True))

@@ -23,9 +23,10 @@ _BINS = 9  # shown on either side of the peak
 _PEAKS = (("peak_frequency", "interpolated peak", "first", "-"), ("decay_frequency", "decay fit", "second", "--"))
 _IMPACTS = ((True, "second", "-", "impact of one corner"), (False, "muted", ":", "other impact"))
 _METHODS = {
-    "fit": ("fit", "first", "-"), "phase": ("line of the phases", "third", "-."),
+    "fit": ("fit", "first", "-"),
+    "phase": ("line of the phases", "third", "-."),
     "spectrum": ("peak of the spectrum", "second", "--"),
-}  # fmt: skip
+}
 
 
 def impulse_response(finding: Any, ax: Axes | None = None) -> Axes:

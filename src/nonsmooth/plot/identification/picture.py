@@ -68,8 +68,10 @@ def picture(
         yield one
         drawn.margins(x=margin)
         named = [
-            name if isinstance(name, tuple) else
-            (str(data[name].attrs.get("long_name", name)), str(data[name].attrs.get("units", ""))) for name in (x, y)
+            name
+            if isinstance(name, tuple)
+            else (str(data[name].attrs.get("long_name", name)), str(data[name].attrs.get("units", "")))
+            for name in (x, y)
         ]
         name_axes(drawn, *named)
         if one.left:
