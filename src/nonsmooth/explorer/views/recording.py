@@ -49,7 +49,7 @@ class Recording(View):
 
     def _redraw_all(self) -> None:
         self.redraw()
-        for name in ("portrait", "history", "section"):
+        for name in ("portrait", "history", "section", "readout"):
             self.sheet.views[name].redraw()
 
     def redraw(self) -> None:
