@@ -113,7 +113,8 @@ class RowsFlow(VariationalFlow):
                 changing = turned(every[0], rates) @ w
             second += float(changing[0]) if every is slopes else 0.0
             found += [float(own[0]), every[0, :n].copy(), float(changing[0]), own[1:] + t * changing[1:]]
-        return Touch(*found, second)
+        found.append(second)
+        return Touch(*found)
 
 
 class LinearFlow(RowsFlow):
