@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.continuation.arguments import allowed_range, largest_step, limits
-from nonsmooth.continuation.branches.begin import size_of
+from nonsmooth.continuation.problems.orbits import size_of
 from nonsmooth.continuation.branches.following import both_ways, dataset
 from nonsmooth.continuation.branches.reading import special_row
 from nonsmooth.continuation.branches.records import record_of

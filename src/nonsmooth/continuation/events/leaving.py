@@ -18,6 +18,7 @@ from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.primitive import is_doubled
+from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.errors import SystemDefinitionError
 
 __all__ = ["ENDINGS", "AlongOrbits"]
@@ -71,12 +72,12 @@ class AlongOrbits(Policy):
     endings = ENDINGS
 
     def __init__(self) -> None:
-        self._unwatched: Orbits | None = None  # a curve whose points simulated rounds do not confirm
+        self._unwatched: Shooting | None = None  # of a curve whose points simulated rounds do not confirm
 
     def unseen(self, step: Step) -> Met | None:
         """The first place on a step where only a simulated round tells that the signature ends."""
         curve = step.curve
-        if step.virtual or curve is self._unwatched or curve.shows(step.b):
+        if step.virtual or curve.shooting is self._unwatched or curve.shows(step.b):
             return None
         met = Unseen().met(step)
         if met is None or beside(curve, met.point) is not None:
@@ -86,7 +87,7 @@ class AlongOrbits(Policy):
             "than the branch: its points from here on are not confirmed",
             RuntimeWarning, stacklevel=2,
         )  # fmt: skip
-        self._unwatched = curve
+        self._unwatched = curve.shooting
         return None
 
     def passed_by(self, step: Step) -> list[Met]:

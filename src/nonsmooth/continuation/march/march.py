@@ -18,6 +18,7 @@ INTERRUPTED = "Interrupted: what was found until then stands"
 FIRST = 1e-3  # step
 LEAST_STEP = 1e-9
 COSINE = 0.98  # of the angle between the tangents of neighbours
+AT_LIMIT = 1e-11  # of the largest margin on a curve: a boundary beside which no point follows
 SPREAD = 0.15  # change of what is known of neighbours (of orbits: chordal, of the multipliers)
 
 
@@ -138,8 +139,12 @@ class _Marching:
         while len(found.rows) < self.limits.points:
             new = self._next()
             if new is None:
-                found.ending = self.policy.why(self.curve, self.point)
-                return
+                limit = self._limit()
+                if not limit:
+                    found.ending = self.policy.why(self.curve, self.point)
+                if not limit or not self._change(limit):
+                    return
+                continue
             step = self._within(new)
             met = None if step is None else first_met(step, self.policy.boundaries)
             if step is None or met is None:  # an event that is not located: nearer
@@ -160,19 +165,33 @@ class _Marching:
                 found.ending = step.cause
                 return
             if step.cause == "change":
-                after = self.policy.behind(found, self.curve, met)
-                if after is None:
+                if not self._change(met):
                     return
-                self._begin(*after)
-                self.ds = 0.1 * self.limits.largest
-                found.add(*after)
-                continue
-            if self._ended(step):
+            elif self._ended(step):
                 return
+
+    def _change(self, met: list[Met]) -> bool:
+        """Go on behind the boundaries ``met``; False where the branch ends there."""
+        after = self.policy.behind(self.found, self.curve, met)
+        if after is None:
+            return False
+        self._begin(*after)
+        self.ds = 0.1 * self.limits.largest
+        self.found.add(*after)
+        return True
+
+    def _limit(self) -> list[Met]:
+        """The boundaries to which the branch has come in the limit: its equations have no derivatives there."""
+        before = np.array([self.curve.margins(row.point) for row in self.found.rows if row.curve is self.curve])
+        before = before.reshape(-1, len(self.margins))
+        widest = np.where(np.isfinite(before), before, 0.0).max(axis=0, initial=0.0)
+        near = zip(self.policy.boundaries, self.margins, widest, strict=True)
+        return [Met(kind, 0.0, self.point, kind.name) for kind, margin, wide in near
+                if 0.0 <= margin < AT_LIMIT * wide]  # fmt: skip
 
     def _begin(self, curve: Curve[Any], point: Any) -> None:
         """Go on from a point of a curve."""
-        self.curve, self.before, self.point = curve, None, curve.passed(point) or point
+        self.curve, self.before, self.point = curve, None, point
         self.numbers, self.margins = self._watched(self.point)
 
     def _watched(self, point: Any) -> tuple[list[float], Any]:
@@ -261,9 +280,11 @@ class _Marching:
         if len(found.rows) >= 2 * self.again:
             self.circle, self.again = curve.landmark(new), len(found.rows)
         self.ds = min(self.ds * self.easy, self.limits.largest)
-        anchored = curve.passed(new)
-        self.before, self.point = (self.point, new) if anchored is None else (None, anchored)
-        self.numbers, self.margins = step.numbers[1], step.margins[1]
+        if renewed := curve.renewed(new):
+            self._begin(*renewed)
+        else:
+            self.before, self.point = self.point, new
+            self.numbers, self.margins = step.numbers[1], step.margins[1]
         return False
 
 

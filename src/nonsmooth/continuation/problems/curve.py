@@ -131,8 +131,8 @@ class Curve(ABC, Generic[P]):
         """Difference of what is known of two neighbours, from 0 to 1."""
         return 0.0
 
-    def passed(self, point: P) -> P | None:
-        """The last point where a phase condition was put through it; None where there is none to move."""
+    def renewed(self, point: P) -> tuple[Curve[P], P] | None:
+        """The curve and the last point in other units, or with a phase condition put through it; None as they are."""
         return None
 
     # --- along the curve
