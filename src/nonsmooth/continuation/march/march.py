@@ -18,7 +18,7 @@ INTERRUPTED = "Interrupted: what was found until then stands"
 FIRST = 1e-3  # step
 LEAST_STEP = 1e-9
 COSINE = 0.98  # of the angle between the tangents of neighbours
-AT_LIMIT = 1e-11  # of the largest margin on a curve: a boundary beside which no point follows
+AT_LIMIT = 1e-8  # along the branch: as near to a boundary no point follows where it is one of the equations' own
 SPREAD = 0.15  # change of what is known of neighbours (of orbits: chordal, of the multipliers)
 
 
@@ -138,19 +138,17 @@ class _Marching:
         self._begin(curve, point)
         while len(found.rows) < self.limits.points:
             new = self._next()
-            if new is None:
+            step = None if new is None else self._within(new)
+            met = None if step is None else first_met(step, self.policy.boundaries)
+            if new is not None and met is None:  # an event that is not located: nearer
+                self.ds *= 0.25
+                if self.ds >= LEAST_STEP:
+                    continue
+            if step is None or met is None:
                 limit = self._limit()
                 if not limit:
                     found.ending = self.policy.why(self.curve, self.point)
                 if not limit or not self._change(limit):
-                    return
-                continue
-            step = self._within(new)
-            met = None if step is None else first_met(step, self.policy.boundaries)
-            if step is None or met is None:  # an event that is not located: nearer
-                self.ds *= 0.25
-                if self.ds < LEAST_STEP:
-                    found.ending = "no_convergence"
                     return
                 continue
             if not met and step.cause in self.policy.unseen_on and (unseen := self.policy.unseen(step)):
@@ -182,12 +180,14 @@ class _Marching:
 
     def _limit(self) -> list[Met]:
         """The boundaries to which the branch has come in the limit: its equations have no derivatives there."""
-        before = np.array([self.curve.margins(row.point) for row in self.found.rows if row.curve is self.curve])
-        before = before.reshape(-1, len(self.margins))
-        widest = np.where(np.isfinite(before), before, 0.0).max(axis=0, initial=0.0)
-        near = zip(self.policy.boundaries, self.margins, widest, strict=True)
-        return [Met(kind, 0.0, self.point, kind.name) for kind, margin, wide in near
-                if 0.0 <= margin < AT_LIMIT * wide]  # fmt: skip
+        point, near = self.point, np.full(len(self.policy.boundaries), np.inf)  # as chords of the margins end
+        for row in self.found.rows:
+            if row.curve is self.curve:
+                fallen = self.curve.margins(row.point) - self.margins
+                s = np.where(fallen > 0.0, float(np.abs(point.Y - row.point.Y).max()), np.inf)
+                near = np.fmin(near, np.abs(self.margins) * s / np.abs(fallen))
+        return [Met(kind, 0.0, point, kind.name) for kind, s in zip(self.policy.boundaries, near, strict=True)
+                if s < AT_LIMIT]  # fmt: skip
 
     def _begin(self, curve: Curve[Any], point: Any) -> None:
         """Go on from a point of a curve."""
