@@ -239,8 +239,12 @@ class _Marching:
         if len(self.found.rows) < 3:
             return
         back = came_back(self.limits.closed, step)
-        if back is not None and back <= step.stop:
-            step.ends("closed", back, self.curve.between(step.a, step.b, back) or step.b)
+        if back is None or back > step.stop:
+            return
+        point = self.curve.between(step.a, step.b, back)
+        last = None if point is None else self.curve.at_landmark(point, self.limits.closed)
+        if last is not None:  # a chord as near as this may belong to another part of the branch
+            step.ends("closed", back, last)
 
     def _special(self, step: Step) -> bool:
         """List the special points of a step; True where the branch ends at one."""
