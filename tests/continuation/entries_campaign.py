@@ -29,7 +29,7 @@ from test_random_branches import drawn, endings
 import nonsmooth as ns
 
 ENTRIES, SAME = 5, 1e-8
-POINTS = 2500
+POINTS, SAMPLES = 2500, 20_000
 
 
 def special(branch: xr.Dataset, name: str, width: float) -> list[tuple[str, float]]:
@@ -78,15 +78,27 @@ def residual(system: ns.System, branch: xr.Dataset, name: str, k: int) -> float:
 
 
 def at_boundary(system: ns.System, point: xr.Dataset) -> float:
-    """The least zero over one simulated period: an indicator at a touch, the height by which one is overshot at a transition
-    (its rate squared over twice its second derivative), or a second indicator at the same instant."""
+    """The least zero over one simulated period: an extremum of an indicator, by a parabola through the sample next to it; the
+    height by which one is overshot at a transition; or a second indicator at the same instant."""
     period, traced = float(point["period"]), system.traced
-    run = ns.simulate(system, duration=period, start=point["section"].values, mode=system.modes[int(point["mode"])])
-    found = [np.inf, *np.abs(run["touch_clearance"].values)] if "touch_clearance" in run else [np.inf]
+    run = ns.simulate(
+        system, duration=period, start=point["section"].values, mode=system.modes[int(point["mode"])], samples=SAMPLES
+    )
+    p, m = system.parameter_vector(), np.zeros(len(traced.m))
+    times, states, modes = run["time"].values, np.nan_to_num(run["u"].values), run["mode"].values
+    found = [np.inf]
+    for mode in range(len(traced.mode_names)):
+        here = np.flatnonzero(modes == mode)
+        if not len(here):
+            continue
+        h, rate, bend = (np.array([np.broadcast_to(x, len(here)) for x in part], dtype=float)
+                         for part in indicators(traced, mode)(times[here], states[here].T, p, m))  # fmt: skip
+        near = np.abs(rate) < np.abs(bend) * period / SAMPLES * 1.5
+        found.append(np.abs(h - rate**2 / np.where(near, 2 * bend, 1.0))[near].min(initial=np.inf))
     for i in range(run.sizes["crossing"]):
         jump = traced.transitions[int(run["crossing_transition"][i])]
         for mode, u in ((jump.source, run["u_before"].values[i]), (jump.target, run["u_after"].values[i])):
-            at = float(run["crossing_time"][i]), np.nan_to_num(u), system.parameter_vector(), np.zeros(len(traced.m))
+            at = float(run["crossing_time"][i]), np.nan_to_num(u), p, m
             h, rate, bend = np.abs(np.array(indicators(traced, mode)(*at), float))
             near = np.flatnonzero(h < 1e-6)
             found += [*sorted(h)[1:2], *(rate[near] ** 2 / np.maximum(2 * bend[near], 1e-300))]

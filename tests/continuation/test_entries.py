@@ -122,3 +122,27 @@ def test_an_impact_that_vanishes_is_a_graze_from_either_side() -> None:
         assert np.abs(table[name].values[table["kind"].values == "grazing"] - last).min() < 1e-9
         assert table["kind"].values.tolist() == tables[0]["kind"].values.tolist()
         assert table[name].values == pytest.approx(tables[0][name].values, abs=1e-8)
+
+
+@pytest.mark.parametrize("amplitude", [0.74, 0.79, 1.7])
+def test_from_a_small_orbit_to_a_large_one(amplitude: float) -> None:
+    """A relay whose motion dies out where the force equals the forcing: steps are measured by the orbit that has grown."""
+    system, name, limits, _ = templates.relay(np.random.default_rng([1, 5]))
+    here = system.with_parameters({name: amplitude})
+    branch = ns.continue_orbit(ns.find_orbit(here, progress=False), name, limits, points=400)
+    assert branch[name].values[[0, -1]] == pytest.approx(limits, abs=1e-12)
+    special = ns.special_points(branch)
+    assert special["sliding"].values.tolist() == ["adding_sliding", "crossing_sliding"]
+    assert special[name].values[0] == pytest.approx(system.values["F"], abs=1e-9)
+
+
+def test_a_slow_impact_is_the_same_impact() -> None:
+    """Beside a non-smooth fold the speed below which impacts may end in rest is passed at once: the branch does not turn back.
+
+    The mass touches the table without speed where the branch turns; there the orbits without and with that impact meet."""
+    system, name, limits, start = templates.rest(np.random.default_rng([1, 4]))
+    first = ns.continue_orbit(ns.find_orbit(system, start=start, progress=False), name, limits, points=120)
+    special = ns.special_points(first)
+    value = special[name].values
+    assert not [kind for kind, near in zip(special["kind"].values[1:], np.diff(value), strict=True)
+                if abs(near) < 1e-12 and kind in ("fold", "flip")]  # fmt: skip

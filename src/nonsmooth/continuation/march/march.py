@@ -135,7 +135,7 @@ class _Marching:
     def follow(self, curve: Curve[Any], point: Any) -> None:
         """March on, point by point."""
         found = self.found
-        self._begin(curve, point)
+        self._begin(*(curve.renewed(point) or (curve, point)))
         while len(found.rows) < self.limits.points:
             new = self._next()
             step = None if new is None else self._within(new)
@@ -183,7 +183,7 @@ class _Marching:
         point, near = self.point, np.full(len(self.policy.boundaries), np.inf)  # as chords of the margins end
         for row in self.found.rows:
             if row.curve is self.curve:
-                fallen = self.curve.margins(row.point) - self.margins
+                fallen = np.nan_to_num(self.curve.margins(row.point)) - np.nan_to_num(self.margins)
                 s = np.where(fallen > 0.0, float(np.abs(point.Y - row.point.Y).max()), np.inf)
                 near = np.fmin(near, np.abs(self.margins) * s / np.abs(fallen))
         return [Met(kind, 0.0, point, kind.name) for kind, s in zip(self.policy.boundaries, near, strict=True)

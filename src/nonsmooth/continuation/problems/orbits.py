@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.anchor import plane_across
@@ -17,6 +18,9 @@ from nonsmooth.continuation.problems.rounds import Rounds
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
 from nonsmooth.continuation.problems.signature import Signature
 from nonsmooth.system.system import System
+
+if TYPE_CHECKING:
+    from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["OrbitPoint", "Orbits", "size_of"]
 
@@ -28,9 +32,15 @@ def size_of(maximum: FloatArray, minimum: FloatArray, system: System) -> FloatAr
 
     Between two resets such a state has no range that could tell how far it moves along a branch."""
     half = np.maximum(np.nan_to_num(0.5 * (maximum - minimum)), 1e-3 * system.scale_vector())
-    still = np.array([all(field[i] == 0 for field in system.traced.fields) for i in range(len(half))])
     largest = np.nan_to_num(np.maximum(np.abs(maximum), np.abs(minimum)))
+    still = _still(system.traced)
     return np.concatenate([np.where(still, np.maximum(half, largest), half), np.ones(len(system.memory))])
+
+
+@lru_cache(maxsize=32)
+def _still(traced: Traced) -> NDArray[np.bool_]:
+    """The states that no mode moves."""
+    return np.array([all(field[i] == 0 for field in traced.fields) for i in range(len(traced.u))])
 
 
 @dataclass
@@ -65,7 +75,7 @@ class Orbits(Curve[OrbitPoint]):
 
     def __init__(self, shooting: Shooting, size: FloatArray, period: float, widths: Sequence[float]) -> None:
         self.shooting, self.walk = shooting, Walk(shooting)
-        m, self.first = shooting.m, size  # the size of the branch's first orbit
+        m, self.first_size = shooting.m, size  # the size of the branch's first orbit
         self.size, self.period, self.widths = size, period, tuple(widths)
         scale = shooting.join(np.full(m, period), np.tile(size, (m + 1, 1)), period, widths)
         # The length of a curve should not depend on how many visits an orbit is cut into.
@@ -97,7 +107,7 @@ class Orbits(Curve[OrbitPoint]):
     def _like(self, shooting: Shooting, size: FloatArray) -> Orbits:
         """The curve of other equations of the same branch, or in other units."""
         curve = Orbits(shooting, size, self.period, self.widths)
-        curve.rounds, curve.first = self.rounds, self.first
+        curve.rounds, curve.first_size = self.rounds, self.first_size
         return curve
 
     def evaluate(self, Y: FloatArray) -> Solved:
@@ -124,7 +134,7 @@ class Orbits(Curve[OrbitPoint]):
         path = self.walk.along(solved, self.shooting.split(solved.X)[1])
         if path is None or not np.isfinite(M).all():
             return None
-        return OrbitPoint(Y, tangent, orientation, iterations, solved, M, solved.multipliers, path)
+        return OrbitPoint(Y, tangent, orientation, iterations, solved, M, solved.multipliers_of(M), path)
 
     def word(self) -> Signature:
         """The signature."""
@@ -138,7 +148,7 @@ class Orbits(Curve[OrbitPoint]):
 
     def shape(self, maximum: FloatArray, minimum: FloatArray, X: FloatArray) -> FloatArray:
         """The extremes and the parameters of an orbit, scaled."""
-        size = self.first[: len(maximum)]
+        size = self.first_size[: len(maximum)]
         return np.nan_to_num(np.concatenate([maximum / size, minimum / size, X[-len(self.widths) :] / self.widths]))
 
     def margins(self, point: OrbitPoint) -> FloatArray:
@@ -158,7 +168,7 @@ class Orbits(Curve[OrbitPoint]):
         """The range of an autonomous orbit without transitions, in units of the first one's; else 1."""
         if self.shooting.forced or self.shooting.m:
             return 1.0
-        swing = (point.path.maximum - point.path.minimum) / self.first[: len(point.path.maximum)]
+        swing = (point.path.maximum - point.path.minimum) / self.first_size[: len(point.path.maximum)]
         return float(np.nanmax(swing))
 
     def renewed(self, point: OrbitPoint) -> tuple[Orbits, OrbitPoint] | None:
