@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.continuation.events.change import Change, by_others, gained, inserted, is_tolerance, without
+from nonsmooth.continuation.events.change import Change, by_others, gained, inserted, is_tolerance, rest_after, without
 from nonsmooth.continuation.march.event import BESIDE, Event, Met, Step
 from nonsmooth.continuation.problems.signature import AT_ONCE
 
@@ -136,19 +136,10 @@ class Own(Crossed):
 
     def contacts(self, curve: Any, point: Any) -> list[Change]:
         """Where only a tolerance is passed: the same impact by the other transition; without the last ones before rest."""
-        visits, i = curve.shooting.signature.visits, self.crossing(curve, point)[0]
-        jumps, surface = curve.shooting.system.traced.transitions, self.surface(curve, point)
+        i, surface = self.crossing(curve, point)[0], self.surface(curve, point)
         if not is_tolerance(curve, surface):
             return []
-        rests = i
-        while visits[rests].transition == visits[i].transition:
-            rests += 1
-        found = by_others(curve, point, i, surface)
-        if visits[rests].mode == visits[i].mode and visits[rests].row >= 0:
-            jump = jumps[visits[rests].transition]
-            if jump.target != jump.source:
-                found.append(without(curve, point, i, rests - i))
-        return found
+        return [*by_others(curve, point, i, surface), without(curve, point, i, rest_after(curve, point, i) or 1)]
 
     def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:
         """The crossing with the least other row."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from nonsmooth.continuation.events.boundaries import BOUNDARIES, Boundary, Crossed, Unseen, passed_by
-from nonsmooth.continuation.events.change import Change, common_point, is_tolerance, past_the_section
+from nonsmooth.continuation.events.change import Change, common_point, is_tolerance, past_the_section, rest_after
 from nonsmooth.continuation.events.grazing import graze
 from nonsmooth.continuation.events.neighbours import beside
 from nonsmooth.continuation.events.of_orbits import KINDS, SMALL
@@ -26,7 +26,6 @@ __all__ = ["ENDINGS", "AlongOrbits"]
 FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
 WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
 AHEAD = 1e-6  # of the range
-BEFORE_REST = 1e-2  # of the period: a flight after an impact as slow as impacts are followed is shorter
 WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
@@ -106,7 +105,7 @@ class AlongOrbits(Policy):
         first = met[0]
         if len(met) == 1 and first.kind.at_section(curve, first.point):
             after = past_the_section(curve, first.point)
-            if after is not None and (after[1].path.margins[1:] > 0.0).all():
+            if after is not None and (after[1].path.margins[1:] >= 0.0).all():
                 return after  # else another boundary is met with the section
         beyond = beside(curve, first.point, contacts_of(curve, met))
         if beyond is not None and _completes(curve, met, beyond[0]):
@@ -145,12 +144,12 @@ def _completes(curve: Orbits, met: list[Met], fresh: Orbits) -> bool:
     """Return whether only the speed below which impacts are completed as rest is reached.
 
     An impact that vanishes far from rest passes that speed too, and is a graze."""
-    tolerances = [is_tolerance(curve, one.kind.surface(curve, one.point, fresh)) for one in met]
-    kind, times = met[0].kind, met[0].point.solved.times
-    if not any(tolerances) or tolerances[0] or not isinstance(kind, Crossed):
-        return any(tolerances)
-    visit = kind.crossing(curve, met[0].point)[0]
-    return visit + 2 < len(times) and float(times[visit + 2] - times[visit + 1]) < BEFORE_REST * float(times[-1])
+    passed = [one for one in met if is_tolerance(curve, one.kind.surface(curve, one.point, fresh))]
+    if not passed:
+        return False
+    kind, point = passed[0].kind, passed[0].point
+    same = fresh.shooting.m == curve.shooting.m or not isinstance(kind, Crossed)
+    return same or rest_after(curve, point, kind.crossing(curve, point)[0]) > 0
 
 
 def _is_centre(curve: Orbits, met: Met) -> bool:
@@ -180,12 +179,17 @@ def mark(found: March, curve: Orbits, met: list[Met], beyond: tuple[Orbits, Orbi
             if change.signature.cycle == cycle:
                 _mark_graze(found, curve, there, change, beyond, sliding)
                 return "grazing"
-        end = _from_behind(point, *beyond)
-        if end is not None and _is_better(curve, met[0], beyond[0], end.point):
-            curve, kind, point = beyond[0], end.kind, end.point
-    own = kind.contacts(curve, point)
-    name = "grazing" if own else kind.name
-    indicator = own[0].indicator if own else kind.surface(curve, point, beyond and beyond[0])
+    teller = curve, kind, point  # what shrinks to nothing explains the end, from whichever side it is located better
+    end = None if beyond is None else _from_behind(point, *beyond)
+    if end is not None:
+        fresh = beyond[0]
+        if fresh.shooting.m > curve.shooting.m:
+            teller = fresh, end.kind, end.point
+        if _is_better(curve, met[0], fresh, end.point):
+            curve, point = fresh, end.point
+    own = teller[1].contacts(teller[0], teller[2])
+    name = "grazing" if own else teller[1].name
+    indicator = own[0].indicator if own else teller[1].surface(teller[0], teller[2], beyond and beyond[0])
     found.mark(name, curve, point, indicator=indicator, sliding=sliding)
     return name
 
