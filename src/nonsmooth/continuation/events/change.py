@@ -19,9 +19,11 @@ from nonsmooth.continuation.problems.signature import AT_ONCE, Signature, Visit
 from nonsmooth.system.symbolic.traced import ASKED, FOUND, Traced
 
 __all__ = [
-    "Change", "by_others", "common_orbit", "common_point", "gained", "inserted", "is_tolerance", "past_the_section", "without",
+    "Change", "by_others", "common_orbit", "common_point", "gained", "inserted", "is_tolerance", "past_the_section",
+    "rest_after", "without",
 ]  # fmt: skip
 
+BEFORE_REST = 1e-4  # of the period: flights after an impact as slow as impacts are followed are shorter
 TOLERANCE = 1e-5  # of an indicator's size: a band as narrow as this stands for no width
 
 
@@ -98,6 +100,17 @@ def without(curve: Orbits, point: OrbitPoint, place: int, count: int) -> Change:
         curve.shooting.signature.without(place, count), np.delete(times, gone), np.delete(states, gone + 1, axis=0),
         jump.rows[visits[place].row].indicator, False, place, visits[place : place + count], float(times[place]),
     )  # fmt: skip
+
+
+def rest_after(curve: Orbits, point: OrbitPoint, place: int) -> int:
+    """The number of impacts from visit ``place`` on that rest follows at once; 0 where none does."""
+    visits, times = curve.shooting.signature.visits, point.solved.times
+    jumps, i = curve.shooting.system.traced.transitions, place
+    while visits[i].transition == visits[place].transition:
+        i += 1
+    jump, soon = jumps[visits[i].transition], BEFORE_REST * float(times[-1])
+    rests = visits[i].row >= 0 and jump.target != jump.source == visits[place].mode
+    return i - place if rests and float(times[i + 1] - times[place + 1]) < soon else 0
 
 
 def by_others(curve: Orbits, point: OrbitPoint, place: int, indicator: int) -> list[Change]:
