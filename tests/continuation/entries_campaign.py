@@ -29,6 +29,7 @@ from test_random_branches import drawn, endings
 import nonsmooth as ns
 
 ENTRIES, SAME = 5, 1e-8
+APART = 1e-6  # of the range: entries from special points
 POINTS, SAMPLES = 2500, 20_000
 
 
@@ -117,10 +118,10 @@ def indicators(traced: Any, mode: int) -> Any:
     return sp.lambdify([traced.t, traced.u, traced.p, traced.m], [traced.indicators, rates, list(map(along, rates))])
 
 
-def entries(system: ns.System, branch: xr.Dataset, name: str) -> list[int]:
+def entries(branch: xr.Dataset, name: str, width: float) -> list[int]:
     """Five points of a branch, apart from its special ones."""
-    plain = np.setdiff1d(np.arange(branch.sizes["point"]), branch["special_point"].values)
-    plain = plain[~branch["virtual"].values[plain]]
+    apart = np.abs(branch[name].values[:, None] - branch["special_value"].values).min(axis=1, initial=np.inf)
+    plain = np.flatnonzero((apart > APART * width) & ~branch["virtual"].values)
     return plain[np.linspace(0, len(plain) - 1, ENTRIES + 2).astype(int)[1:-1]].tolist()
 
 
@@ -134,7 +135,7 @@ def one(template: str, seed: int, drawn_one: templates.Drawn, orbit: ns.Orbit) -
         "ends": endings(branch), "s": round(time.process_time() - begun, 2), "differs": [], "worst": 0.0, "lost": 0,
     }
     size = np.maximum(np.ptp(branch["section"].values, axis=0), 1e-3 * system.scale_vector())
-    for i in entries(system, branch, name):
+    for i in entries(branch, name, width):
         point = branch.isel(point=i)
         here = system.with_parameters({name: float(point[name])})
         try:

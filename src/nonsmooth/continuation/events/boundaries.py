@@ -139,7 +139,8 @@ class Own(Crossed):
         i, surface = self.crossing(curve, point)[0], self.surface(curve, point)
         if not is_tolerance(curve, surface):
             return []
-        return [*by_others(curve, point, i, surface), without(curve, point, i, rest_after(curve, point, i) or 1)]
+        found, count = by_others(curve, point, i, surface), rest_after(curve, point, i)
+        return found if count == 0 else [*found, without(curve, point, i, count or 1)]
 
     def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:
         """The crossing with the least other row."""

@@ -102,15 +102,14 @@ def without(curve: Orbits, point: OrbitPoint, place: int, count: int) -> Change:
     )  # fmt: skip
 
 
-def rest_after(curve: Orbits, point: OrbitPoint, place: int) -> int:
-    """The number of impacts from visit ``place`` on that rest follows at once; 0 where none does."""
+def rest_after(curve: Orbits, point: OrbitPoint, place: int) -> int | None:
+    """The number of impacts from visit ``place`` on that rest follows at once; None where it does not."""
     visits, times = curve.shooting.signature.visits, point.solved.times
-    jumps, i = curve.shooting.system.traced.transitions, place
-    while visits[i].transition == visits[place].transition:
+    i = place
+    while visits[i].row >= 0 and visits[i + 1].mode == visits[place].mode:
         i += 1
-    jump, soon = jumps[visits[i].transition], BEFORE_REST * float(times[-1])
-    rests = visits[i].row >= 0 and jump.target != jump.source == visits[place].mode
-    return i - place if rests and float(times[i + 1] - times[place + 1]) < soon else 0
+    soon = float(times[i + 1] - times[place + 1]) < BEFORE_REST * float(times[-1])
+    return i - place if visits[i].row >= 0 and soon else None
 
 
 def by_others(curve: Orbits, point: OrbitPoint, place: int, indicator: int) -> list[Change]:

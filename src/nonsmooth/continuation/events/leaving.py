@@ -149,7 +149,7 @@ def _completes(curve: Orbits, met: list[Met], fresh: Orbits) -> bool:
         return False
     kind, point = passed[0].kind, passed[0].point
     same = fresh.shooting.m == curve.shooting.m or not isinstance(kind, Crossed)
-    return same or rest_after(curve, point, kind.crossing(curve, point)[0]) > 0
+    return same or rest_after(curve, point, kind.crossing(curve, point)[0]) is not None
 
 
 def _is_centre(curve: Orbits, met: Met) -> bool:

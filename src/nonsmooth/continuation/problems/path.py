@@ -168,7 +168,7 @@ class Walk:
         # In a flight as short as those before rest an indicator does not rise above what it is solved for.
         flown = tau < SHORT * float(solved.times[-1])
         inner[flown[:, None] & (np.abs(inner) <= ROUNDING * size.max(axis=0))] = -np.inf
-        inner[np.abs(inner) <= LEAST * size] = 0.0
+        inner[np.abs(inner) < LEAST * np.where(np.isfinite(size), size, 0.0)] = -np.inf
         at = int(inner.argmax()) if n_t else 0
         touched = (at // n_t, at % n_t) if n_t else (0, 0)
         own = end[self.inside]
