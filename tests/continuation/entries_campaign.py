@@ -1,8 +1,9 @@
 """Branches of random systems of ten kinds, each entered at five of its points: the same branch from each?
 
-``python tests/continuation/entries_campaign.py [--kinds relay rest] [--seeds 0 10] [--rows FILE]`` prints a line for each
-branch and a table. A branch and its entries must have the same special points (kinds, and the parameter to 1e-8 of the range)
-and the same ends; each special point must satisfy its own equation to 1e-8, as a simulated period of its orbit shows it.
+``python tests/continuation/entries_campaign.py [--kinds relay rest] [--systems 10] [--rows FILE]`` prints a line for
+each branch and a table. A branch and its entries must have the same special points (kinds, and the parameter to 1e-8 of
+the range) and the same ends; each special point must satisfy its own equation to 1e-8: its multipliers do, or a
+simulated period of its orbit.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def ends(branch: xr.Dataset, name: str, width: float) -> list[tuple[str, float]]
 
 
 def differ(one: list[tuple[str, float]], other: list[tuple[str, float]]) -> tuple[str, float]:
-    """What one list has and the other has not, and the largest difference of those that both have."""
+    """Return what only one of two lists has, and the largest difference of those that both have."""
     left, missing, worst = list(other), [], 0.0
     for kind, value in one:
         near = [x for x in left if x[0] == kind and abs(x[1] - value) < SAME]
@@ -64,9 +65,10 @@ def differ(one: list[tuple[str, float]], other: list[tuple[str, float]]) -> tupl
 
 
 def residual(system: ns.System, branch: xr.Dataset, name: str, k: int) -> float:
-    """How far special point k is from satisfying the equation that defines it.
+    """Return the distance of special point k from satisfying the equation that defines it.
 
-    A multiplier at 1, at -1, on the unit circle; at a boundary, an indicator that vanishes at a touch, or two at once."""
+    A multiplier at 1, at -1, on the unit circle; at a boundary an indicator that vanishes at a touch, or two at once.
+    """
     point = branch.isel(point=int(branch["special_point"][k]))
     kind, mu = str(branch["special_kind"].values[k]), point["floquet_multipliers"].values
     if kind in ("fold", "pitchfork", "transcritical", "branch_point"):
@@ -79,8 +81,10 @@ def residual(system: ns.System, branch: xr.Dataset, name: str, k: int) -> float:
 
 
 def at_boundary(system: ns.System, point: xr.Dataset) -> float:
-    """The least zero over one simulated period: an extremum of an indicator, by a parabola through the sample next to it; the
-    height by which one is overshot at a transition; or a second indicator at the same instant."""
+    """Return the least zero over one simulated period.
+
+    Of an extremum of an indicator, by a parabola through the sample next to it; of the height by which one is overshot
+    at a transition; of a second indicator at the same instant."""
     period, traced = float(point["period"]), system.traced
     run = ns.simulate(
         system, duration=period, start=point["section"].values, mode=system.modes[int(point["mode"])], samples=SAMPLES
@@ -131,8 +135,15 @@ def one(template: str, seed: int, drawn_one: templates.Drawn, orbit: ns.Orbit) -
     begun = time.process_time()
     branch = ns.continue_orbit(orbit, name, limits, points=POINTS)
     row: dict[str, Any] = {
-        "template": template, "seed": seed, "points": branch.sizes["point"], "special": branch.sizes["special"],
-        "ends": endings(branch), "s": round(time.process_time() - begun, 2), "differs": [], "worst": 0.0, "lost": 0,
+        "template": template,
+        "seed": seed,
+        "points": branch.sizes["point"],
+        "special": branch.sizes["special"],
+        "ends": endings(branch),
+        "s": round(time.process_time() - begun, 2),
+        "differs": [],
+        "worst": 0.0,
+        "lost": 0,
     }
     size = np.maximum(np.ptp(branch["section"].values, axis=0), 1e-3 * system.scale_vector())
     for i in entries(branch, name, width):
@@ -186,6 +197,7 @@ if __name__ == "__main__":
             rows.append(one(kind, seed, system, orbit))
             print(json.dumps(rows[-1]), flush=True)
             if arguments.rows:
+                arguments.rows.parent.mkdir(parents=True, exist_ok=True)
                 with arguments.rows.open("a") as file:
                     file.write(json.dumps(rows[-1]) + "\n")
     print(table(rows))

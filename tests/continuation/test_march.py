@@ -111,12 +111,12 @@ def test_a_circle_closes_with_two_folds() -> None:
 
 @pytest.mark.parametrize("beside", [0.0, 0.003])
 def test_a_branch_that_comes_back_in_another_word_closes(beside: float) -> None:
-    """The part of a point that all words have tells it, at the first parameter; what lies beside it is not the first point.
+    """The part of a point that all words have tells it, at the first parameter; what lies beside it is another point.
 
     A chord of the longest step, 0.05, lies nearer to the one 0.003 away than three tenths of its length."""
     curve = circle()
     first = curve.at_parameter(np.array([-0.8, 0.6]) / curve.scale, 0.6).facing(1.0)
-    limits = Limits(((-1, -4.0, 4.0),), 0.05, 500, ("another word", first.X, first.Y + [beside, 0.0]))
+    limits = Limits(((-1, -4.0, 4.0),), 0.05, 500, ("another word", first.X, first.Y + np.array([beside, 0.0])))
     found = march(curve, first, limits, Along())
     assert found.ending == ("points" if beside else "closed")
     if not beside:
@@ -133,7 +133,8 @@ def test_a_fold_beside_a_boundary_is_met_where_the_same_equations_turn_back_beyo
     curve = Plane(f, Plane(lambda x, p: (x - 0.5, 1.0, 0.0)))
     first = curve.at_parameter(np.array([low, 0.0]) / curve.scale, -f(low, 0.0)[0])
     assert first is not None
-    found = march(curve, first if first.tangent[0] < 0 else first.turned(), Limits(((-1, 0.0, 4.0),), 0.05, 99), Along())
+    down = first if first.tangent[0] < 0 else first.turned()
+    found = march(curve, down, Limits(((-1, 0.0, 4.0),), 0.05, 99), Along())
     assert [one.kind for one in found.special] == ["fold", "half"]
     assert found.special[0].point.X[0] == pytest.approx(0.505, abs=1e-9)
 

@@ -135,7 +135,7 @@ class Own(Crossed):
     """Two rows of the condition that fires vanish together."""
 
     def contacts(self, curve: Any, point: Any) -> list[Change]:
-        """Where only a tolerance is passed: the same impact by the other transition; without the last ones before rest."""
+        """At a tolerance: the same impact by the other transition, and the orbit without it or the last before rest."""
         i, surface = self.crossing(curve, point)[0], self.surface(curve, point)
         if not is_tolerance(curve, surface):
             return []

@@ -122,8 +122,10 @@ def by_others(curve: Orbits, point: OrbitPoint, place: int, indicator: int) -> l
     found = []
     for k, other in enumerate(jumps):
         there = {row.indicator: row.sign for row in other.rows}
-        if (other.source, other.target) == (own.source, own.target) and fired in other.rows and (
-            there.get(indicator, 0.0) * signs.get(indicator, 0.0) < 0.0
+        if (
+            (other.source, other.target) == (own.source, own.target)
+            and fired in other.rows
+            and (there.get(indicator, 0.0) * signs.get(indicator, 0.0) < 0.0)
         ):
             new = replace(visit, transition=k, row=other.rows.index(fired))
             signature = Signature((*visits[:place], new, *visits[place + 1 :]))

@@ -201,9 +201,7 @@ def _from_behind(point: OrbitPoint, fresh: Orbits, first: OrbitPoint) -> Met | N
     new = fresh.step(back, 2.0 * away / steep) if steep * FARTHEST > away else None
     if new is None:
         return None
-    met = first_met(
-        Step(fresh, back, new, ([], []), (fresh.margins(back), fresh.margins(new)), True), BOUNDARIES
-    )
+    met = first_met(Step(fresh, back, new, ([], []), (fresh.margins(back), fresh.margins(new)), True), BOUNDARIES)
     return replace(met[0], point=met[0].point.turned()) if met else None
 
 

@@ -230,11 +230,12 @@ def special_on(step: Step, kinds: Sequence[Event]) -> list[Met]:
     # At a change of equations the parameter may turn too: that belongs to the change. Where a branch closes its first
     # point has been looked at.
     stop = step.stop - {"change": BESIDE, "closed": CLOSING}.get(step.cause, 0.0)
+    if stop <= 0.0:
+        return []
     curve, a, b, (before, after) = step.curve, step.a, step.b, step.numbers
-    if stop < step.end and (last := curve.between(a, b, stop) if stop > 0.0 else None):
-        # Beyond its stop the same equations may turn back
+    if stop < step.end and (last := curve.between(a, b, stop)):  # beyond its stop the same equations may turn back
         b, after = last, [kind.number(curve, last) for kind in kinds]
-    step = replace(step, b=b, numbers=(before, after))
+        step = replace(step, b=b, numbers=(before, after))
     for kind, was, now in zip(kinds, before, after, strict=True):
         if not kind.happened(step, was, now):
             continue

@@ -75,7 +75,7 @@ class Solved:
         return self.multipliers_of(self.monodromy)
 
     def multipliers_of(self, M: FloatArray) -> ComplexArray:
-        """Those of its monodromy matrix; the determinant is that of the pieces, which loses no digits in their product."""
+        """Those of its monodromy matrix M; the determinant is that of the pieces: their product loses digits."""
         if self.free or len(M) != 2 or not np.isfinite(M).all() or any(self.at_once):
             return multipliers_of(M)
         det = float(np.exp(self.segments.divergence.sum()))
@@ -196,8 +196,10 @@ class Shooting:
         signs = [self.system.traced.transitions[j].rows[r].sign for j, r in ((k0, entry.row), (k, row))]
         # In and out by the two sides of a surface, or from impact to impact on one of them
         side = signs[0] * signs[1] * (1.0 if self.modes[i - 1] == self.modes[i] else -1.0)
-        if i and coincide(entry.h_z, entry.h, entry.h_z @ entry.R[:n, :n], entry.h, z) and coincide(
-            enters, entry.h, side * leaves, side * touch.h, x
+        if (
+            i
+            and coincide(entry.h_z, entry.h, entry.h_z @ entry.R[:n, :n], entry.h, z)
+            and coincide(enters, entry.h, side * leaves, side * touch.h, x)
         ):
             return 1
         size = float(np.abs(touch.h_z) @ self.flow.scale)
