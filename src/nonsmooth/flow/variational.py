@@ -203,10 +203,10 @@ class VariationalFlow:
         numbers = np.asarray(z, dtype=float).tolist()
         n, n_u = self.n, self.n_u
         found = self._touches[i, mode](float(t), numbers[:n_u], [*np.asarray(values).tolist(), *numbers[n_u:]])
-        parts = (
-            (float(row[0]), row[1 : 1 + n], float(row[1 + n]), row[2 + n :]) for row in np.array(found).reshape(3, -1)
-        )
-        return Touch(*(part for row in parts for part in row))
+        parts: list[Any] = []
+        for row in np.array(found).reshape(3, -1):  # each with its slopes in z, t, p
+            parts += [float(row[0]), row[1 : 1 + n], float(row[1 + n]), row[2 + n :]]
+        return Touch(*parts)
 
     def phase(self, values: Any, k: int) -> tuple[float, FloatArray]:
         """Phase of the time-triggered transition k and its derivatives (n_active,) in the active parameters."""

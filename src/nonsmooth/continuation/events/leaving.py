@@ -181,7 +181,7 @@ def mark(found: March, curve: Orbits, met: list[Met], beyond: tuple[Orbits, Orbi
                 return "grazing"
     teller = curve, kind, point  # what shrinks to nothing explains the end, from whichever side it is located better
     end = None if beyond is None else _from_behind(point, *beyond)
-    if end is not None:
+    if beyond is not None and end is not None:
         fresh = beyond[0]
         if fresh.shooting.m > curve.shooting.m:
             teller = fresh, end.kind, end.point

@@ -236,13 +236,12 @@ class _Marching:
 
     def _close(self, step: Step) -> None:
         """End a step where the branch comes back to its beginning."""
-        if len(self.found.rows) < 3:
-            return
-        back = came_back(self.limits.closed, step)
-        if back is None or back > step.stop:
+        place = self.limits.closed
+        back = came_back(place, step) if len(self.found.rows) >= 3 else None
+        if place is None or back is None or back > step.stop:
             return
         point = self.curve.between(step.a, step.b, back)
-        last = None if point is None else self.curve.at_landmark(point, self.limits.closed)
+        last = None if point is None else self.curve.at_landmark(point, place)
         if last is not None:  # a chord as near as this may belong to another part of the branch
             step.ends("closed", back, last)
 

@@ -267,7 +267,7 @@ class Shooting:
         instants = t.tolist()
         jumps = [self.flow.jump(values, self.jumps[i][0], instants[i], segments.z[i], self.jumps[i][1])
                  for i in range(m)]  # fmt: skip
-        blocks = self._transitions(jumps, D[:m]) if m else []
+        blocks = self._transitions(jumps, D[:m]) if m else D
         for i, (k, _, at, turn) in enumerate(self.jumps):
             r, first, jump = self.t_at[i], self.z_at[i] - 1, jumps[i]
             J[r : r + n + 1, max(first, 0) : r + 1] = blocks[i][:, max(-first, 0) : n + 2]
