@@ -179,17 +179,12 @@ def mark(found: March, curve: Orbits, met: list[Met], beyond: tuple[Orbits, Orbi
             if change.signature.cycle == cycle:
                 _mark_graze(found, curve, there, change, beyond, sliding)
                 return "grazing"
-    teller = curve, kind, point  # what shrinks to nothing explains the end, from whichever side it is located better
-    end = None if beyond is None else _from_behind(point, *beyond)
-    if beyond is not None and end is not None:
-        fresh = beyond[0]
-        if fresh.shooting.m > curve.shooting.m:
-            teller = fresh, end.kind, end.point
-        if _is_better(curve, met[0], fresh, end.point):
-            curve, point = fresh, end.point
-    own = teller[1].contacts(teller[0], teller[2])
-    name = "grazing" if own else teller[1].name
-    indicator = own[0].indicator if own else teller[1].surface(teller[0], teller[2], beyond and beyond[0])
+        end = _from_behind(point, *beyond)
+        if end is not None and _is_better(curve, met[0], beyond[0], end.point):
+            curve, kind, point = beyond[0], end.kind, end.point
+    own = kind.contacts(curve, point)
+    name = "grazing" if own else kind.name
+    indicator = own[0].indicator if own else kind.surface(curve, point, beyond and beyond[0])
     found.mark(name, curve, point, indicator=indicator, sliding=sliding)
     return name
 
