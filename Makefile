@@ -15,7 +15,7 @@ PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .PHONY: help reproduce reproduce-full test slow installed test-times mutants mutants-sample fuzz altered coverage \
-	coverage-awkward coverage-fit check contacts equilibria bench gpu gpu-compiler docs screenshots clean distclean \
+	coverage-awkward coverage-fit check contacts equilibria branches bench gpu gpu-compiler docs screenshots clean distclean \
 	versions
 
 help:  ## list the targets
@@ -67,6 +67,9 @@ equilibria: $(VENV)/.compiled-test  ## equilibria of 200 random systems beside t
 
 contacts: $(VENV)/.compiled-test  ## 1000 random systems with contacts and friction beside an independent reference (hours)
 	$(BIN)/python tests/independent/contact_campaign.py 0 1000 --rows out/contacts.jsonl
+
+branches: $(VENV)/.compiled-test  ## 100 branches of random systems, each entered at five of its points (an hour)
+	$(BIN)/python tests/continuation/entries_campaign.py --rows out/branches.jsonl
 
 check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell, the prose of docstrings, the weight of rooms
 	$(BIN)/ruff check .

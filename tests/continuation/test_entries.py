@@ -31,7 +31,9 @@ def by_surface(F: float) -> ns.System:
         return lambda t, u, p: (u.v, np.cos(p.w * t) - u.x - sign * p.F)
 
     return ns.System(
-        states=["x", "v"], parameters={"w": 0.2, "F": F}, modes={"back": slip(-1.0), "forward": slip(1.0)},
+        states=["x", "v"],
+        parameters={"w": 0.2, "F": F},
+        modes={"back": slip(-1.0), "forward": slip(1.0)},
         indicators={"speed": lambda t, u, p: u.v},
         transitions=[ns.Surface("speed", below="back", above="forward", mode="stick")],
     )
@@ -123,3 +125,28 @@ def test_an_impact_that_vanishes_is_a_graze_from_either_side() -> None:
         assert np.abs(table[name].values[table["kind"].values == "grazing"] - last).min() < 1e-9
         assert table["kind"].values.tolist() == tables[0]["kind"].values.tolist()
         assert table[name].values == pytest.approx(tables[0][name].values, abs=1e-8)
+
+
+@pytest.mark.parametrize("amplitude", [0.74, 0.79, 1.7])
+def test_from_a_small_orbit_to_a_large_one(amplitude: float) -> None:
+    """Motion dies out where the relay equals the forcing; steps are measured by the orbit that has grown."""
+    system, name, limits, _ = templates.relay(np.random.default_rng([1, 5]))
+    here = system.with_parameters({name: amplitude})
+    branch = ns.continue_orbit(ns.find_orbit(here, progress=False), name, limits, points=400)
+    assert branch[name].values[[0, -1]] == pytest.approx(limits, abs=1e-12)
+    special = ns.special_points(branch)
+    assert special["sliding"].values.tolist() == ["adding_sliding", "crossing_sliding"]
+    assert special[name].values[0] == pytest.approx(system.values["F"], abs=1e-9)
+
+
+def test_a_slow_impact_is_the_same_impact() -> None:
+    """Beside a non-smooth fold the speed below which impacts may end in rest is passed too: no way back.
+
+    It once went back through the orbits it had come by, and met their special points again."""
+    system, name, limits, _ = templates.rest(np.random.default_rng([1, 4]))
+    here = system.with_parameters({name: 2.4515905})
+    orbit = ns.find_orbit(here, start=[0.231722, 0.773737], transient=0, period_number=1, progress=False)
+    special = ns.special_points(ns.continue_orbit(orbit, name, limits, points=150))
+    for kind in ("grazing", "fold", "flip"):
+        values = np.sort(special[name].values[special["kind"].values == kind])
+        assert np.diff(values).min() > 1e-9, kind

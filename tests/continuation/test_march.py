@@ -111,14 +111,47 @@ def test_a_circle_closes_with_two_folds() -> None:
     assert X[-1] == pytest.approx([-0.8, 0.6], abs=1e-12)
 
 
-def test_a_branch_that_comes_back_in_another_word_closes() -> None:
-    """The part of a point that all words have tells it: the last one lies beside the first, by the arc of a chord."""
+@pytest.mark.parametrize("beside", [0.0, 0.003])
+def test_a_branch_that_comes_back_in_another_word_closes(beside: float) -> None:
+    """The part of a point that all words have tells it, at the first parameter; what lies beside it is another point.
+
+    A chord of the longest step, 0.05, lies nearer to the one 0.003 away than three tenths of its length."""
     curve = circle()
     first = curve.at_parameter(np.array([-0.8, 0.6]) / curve.scale, 0.6).facing(1.0)
-    limits = Limits(((-1, -4.0, 4.0),), 0.05, 500, ("another word", np.empty(0), first.Y))
+    limits = Limits(((-1, -4.0, 4.0),), 0.05, 500, ("another word", first.X, first.Y + np.array([beside, 0.0])))
     found = march(curve, first, limits, Along())
-    assert found.ending == "closed"
-    assert found.rows[-1].point.X == pytest.approx([-0.8, 0.6], abs=1e-3)
+    assert found.ending == ("points" if beside else "closed")
+    if not beside:
+        assert found.rows[-1].point.X == pytest.approx([-0.8, 0.6], abs=1e-12)
+
+
+@pytest.mark.parametrize("low", [0.7, 0.8, 0.9])
+def test_a_fold_beside_a_boundary_is_met_where_the_same_equations_turn_back_beyond_it(low: float) -> None:
+    """p' = 10 (x - 0.505) (x - 0.495): the first fold lies before the boundary at x = 1/2, the second behind it."""
+
+    def f(x: float, p: float) -> tuple[float, float, float]:
+        return p - 10 * (x**3 / 3 - 0.5 * x * x + 0.249975 * x), -10 * (x - 0.505) * (x - 0.495), 1.0
+
+    curve = Plane(f, Plane(lambda x, p: (x - 0.5, 1.0, 0.0)))
+    first = curve.at_parameter(np.array([low, 0.0]) / curve.scale, -f(low, 0.0)[0])
+    assert first is not None
+    down = first if first.tangent[0] < 0 else first.turned()
+    found = march(curve, down, Limits(((-1, 0.0, 4.0),), 0.05, 99), Along())
+    assert [one.kind for one in found.special] == ["fold", "half"]
+    assert found.special[0].point.X[0] == pytest.approx(0.505, abs=1e-9)
+
+
+def test_a_branch_goes_on_behind_a_boundary_beyond_which_its_equations_have_no_values() -> None:
+    """p = sqrt(x - 1/2), with slopes that grow without bound; x = p + 1/2 behind it."""
+
+    def f(x: float, p: float) -> tuple[float, float, float]:
+        root = np.sqrt(x - 0.5) if x > 0.5 else np.nan
+        return p - root, -0.5 / root, 1.0
+
+    found = run(Plane(f, Plane(lambda x, p: (x - p - 0.5, 1.0, -1.0))), 0.75, 0.5, -1.0, low=-0.1)
+    assert [one.kind for one in found.special] == ["half"] and found.ending == "range"
+    assert found.special[0].point.X == pytest.approx([0.5, 0.0], abs=1e-7)
+    assert found.rows[-1].point.X == pytest.approx([0.4, -0.1], abs=1e-14)
 
 
 def test_a_zero_at_the_beginning_is_not_met_once_more() -> None:

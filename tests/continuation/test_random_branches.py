@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import count, islice
+from typing import Any
 
 import brute_force
 import numpy as np
@@ -96,16 +97,27 @@ def test_graze_of_a_rigid_stop_beyond_a_fold() -> None:
     assert grazes.max() == pytest.approx(first, abs=1e-10)
 
 
+@pytest.mark.parametrize("begun", [-0.05, 0.001, 0.2])
 @pytest.mark.parametrize("lam", [0.15, 0.7])
-def test_square_root_map_behind_its_border(lam: float) -> None:
-    """x = lam x + mu - sqrt(x): sqrt(x) = (sqrt(1 + 4 (1 - lam) mu) - 1) / (2 (1 - lam)), with infinite slope."""
-    system = ns.models.square_root_map(lam=lam, mu=-0.05)
-    branch = ns.continue_orbit(ns.find_orbit(system, start=[-0.05], progress=False), "mu", (-0.1, 0.3))
+def test_square_root_map_behind_its_border(lam: float, begun: float) -> None:
+    """x = lam x + mu - sqrt(x): sqrt(x) = (sqrt(1 + 4 (1 - lam) mu) - 1) / (2 (1 - lam)), with infinite slope at 0.
+
+    The map has no values on the other side, and the border is met from there too."""
+
+    def fixed(mu: Any) -> Any:
+        root = (np.sqrt(np.maximum(1 + 4 * (1 - lam) * mu, 0.0)) - 1) / (2 * (1 - lam))
+        return np.where(mu > 0, root**2, mu / (1 - lam))
+
+    orbit = ns.find_orbit(
+        ns.models.square_root_map(lam=lam, mu=begun), start=[float(fixed(begun))], period_number=1, transient=0,
+        progress=False,
+    )  # fmt: skip
+    branch = ns.continue_orbit(orbit, "mu", (-0.1, 0.3))
     assert endings(branch) == ["range", "range"]
-    mu, x = branch["mu"].values, branch["section"].values[:, 0]
-    root = (np.sqrt(np.maximum(1 + 4 * (1 - lam) * mu, 0.0)) - 1) / (2 * (1 - lam))
-    assert x == pytest.approx(np.where(mu > 0, root**2, mu / (1 - lam)), abs=1e-11)
-    assert set(ns.special_points(branch)["kind"].values) == {"corner"}
+    assert branch["section"].values[:, 0] == pytest.approx(fixed(branch["mu"].values), abs=1e-11)
+    special = ns.special_points(branch)
+    assert special["kind"].values.tolist() == ["corner"]
+    assert special["mu"].values == pytest.approx([0.0], abs=1e-10)
 
 
 def test_mass_at_rest_on_a_table_until_impacts_accumulate() -> None:

@@ -303,17 +303,17 @@ def test_an_indicator_and_its_lie_derivatives() -> None:
 
     def at(t: float, z: np.ndarray, values: np.ndarray) -> np.ndarray:
         there = flow.indicator(values, 0, 1, t, z)
-        return np.array([there.h, there.L])
+        return np.array([there.h, there.L, there.L2])
 
     for j, unit in enumerate(np.eye(4)):
         slope, _ = differenced(lambda h, unit=unit: at(t, z + h * unit, values), 1e-2)
-        assert np.abs(slope - [touch.h_z[j], touch.L_z[j]]).max() < 1e-9
+        assert np.abs(slope - [touch.h_z[j], touch.L_z[j], touch.L2_z[j]]).max() < 1e-9
     for j, name in enumerate(active):
         unit = np.eye(len(values))[list(system.values).index(name)]
         slope, _ = differenced(lambda h, unit=unit: at(t, z, values + h * unit), 1e-2)
-        assert np.abs(slope - [touch.h_p[j], touch.L_p[j]]).max() < 1e-9
+        assert np.abs(slope - [touch.h_p[j], touch.L_p[j], touch.L2_p[j]]).max() < 1e-9
     slope, _ = differenced(lambda h: at(t + h, z, values), 1e-2)
-    assert np.abs(slope - [touch.h_t, touch.L_t]).max() < 1e-9
+    assert np.abs(slope - [touch.h_t, touch.L_t, touch.L2_t]).max() < 1e-9
 
 
 def test_saltation_of_the_papers_oscillator() -> None:
@@ -467,3 +467,27 @@ def test_a_steep_layer_in_the_middle_of_a_step_is_not_passed_over() -> None:
     found = ns.sensitivity(system, duration=9.0, start={"x": 2.0, "v": 0.5})
     assert found.end.values == pytest.approx(true.y[:2, -1], abs=1e-8)
     assert found.Phi.values.ravel() == pytest.approx(true.y[2:, -1], rel=1e-6, abs=1e-9)
+
+
+def test_second_derivatives_of_linear_systems_have_gradients() -> None:
+    """L_f^2 h of rows of numbers is differentiated too, in state, time and a parameter of the forcing."""
+    system = ns.System(
+        states=["x", "v"], parameters={"A": 1.3, "w": 1.7, "c": 0.4}, modes={
+            "one": lambda t, u, p: (u.v, p.A * np.cos(p.w * t) - u.x - 0.2 * u.v)},
+        indicators={"h": lambda t, u, p: u.v + p.c * u.x}, transitions=[],
+    )  # fmt: skip
+    flow, values = VariationalFlow.of(system, ("A", "w", "c")), system.parameter_vector()
+    t, z = 0.7, np.array([0.3, -0.2])
+    touch = flow.indicator(values, 0, 0, t, z)
+
+    def second(t: float, z: np.ndarray, values: np.ndarray) -> np.ndarray:
+        return np.array([flow.indicator(values, 0, 0, t, z).L2])
+
+    for unit, expected in zip(np.eye(2), touch.L2_z, strict=True):
+        slope, _ = differenced(lambda h, unit=unit: second(t, z + h * unit, values), 1e-2)
+        assert slope[0] == pytest.approx(expected, abs=1e-9)
+    for unit, expected in zip(np.eye(3), touch.L2_p, strict=True):
+        slope, _ = differenced(lambda h, unit=unit: second(t, z, values + h * unit), 1e-2)
+        assert slope[0] == pytest.approx(expected, abs=1e-9)
+    slope, _ = differenced(lambda h: second(t + h, z, values), 1e-2)
+    assert slope[0] == pytest.approx(touch.L2_t, abs=1e-9)

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.continuation.arguments import allowed_range, largest_step, limits
-from nonsmooth.continuation.branches.begin import size_of
 from nonsmooth.continuation.branches.following import both_ways, dataset
 from nonsmooth.continuation.branches.reading import special_row
 from nonsmooth.continuation.branches.records import record_of
 from nonsmooth.continuation.events.codimension_two import KINDS, AlongCurve
 from nonsmooth.continuation.march.march import Limits, Row
 from nonsmooth.continuation.problems.locus import Locus
+from nonsmooth.continuation.problems.orbits import size_of
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.errors import SolveError, shortened
 from nonsmooth.flow.arguments import whole_number

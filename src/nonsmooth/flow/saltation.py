@@ -132,6 +132,9 @@ class Touch:
     L_t: float
     L_p: FloatArray
     L2: float  # L_f^2 h
+    L2_z: FloatArray
+    L2_t: float
+    L2_p: FloatArray
 
 
 def chained(jumps: list[Jump]) -> Jump:

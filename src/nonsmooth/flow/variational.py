@@ -195,20 +195,18 @@ class VariationalFlow:
         )  # fmt: skip
 
     def indicator(self, values: Any, i: int, mode: int, t: float, z: Any) -> Touch:
-        """Indicator ``i`` at (t, z) with its first two derivatives along the flow of ``mode``, and gradients."""
+        """Indicator ``i`` at (t, z) with its first two derivatives along the flow of ``mode``, and gradients of all."""
         if (i, mode) not in self._touches:
             from nonsmooth.system.codegen.variations import touch_function
 
             self._touches[i, mode] = touch_function(self.traced, self.places, i, mode)
         numbers = np.asarray(z, dtype=float).tolist()
-        n, a, n_u = self.n, self.n_active, self.n_u
+        n, n_u = self.n, self.n_u
         found = self._touches[i, mode](float(t), numbers[:n_u], [*np.asarray(values).tolist(), *numbers[n_u:]])
-        g = np.array(found)
-        s = n + a + 2  # h, h_z, h_t, h_p
-        return Touch(
-            found[0], g[1 : 1 + n], found[1 + n], g[2 + n : s],
-            found[s], g[s + 1 : s + 1 + n], found[s + 1 + n], g[s + 2 + n : 2 * s], found[2 * s],
-        )  # fmt: skip
+        parts: list[Any] = []
+        for row in np.array(found).reshape(3, -1):  # each with its slopes in z, t, p
+            parts += [float(row[0]), row[1 : 1 + n], float(row[1 + n]), row[2 + n :]]
+        return Touch(*parts)
 
     def phase(self, values: Any, k: int) -> tuple[float, FloatArray]:
         """Phase of the time-triggered transition k and its derivatives (n_active,) in the active parameters."""

@@ -98,22 +98,23 @@ class RowsFlow(VariationalFlow):
             found[..., n + 2 :: 2] = -speeds * row[..., n + 1 :: 2]
             return found
 
-        slopes = np.empty_like(rows)  # the same of its derivative along the flow
-        slopes[0] = rows[0, :n] @ fields[0]
-        for p in range(1, len(rows)):
-            slopes[p] = rows[p, :n] @ fields[0] + rows[0, :n] @ fields[p]
-        if self.harmonics:
-            slopes += turned(rows, rates[0])
-            slopes[1:] += turned(rows[0], rates[1:])
-        second = float(slopes[0, :n] @ (fields[0] @ w))
+        def along(rows: FloatArray) -> FloatArray:
+            """The same of its derivative along the flow."""
+            slopes = np.empty_like(rows)
+            slopes[0] = rows[0, :n] @ fields[0]
+            for p in range(1, len(rows)):
+                slopes[p] = rows[p, :n] @ fields[0] + rows[0, :n] @ fields[p]
+            if self.harmonics:
+                slopes += turned(rows, rates[0])
+                slopes[1:] += turned(rows[0], rates[1:])
+            return slopes
+
         found: list[Any] = []
-        for every in (rows, slopes):
+        for every in (rows, slopes := along(rows), along(slopes)):
             own, changing = every @ w, np.zeros(len(rows))
             if self.harmonics and every[0, n + 1 :].any():
                 changing = turned(every[0], rates) @ w
-            second += float(changing[0]) if every is slopes else 0.0
             found += [float(own[0]), every[0, :n].copy(), float(changing[0]), own[1:] + t * changing[1:]]
-        found.append(second)
         return Touch(*found)
 
 

@@ -9,21 +9,11 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.branches.records import PointRecord
-from nonsmooth.continuation.problems.orbits import Orbits
+from nonsmooth.continuation.problems.orbits import Orbits, size_of
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.system.system import System
 
-__all__ = ["curve_of", "resumed_at", "size_of"]
-
-
-def size_of(maximum: FloatArray, minimum: FloatArray, system: System) -> FloatArray:
-    """Half the range of each state, and 1 for the memory; of a state that no mode moves at least its absolute value.
-
-    Between two resets such a state has no range that could tell how far it moves along a branch."""
-    half = np.maximum(np.nan_to_num(0.5 * (maximum - minimum)), 1e-3 * system.scale_vector())
-    still = np.array([all(field[i] == 0 for field in system.traced.fields) for i in range(len(half))])
-    largest = np.nan_to_num(np.maximum(np.abs(maximum), np.abs(minimum)))
-    return np.concatenate([np.where(still, np.maximum(half, largest), half), np.ones(len(system.memory))])
+__all__ = ["curve_of", "resumed_at"]
 
 
 def curve_of(orbit: Orbit, name: str, width: float) -> tuple[Orbits, FloatArray]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.continuation.events.change import Change, gained, inserted, is_tolerance, without
+from nonsmooth.continuation.events.change import Change, by_others, gained, inserted, is_tolerance, rest_after, without
 from nonsmooth.continuation.march.event import BESIDE, Event, Met, Step
 from nonsmooth.continuation.problems.signature import AT_ONCE
 
@@ -135,14 +135,12 @@ class Own(Crossed):
     """Two rows of the condition that fires vanish together."""
 
     def contacts(self, curve: Any, point: Any) -> list[Change]:
-        """The orbit without the last impacts before rest, from one as slow as impacts are followed."""
-        visits, i = curve.shooting.signature.visits, self.crossing(curve, point)[0]
-        rests = i
-        while visits[rests].transition == visits[i].transition:
-            rests += 1
-        if visits[rests].mode != visits[i].mode or visits[rests].row < 0:
+        """At a tolerance: the same impact by the other transition, and the orbit without it or the last before rest."""
+        i, surface = self.crossing(curve, point)[0], self.surface(curve, point)
+        if not is_tolerance(curve, surface):
             return []
-        return [without(curve, point, i, rests - i)] if is_tolerance(curve, self.surface(curve, point)) else []
+        found, count = by_others(curve, point, i, surface), rest_after(curve, point, i)
+        return found if count == 0 else [*found, without(curve, point, i, count or 1)]
 
     def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:
         """The crossing with the least other row."""

@@ -19,9 +19,11 @@ from nonsmooth.continuation.problems.signature import AT_ONCE, Signature, Visit
 from nonsmooth.system.symbolic.traced import ASKED, FOUND, Traced
 
 __all__ = [
-    "Change", "common_orbit", "common_point", "gained", "inserted", "is_tolerance", "past_the_section", "without",
+    "Change", "by_others", "common_orbit", "common_point", "gained", "inserted", "is_tolerance", "past_the_section",
+    "rest_after", "without",
 ]  # fmt: skip
 
+BEFORE_REST = 1e-4  # of the period: flights after an impact as slow as impacts are followed are shorter
 TOLERANCE = 1e-5  # of an indicator's size: a band as narrow as this stands for no width
 
 
@@ -98,6 +100,37 @@ def without(curve: Orbits, point: OrbitPoint, place: int, count: int) -> Change:
         curve.shooting.signature.without(place, count), np.delete(times, gone), np.delete(states, gone + 1, axis=0),
         jump.rows[visits[place].row].indicator, False, place, visits[place : place + count], float(times[place]),
     )  # fmt: skip
+
+
+def rest_after(curve: Orbits, point: OrbitPoint, place: int) -> int | None:
+    """The number of impacts from visit ``place`` on that rest follows at once; None where it does not."""
+    visits, times = curve.shooting.signature.visits, point.solved.times
+    i = place
+    while visits[i].row >= 0 and visits[i + 1].mode == visits[place].mode:
+        i += 1
+    soon = float(times[i + 1] - times[place + 1]) < BEFORE_REST * float(times[-1])
+    return i - place if visits[i].row >= 0 and soon else None
+
+
+def by_others(curve: Orbits, point: OrbitPoint, place: int, indicator: int) -> list[Change]:
+    """The same orbit where one of its transitions is another one that needs an indicator with the other sign."""
+    visits, times, states = _parts(curve, point)
+    jumps, visit = curve.shooting.system.traced.transitions, visits[place]
+    own = jumps[visit.transition]
+    fired = own.rows[visit.row]
+    signs = {row.indicator: row.sign for row in own.rows}
+    found = []
+    for k, other in enumerate(jumps):
+        there = {row.indicator: row.sign for row in other.rows}
+        if (
+            (other.source, other.target) == (own.source, own.target)
+            and fired in other.rows
+            and (there.get(indicator, 0.0) * signs.get(indicator, 0.0) < 0.0)
+        ):
+            new = replace(visit, transition=k, row=other.rows.index(fired))
+            signature = Signature((*visits[:place], new, *visits[place + 1 :]))
+            found.append(Change(signature, times, states, indicator, True, place, (new,), float(times[place])))
+    return found
 
 
 def common_orbit(curve: Orbits, point: OrbitPoint, change: Change) -> tuple[Orbits, Solved, FloatArray] | None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from nonsmooth.continuation.events.boundaries import BOUNDARIES, Boundary, Crossed, Unseen, passed_by
-from nonsmooth.continuation.events.change import Change, common_point, is_tolerance, past_the_section
+from nonsmooth.continuation.events.change import Change, common_point, is_tolerance, past_the_section, rest_after
 from nonsmooth.continuation.events.grazing import graze
 from nonsmooth.continuation.events.neighbours import beside
 from nonsmooth.continuation.events.of_orbits import KINDS, SMALL
@@ -18,6 +18,7 @@ from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.primitive import is_doubled
+from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.errors import SystemDefinitionError
 
 __all__ = ["ENDINGS", "AlongOrbits"]
@@ -25,7 +26,6 @@ __all__ = ["ENDINGS", "AlongOrbits"]
 FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
 WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
 AHEAD = 1e-6  # of the range
-BEFORE_REST = 1e-2  # of the period: a flight after an impact as slow as impacts are followed is shorter
 WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
@@ -71,12 +71,12 @@ class AlongOrbits(Policy):
     endings = ENDINGS
 
     def __init__(self) -> None:
-        self._unwatched: Orbits | None = None  # a curve whose points simulated rounds do not confirm
+        self._unwatched: Shooting | None = None  # of a curve whose points simulated rounds do not confirm
 
     def unseen(self, step: Step) -> Met | None:
         """The first place on a step where only a simulated round tells that the signature ends."""
         curve = step.curve
-        if step.virtual or curve is self._unwatched or curve.shows(step.b):
+        if step.virtual or curve.shooting is self._unwatched or curve.shows(step.b):
             return None
         met = Unseen().met(step)
         if met is None or beside(curve, met.point) is not None:
@@ -86,7 +86,7 @@ class AlongOrbits(Policy):
             "than the branch: its points from here on are not confirmed",
             RuntimeWarning, stacklevel=2,
         )  # fmt: skip
-        self._unwatched = curve
+        self._unwatched = curve.shooting
         return None
 
     def passed_by(self, step: Step) -> list[Met]:
@@ -105,7 +105,7 @@ class AlongOrbits(Policy):
         first = met[0]
         if len(met) == 1 and first.kind.at_section(curve, first.point):
             after = past_the_section(curve, first.point)
-            if after is not None and (after[1].path.margins[1:] > 0.0).all():
+            if after is not None and (after[1].path.margins[1:] >= 0.0).all():
                 return after  # else another boundary is met with the section
         beyond = beside(curve, first.point, contacts_of(curve, met))
         if beyond is not None and _completes(curve, met, beyond[0]):
@@ -144,12 +144,12 @@ def _completes(curve: Orbits, met: list[Met], fresh: Orbits) -> bool:
     """Return whether only the speed below which impacts are completed as rest is reached.
 
     An impact that vanishes far from rest passes that speed too, and is a graze."""
-    tolerances = [is_tolerance(curve, one.kind.surface(curve, one.point, fresh)) for one in met]
-    kind, times = met[0].kind, met[0].point.solved.times
-    if not any(tolerances) or tolerances[0] or not isinstance(kind, Crossed):
-        return any(tolerances)
-    visit = kind.crossing(curve, met[0].point)[0]
-    return visit + 2 < len(times) and float(times[visit + 2] - times[visit + 1]) < BEFORE_REST * float(times[-1])
+    passed = [one for one in met if is_tolerance(curve, one.kind.surface(curve, one.point, fresh))]
+    if not passed:
+        return False
+    kind, point = passed[0].kind, passed[0].point
+    same = fresh.shooting.m == curve.shooting.m or not isinstance(kind, Crossed)
+    return same or rest_after(curve, point, kind.crossing(curve, point)[0]) is not None
 
 
 def _is_centre(curve: Orbits, met: Met) -> bool:
@@ -196,9 +196,7 @@ def _from_behind(point: OrbitPoint, fresh: Orbits, first: OrbitPoint) -> Met | N
     new = fresh.step(back, 2.0 * away / steep) if steep * FARTHEST > away else None
     if new is None:
         return None
-    met = first_met(
-        Step(fresh, back, new, ([], []), (fresh.margins(back), fresh.margins(new)), True), BOUNDARIES
-    )
+    met = first_met(Step(fresh, back, new, ([], []), (fresh.margins(back), fresh.margins(new)), True), BOUNDARIES)
     return replace(met[0], point=met[0].point.turned()) if met else None
 
 

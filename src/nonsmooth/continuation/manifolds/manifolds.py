@@ -30,11 +30,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.branches.begin import size_of
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.manifolds.arcs import BEGIN, Arc, grow
 from nonsmooth.continuation.manifolds.section_map import SectionMap
 from nonsmooth.continuation.problems.multipliers import EDGE
+from nonsmooth.continuation.problems.orbits import size_of
 from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.flow.sections import Stroboscopic
 from nonsmooth.system.names import by_name

@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -227,17 +227,21 @@ def first_met(step: Step, boundaries: Sequence[Event]) -> list[Met] | None:
 def special_on(step: Step, kinds: Sequence[Event]) -> list[Met]:
     """The special points before the stop of a step, in their order."""
     found: list[Met] = []
-    curve, a, b = step.curve, step.a, step.b
     # At a change of equations the parameter may turn too: that belongs to the change. Where a branch closes its first
     # point has been looked at.
     stop = step.stop - {"change": BESIDE, "closed": CLOSING}.get(step.cause, 0.0)
-    for kind, was, now in zip(kinds, *step.numbers, strict=True):
+    if stop <= 0.0:
+        return []
+    curve, a, b, (before, after) = step.curve, step.a, step.b, step.numbers
+    if stop < step.end and (last := curve.between(a, b, stop)):  # beyond its stop the same equations may turn back
+        b, after = last, [kind.number(curve, last) for kind in kinds]
+        step = replace(step, b=b, numbers=(before, after))
+    for kind, was, now in zip(kinds, before, after, strict=True):
         if not kind.happened(step, was, now):
             continue
         there: tuple[float, Any] | None = kind.located(step)
         if there is None:
-            # Beyond a change of equations nothing is missed.
-            if kind.certain and (step.cause != "change" or kind.happened(step, was, kind.number(curve, step.last))):
+            if kind.certain:
                 warnings.warn(
                     f"a {kind.name.replace('_', '-')} between the parameter's values {a.value!r} and {b.value!r} was "
                     "met but not located, and is not listed",

@@ -18,6 +18,7 @@ INTERRUPTED = "Interrupted: what was found until then stands"
 FIRST = 1e-3  # step
 LEAST_STEP = 1e-9
 COSINE = 0.98  # of the angle between the tangents of neighbours
+AT_LIMIT = 1e-8  # along the branch: as near to a boundary no point follows where it is one of the equations' own
 SPREAD = 0.15  # change of what is known of neighbours (of orbits: chordal, of the multipliers)
 
 
@@ -134,18 +135,20 @@ class _Marching:
     def follow(self, curve: Curve[Any], point: Any) -> None:
         """March on, point by point."""
         found = self.found
-        self._begin(curve, point)
+        self._begin(*(curve.renewed(point) or (curve, point)))
         while len(found.rows) < self.limits.points:
             new = self._next()
-            if new is None:
-                found.ending = self.policy.why(self.curve, self.point)
-                return
-            step = self._within(new)
+            step = None if new is None else self._within(new)
             met = None if step is None else first_met(step, self.policy.boundaries)
-            if step is None or met is None:  # an event that is not located: nearer
+            if new is not None and met is None:  # an event that is not located: nearer
                 self.ds *= 0.25
-                if self.ds < LEAST_STEP:
-                    found.ending = "no_convergence"
+                if self.ds >= LEAST_STEP:
+                    continue
+            if step is None or met is None:
+                limit = self._limit()
+                if not limit:
+                    found.ending = self.policy.why(self.curve, self.point)
+                if not limit or not self._change(limit):
                     return
                 continue
             if not met and step.cause in self.policy.unseen_on and (unseen := self.policy.unseen(step)):
@@ -160,19 +163,35 @@ class _Marching:
                 found.ending = step.cause
                 return
             if step.cause == "change":
-                after = self.policy.behind(found, self.curve, met)
-                if after is None:
+                if not self._change(met):
                     return
-                self._begin(*after)
-                self.ds = 0.1 * self.limits.largest
-                found.add(*after)
-                continue
-            if self._ended(step):
+            elif self._ended(step):
                 return
+
+    def _change(self, met: list[Met]) -> bool:
+        """Go on behind the boundaries ``met``; False where the branch ends there."""
+        after = self.policy.behind(self.found, self.curve, met)
+        if after is None:
+            return False
+        self._begin(*after)
+        self.ds = 0.1 * self.limits.largest
+        self.found.add(*after)
+        return True
+
+    def _limit(self) -> list[Met]:
+        """The boundaries to which the branch has come in the limit: its equations have no derivatives there."""
+        point, near = self.point, np.full(len(self.policy.boundaries), np.inf)  # as chords of the margins end
+        for row in self.found.rows:
+            if row.curve is self.curve:
+                fallen = np.nan_to_num(self.curve.margins(row.point)) - np.nan_to_num(self.margins)
+                s = np.where(fallen > 0.0, float(np.abs(point.Y - row.point.Y).max()), np.inf)
+                near = np.fmin(near, np.abs(self.margins) * s / np.abs(fallen))
+        return [Met(kind, 0.0, point, kind.name) for kind, s in zip(self.policy.boundaries, near, strict=True)
+                if s < AT_LIMIT]  # fmt: skip
 
     def _begin(self, curve: Curve[Any], point: Any) -> None:
         """Go on from a point of a curve."""
-        self.curve, self.before, self.point = curve, None, curve.passed(point) or point
+        self.curve, self.before, self.point = curve, None, point
         self.numbers, self.margins = self._watched(self.point)
 
     def _watched(self, point: Any) -> tuple[list[float], Any]:
@@ -217,11 +236,14 @@ class _Marching:
 
     def _close(self, step: Step) -> None:
         """End a step where the branch comes back to its beginning."""
-        if len(self.found.rows) < 3:
+        place = self.limits.closed
+        back = came_back(place, step) if len(self.found.rows) >= 3 else None
+        if place is None or back is None or back > step.stop:
             return
-        back = came_back(self.limits.closed, step)
-        if back is not None and back <= step.stop:
-            step.ends("closed", back, self.curve.between(step.a, step.b, back) or step.b)
+        point = self.curve.between(step.a, step.b, back)
+        last = None if point is None else self.curve.at_landmark(point, place)
+        if last is not None:  # a chord as near as this may belong to another part of the branch
+            step.ends("closed", back, last)
 
     def _special(self, step: Step) -> bool:
         """List the special points of a step; True where the branch ends at one."""
@@ -261,9 +283,11 @@ class _Marching:
         if len(found.rows) >= 2 * self.again:
             self.circle, self.again = curve.landmark(new), len(found.rows)
         self.ds = min(self.ds * self.easy, self.limits.largest)
-        anchored = curve.passed(new)
-        self.before, self.point = (self.point, new) if anchored is None else (None, anchored)
-        self.numbers, self.margins = step.numbers[1], step.margins[1]
+        if renewed := curve.renewed(new):
+            self._begin(*renewed)
+        else:
+            self.before, self.point = self.point, new
+            self.numbers, self.margins = step.numbers[1], step.margins[1]
         return False
 
 

@@ -24,6 +24,7 @@ DONE = 1e-9  # a step this small is followed by one of its square
 FARTHEST = 2.5  # times the last step: a cubic is not trusted beyond
 SMALL = 1e-6  # residual of a first guess that a small step alone makes a solution
 CLOSE = 1e-12  # where multipliers are wanted to the last digits
+AGAIN = 1e-4  # in scaled unknowns: as near as a branch comes back to a point of its own
 STEP = 1e-5  # of differences, in scaled unknowns
 #: The word of a curve (of orbits: the signature), the unknowns, and what other curves of the branch have of them.
 Place = tuple[Any, FloatArray, FloatArray]
@@ -123,6 +124,14 @@ class Curve(ABC, Generic[P]):
         """The place by which a branch that comes back to a point is told."""
         return self.word(), point.X, self.seen(point)
 
+    def at_landmark(self, point: P, place: Place) -> P | None:
+        """The point nearby that is the one of a landmark; None where there is none."""
+        word, X, seen = place
+        if word == self.word() and np.abs(X / self.scale - point.Y).max() < AGAIN:
+            return point
+        same = self.at_parameter(point.Y, float(X[-1]))
+        return None if same is None or np.abs(self.seen(same) - seen).max() > AGAIN else same
+
     def margins(self, point: P) -> FloatArray:
         """The numbers that turn negative beyond the boundaries."""
         return np.empty(0)
@@ -131,8 +140,8 @@ class Curve(ABC, Generic[P]):
         """Difference of what is known of two neighbours, from 0 to 1."""
         return 0.0
 
-    def passed(self, point: P) -> P | None:
-        """The last point where a phase condition was put through it; None where there is none to move."""
+    def renewed(self, point: P) -> tuple[Curve[P], P] | None:
+        """The curve and the last point in other units, or with a phase condition put through it; None as they are."""
         return None
 
     # --- along the curve

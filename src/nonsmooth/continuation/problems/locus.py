@@ -128,6 +128,10 @@ class Locus(Orbits):
         null = self.null_vectors(solved, 1e-9)
         return self.point(solved, Y, null[-1]) if len(null) == 1 else None
 
+    def renewed(self, point: OrbitPoint) -> tuple[Orbits, OrbitPoint] | None:
+        """The phase condition put through the last point; the units stay, psi was calibrated in them."""
+        return None if self.shooting.reference is None else super().renewed(point)
+
     def word(self) -> Any:
         """The kind."""
         return self.kind

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.anchor import plane_across
@@ -16,8 +17,30 @@ from nonsmooth.continuation.problems.path import Path, Walk
 from nonsmooth.continuation.problems.rounds import Rounds
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
 from nonsmooth.continuation.problems.signature import Signature
+from nonsmooth.system.system import System
 
-__all__ = ["OrbitPoint", "Orbits"]
+if TYPE_CHECKING:
+    from nonsmooth.system.symbolic.traced import Traced
+
+__all__ = ["OrbitPoint", "Orbits", "size_of"]
+
+GROWN = 2.0  # times its size: the motion is measured anew
+
+
+def size_of(maximum: FloatArray, minimum: FloatArray, system: System) -> FloatArray:
+    """Half the range of each state, and 1 for the memory; of a state that no mode moves at least its absolute value.
+
+    Between two resets such a state has no range that could tell how far it moves along a branch."""
+    half = np.maximum(np.nan_to_num(0.5 * (maximum - minimum)), 1e-3 * system.scale_vector())
+    largest = np.nan_to_num(np.maximum(np.abs(maximum), np.abs(minimum)))
+    still = _still(system.traced)
+    return np.concatenate([np.where(still, np.maximum(half, largest), half), np.ones(len(system.memory))])
+
+
+@lru_cache(maxsize=32)
+def _still(traced: Traced) -> NDArray[np.bool_]:
+    """The states that no mode moves."""
+    return np.array([all(field[i] == 0 for field in traced.fields) for i in range(len(traced.u))])
 
 
 @dataclass
@@ -52,7 +75,7 @@ class Orbits(Curve[OrbitPoint]):
 
     def __init__(self, shooting: Shooting, size: FloatArray, period: float, widths: Sequence[float]) -> None:
         self.shooting, self.walk = shooting, Walk(shooting)
-        m = shooting.m
+        m, self.first_size = shooting.m, size  # the size of the branch's first orbit
         self.size, self.period, self.widths = size, period, tuple(widths)
         scale = shooting.join(np.full(m, period), np.tile(size, (m + 1, 1)), period, widths)
         # The length of a curve should not depend on how many visits an orbit is cut into.
@@ -79,9 +102,13 @@ class Orbits(Curve[OrbitPoint]):
         fresh = Shooting(old.system, signature, old.period_number, old.active)
         X = fresh.join(times, states, period, parameters)
         fresh.prepare(X, self.size)
-        curve = Orbits(fresh, self.size, self.period, self.widths)
-        curve.rounds = self.rounds  # of the same system
-        return curve, X
+        return self._like(fresh, self.size), X
+
+    def _like(self, shooting: Shooting, size: FloatArray) -> Orbits:
+        """The curve of other equations of the same branch, or in other units."""
+        curve = Orbits(shooting, size, self.period, self.widths)
+        curve.rounds, curve.first_size = self.rounds, self.first_size
+        return curve
 
     def evaluate(self, Y: FloatArray) -> Solved:
         """The equations of multiple shooting."""
@@ -107,7 +134,7 @@ class Orbits(Curve[OrbitPoint]):
         path = self.walk.along(solved, self.shooting.split(solved.X)[1])
         if path is None or not np.isfinite(M).all():
             return None
-        return OrbitPoint(Y, tangent, orientation, iterations, solved, M, solved.multipliers, path)
+        return OrbitPoint(Y, tangent, orientation, iterations, solved, M, solved.multipliers_of(M), path)
 
     def word(self) -> Signature:
         """The signature."""
@@ -121,7 +148,7 @@ class Orbits(Curve[OrbitPoint]):
 
     def shape(self, maximum: FloatArray, minimum: FloatArray, X: FloatArray) -> FloatArray:
         """The extremes and the parameters of an orbit, scaled."""
-        size = self.size[: len(maximum)]
+        size = self.first_size[: len(maximum)]
         return np.nan_to_num(np.concatenate([maximum / size, minimum / size, X[-len(self.widths) :] / self.widths]))
 
     def margins(self, point: OrbitPoint) -> FloatArray:
@@ -141,17 +168,23 @@ class Orbits(Curve[OrbitPoint]):
         """The range of an autonomous orbit without transitions, in units of the first one's; else 1."""
         if self.shooting.forced or self.shooting.m:
             return 1.0
-        swing = (point.path.maximum - point.path.minimum) / self.size[: len(point.path.maximum)]
+        swing = (point.path.maximum - point.path.minimum) / self.first_size[: len(point.path.maximum)]
         return float(np.nanmax(swing))
 
-    def passed(self, point: OrbitPoint) -> OrbitPoint | None:
-        """The same orbit with the phase condition of one without transitions put through it."""
+    def renewed(self, point: OrbitPoint) -> tuple[Orbits, OrbitPoint] | None:
+        """The curve in units of an orbit that has grown; or the phase condition of one without transitions put through
+        it."""
         shooting, z = self.shooting, point.X[: self.shooting.n]
         if shooting.reference is None:
-            return None
+            size = size_of(point.path.maximum, point.path.minimum, shooting.system)
+            if not (size > GROWN * self.size).any():
+                return None
+            fresh = self._like(shooting, np.maximum(size, self.size))
+            tangent = point.tangent * self.scale / fresh.scale
+            return fresh, replace(point, Y=point.X / fresh.scale, tangent=tangent / np.linalg.norm(tangent))
         shooting.reference = plane_across(z, point.solved.segments.f_begin[0], self.size)
         row = point.solved.jacobian[-1]
         row[:] = 0.0
         row[: shooting.n] = shooting.reference[1]
         found = self.tangent(point.solved, point.tangent)
-        return point if found is None else replace(point, tangent=found[0], orientation=found[1])
+        return self, (point if found is None else replace(point, tangent=found[0], orientation=found[1]))

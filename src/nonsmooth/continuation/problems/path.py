@@ -22,6 +22,7 @@ __all__ = ["Path", "Walk"]
 ORDER = 20
 RTOL = 1e-15
 ROUNDING = 1e-13  # of an indicator's size
+LEAST = 1e-18  # of an indicator's size: a maximum nearer to zero has no sign
 BEGUN = 1e-10  # of the period
 SHORT = 1e-6  # of the period
 NOTHING = 1e-13  # of the period: where a crossing has passed the section its visit has no length, not a negative one
@@ -167,6 +168,7 @@ class Walk:
         # In a flight as short as those before rest an indicator does not rise above what it is solved for.
         flown = tau < SHORT * float(solved.times[-1])
         inner[flown[:, None] & (np.abs(inner) <= ROUNDING * size.max(axis=0))] = -np.inf
+        inner[np.abs(inner) < LEAST * np.where(np.isfinite(size), size, 0.0)] = -np.inf
         at = int(inner.argmax()) if n_t else 0
         touched = (at // n_t, at % n_t) if n_t else (0, 0)
         own = end[self.inside]

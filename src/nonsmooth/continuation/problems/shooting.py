@@ -71,12 +71,16 @@ class Solved:
 
     @property
     def multipliers(self) -> ComplexArray:
-        """Floquet multipliers; the determinant is that of the pieces, which loses no digits in their product."""
-        M = self.monodromy
+        """Floquet multipliers."""
+        return self.multipliers_of(self.monodromy)
+
+    def multipliers_of(self, M: FloatArray) -> ComplexArray:
+        """Those of its monodromy matrix M; the determinant is that of the pieces: their product loses digits."""
         if self.free or len(M) != 2 or not np.isfinite(M).all() or any(self.at_once):
             return multipliers_of(M)
-        jumps = np.prod([np.linalg.det(jump.saltation) for jump in self.jumps])
-        det = float(jumps) * float(np.exp(self.segments.divergence.sum()))
+        det = float(np.exp(self.segments.divergence.sum()))
+        for (a, b), (c, d) in (jump.S[:2, :2].tolist() for jump in self.jumps):
+            det *= a * d - b * c
         return multipliers_of(M, det, forced=self.forced)
 
 
@@ -192,8 +196,10 @@ class Shooting:
         signs = [self.system.traced.transitions[j].rows[r].sign for j, r in ((k0, entry.row), (k, row))]
         # In and out by the two sides of a surface, or from impact to impact on one of them
         side = signs[0] * signs[1] * (1.0 if self.modes[i - 1] == self.modes[i] else -1.0)
-        if i and coincide(entry.h_z, entry.h, entry.h_z @ entry.R[:n, :n], entry.h, z) and coincide(
-            enters, entry.h, side * leaves, side * touch.h, x
+        if (
+            i
+            and coincide(entry.h_z, entry.h, entry.h_z @ entry.R[:n, :n], entry.h, z)
+            and coincide(enters, entry.h, side * leaves, side * touch.h, x)
         ):
             return 1
         size = float(np.abs(touch.h_z) @ self.flow.scale)
@@ -258,14 +264,14 @@ class Shooting:
         np.negative(pull[:, :, 0], out=D[:, :, 0])
         D[:, :, 1 : n + 1], D[:, :, n + 1], D[:, :, n + 2 :] = segments.Phi, segments.f_end, segments.P
         F, J = np.zeros(size), np.zeros((size, len(X)))
-        jumps = []
-        for i, (k, row, at, turn) in enumerate(self.jumps):
-            jump = self.flow.jump(values, k, float(t[i]), segments.z[i], row)
-            jumps.append(jump)
-            r, first = self.t_at[i], self.z_at[i] - 1
-            block = self._transition(jump, D[i])
-            J[r : r + n + 1, max(first, 0) : r + 1] = block[:, max(-first, 0) : n + 2]
-            J[r : r + n + 1, size:] = block[:, n + 2 :]
+        instants = t.tolist()
+        jumps = [self.flow.jump(values, self.jumps[i][0], instants[i], segments.z[i], self.jumps[i][1])
+                 for i in range(m)]  # fmt: skip
+        blocks = self._transitions(jumps, D[:m]) if m else D
+        for i, (k, _, at, turn) in enumerate(self.jumps):
+            r, first, jump = self.t_at[i], self.z_at[i] - 1, jumps[i]
+            J[r : r + n + 1, max(first, 0) : r + 1] = blocks[i][:, max(-first, 0) : n + 2]
+            J[r : r + n + 1, size:] = blocks[i][:, n + 2 :]
             F[r], F[r + 1 : r + 1 + n] = jump.h, z[i + 1] - jump.z_after
             if self.at_once[i]:
                 J[r] = 0.0
@@ -299,17 +305,16 @@ class Shooting:
             self._anchor(F, J, X, t, z[0])
         return Solved(X, F, J, times, segments, jumps, values, self.free, self.at_once, self.forced)
 
-    def _transition(self, jump: Jump, D: FloatArray) -> FloatArray:
-        """Derivatives of the condition and of -R at a transition, by those of the state before it."""
+    def _transitions(self, jumps: list[Jump], D: FloatArray) -> FloatArray:
+        """Derivatives of the conditions and of -R at the transitions, by those of the states before them."""
         n = self.n
-        found = np.empty((n + 1, D.shape[1]))
-        found[0] = jump.h_z @ D
-        np.matmul(jump.R[:n, :n], D, out=found[1:])
-        found[1:, n + 1] += jump.fields[2, :n]
-        found[1:, n + 2 :] += jump.R[:n, n:]
-        np.negative(found[1:], out=found[1:])
-        found[0, n + 1] += jump.h_t
-        found[0, n + 2 :] += jump.h_p
+        rows = np.array([[*jump.h_z, jump.h_t, *jump.h_p] for jump in jumps])
+        R, fields = np.array([jump.R for jump in jumps]), np.array([jump.fields[2] for jump in jumps])
+        maps = np.concatenate([rows[:, None, :n], -R[:, :n, :n]], axis=1)
+        found = maps @ D
+        found[:, 0, n + 1 :] += rows[:, n:]
+        found[:, 1:, n + 1] -= fields[:, :n]
+        found[:, 1:, n + 2 :] -= R[:, :n, n:]
         return found
 
     def _anchor(self, F: FloatArray, J: FloatArray, X: FloatArray, t: FloatArray, z0: FloatArray) -> None:
@@ -346,7 +351,7 @@ class Shooting:
             inner[size:] = self.period_number * self.flow.period(values)[1]
         if abs(tau) < SHORT[order] * (times[-1] or 1.0):
             x = np.concatenate([times[entry : entry + 1], z[entry], [tau], values[self.places]])
-            F[r], slopes = mean_along(self.flow, x, values, self.places, *visit)
+            F[r], slopes = mean_along(self.flow, x, values, *visit)
             J[r] = slopes[n + 1] * inner
             J[r, begin] += slopes[: n + 1]
             J[r, size:] += slopes[n + 2 :]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.variational import VariationalFlow
@@ -13,31 +12,28 @@ from nonsmooth.flow.variational import VariationalFlow
 __all__ = ["coincide", "mean_along", "one_surface"]
 
 SAME = 1e-12  # of their sizes: gradients and values of one surface
-STEP = 1e-5  # of the differences of a mean
 NODES = 6
 
 
 def mean_along(
-    flow: VariationalFlow, x: FloatArray, values: FloatArray, places: NDArray[np.int64], mode: int, indicator: int,
-    order: int,
-) -> tuple[float, FloatArray]:  # fmt: skip
+    flow: VariationalFlow, x: FloatArray, values: FloatArray, mode: int, indicator: int, order: int
+) -> tuple[float, FloatArray]:
     """The mean of L_f h (order 1) or of (1 - s) L_f^2 h (order 2) along a visit, and its slopes.
 
     ``x`` holds the visit's begin, the state there, its length, and the active parameters."""
     nodes, weights = _gauss(order - 1)
-    n, values = len(flow.scale), values.copy()
-    modes = np.full(NODES, mode)
-
-    def mean(x: FloatArray) -> float:
-        values[places] = x[n + 2 :]
-        tau = nodes * x[n + 1]
-        there = flow.segments(values, modes, np.full(NODES, x[0]), tau, np.tile(x[1 : n + 1], (NODES, 1))).z
-        found = [flow.indicator(values, indicator, mode, x[0] + s, z) for s, z in zip(tau, there, strict=True)]
-        return float(weights @ [one.L if order == 1 else one.L2 for one in found])
-
-    steps = STEP * np.concatenate([[1.0], flow.scale, np.ones(len(x) - n - 1)])
-    slopes = [(mean(x + one) - mean(x - one)) / (2.0 * one.max()) for one in np.diag(steps)]
-    return mean(x), np.array(slopes)
+    n, tau = len(flow.scale), nodes * x[flow.n + 1]
+    ends = flow.segments(values, np.full(NODES, mode), np.full(NODES, x[0]), tau, np.tile(x[1 : n + 1], (NODES, 1)))
+    earlier, mean, slopes = ends.start_time(), 0.0, np.zeros(len(x))
+    for i, weight in enumerate(weights):
+        at = flow.indicator(values, indicator, mode, x[0] + tau[i], ends.z[i])
+        g, g_z, g_t, g_p = (at.L, at.L_z, at.L_t, at.L_p) if order == 1 else (at.L2, at.L2_z, at.L2_t, at.L2_p)
+        mean += weight * g
+        slopes[0] += weight * (g_t + g_z @ earlier[i])
+        slopes[1 : n + 1] += weight * (g_z @ ends.Phi[i])
+        slopes[n + 1] += weight * nodes[i] * (g_t + g_z @ ends.f_end[i])
+        slopes[n + 2 :] += weight * (g_p + g_z @ ends.P[i])
+    return mean, slopes
 
 
 @cache

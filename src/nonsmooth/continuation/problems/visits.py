@@ -11,10 +11,11 @@ from nonsmooth.continuation.problems.signature import AT_ONCE, Visit
 
 if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import Log
-    from nonsmooth.flow.variational import VariationalFlow
+    from nonsmooth.flow.variational import Jump, VariationalFlow
 
 __all__ = ["visits_of"]
 
+ROUNDING = 1e-13  # of an indicator's size
 BEHIND = 1e-9  # of an indicator's size: nearer to a boundary than this is on it
 
 
@@ -47,5 +48,13 @@ def _fired_row(flow: VariationalFlow, values: FloatArray, k: int, t: float, z: F
 
     So it is in a mode in which the indicator stands still: none is reached there."""
     found = flow.jump(values, k, t, z)
-    size = float(np.abs(found.h_z) @ flow.scale) + abs(float(found.h_z @ z))
-    return AT_ONCE if same and (found.rate == 0.0 or abs(found.h) > BEHIND * size) else found.row
+    for row in range(found.row):  # of several that are zero the first: rounding tells no more
+        other = flow.jump(values, k, t, z, row)
+        if not same and abs(other.h) <= ROUNDING * _size(flow, other, z):
+            return row
+    return AT_ONCE if same and (found.rate == 0.0 or abs(found.h) > BEHIND * _size(flow, found, z)) else found.row
+
+
+def _size(flow: VariationalFlow, jump: Jump, z: FloatArray) -> float:
+    """The size of the indicator of a transition."""
+    return float(np.abs(jump.h_z) @ flow.scale) + abs(float(jump.h_z @ z))

@@ -163,7 +163,7 @@ def _switch(traced: Traced, jump: TracedTransition, wanted: list[sp.Symbol]) -> 
 
 
 def touch_function(traced: Traced, active: tuple[int, ...], indicator: int, mode: int) -> Callable[..., Any]:
-    """``f(t, u, q) -> tuple``: h, h_z, h_t, h_p, L_f h, (L_f h)_z, (L_f h)_t, (L_f h)_p, L_f^2 h, all in a row."""
+    """``f(t, u, q) -> tuple``: h, h_z, h_t, h_p, and so for L_f h and L_f^2 h, all in a row."""
     variables = [*traced.u, *traced.m, traced.t, *(traced.p[i] for i in active)]
     flow = list(zip(traced.u, traced.fields[mode], strict=True))
 
@@ -172,7 +172,7 @@ def touch_function(traced: Traced, active: tuple[int, ...], indicator: int, mode
 
     h = traced.indicators[indicator]
     slope = along(h)
-    values = [h, *(h.diff(s) for s in variables), slope, *(slope.diff(s) for s in variables), along(slope)]
+    values = [e for one in (h, slope, along(slope)) for e in (one, *(one.diff(s) for s in variables))]
     lines, used = _code(traced, [(f"r{i}", e) for i, e in enumerate(values)])
     constants = _unpacked(traced, lines)
     result = ", ".join(f"r{i}" for i in range(len(values)))
