@@ -176,7 +176,12 @@ def _columns(dataset: xr.Dataset, name: str) -> dict[str, Any]:
     """Arrays of the parameter and of what is known of an orbit."""
     from nonsmooth.results.branches import ORBIT
 
-    return {key: dataset[key].values for key in (name, *(column.name for column in ORBIT))}
+    found = {key: dataset[key].values for key in (name, *(column.name for column in ORBIT))}
+    at_section = {i: visits[0][0] for i, visits in enumerate(json.loads(dataset.attrs["layouts"]))}
+    for layout, mode in zip(np.ravel(found["layout"]), np.ravel(found["mode"]), strict=True):
+        if at_section.get(int(layout), mode) != mode:
+            raise ValueError(f"mode {mode} is not that of its signature")
+    return found
 
 
 def _point(
