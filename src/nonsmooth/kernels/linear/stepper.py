@@ -19,6 +19,7 @@ from nonsmooth.kernels.linear.values import NODE, at_ends, bound_at, dense, turn
 STEPPER = FORM, TABLES, WORK  # the types of this stepper's records: model, tables, work
 
 AT_ONCE = 1e-13  # of a node spacing: rounding of a root
+ROOT = 1e-8  # of the same: that of one condition, found once with others and once alone, which its rate makes large
 STEPS_AT_REST = 1000  # without a return, before a state without forcing may count as an equilibrium
 RATE_AT_REST = 1e-15  # of the terms of a rate
 SCALE_OF_LIMIT = 1e-9  # the scale of a state, of the size beyond which it has diverged
@@ -228,7 +229,8 @@ def leg(i, form, net, section, goal, tables, work, r_max, ready, first):
         if sense != 0 and fired >= 0 and functional == section.indicator and best - tau < SAME * tables.info[mode, 1]:
             continue  # the transition there passes the section
         if fired >= 0 and sense == 0 and begins_with(rows, lo, hi, net.row_start[fired]):
-            if tau >= best - AT_ONCE * tables.info[mode, 1]:  # the same root: what was declared first comes first
+            near = ROOT if functional == rows[lo, 0] else AT_ONCE
+            if tau >= best - near * tables.info[mode, 1]:  # the same root: what was declared first comes first
                 continue
         if tau >= 0.0 and (tau < best or (fired < 0 and crossed == 0 and tau <= best)):
             best = tau
