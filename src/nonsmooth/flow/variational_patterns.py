@@ -108,15 +108,6 @@ class Calculus:
                 return Row(found[slot], self.rows.n)
         return Row(np.full(self.rows.field.shape[1], np.nan, dtype=self.rows.field.dtype), self.rows.n)
 
-    def watched(self, mode: int) -> FloatArray:
-        """All conditions of a mode."""
-        every = np.zeros((len(self.patterns.slots), self.rows.field.shape[1]))
-        every[:, self.rows.n] = np.nan
-        for k in range(len(self.rows.parts)):
-            for slot, values in self.of_element(mode, k).items():
-                every[slot] = values
-        return every
-
     def map(self, mode: int, change: Change | None) -> FloatArray:
         """The map of the states by a transition, but for an impact that rubs."""
         if change is None:
@@ -132,13 +123,7 @@ class Calculus:
         """The map of an impact that rubs at an instant: its impulses are homogeneous functions of the rates."""
         numbers = RowNumbers(self.rows, self.patterns.mode, w.copy())
         found = decide(numbers, self.patterns.visited[mode], change.elements).rubbed
-        if found is None:
-            return self.rows.identity()
-        some, slopes = found
-        ways = np.array([self.rows.parts[k].direction for k in some]).T
-        rates = np.array([self.rows.rate(k, self.patterns.mode).values for k in some])
-        moved: FloatArray = self.rows.identity() + ways @ slopes @ rates
-        return moved
+        return self.rows.identity() if found is None else self.rows.rubbed(*found)
 
 
 class Packed:
@@ -207,7 +192,8 @@ class Packed:
         for mode in sorted(modes):
             put(mode, parts([one.flow(mode) for one in self.every]).ravel())
         for mode in sorted(watched):
-            put(count + mode, self.every[0].watched(mode).ravel())
+            own = self.every[0]
+            put(count + mode, self.patterns.ways_out(own.rows, own.pattern(mode))[0].ravel())
         for k in taken:
             rows, maps = self.jumps[k]
             number = rows.shape[1] // width

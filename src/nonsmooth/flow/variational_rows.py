@@ -17,7 +17,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.saltation import Touch
 from nonsmooth.flow.variational import VariationalFlow
-from nonsmooth.system.codegen.linear import linear_form
+from nonsmooth.system.codegen.linear import apart, linear_form
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
@@ -125,21 +125,18 @@ class LinearFlow(RowsFlow):
     conditions and the maps of all transitions."""
 
     def _take(self, traced: Traced) -> None:
-        plain, self.stands = traced.without_answers(rows=True)
-        form = linear_form(plain)
+        plain, stands = traced.without_answers()
+        form = linear_form(plain)  # that of the exact flow
         assert form is not None
-        self.form, self.plain, self.harmonics = form, plain, len(form.multiples)
-        self._lay_out()
+        self.form, self.harmonics = form, len(form.multiples)
+        self._lay_out(traced, stands, len(plain.transitions))
         super()._take(traced)
 
-    def _compiled(self) -> tuple[Any, Sequence[int]]:
-        return super()._compiled()[0], self.stands
-
-    def _lay_out(self) -> None:
-        """Make the array without its numbers, and find what stands where."""
-        t, n, h, a = self.plain, self.n, self.harmonics, self.n_active
+    def _lay_out(self, t: Traced, stands: Sequence[int], maps: int) -> None:
+        """Make the array without its numbers, and find what stands where; ``stands``: the map of each transition."""
+        n, h, a = self.n, self.harmonics, self.n_active
         modes, jumps, conditions, width = len(t.mode_names), len(t.transitions), len(t.indicators), n + 1 + 2 * h
-        sizes = modes * n * width, conditions * width, jumps * n * width
+        sizes = modes * n * width, conditions * width, maps * n * width
         places, head = np.zeros(2 * modes + jumps), SIZES + h * (1 + a)
         fields = head + len(places)
         self.begin = fields, fields + (1 + a) * sizes[0], fields + (1 + a) * (sizes[0] + sizes[1])
@@ -150,15 +147,14 @@ class LinearFlow(RowsFlow):
         for mode in self.sliding:
             places[modes + mode], at = at, at + sizes[1]
         lists: list[float] = []
-        for k, jump in enumerate(t.transitions):
+        self.gone = np.zeros((maps, n), dtype=bool)  # states that the mode behind has not
+        for k, (jump, own) in enumerate(zip(t.transitions, stands, strict=True)):
             places[2 * modes + k] = at + len(lists)
             rows = [self.begin[1] + row.indicator * width for row in jump.rows]
-            lists += [len(rows), sizes[1], sizes[2], self.begin[2] + k * n * width, *rows]
+            lists += [len(rows), sizes[1], sizes[2], self.begin[2] + own * n * width, *rows]
+            self.gone[own, : self.n_u] = t.lacking[jump.target]
         self.empty = np.concatenate([np.zeros(head), places, np.zeros(at - fields), lists])
         self.empty[:SIZES] = n, h, a, conditions, modes, sizes[0]
-        gone = [[*t.lacking[jump.target], *([False] * len(t.m))] for jump in t.transitions]
-        self.gone = np.array(gone, dtype=bool).reshape(jumps, n)
-        self.some_gone = bool(self.gone.any())
 
     def _views(self, q: FloatArray, d: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Fields, conditions and maps in the array, or their derivatives in a parameter."""
@@ -175,12 +171,9 @@ class LinearFlow(RowsFlow):
             q, n, tables = self.empty.copy(), self.n, []
             for d in range(1 + self.n_active):
                 fields, conditions, maps = self._views(q, d)
-                of_conditions = conditions[None]
                 tables.append({
-                    "omega": np.zeros(1), **dict(zip("Abcs", _split(fields, n), strict=True)),
-                    "ia": of_conditions[..., :n], "ib": of_conditions[..., n],
-                    "ic": of_conditions[..., n + 1 :: 2], "is_": of_conditions[..., n + 2 :: 2],
-                    **dict(zip(("ra", "rb", "rc", "rs"), _split(maps, n), strict=True)),
+                    "omega": np.zeros(1), **_tables("Abcs", fields, n), **_tables(("ra", "rb", "rc", "rs"), maps, n),
+                    **dict(zip(("ia", "ib", "ic", "is_"), apart(conditions[None], n), strict=True)),
                 })  # fmt: skip
             found = self._local.buffer = q, tables
         return found
@@ -192,13 +185,13 @@ class LinearFlow(RowsFlow):
             self.form.fill(values, place, into, again)
             if h:
                 q[SIZES + d * h : SIZES + (d + 1) * h] = into["omega"] * self.form.multiples
-            if self.some_gone:
+            if self.gone.any():
                 self._views(q, d)[2][self.gone] = 0.0
         for mode in self.sliding:
-            at = int(q[SIZES + h * (1 + self.n_active) + len(self.plain.mode_names) + mode])
+            at = int(q[SIZES + h * (1 + self.n_active) + len(self.traced.mode_names) + mode])
             watched = q[at : at + self.sizes[1]].reshape(-1, self.n + 1 + 2 * h)
             watched[:] = self._views(q, 0)[1]
-            watched[list(self.plain.along[mode])] = 0.0
+            watched[list(self.traced.along[mode])] = 0.0
         return q.copy()
 
     def on_path(self, values: FloatArray, modes: Any) -> FloatArray:
@@ -217,8 +210,7 @@ class LinearFlow(RowsFlow):
         return np.array([one[1][i] for one in every]), np.array([one[0][mode] for one in every]), rates
 
 
-def _split(rows: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Rows (..., n, M) as tables of a linear form, with a leading dim: of the states, constants, cosines, sines."""
-    rows = rows[None]
-    cosines, sines = (np.swapaxes(rows[..., n + k :: 2], -1, -2) for k in (1, 2))
-    return rows[..., :n], rows[..., n], cosines, sines
+def _tables(names: Sequence[str], rows: FloatArray, n: int) -> dict[str, FloatArray]:
+    """Views on rows (..., n, M) as tables of a linear form, with a leading dim and the harmonics before the rows."""
+    states, constants, *waves = apart(rows[None], n)
+    return dict(zip(names, (states, constants, *(np.swapaxes(one, -1, -2) for one in waves)), strict=True))

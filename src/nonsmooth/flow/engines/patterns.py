@@ -21,6 +21,7 @@ from nonsmooth.flow.engines.march import March
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.places import DEAD_END, MODE, RESET, STARTS, TIME, WAITS
 from nonsmooth.results.memory import free_memory, room_for
+from nonsmooth.system.codegen.linear import apart, put_together
 from nonsmooth.system.derived.deciding import Outcome, begun, decide
 from nonsmooth.system.derived.instants import RowNumbers
 from nonsmooth.system.derived.patterns import Change, Lead
@@ -165,9 +166,7 @@ class PatternTables:
         if not self.patterns.form.affine_outputs:
             return None
         found = np.zeros((linear.oa.shape[1], self.rows.field.shape[1]))
-        n = self.rows.n
-        found[:, :n], found[:, n] = linear.oa[i, :, 0], linear.ob[i, :, 0]
-        found[:, n + 1 :: 2], found[:, n + 2 :: 2] = linear.oc[i, :, 0], linear.os[i, :, 0]
+        put_together(found, self.rows.n, linear.oa[i, :, 0], linear.ob[i, :, 0], linear.oc[i, :, 0], linear.os[i, :, 0])
         return found
 
     # What a run asks for
@@ -236,10 +235,7 @@ class PatternTables:
             self.form, self.net = self.form._replace(**self._maps()), self._net()
         taken = self.answers[key]
         if found.rubbed is not None:  # of the rates that an impact had, of which its impulses depend as no row does
-            some, slopes = found.rubbed
-            ways = np.array([self.rows.parts[k].direction for k in some]).T
-            rates = np.array([self.rows.rate(k, self.patterns.mode).values for k in some])
-            self.maps[self.transitions[taken, 3]] = self.maps[0] + ways @ slopes @ rates
+            self.maps[self.transitions[taken, 3]] = self.rows.rubbed(*found.rubbed)
             self.form, self.net = self.form._replace(**self._maps()), self._net()
         return taken
 
@@ -333,16 +329,16 @@ class PatternTables:
         from nonsmooth.kernels.hybrid.records import Form
 
         n = self.rows.n
-        a, b, c, s = _parts(flow[None, None], n)
+        a, b, c, s = _contiguous(flow[None, None], n)
         return Form(
             a, b, _turned(c), _turned(s), self.multiples, self.omega, self.period,
-            *_parts(conditions[None], n), *_parts(outputs[None, :, None], n), **self._maps(),
+            *_contiguous(conditions[None], n), *_contiguous(outputs[None, :, None], n), **self._maps(),
             lacking=np.zeros((0, n), dtype=np.int64),
         )  # fmt: skip
 
     def _maps(self) -> dict[str, FloatArray]:
         """The maps of all transitions, as fields of a form."""
-        a, b, c, s = _parts(np.array(self.maps)[None], self.rows.n)
+        a, b, c, s = _contiguous(np.array(self.maps)[None], self.rows.n)
         return {"ra": a, "rb": b, "rc": _turned(c), "rs": _turned(s)}
 
     def _net(self) -> Any:
@@ -368,10 +364,9 @@ def _joined(lists: list[list[int]]) -> tuple[IntArray, IntArray]:
     return np.cumsum([0, *map(len, lists)], dtype=np.int64), np.array(every, dtype=np.int64)
 
 
-def _parts(rows: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Rows over (u, 1, cos, sin, ...) in parts: of the states, constants, cosines, sines."""
-    cut = rows[..., :n], rows[..., n], rows[..., n + 1 :: 2], rows[..., n + 2 :: 2]
-    a, b, c, s = (np.ascontiguousarray(part) for part in cut)
+def _contiguous(rows: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Rows in parts, as kernels take arrays."""
+    a, b, c, s = map(np.ascontiguousarray, apart(rows, n))
     return a, b, c, s
 
 

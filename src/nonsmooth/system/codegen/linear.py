@@ -22,7 +22,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.system.symbolic.printing import Printer, assignments
 from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
-__all__ = ["LinearForm", "LinearTables", "linear_form"]
+__all__ = ["LinearForm", "LinearTables", "apart", "linear_form", "put_together"]
 
 Terms = dict[Hashable, Expr]  # "1", "t", ("u", i), ("cos", k) or ("sin", k) -> coefficient in the parameters
 
@@ -120,6 +120,17 @@ class LinearForm:
         with np.errstate(all="ignore"):
             self._filler(place, tuple(tables))(np.ascontiguousarray(points.T), **tables)
         return LinearTables(**tables)
+
+
+def apart(rows: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Views on rows (..., M) over w = (u, 1, cos, sin, ...): of the n states, the constant, cosines, sines."""
+    return rows[..., :n], rows[..., n], rows[..., n + 1 :: 2], rows[..., n + 2 :: 2]
+
+
+def put_together(into: FloatArray, n: int, *tables: FloatArray) -> None:
+    """Write tables of the states, the constant, cosines and sines into rows."""
+    for view, values in zip(apart(into, n), tables, strict=True):
+        view[...] = values
 
 
 @lru_cache(maxsize=256)

@@ -20,6 +20,7 @@ import sympy as sp
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.codegen.linear import put_together
 from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
 from nonsmooth.system.symbolic.period import forcing_period
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, TOGETHER, Traced, TracedTransition
@@ -36,7 +37,7 @@ __all__ = ["Patterns", "Row", "Rows"]
 ROUNDING = 1e-12  # of the terms of a sum: below it the sum is zero
 STEP = 1e-30  # of the imaginary parts that carry derivatives: its square is nothing
 
-Rows_ = tuple[tuple[int, int, int], ...]  # indicator, sign, strict of each condition
+Armed = tuple[tuple[int, int, int], ...]  # indicator, sign, strict of each condition
 
 
 class Out(NamedTuple):
@@ -45,7 +46,7 @@ class Out(NamedTuple):
     element: int
     way: int
     leaving: Leaving
-    rows: Rows_
+    rows: Armed
 
 
 class Change(NamedTuple):
@@ -64,10 +65,9 @@ class Lead(NamedTuple):
     source: Pattern
     target: Pattern
     element: str
-    rows: Rows_
+    rows: Armed
     kind: str
     change: Change | None = None
-
 
 
 class Row:
@@ -122,7 +122,7 @@ class Row:
 class Rows(Assembler):
     """The calculus of rows at one parameter point: a vector of states is an array (n, M).
 
-    With complex numbers it is that of derivatives in a parameter, too (:meth:`Patterns.rows`)."""
+    With complex numbers it is that of derivatives in a parameter, too (:meth:`Patterns.rows_at`)."""
 
     def __init__(self, patterns: Patterns, tables: LinearTables, i: int) -> None:
         self.n, harmonics = tables.A.shape[-1], tables.c.shape[-2]
@@ -130,9 +130,9 @@ class Rows(Assembler):
         self.scale, self.asks, self.mode = patterns.scale, True, patterns.mode
         self.sequential = patterns.make.sequential
         self.field = np.zeros((self.n, self.n + 1 + 2 * harmonics), dtype=tables.A.dtype)
-        self._fill(self.field, tables.A[i, 0], tables.b[i, 0], tables.c[i, 0].T, tables.s[i, 0].T)
+        put_together(self.field, self.n, tables.A[i, 0], tables.b[i, 0], tables.c[i, 0].T, tables.s[i, 0].T)
         every = np.zeros((len(tables.ib[i]), self.field.shape[1]), dtype=self.field.dtype)
-        self._fill(every, tables.ia[i], tables.ib[i], tables.ic[i], tables.is_[i])
+        put_together(every, self.n, tables.ia[i], tables.ib[i], tables.ic[i], tables.is_[i])
         self._every, self._at = every, patterns.at
         self.parts = [self._part(k, name, patterns) for k, name in enumerate(patterns.elements)]
         self.known: dict[Any, Any] = {}  # of what elements decide together
@@ -140,10 +140,6 @@ class Rows(Assembler):
         self._approaches: dict[int, Row] = {}
         self._rates: dict[int, Row] = {}
         self._flows: dict[Pattern, tuple[FloatArray, dict[int, Any]]] = {}
-
-    def _fill(self, into: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray, s: FloatArray) -> None:
-        n = self.n
-        into[:, :n], into[:, n], into[:, n + 1 :: 2], into[:, n + 2 :: 2] = a, b, c, s
 
     def augmented(self, u: FloatArray, time: float) -> FloatArray:
         """w of states at a time."""
@@ -263,6 +259,12 @@ class Rows(Assembler):
         if pattern not in self._flows:
             self._flows[pattern] = super().flow(mode, pattern)
         return self._flows[pattern]
+
+    def rubbed(self, some: Sequence[int], slopes: FloatArray) -> FloatArray:
+        """The map of an impact by the derivatives of its impulses in the rates of some elements."""
+        ways = np.array([self.parts[k].direction for k in some]).T
+        found: FloatArray = self.identity() + ways @ slopes @ np.array([self.rate(k, self.mode).values for k in some])
+        return found
 
     def forget(self) -> None:
         """Let go of the fields that were kept for one pattern's neighbours."""
