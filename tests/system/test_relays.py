@@ -6,6 +6,14 @@ import pytest
 import nonsmooth as ns
 
 
+def quadrants(g, h, pp, pm, mp, mm):
+    """The surfaces between four modes, by the signs of two indicators."""
+    return [
+        ns.Surface(g, below=mp, above=pp), ns.Surface(g, below=mm, above=pm),
+        ns.Surface(h, below=pm, above=pp), ns.Surface(h, below=mm, above=mp),
+    ]  # fmt: skip
+
+
 def twisting(load=0.0, r1=10.0, r2=3.0):
     """x1' = x2, x2' = load - r1 sgn x1 - r2 sgn x2, as four modes and two surfaces."""
 
@@ -17,10 +25,7 @@ def twisting(load=0.0, r1=10.0, r2=3.0):
         name="twisting controller", states=["x1", "x2"], parameters={},
         modes={key: field(*s) for key, s in sides.items()},
         indicators={"h1": lambda t, u, p: u.x1, "h2": lambda t, u, p: u.x2},
-        transitions=[
-            ns.Surface("h1", below="mp", above="pp"), ns.Surface("h1", below="mm", above="pm"),
-            ns.Surface("h2", below="pm", above="pp"), ns.Surface("h2", below="mm", above="mp"),
-        ],
+        transitions=quadrants("h1", "h2", "pp", "pm", "mp", "mm"),
     )  # fmt: skip
 
 
@@ -55,10 +60,7 @@ def test_surfaces_of_relative_degree_one_stay_filippovs():
         states=["x", "y"], parameters={},
         modes={"a": field(1, 1), "b": field(1, -1), "c": field(-1, 1), "d": field(-1, -1)},
         indicators={"h": lambda t, u, p: u.x, "g": lambda t, u, p: u.y},
-        transitions=[
-            ns.Surface("h", below="c", above="a"), ns.Surface("h", below="d", above="b"),
-            ns.Surface("g", below="b", above="a"), ns.Surface("g", below="d", above="c"),
-        ],
+        transitions=quadrants("h", "g", "a", "b", "c", "d"),
     )  # fmt: skip
     assert len(system.surfaces) == 4
     assert "h_g_sliding" in system.modes
@@ -78,10 +80,7 @@ def test_a_relay_that_would_push_away_is_refused():
         states=["x1", "x2"], parameters={"r1": 10.0, "r2": 3.0},
         modes={"pp": field(1, 1), "pm": field(1, -1), "mp": field(-1, 1), "mm": field(-1, -1)},
         indicators={"h1": lambda t, u, p: u.x1, "h2": lambda t, u, p: u.x2},
-        transitions=[
-            ns.Surface("h1", below="mp", above="pp"), ns.Surface("h1", below="mm", above="pm"),
-            ns.Surface("h2", below="pm", above="pp"), ns.Surface("h2", below="mm", above="mp"),
-        ],
+        transitions=quadrants("h1", "h2", "pp", "pm", "mp", "mm"),
     )  # fmt: skip
     assert system.with_parameters(r1=4.0).values["r1"] == 4.0
     with pytest.raises(ns.SystemDefinitionError, match="relay at 'h1' pushes towards its surface"):

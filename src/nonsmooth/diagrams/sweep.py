@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -285,13 +286,17 @@ def _dataset(
     if counter is not None:
         del arrays["section"]
         for name, part in (("density", "counts"), ("outside", "outside")):
-            arrays[name] = gather(lambda s, part=part: getattr(s.counter, part))  # type: ignore[misc]
+            arrays[name] = gather(attrgetter(f"counter.{part}"))
+
+    def of_load(name: str) -> np.ndarray:
+        return gather(lambda s: s.loads[name])
+
     labels = labels_of(system)
     return build(
         labels, provenance(labels, "sweep", options, method=method), parameter, numbers, arrays,
         directions=directions, starts=starts, squeeze=tuple(squeeze),
         edges=None if counter is None else counter.edges,
-        loads={name: (gather(lambda s: s.loads[name]), *measured[name]) for name in measured},  # noqa: B023
+        loads={name: (of_load(name), *measured[name]) for name in measured},
     )  # fmt: skip
 
 

@@ -26,7 +26,8 @@ from nonsmooth.system.symbolic.traced import NOT_UNIQUE
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nonsmooth.system.derived.patterns import Patterns, Rows
+    from nonsmooth.system.derived.patterns import Patterns
+    from nonsmooth.system.derived.rows import Rows
     from nonsmooth.system.system import System
 
 __all__ = ["EquilibriumSet", "Extreme", "equilibrium_sets", "modes_of_sets"]

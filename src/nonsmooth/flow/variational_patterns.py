@@ -18,7 +18,8 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.variational_rows import NONE, SIZES, RowsFlow
 from nonsmooth.system.derived.deciding import decide
 from nonsmooth.system.derived.instants import RowNumbers
-from nonsmooth.system.derived.patterns import STEP, Change, Patterns, Row, Rows
+from nonsmooth.system.derived.patterns import STEP, Change, Patterns
+from nonsmooth.system.derived.rows import Row, Rows
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern

@@ -138,7 +138,7 @@ def _content(d: Description) -> dict[str, Any]:
     if elements is not None and elements.make.sequential:
         content["impacts"] = "sequential"
     if known:
-        from nonsmooth.system.derived.combinations import SPEED
+        from nonsmooth.system.derived.expressions import SPEED
 
         names = {**names, SPEED: "speed"}
         content["elements"] = {k: _element_content(one, text) for k, one in known.items()}
@@ -305,7 +305,7 @@ class _Reader:
         return getattr(elements, name)
 
     def element(self, entry: Mapping[str, Any]) -> Any:
-        from nonsmooth.system.derived.combinations import SPEED
+        from nonsmooth.system.derived.expressions import SPEED
 
         kind = self.kind(entry["kind"])
 

@@ -6,265 +6,30 @@ the system without a line for elements.
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import sympy as sp
 
-from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError, shortened
-from nonsmooth.system.derived.assembly import INDEPENDENT, Assembler, Part, Pattern
+from nonsmooth.system.derived.assembly import Pattern
 from nonsmooth.system.derived.decider import Decider
 from nonsmooth.system.derived.elements import Element
-from nonsmooth.system.derived.elements.element import Condition, Law
+from nonsmooth.system.derived.expressions import Expressions
 from nonsmooth.system.mode import Mode
-from nonsmooth.system.names import unknown
-from nonsmooth.system.symbolic.scalar import Scalar, to_expression
+from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, OWN, TOGETHER
-from nonsmooth.system.symbolic.tracing import Symbols, call_scalar, call_vector
+from nonsmooth.system.symbolic.tracing import Symbols, call_vector
 from nonsmooth.system.transition import Surface, Transition
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.patterns import Patterns
 
-__all__ = ["SPEED", "assembled", "element_names"]
+__all__ = ["assembled", "element_names"]
 
 MOST = 256  # modes that are written out
-OTHER = 8  # draws from here on have other parameters too
-SPEED = sp.Symbol("speed_", real=True)  # in a law of it
-
-
-class Expressions(Assembler):
-    """The calculus of expressions: a vector is a list of them, one for each state."""
-
-    def __init__(
-        self, symbols: Symbols, base: Mapping[str, tuple[sp.Expr, ...]], elements: Mapping[str, Element],
-        scale: Mapping[str, float], values: Mapping[sp.Symbol, float],
-    ) -> None:  # fmt: skip
-        self.symbols, self.fields, self.scale, self.values = symbols, base, scale, values
-        self.u = tuple(symbols.u.values())
-        self.parts = [self._part(name, element) for name, element in elements.items()]
-        self.indicators: dict[str, sp.Expr] = {}
-        self._known: dict[tuple[str, sp.Expr], str] = {}
-        self._laws: dict[tuple[int, str, int | None], sp.Expr] = {}
-        self._approaches: dict[tuple[int, str], sp.Expr] = {}
-        self._slopes: dict[tuple[sp.Expr, int], FloatArray] = {}
-        self._drawn: dict[int, dict[sp.Basic, sp.Float]] = {}
-        self._may_hold: dict[tuple[str, tuple[int, ...]], bool] = {}
-        self._flows: dict[tuple[str, Pattern], tuple[list[sp.Expr], dict[int, sp.Expr]]] = {}
-
-    # What the user gave
-
-    def _call(self, function: Any, what: str) -> sp.Expr:
-        return call_scalar(function, (Scalar(self.symbols.t), self.symbols.states(), self.symbols.parameters()), what)
-
-    def _given(self, given: Law, what: str) -> sp.Expr:
-        """A number, the name of a parameter or of memory, or a function of t, u, p."""
-        if isinstance(given, str):
-            known = {**self.symbols.p, **self.symbols.m}
-            if given not in known:
-                raise SystemDefinitionError(f"{what}: {unknown(given, 'a parameter', 'this system', list(known))}")
-            return known[given]
-        return self._call(given if callable(given) else (lambda t, u, p: given), what)
-
-    def _part(self, name: str, element: Element) -> Part:
-        what, names = f"element {name!r}", list(self.symbols.u)
-        if not isinstance(element, Element):
-            raise SystemDefinitionError(f"{what} is one of nonsmooth.elements, not {shortened(element)}")
-        if element.on is None:
-            raise SystemDefinitionError(f"{what}: at= is for ns.mechanical; here give {element.kinematics}= and on=")
-        direction = {}
-        for state, given in element.on.items():
-            if state not in self.symbols.u:
-                raise SystemDefinitionError(f"{what}: {unknown(state, 'a state', 'this system', names)}")
-            direction[names.index(state)] = self._given(given, f"on[{state!r}] of {what}")
-        own = getattr(element, element.kinematics)
-        return Part(name, element, direction, self._call(own, f"{element.kinematics} of {what}"))
-
-    def law(self, k: int, name: str, side: int | None = None) -> sp.Expr:
-        key = k, name, side
-        if key not in self._laws:
-            part = self.parts[k]
-            given, what = getattr(part.element, name), f"{name} of element {part.name!r}"
-            if side is not None and callable(given) and _arguments(given) == 2:
-                of = Scalar(side * part.where), self.symbols.parameters()
-                self._laws[key] = call_scalar(given, of, what)
-            else:
-                self._laws[key] = self._given(given, what)
-        return self._laws[key]
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the states."""
-        return list(self.symbols.u)
-
-    def spoken(self, k: int, name: str) -> sp.Expr:
-        """A law as an expression; one of the speed's magnitude in the symbol ``SPEED``."""
-        given = getattr(self.parts[k].element, name)
-        if callable(given) and _arguments(given) == 2:
-            return call_scalar(given, (Scalar(SPEED), self.symbols.parameters()), name)
-        known = {part.name for part in self.parts}
-        return sp.Integer(0) if isinstance(given, str) and given in known else self.law(k, name)
-
-    # Calculus
-
-    def base(self, mode: str) -> list[sp.Expr]:
-        return list(self.fields[mode])
-
-    def identity(self) -> list[sp.Expr]:
-        return list(self.u)
-
-    def along(self, expression: sp.Expr, field: Sequence[sp.Expr]) -> sp.Expr:
-        total = sp.diff(expression, self.symbols.t)
-        for symbol, entry in zip(self.u, field, strict=True):
-            total += sp.diff(expression, symbol) * entry
-        return sp.expand(total)
-
-    def across(self, expression: sp.Expr, part: Part) -> sp.Expr:
-        return sp.Add(*[sp.diff(expression, self.u[i]) * d for i, d in part.direction.items()])
-
-    def moved(self, vector: Sequence[sp.Expr], part: Part, amount: sp.Expr) -> list[sp.Expr]:
-        return [entry + part.direction.get(i, 0) * amount for i, entry in enumerate(vector)]
-
-    def joined(self, part: Part, other: Part, share: Any) -> Part:
-        both = {*part.direction, *other.direction}
-        return replace(part, direction={i: part.direction.get(i, 0) + share * other.direction.get(i, 0) for i in both})
-
-    def shifted_back(self, states: Sequence[sp.Expr], expression: sp.Expr) -> list[sp.Expr]:
-        slopes = [sp.diff(expression, symbol) for symbol in self.u]
-        length = sp.Add(*[slope**2 for slope in slopes])
-        return self.tidy([x - expression * s / length for x, s in zip(states, slopes, strict=True)])
-
-    def behind(self, expression: sp.Expr, states: Sequence[sp.Expr]) -> sp.Expr:
-        return sp.sympify(expression).subs(dict(zip(self.u, states, strict=True)), simultaneous=True)
-
-    def solved(self, matrix: list[list[sp.Expr]], right: list[Any]) -> list[sp.Expr]:
-        found = list(sp.Matrix(matrix).LUsolve(sp.Matrix(right)))
-        return [sp.cancel(value) for value in found] if len(found) > 1 else found
-
-    def vanishes(self, expression: Any) -> bool:
-        expanded = sp.expand(expression)
-        return expanded == 0 or (not expanded.is_number and sp.simplify(expanded) == 0)
-
-    def size(self, expression: sp.Expr) -> sp.Expr:
-        found = [self.scale[name] for name, symbol in self.symbols.u.items() if expression.has(symbol)]
-        return to_expression(max(found, default=1.0))
-
-    def tidy(self, states: Sequence[sp.Expr]) -> list[sp.Expr]:
-        return [sp.expand(sp.cancel(entry)) for entry in states]
-
-    def approach(self, k: int, mode: str) -> sp.Expr:
-        key = k, mode
-        if key not in self._approaches:
-            self._approaches[key] = super().approach(k, mode)
-        return self._approaches[key]
-
-    def flow(self, mode: str, pattern: Pattern) -> tuple[list[sp.Expr], dict[int, sp.Expr]]:
-        key = mode, pattern
-        if key not in self._flows:
-            field, forces = super().flow(mode, pattern)
-            expanded = {k: sp.expand(force) for k, force in forces.items()}
-            self._flows[key] = [sp.expand(entry) for entry in field], expanded
-        return self._flows[key]
-
-    def slopes(self, expression: sp.Expr, draw: int = 0) -> FloatArray:
-        key = expression, draw
-        if key not in self._slopes:
-            self._slopes[key] = self._numbers([sp.diff(expression, symbol) for symbol in self.u], draw)
-        return self._slopes[key]
-
-    def pushes(self, part: Part, draw: int = 0) -> FloatArray:
-        return self._numbers([part.direction.get(i, sp.Integer(0)) for i in range(len(self.u))], draw)
-
-    def _numbers(self, expressions: Sequence[Any], draw: int) -> FloatArray:
-        """Their values in a state drawn at random; from ``OTHER`` on at parameters drawn at random too."""
-        if draw not in self._drawn:
-            at, rng = dict(self.values), np.random.default_rng(draw)
-            for symbol in [self.symbols.t, *self.u, *self.symbols.m.values(), *(at if draw >= OTHER else ())]:
-                at[symbol] = rng.uniform(0.5, 1.5)
-            self._drawn[draw] = {symbol: sp.Float(value) for symbol, value in at.items()}
-        return np.array([float(sp.sympify(one).xreplace(self._drawn[draw])) for one in expressions])
-
-    def may_hold(self, some: Sequence[int], mode: str) -> bool:
-        """Return whether some elements can be held at once."""
-        key = mode, tuple(some)
-        if key not in self._may_hold:
-            rates = [self.rate(k, mode) for k in some]
-            gaps = [self.parts[k].where for k in some if self.parts[k].element.bears]
-            self._may_hold[key] = self._vanish_together(rates, OTHER) and self._vanish_together(gaps, 2)
-        return self._may_hold[key]
-
-    def _vanish_together(self, expressions: Sequence[sp.Expr], draw: int) -> bool:
-        """Return whether expressions may be zero at once: not where a sum of them is a number other than zero, as far
-        as drawn states (with ``OTHER`` parameters too) tell."""
-        chosen: list[sp.Expr] = []
-        for one in expressions:
-            before = np.array([self.slopes(other) for other in chosen]).reshape(len(chosen), len(self.u))
-            sums, off = np.linalg.lstsq(before.T, self.slopes(one), rcond=None)[0], np.inf
-            if len(chosen):
-                off = np.abs(before.T @ sums - self.slopes(one)).max()
-            if off > INDEPENDENT * np.abs(self.slopes(one)).max():
-                chosen.append(one)
-                continue
-            left = [n[0] - sums @ n[1:] for n in (self._numbers([one, *chosen], draw) for draw in (0, 1, draw))]
-            if abs(left[0]) > INDEPENDENT and np.ptp(left) < INDEPENDENT * abs(left[0]):
-                return False
-        return True
-
-    def described(self) -> dict[str, dict[str, Any]]:
-        """The elements as data: kind, options, and expressions of where they are, what they act on, and their laws."""
-        found = {}
-        for k, part in enumerate(self.parts):
-            e, others = part.element, {other.name for other in self.parts} - {part.name}
-            known = {"at", "on", e.kinematics, "position", "belt", *e.laws}
-            options = {one.name: getattr(e, one.name) for one in fields(e) if one.name not in known}
-            named = {name: getattr(e, name) for name in e.laws if isinstance(getattr(e, name), str)}
-            options |= {name: value for name, value in named.items() if value in others}
-            laws = {name: self.spoken(k, name) for name in e.laws if getattr(e, name) is not None}
-            found[part.name] = {
-                "kind": type(e).__name__, "options": options, e.kinematics: part.where,
-                "on": {self.names[i]: d for i, d in part.direction.items() if d != 0},
-                "laws": {name: law for name, law in laws.items() if name not in options},
-            }  # fmt: skip
-        return found
-
-    # What a user would have written
-
-    def ranges(self, mode: str) -> list[tuple[sp.Expr, str]]:
-        """Expressions of the parameters that must not be negative, each with the sentence for where it is."""
-        known = set(self.symbols.p.values())
-        every = [row for here in self.places(mode, (0,) * len(self.parts)) for row in here.element.ranges(here)]
-        return [(e, text) for e, text in every if e.free_symbols and e.free_symbols <= known]
-
-    def condition(self, rows: Sequence[Condition], owner: str) -> str:
-        """The text of a condition; its expressions become indicators, equal ones of an element the same."""
-        words = []
-        for expression, sign, name, strict in rows:
-            indicator = sp.expand(expression)
-            key = owner, indicator
-            if key not in self._known:
-                unique, n = f"{owner}_{name}" if owner else name, 1
-                while unique in self.indicators:
-                    n += 1
-                    unique = f"{owner}_{name}_{n}" if owner else f"{name}_{n}"
-                self._known[key] = unique
-                self.indicators[unique] = indicator
-            words.append(f"{self._known[key]} {'>' if sign > 0 else '<'}{'' if strict else '='} 0")
-        return " and ".join(words)
-
-
-def _arguments(function: Callable[..., Any]) -> int:
-    """Number of arguments that a function must be given: a law of the speed takes two, others three."""
-    kinds = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
-    try:
-        found = inspect.signature(function).parameters.values()
-    except (TypeError, ValueError):  # a function of C
-        return 3
-    return sum(one.kind in kinds and one.default is one.empty for one in found)
 
 
 def element_names(elements: Any) -> dict[str, Element]:

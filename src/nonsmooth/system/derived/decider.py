@@ -23,7 +23,7 @@ from nonsmooth.system.symbolic.traced import FOUND, Row, Traced, TracedTransitio
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern
-    from nonsmooth.system.derived.combinations import Expressions
+    from nonsmooth.system.derived.expressions import Expressions
     from nonsmooth.system.derived.patterns import Patterns
 
 __all__ = ["Decider"]

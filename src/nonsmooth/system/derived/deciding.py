@@ -24,17 +24,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import SolveError
-from nonsmooth.kernels import convex
+from nonsmooth.system.derived.bounded import is_symmetric, least
 from nonsmooth.system.derived.elements.element import CREEP, SMALL
 from nonsmooth.system.derived.enumerating import HELD, Candidates, moving_by_trial
 from nonsmooth.system.derived.impact_with_friction import stronge
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derived.assembly import Pattern, Place
+    from nonsmooth.system.derived.assembly import Pattern
     from nonsmooth.system.derived.instants import Ahead, Numbers
+    from nonsmooth.system.derived.place import Place
 
-__all__ = ["Outcome", "begun", "decide", "least", "least_within"]
+__all__ = ["Outcome", "begun", "decide"]
 
 ZERO = 1e-11  # of the sum of the terms of a row: what is smaller is zero
 ROUNDS = 10_000  # of impacts one after the other
@@ -283,7 +283,7 @@ class _Instant:
         or of all that are tried where there is none."""
         every = [*candidates, *slips]
         G = self.numbers.effects(every, every)
-        tried = any(k in self.make.rubbing for k in candidates) or not _is_symmetric(G)
+        tried = any(k in self.make.rubbing for k in candidates) or not is_symmetric(G)
         kinetic: set[int] = set()
         while True:
             if tried:
@@ -355,50 +355,3 @@ class _Instant:
                 laws += [element.most(here), *(element.force(here.put(side)) for side in element.sides)]
         pattern = tuple(0 if k in candidates else phase for k, phase in enumerate(self.pattern))
         return self.numbers.ahead(candidates, pattern, forces, laws)
-
-
-def least(G: FloatArray, a: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Minimise 1/2 x' G x + a' x between bounds, for G not negative and symmetric by factors (:mod:`.convex`)."""
-    size, scale = len(a), _symmetric(G)
-    x, sets, factor = np.empty((2, size)), np.empty((2, size), dtype=np.int64), np.empty((size, size + 1))
-    status = convex.least(G * scale, a + 0.0, low / scale, high / scale, x[0], *sets, factor, x[1])
-    if status:
-        raise SolveError(
-            "the forces of contacts and frictions that decide together were not found: "
-            + ("no set is the last" if status == 1 else "contacts close on what cannot give way")
-        )
-    return x[0] * scale
-
-
-def least_within(sums: FloatArray, total: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """The forces x of least norm between bounds with ``x @ sums == total``."""
-    weight = 1e8 / np.square(sums).sum()
-    x = least(np.eye(len(sums)) + weight * sums @ sums.T, -weight * sums @ total, low, high)
-    near = 1e-6 * np.abs(x).max()
-    bound = np.where(x <= low + near, low, np.where(x >= high - near, high, np.nan))
-    free = np.isnan(bound)
-    x = np.where(free, 0.0, bound)
-    x[free] = np.linalg.pinv(sums[free].T) @ (total - x @ sums)
-    return x
-
-
-def _is_symmetric(G: FloatArray) -> bool:
-    """Return whether positive factors of its columns make G symmetric."""
-    scaled = G * _symmetric(G)
-    return bool((np.abs(scaled - scaled.T) <= 1e-12 * np.abs(scaled).max(initial=0.0)).all())
-
-
-def _symmetric(G: FloatArray) -> FloatArray:
-    """Positive factors s of the columns that make G symmetric; ones where there are none."""
-    size = len(G)
-    scale = np.zeros(size)
-    for first in range(size):
-        if scale[first]:
-            continue
-        scale[first], known = 1.0, [first]
-        for i in known:
-            for j in range(size):
-                if not scale[j] and G[i, j] and G[i, j] * G[j, i] > 0:
-                    scale[j] = G[j, i] * scale[i] / G[i, j]
-                    known.append(j)
-    return scale

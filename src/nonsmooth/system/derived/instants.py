@@ -22,8 +22,8 @@ from nonsmooth.arrays import FloatArray
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Assembler, Pattern
-    from nonsmooth.system.derived.combinations import Expressions
-    from nonsmooth.system.derived.patterns import Rows
+    from nonsmooth.system.derived.expressions import Expressions
+    from nonsmooth.system.derived.rows import Rows
 
 __all__ = ["Ahead", "Numbers", "RowNumbers", "SeriesCode", "SeriesNumbers"]
 

@@ -1,10 +1,8 @@
 """Patterns of phases of a system with many elements: a mode is made when it is first visited.
 
 Twenty-five contacts have more combinations of phases than can be written out, and a motion visits few of them. Where
-every expression is affine in the states, a combination needs no algebra: a force, an indicator, a component of a reset
-is a :class:`Row` of numbers over w = (u, 1, cos k_1 w t, sin k_1 w t, ...), the vector that the exact flow moves, and
-the rules of :mod:`nonsmooth.system.derived.assembly` are sums of such rows and one small linear system. The phases
-visited so far are numbered in the order of their first visit; that numbering is shared by all copies of a system.
+every expression is affine in the states, a combination needs no algebra (:mod:`nonsmooth.system.derived.rows`). The
+phases visited so far are numbered in the order of their first visit; all copies of a system share that numbering.
 """
 
 from __future__ import annotations
@@ -20,8 +18,8 @@ import sympy as sp
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.codegen.linear import put_together
-from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
+from nonsmooth.system.derived.assembly import Pattern
+from nonsmooth.system.derived.rows import Row, Rows
 from nonsmooth.system.symbolic.period import forcing_period
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, TOGETHER, Traced, TracedTransition
 from nonsmooth.system.symbolic.traced import Row as Condition
@@ -29,12 +27,11 @@ from nonsmooth.system.symbolic.tracing import call_scalar
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearForm, LinearTables
-    from nonsmooth.system.derived.combinations import Expressions
     from nonsmooth.system.derived.elements.element import Leaving
+    from nonsmooth.system.derived.expressions import Expressions
 
-__all__ = ["Patterns", "Row", "Rows"]
+__all__ = ["STEP", "Change", "Lead", "Patterns"]
 
-ROUNDING = 1e-12  # of the terms of a sum: below it the sum is zero
 STEP = 1e-30  # of the imaginary parts that carry derivatives: its square is nothing
 
 Armed = tuple[tuple[int, int, int], ...]  # indicator, sign, strict of each condition
@@ -68,207 +65,6 @@ class Lead(NamedTuple):
     rows: Armed
     kind: str
     change: Change | None = None
-
-
-class Row:
-    """An affine function of the states with harmonics in time: numbers over w."""
-
-    __slots__ = ("one", "values")
-    __array_ufunc__ = None  # numbers of NumPy leave sums and products to this class
-
-    def __init__(self, values: FloatArray, one: int) -> None:
-        self.values, self.one = values, one
-
-    @property
-    def number(self) -> float | None:
-        """Its value where it is a constant."""
-        return None if np.count_nonzero(self.values) > (self.values[self.one] != 0) else self.values[self.one].item()
-
-    def __add__(self, other: Row | float) -> Row:
-        if isinstance(other, Row):
-            return Row(self.values + other.values, self.one)
-        values = self.values.copy()
-        values[self.one] += other
-        return Row(values, self.one)
-
-    __radd__ = __add__
-
-    def __neg__(self) -> Row:
-        return Row(-self.values, self.one)
-
-    def __sub__(self, other: Row | float) -> Row:
-        return self + -other
-
-    def __rsub__(self, other: float) -> Row:
-        return -self + other
-
-    def __mul__(self, other: Row | float) -> Row:
-        if not isinstance(other, Row):
-            return Row(self.values * other, self.one)
-        a, b = self.number, other.number
-        if b is not None:
-            return Row(self.values * b, self.one)
-        if a is not None:
-            return Row(other.values * a, self.one)
-        raise SystemDefinitionError(
-            "a product of two quantities that depend on states or time is not affine: elements with such a law "
-            "(friction that depends on the speed under a normal force that varies) combine as long as all combinations "
-            "of phases can be written out"
-        )
-
-    __rmul__ = __mul__
-
-
-class Rows(Assembler):
-    """The calculus of rows at one parameter point: a vector of states is an array (n, M).
-
-    With complex numbers it is that of derivatives in a parameter, too (:meth:`Patterns.rows_at`)."""
-
-    def __init__(self, patterns: Patterns, tables: LinearTables, i: int) -> None:
-        self.n, harmonics = tables.A.shape[-1], tables.c.shape[-2]
-        self.rates = tables.omega[i] * np.array(patterns.form.multiples, dtype=float)
-        self.scale, self.asks, self.mode = patterns.scale, True, patterns.mode
-        self.sequential = patterns.make.sequential
-        self.field = np.zeros((self.n, self.n + 1 + 2 * harmonics), dtype=tables.A.dtype)
-        put_together(self.field, self.n, tables.A[i, 0], tables.b[i, 0], tables.c[i, 0].T, tables.s[i, 0].T)
-        every = np.zeros((len(tables.ib[i]), self.field.shape[1]), dtype=self.field.dtype)
-        put_together(every, self.n, tables.ia[i], tables.ib[i], tables.ic[i], tables.is_[i])
-        self._every, self._at = every, patterns.at
-        self.parts = [self._part(k, name, patterns) for k, name in enumerate(patterns.elements)]
-        self.known: dict[Any, Any] = {}  # of what elements decide together
-        self._bases: dict[Any, tuple[list[int], FloatArray]] = {}
-        self._approaches: dict[int, Row] = {}
-        self._rates: dict[int, Row] = {}
-        self._flows: dict[Pattern, tuple[FloatArray, dict[int, Any]]] = {}
-
-    def augmented(self, u: FloatArray, time: float) -> FloatArray:
-        """w of states at a time."""
-        angles = self.rates * time
-        return np.concatenate([u, [1.0], np.stack([np.cos(angles), np.sin(angles)], axis=-1).ravel()])
-
-    def augmented_all(self, u: FloatArray, time: FloatArray) -> FloatArray:
-        """w of states at N times."""
-        angles = time[:, None] * self.rates
-        waves = np.stack([np.cos(angles), np.sin(angles)], axis=-1).reshape(len(time), -1)
-        return np.hstack([u, np.ones((len(time), 1)), waves])
-
-    def _part(self, k: int, name: str, patterns: Patterns) -> Part:
-        direction = np.zeros(self.n, dtype=self.field.dtype)
-        for i in patterns.acts_on[k]:
-            number = Row(self._every[self._at[k, "on", i]], self.n).number
-            if number is None:
-                raise SystemDefinitionError(
-                    f"element {name!r}: what its force adds to a state's derivative depends on states or time; with so "
-                    "many elements it must be a number or a function of parameters"
-                )
-            direction[i] = number
-        return Part(name, patterns.elements[name], direction, Row(self._every[self._at[k, "where", None]], self.n))
-
-    def base(self, mode: str) -> FloatArray:
-        return self.field
-
-    def law(self, k: int, name: str, side: int | None = None) -> Row:
-        return Row(self._every[self._at[k, name, side]], self.n)
-
-    def constant(self, k: int, name: str) -> float:
-        number = self.law(k, name).number
-        if number is None:
-            raise SystemDefinitionError(
-                f"{name} of element {self.parts[k].name!r} depends on states or time; at a rigid contact it is a "
-                "number or a function of parameters"
-            )
-        return number
-
-    def along(self, expression: Row, field: FloatArray) -> Row:
-        n, e = self.n, expression.values
-        values = e[:n] @ field
-        values[n + 1 :: 2] += self.rates * e[n + 2 :: 2]
-        values[n + 2 :: 2] -= self.rates * e[n + 1 :: 2]
-        return Row(values, n)
-
-    def across(self, expression: Row, part: Part) -> float:
-        terms = expression.values[: self.n] * part.direction
-        total: float = terms.sum().item()
-        return total if abs(total) > ROUNDING * float(np.abs(terms).sum()) else 0.0
-
-    def effects(self, some: Sequence[int], mode: str, parts: Sequence[Part] | None = None) -> Any:
-        rates = np.array([self.rate(i, mode).values[: self.n] for i in some]).reshape(len(some), 1, self.n)
-        terms = rates * np.array([part.direction for part in parts or [self.parts[k] for k in some]])
-        total = terms.sum(axis=-1)
-        return np.where(np.abs(total) > ROUNDING * np.abs(terms).sum(axis=-1), total, 0.0)
-
-    def basis(self, held: Sequence[int], mode: str, pattern: Pattern) -> tuple[list[int], FloatArray]:
-        key = tuple(held), tuple(pattern[r] for r in self.rubbing.values())
-        if key not in self._bases:
-            self._bases[key] = super().basis(held, mode, pattern)
-        return self._bases[key]
-
-    def identity(self) -> FloatArray:
-        return np.eye(self.n, self.field.shape[1])
-
-    def moved(self, vector: FloatArray, part: Part, amount: Any) -> FloatArray:
-        return vector + np.outer(part.direction, amount.values) if isinstance(amount, Row) else vector
-
-    def joined(self, part: Part, other: Part, share: Any) -> Part:
-        return replace(part, direction=part.direction + share * other.direction)
-
-    def shifted_back(self, states: FloatArray, expression: Row) -> FloatArray:
-        slopes = expression.values[: self.n]
-        return states - np.outer(slopes / (slopes @ slopes), expression.values)
-
-    def behind(self, expression: Row, states: FloatArray) -> Row:
-        values = expression.values[: self.n] @ states
-        values[self.n :] += expression.values[self.n :]
-        return Row(values, self.n)
-
-    def solved(self, matrix: list[list[float]], right: list[Any]) -> list[Row]:
-        rows = [one.values if isinstance(one, Row) else np.zeros(self.field.shape[1]) for one in right]
-        return [Row(values, self.n) for values in np.linalg.solve(np.array(matrix), np.array(rows))]
-
-    def slopes(self, expression: Row, draw: int = 0) -> FloatArray:
-        return expression.values[: self.n].real
-
-    def pushes(self, part: Part, draw: int = 0) -> FloatArray:
-        return np.asarray(part.direction).real
-
-    def vanishes(self, expression: Any) -> bool:
-        return not (expression.values.real.any() if isinstance(expression, Row) else expression)
-
-    def size(self, expression: Row) -> float:
-        return float(max(self.scale[expression.values[: self.n] != 0], default=1.0))
-
-    def approach(self, k: int, mode: str) -> Row:
-        if k not in self._approaches:
-            self._approaches[k] = super().approach(k, mode)
-        return self._approaches[k]
-
-    def rate(self, k: int, mode: str) -> Row:
-        if k not in self._rates:
-            self._rates[k] = super().rate(k, mode)
-        return self._rates[k]
-
-    @cached_property
-    def changes(self) -> FloatArray:
-        """Changes of the derivatives of the rates of all that may hold by unit forces of each of them."""
-        bearing = [k for k, part in enumerate(self.parts) if part.element.held]
-        found = np.zeros((len(self.parts), len(self.parts)))
-        found[np.ix_(bearing, bearing)] = self.effects(bearing, self.mode)
-        return found
-
-    def flow(self, mode: str, pattern: Pattern) -> tuple[FloatArray, dict[int, Any]]:
-        if pattern not in self._flows:
-            self._flows[pattern] = super().flow(mode, pattern)
-        return self._flows[pattern]
-
-    def rubbed(self, some: Sequence[int], slopes: FloatArray) -> FloatArray:
-        """The map of an impact by the derivatives of its impulses in the rates of some elements."""
-        ways = np.array([self.parts[k].direction for k in some]).T
-        found: FloatArray = self.identity() + ways @ slopes @ np.array([self.rate(k, self.mode).values for k in some])
-        return found
-
-    def forget(self) -> None:
-        """Let go of the fields that were kept for one pattern's neighbours."""
-        self._flows.clear()
 
 
 @dataclass(eq=False)

@@ -11,7 +11,7 @@ import numpy as np
 from nonsmooth.system.derived.elements.element import Condition, Contact, Element, Law, Leaving
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derived.assembly import Place
+    from nonsmooth.system.derived.place import Place
 
 __all__ = ["Backlash", "ElasticStop", "PreloadedSpring"]
 

@@ -3,7 +3,7 @@
 An element is in one of a few phases (open or at rest, slipping or sticking, ...). In each its force is a law, or it is
 whatever keeps a rate at zero: the approach of a contact that rests, the speed of one that sticks. A system with
 elements has a mode for each combination of their phases. An element knows its own rules and no other element; what
-stands around it is a :class:`nonsmooth.system.derived.assembly.Place`.
+stands around it is a :class:`nonsmooth.system.derived.place.Place`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from nonsmooth.errors import SystemDefinitionError, shortened
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derived.assembly import Place
+    from nonsmooth.system.derived.place import Place
 
 __all__ = ["CREEP", "SLOW", "SMALL", "Condition", "Contact", "Element", "Law", "Leaving"]
 

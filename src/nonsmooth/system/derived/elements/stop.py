@@ -11,7 +11,7 @@ from nonsmooth.system.derived.elements.element import CREEP, SMALL, Condition, C
 from nonsmooth.system.derived.elements.rubbing import RUBS, Rubbing
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derived.assembly import Place
+    from nonsmooth.system.derived.place import Place
 
 __all__ = ["Stop"]
 
