@@ -144,3 +144,26 @@ def test_orbits_and_branches_are_those_of_the_system_written_out(monkeypatch):
     assert kinds[0] == kinds[1]
     assert kinds[0]
     np.testing.assert_allclose(branches[1].special_value, branches[0].special_value, rtol=1e-9)
+
+
+@pytest.mark.physics
+def test_two_frictions_whose_shares_depend_on_a_parameter_are_one_of_their_sum():
+    def system(elements, **other):
+        return ns.System(
+            states=["x", "v"], parameters={"a": 2.0, "F": 0.9, "w": 0.7, **other},
+            modes={"m": lambda t, u, p: (u.v, p.F * np.cos(p.w * t) - u.x)}, elements=elements,
+        )  # fmt: skip
+
+    def rub(push, friction):
+        return E.Coulomb(speed=lambda t, u, p: u.v, on={"v": push}, friction=friction)
+
+    two = system({"f": rub(1.0, 0.1), "g": rub(lambda t, u, p: p.a, 0.05)})
+    for a in (2.0, 1.0):
+        one = system({"f": rub(1.0, 0.1 + 0.05 * a)})
+        runs = [ns.sensitivity(s, duration=30.0, start={"x": 0.4}, parameters=["F"])
+                for s in (two.with_parameters(a=a), one)]  # fmt: skip
+        assert runs[0].sizes["crossing"] > 3
+        np.testing.assert_allclose(runs[0].end, runs[1].end, atol=1e-12)
+        np.testing.assert_allclose(runs[0].P, runs[1].P, atol=1e-11)
+    with pytest.raises(ns.SystemDefinitionError, match="depends on a parameter in which derivatives"):
+        ns.sensitivity(two.with_parameters(F=0.1), duration=30.0, start={"x": 0.4}, parameters=["a"])  # it sticks

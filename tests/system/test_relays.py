@@ -72,16 +72,26 @@ def test_a_saved_run_is_read_back(tmp_path):
     assert ns.load(tmp_path / "run.nc").equals(run)
 
 
-def test_a_relay_that_would_push_away_is_refused():
+def with_strengths():
     def field(a, b):
-        return lambda t, u, p: (u.x2, -p.r1 * a - p.r2 * b)
+        return lambda t, u, p: (u.x2, p.load - p.r1 * a - p.r2 * b)
 
-    system = ns.System(
-        states=["x1", "x2"], parameters={"r1": 10.0, "r2": 3.0},
+    return ns.System(
+        states=["x1", "x2"], parameters={"r1": 10.0, "r2": 3.0, "load": 0.0},
         modes={"pp": field(1, 1), "pm": field(1, -1), "mp": field(-1, 1), "mm": field(-1, -1)},
         indicators={"h1": lambda t, u, p: u.x1, "h2": lambda t, u, p: u.x2},
         transitions=quadrants("h1", "h2", "pp", "pm", "mp", "mm"),
     )  # fmt: skip
+
+
+@pytest.mark.parametrize(("load", "holds"), [(8.9, True), (9.1, False)])
+def test_strengths_that_changed_since_the_definition_hold_what_they_can_bear(load, holds):
+    run = ns.simulate(with_strengths().with_parameters(r1=4.0, r2=5.0, load=load), duration=1.0)
+    assert float(run.u[-1, 0]) == pytest.approx(0.0 if holds else 0.05, abs=1e-12)
+
+
+def test_a_relay_that_would_push_away_is_refused():
+    system = with_strengths()
     assert system.with_parameters(r1=4.0).values["r1"] == 4.0
     with pytest.raises(ns.SystemDefinitionError, match="relay at 'h1' pushes towards its surface"):
         system.with_parameters(r1=-1.0)

@@ -153,7 +153,7 @@ def describe(
             between = {"all": relays.field}
             made = assembled(symbols, between, relays.elements, given, _scale(scale, units, name), now, relays.name)
         derived = made["indicators"].keys() - (indicators or {}).keys()
-        ranges, patterns = [*made["ranges"], *(relays.ranges if relays else ())], made.get("patterns")
+        ranges, patterns = [*(relays.ranges if relays else ()), *made["ranges"]], made.get("patterns")
         plain = partial(_without_elements, name, symbols, units, modes, indicators, transitions, outputs)
         modes, indicators, transitions, outputs = (made[k] for k in ("modes", "indicators", "transitions", "outputs"))
     indicators = dict(indicators or {})

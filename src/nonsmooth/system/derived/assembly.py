@@ -31,10 +31,21 @@ from nonsmooth.system.derived.elements import Element, Rubbing
 from nonsmooth.system.derived.elements.element import Condition, Leaving
 from nonsmooth.system.derived.place import Place
 
-__all__ = ["Assembler", "Part", "Pattern"]
+__all__ = ["Assembler", "Part", "Pattern", "VaryingError"]
 
 Pattern = tuple[int, ...]  # the phase of each element
 DEPENDENT, INDEPENDENT = 1e-13, 1e-7  # what is left of a unit row when those before are taken away
+
+
+class VaryingError(SystemDefinitionError):
+    """By which sum of forces elements hold together depends on the state or on parameters."""
+
+    def __init__(self, names: str, of: str = "the state or on parameters") -> None:
+        self.names = names
+        super().__init__(
+            f"elements {names} hold together, and by which sum of forces depends on {of}: take fewer elements, or "
+            "numbers in on="
+        )
 
 
 @dataclass(frozen=True)
@@ -53,6 +64,7 @@ class Assembler(ABC):
     parts: list[Part]
     sequential: bool = False  # impacts of one instant come one after the other
     asks: bool = False  # what several elements decide together is asked at each instant (``deciding``)
+    draws: tuple[int, ...] = ()  # of states and parameters, at which numbers that must be constant are compared
 
     # The calculus
 
@@ -195,12 +207,9 @@ class Assembler(ABC):
     def basis(self, held: Sequence[int], mode: str, pattern: Pattern) -> tuple[list[int], FloatArray]:
         """Held elements whose rates are independent, and the forces of all of them as sums of those."""
         chosen, sums = self._basis(held, mode, pattern, 0)
-        again = sums if len(chosen) == len(held) else self._basis(held, mode, pattern, 1)[1]
-        if not np.allclose(sums, again, rtol=1e-9, atol=1e-9):
-            names = ", ".join(repr(self.parts[k].name) for k in held)
-            raise SystemDefinitionError(
-                f"elements {names} hold together, and by which sum of forces depends on the state: take fewer elements"
-            )
+        for draw in self.draws if len(chosen) < len(held) else ():
+            if not np.allclose(sums, self._basis(held, mode, pattern, draw)[1], rtol=1e-9, atol=1e-9):
+                raise VaryingError(", ".join(repr(self.parts[k].name) for k in held))
         return chosen, sums
 
     def _basis(self, held: Sequence[int], mode: str, pattern: Pattern, draw: int) -> tuple[list[int], FloatArray]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
-from nonsmooth.system.derived.assembly import Pattern
+from nonsmooth.system.derived.assembly import Pattern, VaryingError
 from nonsmooth.system.derived.decider import Decider
 from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.derived.expressions import Expressions
@@ -81,6 +81,19 @@ def assembled(
         why = f"have more than {MOST} combinations of phases"
         return _opened(make, base, given, "rub" if make.rubbing else "strike in sequence" if make.sequential else why)
     make.asks = _decide_together(make, base, resets)
+    try:
+        return _written_out(make, base, given, counts, named)
+    except VaryingError as error:
+        if named is not None or _affine(make, base, given) is None:
+            raise
+        return _opened(make, base, given, f"hold together by sums of forces that depend on parameters ({error.names})")
+
+
+def _written_out(
+    make: Expressions, base: Mapping[str, tuple[sp.Expr, ...]], given: Mapping[str, Any], counts: Sequence[int],
+    named: Callable[[list[str]], str] | None,
+) -> dict[str, Any]:  # fmt: skip
+    """A mode for each combination that may be."""
     every = product(base, product(*[range(count) for count in counts]))
     pairs = [pair for pair in every if make.may_hold(make.held(pair[1]), pair[0])]
 

@@ -32,7 +32,7 @@ class Expressions(Assembler):
         self, symbols: Symbols, base: Mapping[str, tuple[sp.Expr, ...]], elements: Mapping[str, Element],
         scale: Mapping[str, float], values: Mapping[sp.Symbol, float],
     ) -> None:  # fmt: skip
-        self.symbols, self.fields, self.scale, self.values = symbols, base, scale, values
+        self.symbols, self.fields, self.scale, self.values, self.draws = symbols, base, scale, values, (1, OTHER)
         self.u = tuple(symbols.u.values())
         self.parts = [self._part(name, element) for name, element in elements.items()]
         self.indicators: dict[str, sp.Expr] = {}

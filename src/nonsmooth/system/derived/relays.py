@@ -76,7 +76,8 @@ def relays_of(
         return None
     keys = list(dict.fromkeys(item.indicator for item in transitions))
     signs = _signs(keys, modes, transitions)
-    if signs is None or any(key not in (indicators or {}) for key in keys):
+    where = dict(indicators or {})
+    if signs is None or any(key not in where for key in keys):
         return None
     arguments = Scalar(symbols.t), symbols.states(), symbols.parameters()
     u = tuple(symbols.u.values())
@@ -98,7 +99,7 @@ def relays_of(
     elements: dict[str, Element] = {}
     ranges: list[tuple[sp.Expr, str]] = []
     for key, b in zip(keys, pushes, strict=True):
-        h = call_scalar(indicators[key], arguments, f"indicator {key!r}")  # type: ignore[index]
+        h = call_scalar(where[key], arguments, f"indicator {key!r}")
         slopes = [sp.diff(h, symbol) for symbol in u]
         rate = sp.diff(h, symbols.t) + sum(s * f for s, f in zip(slopes, middle, strict=True))
         first, second = (
@@ -112,11 +113,13 @@ def relays_of(
             says = f"the relay at {key!r} pushes towards its surface; where it does not, define another system"
             ranges.append((-acts, says))
         degrees.append(1 if first != 0 else 2)
-        on = {name: _given(-part) for name, part in zip(symbols.u, b, strict=True) if part != 0}
+        # its strength is the bound of a force that changes a rate by 1: what several hold is then shared by numbers
+        on = {name: _given(sp.cancel(part / acts)) for name, part in zip(symbols.u, b, strict=True) if part != 0}
+        strength = _given(-acts)
         if degrees[-1] == 1:
-            elements[key] = Coulomb(speed=indicators[key], friction=1.0, on=on)  # type: ignore[index]
+            elements[key] = Coulomb(speed=where[key], friction=strength, on=on)
         else:
-            elements[key] = SecondOrderRelay(displacement=indicators[key], preload=1.0, on=on)  # type: ignore[index]
+            elements[key] = SecondOrderRelay(displacement=where[key], preload=strength, on=on)
     if 2 not in degrees:
         return None
     entries = [Scalar(sp.sympify(e)) for e in middle]

@@ -17,7 +17,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.codegen.linear import put_together
-from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
+from nonsmooth.system.derived.assembly import Assembler, Part, Pattern, VaryingError
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearTables
@@ -158,8 +158,19 @@ class Rows(Assembler):
     def basis(self, held: Sequence[int], mode: str, pattern: Pattern) -> tuple[list[int], FloatArray]:
         key = tuple(held), tuple(pattern[r] for r in self.rubbing.values())
         if key not in self._bases:
-            self._bases[key] = super().basis(held, mode, pattern)
+            self._bases[key] = chosen, sums = super().basis(held, mode, pattern)
+            if len(chosen) < len(held) and self.field.dtype == complex:
+                self._refuse_varying(chosen, held, sums, pattern)
         return self._bases[key]
+
+    def _refuse_varying(self, chosen: list[int], held: Sequence[int], sums: FloatArray, pattern: Pattern) -> None:
+        """Raise where the sums of forces that hold together depend on the parameter of the derivatives."""
+        ways, some = (
+            np.array([self.pushing(k, self.mode, pattern).direction for k in which]) for which in (held, chosen)
+        )
+        if np.abs((ways - sums @ some).imag).max() > 1e-9 * np.abs(ways.imag).max(initial=0.0):
+            names = ", ".join(repr(self.parts[k].name) for k in held)
+            raise VaryingError(names, "a parameter in which derivatives are asked for")
 
     def identity(self) -> FloatArray:
         return np.eye(self.n, self.field.shape[1])
