@@ -7,7 +7,7 @@ import pytest
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.load import parse_recording
-from nonsmooth.recordings.readers.text_table import split_unit
+from nonsmooth.recordings.readers.fields import split_unit
 
 ENGLISH = (
     b'\xef\xbb\xbf"Time (s) Run #1","Position (m) Run #1","Temperature, Ch P3 (\xc2\xb0C) Run #1",'

@@ -14,7 +14,8 @@ import numpy as np
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.limits import MAX_COLUMNS
-from nonsmooth.recordings.readers.text_table import Cells, checked_header, decoded, read_cells, rows, split_unit
+from nonsmooth.recordings.readers.fields import places, split_unit
+from nonsmooth.recordings.readers.text_table import Cells, Numerals, checked_header, decoded, read_cells, rows
 from nonsmooth.recordings.reading import TIME_WORDS, Options, Reading, Source, Trace, names_of, scaled_time
 from nonsmooth.recordings.remarks import Remarks
 
@@ -55,13 +56,13 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
         raise ValueError("columns, rate and axis do not concern a Capstone file; read it with format='csv' to use them")
     reading = Reading()
     delimiter = options.delimiter or _delimiter(data, source)
-    decimal = options.decimal or ("." if delimiter == "," else None)
+    numerals = Numerals(options.decimal or ("." if delimiter == "," else None), options.thousands, options.na)
     table = rows(decoded(data, source, reading.remarks), delimiter, source)
     line, fields = next(table, (1, []))
     header = checked_header(fields, line, source)
     times, channels = _layout(header, source)
     cells = read_cells(
-        table, header, range(len(header)), decimal, source, reading.remarks, ends_with_newline=data.endswith(b"\n")
+        table, header, range(len(header)), numerals, source, reading.remarks, ends_with_newline=data.endswith(b"\n")
     )
     for column, (run, label) in channels.items():
         time = _time_of(times, run, column)
@@ -122,7 +123,8 @@ def _trace(
     name, unit = split_unit(label)
     where = f"run {run!r}, channel {name!r}"
     held = cells.rows[column]
-    timed = cells.places(held, cells.rows[time], source, f"{where} has a value where its run has no time")
+    complaint = f"{where} has a value where its run has no time"
+    timed = places(held, cells.rows[time], cells.lines, source, complaint)
     seconds = scaled_time(cells.values[time][timed], time_unit)
     if seconds is None:
         raise source.error("line 1", f"{where}: its time is in {time_unit!r}, which is no unit of time")
