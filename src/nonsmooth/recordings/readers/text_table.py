@@ -103,7 +103,7 @@ def number(field: str, decimal: str, thousands: str | None = None) -> float | No
 
 
 class Numerals(NamedTuple):
-    """How the numbers of a table are written: decimal mark (None: to be told), thousands, texts for a missing one."""
+    """Marks of the numbers in a table: decimal (None: unknown), between thousands, and texts for a missing one."""
 
     decimal: str | None = None
     thousands: str | None = None
