@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from nonsmooth.identification.fit.select import select_model as select_model
     from nonsmooth.identification.fit.sensors import Sensor as Sensor
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
+    from nonsmooth.identification.propagate import propagate as propagate
     from nonsmooth.recordings.load import load_recording as load_recording
     from nonsmooth.recordings.recording import Recording as Recording
     from nonsmooth.results.store import load as load
@@ -115,6 +116,7 @@ _WHERE = {
     "identify": "studies.savi2007.identification.chain",
     "ParameterSet": "identification.parameter_set",
     "compare": "identification.compare.compare",
+    "propagate": "identification.propagate",
     "explore": "explorer.serve",
     "save": "results.store",
     "load": "results.store",
