@@ -118,7 +118,8 @@ def test_the_probability_of_a_period_is_that_of_the_side_of_a_flip() -> None:
         **QUIET,
     )  # fmt: skip
     flips = ns.propagate(
-        found, ns.continue_orbit, ns.find_orbit(s.with_parameters(rho=0.45)), "rho", (0.3, 0.5), draws=30, step=0.1, **QUIET
+        found, ns.continue_orbit, ns.find_orbit(s.with_parameters(rho=0.45)), "rho", (0.3, 0.5), draws=30, step=0.1,
+        **QUIET,
     )["special_value_draws"].values[:, 0]
     of_one = plane["period_number_probability"].sel(period_value=1).values
     far = np.abs(flips[:, None] - rho) > 2e-3
