@@ -170,9 +170,9 @@ def _information(
     from nonsmooth.identification.fit.fit import problem_of
 
     settings = dict(run.get("settings", {}))
-    length = {key: run[key] for key in ("duration", "periods") if key in run}
-    asked = {key: run.get(key) for key in ("samples", "start", "mode")}
-    motion = simulate(system.with_parameters(settings), **asked, **length)
+    asked: dict[str, Any] = {key: run.get(key) for key in ("samples", "start", "mode")}
+    asked |= {key: run[key] for key in ("duration", "periods") if key in run}
+    motion = simulate(system.with_parameters(settings), **asked)
     mode = list(system.modes)[int(motion["mode"].values[0])] if motion["mode"].dtype.kind in "iu" else None
     problem = problem_of(system, motion, parameters, sensors, priors, settings, None, "time", run.get("mode") or mode)
     problem = replace(problem, noise=noise)
