@@ -184,7 +184,7 @@ def _information(
         raise SolveError(f"run {name!r} cannot be followed to its end; shorten it", status="no_convergence")
     used = np.ones(len(whole.pieces), dtype=bool)
     normal = reduced(whole, state, whole.weights(None, 0.0), used, len(theta))[0]
-    shared = len(problem.unknowns.active) + len(problem.unknowns.sensors)
+    shared = len(theta) - problem.unknowns.phases
     own = np.linalg.pinv(normal[shared:, shared:], hermitian=True)
     eliminated = normal[:shared, :shared] - normal[:shared, shared:] @ own @ normal[shared:, :shared]
     known = problem.unknowns.precision[:shared, :shared]
