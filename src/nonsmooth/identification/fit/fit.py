@@ -50,6 +50,7 @@ def fit(
     profile: Sequence[str] = (),
     loss: str = "linear",
     leave_out: bool = False,
+    posterior: int = 0,
     tries: int = 8,
     seed: int = 0,
     progress: Progress = True,
@@ -109,6 +110,10 @@ def fit(
     leave_out : bool
         True: short windows that disagree with the rest (a knock at the table, a sensor that slipped) are left out, and
         the notes say when they were; the motion begins anew behind each.
+    posterior : int
+        Steps of an ensemble sampler (emcee, extra ``posterior``) that starts about the optimum: the finding
+        ``"posterior"``, ``.posterior`` of the set, and what its ``draw`` then draws from. For a law that is no normal
+        one; some thousand steps of a likelihood that costs a simulation of the record each.
     tries : int
         First guesses to try, the given one and others around it (or within the bounds), while none fits.
     seed : int
@@ -135,7 +140,8 @@ def fit(
 
     References
     ----------
-    H.G. Bock, in Springer Ser. Chem. Phys. 18 (1981) 102-125; W.K. Newey, K.D. West, Econometrica 55 (1987) 703-708.
+    H.G. Bock, in Springer Ser. Chem. Phys. 18 (1981) 102-125; W.K. Newey, K.D. West, Econometrica 55 (1987) 703-708;
+    J. Goodman, J. Weare, Comm. Appl. Math. Comp. Sci. 5 (2010) 65-80 (``posterior``).
 
     Examples
     --------
@@ -173,11 +179,16 @@ def fit(
         problem, left = without_disagreeing(problem, best.theta)
         if len(problem.records) != len(best.problem.records) or problem.records[0] is not best.problem.records[0]:
             best = best_of(problem, None, True, longest, tried, whole_number(seed, "seed", 0), progress)
+    beside = []
+    if steps := whole_number(posterior, "posterior", 0):
+        from nonsmooth.identification.fit.posterior import posterior_of
+
+        beside.append(posterior_of(best, steps, whole_number(seed, "seed", 0), progress))
     options = {"parameters": list(problem.unknowns.names), "window": window, "tries": tries, "seed": seed}
     given = recording if isinstance(recording, list | tuple) else [recording]
     return outcome(
         best, options, synthetic=any(getattr(one, "synthetic", False) for one in given), profiles=profiles,
-        watched=progress, left=left,
+        watched=progress, left=left, beside=beside,
     )  # fmt: skip
 
 

@@ -38,7 +38,7 @@ METHOD = (
 
 def outcome(
     grown: Grown, options: Mapping[str, Any], synthetic: bool = False, profiles: Sequence[str] = (),
-    watched: Progress = False, left: Sequence[str] = (),
+    watched: Progress = False, left: Sequence[str] = (), beside: Sequence[Finding] = (),
 ) -> ParameterSet:  # fmt: skip
     """The parameters, with what is known of how well."""
     problem, theta = grown.problem, grown.theta
@@ -70,7 +70,7 @@ def outcome(
     extra = {**dict(zip([*u.names[a:], *starts.names], rows[a:], strict=True)), **noise}
     data = residual_data(grown, options).assign_attrs(synthetic="yes" if synthetic else "no")
     known = [name for name in profiles if np.isfinite(rows[u.names.index(name)].uncertainty)]
-    beside = profiled(grown, known, normal + u.precision, found.covariance, synthetic, watched)
+    beside = [*profiled(grown, known, normal + u.precision, found.covariance, synthetic, watched), *beside]
     notes = [*left, *_notes(grown, found, data)] + [note for finding in beside for note in finding.notes]
     finding = Finding(
         "fit", next(iter({**estimates, **extra}.values())), METHOD, data.sizes["sample"],
