@@ -96,7 +96,7 @@ def _sensor(group: list[Trace], source: Source, axis: str, remarks: Remarks) -> 
             remarks.of(trace.run, trace.name, sentence)
 
     attrs: dict[str, Any] = _clock(first, where, source, note) if axis == "time" else {}
-    if len(first.values) < SHORT and any(trace.name != EVENTS for trace in group):
+    if axis == "time" and len(first.values) < SHORT and any(trace.name != EVENTS for trace in group):
         note(f"only {len(first.values)} samples; too short to identify anything from")
     variables: dict[str, Any] = {}
     for trace in group:

@@ -103,7 +103,7 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
 def _drawn(
     grown: Grown, weights: list[FloatArray], at: list[tuple[int, int]], count: int, rng: np.random.Generator
 ) -> FloatArray:
-    """Where the walkers begin: from the normal law of the unknowns and the starts about the optimum."""
+    """First places of the walkers: from the normal law of the unknowns and the starts about the optimum."""
     problem, u, p = grown.problem, grown.problem.unknowns, len(grown.theta)
     state = problem.derivatives(grown.theta, grown.starts)
     normal, _, back = reduced(problem, state, weights, [True] * len(problem.pieces), p)
