@@ -8,6 +8,7 @@ and of stick, in contact and out of it, are integrated one after another between
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,10 @@ M, C, K = 0.8, 1.1, 320.0  # kg, N s/m, N/m
 FRICTION, GAP, STOP, STOP_DAMPING = 0.3, 4.0e-3, 1300.0, 2.0  # N, m, N/m, N s/m
 FORCE, PHASE = 1.2, 0.3  # N, rad
 NOISE_X, NOISE_F, NOISE_AMPLITUDE = 2.0e-4, 0.05, 4.0e-5  # m, N, m
+
+
+def _excess(t: float, force: Callable[..., float], x: float, touching: bool) -> float:
+    return abs(force(t, x, 0.0, touching)) - FRICTION
 
 
 def motion(frequency: float, phase: float, times: np.ndarray, x: float = 0.0, v: float = 0.0) -> np.ndarray:
@@ -40,7 +45,7 @@ def motion(frequency: float, phase: float, times: np.ndarray, x: float = 0.0, v:
             leaves = end
             if over.any():
                 b = later[np.argmax(over)]
-                leaves = brentq(lambda s: abs(force(s, x, 0.0, touching)) - FRICTION, b - 1e-4, b, xtol=1e-15)
+                leaves = brentq(_excess, b - 1e-4, b, args=(force, x, touching), xtol=1e-15)
             while filled < len(times) and times[filled] <= min(leaves, end):
                 out[filled] = x, 0.0
                 filled += 1
