@@ -30,7 +30,7 @@ FORMATS = {
     "capstone-cap": "capstone_cap",
     "csv": "delimited",
     "lvm": "lvm",
-    "tdms": "tdms",
+    "tdms": "arrays",
     "mat": "arrays",
     "hdf5": "arrays",
     "npy": "arrays",

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from nonsmooth.recordings.limits import MAX_COLUMNS, MAX_DEPTH
 from nonsmooth.recordings.readers.fields import Field, Table, label, traces_of
-from nonsmooth.recordings.readers.loaders import LOADERS, Group
+from nonsmooth.recordings.readers.group import Group
+from nonsmooth.recordings.readers.loaders import LOADERS
 from nonsmooth.recordings.reading import Options, Reading, Source, is_axis_name, names_of
 from nonsmooth.recordings.remarks import Remarks
 
@@ -59,7 +60,8 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     for path, node, key in found:
         run = getattr(node, "run", None) or path or _TOP
         notes = {name: _note(v) for name, v in node.items() if _note(v)}
-        reading.run_attrs.setdefault(run, {}).update({f"note_{name}": text for name, text in notes.items()})
+        own = {**getattr(node, "notes", {}), **{f"note_{name}": text for name, text in notes.items()}}
+        reading.run_attrs.setdefault(run, {}).update(own)
         table = _table(run, path, node, key, options, reading.remarks)
         reading.traces += traces_of(table, options, source, reading)
         if len(reading.traces) > MAX_COLUMNS:
@@ -127,7 +129,8 @@ def _table(
             ours = options.axis if name == key else said if unit else name
             for k, column in enumerate(columns, 1):
                 number = f"({k})" if len(columns) > 1 else ""
-                fields.append(Field(ours + number, units.get(name, "") or unit, column, origin + number))
+                attrs = getattr(node, "attrs", {}).get(name, {})
+                fields.append(Field(ours + number, units.get(name, "") or unit, column, origin + number, attrs=attrs))
     return Table(run, fields, n, rate=getattr(node, "rate", None))
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ class Field:
     values: NDArray[Any]
     origin: str
     rows: NDArray[np.int64] | None = None
+    attrs: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +103,7 @@ def _find(wanted: str | int, header: Sequence[str], named: list[tuple[str, str]]
 
 def traces_of(table: Table, options: Options, source: Source, reading: Reading) -> Iterator[Trace]:
     """The channels of a table by run, over its axis or at its rate."""
-    fields = {field.name: _unwrapped(field, options) for field in table.fields}
+    fields = {one.name: _unwrapped(one, options) for one in table.fields}
     axis, rate = fields.pop(options.axis, None), options.rate or table.rate
     if axis is not None and options.rate is not None:
         reading.remarks.say(f"{axis.origin} is not used as the time, since rate= is given")
@@ -118,28 +119,28 @@ def traces_of(table: Table, options: Options, source: Source, reading: Reading) 
     runs = _runs(table, numbers, source)
     if len(runs) * (len(fields) + 1) > MAX_COLUMNS:
         raise source.error("", f"holds {len(fields) + 1} columns in {len(runs)} runs; at most {MAX_COLUMNS} are read")
-    for field in fields.values():
-        rows = np.arange(table.rows) if field.rows is None else field.rows
-        if field.values.dtype.kind == "c":
-            raise source.error(field.origin, "holds complex numbers; save its parts as two real vectors")
+    for one in fields.values():
+        rows = np.arange(table.rows) if one.rows is None else one.rows
+        if one.values.dtype.kind == "c":
+            raise source.error(one.origin, "holds complex numbers; save its parts as two real vectors")
         for run, inside in runs:
             whole = inside is None and len(rows) == table.rows
             mine = slice(None) if inside is None else inside[rows]
-            at, values = rows[mine], np.ascontiguousarray(field.values[mine], np.float64)
+            at, values = rows[mine], np.ascontiguousarray(one.values[mine], np.float64)
             blank = (table.rows if inside is None else int(np.count_nonzero(inside))) - len(at)
             if blank and len(at):
-                reading.remarks.of(run, field.name, f"{blank} blank fields dropped")
+                reading.remarks.of(run, one.name, f"{blank} blank fields dropped")
             if axis is None:
                 first = 0 if inside is None else int(np.flatnonzero(inside)[0])
                 taken = (at - first) / float(rate or 1.0)
             elif whole and len(held) == table.rows:
                 taken = along  # the same array for all: told at once to be one clock
             else:
-                complaint = f"run {run!r}, channel {field.name!r} has a value where there is no {options.axis}"
+                complaint = f"run {run!r}, channel {one.name!r} has a value where there is no {options.axis}"
                 place = places(at, held, table.lines, source, complaint)
                 taken = along[place]
             lines = None if table.lines is None else table.lines[at]
-            yield Trace(run, field.name, field.unit, taken, values, field.origin, unit, lines=lines)
+            yield Trace(run, one.name, one.unit, taken, values, one.origin, unit, lines=lines, attrs=one.attrs)
 
 
 def places(

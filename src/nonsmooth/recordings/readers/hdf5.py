@@ -9,7 +9,7 @@ import numpy as np
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.limits import MAX_COLUMNS, MAX_DEPTH, inflation_limit
-from nonsmooth.recordings.readers.loaders import Group
+from nonsmooth.recordings.readers.group import Group
 from nonsmooth.recordings.reading import Source
 from nonsmooth.recordings.remarks import Remarks
 

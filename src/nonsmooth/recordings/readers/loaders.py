@@ -1,7 +1,6 @@
 """One loader per format of named arrays, each over its library: claims are checked before the library acts on them.
 
-A loader returns the file's arrays as nested dicts and lists, and what the file says of itself. A ``Group`` also knows
-the units of its arrays, their sample rate, and the run they belong to.
+A loader returns the file's arrays as nested dicts and lists, and what the file says of itself.
 """
 
 from __future__ import annotations
@@ -20,23 +19,13 @@ from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.limits import MAX_COLUMNS, inflation_limit
 from nonsmooth.recordings.needed import needed
 from nonsmooth.recordings.readers.archive import Archive
+from nonsmooth.recordings.readers.group import Group
 from nonsmooth.recordings.reading import Source
 from nonsmooth.recordings.remarks import Remarks
 
-__all__ = ["LOADERS", "Group"]
+__all__ = ["LOADERS"]
 
 Loaded = tuple[Mapping[str, Any], dict[str, Any]]
-
-
-class Group(dict[str, Any]):
-    """Arrays by name, with their units, the rate at which they were sampled, and their run where it has a name."""
-
-    def __init__(
-        self, members: Mapping[str, Any] | None = None, units: Mapping[str, str] | None = None,
-        rate: float | None = None,
-    ) -> None:  # fmt: skip
-        super().__init__(members or {})
-        self.units, self.rate, self.run = dict(units or {}), rate, ""
 
 
 def _matlab(data: bytes, source: Source, remarks: Remarks) -> Loaded:
@@ -54,6 +43,12 @@ def _hdf5(data: bytes, source: Source, remarks: Remarks) -> Loaded:
     from nonsmooth.recordings.readers.hdf5 import load_hdf5
 
     return load_hdf5(data, source, remarks, matlab=False), {}
+
+
+def _tdms(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+    from nonsmooth.recordings.readers.tdms import load_tdms
+
+    return load_tdms(data, source, remarks)
 
 
 def _numpy(data: bytes, source: Source, remarks: Remarks) -> Loaded:
@@ -192,6 +187,7 @@ def _guarded(load: Callable[[bytes, Source, Remarks], Loaded], what: str) -> Cal
 LOADERS = {
     "mat": _matlab,
     "hdf5": _hdf5,
+    "tdms": _tdms,
     "npy": _numpy,
     "arrow": _guarded(_arrow, "Parquet or Arrow"),
     "wav": _guarded(_wave, "a WAV file"),
