@@ -50,8 +50,10 @@ def read_lines(
         if not first:
             raise source.error("", "holds no table, only blank lines or comments")
         delimiter = options.delimiter or delimiter or _delimiter(first)
-        arrow = (_ARROW.sub(rf"\1{delimiter}", text) for text in itertools.chain([first], kept))
-        table = rows(arrow, delimiter, source, at)
+        lines: Iterator[str] = itertools.chain([first], kept)
+        if _ARROW.match(first):
+            lines = (_ARROW.sub(rf"\1{delimiter}", text) for text in lines)
+        table = rows(lines, delimiter, source, at)
         reading.traces += _table(table, run, delimiter, source, options, reading, ends)
     except DataFileError as error:
         advice = "" if options.header else _advice([*top, *itertools.islice(stream, max(0, _SEARCHED - len(top)))])
@@ -71,6 +73,8 @@ def _kept(stream: Iterable[str], options: Options, top: list[str], comments: lis
             comments.append(text.strip())
         left = not begun or (line != options.header and bool(options.leave) and begin.startswith(options.leave))
         yield "\n" if left else text
+        if begun and not options.leave and line >= _SEARCHED:
+            yield from stream
 
 
 def _table(

@@ -27,6 +27,7 @@ __all__ = ["Cells", "Numerals", "Row", "checked_header", "decoded", "number", "r
 Row = tuple[int, list[str]]
 
 _LONGEST_NUMBER = 64  # characters; a double has at most 24 that matter
+_CHUNK = 4096  # rows read at once
 _SNIFFED = 20  # rows looked at to tell the decimal mark
 
 
@@ -158,19 +159,33 @@ def read_cells(
     lines = array("q")
     pairs = sorted(enumerate(wanted), key=lambda pair: pair[1])
     short, first_short, last_short = 0, 0, False
-    for row, (line, fields) in enumerate(itertools.chain(head, table)):
-        if len(fields) > n and any(field.strip() for field in fields[n:]):
-            raise source.error(f"line {line}", f"has {len(fields)} fields, the header has {n}")
-        last_short = len(fields) < n
-        if last_short:
-            short, first_short = short + 1, first_short or line
-        lines.append(line)
-        for k, column in pairs:
-            # A short row costs what it weighs, however many columns the header announces.
-            if column >= len(fields):
-                break
-            field = fields[column]
-            if field and not field.isspace() and field.strip() not in na:
+    table = itertools.chain(head, table)
+    while chunk := list(itertools.islice(table, _CHUNK)):
+        begin, slow = len(lines), pairs
+        lines.extend(line for line, _ in chunk)
+        if all(len(fields) == n for _, fields in chunk):
+            last_short, slow = False, []
+            for k, column in pairs:
+                texts = [] if stamps is not None and column == stamped else [fields[column] for _, fields in chunk]
+                plain = _plain(texts, decimal)
+                if plain is None:
+                    slow.append((k, column))
+                else:
+                    values[k].extend(plain)
+                    held[k].extend(range(begin, begin + len(chunk)))
+        for row, (line, fields) in enumerate(chunk, begin) if slow else ():
+            if len(fields) > n and any(field.strip() for field in fields[n:]):
+                raise source.error(f"line {line}", f"has {len(fields)} fields, the header has {n}")
+            last_short = len(fields) < n
+            if last_short:
+                short, first_short = short + 1, first_short or line
+            for k, column in slow:
+                # A short row costs what it weighs, however many columns the header announces.
+                if column >= len(fields):
+                    break
+                field = fields[column]
+                if not field or field.isspace() or field.strip() in na:
+                    continue
                 if stamps is not None and column == stamped:
                     stamps.append(field)
                 else:
@@ -188,6 +203,21 @@ def read_cells(
         for column, v in zip(wanted, values, strict=True)
     ]
     return Cells(columns, [np.asarray(h) for h in held], np.asarray(lines))
+
+
+def _plain(texts: list[str], decimal: str) -> list[float] | None:
+    """The numbers, where all fields hold plain ones; None leaves it to a closer look at each."""
+    joined = "".join(texts)
+    if not texts or not joined.isascii() or "_" in joined or len(joined) > _LONGEST_NUMBER * len(texts):
+        return None
+    if decimal == ",":
+        if "." in joined:
+            return None
+        texts = [text.replace(",", ".") for text in texts]
+    try:
+        return list(map(float, texts))
+    except ValueError:
+        return None
 
 
 def _no_number(column: int, fields: list[str], labels: Sequence[str], decimal: str, line: int, first: bool) -> str:
