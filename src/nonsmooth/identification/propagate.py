@@ -146,9 +146,20 @@ def propagate(
     systems, drawn = draw_systems(system, found, known, count, many, bounds)
     gathered = _Gathered(centre)
     failures: list[str] = []
-    stopped = False
-    with _progress(count, progress) as advance:
-        try:
+    linear_part = _to_first_order(centre, found, known, base) if linear else {}
+
+    def banded() -> xr.Dataset:
+        n = len(gathered.rows)
+        variables = gathered.variables(edges) | linear_part
+        variables |= drawn_variables({name: values[:n] for name, values in drawn.items()}, base)
+        reasons = "; ".join(dict.fromkeys(failures[:FAILURES]))
+        variables["failed"] = ((), len(failures), {"long_name": "draws for which the verb failed", "comment": reasons})
+        result = centre.assign(variables).assign_coords(quantile=("quantile", edges))
+        result.attrs = {**centre.attrs, "propagated": f"{n} draws from seed {many}"}
+        return result
+
+    try:
+        with _progress(count, progress) as advance:
             for one in systems:
                 try:
                     with warnings.catch_warnings():  # said once, of the parameters found
@@ -158,24 +169,12 @@ def propagate(
                     failures.append(str(error))
                     gathered.add(None)
                 advance()
-        except KeyboardInterrupt:
-            stopped = True
+    except KeyboardInterrupt as error:
+        said = f"stopped after {len(gathered.rows)} of {count} draws; what they gave is the exception's result"
+        raise Interrupted(said, banded()) from error
     if systems and len(failures) == len(systems):
         raise SolveError(f"the verb failed for all {count} draws: {failures[0]}", status="no_convergence")
-    variables = gathered.variables(edges)
-    n = len(gathered.rows)
-    variables |= drawn_variables({name: values[:n] for name, values in drawn.items()}, base)
-    reasons = "; ".join(dict.fromkeys(failures[:FAILURES]))
-    variables["failed"] = ((), len(failures), {"long_name": "draws for which the verb failed", "comment": reasons})
-    if linear:
-        variables |= _to_first_order(centre, found, known, base)
-    result = centre.assign(variables).assign_coords(quantile=("quantile", edges))
-    if linear:
-        result = result.assign_coords(source=("source", [name for name, _ in _sources(found, known, base)[0]]))
-    result.attrs = {**centre.attrs, "propagated": f"{n} draws from seed {many}"}
-    if stopped:
-        raise Interrupted(f"stopped after {n} of {count} draws; what they gave is the exception's result", result)
-    return result
+    return banded()
 
 
 def _progress(total: int, watched: Progress) -> Any:
@@ -440,6 +439,7 @@ def _to_first_order(
     variance = np.einsum("si,ij,sj->s", slope, covariance, slope)
     unit = system.parameters[own].unit or "1"
     return {
+        "source": ("source", [name for name, _ in sources]),
         "special_slope": (("special", "source"), slope, {"long_name": f"derivative of {own} at a special point"}),
         "special_first_order": (("special",), np.sqrt(variance), {
             "long_name": f"standard uncertainty of {own} to first order", "units": unit}),
