@@ -103,8 +103,10 @@ def _find(wanted: str | int, header: Sequence[str], named: list[tuple[str, str]]
 
 def traces_of(table: Table, options: Options, source: Source, reading: Reading) -> Iterator[Trace]:
     """The channels of a table by run, over its axis or at its rate."""
-    fields = {one.name: _unwrapped(one, options) for one in table.fields}
-    axis, rate = fields.pop(options.axis, None), options.rate or table.rate
+    fields = [_unwrapped(one, options) for one in table.fields]
+    axis, rate = next((one for one in fields if one.name == options.axis), None), options.rate or table.rate
+    numbers = next((one for one in fields if one.name == "run" and "run" in (options.columns or {})), None)
+    fields = [one for one in fields if one is not axis and one is not numbers]
     if axis is not None and options.rate is not None:
         reading.remarks.say(f"{axis.origin} is not used as the time, since rate= is given")
         axis = None
@@ -115,11 +117,10 @@ def traces_of(table: Table, options: Options, source: Source, reading: Reading) 
     else:
         held = np.arange(table.rows) if axis.rows is None else axis.rows
         along, unit = _along(axis, table, options, source, reading)
-    numbers = fields.pop("run", None) if "run" in (options.columns or {}) else None
     runs = _runs(table, numbers, source)
     if len(runs) * (len(fields) + 1) > MAX_COLUMNS:
         raise source.error("", f"holds {len(fields) + 1} columns in {len(runs)} runs; at most {MAX_COLUMNS} are read")
-    for one in fields.values():
+    for one in fields:
         rows = np.arange(table.rows) if one.rows is None else one.rows
         if one.values.dtype.kind == "c":
             raise source.error(one.origin, "holds complex numbers; save its parts as two real vectors")
@@ -127,7 +128,7 @@ def traces_of(table: Table, options: Options, source: Source, reading: Reading) 
             whole = inside is None and len(rows) == table.rows
             mine = slice(None) if inside is None else inside[rows]
             at, values = rows[mine], np.ascontiguousarray(one.values[mine], np.float64)
-            blank = (table.rows if inside is None else int(np.count_nonzero(inside))) - len(at)
+            blank = (len(held) if inside is None else int(np.count_nonzero(inside[held]))) - len(at)
             if blank and len(at):
                 reading.remarks.of(run, one.name, f"{blank} blank fields dropped")
             if axis is None:

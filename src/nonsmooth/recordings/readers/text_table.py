@@ -124,14 +124,6 @@ class Cells:
     rows: list[NDArray[np.int64]]
     lines: NDArray[np.int64]
 
-    def blanks(self, column: int) -> tuple[int, int]:
-        """Number of blank rows after a column's last value, and before it."""
-        held = self.rows[column]
-        if len(held) == 0:
-            return len(self.lines), 0
-        last = int(held[-1])
-        return len(self.lines) - 1 - last, last + 1 - len(held)
-
 
 def read_cells(
     table: Iterator[Row],
