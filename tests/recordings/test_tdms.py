@@ -66,7 +66,7 @@ def test_time_channel_or_rate() -> None:
         (WAVE[:-1], r"segment 1, byte 0: says it is \d+ bytes long .* cut short"),
         (WAVE + WAVE[:20], r"segment 2, byte \d+: its lead-in of 28 bytes is cut short"),
         (WAVE + b"NOPE" + WAVE[4:], r"segment 2, byte \d+: begins with b'NOPE'"),
-        (segment([numbers("/'g'/'x'", 2), numbers("/'g'/'time'", 1)], [1.0, 2.0, 3.0]), r"no vector 'time' beside others"),
+        (segment([numbers("/'g'/'x'", 2), numbers("/'g'/'time'", 1)], [1.0, 2.0, 3.0]), r"no vector 'time' beside"),
     ],
 )
 def test_bad_files_say_where(data: bytes, message: str) -> None:

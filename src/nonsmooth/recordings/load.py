@@ -8,6 +8,7 @@ import os
 import re
 import stat
 import warnings
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
@@ -18,7 +19,7 @@ import numpy as np
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.assemble import assemble
-from nonsmooth.recordings.limits import MAX_FILE_BYTES
+from nonsmooth.recordings.limits import MAX_FILE_BYTES, inflation_limit
 from nonsmooth.recordings.reading import Column, Options, Reading, Source, Trace, names_of
 from nonsmooth.recordings.recording import Recording, RecordingWarning
 
@@ -77,8 +78,8 @@ def load_recording(
 
     PASCO Capstone (``.csv`` exports in both locales, ``.cap``), any table (CSV, TSV, ``.xlsx``), LabVIEW (``.lvm``,
     ``.tdms``), and files of arrays: MATLAB (``.mat``, v5 to v7.3), HDF5, NumPy (``.npy``, ``.npz``), Parquet and
-    Feather, ``.wav``, universal files (data sets 58) and ASAM MDF (``.mf4``). The format is told by the content, not by
-    the file's name.
+    Feather, ``.wav``, universal files (data sets 58) and ASAM MDF (``.mf4``); packed by gzip too. The format is told by
+    the content, not by the file's name.
 
     Parameters
     ----------
@@ -154,9 +155,11 @@ def load_recording(
 def parse_recording(data: bytes, name: str, options: Options | None = None, *, format: str | None = None) -> Recording:
     """The recording in ``data``; ``name`` is what errors call it."""
     options = options or Options()
-    unread = Source(name, len(data), "", "")
+    unread, digest = Source(name, len(data), "", ""), hashlib.sha256(data).hexdigest()
+    if data.startswith(b"\x1f\x8b"):
+        data = _unpacked(data, unread)
     kind = format if format is not None else _detect(data, unread, options)
-    source = Source(name, len(data), hashlib.sha256(data).hexdigest(), kind)
+    source = Source(name, unread.size, digest, kind)
     reader = import_module(f"nonsmooth.recordings.readers.{FORMATS[kind]}")
     read: Callable[[bytes, Source, Options], Reading] = reader.read
     # Numbers from elsewhere may lie at both ends of the range of doubles; what is not finite is judged by assemble.
@@ -164,6 +167,18 @@ def parse_recording(data: bytes, name: str, options: Options | None = None, *, f
         reading = read(data, source, options)
         _replace_units(reading, source, options)
         return assemble(reading, source, _given(options), options.axis)
+
+
+def _unpacked(data: bytes, source: Source) -> bytes:
+    """The content of a file that gzip has packed."""
+    limit = inflation_limit(len(data))
+    try:
+        content = zlib.decompressobj(wbits=31).decompress(data, limit + 1)
+    except zlib.error as error:
+        raise source.error("", f"cannot be unpacked, it is damaged or cut short ({error})") from error
+    if len(content) > limit:
+        raise source.error("", f"unpacks to more than {limit} bytes, more than its size warrants: unpack it yourself")
+    return content
 
 
 def _checked(

@@ -24,7 +24,8 @@ __all__ = [
 
 #: What instruments call the time column, lower case, in the languages their programs speak.
 TIME_WORDS = frozenset(
-    ["time", "t", "zeit", "temps", "tiempo", "tempo", "tid", "tijd", "aika", "czas", "čas", "laiks", "laikas",
+    ["time", "t", "timestamp", "datetime", "zeit", "temps", "tiempo", "tempo", "tid", "tijd", "aika", "czas", "čas",
+     "laiks", "laikas",
      "время", "时间", "時間", "시간"]
 )  # fmt: skip
 

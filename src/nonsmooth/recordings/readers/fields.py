@@ -56,8 +56,10 @@ def split_unit(text: str, brackets: str = "()") -> tuple[str, str]:
 
 
 def label(text: str) -> tuple[str, str]:
-    """Name and unit of ``Position (m)``, ``Position [m]`` or ``t_s``."""
+    """Name and unit of ``Position (m)``, ``Position [m]`` or ``t_s``; ``pos (1)`` is a name."""
     name, unit = split_unit(text)
+    if unit.isdigit():  # a channel's number
+        name, unit = text.strip(), ""
     if not unit:
         name, unit = split_unit(text, "[]")
     tail = name.casefold().rpartition("_")[2]

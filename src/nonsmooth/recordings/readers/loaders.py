@@ -150,7 +150,7 @@ def _direction(number: Any) -> str:
 
 def _measured(data: bytes, source: Source, remarks: Remarks) -> Loaded:
     """Channel groups of an MDF file: one run, each group with the clock of its master."""
-    asammdf = needed("asammdf", "asammdf", source)
+    asammdf = needed("asammdf", "asammdf", source, "mdf")
     groups: dict[str, Any] = {}
     with asammdf.MDF(io.BytesIO(data)) as opened:
         cycles = sum(group.channel_group.cycles_nr * len(group.channels) for group in opened.groups)
