@@ -128,6 +128,17 @@ def test_the_probability_of_a_period_is_that_of_the_side_of_a_flip() -> None:
     assert np.all(plane["period_number_probability"].sum("period_value").values == pytest.approx(1.0))
 
 
+def test_of_a_diagram_of_branches_the_special_points_have_distributions() -> None:
+    s = support().with_parameters(g=-0.0045, rho=0.42)
+    found = known(s, {"k": 0.004})
+    band = ns.propagate(found, ns.bifurcation_diagram, s, "rho", (0.38, 0.43), n=5, draws=3, **QUIET)
+    alone = ns.propagate(found, ns.continue_orbit, ns.find_orbit(s), "rho", (0.38, 0.43), draws=3, **QUIET)
+    at = int(np.flatnonzero(band["special_kind"].values == "flip")[0])
+    expected = alone["special_value_draws"].values[:, 0]
+    np.testing.assert_allclose(band["special_value_draws"].values[:, at], expected, rtol=1e-7)
+    assert "maximum_quantiles" not in band
+
+
 def test_a_number_of_a_function_and_bounds() -> None:
     s = support()
     found = known(s, {"c": 0.4})

@@ -92,10 +92,10 @@ def propagate(
     xarray.Dataset
         The result at the parameters found, and for each variable ``x`` with numbers ``x_quantiles`` over ``quantile``;
         where some draws have no value, ``x_share`` says how many have. For period numbers ``period_number_probability``
-        over ``period`` (0: none found), for ``stable`` ``stable_probability``. Of a branch, at each of its points
-        the values of drawn branches at the same parameter, between the same folds. Jumps and special points are
-        matched by kind and nearness, ``jump_value_draws`` and ``special_value_draws`` over ``draw``, their
-        ``_quantiles`` and ``_share``. With ``first_order``: ``special_slope`` over ``special`` and ``source`` (g), and
+        over ``period_value`` (0: none found), for ``stable`` ``stable_probability``. Of a branch, at each of its points
+        the values of drawn branches at the same parameter, between the same folds (of a diagram of several branches
+        only the special points). Jumps and special points are matched by kind and nearness: ``jump_value_draws`` and
+        ``special_value_draws`` over ``draw``, their ``_quantiles`` and ``_share``. With ``first_order``: ``special_slope`` over ``special`` and ``source`` (g), and
         ``special_first_order`` (the standard uncertainty). ``drawn_<name>`` are the draws, ``failed`` says how many the
         verb refused.
 
@@ -230,12 +230,11 @@ class _Gathered:
         listed = {str(name) for name in numbers if set(centre[name].dims) & set(LISTS)}
         along = {name for name in numbers if "point" in centre[name].dims}
         self.plain = [name for name in numbers if name not in listed | along]
-        self.along = [
-            name for name in along if name != self.branch and name not in ("unknowns", "tangent", "layout", "mode")
-        ]
+        left = {self.branch, "unknowns", "tangent", "layout", "mode"}
+        self.along = [] if "branch" in centre else [name for name in along if name not in left]  # one branch alone
         self.lists = [dim for dim in LISTS if dim in centre.dims and (dim != "special" or self.branch)]
         self.rows: list[dict[str, Any]] = []
-        self.sheets = _Sheets(centre, self.branch, self.along) if self.branch else None
+        self.sheets = _Sheets(centre, self.branch, self.along) if self.along else None
 
     def add(self, result: xr.Dataset | None) -> None:
         """Keep what a draw gave; None where it failed."""
