@@ -70,6 +70,22 @@ def test_draws_and_first_order_agree_on_a_flip() -> None:
     assert np.mean(draws) == pytest.approx(float(band["special_value"][0]), abs=3 * expected / 10)
 
 
+def test_a_hopf_point_to_first_order_is_that_of_its_draws() -> None:
+    """By differences; the valve's Hopf point moves by 1 % and less, in proportion."""
+    s = ns.models.relief_valve(q=9.0)
+    band = ns.propagate(
+        known(s, {"k": 1e-3, "beta": 0.01}), ns.continue_equilibrium, s, "q", (8.0, 9.5), draws=30, first_order=True,
+        start={"y1": 2.0, "y3": 12.0}, **QUIET,
+    )  # fmt: skip
+    assert band["special_kind"].values.tolist() == ["hopf"] and band["source"].values.tolist() == ["k", "beta"]
+    linear = band["special_value"].values[0] + sum(
+        band["special_slope"].values[0, i] * (band[f"drawn_{name}"].values - s.values[name])
+        for i, name in enumerate(("k", "beta"))
+    )
+    spread = float(band["special_first_order"][0])
+    np.testing.assert_allclose(band["special_value_draws"].values[:, 0], linear, atol=0.02 * spread)
+
+
 def scaled_stop() -> ns.System:
     """A mass that meets an elastic stop; ``a`` scales force and gap, so that every motion is ``a`` times as large."""
     stop = ns.elements.ElasticStop(at="q", position="a", stiffness=6.0, damping=0.0)

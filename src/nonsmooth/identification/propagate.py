@@ -33,6 +33,7 @@ LISTS = {"jump": ("jump_value", ("jump_variable", "jump_direction")), "special":
 COARSE = 0.02  # the largest step of draws' branches: values between points lie on a cubic
 FINER = 8  # points to a step of a drawn branch, on that cubic
 FAILURES = 3  # reasons that are repeated
+DIFFERENCE = 0.1  # of a standard uncertainty, to either side
 MOST = 10**8  # numbers kept over all draws
 
 
@@ -60,7 +61,7 @@ def propagate(
         g_i = \frac{d \lambda^*}{d p_i} = -\frac{\psi \cdot F_{p_i}}{\psi \cdot F_\lambda} ,
 
     C the covariance of the parameters, F = 0 the equations of the orbit and of the special point, bordered so that they
-    are regular, :math:`\psi` their left null vector.
+    are regular, :math:`\psi` their left null vector (special points of equilibria: by differences).
 
     Parameters
     ----------
@@ -95,9 +96,9 @@ def propagate(
         over ``period_value`` (0: none found), for ``stable`` ``stable_probability``. Of a branch, at each of its points
         the values of drawn branches at the same parameter, between the same folds (of a diagram of several branches
         only the special points). Jumps and special points are matched by kind and nearness: ``jump_value_draws`` and
-        ``special_value_draws`` over ``draw``, their ``_quantiles`` and ``_share``. With ``first_order``: ``special_slope`` over ``special`` and ``source`` (g), and
-        ``special_first_order`` (the standard uncertainty). ``drawn_<name>`` are the draws, ``failed`` says how many the
-        verb refused.
+        ``special_value_draws`` over ``draw``, their ``_quantiles`` and ``_share``. With ``first_order``:
+        ``special_slope`` over ``special`` and ``source`` (g), and ``special_first_order`` (the standard uncertainty).
+        ``drawn_<name>`` are the draws, ``failed`` says how many the verb refused.
 
     Raises
     ------
@@ -146,7 +147,7 @@ def propagate(
     systems, drawn = draw_systems(system, found, known, count, many, bounds)
     gathered = _Gathered(centre)
     failures: list[str] = []
-    linear_part = _to_first_order(centre, found, known, base) if linear else {}
+    linear_part = _to_first_order(centre, found, known, base, call) if linear else {}
 
     def banded() -> xr.Dataset:
         n = len(gathered.rows)
@@ -246,7 +247,7 @@ class _Gathered:
             if self.sheets is not None:
                 row |= self.sheets.brought(result)
             for dim in self.lists:
-                row[dim] = _matched(self.centre, result, dim, self.branch)
+                row[dim] = _matched(self.centre, result, dim)
             if len(self.rows) * sum(np.size(values) for values in row.values()) > MOST:
                 raise ValueError("the draws hold more than 1e8 numbers: take fewer draws, or a smaller result")
         self.rows.append(row)
@@ -384,7 +385,7 @@ def _at(wanted: FloatArray, value: FloatArray, other: FloatArray, flag: bool) ->
     return rows.reshape(len(wanted), *other.shape[1:])
 
 
-def _matched(centre: xr.Dataset, result: xr.Dataset, dim: str, name: str) -> FloatArray:
+def _matched(centre: xr.Dataset, result: xr.Dataset, dim: str) -> FloatArray:
     """The value of each listed row in a draw: the nearest of the same kind; NaN where it has none."""
     from scipy.optimize import linear_sum_assignment
 
@@ -419,7 +420,7 @@ def _sources(found: Any, settings: Mapping[str, Setting], system: System) -> tup
 
 
 def _to_first_order(
-    branch: xr.Dataset, found: Any, settings: Mapping[str, Setting], system: System
+    branch: xr.Dataset, found: Any, settings: Mapping[str, Setting], system: System, call: _Call
 ) -> dict[str, Any]:
     """Derivatives of special points in the uncertain parameters, and their standard uncertainties."""
     from nonsmooth.continuation.special import special_points
@@ -435,6 +436,12 @@ def _to_first_order(
         [0.0 if name == own else _slope(table.isel(special=i), name) for name, _ in sources]
         for i in range(table.sizes["special"])
     ]).reshape(table.sizes["special"], len(sources))  # fmt: skip
+    for i, (name, error) in enumerate(sources):
+        if (lost := np.isnan(slope[:, i])).any() and error > 0:  # of equilibria: by differences of whole branches
+            value, h = system.values[name], DIFFERENCE * error
+            ends = [call(system.with_parameters({name: value + sign * h}), coarse=True) for sign in (1, -1)]
+            ahead, behind = (_matched(branch, one, "special") for one in ends)
+            slope[lost, i] = ((ahead - behind) / (2 * h))[lost]
     variance = np.einsum("si,ij,sj->s", slope, covariance, slope)
     unit = system.parameters[own].unit or "1"
     return {

@@ -175,7 +175,7 @@ def fit(
     if rests and not free_start:
         raise ValueError("leave_out=True begins anew behind what it leaves out: it needs free starts, free_start=True")
     best = best_of(problem, begin, bool(free_start), longest, tried, whole_number(seed, "seed", 0), progress)
-    if rests and not best.good:
+    if rests:
         problem, left = without_disagreeing(problem, best.theta)
         if len(problem.records) != len(best.problem.records) or problem.records[0] is not best.problem.records[0]:
             best = best_of(problem, None, True, longest, tried, whole_number(seed, "seed", 0), progress)
