@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from nonsmooth.errors import SolveError as SolveError
     from nonsmooth.errors import SystemDefinitionError as SystemDefinitionError
     from nonsmooth.explorer.serve import explore as explore
+    from nonsmooth.flow.inputs import Input as Input
     from nonsmooth.flow.poincare import poincare as poincare
     from nonsmooth.flow.sections import Poincare as Poincare
     from nonsmooth.flow.sections import Stroboscopic as Stroboscopic
@@ -82,6 +83,7 @@ _WHERE = {
     "Band": "system.mode",
     "where": "system.symbolic.scalar",
     "system_of": "system.origin",
+    "Input": "flow.inputs",
     "simulate": "flow.simulate",
     "sensitivity": "flow.sensitivity",
     "poincare": "flow.poincare",
