@@ -50,9 +50,11 @@ if TYPE_CHECKING:
     from nonsmooth.flow.starts import random_starts as random_starts
     from nonsmooth.identification.compare.compare import compare as compare
     from nonsmooth.identification.fit.fit import fit as fit
+    from nonsmooth.identification.fit.plan import plan_experiment as plan_experiment
     from nonsmooth.identification.fit.select import select_model as select_model
     from nonsmooth.identification.fit.sensors import Sensor as Sensor
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
+    from nonsmooth.identification.propagate import propagate as propagate
     from nonsmooth.recordings.load import load_recording as load_recording
     from nonsmooth.recordings.recording import Recording as Recording
     from nonsmooth.results.store import load as load
@@ -114,9 +116,11 @@ _WHERE = {
     "fit": "identification.fit.fit",
     "Sensor": "identification.fit.sensors",
     "select_model": "identification.fit.select",
+    "plan_experiment": "identification.fit.plan",
     "identify": "studies.savi2007.identification.chain",
     "ParameterSet": "identification.parameter_set",
     "compare": "identification.compare.compare",
+    "propagate": "identification.propagate",
     "explore": "explorer.serve",
     "save": "results.store",
     "load": "results.store",
