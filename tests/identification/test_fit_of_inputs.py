@@ -59,7 +59,7 @@ def test_parameters_and_the_delay_of_a_measured_force(recording: dict[str, Any])
 def test_what_is_refused(recording: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match="`mot` is not a channel"):
         ns.fit(rig(), recording, ["k"], inputs={"f": "mot"}, progress=False)
-    with pytest.raises(ValueError, match="has the inputs"):
+    with pytest.raises(ValueError, match="'f' is missing"):
         ns.fit(rig(), {"x": recording["x"]}, ["k"], progress=False)
     with pytest.raises(ValueError, match="neither 'phase' nor 'clock'"):
         ns.fit(rig(), recording, ["k", "clock"], inputs={"f": "motor"}, progress=False)
