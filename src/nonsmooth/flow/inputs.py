@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +12,14 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import float_array, real_number
 from nonsmooth.flow.engines.engine import Changes
+from nonsmooth.flow.saltation import Jump
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
+    from nonsmooth.flow.variational import VariationalFlow
     from nonsmooth.system.system import System
 
-__all__ = ["Driven", "Input", "driven"]
+__all__ = ["Course", "Driven", "Input", "driven"]
 
 BETWEEN = ("linear", "steps")
 
@@ -93,48 +95,90 @@ class Driven:
     """The inputs of one run of a system, all of them."""
 
     def __init__(self, system: System, inputs: Mapping[str, Input]) -> None:
-        self.system, self.inputs = system, dict(inputs)
+        self.inputs = {name: inputs[name] for name in system.inputs}
         self.first = len(system.states) - 2 * len(system.inputs)
-        self.delays = {one.delay for one in inputs.values() if isinstance(one.delay, str)}
-        self._known: tuple[Any, tuple[FloatArray, FloatArray]] = (None, (np.zeros(0), np.zeros((0, 0))))
+        self._known: dict[tuple[float, ...], Course] = {}
 
-    def __call__(self, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
-        """All instants of change, and values and rates of all inputs behind them, at values of the parameters."""
-        delays = tuple(values[d] if isinstance(d, str) else float(d) for d in (one.delay for one in self._ordered))
-        if self._known[0] != delays:
-            courses = [one.course(delay) for one, delay in zip(self._ordered, delays, strict=True)]
-            times = np.unique(np.concatenate([t for t, _, _ in courses]))
-            table = np.empty((len(times), 2 * len(courses)))
-            for i, (t, y, rate) in enumerate(courses):
-                at = np.searchsorted(t, times, "right") - 1
-                k = np.maximum(at, 0)
-                slope = np.where(at >= 0, rate[k], 0.0)
-                # of an input that does not change here the value is that of its own course
-                table[:, 2 * i] = y[k] + slope * (times - t[k])
-                table[:, 2 * i + 1] = slope
-            self._known = delays, (times, table)
-        return self._known[1]
+    def at(self, values: Mapping[str, float]) -> Course:
+        """The inputs at values of the parameters, among which delays may be."""
+        delays = tuple(values[one.delay] if isinstance(one.delay, str) else one.delay for one in self.inputs.values())
+        if delays not in self._known:
+            self._known = {delays: Course(self, delays)}
+        return self._known[delays]
 
-    @property
-    def _ordered(self) -> list[Input]:
-        return [self.inputs[name] for name in self.system.inputs]
+    def data(self) -> dict[str, Any]:
+        """The inputs as data that a result can record."""
+        return {name: one.data() for name, one in self.inputs.items()}
 
-    def at(self, time: float, values: Mapping[str, float]) -> FloatArray:
+
+class Course:
+    """The inputs of a run with known delays.
+
+    Attributes
+    ----------
+    times : array (K,)
+        Instants at which an input changes.
+    table : array (K, 2 m)
+        Values and rates of all m inputs behind them.
+    own : array (K, m) of bool
+        Those that change there; the others go on.
+    """
+
+    def __init__(self, drive: Driven, delays: Sequence[float]) -> None:
+        self.first, self.delays = drive.first, [one.delay for one in drive.inputs.values()]
+        courses = [one.course(delay) for one, delay in zip(drive.inputs.values(), delays, strict=True)]
+        self.times = courses[0][0] if len(courses) == 1 else np.unique(np.concatenate([t for t, _, _ in courses]))
+        self.table = np.empty((len(self.times), 2 * len(courses)))
+        self.own = np.empty((len(self.times), len(courses)), dtype=bool)
+        for i, (t, y, rate) in enumerate(courses):
+            at = np.searchsorted(t, self.times, "right") - 1
+            k = np.maximum(at, 0)
+            slope = np.where(at >= 0, rate[k], 0.0)
+            self.table[:, 2 * i] = y[k] + slope * (self.times - t[k])
+            self.table[:, 2 * i + 1] = slope
+            self.own[:, i] = self.times == t[k]
+
+    def at(self, time: float) -> FloatArray:
         """Values and rates of all inputs just behind an instant."""
-        times, table = self(values)
-        k = int(np.searchsorted(times, time, "right")) - 1
-        found: FloatArray = table[max(k, 0)].copy()
+        k = int(np.searchsorted(self.times, time, "right")) - 1
+        found: FloatArray = self.table[max(k, 0)].copy()
         if k < 0:
             found[1::2] = 0.0
         else:
-            found[::2] += found[1::2] * (time - times[k])
+            found[::2] += found[1::2] * (time - self.times[k])
         return found
 
-    def changes(self, begin: float, until: float, values: Mapping[str, float]) -> Changes:
+    def changes(self, begin: float, until: float) -> Changes:
         """The changes between two instants, the ends left out."""
-        times, table = self(values)
-        here = slice(np.searchsorted(times, begin, "right"), np.searchsorted(times, until, "left"))
-        return Changes(np.ascontiguousarray(times[here]), np.ascontiguousarray(table[here]), self.first)
+        here = slice(np.searchsorted(self.times, begin, "right"), np.searchsorted(self.times, until, "left"))
+        return Changes(self.times[here], self.table[here], self.first)
+
+    def by_delays(self, flow: VariationalFlow, rates: FloatArray) -> FloatArray:
+        """Derivatives (n, n_active) of the states that are inputs in the active parameters: in their delays."""
+        found = np.zeros((flow.n, flow.n_active))
+        for i, delay in enumerate(self.delays):
+            if delay in flow.active:
+                found[self.first + 2 * i, flow.active.index(str(delay))] = -rates[self.first + 2 * i]
+        return found
+
+    def jump(self, flow: VariationalFlow, time: float, z: FloatArray, before: FloatArray, after: FloatArray) -> Jump:
+        """A change of inputs as a jump to z, from the rates before it to those behind it.
+
+        Inputs take values of their own. One with a delay changes later where that is greater: what moves has the rates
+        before it for so much longer."""
+        n, size = flow.n, flow.n + flow.n_active
+        S, fields, instant = np.eye(size), np.zeros((3, size)), np.zeros(size)
+        S[self.first : flow.n_u] = 0.0
+        S[self.first : flow.n_u, n:] = self.by_delays(flow, after)[self.first : flow.n_u]
+        changed = self.own[np.searchsorted(self.times, time)]
+        moved = {delay for delay, one in zip(self.delays, changed, strict=True) if one}
+        for j in (n + k for k, name in enumerate(flow.active) if name in moved):
+            instant[j] = 1.0
+            S[: self.first, j] = (before - after)[: self.first]
+        fields[0, :n], fields[1, :n] = before, after
+        R = S.copy()
+        R[: self.first, n:] = 0.0
+        return Jump(z, R, fields, 0.0, np.zeros(n), 1.0, np.zeros(flow.n_active), S, instant, -1, -1)
 
 
 def driven(system: System, given: Any) -> Driven | None:

@@ -114,19 +114,20 @@ def simulate(
     width = 2 * len(traced.u) + len(traced.outputs) + 3  # of the log and of the result
     instants = _instants(samples, t_begin, t_end, None if ramps and period is None else period, width)
     state, drive = first_state(system, start, mode), driven(system, inputs)
-    if drive is not None:
-        state.u[drive.first :] = drive.at(0.0, system.values)
+    course = None if drive is None else drive.at(system.values)
+    if course is not None:
+        state.u[course.first :] = course.at(0.0)
     if not ramps:
         refuse_beyond_stops(system, state.u[None, :])
     engine = engine_for(system, method, rtol, atol, step, traced=traced if ramps else None, **expert)
     begun = np.abs(state.u)
     tables = engine.prepare(system.parameter_vector()[None, :])
     if t_begin > 0:
-        changes = None if drive is None else drive.changes(0.0, t_begin, system.values)
+        changes = None if course is None else course.changes(0.0, t_begin)
         check_complete(engine.record(tables, state, t_begin, np.empty(0), changes=changes), system, state, period)
-        if drive is not None:
-            state.u[drive.first :] = drive.at(t_begin, system.values)
-    changes = None if drive is None else drive.changes(t_begin, t_end, system.values)
+        if course is not None:
+            state.u[course.first :] = course.at(t_begin)
+    changes = None if course is None else course.changes(t_begin, t_end)
     log = engine.record(tables, state, t_end, instants, changes=changes)
     check_complete(log, system, state, period)
     largest = np.nanmax(np.abs(np.vstack([begun, log.sample_u, log.u_before, log.u_after])), axis=0)
@@ -136,7 +137,7 @@ def simulate(
         "periods": periods, "duration": duration, "start": plain_start(system, start), "mode": mode,
         "transient": transient, "samples": samples, "step": step,
         "ramps": None if not ramps else {k: v if not callable(v) else str(v) for k, v in ramps.items()},
-        "inputs": None if drive is None else {name: one.data() for name, one in drive.inputs.items()},
+        "inputs": None if drive is None else drive.data(),
         "method": method, "rtol": rtol, "atol": atol, **expert,
     }  # fmt: skip
     traced = engine.traced if ramps else system.traced  # with what the run has visited and found
