@@ -20,7 +20,8 @@ from nonsmooth.identification.compare.draws import (
     nominal,
     read_settings,
 )
-from nonsmooth.results.progress import Progress, progress
+from nonsmooth.results.progress import Progress
+from nonsmooth.results.progress import progress as watched
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
@@ -160,7 +161,7 @@ def propagate(
         return result
 
     try:
-        with _progress(count, progress) as advance:
+        with watched(count, "propagate", progress) as advance:
             for one in systems:
                 try:
                     with warnings.catch_warnings():  # said once, of the parameters found
@@ -176,10 +177,6 @@ def propagate(
     if systems and len(failures) == len(systems):
         raise SolveError(f"the verb failed for all {count} draws: {failures[0]}", status="no_convergence")
     return banded()
-
-
-def _progress(total: int, watched: Progress) -> Any:
-    return progress(total, "propagate", watched)
 
 
 class _Call:
