@@ -68,6 +68,8 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System as System
     from nonsmooth.system.transition import Surface as Surface
     from nonsmooth.system.transition import Transition as Transition
+    from nonsmooth.tables.region import region as region
+    from nonsmooth.tables.table import table as table
 
 _WHERE = {
     "System": "system.system",
@@ -116,6 +118,8 @@ _WHERE = {
     "ParameterSet": "identification.parameter_set",
     "compare": "identification.compare.compare",
     "explore": "explorer.serve",
+    "table": "tables.table",
+    "region": "tables.region",
     "save": "results.store",
     "load": "results.store",
     "SystemDefinitionError": "errors",
