@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from nonsmooth.identification.fit.select import select_model as select_model
     from nonsmooth.identification.fit.sensors import Sensor as Sensor
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
+    from nonsmooth.plot.animation import animate as animate
     from nonsmooth.recordings.load import load_recording as load_recording
     from nonsmooth.recordings.recording import Recording as Recording
     from nonsmooth.results.store import load as load
@@ -118,6 +119,7 @@ _WHERE = {
     "ParameterSet": "identification.parameter_set",
     "compare": "identification.compare.compare",
     "explore": "explorer.serve",
+    "animate": "plot.animation",
     "table": "tables.table",
     "region": "tables.region",
     "save": "results.store",

@@ -15,6 +15,7 @@ from nonsmooth.plot.comparison import (
     comparison_section,
     comparison_time,
 )
+from nonsmooth.plot.mechanism import mechanism
 from nonsmooth.plot.planes import basin_fractions, basins, chart
 from nonsmooth.plot.regions import regions
 from nonsmooth.plot.style import COLORS, COLUMN, PAGE, journal, save_figure
@@ -45,6 +46,7 @@ __all__ = [
     "identification",
     "journal",
     "manifolds",
+    "mechanism",
     "multipliers",
     "orbit",
     "phase_portrait",
