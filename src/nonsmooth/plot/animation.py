@@ -65,8 +65,8 @@ def animate(
     -------
     Animation
         ``.save("run.gif")`` (also ``.mp4`` and ``.html``, a page with a player of its own); a notebook shows the
-        player. Positions are those at even instants, computed as :func:`nonsmooth.table` does. Displacements and gaps in the
-        sketch are to one scale, the size of the masses is not. A system without masses on a line has no sketch.
+        player. Positions are those at even instants, computed as :func:`nonsmooth.table` does. Displacements and gaps in
+        the sketch are to one scale, the size of the masses is not. A system without masses on a line has no sketch.
 
     Raises
     ------
@@ -187,9 +187,8 @@ class Animation:
             return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
 
         palette = picture(len(self) // 2).quantize(_COLORS, dither=Image.Dither.NONE)
-        colors, paper = palette.getpalette() or [], 3 * int(palette.getpixel((0, 0)))  # type: ignore[arg-type]
-        colors[paper : paper + 3] = [255] * 3
-        palette.putpalette(colors)
+        colors = np.reshape(palette.getpalette() or [], (-1, 3))
+        palette.putpalette(np.where(colors.min(axis=1, keepdims=True) > 245, 255, colors).ravel().tolist())  # paper
         for k in range(len(self)):
             yield picture(k).quantize(palette=palette, dither=Image.Dither.NONE)
 

@@ -162,10 +162,13 @@ class Sketch:
                 pen.line([x, x], [0, FLOOR + self.tall * (1 - (grounded[0] + 0.5) / len(zone)) + 0.14], width=2.2)
 
     def _anchor(self, z: int) -> float:
-        """The place of the ground in a zone: a wall, or a post in its middle."""
+        """The place of the ground in a zone: a wall, or a post with room beside it."""
         if z == 0:
             return self.left
-        return self.right if z == len(self.faces) else self.faces[z] - 0.5 * _ZONE
+        if z == len(self.faces):
+            return self.right
+        held = {link.left == GROUND for link in self.zones[z] if GROUND in (link.left, link.right)}
+        return self.faces[z] - (0.5 if len(held) > 1 else 0.68 if True in held else 0.32) * _ZONE
 
     def _mass(self, pen: _Pen, i: int, x: float, moving: bool) -> None:
         pen.box(x, FLOOR, _WIDTH, self.tall, _FILL)

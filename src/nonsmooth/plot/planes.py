@@ -99,11 +99,11 @@ def _contours(values: xr.DataArray, levels: Any, drawn: Axes, first: str, second
     """Lines of equal value, each with its value in the unit that suits it."""
     table, unit = values.transpose(second, first).values.astype(float), str(values.attrs.get("units", "1"))
     at = (values[first].values, values[second].values)
-    for color, style_of, width in (("white", "-", 2.0), (style.COLORS["section"], "--", 0.8)):  # a seam below it
-        found = drawn.contour(*at, table, levels, colors=color, linestyles=style_of, linewidths=width)
+    found = drawn.contour(*at, table, levels, colors=style.COLORS["section"], linestyles="--", linewidths=0.8)
+    found.set_path_effects(style.halo())
     power = power_for(unit, float(np.abs(levels).max()))
     words = {at: f"{at / 10.0**power:g} {PREFIXES[power]}{unit.removesuffix('1')}".strip() for at in found.levels}
-    for text in drawn.clabel(found, fmt=words, fontsize=style.small(drawn), inline=True):
+    for text in drawn.clabel(found, fmt=words, fontsize=style.small(drawn), inline_spacing=1):
         text.set_path_effects(style.halo())
     _title(drawn, f"dashed: {name}")
 

@@ -74,7 +74,7 @@ def region(result: Any, condition: str) -> xr.DataArray:
     >>> chart = ns.chart(ns.models.discontinuous_support(g=0.005), plane, progress=False)
     >>> quiet = ns.region(chart, "abs(x) < 0.01 and period_number == 1")
     >>> quiet.dims, int(quiet.sum())
-    (('omega', 'rho'), 4)
+    (('omega', 'rho'), 6)
     """
     import xarray as xr
 
