@@ -8,7 +8,8 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.plot.mechanism import Sketch
-from nonsmooth.plot.scheme import GROUND, scheme_of
+from nonsmooth.plot.parts import GROUND
+from nonsmooth.plot.scheme import scheme_of
 
 E = ns.elements
 

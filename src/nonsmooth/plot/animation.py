@@ -65,8 +65,8 @@ def animate(
     -------
     Animation
         ``.save("run.gif")`` (also ``.mp4`` and ``.html``, a page with a player of its own); a notebook shows the
-        player. Positions are those at even instants, computed as :func:`nonsmooth.table` does. Displacements and gaps in
-        the sketch are to one scale, the size of the masses is not. A system without masses on a line has no sketch.
+        player. Positions are those at even instants, computed as :func:`nonsmooth.table` does. Displacements and gaps
+        in the sketch are to one scale, the size of the masses is not. A system without masses on a line has no sketch.
 
     Raises
     ------

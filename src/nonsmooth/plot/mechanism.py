@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.scheme import GROUND, Link, Scheme, scheme_of
+from nonsmooth.plot.parts import GROUND, Link, Scheme
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,6 +60,8 @@ def mechanism(system: System, ax: Axes | None = None, *, labels: bool = True) ->
     >>> import nonsmooth as ns
     >>> ax = ns.plot.mechanism(ns.models.impact_damper())
     """
+    from nonsmooth.plot.scheme import scheme_of
+
     sketch = Sketch(scheme_of(system))
     with style.axes(ax, width=min(0.56 * sketch.width, style.PAGE), ratio=sketch.height / sketch.width) as drawn:
         sketch.frame(drawn)
@@ -309,7 +311,8 @@ class _Pen:
     def spring(
         self, a: float, b: float, y: float, words: str = "", boxed: bool = False, color: str = _DARK, high: float = 0.1
     ) -> None:
-        end = min(0.18, 0.15 * abs(b - a))
+        a, b = min(a, b), max(a, b)
+        end = min(0.18, 0.15 * (b - a))
         x = np.linspace(a + end, b - end, 14)
         zigzag = np.r_[0.0, [high * (-1) ** k for k in range(12)], 0.0]
         self.line(np.r_[a, x, b], y + np.r_[0.0, zigzag, 0.0], color=color)
@@ -321,7 +324,8 @@ class _Pen:
         self.text(0.5 * (a + b), y + (0.19 if boxed else 0.13), words, va="bottom")
 
     def damper(self, a: float, b: float, y: float, words: str = "", color: str = _DARK, high: float = 0.11) -> None:
-        middle, half = 0.5 * (a + b), 0.2 * min(1.0, abs(b - a))
+        a, b = min(a, b), max(a, b)
+        middle, half = 0.5 * (a + b), 0.2 * min(1.0, b - a)
         self.line([a, middle], [y, y], color=color)
         self.line([middle, middle], [y - 0.7 * high, y + 0.7 * high], color=color, width=1.6)
         mouth, end = middle - half, middle + half

@@ -8,10 +8,8 @@ import numpy as np
 
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.labels import in_words, name_and_unit, name_axes, name_plane, only_states, variable_along
-from nonsmooth.plot.units import PREFIXES, power_for
 from nonsmooth.results.labels import kind_of
 from nonsmooth.tables.quantities import quantities_of, quantity
-from nonsmooth.tables.region import region as region_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
-    "basin_fractions", "basins", "cell_edges", "chart", "classes_of", "legend_of", "names_of", "section_mark",
+    "basin_fractions", "basins", "cell_edges", "chart", "classes_of", "held", "legend_of", "names_of", "section_mark",
     "told_apart",
 ]  # fmt: skip
 
@@ -80,7 +78,7 @@ def chart(
     known = quantities_of(one)
     values = quantity(one, show, known)
     lines = {name: (quantity(one, name, known), np.sort(np.atleast_1d(at))) for name, at in (contours or {}).items()}
-    inside = region_of(one, region) if isinstance(region, str) else region
+    inside = held(one, region)
     with style.axes(ax, ratio=0.8) as drawn:
         if show == "period_number":
             _periods(one, drawn, first, second)
@@ -95,8 +93,19 @@ def chart(
     return drawn
 
 
+def held(result: xr.Dataset, region: Any) -> Any:
+    """A region given as a condition or as what ``region`` gave."""
+    if not isinstance(region, str):
+        return region
+    from nonsmooth.tables.region import region as region_of
+
+    return region_of(result, region)
+
+
 def _contours(values: xr.DataArray, levels: Any, drawn: Axes, first: str, second: str, name: str) -> None:
     """Lines of equal value, each with its value in the unit that suits it."""
+    from nonsmooth.plot.units import PREFIXES, power_for
+
     table, unit = values.transpose(second, first).values.astype(float), str(values.attrs.get("units", "1"))
     at = (values[first].values, values[second].values)
     found = drawn.contour(*at, table, levels, colors=style.COLORS["section"], linestyles="--", linewidths=0.8)
@@ -165,7 +174,7 @@ def _periods(result: xr.Dataset, drawn: Axes, first: str, second: str) -> None:
         cmap=ListedColormap([color for _, color in entries]), vmin=-0.5, vmax=len(entries) - 0.5,
     )  # fmt: skip
     looks: dict[str, Any] = {"edgecolor": "black", "linewidth": 0.4}
-    shown = {words.replace("no period", "none"): color for words, color in legend_of(classes, entries)}
+    shown = {words.replace("no period", "none found"): color for words, color in legend_of(classes, entries)}
     drawn.legend(
         handles=[Patch(facecolor=color, label=words, **looks) for words, color in shown.items()], title="period",
         loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, handlelength=1.0, handleheight=1.0,

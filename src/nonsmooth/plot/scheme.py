@@ -11,53 +11,19 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
+from nonsmooth.plot.parts import GROUND, Link, Scheme
 from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["GROUND", "Link", "Scheme", "scheme_of"]
+__all__ = ["scheme_of"]
 
-GROUND = -1
 _LONGEST = 18  # characters of a label that is drawn
-
-
-@dataclass(frozen=True)
-class Link:
-    """A spring, a contact, ... between two masses, or the ground and a mass: ``left`` and ``right`` by their numbers.
-
-    ``gap`` is the room of a contact at rest (``gap_at`` that of a stop that moves, by the time), ``words`` its label;
-    ``half`` the half width of a play; ``damped`` an elastic contact with a damper; ``pulls`` a contact that closes when
-    its masses part."""
-
-    kind: str
-    left: int
-    right: int
-    label: str = ""
-    gap: float = 0.0
-    words: str = ""
-    half: float = 0.0
-    damped: bool = False
-    pulls: bool = False
-    gap_at: Callable[[float], float] | None = None
-
-
-@dataclass
-class Scheme:
-    """Masses in order along the line, with the names of their coordinates and their labels; links; loads by mass."""
-
-    coordinates: list[str]
-    masses: list[str]
-    links: list[Link] = field(default_factory=list)
-    forces: dict[int, str] = field(default_factory=dict)
-    base: str = ""
-    others: list[str] = field(default_factory=list)
 
 
 def scheme_of(system: System) -> Scheme:

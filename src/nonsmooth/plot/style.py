@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
 
 __all__ = [
-    "ABOVE", "COLORS", "COLUMN", "PAGE", "axes", "clear_legend", "cloud", "even_dots", "halo", "journal", "make_room",
-    "mark", "once", "save_figure", "small",
+    "ABOVE", "COLORS", "COLUMN", "PAGE", "apart", "axes", "clear_legend", "cloud", "even_dots", "halo", "journal",
+    "make_room", "mark", "once", "save_figure", "small",
 ]  # fmt: skip
 
 #: Widths of one column (84 mm) and of the page (174 mm), in inches.
@@ -182,6 +182,25 @@ def clear_legend(ax: Axes) -> Legend:
         ):
             return ax.legend(**ABOVE, ncols=2, columnspacing=1.0)
     return legend
+
+
+def apart(ax: Axes, labels: Iterable[Any]) -> None:
+    """Move labels that stand over others up or down, towards the middle of the axes; call it when all is drawn."""
+    whole: Any = ax.figure.canvas.figure
+    whole.draw_without_rendering()
+    middle = 0.5 * sum(ax.get_window_extent().intervaly)
+    placed: list[Any] = []
+    for label in labels:
+        rises = sum(label.get_window_extent().intervaly) < 2.0 * middle
+        for _ in placed:
+            box = label.get_window_extent()
+            other = next((one for one in placed if one.overlaps(box)), None)
+            if other is None:
+                break
+            x, y = label.xyann
+            by = other.y1 - box.y0 + 1.0 if rises else other.y0 - box.y1 - 1.0
+            label.xyann = x, y + by * 72.0 / whole.dpi
+        placed.append(label.get_window_extent())
 
 
 def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:

@@ -18,10 +18,9 @@ from nonsmooth.plot.labels import (
     only_states,
     variable_along,
 )
-from nonsmooth.plot.planes import cell_edges
+from nonsmooth.plot.planes import cell_edges, held
 from nonsmooth.tables.quantities import quantities_of
 from nonsmooth.tables.quantities import quantity as quantity_of
-from nonsmooth.tables.region import region as region_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -229,8 +228,9 @@ def frequency_response(
     known = quantities_of(result)
     alone = f"{name}_{quantity}" not in known
     heights = quantity_of(result, name if alone else f"{name}_{quantity}", known)
-    inside = region_of(result, region) if isinstance(region, str) else region
+    inside = held(result, region)
     ax, branches = sorted_out(over, ax, parameter)
+    marks: list[Any] = []
     with style.axes(ax) as drawn:
         for i, direction in enumerate(np.atleast_1d(result["direction"].values).astype(str)):
             one = heights.isel(direction=i) if "direction" in heights.dims else heights
@@ -242,7 +242,7 @@ def frequency_response(
                 drawn.plot(*broken, label=_WORDS[direction] if k == 0 else None, **_LOOKS[direction])
                 if jumps:
                     for place, i in found:
-                        _mark(drawn, curve, i, values[0] <= values[-1], place, direction, digits)
+                        marks.append(_mark(drawn, curve, i, values[0] <= values[-1], place, direction, digits))
         for behind in branches:
             draw_branch(drawn, behind, y=name, quantity=quantity, color=style.COLORS["section"], width=0.7, behind=True)
         drawn.margins(x=0)
@@ -250,6 +250,7 @@ def frequency_response(
             _shade(drawn, inside, parameter)
         _name(drawn, result, parameter, name, heights, "" if alone else f"{quantity} of ")
         style.clear_legend(drawn)
+        style.apart(drawn, marks)
     return drawn
 
 
@@ -296,8 +297,8 @@ def _intervals(values: NDArray[np.float64], curve: NDArray[np.float64], places: 
 
 def _mark(
     ax: Axes, curve: NDArray[np.float64], at: int, rising: bool, place: float, direction: str, digits: int
-) -> None:
-    """An arrow from the height before the jump to the height after it, in the sense of the sweep."""
+) -> Any:
+    """An arrow from the height before the jump to the height after it, in the sense of the sweep; its label."""
     before, after = (curve[at - 1], curve[at]) if (direction == "up") == rising else (curve[at], curve[at - 1])
     color = _LOOKS[direction]["color"]
     arrow = {"arrowstyle": "->", "color": color, "linestyle": ":", "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
@@ -305,7 +306,7 @@ def _mark(
     side = 2 if direction == "up" else -2
     small = abs(after - before) < 0.2 * np.ptp(curve[np.isfinite(curve)])  # no room beside the arrow: below it
     where, offset = (min(before, after), (side, -3)) if small else ((before + after) / 2, (side, 0))
-    ax.annotate(
+    return ax.annotate(
         f"{place:.{digits}g}", (place, where), offset, textcoords="offset points", color=color, rotation=90,
         fontsize=style.small(ax), va="top" if small else "center", ha="left" if side > 0 else "right", zorder=6,
         path_effects=style.halo(),

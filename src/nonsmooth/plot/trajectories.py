@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,10 +42,11 @@ def pieces_by_mode(mode: NDArray[np.integer], *curves: NDArray[np.float64]) -> l
     return [[np.where(mode == k, curve, np.nan) for curve in curves] for k in range(int(mode.max(initial=0)) + 1)]
 
 
-def time_history(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, shade: bool = True) -> Axes:
+def time_history(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, shade: bool | str = True) -> Axes:
     """Draw ``y`` (a state, by default the first, or an output) of a ``simulate`` result over time.
 
-    The curve is cut where a reset makes the state jump. ``shade`` marks the time spent in any mode but the first.
+    The curve is cut where a reset makes the state jump. ``shade`` marks the time spent in any mode but the first; the
+    name of an element, ``"stop"``, the time in which it does something else than in the first mode.
     """
     variable_along(result, "u", "simulate")
     (name,) = first_states(result, y)
@@ -52,7 +54,7 @@ def time_history(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = 
         time = result["time"].values
         drawn.plot(*with_gaps(result, time, column(result, "u", name).values), color=style.COLORS["first"])
         if shade:
-            away = result["mode"].values > 0
+            away = _away(result["mode"], shade)
             drawn.fill_between(
                 time, 0, 1, where=away, transform=drawn.get_xaxis_transform(),
                 color=style.COLORS["zone"], alpha=0.25, linewidth=0,
@@ -60,6 +62,18 @@ def time_history(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = 
         drawn.margins(x=0)
         name_plane(drawn, result, "time", name)
     return drawn
+
+
+def _away(mode: xr.DataArray, shade: bool | str) -> NDArray[np.bool_]:
+    """The samples in another mode than the first, or with an element in another phase."""
+    if not isinstance(shade, str):
+        return np.asarray(mode.values > 0)
+    words = words_of_flags(mode)
+    found = [re.search(rf"(?:^|_){re.escape(shade)}_([a-z]+)", word) for word in words]
+    phases = [None if one is None else one[1] for one in found]
+    if phases[0] is None:
+        raise ValueError(f"shade = {shade!r}: no element of this name in the modes {', '.join(words[:6])}")
+    return np.array([phase != phases[0] for phase in phases])[mode.values]
 
 
 ZONE = "contact zone"  # in legends

@@ -17,7 +17,7 @@ from matplotlib.ticker import ScalarFormatter
 
 from nonsmooth.plot.labels import with_unit
 
-__all__ = ["PREFIXES", "name_axis", "power_for", "prefixed"]
+__all__ = ["PREFIXES", "in_unit", "name_axis", "power_for", "prefixed"]
 
 PREFIXES = {0: "", -3: "m", -6: "\N{MICRO SIGN}", -9: "n"}
 #: Units that take a prefix; the first one of a compound does: ``m``, ``m/s``, ``m s``, ``N/m``.
@@ -74,6 +74,24 @@ def name_axis(axis: Axis, name: str, unit: str, largest: float | None = None) ->
     power = power_for(unit, float(np.abs(axis.get_view_interval()).max()) if largest is None else largest)
     axis.set_major_formatter(_Prefixed(unit))
     ticks.write(power)
+
+
+def in_unit(axis: Axis, unit: str) -> None:
+    """Write an axis that :func:`name_axis` has named in a unit with another prefix, or with none.
+
+    Raises
+    ------
+    ValueError
+        An axis whose unit takes no prefix, or a unit that is not its own with one of them.
+    """
+    ticks = axis.major
+    if not isinstance(ticks, _Ticks) or (plain := ticks.units.get(axis)) is None:
+        raise ValueError(f"unit = {unit!r}: this axis ({axis.get_label_text()!r}) has no unit that takes a prefix")
+    allowed = {prefix + plain: power for power, prefix in PREFIXES.items()}
+    wanted = {f"u{plain}": PREFIXES[-6] + plain}.get(unit, unit)
+    if wanted not in allowed:
+        raise ValueError(f"unit = {unit!r} is not one of {', '.join(allowed)}, the units of this axis")
+    ticks.write(allowed[wanted])
 
 
 class _Ticks(Ticker):
