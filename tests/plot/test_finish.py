@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -22,7 +24,8 @@ def test_title_unit_legend_and_lines(run) -> None:
     assert ax.lines[0].get_color() == "black"
     ax.figure.canvas.draw()
     assert "10^{\N{MINUS SIGN}2}" in ax.yaxis.get_offset_text().get_text()
-    ticks = [0.01 * float(t.get_text().replace("\N{MINUS SIGN}", "-")) for t in ax.get_yticklabels()]
+    numbers = [re.search(r"-?\d+(\.\d+)?", t.get_text().replace("\N{MINUS SIGN}", "-")) for t in ax.get_yticklabels()]
+    ticks = [0.01 * float(number[0]) for number in numbers]
     assert ticks == pytest.approx(list(ax.get_yticks()), abs=1e-12)  # in metres, as the label says
     assert ns.plot.time_history(run, unit="um").get_ylabel() == "$x$ (\N{MICRO SIGN}m)"
     ax = ns.plot.phase_portrait(run, unit={"x": "mm", "y": "m/s"})
