@@ -8,6 +8,7 @@ anew in the plain unit, or a formatter of the caller's own, brings the plain num
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ _FIRST = re.compile(r"(m|s|N|V|A|Pa|W|J|rad)(?=$|[/ ])")
 #: Below this a prefix is used. Lengths and speeds are read in millimetres up to a metre.
 _WHOLE = {"m": 1.0}
 _ALMOST_WHOLE = 0.1
+_READ = 0.05  # of the other axis' unit: from there on both have it
 
 
 def power_for(unit: str, largest: float) -> int:
@@ -36,6 +38,19 @@ def power_for(unit: str, largest: float) -> int:
         return 0
     # 0.1 mm to 1 m are millimetres
     return max(-3 * int(np.ceil((-np.log10(largest) - 1) / 3 - 1e-9)) or -3, min(PREFIXES))
+
+
+def together(axes: Sequence[tuple[str, float]]) -> list[float]:
+    """Largest values (unit, largest) by which axes choose their prefixes: metres beside metres per second, where the
+    smaller one is still read easily."""
+    found = [most for _, most in axes]
+    firsts = {match[1] for unit, _ in axes if (match := _FIRST.match(unit))}
+    powers = [power_for(unit, most) for unit, most in axes]
+    if len(axes) == 2 and len(firsts) == 1 and powers[0] != powers[1] and all(_FIRST.match(unit) for unit, _ in axes):
+        low = powers.index(min(powers))
+        if found[low] >= _READ * 10.0 ** max(powers):
+            found[low] = found[1 - low]
+    return found
 
 
 def prefixed(value: float, unit: str) -> tuple[str, str]:
