@@ -1,7 +1,7 @@
-"""Floating-point operations of the exact flow, counted: the kernels' own text, run as plain Python on counting numbers.
+"""Floating-point operations, counted: the kernels' own text, run as plain Python on counting numbers.
 
 Every +, -, * and / of a float counts as one; comparisons, signs and the library's functions do not. Run with
-NUMBA_DISABLE_JIT=1; prints one JSON object.
+NUMBA_DISABLE_JIT=1; prints one JSON object for the exact flow of the paper's oscillator.
 """
 
 from __future__ import annotations
@@ -13,7 +13,10 @@ from typing import Any
 import numpy as np
 
 import nonsmooth as ns
+from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.sections import section_plan
+from nonsmooth.kernels.compile.pointers import Block
 from work import TABLE_1
 
 PLANES = {
@@ -43,32 +46,38 @@ for _name in ("add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv"
 Counted.__neg__ = lambda self: Counted(-float(self))
 
 
-def counted(array: Any) -> Any:
-    """The same array of counting numbers (or of plain integers)."""
-    kind = Counted if np.asarray(array).dtype.kind == "f" else int
-    found = np.empty(np.shape(array), dtype=object)
+def counted(record: Any) -> Any:
+    """The same record with arrays of counting numbers in place of arrays of floats."""
+    if isinstance(record, tuple):
+        parts = [counted(part) for part in record]
+        return type(record)(*parts) if hasattr(record, "_fields") else tuple(parts)
+    if not isinstance(record, np.ndarray) or record.dtype.kind != "f":
+        return record
+    found = np.empty(record.shape, dtype=object)
     for place in np.ndindex(found.shape):
-        found[place] = kind(array[place])
+        found[place] = Counted(record[place])
     return found
 
 
-def operations(system: ns.System, returns: int) -> int:
-    """Operations of one run from rest, its tables included."""
-    engine: Any = engine_for(system)
-    tables = engine.prepare(system.parameter_vector()[None, :])
-    module = tables.module
-    for plain in (math.cos, math.sin, math.fabs, math.sqrt):
-        setattr(module, plain.__name__, lambda x, f=plain: Counted(f(x)))
-    out = engine.kept(1, 1)
-    rows = engine.net[1].copy()
+def _put(block: Block, record: Any) -> Any:
+    block.address[:] = [counted(record)]
+    return block.address
+
+
+def operations(
+    engine: Any, section: Any, start: list[float], returns: int, spaces: tuple[dict[str, Any], ...] = ()
+) -> int:
+    """Operations of one run to so many section returns, tables included; ``spaces``: names of more text it calls."""
+    functions = {name: getattr(math, name) for name in ("fabs", "sqrt", "exp", "log", "cos", "sin")} | {"ln": math.log}
+    for space in (vars(engine.module()), *spaces):
+        for name, plain in functions.items():
+            if name in space:
+                space[name] = lambda x, f=plain: Counted(f(x))
+    Block.put = _put  # type: ignore[method-assign]
+    tables = engine.prepare(engine.point)
+    state = State(np.array(start), np.zeros(len(engine.traced.m)))
     Counted.done = 0
-    module.chain(
-        0, 1, 0, counted(np.zeros((1, 2))), *(counted(np.zeros(n)) for n in (2, 3)), [0, -1, 0, 0],
-        *map(counted, tables.linear), *(counted(part) for part in (engine.net[0], rows, *engine.net[2:])),
-        0.0, [-1, 1, -1, 1, 1, 0], 1e300, returns - 1, 1, counted(1e9 * engine.scale),
-        *(counted(part) if part.ndim else part for part in out),
-        *(counted(part) for part in module.scratch(*tables.sizes)),
-    )  # fmt: skip
+    engine.chain(tables, 0, 1, state, None, section, returns - 1, 1, engine.kept(1, 1))
     return Counted.done
 
 
@@ -80,7 +89,9 @@ def main() -> None:
         table, period = [], []
         for _ in range(20):
             system = model.with_parameters({key: float(rng.uniform(*ends)) for key, ends in ranges.items()})
-            few, many = operations(system, 2), operations(system, 42)
+            engine: Any = engine_for(system)
+            engine.point = system.parameter_vector()[None, :]
+            few, many = (operations(engine, section_plan(system, None)[1], [0.0, 0.0], n) for n in (2, 42))
             period.append((many - few) / 40)
             table.append(few - 2 * period[-1])
         found[name] = {"per_period": float(np.mean(period)), "tables": float(np.mean(table))}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,11 @@ def type_of(value: Any) -> str:
         return "int64"
     if isinstance(value, float | np.floating):
         return "float64"
-    assert value.flags.c_contiguous, "a kernel takes arrays in C order only"
+    assert value.flags["C_CONTIGUOUS"], "a kernel takes arrays in C order only"
     return f"{value.dtype}[{', '.join([':'] * (value.ndim - 1) + ['::1'])}]"
+
+
+JOBS: Counter[str] = Counter()  # of all launches, by kernel
 
 
 def launches_of(engine_on_gpu: Any) -> dict[str, str]:
@@ -30,6 +34,7 @@ def launches_of(engine_on_gpu: Any) -> dict[str, str]:
         signature = f"void({', '.join(map(type_of, (jobs, *arguments)))})"
         name = entry.py_func.__name__
         assert launched.setdefault(name, signature) == signature, "one set of types for each kernel"
+        JOBS[name] += len(jobs)
         plain_launch(self, entry, jobs, *arguments)
 
     engine_on_gpu.launch = launch

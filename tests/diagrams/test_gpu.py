@@ -29,6 +29,7 @@ from nonsmooth.kernels.linear.module import STEPPER
 COMPILER = [importlib.util.find_spec(name) is not None for name in ("numba_cuda", "nvidia")]
 pytestmark = pytest.mark.skipif(not COMPILER[0], reason="numba-cuda is not installed (extra `test`, Linux only)")
 SCRIPT = Path(__file__).with_name("gpu_script.py")
+SIMULATED = os.environ.get("NUMBA_ENABLE_CUDASIM", "1")  # 0: a real GPU (CONTRIBUTING)
 
 COMPILE = """
 import functools, gc, json, sys
@@ -57,7 +58,7 @@ def run(code: list[str], given: str = "", **environment: str) -> str:
 
 @pytest.fixture(scope="module")
 def simulated() -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(run([str(SCRIPT)], NUMBA_ENABLE_CUDASIM="1").splitlines()[-1])
+    found: dict[str, Any] = json.loads(run([str(SCRIPT)], NUMBA_ENABLE_CUDASIM=SIMULATED).splitlines()[-1])
     return found
 
 

@@ -25,7 +25,8 @@ pytestmark = pytest.mark.skipif(not COMPILER[0], reason="numba-cuda is not insta
 FOLDER = Path(__file__).parent
 
 COMPILE = """
-import json, sys
+import functools, gc, json, sys
+import numba.cuda
 import nonsmooth as ns
 from gpu_series_systems import filtered, two_wells
 from nonsmooth.flow.engines.devices import engine_on
@@ -33,13 +34,18 @@ from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.engines.series_cuda import module_of
 from nonsmooth.kernels.cuda.ptx import ptx_of_module
 
+gc.disable()  # a compile makes millions of objects and hardly a cycle
 name, signatures = json.load(sys.stdin)
+optimised = name.removesuffix(", typed") == name
+name = name.removesuffix(", typed")
+numba.cuda.compile = functools.partial(numba.cuda.compile, opt=optimised)
 system = {"valve": ns.models.relief_valve, "two wells": two_wells, "filtered": filtered}[name]()
 engine = engine_on("cuda", engine_for(system, "auto" if name == "filtered" else "taylor", None, None), None)
 module = module_of(engine, engine.prepare(system.parameter_vector()[None, :]))
 texts = [ptx_of_module(module, entry, signature) for entry, signature in signatures.items()]
 print(json.dumps([[text.count(".visible .entry"), ".target sm_90" in text] for text in texts]))
 """
+SIMULATED = os.environ.get("NUMBA_ENABLE_CUDASIM", "1")  # 0: a real GPU (CONTRIBUTING)
 ENTRIES = {"advance", "beside", "measure", "contract", "decide", "separated"}
 
 
@@ -54,7 +60,7 @@ def run(code: list[str], given: str = "", **environment: str) -> str:
 
 @pytest.fixture(scope="module")
 def simulated() -> dict[str, Any]:
-    printed = run([str(FOLDER / "gpu_series_script.py")], NUMBA_ENABLE_CUDASIM="1")
+    printed = run([str(FOLDER / "gpu_series_script.py")], NUMBA_ENABLE_CUDASIM=SIMULATED)
     found: dict[str, Any] = json.loads(printed.splitlines()[-1])
     return found
 
@@ -113,9 +119,10 @@ def test_basins_have_the_labels_and_attractors_of_the_processor(simulated: dict[
     np.testing.assert_allclose(*pair(simulated, "basins", "section_points"), rtol=0, atol=1e-9)
 
 
-@pytest.mark.slow  # half a minute of processor time each
 @pytest.mark.skipif(not COMPILER[1], reason="nvidia-nvvm is not installed (extra `test`, Linux only)")
-@pytest.mark.parametrize("name", ["valve", "two wells", "filtered"])
+@pytest.mark.parametrize("name", [
+    "valve, typed", *(pytest.param(name, marks=pytest.mark.slow) for name in ("valve", "two wells", "filtered")),
+])  # fmt: skip
 def test_the_kernels_compile_for_the_types_they_are_launched_with(simulated: dict[str, Any], name: str) -> None:
     printed = run(["-c", COMPILE], json.dumps([name, simulated["launched"]]))
     assert json.loads(printed.splitlines()[-1]) == [[1, True]] * len(ENTRIES)

@@ -124,7 +124,7 @@ class Engine(ABC):
         if starts:
             work.tally[MODE] = there
         else:
-            taken = decider.found(waits, there, tuple(k for k, _ in found.struck))
+            taken = decider.found(waits, there, found.struck)
         if taken < 0 or not found.struck:
             work.w[:n] = found.states
         work.tally[WAITS] = taken + 1

@@ -214,7 +214,7 @@ class PatternTables:
 
     def _answer(self, waits: int, found: Outcome) -> int:
         """The transition to which a question has led; it is made where it is new."""
-        lead, struck = self.leads[waits], tuple(k for k, _ in found.struck)
+        lead, struck = self.leads[waits], found.struck
         key = waits, self.place(found.pattern), (found.rubbed is not None, *struck), found.ends
         if key not in self.answers:
             self.answers[key] = len(self.leads)

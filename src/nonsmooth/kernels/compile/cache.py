@@ -334,6 +334,9 @@ def once(function: Callable[..., Any]) -> Any:
     return _jitted(function, {**_INNER, "inline": "always"})
 
 
+local = once  # on a GPU too: a function there may not return one of several arrays
+
+
 def load_module(source: str, stem: str, *, lasting: bool = True) -> ModuleType:
     """Write a generated module under a name that is a hash of its content, and import it.
 

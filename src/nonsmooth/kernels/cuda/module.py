@@ -47,9 +47,9 @@ def cuda_linear_module(
     return load_module(text + stamp(), f"cuda_{observer}_{name}")
 
 
-def joined(parts: Iterable[str]) -> str:
-    """The text of some kernel files in one, with the GPU's markers; a model's functions are there by name."""
-    text = assembly.joined(parts, absent=ELSEWHERE)
+def joined(parts: Iterable[str], model: str = "") -> str:
+    """The text of a model and of some kernel files in one, with the GPU's markers; its functions are there by name."""
+    text = f"{model}\n{assembly.joined(parts, absent=ELSEWHERE)}"
     text = re.sub(r"^ +(field|jet|values|jump) = \1_of\(form\)$", "", text, flags=re.MULTILINE)
     return text.replace("from nonsmooth.kernels.compile.cache import", "from nonsmooth.kernels.cuda.target import")
 

@@ -35,7 +35,7 @@ def cuda_series_source(model: str, sizes: Mapping[str, int], tables: Mapping[str
     tables : mapping
         The arrays there.
     """
-    text = f"{model}\n{joined(PARTS)}"
+    text = joined(PARTS, model)
     for names in (("METHOD", "ORDER", "CHECKED", "CORNERS", "N_GUARDS"),
                   ("N_PARAMETERS", "N_MEMORY", "N_INDICATORS", "N_OUTPUTS", "N_SCRATCH_ROWS")):  # fmt: skip
         line = f"{', '.join(names)} = {', '.join(str(int(sizes[name])) for name in names)}"

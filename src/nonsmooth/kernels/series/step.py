@@ -6,7 +6,7 @@ from math import log as ln
 from numpy import float32
 
 import nonsmooth.kernels.series.places as place
-from nonsmooth.kernels.compile.cache import device, inline, once
+from nonsmooth.kernels.compile.cache import device, inline, local, once
 from nonsmooth.kernels.hybrid.places import MODE, NO_END, TIME, WAITED
 from nonsmooth.kernels.series.crossing import earliest, rows_hold
 from nonsmooth.kernels.series.generated import field_of, jet_of, values_of
@@ -22,7 +22,7 @@ def degree_of(form):
     return 5 if form.method == place.RKF45 else form.order
 
 
-@once
+@local
 def jets_of(form, work):
     """The jets at the present instant."""
     return work.J0 if form.method == place.RKF45 else work.C

@@ -317,10 +317,11 @@ class Assembler(ABC):
 
     def impact(self, some: Sequence[int], mode: str, factor: Any = None) -> Any:
         """States behind impulses of several elements that take their rates to -factor times these; without one, by the
-        restitution of each.
+        restitution of each, of ~k without any.
 
         Of those that keep their rate at zero, as at rest, the rate is zero before it as well."""
-        factors = [self.law(k, "restitution") if factor is None else factor for k in some]
+        factors = [0 if k < 0 else self.law(k, "restitution") if factor is None else factor for k in some]
+        some = [max(k, ~k) for k in some]
         wanted = [-(1 + e) * self.rate(k, mode) for k, e in zip(some, factors, strict=True)]
         after = self.identity()
         for k, amount in zip(some, self.solved(self.effects(some, mode), wanted), strict=True):

@@ -43,15 +43,15 @@ ORDERS = 24  # derivatives that are looked at where all before are zero
 
 @dataclass(frozen=True)
 class Outcome:
-    """The phases behind an instant and the states there; the contacts that bore an impulse, each with the part of its
-    approach that it gave back.
+    """The phases behind an instant and the states there; the contacts that bore an impulse, ~k for a contact k that
+    gave back nothing of its approach although it has a restitution.
 
     ``rubbed``: of an impact that rubs the elements that bore impulses, and the derivatives of these in their rates;
     ``ends`` and ``names``: the status of a run that cannot go on, and the elements for which it cannot."""
 
     pattern: Pattern
     states: FloatArray
-    struck: tuple[tuple[int, float], ...] = ()
+    struck: tuple[int, ...] = ()
     rubbed: tuple[tuple[int, ...], FloatArray] | None = None
     ends: str = ""
     names: str = ""
@@ -155,8 +155,8 @@ class _Instant:
         names = ", ".join(repr(self.parts[k].name) for k in sorted(elements))
         return Outcome(self.pattern, self.numbers.u.copy(), ends=status, names=names)
 
-    def strike(self, contacts: list[int], restitution: dict[int, float]) -> tuple[tuple[int, float], ...]:
-        """The impact of all contacts that are closed; returns those that bore an impulse."""
+    def strike(self, contacts: list[int], restitution: dict[int, float]) -> tuple[int, ...]:
+        """The impact of all contacts that are closed; returns those that bore an impulse (see :class:`Outcome`)."""
         rubs = [k for k in contacts if self.speeds[k] < 0.0 and k in self.make.rubbing]
         if rubs:
             return self._rub(rubs[0], contacts, restitution[rubs[0]])
@@ -176,9 +176,10 @@ class _Instant:
             if impulse > 0.0:
                 self.speeds[k] = max(0.0, -e * speed)
             self.numbers.shift(self.numbers.direction(k) * impulse)
-        return tuple((k, float(e)) for k, e, p in zip(contacts, given_back, impulses, strict=True) if p > 0.0)
+        bore = [(k, e) for k, e, impulse in zip(contacts, given_back, impulses, strict=True) if impulse > 0.0]
+        return tuple(k if e == self.restitution(k) else ~k for k, e in bore)
 
-    def _rub(self, k: int, contacts: list[int], restitution: float) -> tuple[tuple[int, float], ...]:
+    def _rub(self, k: int, contacts: list[int], restitution: float) -> tuple[int, ...]:
         """The impact of one contact that rubs, the others that are closed without friction."""
         r = self.make.rubbing[k]
         some = [k, r, *(j for j in contacts if j != k)]
@@ -190,7 +191,7 @@ class _Instant:
         impulses, slopes, after = found
         self._struck(some, impulses, after)
         self.rubbed = tuple(some), slopes
-        return ((k, restitution),)
+        return (k,)
 
     def _struck(self, some: list[int], impulses: FloatArray, after: FloatArray) -> None:
         """Put in the impulses of some elements, whose rates are then ``after``."""
@@ -202,7 +203,7 @@ class _Instant:
         for j, impulse in zip(some, impulses, strict=True):
             self.numbers.shift(self.numbers.direction(j) * impulse)
 
-    def _in_sequence(self, contacts: list[int], restitution: dict[int, float]) -> tuple[tuple[int, float], ...]:
+    def _in_sequence(self, contacts: list[int], restitution: dict[int, float]) -> tuple[int, ...]:
         """Impacts one after the other, the fastest approach first, those of one speed at once; a plastic one of all
         contacts ends them where no approach is faster than rest."""
         G, count = self.numbers.effects(contacts, contacts), len(contacts)
@@ -231,13 +232,13 @@ class _Instant:
             return ()
         self._struck(contacts, impulses, np.where(np.abs(v) <= ZERO * np.abs(G) @ impulses, 0.0, v))
         self.rubbed = tuple(contacts), slopes
-        return tuple((k, restitution[k]) for k, impulse in zip(contacts, impulses, strict=True) if impulse > 0.0)
+        return tuple(k for k, impulse in zip(contacts, impulses, strict=True) if impulse > 0.0)
 
     def share(self, r: int) -> float:
         """The coefficient of friction of a contact."""
         return self.numbers.value(self.place(r).law("friction"))
 
-    def outcome(self, contacts: list[int], struck: tuple[tuple[int, float], ...]) -> Outcome:
+    def outcome(self, contacts: list[int], struck: tuple[int, ...]) -> Outcome:
         """Those that hold and those that let go, with the rates as they are now."""
         candidates = [k for k in contacts if self.speeds[k] == 0.0 and self._may_rest(k)]
         slips: dict[int, int] = {}  # at contacts that may stay closed

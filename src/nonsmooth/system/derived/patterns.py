@@ -48,7 +48,7 @@ class Out(NamedTuple):
 
 class Change(NamedTuple):
     """The change of the states by a transition: the ``way``-th way of an element out of its phase, or an impact of
-    several of them, with friction or one after the other where it ``rubs``."""
+    several of them (~k: without restitution), with friction or one after the other where it ``rubs``."""
 
     elements: tuple[int, ...]
     way: int = -1
