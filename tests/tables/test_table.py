@@ -162,3 +162,24 @@ def test_what_does_not_fit_is_said(swinging, tmp_path) -> None:
     ]:
         with pytest.raises((TypeError, ValueError), match=words):
             wrong()
+
+
+def test_rows_of_spectra_and_special_points() -> None:
+    system = ns.models.discontinuous_support(g=0.02)
+    lines = ns.table(ns.amplitude_spectrum(system, periods=16))
+    at = lines.iloc[(lines["order"] - 1.0).abs().argmin()]
+    assert at["frequency (Hz)"] == pytest.approx(3.69 / (2 * math.pi))  # the line of the force
+    branch = ns.continue_orbit(ns.find_orbit(system), "rho", (0.05, 0.5))
+    special = ns.special_points(branch)
+    found = ns.table(special, ["kind"])
+    assert found["kind"].tolist() == special["kind"].values.tolist()
+    assert found["rho (N)"].tolist() == special["rho"].values.tolist()
+
+
+def test_parameters_with_their_uncertainties() -> None:
+    from nonsmooth.identification.finding import Estimate
+
+    found = ns.table(ns.ParameterSet({"k": Estimate(8.0, 0.1, "N/m"), "m": Estimate(2.0, 0.2, "kg")}, np.eye(2)))
+    assert found[["parameter", "value", "uncertainty", "unit"]].to_numpy().tolist() == [
+        ["k", 8.0, 0.1, "N/m"], ["m", 2.0, 0.2, "kg"],
+    ]  # fmt: skip

@@ -21,7 +21,7 @@ __all__ = ["coordinates_of", "dataset_of", "quantities_of", "quantity", "rows_of
 
 #: Dims whose entries are columns of a table, not rows.
 _SPREAD = ("state", "indicator", "multiplier", "eigenvalue", "exponent", "harmonic", "memory", "component")
-_FIRST = ("time", "point")  # dims of rows where a result has them
+_FIRST = ("time", "point", "special", "frequency")  # dims of rows where a result has them
 _INNER = ("layout",)  # what continuation goes on from
 
 
