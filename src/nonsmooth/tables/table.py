@@ -94,6 +94,8 @@ def table(
     if over is not None:
         known = {name: array for name, array in known.items() if over in array.dims}
     varied = {name: one for name, one in coordinates_of(data, rows).items() if name not in _BESIDE}
+    if (along := data.attrs.get("parameter")) in known:  # of special points
+        varied[along] = known[along]
     names = [name for name in known if name not in varied] if columns is None else _asked(columns)
     found = varied | {name: quantity(data, name, known) for name in names}
     frame = pd.DataFrame(_columns(data, rows, found, units))
