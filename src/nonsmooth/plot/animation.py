@@ -246,9 +246,9 @@ class Animation:
             image.save(file, format="png", optimize=True)
             frames.append(base64.b64encode(file.getvalue()).decode())
         name = f"a{uuid.uuid4().hex[:12]}"
-        list_ = ",".join(f'"{one}"' for one in frames)
-        player = _PLAYER.replace("NAME", name).replace("LAST", str(len(frames) - 1)).replace("FRAMES", list_)
-        return player.replace("DELAY", str(round(1000 / self.rate)))
+        player = _PLAYER.replace("NAME", name).replace("LAST", str(len(frames) - 1))
+        player = player.replace("DELAY", str(round(1000 / self.rate)))
+        return player.replace("FRAMES", ",".join(f'"{one}"' for one in frames))
 
 
 _PLAYER = """<div id="NAME" style="display:inline-block;max-width:100%">
