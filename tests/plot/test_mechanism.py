@@ -127,8 +127,18 @@ def test_gaps_and_displacements_are_to_one_scale() -> None:
     [
         (lambda: ns.models.chua_circuit(), "has no mass to draw"),
         (lambda: ns.models.rubbing_rotor(), "follows a curve"),
-        (lambda: ns.mechanical([[2.0, 1.0], [1.0, 2.0]], [[1.0, 0.0], [0.0, 1.0]], np.eye(2), parameters={}),
-         "not diagonal"),
+        (lambda: ns.mechanical([[2.0, 1.0], [1.0, 2.0]], np.eye(2), np.eye(2), parameters={}), "not diagonal"),
+        (lambda: ns.mechanical(
+            [[2.0, 1.0], [1.0, 2.0]], np.zeros((2, 2)), np.eye(2), parameters={}, forcing={"q1": lambda t, p: np.cos(t)}
+        ), "not diagonal"),
+        (lambda: ns.mechanical(
+            [[2.0, 1.0], [1.0, 2.0]], np.zeros((2, 2)), np.eye(2), parameters={},
+            elements={"stop": E.Stop(at="q1", position=1.0)},
+        ), "not diagonal"),
+        (lambda: ns.mechanical(
+            np.eye(2), 0.1 * np.eye(2), np.eye(2), coordinates=["x", "y"], parameters={},
+            elements={"floor": E.Stop(at="y", side=-1, position=-1.0, friction=0.3, tangent="x")},
+        ), "rubs along another coordinate"),
     ],
 )  # fmt: skip
 def test_what_has_no_sketch_says_why(system, words: str) -> None:

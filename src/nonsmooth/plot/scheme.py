@@ -85,7 +85,7 @@ class _Reader:
         else:
             self._transitions(scheme, masses)
         if not scheme.links:
-            raise ValueError(f"nothing joins the masses of {self.system.name!r}: it has no sketch")
+            raise self._off("nothing joins them")
         return scheme
 
     # Expressions
@@ -125,24 +125,22 @@ class _Reader:
                 loaded = self.acceleration[i].subs(self.still)
                 if table[i][i] != 0 and damping[i][i] != 0:
                     found[i] = sp.simplify(table[i][i] / damping[i][i])
-                elif (force := sp.diff(push, v)) != 0 and loaded != 0 and "base" not in powers:
-                    found[i] = sp.simplify(force / loaded)
-            for i in range(size):
-                for j in range(size):
-                    if found[i] is not None and not self.is_zero(table[i][j] - found[i] * damping[i][j]):
-                        raise ValueError(
-                            f"the mass matrix of {self.system.name!r} is not diagonal: its coordinates are no masses "
-                            "on a line, and it has no sketch"
-                        )
+                elif loaded != 0 and "base" not in powers:
+                    found[i] = sp.simplify(sp.diff(push, v) / loaded)
+            apart = [self.is_zero(table[i][j] - found[i] * damping[i][j])
+                     for i in range(size) for j in range(size) if found[i] is not None]  # fmt: skip
+            if not all(apart) or 0 in found:
+                raise self._off("its mass matrix is not diagonal")
         for load in self.loads.elements if self.loads is not None else ():
             if load.kind == "Rubbing":
-                continue
+                raise self._off(f"the contact {load.rubs!r} rubs along another coordinate")
             along = self.v if load.element.kinematics == "speed" else self.q
-            into = -1 if load.kind in ("Stop", "ElasticStop") else 1
             for i in range(size):
                 weight, effect = sp.diff(load.where, along[i]), load.direction.get(self.speeds[i], 0)
+                if powers and (weight == 0) != (effect == 0):
+                    raise self._off("its mass matrix is not diagonal")
                 if found[i] is None and weight != 0 and effect != 0:
-                    found[i] = sp.simplify((-into if into < 0 else 1) * weight / effect)
+                    found[i] = sp.simplify(weight / effect)
         for _ in range(size):  # a spring between two masses tells one from the other
             for i in range(size):
                 for j in range(size):
@@ -154,6 +152,9 @@ class _Reader:
                 if found[i] is None:
                     found[i] = sp.denom(sp.together(a))
         return [m if m is not None and m.free_symbols <= set(self.p) else None for m in found]
+
+    def _off(self, why: str) -> ValueError:
+        return ValueError(f"{self.system.name!r} has no sketch, its coordinates are no masses on a line: {why}")
 
     def _forces(self, scheme: Scheme, masses: list[Any]) -> None:
         """Forces on masses, and the motion of the base."""
@@ -171,16 +172,11 @@ class _Reader:
 
     def _element(self, scheme: Scheme, load: Any) -> None:
         given = _keywords(load.text)
-        if load.kind == "Rubbing":
-            return
         speed = load.element.kinematics == "speed"
         place = self._place(load.where, self.v if speed else self.q)
         if place is None:
             if any(sp.diff(load.where, x).has(*self.u) for x in (*self.q, *self.v)):
-                raise ValueError(
-                    f"the element {load.name!r} of {self.system.name!r} follows a curve: its masses are not on a line, "
-                    "and it has no sketch"
-                )
+                raise self._off(f"the element {load.name!r} follows a curve")
             scheme.others.append(f"{load.name}: {load.text}")
             return
         weights, rest = place
@@ -193,8 +189,6 @@ class _Reader:
                 scheme.links.append(self._contact(
                     "stop" if load.kind == "Stop" else "elastic", weights, rest, label, "damping" in given
                 ))  # fmt: skip
-                if "friction" in given:
-                    scheme.others.append(f"friction {law['friction']} along {load.name}")
             case "Coulomb":
                 words = "" if self.is_zero(rest) else self.text(-rest)
                 scheme.links.append(Link("friction", left, right, law.get("friction", ""), words=words))
@@ -205,7 +199,8 @@ class _Reader:
                     half=self._value(half),
                 ))  # fmt: skip
             case "PreloadedSpring":
-                scheme.links.append(Link("preload", left, right, law.get("preload", "")))
+                label = r",\ ".join(filter(None, (law.get("preload"), law.get("stiffness"))))
+                scheme.links.append(Link("preload", left, right, label))
 
     def _place(self, where: Any, along: list[Any]) -> tuple[dict[int, int], Any] | None:
         """Weights of one or two masses, of size one, and what is left; None for all else."""
