@@ -91,3 +91,20 @@ def test_labels_of_jumps_do_not_stand_over_each_other() -> None:
     assert len(boxes) == 3
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
     plt.close("all")
+
+
+def test_slides_have_a_style_of_their_own(run, tmp_path) -> None:
+    from PIL import Image
+
+    with ns.plot.slides():
+        ax = ns.plot.time_history(run)
+    wide, high = ax.figure.get_size_inches()
+    assert wide / high == pytest.approx(16 / 9)
+    assert ax.xaxis.label.get_fontsize() == 11
+    assert ax.lines[0].get_linewidth() == 1.6
+    with Image.open(ns.plot.save_figure(ax, tmp_path / "slide.png")) as picture:
+        assert picture.size == (1920, 1080)
+    journal = ns.plot.time_history(run)  # behind the block it is the journal's again
+    assert journal.figure.get_size_inches()[0] == pytest.approx(84 / 25.4)
+    assert journal.lines[0].get_linewidth() == 0.8
+    plt.close("all")

@@ -20,7 +20,7 @@ from nonsmooth.plot.finish import finished
 from nonsmooth.plot.mechanism import mechanism
 from nonsmooth.plot.planes import basin_fractions, basins, chart
 from nonsmooth.plot.regions import regions
-from nonsmooth.plot.style import COLORS, COLUMN, PAGE, journal, save_figure
+from nonsmooth.plot.style import COLORS, COLUMN, PAGE, journal, save_figure, slides
 from nonsmooth.plot.sweeps import bifurcation, bifurcation_diagram, density, frequency_response, smoothing_report
 from nonsmooth.plot.trajectories import amplitude_spectrum, orbit, phase_portrait, section, time_history
 
@@ -63,6 +63,7 @@ __all__ = [
     "regions",
     "save_figure",
     "section",
+    "slides",
     "smoothing_report",
     "time_history",
 ]
