@@ -15,6 +15,7 @@ import io
 import os
 import re
 import runpy
+import shutil
 import sys
 import tempfile
 from pathlib import Path
@@ -94,6 +95,8 @@ def main(wanted: list[str]) -> None:
                 print(f"{file}: left as it is; NONSMOOTH_DATA names no folder")
                 continue
             with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+                for given in re.findall(r"\{download\}`[^`<]*<([^>`]+)>`", page.read_text(encoding="utf-8")):
+                    shutil.copy(page.parent / given, folder)
                 names: dict[str, Any] = {}
                 with contextlib.redirect_stdout(None):
                     exec(code, names)

@@ -48,6 +48,14 @@ def steps(folder: Path) -> dict[str, Callable[[dict[str, Any]], Any]]:
         models = {"true": (system, ["k", "c"]), "undamped": (system.with_parameters(c=0.0), ["k"])}
         return ns.select_model(models, {"q": (time_, noisy)}, folds=2, tries=1, **QUIET)
 
+    def propagate(found: dict[str, Any]) -> Any:
+        force = {"settings": {"rho": (0.14, 1e-3)}, "draws": 3}
+        return ns.propagate({}, ns.sweep, s, "omega", [4.5], start=free, **force, **FEW)
+
+    def plan_experiment(found: dict[str, Any]) -> Any:
+        runs = {"short": {"duration": 2.0, "samples": 50, "start": {"q": 1.0}}}
+        return ns.plan_experiment(found["mechanical"], runs, ["k", "c"], measured={"q": ns.Sensor(noise=1e-3)})
+
     def load_recording(_: Any) -> Any:
         lines = [f"{t:.2f},{value:.6f}" for t, value in zip(time_, noisy, strict=True)]
         (folder / "log.csv").write_text("\n".join(["Time (s),q (m)", *lines]))
@@ -136,6 +144,8 @@ def steps(folder: Path) -> dict[str, Callable[[dict[str, Any]], Any]]:
         "load_recording": load_recording,
         "fit": fit,
         "select_model": select_model,
+        "propagate": propagate,
+        "plan_experiment": plan_experiment,
         "compare": compare,
         "identify": identify,
         "explore": explore,
@@ -180,6 +190,8 @@ FACTS: dict[str, Callable[[Any, dict[str, Any]], bool]] = {
     "load_recording": lambda found, _: np.allclose(*(one.channel("q").values for one in found), atol=1e-6),
     "fit": lambda found, _: abs(found["k"] - 4.0) < 0.02,
     "select_model": lambda found, _: float(found["rms"].sel(model="true")) < float(found["rms"].sel(model="undamped")),
+    "propagate": lambda found, _: bool((np.ptp(found["maximum_quantiles"], axis=0) > 0).any()),
+    "plan_experiment": lambda found, _: bool(np.isfinite(found["uncertainty"]).all()),
     "compare": lambda found, _: int(found["measured_period_number"]) == int(found["theory_period_number"]) == 1,
     "control_based_continuation": lambda found, _: found.sizes["point"] == 2,
     "explore": lambda found, _: "nonsmooth explorer" in found,

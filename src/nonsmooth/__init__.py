@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from nonsmooth.errors import SolveError as SolveError
     from nonsmooth.errors import SystemDefinitionError as SystemDefinitionError
     from nonsmooth.explorer.serve import explore as explore
+    from nonsmooth.flow.inputs import Input as Input
     from nonsmooth.flow.poincare import poincare as poincare
     from nonsmooth.flow.sections import Poincare as Poincare
     from nonsmooth.flow.sections import Stroboscopic as Stroboscopic
@@ -49,9 +50,11 @@ if TYPE_CHECKING:
     from nonsmooth.flow.starts import random_starts as random_starts
     from nonsmooth.identification.compare.compare import compare as compare
     from nonsmooth.identification.fit.fit import fit as fit
+    from nonsmooth.identification.fit.plan import plan_experiment as plan_experiment
     from nonsmooth.identification.fit.select import select_model as select_model
     from nonsmooth.identification.fit.sensors import Sensor as Sensor
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
+    from nonsmooth.identification.propagate import propagate as propagate
     from nonsmooth.plot.animation import animate as animate
     from nonsmooth.recordings.load import load_recording as load_recording
     from nonsmooth.recordings.recording import Recording as Recording
@@ -83,6 +86,7 @@ _WHERE = {
     "Band": "system.mode",
     "where": "system.symbolic.scalar",
     "system_of": "system.origin",
+    "Input": "flow.inputs",
     "simulate": "flow.simulate",
     "sensitivity": "flow.sensitivity",
     "poincare": "flow.poincare",
@@ -115,9 +119,11 @@ _WHERE = {
     "fit": "identification.fit.fit",
     "Sensor": "identification.fit.sensors",
     "select_model": "identification.fit.select",
+    "plan_experiment": "identification.fit.plan",
     "identify": "studies.savi2007.identification.chain",
     "ParameterSet": "identification.parameter_set",
     "compare": "identification.compare.compare",
+    "propagate": "identification.propagate",
     "explore": "explorer.serve",
     "animate": "plot.animation",
     "table": "tables.table",

@@ -12,6 +12,7 @@ import ast
 import contextlib
 import io
 import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from typing import Any
 #: Commands that have tests of their own; the second one serves a page until it is stopped.
 ELSEWHERE = ("reproduce", "explore")
 _BLOCK = re.compile(r"^```(python|toml|sh|text)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+_GIVEN = re.compile(r"\{download\}`[^`<]*<([^>`]+)>`")
 _FILE = re.compile(r"^```\{code-block\} \w+\n:caption: (\S+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
@@ -45,6 +47,8 @@ def run_page(
     block, and what stands in its place; of that block nothing is expected."""
     names: dict[str, Any] = {"__name__": "page"}
     text = page.read_text(encoding="utf-8")
+    for name in _GIVEN.findall(text):  # files that the page gives its reader
+        shutil.copy(page.parent / name, folder)
     with contextlib.chdir(folder):
         for name, content in _FILE.findall(text):
             Path(name).write_text(content, encoding="utf-8")

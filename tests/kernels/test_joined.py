@@ -23,7 +23,7 @@ TEXTS = {
     "series": (*series_module.STEPPER, *series_module.OBSERVERS),
     "cuda series": cuda_series_module.PARTS,
 }
-MARKERS = {"device", "inline", "kernel", "callback", "once"}  # another compiler's on a GPU
+MARKERS = {"device", "inline", "kernel", "callback", "local", "once"}  # another compiler's on a GPU
 ON_PURPOSE = MARKERS | {"build", "may_pause"}  # replaced on a GPU
 SWAPPED = {*PLACES, "series.generated"}  # for the stepper that is joined
 

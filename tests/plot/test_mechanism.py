@@ -144,3 +144,14 @@ def test_gaps_and_displacements_are_to_one_scale() -> None:
 def test_what_has_no_sketch_says_why(system, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         ns.plot.mechanism(system())
+
+
+def test_a_measured_input_is_a_force_and_no_mass() -> None:
+    cart = ns.mechanical(2.0, 0.0, 8.0, forcing={"q": lambda t, p: p.force}, inputs={"force": "N"})
+    scheme = scheme_of(cart)
+    assert scheme.coordinates == ["q"]
+    assert scheme.forces == {0: r"\mathrm{force}"}
+    run = ns.simulate(cart, duration=3.0, inputs={"force": ns.Input([0, 1, 2], [4, 0, -4], between="steps")})
+    with pytest.warns(UserWarning, match="interpolated by cubic splines"):  # the record does not hold the samples
+        found = ns.table(run, ["q"], samples=[0.5])
+    assert found["q"][0] == pytest.approx(0.5 * (1 - np.cos(1.0)), abs=1e-7)  # 4 N on 2 kg and 8 N/m

@@ -11,6 +11,7 @@ import struct
 import sys
 import time
 import tracemalloc
+import wave
 import zipfile
 from collections import Counter
 from collections.abc import Callable
@@ -119,6 +120,56 @@ def _tdms() -> bytes:
     return packed.getvalue()
 
 
+def _npz() -> bytes:
+    packed = io.BytesIO()
+    np.savez_compressed(packed, t=np.arange(9.0), x=np.arange(9.0), M=np.ones((9, 2)))
+    return packed.getvalue()
+
+
+def _npy() -> bytes:
+    packed = io.BytesIO()
+    np.save(packed, np.ones((9, 2)))
+    return packed.getvalue()
+
+
+def _wav() -> bytes:
+    packed = io.BytesIO()
+    with wave.open(packed, "wb") as file:
+        file.setparams((2, 2, 100, 0, "NONE", ""))
+        file.writeframes(bytes(range(200)))
+    return packed.getvalue()
+
+
+def _sheet() -> bytes:
+    openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed (extra `experiment`)")
+    book = openpyxl.Workbook()
+    for row in (("t", "x"), *((float(k), k * 0.5) for k in range(9))):
+        book.active.append(row)
+    packed = io.BytesIO()
+    book.save(packed)
+    return packed.getvalue()
+
+
+def _parquet(feather: bool) -> bytes:
+    pyarrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed (extra `experiment`)")
+    from pyarrow import feather as feathers
+    from pyarrow import parquet
+
+    packed = io.BytesIO()
+    table = pyarrow.table({"t": np.arange(9.0), "x": np.arange(9.0)})
+    feathers.write_feather(table, packed) if feather else parquet.write_table(table, packed)
+    return packed.getvalue()
+
+
+def _uff() -> bytes:
+    pytest.importorskip("pyuff", reason="pyuff is not installed (extra `experiment`)")
+    head = ["    -1", "    58", *["NONE"] * 5,
+            f"{1:5d}{0:10d}{0:5d}{0:10d} {'N':10s}{1:10d}{1:4d} {'N':10s}{1:10d}{1:4d}",
+            f"{4:10d}{4:10d}{1:10d}{0.0:13.5e}{0.01:13.5e}{0.0:13.5e}",
+            *[f"{kind:10d}{0:5d}{0:5d}{0:5d} {'x':20s} {'s':20s}" for kind in (17, 8, 0, 0)]]  # fmt: skip
+    return ("\n".join([*head, "".join(f"{v:20.12e}" for v in range(4)), "    -1"]) + "\n").encode()
+
+
 TABLE = b"# note\nt_s\tx [m]\trun\n" + b"".join(b"%d\t%d.5\t%d\n" % (k % 9, k, k // 9) for k in range(27))
 NAMED = Options(columns={"time": "t_s", "x": "x [m]", "run": "run"})
 
@@ -135,6 +186,19 @@ SEEDS: dict[str, Callable[[], Seed]] = {
     "mat v5": lambda: Seed(_mat(False), "mat"),
     "mat v5, packed": lambda: Seed(_mat(True), "mat"),
     "mat v7.3": lambda: Seed(_hdf5(), "mat"),
+    "hdf5": lambda: Seed(_hdf5(), "hdf5"),
+    "npy": lambda: Seed(_npy(), "npy", Options(rate=1.0)),
+    "npz": lambda: Seed(_npz(), "npy"),
+    "wav": lambda: Seed(_wav(), "wav"),
+    "xlsx": lambda: Seed(_sheet(), "xlsx"),
+    "parquet": lambda: Seed(_parquet(False), "arrow"),
+    "feather": lambda: Seed(_parquet(True), "arrow"),
+    "uff": lambda: Seed(_uff(), "uff"),
+    "stamps": lambda: Seed(b"time,x\n" + b"".join(b"2026-05-31T12:00:%02d.5,%d\n" % (k, k) for k in range(20)), None),
+    "table, options": lambda: Seed(
+        b"Bench\nt;x\ns;mm\n" + b"".join(b"%d;1.00%d,5\n" % (k, k) for k in range(9)), "csv",
+        Options(header=2, units_row=3, decimal=",", thousands=".", na=("n",), leave=("S",), wraps={"x": 64.0}),
+    ),
 }
 
 PIECES = [

@@ -70,7 +70,7 @@ def test_special_blocks_are_passed_over() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (b"-2E-3", b"-2E-", r"line 18: column 'Voltage' holds '-2E-', expected a number"),
+        (b"-2E-3", b"-2E-", r"line 18: column 2 \('Voltage'\) holds '-2E-', expected a number"),
         (b"Channels\t2", b"Channels\t99999", r"line 7: Channels is '99999'"),
         (b"Channels\t2", b"Channels\ttwo", r"line 7: Channels is 'two'"),
         (b"Channels\t2", b"Channels\t7", r"line 16: names 3 columns, the segment has 7"),

@@ -44,6 +44,22 @@ def test_matlab_response_curves() -> None:
     assert curve["frequency"].attrs["units"] == "Hz"
 
 
+def test_servos_with_time_stamps() -> None:
+    """Four servos, ten rows a second, stamps of ISO 8601; what is expected is NumPy's reading of them."""
+    recording = ns.load_recording(Path(FOLDER) / "servo_backlash_telemetry.csv")
+    clock = recording.channel("target pos (1)")["time"].values
+    assert clock[0] == 0.0 and (np.diff(clock) > 0).all()
+    with open(Path(FOLDER) / "servo_backlash_telemetry.csv", encoding="utf-8") as file:
+        stamps = [line.split(",")[0] for line in file][1:]
+    first, last = (np.datetime64(stamps[k].rstrip("Z").partition("+")[0]) for k in (0, -1))
+    assert clock[-1] == pytest.approx((last - first) / np.timedelta64(1, "us") * 1e-6, abs=1e-6)
+
+
+def test_a_packed_table_without_time() -> None:
+    recording = ns.load_recording(Path(FOLDER) / "silverbox_SNLS80mV.csv.gz", rate=610.35)
+    assert {"V1", "V2"} <= set(recording.channels) and recording.channel("V1").size > 100_000
+
+
 def test_cube_tosses() -> None:
     recording = ns.load_recording(
         Path(FOLDER) / "contactnets_cube_tosses_12.csv",

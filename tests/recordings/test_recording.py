@@ -73,7 +73,7 @@ def test_provenance_and_warnings(tmp_path: Path) -> None:
 
     file = tmp_path / "pull.csv"
     file.write_bytes(TWO)
-    with pytest.warns(RecordingWarning, match=r"pull\.csv: run 'a', channel 'y': 1 trailing blanks"):
+    with pytest.warns(RecordingWarning, match=r"pull\.csv: run 'a', channel 'y': 1 blank fields"):
         recording = ns.load_recording(file, units={"x": "mm"})
     record = read_provenance(recording.to_dataset())
     assert record["verb"] == "load_recording" and record["source"]["file"] == "pull.csv"

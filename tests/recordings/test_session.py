@@ -71,10 +71,10 @@ def test_a_computed_file_in_a_measured_session_is_an_error(tmp_path: Path) -> No
 
 
 def test_options_of_the_reader_are_handed_on(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text("t;pos\n" + "".join(f"{i / 100};{i}\n" for i in range(100)))
+    (tmp_path / "log.csv").write_text("our bench\nt;pos\n" + "".join(f"{i / 100};{i}\n" for i in range(100)))
     (tmp_path / "session.toml").write_text(
         '[[recording]]\nfile = "log.csv"\nprocedure = "impulse"\nruns = [ { run = "Run #1" } ]\n'
-        'read = { columns = { time = "t", Angle = ["pos", "rad"] } }\n'
+        'read = { header = 2, na = "-", columns = { time = "t", Angle = ["pos", "rad"] } }\n'
     )
     session = load_session(tmp_path)
     with pytest.warns(RecordingWarning, match="the time column has no unit"):

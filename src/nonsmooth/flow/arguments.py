@@ -19,11 +19,17 @@ __all__ = ["check_options", "check_system", "float_array", "real_number", "swept
 _MOST = 2**53  # whole numbers up to here are exact in floating point
 
 
-def check_system(system: Any, verb: str) -> None:
-    """TypeError where ``system`` is no System: a name, or a model's function that was not called."""
+def check_system(system: Any, verb: str, inputs: bool = False) -> None:
+    """TypeError where ``system`` is no System: a name, or a model's function that was not called. ValueError where it
+    has ``inputs`` and the verb takes none."""
     from nonsmooth.system.system import System
 
     if isinstance(system, System):
+        if system.inputs and not inputs:
+            raise ValueError(
+                f"{verb} takes systems without inputs; {system.name!r} has {', '.join(map(repr, system.inputs))}: "
+                "simulate, sensitivity and fit take their course; elsewhere write it as a function of t and p"
+            )
         return
     name = getattr(system, "__name__", None)
     hint = f"; call it: {name}()" if callable(system) and name else ""

@@ -10,6 +10,7 @@ import numpy as np
 from nonsmooth.flow.arguments import check_system
 from nonsmooth.flow.engines.engine import FloatArray, Log, State
 from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.inputs import Course, driven
 from nonsmooth.flow.saltation import Jump
 from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.simulate import check_complete, run_length
@@ -38,24 +39,36 @@ class Variation:
     jumps : list of Jump
         Between the segments; transitions at one instant are one.
     transitions : list of tuple of int
+        Of each jump; none where inputs change.
     start : Jump or None
         The transitions taken at the start because they held already: nothing moves in time there.
     Phi, P : array (n, n), (n, n_active)
         Derivatives of the end in the start and in the parameters, at fixed times.
     """
 
-    def __init__(self, flow: VariationalFlow, values: FloatArray, log: Log, start: tuple[int, FloatArray],
-                 t_begin: float, t_end: float) -> None:  # fmt: skip
+    def __init__(
+        self, flow: VariationalFlow, values: FloatArray, log: Log, start: tuple[int, FloatArray], t_begin: float,
+        t_end: float, course: Course | None = None, changes: Sequence[float] = (),
+    ) -> None:  # fmt: skip
         first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
         flow.catch_up()
         self.start = settled(flow, values, start, first, t_begin)
-        self.modes, starts, self.times, self.transitions, before = apart(flow, log, first, t_begin)
+        self.modes, starts, self.times, self.transitions, before = apart(
+            flow, log, first, t_begin, [(t, k) for k, t in enumerate(changes, start=1)]
+        )
         taus = np.diff([*self.times, t_end])
         self.segments: Segments = flow.segments(values, self.modes, self.times, taus, starts)
-        self.jumps: list[Jump] = [
-            flow.jump(values, chain, t, z) for chain, t, z in zip(self.transitions, self.times[1:], before, strict=True)
-        ]
+        self.jumps: list[Jump] = []
+        for i, (chain, t, z) in enumerate(zip(self.transitions, self.times[1:], before, strict=True)):
+            if chain:
+                self.jumps.append(flow.jump(values, chain, t, z))
+            else:
+                assert course is not None
+                rates = self.segments.f_end[i], self.segments.f_begin[i + 1]
+                self.jumps.append(course.jump(flow, t, starts[i + 1], *rates))
         self.Phi, self.P = self.segments.Phi[0], self.segments.P[0]
+        if course is not None:
+            self.P = self.P + self.Phi @ course.by_delays(flow, self.segments.f_begin[0])
         if self.start is not None:
             self.Phi, self.P = self.Phi @ self.start.R_z, self.P + self.Phi @ self.start.R_p
         for i, jump in enumerate(self.jumps, start=1):
@@ -78,20 +91,39 @@ class Variation:
 
 
 def apart(
-    flow: VariationalFlow, log: Log, first: tuple[int, FloatArray], t_begin: float
-) -> tuple[list[int], list[FloatArray], list[float], list[tuple[int, ...]], list[FloatArray]]:
+    flow: VariationalFlow, log: Log, first: tuple[int, FloatArray], t_begin: float,
+    changes: Sequence[tuple[float, int]] = (),
+) -> tuple[list[int], list[FloatArray], list[float], list[tuple[int, ...]], list[FloatArray]]:  # fmt: skip
     """Segments of a run that begins in ``first`` = (mode, z): their modes, starts and times; the transitions between
-    them, those at one instant as one, and the state before each."""
+    them, those at one instant as one, and the state before each.
+
+    ``changes`` of inputs (their times, and the samples there) stand between segments too, as no transitions."""
     flow.catch_up()
     n_u, targets = flow.n_u, [jump.target for jump in flow.traced.transitions]
     modes, starts, times = [first[0]], [first[1]], [t_begin]
     transitions: list[tuple[int, ...]] = []
     before: list[FloatArray] = []
     memory = first[1][n_u:]
+    rest, crossings = list(changes), len(log.crossing_time)
+
+    def change(upto: float, crossing: int) -> None:
+        """Take the changes up to a time; one at the very time of a crossing comes before it."""
+        while rest and rest[0][0] <= upto:
+            t, k = rest.pop(0)
+            state = np.concatenate([np.nan_to_num(log.sample_u[k]), memory])
+            if crossing < crossings and log.crossing_time[crossing] == t:
+                state = np.concatenate([np.nan_to_num(log.u_before[crossing]), memory])
+            transitions.append(())
+            before.append(state)
+            modes.append(modes[-1])
+            starts.append(state)
+            times.append(float(t))
+
     for i, t in enumerate(log.crossing_time):
+        change(t, i)
         k = int(log.crossing_transition[i])
         after = np.concatenate([np.nan_to_num(log.u_after[i]), log.memory_after[i]])
-        if transitions and t == times[-1]:  # a chain at one instant
+        if transitions and transitions[-1] and t == times[-1]:  # a chain at one instant
             transitions[-1] += (k,)
             modes[-1], starts[-1] = targets[k], after
         else:
@@ -101,6 +133,7 @@ def apart(
             starts.append(after)
             times.append(float(t))
         memory = log.memory_after[i]
+    change(np.inf, crossings)
     return modes, starts, times, transitions, before
 
 
@@ -133,7 +166,9 @@ def settled(
     raise AssertionError("a run begins in a mode that no transitions lead to")
 
 
-def variation(system: System, flow: VariationalFlow, state: State, t_end: float) -> tuple[Variation, Log]:
+def variation(
+    system: System, flow: VariationalFlow, state: State, t_end: float, course: Course | None = None
+) -> tuple[Variation, Log]:
     """Run from ``state`` (t = 0) to ``t_end`` and take the run apart.
 
     Raises
@@ -143,10 +178,15 @@ def variation(system: System, flow: VariationalFlow, state: State, t_end: float)
     """
     engine = engine_for(system, rtol=RTOL)
     values = system.parameter_vector()
+    changes = None
+    if course is not None:
+        state.u[course.first :] = course.at(0.0)
+        changes = course.changes(0.0, t_end)
     start = int(state.counters[0]), np.concatenate([state.u, state.memory])
-    log = engine.record(engine.prepare(values[None, :]), state, t_end, np.zeros(1))
+    instants = np.zeros(1) if changes is None else np.append(0.0, changes.times)
+    log = engine.record(engine.prepare(values[None, :]), state, t_end, instants, changes=changes)
     check_complete(log, system, state, system.period())
-    return Variation(flow, values, log, start, 0.0, t_end), log
+    return Variation(flow, values, log, start, 0.0, t_end, course, instants[1:].tolist()), log
 
 
 @by_name
@@ -158,6 +198,7 @@ def sensitivity(
     start: Any = None,
     mode: str | None = None,
     parameters: Sequence[str] = (),
+    inputs: Any = None,
 ) -> xr.Dataset:
     r"""Derivatives of a run's end in its start and in parameters, through every transition.
 
@@ -173,7 +214,9 @@ def sensitivity(
     start, mode
         As in :func:`nonsmooth.simulate`.
     parameters : sequence of str
-        Parameters in which to differentiate.
+        Parameters in which to differentiate; the delay of an input is one.
+    inputs
+        As in :func:`nonsmooth.simulate`.
 
     Returns
     -------
@@ -197,11 +240,13 @@ def sensitivity(
     Transitions taken at the same instant stand as one crossing, with the last one's number. A parameter that has the
     name of a variable above (``P``, ``end``) is no coordinate of the result; `system_of` gives its value.
     """
-    check_system(system, "sensitivity")
+    check_system(system, "sensitivity", inputs=True)
+    drive = driven(system, inputs)
+    course = None if drive is None else drive.at(system.values)
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     flow = VariationalFlow.of(system, names)
     _, length = run_length(system, periods, duration, system.period(), 0.0)
-    found, log = variation(system, flow, first_state(system, start, mode), length)
+    found, log = variation(system, flow, first_state(system, start, mode), length, course)
     warn_if_slow(system, found.segments.z[:, : len(system.states)], log.u_before, log.u_after)
     parameter_part = found.P
     if periods is not None and names:
@@ -215,15 +260,21 @@ def sensitivity(
     options = {
         "periods": periods, "duration": duration, "start": plain_start(system, start), "mode": mode,
         "parameters": list(names),
+        "inputs": None if drive is None else drive.data(),
     }  # fmt: skip
     n = flow.n
+    crossings = [
+        (t, chain[-1], jump)
+        for t, chain, jump in zip(found.times[1:], found.transitions, found.jumps, strict=True)
+        if chain
+    ]
     return derivatives_of_run(
         labels, provenance(labels, "sensitivity", options, method="variational"), names,
-        Phi=found.Phi, P=parameter_part, end=found.segments.z[-1], crossing_time=found.times[1:],
-        crossing_transition=[chain[-1] for chain in found.transitions],
-        saltation=np.array([jump.saltation for jump in found.jumps]).reshape(-1, n, n),
-        log_det_saltation=[jump.log_determinant for jump in found.jumps],
-        transversality=[jump.transversality for jump in found.jumps],
+        Phi=found.Phi, P=parameter_part, end=found.segments.z[-1], crossing_time=[t for t, _, _ in crossings],
+        crossing_transition=[k for _, k, _ in crossings],
+        saltation=np.array([jump.saltation for _, _, jump in crossings]).reshape(-1, n, n),
+        log_det_saltation=[jump.log_determinant for _, _, jump in crossings],
+        transversality=[jump.transversality for _, _, jump in crossings],
         log_det=found.log_determinant, divergence=float(found.segments.divergence.sum()), trace=found.trace,
         status=log.status,
     )  # fmt: skip

@@ -13,6 +13,7 @@ from nonsmooth.flow.engines.engine import FloatArray, Log, State
 from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
 from nonsmooth.flow.failure import refuse_beyond_stops, solve_error, wrong_way
+from nonsmooth.flow.inputs import driven
 from nonsmooth.flow.loads import meter_of
 from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state, is_one_start, plain_start
@@ -43,6 +44,7 @@ def simulate(
     samples: Any = None,
     step: float | None = None,
     ramps: Mapping[str, Any] | None = None,
+    inputs: Any = None,
     method: str = "auto",
     rtol: float | None = None,
     atol: Any = None,
@@ -69,6 +71,9 @@ def simulate(
         Fixed step of ``"taylor"`` and ``"rkf45"``.
     ramps : mapping of parameter to (first, last) or callable, optional
         Parameters as functions of time in this run: linear over the recorded time, or ``f(t)``.
+    inputs : mapping of input to (time, values) or Input, or a table with a column ``time``, optional
+        The courses of the system's inputs, see :class:`nonsmooth.Input`. They begin at their own times, whatever the
+        transient.
     method, rtol, atol
         See :func:`nonsmooth.flow.engines.methods.engine_for`; rtol is 1e-9 where not given.
 
@@ -91,7 +96,7 @@ def simulate(
     SolveError
         The run could not be completed; it says where and why.
     """
-    check_system(system, "simulate")
+    check_system(system, "simulate", inputs=True)
     check_options(system, expert, simulate)
     period = system.period()
     unit, length = run_length(system, periods, duration, period, transient)
@@ -108,15 +113,22 @@ def simulate(
         traced = with_ramps(system, ramps, t_begin, t_end)
     width = 2 * len(traced.u) + len(traced.outputs) + 3  # of the log and of the result
     instants = _instants(samples, t_begin, t_end, None if ramps and period is None else period, width)
-    state = first_state(system, start, mode)
+    state, drive = first_state(system, start, mode), driven(system, inputs)
+    course = None if drive is None else drive.at(system.values)
+    if course is not None:
+        state.u[course.first :] = course.at(0.0)
     if not ramps:
         refuse_beyond_stops(system, state.u[None, :])
     engine = engine_for(system, method, rtol, atol, step, traced=traced if ramps else None, **expert)
     begun = np.abs(state.u)
     tables = engine.prepare(system.parameter_vector()[None, :])
     if t_begin > 0:
-        check_complete(engine.record(tables, state, t_begin, np.empty(0)), system, state, period)
-    log = engine.record(tables, state, t_end, instants)
+        changes = None if course is None else course.changes(0.0, t_begin)
+        check_complete(engine.record(tables, state, t_begin, np.empty(0), changes=changes), system, state, period)
+        if course is not None:
+            state.u[course.first :] = course.at(t_begin)
+    changes = None if course is None else course.changes(t_begin, t_end)
+    log = engine.record(tables, state, t_end, instants, changes=changes)
     check_complete(log, system, state, period)
     largest = np.nanmax(np.abs(np.vstack([begun, log.sample_u, log.u_before, log.u_after])), axis=0)
     warn_if_coarse(system, engine, largest)
@@ -125,6 +137,7 @@ def simulate(
         "periods": periods, "duration": duration, "start": plain_start(system, start), "mode": mode,
         "transient": transient, "samples": samples, "step": step,
         "ramps": None if not ramps else {k: v if not callable(v) else str(v) for k, v in ramps.items()},
+        "inputs": None if drive is None else drive.data(),
         "method": method, "rtol": rtol, "atol": atol, **expert,
     }  # fmt: skip
     traced = engine.traced if ramps else system.traced  # with what the run has visited and found
@@ -138,7 +151,7 @@ def simulate(
             values = values_along(system, ramps, t_begin, t_end, log.crossing_time)
         crossings = log.crossing_time, log.u_before, log.u_after, log.memory_after
         found = with_impacts(found, meter.at_crossings, meter.impacts(values, *crossings, largest)[:3])
-    note = "" if ramps else _resting(system, begun, log, state)
+    note = "" if ramps or drive is not None else _resting(system, begun, log, state)
     return found.assign_attrs(note=note) if note else found
 
 

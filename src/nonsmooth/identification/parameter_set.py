@@ -119,6 +119,20 @@ class ParameterSet(Mapping[str, float]):
                 return finding.data
         raise ValueError("this set holds no residuals: they are those of a fit, ns.fit(...), made in this session")
 
+    @property
+    def posterior(self) -> xr.DataArray:
+        """Draws of all unknowns over ``draw`` and ``parameter``, of a set that ``fit(..., posterior=)`` found.
+
+        Raises
+        ------
+        ValueError
+            If there are none: they are asked for, and not kept in files.
+        """
+        for finding in self.findings:
+            if finding.name == "posterior" and finding.data is not None:
+                return finding.data["value"]
+        raise ValueError("this set holds no posterior: ask for one, ns.fit(..., posterior=2000), in this session")
+
     @staticmethod
     def _labelled(names: list[str], matrix: FloatArray) -> xr.DataArray:
         import xarray as xr
@@ -157,8 +171,15 @@ class ParameterSet(Mapping[str, float]):
         )  # fmt: skip
 
     def draw(self, n: int, seed: int = 0) -> dict[str, FloatArray]:
-        """``n`` sets of the model's parameters, correlated as known; those known to a factor are log-normal."""
+        """``n`` sets of the model's parameters, correlated as known; those known to a factor are log-normal.
+
+        They are rows of the posterior where the set has one.
+        """
         names = list(self.estimates)
+        if any(finding.name == "posterior" and finding.data is not None for finding in self.findings):
+            table = self.posterior.sel(parameter=names).values
+            table = table[np.random.default_rng(seed).integers(len(table), size=n)]
+            return {name: table[:, i].copy() for i, name in enumerate(names)}
         centre = np.array([self[name] for name in names])
         matrix = np.array(self._covariance[: len(names), : len(names)])
         logarithmic = np.array([self.estimates[name].logarithmic and self[name] > 0 for name in names])

@@ -38,20 +38,21 @@ class _Reader:
         t = system._description.traced
         self.t, self.u, self.p = t.t, list(t.u), list(t.p)
         first = self._smooth(t)
-        pairs = [(i, self.u.index(e)) for i, e in enumerate(first) if e in self.u and e != self.u[i]]
+        names, driven = list(system.states), {self.u[list(system.states).index(name)] for name in system.inputs}
+        pairs = [(i, self.u.index(e)) for i, e in enumerate(first) if e in self.u and self.u[i] not in driven | {e}]
         if not pairs:
             raise ValueError(
                 f"{system.name!r} has no mass to draw: no state whose derivative is another state, its speed"
             )
-        names = list(system.states)
         self.names = [names[i] for i, _ in pairs]
         self.q, self.v = [self.u[i] for i, _ in pairs], [self.u[j] for _, j in pairs]
         self.acceleration = [first[j] for _, j in pairs]
         self.speeds = [j for _, j in pairs]
-        self.still = dict.fromkeys(self.u, 0)
+        self.still = {one: 0 for one in self.u if one not in driven}
         self.values = dict(zip(self.p, (system.values[name] for name in t.parameter_names), strict=True))
         self.symbols = {one: system.parameters[name].symbol or latex_name(name)
                         for one, name in zip(self.p, t.parameter_names, strict=True)} | {self.t: "t"}  # fmt: skip
+        self.symbols |= {one: latex_name(name) for one, name in zip(self.u, names, strict=True) if one in driven}
 
     def _smooth(self, t: Any) -> tuple[Any, ...]:
         """The vector field without contacts: of a system whose surfaces slide what both sides have in common."""

@@ -96,7 +96,7 @@ def _sensor(group: list[Trace], source: Source, axis: str, remarks: Remarks) -> 
             remarks.of(trace.run, trace.name, sentence)
 
     attrs: dict[str, Any] = _clock(first, where, source, note) if axis == "time" else {}
-    if len(first.values) < SHORT and any(trace.name != EVENTS for trace in group):
+    if axis == "time" and len(first.values) < SHORT and any(trace.name != EVENTS for trace in group):
         note(f"only {len(first.values)} samples; too short to identify anything from")
     variables: dict[str, Any] = {}
     for trace in group:
@@ -129,13 +129,14 @@ def _clock(trace: Trace, where: str, source: Source, note: Callable[[str], None]
         raise source.error(
             trace.place(i + 1),
             f"{where}: time goes back from {time[i]:.9g} s to {time[i + 1]:.9g} s; if a new run begins here, "
-            "name the column that numbers the runs, columns={'run': ...}",
+            "name the column that numbers the runs, columns={'run': ...}; if a counter begins anew there, say at which "
+            "count, wraps={'time': 2**32}",
         )
     clock = examine(time)
     if clock.repeated:
         note(
             f"{clock.repeated} of {len(time) - 1} time steps are zero; the times were written with too few "
-            "digits (export more of them) or samples stand twice"
+            "digits (export more of them, or give rate=) or samples stand twice"
         )
     if clock.change is not None:
         i, before, after = clock.change

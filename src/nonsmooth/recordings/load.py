@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 import math
 import os
+import re
 import stat
 import warnings
-from collections.abc import Callable, Mapping
+import zlib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -17,7 +19,7 @@ import numpy as np
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.assemble import assemble
-from nonsmooth.recordings.limits import MAX_FILE_BYTES
+from nonsmooth.recordings.limits import MAX_FILE_BYTES, inflation_limit
 from nonsmooth.recordings.reading import Column, Options, Reading, Source, Trace, names_of
 from nonsmooth.recordings.recording import Recording, RecordingWarning
 
@@ -29,9 +31,29 @@ FORMATS = {
     "capstone-cap": "capstone_cap",
     "csv": "delimited",
     "lvm": "lvm",
-    "tdms": "tdms",
-    "mat": "matlab",
+    "tdms": "arrays",
+    "mat": "arrays",
+    "hdf5": "arrays",
+    "npy": "arrays",
+    "xlsx": "sheets",
+    "arrow": "arrays",
+    "wav": "arrays",
+    "uff": "arrays",
+    "mf4": "arrays",
 }
+#: Formats by the first bytes of a file, and of an archive by a member's name.
+_BEGINS = {
+    b"PK\x03\x04": "zip",
+    b"TDSm": "tdms",
+    b"MATLAB ": "mat",
+    b"\x89HDF\r\n\x1a\n": "hdf5",
+    b"\x93NUMPY": "npy",
+    b"PAR1": "arrow",
+    b"ARROW1": "arrow",
+    b"RIFF": "wav",
+    b"MDF     ": "mf4",
+}
+_MEMBERS = {b"xl/workbook.xml": "xlsx", b".npy": "npy"}
 _SPOKEN = 20  # warnings shown one by one; the rest is counted, and all are in Recording.warnings
 
 
@@ -45,32 +67,53 @@ def load_recording(
     units: Mapping[str, str] | None = None,
     delimiter: str | None = None,
     decimal: str | None = None,
+    thousands: str | None = None,
+    header: int | None = None,
+    units_row: int | None = None,
+    skip: int | str | Sequence[str] = 0,
+    na: str | Sequence[str] = (),
+    wraps: Mapping[str, float] | None = None,
 ) -> Recording:
     """Read what an instrument recorded: runs, channels, units, sample rates, and where each came from.
 
-    PASCO Capstone (``.csv`` exports in both locales, ``.cap``), any table (CSV, TSV), LabVIEW (``.lvm``, ``.tdms``)
-    and MATLAB (``.mat``, v5 to v7.3). The format is told by the content, not by the file's name.
+    PASCO Capstone (``.csv`` exports in both locales, ``.cap``), any table (CSV, TSV, ``.xlsx``), LabVIEW (``.lvm``,
+    ``.tdms``), and files of arrays: MATLAB (``.mat``, v5 to v7.3), HDF5, NumPy (``.npy``, ``.npz``), Parquet and
+    Feather, ``.wav``, universal files (data sets 58) and ASAM MDF (``.mf4``); packed by gzip too. The format is told by
+    the content, not by the file's name.
 
     Parameters
     ----------
     path : path
         The file.
     format : str, optional
-        ``"capstone-csv"``, ``"capstone-cap"``, ``"csv"``, ``"lvm"``, ``"tdms"`` or ``"mat"``, where the content is
-        not to be asked.
+        One of ``"capstone-csv"``, ``"capstone-cap"``, ``"csv"``, ``"xlsx"``, ``"lvm"``, ``"tdms"``, ``"mat"``,
+        ``"hdf5"``, ``"npy"``, ``"arrow"``, ``"wav"``, ``"uff"``, ``"mf4"``, where the content is not to be asked.
     columns : mapping, optional
-        For tables and MATLAB files: our name -> the file's column, by its header, or its place counted from 0, or
-        ``(column, unit)``. ``"time"`` (or ``axis``) names the time column and ``"run"`` a column that numbers
-        the runs. Columns that are not named are left out.
+        For tables and arrays: our name -> the file's column, by its header, or its place counted from 0, or
+        ``(column, unit)``; in files of arrays by path. ``"time"`` (or ``axis``) names the time column and ``"run"`` a
+        column that numbers the runs. Columns that are not named are left out.
     axis : str
         What the samples stand over; ``"time"`` in seconds, or e.g. ``"frequency"`` for a table of responses.
     rate : float, optional
-        Sample rate in Hz, for files that have no time column; time then begins at 0.
+        Sample rate in Hz, for files that have no time column, or one not to be used; time then begins at 0.
     units : mapping, optional
         Units of channels, for what the file does not say; they replace what it says. By channel (``"Angle, Ch P2"``),
-        or by quantity for all channels that measure it (``"Angle"``).
-    delimiter, decimal : str, optional
-        For tables: the character between fields and the decimal mark, where they are not to be guessed.
+        or by quantity for all channels that measure it (``"Angle"``). That of ``"time"`` is a unit of time, or the
+        form of its stamps in the letters of ``strptime``: ``{"time": "%d.%m.%Y %H:%M:%S,%f"}``. Stamps as
+        ``2026-05-31T14:05:09.25`` and ``14:05:09.25`` need none.
+    delimiter, decimal, thousands : str, optional
+        For tables: the character between fields, the decimal mark, and the mark between thousands, where they are not
+        to be guessed (the last one never is).
+    header, units_row : int, optional
+        For tables: the lines, counted from 1, of the column names and of a row of units below them.
+    skip : int, str or sequence of str
+        For tables: the number of lines to leave out at the top, or the beginnings of lines to leave out anywhere.
+    na : str or sequence of str
+        For tables: texts that stand for a missing value, ``"#N/A"``.
+    wraps : mapping, optional
+        Channels (or ``"time"``) that are counters, and where each begins anew: ``{"angle": 65536}``; in the unit of the
+        file, seconds for time stamps (``{"time": 86400}`` for a clock that passes midnight). Two neighbouring samples
+        are taken to differ by less than half of it.
 
     Returns
     -------
@@ -93,6 +136,12 @@ def load_recording(
     >>> ns.load_recording("log.csv", columns={"time": "t", "x": ("pos", "mm")})     # doctest: +SKIP
     """
     options = _checked(format, columns, axis, rate, units, delimiter, decimal)
+    options = replace(
+        options, thousands=_mark(thousands, options.decimal), header=_line(header, "header"),
+        units_row=_line(units_row, "units_row"), skip=_line(skip, "skip") if isinstance(skip, int) else 0,
+        leave=() if isinstance(skip, int) else _texts(skip, "skip"), na=_texts(na, "na"),
+        wraps=_periods(wraps or {}),
+    )  # fmt: skip
     file = Path(path)
     recording = parse_recording(content_of(file), file.name, options, format=format)
     for remark in recording.warnings[:_SPOKEN]:
@@ -106,9 +155,11 @@ def load_recording(
 def parse_recording(data: bytes, name: str, options: Options | None = None, *, format: str | None = None) -> Recording:
     """The recording in ``data``; ``name`` is what errors call it."""
     options = options or Options()
-    unread = Source(name, len(data), "", "")
+    unread, digest = Source(name, len(data), "", ""), hashlib.sha256(data).hexdigest()
+    if data.startswith(b"\x1f\x8b"):
+        data = _unpacked(data, unread)
     kind = format if format is not None else _detect(data, unread, options)
-    source = Source(name, len(data), hashlib.sha256(data).hexdigest(), kind)
+    source = Source(name, unread.size, digest, kind)
     reader = import_module(f"nonsmooth.recordings.readers.{FORMATS[kind]}")
     read: Callable[[bytes, Source, Options], Reading] = reader.read
     # Numbers from elsewhere may lie at both ends of the range of doubles; what is not finite is judged by assemble.
@@ -116,6 +167,18 @@ def parse_recording(data: bytes, name: str, options: Options | None = None, *, f
         reading = read(data, source, options)
         _replace_units(reading, source, options)
         return assemble(reading, source, _given(options), options.axis)
+
+
+def _unpacked(data: bytes, source: Source) -> bytes:
+    """The content of a file that gzip has packed."""
+    limit = inflation_limit(len(data))
+    try:
+        content = zlib.decompressobj(wbits=31).decompress(data, limit + 1)
+    except zlib.error as error:
+        raise source.error("", f"cannot be unpacked, it is damaged or cut short ({error})") from error
+    if len(content) > limit:
+        raise source.error("", f"unpacks to more than {limit} bytes, more than its size warrants: unpack it yourself")
+    return content
 
 
 def _checked(
@@ -150,6 +213,32 @@ def _checked(
     return Options(columns, axis, None if rate is None else float(rate), dict(units or {}), delimiter, decimal)
 
 
+def _mark(thousands: str | None, decimal: str | None) -> str | None:
+    if thousands is not None and (thousands not in (".", ",", " ", "'", "\u00a0", "\u202f") or thousands == decimal):
+        raise ValueError(f"thousands must be one of . , ' or a space, and not the decimal mark, got {thousands!r}")
+    return thousands
+
+
+def _line(given: Any, name: str) -> int:
+    if given is not None and (isinstance(given, bool) or not isinstance(given, int) or given < (name != "skip")):
+        raise ValueError(f"{name} must be the number of a line, counted from 1, got {given!r}")
+    return given or 0
+
+
+def _texts(given: str | Sequence[str], name: str) -> tuple[str, ...]:
+    texts = (given,) if isinstance(given, str) else tuple(given)
+    if not all(isinstance(text, str) and text.strip() for text in texts):
+        raise TypeError(f"{name} must be a text or several, {name}='#N/A', got {given!r}")
+    return texts
+
+
+def _periods(wraps: Mapping[str, float]) -> dict[str, float]:
+    for name, period in wraps.items():
+        if isinstance(period, bool) or not isinstance(period, int | float) or not 0 < period < math.inf:
+            raise ValueError(f"wraps[{name!r}] must be the count at which it begins anew, 65536 e.g., got {period!r}")
+    return {name: float(period) for name, period in wraps.items()}
+
+
 def content_of(file: Path) -> bytes:
     """The bytes of a regular file of at most 1 GiB.
 
@@ -180,17 +269,21 @@ def _without_waiting(path: str, flags: int) -> int:
 
 def _detect(data: bytes, source: Source, options: Options) -> str:
     """The format, by the first bytes."""
-    if data.startswith(b"PK\x03\x04"):
-        return "capstone-cap"
-    if data.startswith(b"TDSm"):
-        return "tdms"
-    if data.startswith((b"MATLAB ", b"\x89HDF\r\n\x1a\n")):
-        return "mat"
+    for begin, kind in _BEGINS.items():
+        if data.startswith(begin):
+            if kind == "zip":
+                return next((k for part, k in _MEMBERS.items() if part in data), "capstone-cap")
+            return "mat" if kind == "hdf5" and source.name.endswith(".mat") else kind
     if data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"LabVIEW Measurement"):
         return "lvm"
+    if re.match(rb"\s*-1\s*\n\s+\d+", data[:200]):
+        return "uff"
     if b"\0" in data[:4096] and not data.startswith((b"\xff\xfe", b"\xfe\xff")):
         hint = "a .mat file of version 4 is not read: save it again with -v7" if source.name.endswith(".mat") else ""
-        known = "is none of the formats known: Capstone .csv and .cap, tables, LabVIEW .lvm and .tdms, MATLAB .mat"
+        known = (
+            "is none of the formats known: Capstone .csv and .cap, tables, .xlsx, LabVIEW .lvm and .tdms, MATLAB .mat, "
+            "HDF5, .npy and .npz, Parquet and Feather, .wav, universal files, .mf4; give format= if it is one of them"
+        )
         raise source.error("", known + (f" ({hint})" if hint else ""))
     from nonsmooth.recordings.readers.capstone_csv import looks_like_capstone
 
@@ -200,9 +293,11 @@ def _detect(data: bytes, source: Source, options: Options) -> str:
 
 def _replace_units(reading: Reading, source: Source, options: Options) -> None:
     names = {trace.name for trace in reading.traces}
+    for name in set(options.wraps) - names - {options.axis}:
+        raise source.error("", f"wraps names {name!r}, which is no channel; there are: {names_of(sorted(names))}")
     quantities = {trace.attrs.get("measurement", trace.name) for trace in reading.traces}
     for name in options.units:
-        if name not in names | quantities:
+        if name not in names | quantities | {options.axis}:
             raise source.error("", f"units names {name!r}, which is no channel; there are: {names_of(sorted(names))}")
 
     def unit(trace: Trace) -> str:

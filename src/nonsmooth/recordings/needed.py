@@ -11,9 +11,9 @@ from nonsmooth.recordings.reading import Source
 __all__ = ["needed"]
 
 
-def needed(module: str, package: str, source: Source) -> ModuleType:
+def needed(module: str, package: str, source: Source, extra: str = "experiment") -> ModuleType:
     """Import ``module``; where it is missing, a DataFileError that says how to get it."""
     try:
         return import_module(module)
     except ImportError as error:
-        raise source.error("", f"reading it needs {not_installed(package, 'experiment')}") from error
+        raise source.error("", f"reading it needs {not_installed(package, extra)}") from error

@@ -53,7 +53,8 @@ SETTINGS: Mapping[str, tuple[type, str, str]] = MappingProxyType({
     "note": (str, "", "a remark"),
 })  # fmt: skip
 
-_READ = ("format", "columns", "axis", "rate", "units", "delimiter", "decimal")
+_READ = ("format", "columns", "axis", "rate", "units", "delimiter", "decimal", "thousands", "header", "units_row",
+         "skip", "na", "wraps")  # fmt: skip
 
 
 @dataclass(frozen=True)

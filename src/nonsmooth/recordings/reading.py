@@ -24,13 +24,15 @@ __all__ = [
 
 #: What instruments call the time column, lower case, in the languages their programs speak.
 TIME_WORDS = frozenset(
-    ["time", "t", "zeit", "temps", "tiempo", "tempo", "tid", "tijd", "aika", "czas", "čas", "laiks", "laikas",
+    ["time", "t", "timestamp", "datetime", "zeit", "temps", "tiempo", "tempo", "tid", "tijd", "aika", "czas", "čas",
+     "laiks", "laikas",
      "время", "时间", "時間", "시간"]
 )  # fmt: skip
 
 #: Time units and their length in seconds. The empty unit is taken for seconds, with a remark.
 TIME_SCALES = {
-    "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0,
+    "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9, "min": 60.0,
+    "h": 3600.0, "d": 86400.0,
 }  # fmt: skip
 
 #: A column of a file: its name there or its place (from 0), and its unit where the file does not say it.
@@ -61,6 +63,13 @@ class Options:
     units: Mapping[str, str] = field(default_factory=dict)
     delimiter: str | None = None
     decimal: str | None = None
+    thousands: str | None = None
+    header: int = 0
+    units_row: int = 0
+    skip: int = 0
+    leave: tuple[str, ...] = ()
+    na: tuple[str, ...] = ()
+    wraps: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,12 +112,13 @@ def is_axis_name(name: str, axis: str) -> bool:
     word = name.strip().casefold()
     if word == axis.casefold():
         return True
-    return axis == "time" and (word in TIME_WORDS or word.removesuffix("_s") in TIME_WORDS)
+    stem, _, unit = word.rpartition("_")  # t_s
+    return axis == "time" and (word in TIME_WORDS or (stem in TIME_WORDS and unit in ("s", "ms", "us")))
 
 
 def scaled_time(values: FloatArray, unit: str) -> FloatArray | None:
     """Times in seconds; None if ``unit`` is no unit of time."""
-    scale = 1.0 if unit == "" else TIME_SCALES.get(unit.strip())
+    scale = 1.0 if unit == "" else TIME_SCALES.get(unit.partition(" since ")[0].strip())
     if scale is None:
         return None
     return values if scale == 1.0 else values * scale

@@ -22,6 +22,7 @@ from nonsmooth.system.equations import (
     trace_surface,
     trace_system,
 )
+from nonsmooth.system.inputs import input_states, with_inputs
 from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.names import check_names, unknown
 from nonsmooth.system.parameter import Parameter, finite_number
@@ -62,6 +63,7 @@ class Description:
     )  # without elements
     relays: bool = False  # the elements are the surfaces that were given
     loads: Loads | None = None  # of a system with elements
+    inputs: Mapping[str, str] = field(default_factory=dict)  # those of the states that stand for inputs, by unit
     variants: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # a cache, see variant.py
 
     def with_loads(self, loads: Loads) -> Description:
@@ -112,6 +114,7 @@ def describe(
     bands: Mapping[str, Band] | None,
     elements: Any = None,
     impacts: str = "simultaneous",
+    inputs: Mapping[str, str] | Sequence[str] | None = None,
 ) -> Description:
     """Check everything, call each function once with symbols, and return the description."""
     if not isinstance(name, str) or not name:
@@ -121,6 +124,11 @@ def describe(
     units = _units(states, "states", name)
     if not units:
         raise SystemDefinitionError(f"{name!r}: a system needs at least one state")
+    driven = _units(inputs or {}, "inputs", name)
+    if driven:
+        made_of = {"name": name, "modes": modes, "transitions": transitions, "symmetry": symmetry, "bands": bands}
+        made_of = with_inputs(driven, made_of)
+        modes, transitions, units = made_of["modes"], made_of["transitions"], units | input_states(driven)
     _is_mapping(parameters, "parameters", name, '{"m": (0.838, "kg"), "k": 8.47}')
     known = {key: Parameter.read(key, given) for key, given in parameters.items()}
     _is_mapping(modes, "modes", name, '{"free": free, "contact": contact}')
@@ -128,7 +136,8 @@ def describe(
         raise SystemDefinitionError(f"{name!r}: a system needs at least one mode")
     remembered = {key: _memory(key, given) for key, given in _units(memory or {}, "memory", name, raw=True).items()}
     symbols = Symbols(
-        name, units, {k: v.unit for k, v in known.items()}, {k: unit for k, (_, unit) in remembered.items()}
+        name, units, {k: v.unit for k, v in known.items()}, {k: unit for k, (_, unit) in remembered.items()},
+        tuple(input_states(driven)),
     )
     derived: Collection[str] = ()
     ranges: Sequence[tuple[sp.Expr, str]] = ()
@@ -197,6 +206,7 @@ def describe(
         bands=tuple(trace_band(key, band, traced, symbols, shown, known) for key, band in bands.items()),
         symmetry=None if symmetry is None else trace_symmetry(symmetry, traced, symbols, values),
         explicit_time=explicit, ranges=tuple(ranges), plain=plain, relays=relays is not None, loads=loads,
+        inputs=driven,
     )  # fmt: skip
     return description if loads is None else description.with_loads(loads)
 

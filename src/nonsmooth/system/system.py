@@ -60,6 +60,9 @@ class System:
     impacts : {"simultaneous", "sequential"}, optional
         Impacts of several contacts at one instant: all at once by Newton's law, or one after the other, the fastest
         approach first, as of bodies that are not quite in touch.
+    inputs : mapping of str to str, or sequence of str, optional
+        Names and units of inputs, ``{"force": "N"}``: functions of time that come with a run, such as a measured force;
+        read as ``p.force``, its rate as ``p.force_rate``. Both stand among the states, behind the system's own.
     name : str
 
     Raises
@@ -94,12 +97,13 @@ class System:
         bands: Mapping[str, Band] | None = None,
         elements: Any = None,
         impacts: str = "simultaneous",
+        inputs: Mapping[str, str] | Sequence[str] | None = None,
         name: str = "system",
     ) -> None:
         description = describe(
             name=name, states=states, parameters=parameters, modes=modes, indicators=indicators,
             transitions=transitions, memory=memory, outputs=outputs, symmetry=symmetry, scale=scale,
-            period=period, bands=bands, elements=elements, impacts=impacts,
+            period=period, bands=bands, elements=elements, impacts=impacts, inputs=inputs,
         )  # fmt: skip
         values = {key: parameter.value for key, parameter in description.parameters.items()}
         self._set(description, values, variant_of(description, SHARP))
@@ -176,6 +180,11 @@ class System:
     def outputs(self) -> Mapping[str, str]:
         """Names and units of the outputs."""
         return MappingProxyType(dict(self._description.outputs))
+
+    @property
+    def inputs(self) -> Mapping[str, str]:
+        """Names and units of the inputs."""
+        return MappingProxyType(dict(self._description.inputs))
 
     @property
     def scale(self) -> Mapping[str, float]:

@@ -17,6 +17,7 @@ from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.condition import condition_text
 from nonsmooth.system.description import Description
 from nonsmooth.system.equations import TracedSurface
+from nonsmooth.system.inputs import input_states
 from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.symbolic.expressions import read_expression, write_expression
 from nonsmooth.system.symbolic.scalar import Scalar
@@ -127,6 +128,8 @@ def _content(d: Description) -> dict[str, Any]:
             for k, row in zip(t.output_names, t.outputs, strict=True)
         },
     }
+    if d.inputs:
+        content["inputs"] = dict(d.inputs)
     if d.traced.period is not None:
         content["period"] = text(d.traced.period)
     if d.symmetry is not None:
@@ -258,6 +261,7 @@ class _Reader:
     def __init__(self, content: Mapping[str, Any]) -> None:
         self.content = content
         self.bands = content.get("bands", {})
+        self.driven = input_states(content.get("inputs", {}))
         memory = {key: entry["unit"] for key, entry in content.get("memory", {}).items()}
         parameters = {key: entry["unit"] for key, entry in content["parameters"].items()}
         symbols = Symbols(content["name"], content["states"], parameters, memory)
@@ -273,17 +277,23 @@ class _Reader:
         parts = [self.function(text, extra)() for text in texts.values()]
         return lambda *_: parts
 
+    def own(self, texts: Mapping[str, str]) -> Callable[..., Any]:
+        """A vector without the entries of inputs, whose motion is that of all inputs."""
+        return self.vector({state: text for state, text in texts.items() if state not in self.driven})
+
     def arguments(self) -> dict[str, Any]:
         c = self.content
         memory = c.get("memory", {})
         symmetry = c.get("symmetry")
+        own = [name for name in c["states"] if name not in self.driven]
         return {
             "name": c["name"],
-            "states": c["states"],
+            "states": {name: c["states"][name] for name in own},
+            "inputs": c.get("inputs"),
             "scale": c["scale"],
             "parameters": {k: (e["value"], e["unit"], e["symbol"]) for k, e in c["parameters"].items()},
             "memory": {k: (e["value"], e["unit"]) for k, e in memory.items()},
-            "modes": {k: Mode(self.vector(e), states=list(e)) for k, e in c["modes"].items()},
+            "modes": {k: Mode(self.own(e), states=[s for s in e if s in own]) for k, e in c["modes"].items()},
             "indicators": {k: self.function(e) for k, e in c["indicators"].items()},
             "transitions": [self.transition(e) for e in c["transitions"]],
             "outputs": {
@@ -357,14 +367,14 @@ class _Reader:
             return Surface(
                 entry["surface"], below=entry["below"], above=entry["above"], mode=entry.get("mode"),
                 static=self.function(entry["static"]) if "static" in entry else None,
-                field=self.vector(entry["field"]) if "field" in entry else None,
+                field=self.own(entry["field"]) if "field" in entry else None,
             )  # fmt: skip
         return Transition(
             entry["source"],
             entry["target"],
             when=entry.get("when"),
             at=self.function(entry["at"]) if isinstance(entry.get("at"), str) else entry.get("at"),
-            reset=self.vector(entry["reset"]) if "reset" in entry else None,
+            reset=self.own(entry["reset"]) if "reset" in entry else None,
             write={k: self.function(e) for k, e in entry["write"].items()} if "write" in entry else None,
         )
 

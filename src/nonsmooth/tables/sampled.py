@@ -69,7 +69,7 @@ def _anew(run: xr.Dataset, instants: NDArray[np.float64]) -> xr.Dataset | None:
     record = read_provenance(run) if ATTRIBUTE in run.attrs else {}
     options = record.get("options") or {}
     ramps = options.get("ramps") or {}
-    if record.get("verb") != "simulate" or any(isinstance(one, str) for one in ramps.values()):
+    if record.get("verb") != "simulate" or options.get("inputs") or any(isinstance(one, str) for one in ramps.values()):
         return None
     known = {key: value for key, value in options.items() if value is not None}
     last = run["time"].values[-1:]

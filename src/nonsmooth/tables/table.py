@@ -52,7 +52,7 @@ def table(
     step, samples : float, int or array, optional
         Of a run: its motion every ``step`` of time, at so many equidistant instants, or at the instants given. They are
         computed anew, as the run was, so that no value is interpolated; where the run's record does not tell how it was
-        made (a ramp that is a function), by cubic splines between crossings, with a warning.
+        made (measured inputs, a ramp that is a function), by cubic splines between crossings, with a warning.
     units : bool
         False: names alone in the header.
     file : path, optional

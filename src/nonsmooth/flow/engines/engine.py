@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nonsmooth.arrays import FloatArray
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 
-__all__ = ["Kept", "Log", "Section", "State"]
+__all__ = ["Changes", "Kept", "Log", "Section", "State"]
 
 IntArray = NDArray[np.int64]
 
@@ -54,6 +54,15 @@ class State:
 
     def copy(self) -> State:
         return State(self.u.copy(), self.memory.copy(), self.clock.copy(), self.counters.copy(), self.settled)
+
+
+class Changes(NamedTuple):
+    """Instants (K,) at which states that stand for inputs change, their values (K, m) from then on, and the number of
+    the first of these states."""
+
+    times: FloatArray
+    values: FloatArray
+    first: int
 
 
 @dataclass

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, Kept, Log, Section, State
+from nonsmooth.flow.engines.engine import Changes, FloatArray, Kept, Log, Section, State
 from nonsmooth.flow.engines.march import March
 from nonsmooth.kernels.hybrid import codes, places
 from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, FIRED, MODE, RESET, STARTS, TIME, TOUCHES, WAITS
@@ -142,6 +142,10 @@ class Engine(ABC):
         return 0.0
 
     @cached_property
+    def _unchanged(self) -> Changes:
+        return Changes(np.zeros(0), np.zeros((0, 0)), 0)
+
+    @cached_property
     def phases(self) -> Callable[[Any], FloatArray] | None:
         """``Net.at`` as a function of the parameters; None where no phase depends on them."""
         return varying_phases(self.traced)
@@ -229,24 +233,28 @@ class Engine(ABC):
         return [_crossings(1024, n_u, n_m), _touches(1024, n_u)]
 
     def record(
-        self, tables: Any, state: State, until: float, samples: FloatArray, room: Any = None
-    ) -> Log:
+        self, tables: Any, state: State, until: float, samples: FloatArray, room: Any = None,
+        changes: Changes | None = None,
+    ) -> Log:  # fmt: skip
         """Point 0: march ``state`` to the time ``until``, with dense samples at the increasing absolute times
-        ``samples`` (a sample exactly at a crossing is the limit after it). A state that a mode lacks is NaN."""
+        ``samples`` (a sample exactly at a crossing is the limit after it). A state that a mode lacks is NaN.
+
+        States that stand for inputs are given new values at the times of ``changes``."""
         from nonsmooth.kernels.hybrid import records
 
         n, n_u, n_m = len(samples), len(self.scale), len(self.traced.m)
         sampled = _samples(samples, n_u, n_m) if n else self._none[0]
         crossings, touches = Engine.room(self, tables) if room is None else room
         spare, march = self.touches_of_a_leg(), self.march()
+        given = self._unchanged if changes is None else changes
         state.counters[1] = int(state.settled)
         march.logged(state, float(until))
-        march.log.put(records.Log(*(*sampled, *crossings, *touches, spare)))
+        march.log.put(records.Log(*(*sampled, *crossings, *touches, spare, *given)))
         code, system = self._run(march, tables)
         while code == codes.LOG_FULL:
             crossings = _longer(crossings, _crossings(2 * len(crossings[0]), n_u, n_m))
             touches = _longer(touches, _touches(2 * len(touches[0]) + spare, n_u))
-            march.log.put(records.Log(*(*sampled, *crossings, *touches, spare)))
+            march.log.put(records.Log(*(*sampled, *crossings, *touches, spare, *given)))
             code, system = self._go_on(march, tables, -1, system)
         state.settled = True
         tally = system[3].tally

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Log, Section, State
+from nonsmooth.flow.engines.engine import Changes, FloatArray, IntArray, Kept, Log, Section, State
 from nonsmooth.flow.engines.linear import table_bytes
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.march import March
@@ -108,9 +108,12 @@ class PatternEngine(Engine):
     def room(self, tables: Points) -> None:
         """None: a pattern that is met for the first time changes the memory."""
 
-    def record(self, tables: Points, state: State, until: float, samples: FloatArray, room: Any = None) -> Log:
+    def record(
+        self, tables: Points, state: State, until: float, samples: FloatArray, room: Any = None,
+        changes: Changes | None = None,
+    ) -> Log:  # fmt: skip
         here, _ = self.enter(tables, 0, state)
-        log = super().record(here, state, until, samples)
+        log = super().record(here, state, until, samples, changes=changes)
         here.leave(state)
         numbers = np.array(here.numbers, dtype=np.int64)
         log.sample_mode = np.where(log.sample_mode < 0, -1, numbers[log.sample_mode])

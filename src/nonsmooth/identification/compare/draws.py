@@ -89,7 +89,8 @@ def settled(settings: Settings, values: Mapping[str, float]) -> dict[str, float]
 
 
 def draw_systems(
-    system: System, parameters: Any, settings: Settings, draws: int, seed: int
+    system: System, parameters: Any, settings: Settings, draws: int, seed: int,
+    bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
 ) -> tuple[list[System], dict[str, np.ndarray]]:
     """Systems whose parameters are drawn from their joint law, and the draws by name.
 
@@ -102,11 +103,13 @@ def draw_systems(
     settings : mapping
         As from :func:`read_settings`: independent, normal; a setting that is also a parameter replaces it.
     draws, seed : int
+    bounds : mapping, optional
+        ``{name: (low, high)}``, None for no end: a draw outside is drawn again.
 
     Raises
     ------
     ValueError
-        A covariance from which almost no draw is allowed by the system's equations.
+        Bounds that are not such; a covariance from which almost no draw is allowed by the system's equations.
 
     Notes
     -----
@@ -115,6 +118,7 @@ def draw_systems(
     """
     rng = np.random.default_rng(seed)
     base = nominal(system, parameters, settings)
+    allowed = _ends(bounds or {}, system)
     systems: list[System] = []
     kept: dict[str, list[float]] = {}
     refused = 0
@@ -136,7 +140,8 @@ def draw_systems(
             except (SystemDefinitionError, ValueError):
                 refused += 1
                 continue
-            if any(base.values[name] > 0 >= value and name not in settings for name, value in row.items()):
+            negative = any(base.values[name] > 0 >= value and name not in settings for name, value in row.items())
+            if negative or any(not low <= drawn.values[name] <= high for name, (low, high) in allowed.items()):
                 refused += 1
                 continue
             systems.append(drawn)
@@ -148,6 +153,24 @@ def draw_systems(
                 "uncertainty is many times its value; identify it better, or leave it out of the covariance"
             )
     return systems, {name: np.array(column) for name, column in kept.items()}
+
+
+def _ends(bounds: Mapping[str, Any], system: System) -> dict[str, tuple[float, float]]:
+    from nonsmooth.system.names import unknown
+
+    found = {}
+    for name, pair in bounds.items():
+        if name not in system.parameters:
+            units = {key: item.unit for key, item in system.parameters.items()}
+            raise ValueError(unknown(name, "a parameter", repr(system.name), units))
+        if not isinstance(pair, list | tuple) or len(pair) != 2:
+            raise TypeError(f"bounds of {name!r}: allowed is (low, high), None for no end; got {pair!r}")
+        low, high = (real_number(e, f"bounds of {name!r}") if e is not None else s * np.inf
+                     for e, s in zip(pair, (-1, 1), strict=True))  # fmt: skip
+        if not low < high:
+            raise ValueError(f"bounds of {name!r}: {low:g} must be below {high:g}")
+        found[name] = (low, high)
+    return found
 
 
 def drawn_variables(drawn: Mapping[str, np.ndarray], system: System) -> dict[str, Any]:

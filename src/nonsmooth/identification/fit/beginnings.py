@@ -36,6 +36,8 @@ def drawn(problem: Windows, rng: np.random.Generator) -> FloatArray:
     bounded = np.isfinite(u.low) & np.isfinite(u.high)
     other[bounded] = rng.uniform(u.low[bounded], u.high[bounded])
     other[len(other) - u.phases :] = rng.uniform(size=u.phases)
+    clocks = [u.clock_place(run) for run in range(len(problem.records)) if u.clock]
+    other[clocks] = u.guess[clocks]
     return np.clip(other, u.low, u.high)
 
 

@@ -139,9 +139,9 @@ def _others(
     values = problem.values(theta, window.record)
     if i and problem.pieces[i - 1].record == window.record and values is not None:
         before = problem.pieces[i - 1]
-        shift = problem.shift(theta, window)
+        shift, clock = problem.shift(theta, window), problem.clock(theta, window.record)
         motion = problem.marcher.run(
-            values, before.begin + shift, np.array([window.begin + shift]), starts[i - 1], before.mode
+            values, clock * before.begin + shift, np.array([clock * window.begin + shift]), starts[i - 1], before.mode
         )
         if motion is not None:
             found.append((replace(window, mode=int(motion.mode[0])), motion.z[0]))

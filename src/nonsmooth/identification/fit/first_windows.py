@@ -72,7 +72,7 @@ def first_windows(
 def _of_record(
     problem: Windows, theta: FloatArray, i: int, record: Record, length: float, start: FloatArray | None, free: bool
 ) -> list[Window]:
-    n_u, early = len(problem.system.states), _lead(problem, theta, record)
+    n_u, early = len(problem.system.states), _lead(problem, theta, i)
     memory = problem.system.memory_vector()
     told = states_from_samples(problem, theta, record, slice(None))
     z = np.concatenate([np.zeros(n_u) if start is None else start, memory])
@@ -80,7 +80,7 @@ def _of_record(
     if values is None:
         return []
     period = problem.system.period_at(values)
-    which = problem.unknowns.of_run(i)
+    which, clock = problem.unknowns.places[i], problem.clock(theta, i)
     shift = 0.0 if period is None or not problem.unknowns.phases else float(theta[which[-1]]) * period
     sizes = np.max(np.abs(np.nan_to_num(told)), axis=0)
     time, mode, first, windows = record.time, problem.modes[i][0], 0, []
@@ -92,7 +92,9 @@ def _of_record(
         set_ = np.where(known, np.append(np.nan_to_num(told[first]), memory), z)
         begin = float(time[first]) - early
         for candidate in [z] if first == 0 and start is not None else [set_, z]:  # beyond a stop: as it was going
-            motion = problem.marcher.run(values, begin + shift, time[first:end] - early + shift, candidate, mode)
+            motion = problem.marcher.run(
+                values, clock * begin + shift, clock * (time[first:end] - early) + shift, candidate, mode
+            )
             if motion is not None:
                 break
         if motion is None:  # the samples of this window come back when windows are joined
@@ -112,13 +114,13 @@ def _of_record(
     return [replace(window, spread=window.spread * wide) for window in windows]
 
 
-def _lead(problem: Windows, theta: FloatArray, record: Record) -> float:
+def _lead(problem: Windows, theta: FloatArray, run: int) -> float:
     """Time by which a window begins before its first sample: the longest delay that the fit may try."""
-    lead = float(max(problem.delays(theta).max(), 0.0))
-    for k, (_, what) in enumerate(problem.unknowns.sensors, start=len(problem.unknowns.active)):
+    lead, u = float(max(problem.delays(theta, run).max(), 0.0)), problem.unknowns
+    for k, (_, what) in zip(u.places[run][len(u.active) :], u.sensors, strict=False):
         if what == "delay":
-            most = float(problem.unknowns.high[k])
-            lead = max(lead, most if np.isfinite(most) else lead + 10 * float(np.median(np.diff(record.time))))
+            most, step = float(u.high[k]), float(np.median(np.diff(problem.records[run].time)))
+            lead = max(lead, most if np.isfinite(most) else lead + 10 * step)
     return lead
 
 
@@ -142,7 +144,7 @@ def states_from_samples(problem: Windows, theta: FloatArray, record: Record, whi
     system, names = problem.system, list(problem.system.states)
     told = np.full((len(at), len(names)), np.nan)
     known = rates(system)
-    measured = problem.sensor_values(theta)
+    measured = problem.sensor_values(theta, next(i for i, one in enumerate(problem.records) if one is record))
     for c, (quantity, sensor) in enumerate(measured.items()):
         if quantity not in names:
             continue

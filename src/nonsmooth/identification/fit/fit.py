@@ -41,6 +41,7 @@ def fit(
     start: Any = None,
     free_start: bool = True,
     mode: Any = None,
+    per_run: Sequence[str] = (),
     priors: Any = None,
     settings: Any = None,
     runs: Sequence[str] | None = None,
@@ -48,6 +49,8 @@ def fit(
     window: float | None = None,
     profile: Sequence[str] = (),
     loss: str = "linear",
+    leave_out: bool = False,
+    posterior: int = 0,
     tries: int = 8,
     seed: int = 0,
     progress: Progress = True,
@@ -73,7 +76,9 @@ def fit(
         own. Times are those of the model: the forcing begins at t = 0, unless the phase is unknown.
     parameters : sequence of str, or mapping of str to (low, high)
         What is to be found: parameters of the system, ``"<quantity>.gain"``, ``".offset"`` and ``".delay"`` of sensors,
-        ``"phase"`` (of the forcing at t = 0, in periods, for each run). A mapping gives bounds (None: none).
+        ``"clock"`` (time of the model over that of the recording: 1.0001 where its clock is slow by that much, between
+        0.9 and 1.1) and ``"phase"`` (of the forcing at t = 0, in periods, for each run). A mapping gives bounds (None:
+        none).
     measured : mapping of str to str or Sensor, optional
         ``{"x": "position channel"}``: which channel shows which state or output of the system, or with which
         :class:`nonsmooth.Sensor`. Channels named as states or outputs where not given.
@@ -84,6 +89,8 @@ def fit(
     mode : str or mapping of str to str, optional
         Mode in which the recording begins, or each run of it. Where not given, each one is tried in which a motion may
         begin there (a relay with hysteresis: both), and a note says which fits best and by how much.
+    per_run : sequence of str
+        Unknowns of which each run has its own, as ``"c, Run #1"`` in ``extra``; the others are shared by all runs.
     priors : mapping of str to (value, standard uncertainty), or ParameterSet, optional
         What is known before of the unknowns.
     settings : mapping or sequence, optional
@@ -100,6 +107,13 @@ def fit(
     loss : {"linear", "huber"}
         ``"huber"``: residuals beyond 2.5 noise deviations count linearly, so that outliers hardly count. Outliers are
         named in the notes either way.
+    leave_out : bool
+        True: short windows that disagree with the rest (a knock at the table, a sensor that slipped) are left out, and
+        the notes say when they were; the motion begins anew behind each.
+    posterior : int
+        Steps of an ensemble sampler (emcee, extra ``posterior``) that starts about the optimum: the finding
+        ``"posterior"``, ``.posterior`` of the set, and what its ``draw`` then draws from. For a law that is no normal
+        one; some thousand steps of a likelihood that costs a simulation of the record each.
     tries : int
         First guesses to try, the given one and others around it (or within the bounds), while none fits.
     seed : int
@@ -126,7 +140,8 @@ def fit(
 
     References
     ----------
-    H.G. Bock, in Springer Ser. Chem. Phys. 18 (1981) 102-125; W.K. Newey, K.D. West, Econometrica 55 (1987) 703-708.
+    H.G. Bock, in Springer Ser. Chem. Phys. 18 (1981) 102-125; W.K. Newey, K.D. West, Econometrica 55 (1987) 703-708;
+    J. Goodman, J. Weare, Comm. Appl. Math. Comp. Sci. 5 (2010) 65-80 (``posterior``).
 
     Examples
     --------
@@ -138,9 +153,10 @@ def fit(
     >>> round(found["k"], 6) == system.values["k"]
     True
     """
+    from nonsmooth.identification.fit.disagreeing import without_disagreeing
     from nonsmooth.identification.fit.outcome import outcome
 
-    problem = problem_of(system, recording, parameters, measured, priors, settings, runs, time, mode, loss)
+    problem = problem_of(system, recording, parameters, measured, priors, settings, runs, time, mode, loss, per_run)
     if start is not None and not is_one_start(start):
         raise ValueError("fit takes one first guess of the start, for all runs; settings= differ from run to run")
     begin = None if start is None else np.tile(start_states(system, start)[0], (len(problem.records), 1))
@@ -154,18 +170,31 @@ def fit(
         if name not in problem.unknowns.names:
             raise ValueError(f"profile: {unknown(name, 'an unknown', 'this fit', list(problem.unknowns.names))}")
     tried = whole_number(tries, "tries", 1)
+    left: list[str] = []
+    rests = yes_or_no(leave_out, "leave_out")
+    if rests and not free_start:
+        raise ValueError("leave_out=True begins anew behind what it leaves out: it needs free starts, free_start=True")
     best = best_of(problem, begin, bool(free_start), longest, tried, whole_number(seed, "seed", 0), progress)
+    if rests:
+        problem, left = without_disagreeing(problem, best.theta)
+        if len(problem.records) != len(best.problem.records) or problem.records[0] is not best.problem.records[0]:
+            best = best_of(problem, None, True, longest, tried, whole_number(seed, "seed", 0), progress)
+    beside = []
+    if steps := whole_number(posterior, "posterior", 0):
+        from nonsmooth.identification.fit.posterior import posterior_of
+
+        beside.append(posterior_of(best, steps, whole_number(seed, "seed", 0), progress))
     options = {"parameters": list(problem.unknowns.names), "window": window, "tries": tries, "seed": seed}
     given = recording if isinstance(recording, list | tuple) else [recording]
     return outcome(
         best, options, synthetic=any(getattr(one, "synthetic", False) for one in given), profiles=profiles,
-        watched=progress,
+        watched=progress, left=left, beside=beside,
     )  # fmt: skip
 
 
 def problem_of(
     system: System, recording: Any, parameters: Any, measured: Any = None, priors: Any = None, settings: Any = None,
-    runs: Any = None, time: str = "time", mode: Any = None, loss: Any = "linear",
+    runs: Any = None, time: str = "time", mode: Any = None, loss: Any = "linear", per_run: Sequence[str] = (),
 ) -> Windows:  # fmt: skip
     """The problem, without windows; the noise is the records' own irregularity."""
     check_system(system, "fit")
@@ -179,7 +208,8 @@ def problem_of(
         raise ValueError(f"{system.name!r} is a map, whose time is a count: fit takes systems with vector fields")
     sensors, records = read_records(system, recording, measured, runs=runs, time=time, settings=settings)
     labels = [record.name for record in records]
-    unknowns = read_unknowns(system, sensors, parameters, priors, labels, [record.settings for record in records])
+    known = [record.settings for record in records]
+    unknowns = read_unknowns(system, sensors, parameters, priors, labels, known, per_run)
     within = [[record.values[sensor.limit(y) == 0, c] for record in records for y in [record.values[:, c]]]
               for c, sensor in enumerate(sensors.values())]  # fmt: skip
     irregular = np.array([
@@ -251,7 +281,7 @@ def _guesses(
 
     def with_phases(guess: FloatArray) -> FloatArray:
         """The guess with the phase of each run, of a few, at which its first windows fit best."""
-        if not u.phases:
+        if not u.phases or u.phases != len(problem.records):  # of parts of runs they are known already
             return guess
         shared = len(u.names) - u.phases
         phases = np.arange(_PHASES) / _PHASES

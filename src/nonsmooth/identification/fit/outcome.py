@@ -38,7 +38,7 @@ METHOD = (
 
 def outcome(
     grown: Grown, options: Mapping[str, Any], synthetic: bool = False, profiles: Sequence[str] = (),
-    watched: Progress = False,
+    watched: Progress = False, left: Sequence[str] = (), beside: Sequence[Finding] = (),
 ) -> ParameterSet:  # fmt: skip
     """The parameters, with what is known of how well."""
     problem, theta = grown.problem, grown.theta
@@ -65,13 +65,13 @@ def outcome(
         Estimate(float(v), float(np.sqrt(covariance[i, i])), unit)
         for i, (v, unit) in enumerate(zip(values, units, strict=True))
     ]
-    a = len(u.active)
-    estimates = dict(zip(u.active, rows[:a], strict=True))
+    a = sum(name in u.active for name in u.names)
+    estimates = dict(zip(u.names[:a], rows[:a], strict=True))
     extra = {**dict(zip([*u.names[a:], *starts.names], rows[a:], strict=True)), **noise}
     data = residual_data(grown, options).assign_attrs(synthetic="yes" if synthetic else "no")
     known = [name for name in profiles if np.isfinite(rows[u.names.index(name)].uncertainty)]
-    beside = profiled(grown, known, normal + u.precision, found.covariance, synthetic, watched)
-    notes = _notes(grown, found, data) + [note for finding in beside for note in finding.notes]
+    beside = [*profiled(grown, known, normal + u.precision, found.covariance, synthetic, watched), *beside]
+    notes = [*left, *_notes(grown, found, data)] + [note for finding in beside for note in finding.notes]
     finding = Finding(
         "fit", next(iter({**estimates, **extra}.values())), METHOD, data.sizes["sample"],
         tuple(record.name for record in problem.records), tuple(notes), data=data, plot="fit_residuals",

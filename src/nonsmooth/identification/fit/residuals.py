@@ -41,8 +41,9 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
         predicted, _ = problem.readings(theta, window, motion, False)
         k, c = window.readings
         shift = motion.time[0] - problem.instants(theta, window)[0]
+        clock, delays = problem.clock(theta, window.record), problem.delays(theta, window.record)
         here = np.minimum(
-            np.searchsorted(motion.time, window.time[k] + shift - problem.delays(theta)[c]), len(motion.time) - 1
+            np.searchsorted(motion.time, clock * window.time[k] + shift - delays[c]), len(motion.time) - 1
         )
         columns["time"].append(window.time[k])
         columns["run"].append(np.full(len(k), window.record))
@@ -87,7 +88,8 @@ def by_place(data: xr.Dataset) -> list[tuple[str, float, int]]:
 
 
 def _nominal(grown: Grown) -> System:
-    found = dict(zip(grown.problem.unknowns.active, map(float, grown.theta), strict=False))
+    u = grown.problem.unknowns
+    found = {name: float(value) for name, value in zip(u.names, grown.theta, strict=True) if name in u.active}
     return grown.problem.system.with_parameters(found)
 
 

@@ -1,4 +1,4 @@
-"""Unknowns of a fit: parameters of the system, of its sensors, and the phase of each run."""
+"""Unknowns of a fit: parameters of the system, of its sensors and of the clock, shared or of each run; phases."""
 
 from __future__ import annotations
 
@@ -20,31 +20,40 @@ if TYPE_CHECKING:
 
 __all__ = ["Unknowns", "read_unknowns"]
 
+_CLOCKS = (0.9, 1.1)  # within which the time of the model over that of the recording lies
+
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
     """Names, first guesses, bounds and what is known before.
 
-    The parameters of the system come first, then those of sensors, then one phase for each run (where it is unknown).
+    The parameters of the system that all runs share come first, then those of each run, those of sensors, the clock,
+    and one phase for each run (where it is unknown). On a run act those of `active`, of `sensors`, the clock and the
+    phase, in this order: ``places[run]``.
 
     Attributes
     ----------
     names : tuple of str
     active : tuple of str
-        The parameters of the system among them.
+        The parameters of the system among them, each once.
     sensors : tuple of (str, str)
         Quantity and which of gain, offset and delay, for each unknown of a sensor.
+    clock : bool
+        Whether the clock is unknown.
     phases : int
         How many phases are unknown: none, or one for each run.
     units : tuple of str
     guess, low, high : array (p,)
     precision : array (p, p)
         Inverse covariance of what is known before, about ``centre``.
+    places : array (runs, q)
+        Places of the unknowns that act on each run.
     """
 
     names: tuple[str, ...]
     active: tuple[str, ...]
     sensors: tuple[tuple[str, str], ...]
+    clock: bool
     phases: int
     units: tuple[str, ...]
     guess: FloatArray
@@ -52,18 +61,18 @@ class Unknowns:
     high: FloatArray
     centre: FloatArray
     precision: FloatArray
+    places: NDArray[np.intp]
 
-    def of_run(self, run: int) -> NDArray[np.intp]:
-        """Places of the unknowns that act on a run."""
-        shared = len(self.active) + len(self.sensors)
-        return np.array([*range(shared), *([shared + run] if self.phases else [])], dtype=np.intp)
+    def clock_place(self, run: int) -> int:
+        """The place of the clock of a run; -1 where it is known."""
+        return int(self.places[run][len(self.active) + len(self.sensors)]) if self.clock else -1
 
 
 def read_unknowns(
     system: System, sensors: Mapping[str, Sensor], parameters: Any, priors: Any, runs: Sequence[str],
-    settings: Sequence[Mapping[str, float]],
+    settings: Sequence[Mapping[str, float]], per_run: Sequence[str] = (),
 ) -> Unknowns:  # fmt: skip
-    """Read the unknowns of a fit from names, bounds and priors.
+    """Read the unknowns of a fit from names, bounds and priors, and those of which each run has its own.
 
     Raises
     ------
@@ -87,31 +96,49 @@ def read_unknowns(
         raise ValueError(f"the phase of {system.name!r} cannot be found: it has no forcing period; leave 'phase' out")
     active = tuple(name for name in given if name in system.values)
     of_sensors = tuple((q, what) for name in given if "." in name for q, what in [name.split(".", 1)])
-    phases = len(runs) if "phase" in given else 0
-    labels = [f"phase, {run}" for run in runs] if phases > 1 else ["phase"] * phases
-    names = (*active, *(f"{q}.{what}" for q, what in of_sensors), *labels)
+    own = [per_run] if isinstance(per_run, str) else list(per_run)
+    for name in own:
+        if name not in given:
+            raise ValueError(f"per_run: {unknown(name, 'an unknown', 'this fit', dict.fromkeys(given, ''))}")
+    clock, phases = "clock" in given, len(runs) if "phase" in given else 0
+    each = {*own, *(["phase"] if phases else [])} if len(runs) > 1 else set()
+    local = [*active, *(f"{q}.{what}" for q, what in of_sensors), *["clock"] * clock, *["phase"] * bool(phases)]
+    order = [*(n for n in active if n not in each), *(n for n in active if n in each), *local[len(active) :]]
+    base: list[str] = []
+    names: list[str] = []
+    first: dict[str, int] = {}
+    for name in order:
+        first[name] = len(names)
+        base += [name] * (len(runs) if name in each else 1)
+        names += [f"{name}, {run}" for run in runs] if name in each else [name]
+    places = np.array([[first[n] + run * (n in each) for n in local] for run in range(len(runs))], dtype=np.intp)
     quantity = {**system.states, **system.outputs}
-    found_units = [units[name] for name in active] + [
-        "" if what == "delay" else "" if what == "gain" and not quantity[q] else
+    of_names = {**units, "clock": "", "phase": "periods"} | {
+        f"{q}.{what}": "" if what == "delay" else "" if what == "gain" and not quantity[q] else
         f"1/({quantity[q]})" if what == "gain" and sensors[q].gain != 1 else "" if what == "gain" else quantity[q]
         for q, what in of_sensors
-    ]  # fmt: skip
-    guess = [system.values[name] for name in active] + [getattr(sensors[q], what) for q, what in of_sensors]
+    }  # fmt: skip
+    values = {**system.values, "clock": 1.0, "phase": 0.0}
+    values |= {f"{q}.{what}": getattr(sensors[q], what) for q, what in of_sensors}
+    guess = np.array([values[name] for name in base])
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
-    whole = np.array(guess + [0.0] * phases)
     for i, name in enumerate(names):
-        pair = bounds.get(name.split(",")[0])
+        if name.partition(",")[0] == "clock":
+            low[i], high[i] = _CLOCKS
+        pair = bounds.get(base[i])
         if pair is not None:
-            low[i], high[i] = _bounds(name, pair, whole[i])
-    centre, precision = _known(names, priors, whole)
+            low[i], high[i] = _bounds(name, pair, guess[i])
+    centre, precision = _known(tuple(names), priors, guess)
     return Unknowns(
-        names, active, of_sensors, phases, (*found_units, *["periods"] * phases), whole, low, high, centre, precision
-    )
+        tuple(names), active, of_sensors, clock, phases, tuple(of_names[name] for name in base), guess, low, high,
+        centre, precision, places,
+    )  # fmt: skip
 
 
 def _allowed(system: System, sensors: Mapping[str, Sensor]) -> dict[str, str]:
     units = {key: parameter.unit for key, parameter in system.parameters.items()}
-    return {**units, **{f"{q}.{what}": "" for q in sensors for what in OF_A_SENSOR}, "phase": "periods"}
+    of_sensors = {f"{q}.{what}": "" for q in sensors for what in OF_A_SENSOR}
+    return {**units, **of_sensors, "clock": "", "phase": "periods"}
 
 
 def _bounds(name: str, pair: Any, guess: float) -> tuple[float, float]:

@@ -127,17 +127,17 @@ class Windows:
         """Starts of the windows as they are set (windows, n)."""
         return np.array([window.start for window in self.pieces])
 
-    def sensor_values(self, theta: FloatArray) -> dict[str, Sensor]:
-        """The sensors at these values of the unknowns."""
-        found = dict(self.sensors)
-        for i, (quantity, what) in enumerate(self.unknowns.sensors, start=len(self.unknowns.active)):
+    def sensor_values(self, theta: FloatArray, run: int) -> dict[str, Sensor]:
+        """The sensors in a run at these values of the unknowns."""
+        found, u = dict(self.sensors), self.unknowns
+        for i, (quantity, what) in zip(u.places[run][len(u.active) :], u.sensors, strict=False):
             value: Any = float(theta[i]) or (1e-300 if what == "gain" else 0.0)
             found[quantity] = replace(found[quantity], **{what: value})
         return found
 
     def values(self, theta: FloatArray, record: int) -> FloatArray | None:
         """The system's parameters in a record; None where its equations do not allow them."""
-        own = dict(zip(self.unknowns.active, map(float, theta), strict=False))
+        own = dict(zip(self.unknowns.active, map(float, theta[self.unknowns.places[record]]), strict=False))
         try:
             return self.system.with_parameters({**self.records[record].settings, **own}).parameter_vector()
         except (SystemDefinitionError, ValueError):
@@ -146,8 +146,12 @@ class Windows:
     def phase(self, theta: FloatArray, window: Window) -> float:
         return float(theta[window.which[-1]]) if self.unknowns.phases else 0.0
 
+    def clock(self, theta: FloatArray, run: int) -> float:
+        """The system's time over that of the recording."""
+        return float(theta[self.unknowns.clock_place(run)]) if self.unknowns.clock else 1.0
+
     def shift(self, theta: FloatArray, window: Window) -> float:
-        """The system's time less that of the record, from the phase of the run."""
+        """The system's time less that of the record's corrected clock, from the phase of the run."""
         values = self.values(theta, window.record) if self.unknowns.phases else None
         period = None if values is None else self.system.period_at(values)
         return 0.0 if period is None else self.phase(theta, window) * period
@@ -158,20 +162,20 @@ class Windows:
         if values is None or not np.isfinite(theta).all() or not np.isfinite(start).all():
             return None
         shift = self.shift(theta, window)
-        instants = self.instants(theta, window)
-        if instants[0] < window.begin:  # a delay beyond what its bounds allow
+        instants, begin = self.instants(theta, window), self.clock(theta, window.record) * window.begin
+        if instants[0] < begin:  # a delay beyond what its bounds allow
             return None
-        return self.marcher.run(values, window.begin + shift, instants + shift, start, window.mode, derivatives)
+        return self.marcher.run(values, begin + shift, instants + shift, start, window.mode, derivatives)
 
-    def delays(self, theta: FloatArray) -> FloatArray:
-        return np.array([sensor.delay for sensor in self.sensor_values(theta).values()])
+    def delays(self, theta: FloatArray, run: int) -> FloatArray:
+        return np.array([sensor.delay for sensor in self.sensor_values(theta, run).values()])
 
     def instants(self, theta: FloatArray, window: Window) -> FloatArray:
-        """Times on the record's clock at which the motion is needed."""
-        delays = np.unique(self.delays(theta))
+        """Times on the record's corrected clock at which the motion is needed."""
+        delays, time = np.unique(self.delays(theta, window.record)), self.clock(theta, window.record) * window.time
         if len(delays) == 1:
-            return window.time - delays[0]
-        return np.unique((window.time[:, None] - delays).ravel())
+            return time - delays[0]
+        return np.unique((time[:, None] - delays).ravel())
 
     def readings(
         self, theta: FloatArray, window: Window, motion: Motion, slopes: bool
@@ -179,7 +183,8 @@ class Windows:
         """Predicted readings (R,), and their derivatives (R, unknowns of the window + n) where asked for."""
         values = self.values(theta, window.record)
         assert values is not None
-        sensors, u = self.sensor_values(theta), self.unknowns
+        sensors, u = self.sensor_values(theta, window.record), self.unknowns
+        clock = self.clock(theta, window.record)
         k, c = window.readings
         n, a, p = self.marcher.flow.n, len(u.active), len(window.which)
         period, of_period = self.marcher.flow.period(values)
@@ -188,7 +193,8 @@ class Windows:
         offset = 0.0 if not np.isfinite(period) else phase * period
         for j, (name, sensor) in enumerate(sensors.items()):
             rows = np.flatnonzero(c == j)
-            at = np.searchsorted(motion.time, window.time[k[rows]] - sensor.delay + offset - 1e-12 * abs(offset))
+            taken = clock * window.time[k[rows]] - sensor.delay + offset
+            at = np.searchsorted(motion.time, taken - 1e-12 * abs(offset))
             at = np.minimum(at, len(motion.time) - 1)
             t, z, mode = motion.time[at], motion.z[at], motion.mode[at]
             readout = self.readouts[j]
@@ -203,11 +209,15 @@ class Windows:
             of_shift = np.einsum("ri,ri->r", in_z, motion.of_time[at]) + in_t
             table[rows, p:] = sensor.gain * of_all[:, :n]
             table[rows, :a] = sensor.gain * (of_all[:, n:] + in_p)
+            now = np.einsum("ri,ri->r", in_z, motion.rate[at]) + in_t
             for i, (quantity, what) in enumerate(u.sensors, start=a):
                 if quantity == name and what == "delay":
-                    table[rows, i] = -sensor.gain * (np.einsum("ri,ri->r", in_z, motion.rate[at]) + in_t)
+                    table[rows, i] = -sensor.gain * now
                 elif quantity == name:
                     table[rows, i] = raw if what == "gain" else 1.0
+            if u.clock:
+                since = window.time[k[rows]] - window.begin
+                table[rows, a + len(u.sensors)] = sensor.gain * (now * since + of_shift * window.begin)
             if u.phases:
                 table[rows, :a] += sensor.gain * phase * of_shift[:, None] * of_period
                 table[rows, p - 1] = sensor.gain * period * of_shift

@@ -40,6 +40,7 @@ from nonsmooth.kernels.hybrid.places import (
     MOST_CROSSINGS,
     NO_END,
     NOTED,
+    OPEN_RUN,
     OWN,
     PERIODS,
     RESET,
@@ -237,6 +238,11 @@ def march(i, form, net, section, goal, motion, seen, tables, work):
         if t >= 0:
             tally[WAITS] = 0
             short, state = tally[CLOSELY] != 0, tally[NOTED]
+        elif changed(goal, seen, work):
+            look(i, form, tables, work, tally[MODE])
+            t = next_holding(tally[MODE], tables, net, work)
+            tally[FIRED], tally[SOURCE], tally[NOTED] = -1, tally[MODE], OPEN_RUN
+            short, state = False, OPEN_RUN
         else:
             ready, first = False, 0
             if strides:
@@ -244,7 +250,7 @@ def march(i, form, net, section, goal, motion, seen, tables, work):
             stop, timed = NO_END, -1
             if not strides:
                 stop, timed = next_stop(i, form, net, section, goal, work)
-            wait, rest = stop - memo[TIME], remaining(section, goal, work)
+            wait, rest = stop - memo[TIME], remaining(section, goal, seen, work)
             step, t, full, sense = leg(i, form, net, section, goal, tables, work, min(wait, rest), ready, first)
             if not step >= 0.0:
                 code = DIVERGED

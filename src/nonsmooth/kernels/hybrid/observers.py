@@ -7,7 +7,15 @@ from nonsmooth.kernels.compile.cache import once
 from nonsmooth.kernels.hybrid.codes import OK
 from nonsmooth.kernels.hybrid.growth import leave_transitions, mark_unit, open_frame
 from nonsmooth.kernels.hybrid.places import DONE, GROW, LOGGED, NO_END, OPEN_RUN, RETURNS, RETURNS_OF_SECTION, WAITED
-from nonsmooth.kernels.hybrid.record import base_of, log_transition, mark_time, observe_samples, room_in_log
+from nonsmooth.kernels.hybrid.record import (
+    base_of,
+    change_inputs,
+    log_transition,
+    mark_time,
+    next_end,
+    observe_samples,
+    room_in_log,
+)
 from nonsmooth.kernels.hybrid.sections import (
     arrive_at_section,
     count_transition,
@@ -55,12 +63,20 @@ def room(goal, seen, work):
 
 
 @once
-def remaining(section, goal, work):
-    """Time to the end of the run or of the unit, or for which a return to a surface is waited still."""
+def changed(goal, seen, work):
+    """Return whether inputs have just changed."""
+    if LOGS == 1 and goal.kind == LOGGED:
+        return change_inputs(goal, seen.log, work)
+    return False
+
+
+@once
+def remaining(section, goal, seen, work):
+    """Time to the end of the run or unit, to a change of inputs, or for which a return to a surface is waited for."""
     if GROWS == 2 or (GROWS == 1 and goal.kind == GROW):
         return max((work.tally[RETURNS] + 1) * goal.unit - work.memo[DONE], 0.0)  # rounding may have passed it
     if LOGS == 1 and goal.kind == LOGGED:
-        return goal.until - work.memo[DONE]
+        return max(next_end(goal, seen.log, work) - work.memo[DONE], 0.0)
     return section.t_max - work.memo[WAITED] if section.indicator >= 0 else NO_END
 
 
@@ -107,7 +123,7 @@ def mark(i, wrapped, ended, crossed, step, form, goal, seen, work):
     if GROWS == 2 or (GROWS == 1 and goal.kind == GROW):
         mark_unit(i, ended, crossed, step, form, goal, seen.growth, work)
     elif LOGS == 1 and goal.kind == LOGGED:
-        mark_time(i, wrapped, ended, crossed, form, goal, work)
+        mark_time(i, wrapped, ended, crossed, form, goal, seen.log, work)
     else:
         mark_return(step, work)
 

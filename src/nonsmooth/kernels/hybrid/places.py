@@ -9,7 +9,8 @@ FIRED = 10  # the functional (indicator) that has crossed, or -1
 # the mode before the first, the first; whether they are closely behind others, and what the observer saw on the leg
 WAITS, TAKEN, SOURCE, FIRST, CLOSELY, NOTED = 11, 12, 13, 14, 15, 16
 STARTS = 17  # 1 where what the elements of a system do at a start is asked; -1: motion is not unique, -2: there is none
-N_TALLY = 18
+CHANGES = 18  # of inputs, so far
+N_TALLY = 19
 
 # times
 TIME, PERIODS, SINCE, WAITED, DONE = 0, 1, 2, 3, 4  # in the period, since a crossing, since a pass, since the start

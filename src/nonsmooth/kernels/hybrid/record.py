@@ -2,7 +2,18 @@
 
 from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.codes import LOG_FULL, OK
-from nonsmooth.kernels.hybrid.places import CROSSINGS, DONE, JUMPS, MODE, NO_END, PERIODS, SAMPLES, TIME, TOUCHES
+from nonsmooth.kernels.hybrid.places import (
+    CHANGES,
+    CROSSINGS,
+    DONE,
+    JUMPS,
+    MODE,
+    NO_END,
+    PERIODS,
+    SAMPLES,
+    TIME,
+    TOUCHES,
+)
 from nonsmooth.kernels.linear.stepper import memory_at, state_at
 from nonsmooth.kernels.linear.touches import log_touches
 
@@ -49,11 +60,30 @@ def observe_samples(step, form, net, seen, tables, work):
 
 
 @once
-def mark_time(i, wrapped, ended, crossed, form, goal, work):
+def next_end(goal, seen, work):
+    """The time to which one goes before anything else: the end of the run, or the next change of its inputs."""
+    k = work.tally[CHANGES]
+    return min(seen.changes[k], goal.until) if k < seen.changes.shape[0] else goal.until
+
+
+@once
+def change_inputs(goal, seen, work):
+    """Where inputs change by now, give the states that stand for them their values; returns whether they do."""
+    k, first = work.tally[CHANGES], seen.inputs
+    if k >= seen.changes.shape[0] or work.memo[DONE] < seen.changes[k]:
+        return False
+    for j in range(seen.given.shape[1]):
+        work.w[first + j] = seen.given[k, j]
+    work.tally[CHANGES] = k + 1
+    return True
+
+
+@once
+def mark_time(i, wrapped, ended, crossed, form, goal, seen, work):
     """The time at the end of a segment."""
     if wrapped or (not form.period[i] < NO_END and not crossed):
         work.tally[JUMPS] = 0
-    work.memo[DONE] = goal.until if ended else base_of(i, form, work)
+    work.memo[DONE] = next_end(goal, seen, work) if ended else base_of(i, form, work)
 
 
 @once

@@ -197,6 +197,9 @@ class Log(NamedTuple):
     touch_u: Any
     touch_gap: Any
     spare: Any  # touches that one leg may add
+    changes: Any  # instants at which inputs change
+    given: Any  # (changes, states that are inputs) their values from then on
+    inputs: Any  # the first of these states
 
 
 class Growth(NamedTuple):
@@ -259,5 +262,5 @@ SERIES_WORK = type_of(
 MOTION = type_of(Motion, _f1, _f1, _f1, _i1)
 CALL = type_of(Call, _i1, _f1, _f1, _f2, MOTION)
 KEPT = type_of(Kept, _f3, _f2, _f2, _i1, _i1, _f1, _f2, _i2, _i1)
-LOG = type_of(Log, _f1, _f2, _f2, _i1, _i1, _f1, _i1, _f2, _f2, _f2, _f1, _i1, _f2, _f1, _i)
+LOG = type_of(Log, _f1, _f2, _f2, _i1, _i1, _f1, _i1, _f2, _f2, _f2, _f1, _i1, _f2, _f1, _i, _f1, _f2, _i)
 GROWTH = type_of(Growth, _f1, _f2, _f2, _f1, _f1, *[_f2] * 4, _f1, _f1, _i1, _i1, _i, _f1, _f1)

@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import re
 
-import numpy as np
-
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.limits import MAX_COLUMNS
-from nonsmooth.recordings.readers.text_table import Cells, checked_header, decoded, read_cells, rows, split_unit
-from nonsmooth.recordings.reading import TIME_WORDS, Options, Reading, Source, Trace, names_of, scaled_time
+from nonsmooth.recordings.readers.fields import Field, Table, split_unit, traces_of
+from nonsmooth.recordings.readers.text_table import Cells, Numerals, checked_header, decoded, read_cells, rows
+from nonsmooth.recordings.reading import TIME_WORDS, Options, Reading, Source, Trace, names_of
 from nonsmooth.recordings.remarks import Remarks
 
 __all__ = ["SYNTHETIC", "looks_like_capstone", "read"]
@@ -55,20 +54,23 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
         raise ValueError("columns, rate and axis do not concern a Capstone file; read it with format='csv' to use them")
     reading = Reading()
     delimiter = options.delimiter or _delimiter(data, source)
-    decimal = options.decimal or ("." if delimiter == "," else None)
+    numerals = Numerals(options.decimal or ("." if delimiter == "," else None), options.thousands, options.na)
     table = rows(decoded(data, source, reading.remarks), delimiter, source)
     line, fields = next(table, (1, []))
     header = checked_header(fields, line, source)
     times, channels = _layout(header, source)
     cells = read_cells(
-        table, header, range(len(header)), decimal, source, reading.remarks, ends_with_newline=data.endswith(b"\n")
+        table, header, range(len(header)), numerals, source, reading.remarks, ends_with_newline=data.endswith(b"\n")
     )
+    tables: dict[int, list[Field]] = {}
     for column, (run, label) in channels.items():
-        time = _time_of(times, run, column)
-        reading.traces.append(_trace(column, run, label, time, times[time][1], cells, source, reading.remarks))
-    used = {_time_of(times, run, column) for column, (run, _) in channels.items()}
-    for column, (run, _) in times.items():
-        if column not in used:
+        tables.setdefault(_time_of(times, run, column), []).append(_field(column, label, cells))
+    for column, (run, unit) in times.items():
+        if column in tables:
+            time = Field("time", unit, cells.values[column], f"column {column + 1}", cells.rows[column])
+            held = Table(run, [time, *tables[column]], len(cells.lines), cells.lines)
+            reading.traces += traces_of(held, options, source, reading)
+        else:
             reading.remarks.of(run, header[column], "is the time of no channel")
     runs = {run for run, _ in times.values()}
     reading.synthetic = any(run.endswith(SYNTHETIC) for run in runs)
@@ -116,35 +118,11 @@ def _time_of(times: dict[int, tuple[str, str]], run: str, column: int) -> int:
     return before[-1] if before else own[0]
 
 
-def _trace(
-    column: int, run: str, label: str, time: int, time_unit: str, cells: Cells, source: Source, remarks: Remarks
-) -> Trace:
+def _field(column: int, label: str, cells: Cells) -> Field:
     name, unit = split_unit(label)
-    where = f"run {run!r}, channel {name!r}"
-    held = cells.rows[column]
-    timed = cells.places(held, cells.rows[time], source, f"{where} has a value where its run has no time")
-    seconds = scaled_time(cells.values[time][timed], time_unit)
-    if seconds is None:
-        raise source.error("line 1", f"{where}: its time is in {time_unit!r}, which is no unit of time")
-    if not time_unit:
-        remarks.of(run, name, "the time has no unit; taken as seconds")
-    if len(held):
-        _, between = cells.blanks(column)
-        last_time = cells.rows[time][-1] if len(cells.rows[time]) else -1
-        trailing = int(np.count_nonzero(cells.rows[time] > held[-1]))
-        if trailing:
-            remarks.of(
-                run, name,
-                f"{trailing} trailing blanks dropped: it ends at line {cells.lines[held[-1]]}, "
-                f"the time of its run at line {cells.lines[last_time]}",
-            )  # fmt: skip
-        if between:
-            remarks.of(run, name, f"{between} blank fields before its last value dropped; it has its own clock")
     match = _PORT.fullmatch(name)
     attrs = {"measurement": match["measurement"], "port": match["port"]} if match else {"measurement": name}
-    return Trace(
-        run, name, unit, seconds, cells.values[column], f"column {column + 1}", lines=cells.lines[held], attrs=attrs
-    )
+    return Field(name, unit, cells.values[column], f"column {column + 1}", cells.rows[column], attrs)
 
 
 def _without_mark(trace: Trace) -> Trace:

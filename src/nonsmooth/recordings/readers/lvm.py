@@ -11,15 +11,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from array import array
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.limits import MAX_COLUMNS
-from nonsmooth.recordings.readers.text_table import decoded, number
+from nonsmooth.recordings.readers.fields import places
+from nonsmooth.recordings.readers.text_table import Cells, Numerals, decoded, number, read_cells
 from nonsmooth.recordings.reading import Options, Reading, Source, Trace
 from nonsmooth.recordings.remarks import Remarks
 
@@ -34,17 +34,13 @@ Lines = Iterator[tuple[int, list[str]]]
 
 @dataclass
 class _Segment:
-    """A segment's header and its columns of values, each with rows (from 0); the lines and X of the rows."""
+    """A segment's header, the names of its channels, its columns as read, and the comments behind its rows."""
 
     line: int
     names: list[str]
     fields: dict[str, list[str]]
-    x: list[array[float]]
-    values: list[array[float]]
-    rows: list[array[int]]
-    lines: array[int] = field(default_factory=lambda: array("q"))
-    comments: list[str] = field(default_factory=list)
-    more_comments: int = 0
+    cells: Cells
+    comments: list[str]
 
 
 def read(data: bytes, source: Source, options: Options) -> Reading:
@@ -61,12 +57,13 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     clocks = _word(header, "X_Columns", "One")
     if clocks not in ("One", "No", "Multi"):
         raise source.error("", f"X_Columns is {clocks[:20]!r}, expected One, No or Multi")
-    ends = data.endswith(b"\n")
-    for k, segment in enumerate(_segments(lines, clocks, decimal, source, ends), 1):
+    ends, numerals = data.endswith(b"\n"), Numerals(decimal, options.thousands, options.na)
+    for k, segment in enumerate(_segments(lines, clocks, numerals, source, ends), 1):
         run = f"Segment {k}"
         if segment.comments:
-            extra = [f"(and {segment.more_comments} more)"] if segment.more_comments else []
-            reading.run_attrs[run] = {"comments": "\n".join(segment.comments + extra)}
+            more = len(segment.comments) - _MAX_COMMENTS
+            said = segment.comments[:_MAX_COMMENTS] + ([f"(and {more} more)"] if more > 0 else [])
+            reading.run_attrs[run] = {"comments": "\n".join(said)}
         reading.traces += _traces(run, segment, clocks, decimal, source, options, reading.remarks)
     if not reading.traces:
         raise source.error("", f"holds no segment of data after its header; expected one that ends in {_END}")
@@ -119,39 +116,66 @@ def _word(header: dict[str, list[str]], key: str, default: str) -> str:
     return values[0].strip() if len(values[0].strip()) else values[0][:1] or default
 
 
-def _segments(lines: Lines, clocks: str, decimal: str, source: Source, ends: bool) -> Iterator[_Segment]:
-    segment: _Segment | None = None
-    count = 0
-    last = 0
-    channels = 0
-    for line, fields in lines:
-        if not any(f.strip() for f in fields):
-            continue
-        key = fields[0].strip()
-        if key and (key[0].isalpha() or key.startswith("*")) and number(key, decimal) is None:
-            if segment is not None:
-                yield segment
-            count += 1
-            if count > _MAX_SEGMENTS:
-                raise source.error(f"line {line}", f"holds more than {_MAX_SEGMENTS} segments")
-            segment = _begin(line, fields, lines, clocks, source)
-            channels += len(segment.names)
-            if channels > MAX_COLUMNS:
-                held = f"its {count} segments hold {channels} channels so far"
-                raise source.error(f"line {line}", f"{held}; at most {MAX_COLUMNS} are read")
-            last = 0
-        elif segment is None:
+def _segments(
+    lines: Lines, clocks: str, numerals: Numerals, source: Source, ends: bool
+) -> Iterator[_Segment]:
+    """Each segment: its header, the names of its columns, and the rows up to the next header."""
+    count, channels, decimal = 0, 0, numerals.decimal or "."
+    begun = next(((line, fields) for line, fields in lines if any(f.strip() for f in fields)), None)
+    while begun is not None:
+        line, fields = begun
+        if not _is_key(fields[0], decimal):
             raise source.error(f"line {line}", "holds values before any segment's header")
-        else:
-            _row(segment, line, fields, clocks, decimal, source)
-            last = len(fields) if not ends else 0
-    if segment is not None:
-        if last and last < _width(segment, clocks):
-            raise source.error(f"line {segment.lines[-1]}", "ends in the middle of a row: the file is cut short")
-        yield segment
+        count += 1
+        if count > _MAX_SEGMENTS:
+            raise source.error(f"line {line}", f"holds more than {_MAX_SEGMENTS} segments")
+        header, names = _begin(line, fields, lines, clocks, source)
+        channels += len(names)
+        if channels > MAX_COLUMNS:
+            held = f"its {count} segments hold {channels} channels so far"
+            raise source.error(f"line {line}", f"{held}; at most {MAX_COLUMNS} are read")
+        labels = [text for name in names for text in (f"X_Value of {name}", name)] if clocks == "Multi" else (
+            ["X_Value", *names])  # fmt: skip
+        rows = _Rows(lines, len(labels), decimal)
+        wanted = range(clocks == "No", len(labels))
+        cells = read_cells(iter(rows), labels, wanted, numerals, source, Remarks(), ends_with_newline=True)
+        if not ends and rows.following is None and len(cells.lines) and rows.last < len(labels):
+            raise source.error(f"line {cells.lines[-1]}", "ends in the middle of a row: the file is cut short")
+        yield _Segment(line, names, header, cells, rows.comments)
+        begun = rows.following
 
 
-def _begin(line: int, fields: list[str], lines: Lines, clocks: str, source: Source) -> _Segment:
+class _Rows:
+    """Rows of a segment without their comments, up to the header that follows."""
+
+    def __init__(self, lines: Lines, width: int, decimal: str) -> None:
+        self.lines, self.width, self.decimal = lines, width, decimal
+        self.comments: list[str] = []
+        self.following: tuple[int, list[str]] | None = None
+        self.last = 0
+
+    def __iter__(self) -> Iterator[tuple[int, list[str]]]:
+        for line, fields in self.lines:
+            if not any(f.strip() for f in fields):
+                continue
+            if _is_key(fields[0], self.decimal):
+                self.following = line, fields
+                return
+            said = " ".join(text.strip() for text in fields[self.width :] if text.strip())
+            self.comments += [f"line {line}: {said[:400]}"] if said else []
+            self.last = len(fields)
+            yield line, fields[: self.width]
+
+
+def _is_key(text: str, decimal: str) -> bool:
+    key = text.strip()
+    return bool(key) and (key[0].isalpha() or key.startswith("*")) and number(key, decimal) is None
+
+
+def _begin(
+    line: int, fields: list[str], lines: Lines, clocks: str, source: Source
+) -> tuple[dict[str, list[str]], list[str]]:
+    """The header of a segment, and the names of its channels."""
     header = _keys(lines, source, f"the segment's header that begins in line {line}", fields)
     said = _word(header, "Channels", "")
     if not (said.isascii() and said.isdigit()) or not 0 < int(said[:9]) <= MAX_COLUMNS:
@@ -163,50 +187,7 @@ def _begin(line: int, fields: list[str], lines: Lines, clocks: str, source: Sour
     names = top[1:] if clocks != "Multi" else top[1::2]
     if len(names) < n:
         raise source.error(f"line {at}", f"names {len(names)} columns, the segment has {n} channels")
-    return _Segment(
-        line, [name.strip() for name in names[:n]], header,
-        [array("d") for _ in range(n if clocks == "Multi" else 1)],
-        [array("d") for _ in range(n)], [array("q") for _ in range(n)],
-    )  # fmt: skip
-
-
-def _width(segment: _Segment, clocks: str) -> int:
-    n = len(segment.names)
-    return 2 * n if clocks == "Multi" else n + 1
-
-
-def _row(segment: _Segment, line: int, fields: list[str], clocks: str, decimal: str, source: Source) -> None:
-    row = len(segment.lines)
-    segment.lines.append(line)
-    width = _width(segment, clocks)
-    comment = [text.strip() for text in fields[width:] if text.strip()]
-    if comment and len(segment.comments) < _MAX_COMMENTS:
-        segment.comments.append(f"line {line}: {' '.join(comment)[:400]}")
-    elif comment:
-        segment.more_comments += 1
-    if clocks == "One":
-        segment.x[0].append(_value(fields[0], "X_Value", line, decimal, source))
-    # A short row costs what it weighs, however many channels the header announces.
-    present = len(fields) // 2 if clocks == "Multi" else len(fields) - 1
-    for k, name in enumerate(segment.names[:present]):
-        place = 2 * k + 1 if clocks == "Multi" else k + 1
-        text = fields[place]
-        if text and not text.isspace():
-            segment.values[k].append(_value(text, name, line, decimal, source))
-            segment.rows[k].append(row)
-            if clocks == "Multi":
-                segment.x[k].append(_value(fields[place - 1], f"X_Value of {name}", line, decimal, source))
-
-
-def _value(text: str, name: str, line: int, decimal: str, source: Source) -> float:
-    if not text.strip():
-        return math.nan
-    value = number(text, decimal)
-    if value is None:
-        raise source.error(
-            f"line {line}", f"column {name!r} holds {text[:40]!r}, expected a number with the decimal mark {decimal!r}"
-        )
-    return value
+    return header, [name.strip() for name in names[:n]]
 
 
 def _traces(
@@ -218,8 +199,10 @@ def _traces(
     step = _numbers(segment, "Delta_X", math.nan, decimal, at, source)
     said = _numbers(segment, "Samples", math.nan, decimal, at, source)
     units = _texts(segment, "Y_Unit_Label", n)
-    lines = np.asarray(segment.lines)
-    clock = np.asarray(segment.x[0])
+    cells, lines, first = segment.cells, segment.cells.lines, clocks != "No"
+    clock = np.full(len(lines), np.nan)
+    if clocks == "One":
+        clock[cells.rows[0]] = cells.values[0]
     dimension = (_texts(segment, "X_Dimension", n)[0] or "Time").strip()
     if dimension.casefold() != options.axis.casefold():
         raise source.error(at, f"its channels are over {dimension!r}; read it with axis={dimension.lower()!r}")
@@ -227,10 +210,11 @@ def _traces(
     dates, times = _texts(segment, "Date", n), _texts(segment, "Time", n)
     for k, name in enumerate(segment.names):
         where = f"run {run!r}, channel {name!r}"
-        rows = np.asarray(segment.rows[k])
-        values = np.asarray(segment.values[k])
+        column = 2 * k + 1 if clocks == "Multi" else k + first
+        rows, values = cells.rows[column], cells.values[column]
         if clocks == "Multi":
-            axis = np.asarray(segment.x[k])
+            own = places(rows, cells.rows[column - 1], lines, source, f"{where} has a value without its X_Value")
+            axis = cells.values[column - 1][own]
         elif clocks == "One" and _same(step[k], step[0]) and len(rows) and len(clock):
             axis = clock[rows] + (start[k] - start[0])
         else:

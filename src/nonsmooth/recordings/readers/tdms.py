@@ -14,40 +14,38 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.limits import MAX_COLUMNS
 from nonsmooth.recordings.needed import needed
+from nonsmooth.recordings.readers.group import Group
 from nonsmooth.recordings.readers.tdms_layout import check_layout
-from nonsmooth.recordings.reading import Options, Reading, Source, Trace, is_axis_name, scaled_time
+from nonsmooth.recordings.reading import Source, is_axis_name
 from nonsmooth.recordings.remarks import Remarks
 
-__all__ = ["read"]
+__all__ = ["load_tdms"]
 
 
-def read(data: bytes, source: Source, options: Options) -> Reading:
-    """Read a TDMS file."""
-    if options.columns is not None or options.axis != "time":
-        raise ValueError("columns and axis do not concern a .tdms file; take its channels by name")
+def load_tdms(data: bytes, source: Source, remarks: Remarks) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The groups of a file by clock, and its properties."""
     nptdms = needed("nptdms", "npTDMS", source)
     check_layout(data, source)
-    reading = Reading()
     try:
-        with _heard(reading.remarks), nptdms.TdmsFile.open(io.BytesIO(data)) as opened:
-            groups = opened.groups()
-            reading.header = {"properties": _plain(opened.properties)}
-            if sum(len(group.channels()) for group in groups) > MAX_COLUMNS:
+        with _heard(remarks), nptdms.TdmsFile.open(io.BytesIO(data)) as opened:
+            if sum(len(group.channels()) for group in opened.groups()) > MAX_COLUMNS:
                 raise source.error("", f"holds more than {MAX_COLUMNS} channels")
-            found = [(group.name, _plain(group.properties), list(_channels(group, data, source))) for group in groups]
+            found = {}
+            for group in opened.groups():
+                notes = {f"property_{key}": value for key, value in _plain(group.properties).items()}
+                for k, clocked in enumerate(_by_clock(group, data, source, remarks)):
+                    clocked.run, clocked.notes = group.name, notes
+                    found[f"{group.name} ({k + 1})" if k else group.name] = clocked
+            return found, {"properties": _plain(opened.properties)}
     except DataFileError:
         raise
     # Damaged metadata surfaces as almost any exception of the library.
     except Exception as error:
-        raise source.error("", f"cannot be read as TDMS, it is damaged or cut short ({_short(error)})") from error
-    for name, properties, channels in found:
-        reading.run_attrs[name] = {f"property_{key}": value for key, value in properties.items()}
-        reading.traces += _traces(name, channels, source, options, reading.remarks)
-    return reading
+        said = f"{type(error).__name__}: {error}"[:200]
+        raise source.error("", f"cannot be read as TDMS, it is damaged or cut short ({said})") from error
 
 
 @contextlib.contextmanager
@@ -69,76 +67,29 @@ def _heard(remarks: Remarks) -> Iterator[None]:
             logger.removeFilter(note)
 
 
-def _channels(group: Any, data: bytes, source: Source) -> Iterator[tuple[str, dict[str, str], Any]]:
+def _by_clock(group: Any, data: bytes, source: Source, remarks: Remarks) -> list[Group]:
+    """The channels of a group: those with a waveform by their clock, the others together."""
+    groups: dict[Any, Group] = {}
     for channel in group.channels():
-        kind = getattr(channel, "dtype", None)
-        n = len(channel)
+        kind, n, place = getattr(channel, "dtype", None), len(channel), f"{group.name}/{channel.name}"
         # What the file says it holds must be there: never more memory than it warrants.
         if kind is not None and n * max(1, np.dtype(kind).itemsize if kind != np.dtype("O") else 1) > 2 * len(data):
-            raise source.error(
-                f"{group.name}/{channel.name}", f"says it holds {n} values, more than {len(data)} bytes can"
-            )
-        yield channel.name, _plain(channel.properties), channel[:]
-
-
-def _traces(
-    run: str,
-    channels: list[tuple[str, dict[str, str], Any]],
-    source: Source,
-    options: Options,
-    remarks: Remarks,
-) -> Iterator[Trace]:
-    numeric: list[tuple[str, dict[str, str], FloatArray]] = []
-    clock: tuple[str, FloatArray] | None = None
-    for name, properties, raw in channels:
-        values = np.asarray(raw)
-        if values.dtype.kind == "M":
-            seconds = (values - values[:1]).astype("timedelta64[ns]").astype(np.int64) * 1e-9
-            if clock is None and is_axis_name(name, "time"):
-                clock = (name, np.asarray(seconds, np.float64))
-                continue
-            remarks.of(run, name, "holds dates; left out")
-        elif values.dtype.kind not in "fiub" or values.ndim != 1:
-            remarks.of(run, name, f"holds {values.dtype.name} values, no real numbers; left out")
-        elif clock is None and "wf_increment" not in properties and is_axis_name(name, "time"):
-            scaled = scaled_time(values.astype(np.float64), properties.get("unit_string", ""))
-            if scaled is None:
-                raise source.error(f"{run}/{name}", f"is in {properties['unit_string']!r}, which is no unit of time")
-            clock = (name, scaled)
-        else:
-            numeric.append((name, properties, values.astype(np.float64)))
-    for name, properties, column in numeric:
-        yield _trace(run, name, properties, column, clock, source, options)
-
-
-def _trace(
-    run: str,
-    name: str,
-    properties: dict[str, str],
-    values: FloatArray,
-    clock: tuple[str, FloatArray] | None,
-    source: Source,
-    options: Options,
-) -> Trace:
-    origin = f"/{run}/{name}"
-    step = _number(properties.get("wf_increment"))
-    axis: FloatArray
-    if step is not None and step > 0:
-        axis = (_number(properties.get("wf_start_offset")) or 0.0) + step * np.arange(len(values), dtype=np.float64)
-    elif clock is not None:
-        if len(clock[1]) != len(values):
-            raise source.error(origin, f"holds {len(values)} values, its time channel {clock[0]!r} {len(clock[1])}")
-        axis = clock[1]
-    elif options.rate is not None:
-        axis = np.arange(len(values)) / options.rate
-    elif len(values):
-        raise source.error(
-            origin, "has no wf_increment, and its group no time channel; give the sample rate in Hz, rate=..."
-        )
-    else:
-        axis = np.empty(0)
-    kept = {f"property_{key}": text for key, text in properties.items()}
-    return Trace(run, name, properties.get("unit_string", ""), axis, values, origin, attrs=kept)
+            raise source.error(place, f"says it holds {n} values, more than {len(data)} bytes can")
+        values, properties = np.asarray(channel[:]), _plain(channel.properties)
+        step, begin = (_number(properties.get(key)) for key in ("wf_increment", "wf_start_offset"))
+        clock = (step, begin or 0.0, n) if step is not None and step > 0 else None
+        if values.ndim != 1 or values.dtype.kind not in "fiubM" or (
+            values.dtype.kind == "M" and (clock or not is_axis_name(channel.name, "time"))
+        ):
+            remarks.of(group.name, channel.name, f"holds {values.dtype.name} values, no real numbers; left out")
+            continue
+        held = groups.setdefault(clock, Group())
+        if clock is not None:
+            held["time"], held.units["time"] = clock[1] + clock[0] * np.arange(n, dtype=np.float64), "s"
+        name = channel.name if channel.name != "time" or clock is None else "time (channel)"
+        held[name], held.units[name] = values, properties.get("unit_string", "")
+        held.attrs[name] = {f"property_{key}": text for key, text in properties.items()}
+    return list(groups.values())
 
 
 def _number(text: str | None) -> float | None:
@@ -150,7 +101,3 @@ def _number(text: str | None) -> float | None:
 
 def _plain(properties: Any) -> dict[str, str]:
     return {str(key): str(value)[:1000] for key, value in list(properties.items())[:256]}
-
-
-def _short(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"[:200]

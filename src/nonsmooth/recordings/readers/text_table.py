@@ -8,24 +8,26 @@ from __future__ import annotations
 import csv
 import io
 import itertools
+import re
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.limits import MAX_COLUMNS
 from nonsmooth.recordings.reading import Source
 from nonsmooth.recordings.remarks import Remarks
 
-__all__ = ["Cells", "Row", "checked_header", "decoded", "number", "read_cells", "rows", "split_unit"]
+__all__ = ["Cells", "Numerals", "Row", "checked_header", "decoded", "number", "read_cells", "rows"]
 
 #: Line number and fields.
 Row = tuple[int, list[str]]
 
 _LONGEST_NUMBER = 64  # characters; a double has at most 24 that matter
+_CHUNK = 4096  # rows read at once
 _SNIFFED = 20  # rows looked at to tell the decimal mark
 
 
@@ -82,9 +84,13 @@ def checked_header(fields: list[str], line: int, source: Source) -> list[str]:
     return [field.strip() for field in fields]
 
 
-def number(field: str, decimal: str) -> float | None:
+def number(field: str, decimal: str, thousands: str | None = None) -> float | None:
     """The number in a field, strictly; None if it is none. Underscores and foreign digits are none."""
     text = field.strip()
+    if thousands and thousands in text:
+        if not re.fullmatch(rf"[+-]?\d{{1,3}}(?:{re.escape(thousands)}\d{{3}})+(?:\D.*)?", text):
+            return None
+        text = text.replace(thousands, "")
     if len(text) > _LONGEST_NUMBER or not text.isascii() or "_" in text:
         return None
     if decimal == ",":
@@ -97,103 +103,129 @@ def number(field: str, decimal: str) -> float | None:
         return None
 
 
+class Numerals(NamedTuple):
+    """Marks of the numbers in a table: decimal (None: unknown), between thousands, and texts for a missing one."""
+
+    decimal: str | None = None
+    thousands: str | None = None
+    na: tuple[str, ...] = ()
+
+    def some(self, field: str) -> bool:
+        """Return whether it is a number, or the mark of a missing one."""
+        text = field.strip()
+        return text in self.na or any(number(text, d, self.thousands) is not None for d in (self.decimal or ".,"))
+
+
 @dataclass(frozen=True, eq=False)
 class Cells:
     """The columns of a table: values, and the rows (from 0) in which each has one; the line of every row."""
 
-    values: list[FloatArray]
+    values: list[NDArray[Any]]
     rows: list[NDArray[np.int64]]
     lines: NDArray[np.int64]
-
-    def places(
-        self, held: NDArray[np.int64], axis: NDArray[np.int64], source: Source, complaint: str
-    ) -> NDArray[np.int64]:
-        """Place among the rows of the axis of each row in which a channel has a value; all must be there."""
-        place = np.searchsorted(axis, held)
-        missing = np.flatnonzero(axis[np.minimum(place, len(axis) - 1)] != held) if len(axis) else np.arange(len(held))
-        if len(missing):
-            raise source.error(f"line {self.lines[held[missing[0]]]}", complaint)
-        return place
-
-    def blanks(self, column: int) -> tuple[int, int]:
-        """Number of blank rows after a column's last value, and before it."""
-        held = self.rows[column]
-        if len(held) == 0:
-            return len(self.lines), 0
-        last = int(held[-1])
-        return len(self.lines) - 1 - last, last + 1 - len(held)
 
 
 def read_cells(
     table: Iterator[Row],
     labels: Sequence[str],
     wanted: Sequence[int],
-    decimal: str | None,
+    numerals: Numerals,
     source: Source,
     remarks: Remarks,
     *,
     ends_with_newline: bool,
+    stamped: int = -1,
 ) -> Cells:
-    """Read the rows below a header. Only ``wanted`` columns must hold numbers.
+    """Read the rows below a header. Only ``wanted`` columns must hold numbers; ``stamped`` may hold time stamps.
 
     A row with more fields than the header is an error, one with fewer is remarked; a last line with fewer and no
     line end means that the file is cut short.
     """
     n = len(labels)
-    if decimal is None:
-        head = [row for _, row in zip(range(_SNIFFED), table, strict=False)]
-        decimal = _decimal_of(head, wanted)
-        table = itertools.chain(head, table)
+    head = [row for _, row in zip(range(_SNIFFED), table, strict=False)]
+    decimal, thousands, na = numerals.decimal or _decimal_of(head, wanted), numerals.thousands, numerals.na
+    begins = next((row[stamped] for _, row in head if len(row) > stamped >= 0 and row[stamped].strip()), "0")
+    stamps: list[str] | None = None if number(begins, decimal, thousands) is not None else []
     values = [array("d") for _ in wanted]
     held = [array("q") for _ in wanted]
     lines = array("q")
     pairs = sorted(enumerate(wanted), key=lambda pair: pair[1])
     short, first_short, last_short = 0, 0, False
-    for row, (line, fields) in enumerate(table):
-        if len(fields) > n and any(field.strip() for field in fields[n:]):
-            raise source.error(f"line {line}", f"has {len(fields)} fields, the header has {n}")
-        last_short = len(fields) < n
-        if last_short:
-            short, first_short = short + 1, first_short or line
-        lines.append(line)
-        for k, column in pairs:
-            # A short row costs what it weighs, however many columns the header announces.
-            if column >= len(fields):
-                break
-            field = fields[column]
-            if field and not field.isspace():
-                value = number(field, decimal)
-                if value is None:
-                    shown = field if len(field) <= 40 else field[:37] + "..."
-                    raise source.error(
-                        f"line {line}",
-                        f"column {column + 1} ({labels[column]!r}) holds {shown!r}, expected a number with the "
-                        f"decimal mark {decimal!r}, or nothing",
-                    )
-                values[k].append(value)
+    table = itertools.chain(head, table)
+    while chunk := list(itertools.islice(table, _CHUNK)):
+        begin, slow = len(lines), pairs
+        lines.extend(line for line, _ in chunk)
+        if all(len(fields) == n for _, fields in chunk):
+            last_short, slow = False, []
+            for k, column in pairs:
+                texts = [] if stamps is not None and column == stamped else [fields[column] for _, fields in chunk]
+                plain = _plain(texts, decimal)
+                if plain is None:
+                    slow.append((k, column))
+                else:
+                    values[k].extend(plain)
+                    held[k].extend(range(begin, begin + len(chunk)))
+        for row, (line, fields) in enumerate(chunk, begin) if slow else ():
+            if len(fields) > n and any(field.strip() for field in fields[n:]):
+                raise source.error(f"line {line}", f"has {len(fields)} fields, the header has {n}")
+            last_short = len(fields) < n
+            if last_short:
+                short, first_short = short + 1, first_short or line
+            for k, column in slow:
+                # A short row costs what it weighs, however many columns the header announces.
+                if column >= len(fields):
+                    break
+                field = fields[column]
+                if not field or field.isspace() or field.strip() in na:
+                    continue
+                if stamps is not None and column == stamped:
+                    stamps.append(field)
+                else:
+                    value = number(field, decimal, thousands)
+                    if value is None:
+                        raise source.error(f"line {line}", _no_number(column, fields, labels, decimal, line, row == 0))
+                    values[k].append(value)
                 held[k].append(row)
     if last_short and not ends_with_newline:
         raise source.error(f"line {lines[-1]}", f"ends after fewer than {n} fields: the file is cut short")
     if short:
         remarks.say(f"{short} rows have fewer fields than the header, first line {first_short}; taken as blank")
-    return Cells(
-        [np.asarray(v) for v in values], [np.asarray(h) for h in held], np.asarray(lines),
-    )  # fmt: skip
+    columns = [
+        np.array(stamps, dtype=object) if stamps is not None and column == stamped else np.asarray(v)
+        for column, v in zip(wanted, values, strict=True)
+    ]
+    return Cells(columns, [np.asarray(h) for h in held], np.asarray(lines))
 
 
-def split_unit(text: str, brackets: str = "()") -> tuple[str, str]:
-    """``"Force (push) (N/(m/s))"`` -> ``("Force (push)", "N/(m/s)")``: the last balanced bracket is the unit."""
-    stripped = text.strip()
-    opening, closing = brackets[0], brackets[1]
-    if not stripped.endswith(closing):
-        return stripped, ""
-    depth = 0
-    for i in range(len(stripped) - 1, -1, -1):
-        depth += (stripped[i] == closing) - (stripped[i] == opening)
-        if depth == 0:
-            name = stripped[:i].strip()
-            return (name, stripped[i + 1 : -1].strip()) if name else (stripped, "")
-    return stripped, ""
+def _plain(texts: list[str], decimal: str) -> list[float] | None:
+    """The numbers, where all fields hold plain ones; None leaves it to a closer look at each."""
+    joined = "".join(texts)
+    if not texts or not joined.isascii() or "_" in joined or len(joined) > _LONGEST_NUMBER * len(texts):
+        return None
+    if decimal == ",":
+        if "." in joined:
+            return None
+        texts = [text.replace(",", ".") for text in texts]
+    try:
+        return list(map(float, texts))
+    except ValueError:
+        return None
+
+
+def _no_number(column: int, fields: list[str], labels: Sequence[str], decimal: str, line: int, first: bool) -> str:
+    """A field that is no number, and the option that would make it one or leave it out."""
+    field = fields[column]
+    shown = field if len(field) <= 40 else field[:37] + "..."
+    marks = [(d, t) for d in ".," for t in ".,' " if d != t and number(field, d, t) is not None]
+    if marks:
+        options = f"if it is one, decimal={marks[0][0]!r}, thousands={marks[0][1]!r}"
+    elif not any(number(text, decimal) is not None for text in fields):
+        options = f"if units stand in this line, units_row={line}; else " if first else ""
+        options += f"leave out the lines that begin like this one, skip={fields[0].strip()[:12]!r}"
+    else:
+        options = f"if it marks a missing value, na={shown.strip()!r}"
+    said = f"column {column + 1} ({labels[column]!r}) holds {shown!r}, expected a number with the decimal mark"
+    return f"{said} {decimal!r}, or nothing; {options}"
 
 
 def _decimal_of(head: list[Row], wanted: Sequence[int]) -> str:

@@ -93,6 +93,7 @@ class RowNumbers(Numbers):
         self.make, self.rows, self.mode, self.w, self.known = rows, rows, mode, w, rows.known
         self.u = w[: rows.n]
         self.size = np.abs(w)
+        self.size[rows.n :] = 1.0  # a sine that is zero has the rounding of its phase
         self.size[: rows.n] += 0.25 * step * np.abs(rows.base(mode)) @ self.size
 
     def copy(self) -> RowNumbers:
@@ -137,7 +138,7 @@ class _RowsAhead(Ahead):
 
     def __init__(self, here: RowNumbers, some: Sequence[int], forces: Sequence[tuple[int, Any]], laws: Any) -> None:
         rows = here.rows
-        self.n, self.waves, self.w, self.size = rows.n, rows.rates, here.w, np.abs(here.w)
+        self.n, self.waves, self.w, self.size = rows.n, rows.rates, here.w, here.size
         self.field = rows.base(here.mode).copy()
         for k, law in forces:
             if hasattr(law, "values"):

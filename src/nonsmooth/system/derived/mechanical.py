@@ -38,6 +38,7 @@ def mechanical(
     symmetry: Any = None,
     period: Any = None,
     impacts: str = "simultaneous",
+    inputs: Mapping[str, str] | Sequence[str] | None = None,
     name: str = "mechanical system",
 ) -> System:
     r"""A mechanical system of N degrees of freedom with contacts and friction, ready for every verb.
@@ -61,7 +62,7 @@ def mechanical(
         Names of the coordinates (``q1``, ``q2``, ...; ``q`` for one). Speeds are called ``v_<coordinate>``.
     base : callable, optional
         Acceleration of the base, ``lambda t, p: -p.Y * p.w**2 * np.cos(p.w * t)``; coordinates are relative to it.
-    scale, outputs, symmetry, period, impacts, name
+    scale, outputs, symmetry, period, impacts, inputs, name
         As for :class:`nonsmooth.System`.
 
     Returns
@@ -129,11 +130,11 @@ def mechanical(
     }
     system = System(
         name=name, states=states, parameters=given, modes={"all": field}, outputs=outputs, scale=scale,
-        symmetry=symmetry, period=period, elements=parts or None, impacts=impacts,
+        symmetry=symmetry, period=period, elements=parts or None, impacts=impacts, inputs=inputs,
     )  # fmt: skip
     d = system._description
-    p = Symbols(name, states, dict.fromkeys(d.parameters, ""), {}).parameters()
-    powers = _powers(*matrices(p)[1:], *outside(Scalar(d.traced.t), p), d.traced.u)
+    p = Symbols(name, d.states, dict.fromkeys(d.parameters, ""), {}, tuple(d.states)[2 * size :]).parameters()
+    powers = _powers(*matrices(p)[1:], *outside(Scalar(d.traced.t), p), d.traced.u[: 2 * size])
     units_of = {symbol: read_unit(unit) for symbol, unit in d.symbol_units.items()}
     energies = (
         product(unit_of(matrices(p)[3][i, i], units_of), *2 * [units_of[d.traced.u[size + i]]]) for i in range(size)

@@ -30,27 +30,31 @@ class Symbols:
     name : str
         The system's name, for messages.
     states, parameters, memory : mapping of name to unit
+    inputs : sequence of str
+        The states that stand for inputs: functions read them among the parameters.
     """
 
     def __init__(
-        self, name: str, states: Mapping[str, str], parameters: Mapping[str, str], memory: Mapping[str, str]
-    ) -> None:
+        self, name: str, states: Mapping[str, str], parameters: Mapping[str, str], memory: Mapping[str, str],
+        inputs: Sequence[str] = (),
+    ) -> None:  # fmt: skip
         self.name = name
         self.units = {**states, **parameters, **memory}
         self.t = sp.Symbol("t_", real=True)
         self.u = {key: sp.Symbol(f"u_{key}", real=True) for key in states}
         self.p = {key: sp.Symbol(f"p_{key}", real=True) for key in parameters}
         self.m = {key: sp.Symbol(f"m_{key}", real=True) for key in memory}
+        self.inputs = {key: self.u[key] for key in inputs}
 
     def states(self, names: Sequence[str] | None = None, owner: str | None = None) -> States:
         """The state vector as a function sees it: all states, or those a mode has."""
-        chosen = self.u if names is None else {name: self.u[name] for name in names}
+        chosen = {name: self.u[name] for name in (self.u if names is None else names) if name not in self.inputs}
         units = {name: self.units[name] for name in chosen}
         return States({name: Scalar(symbol) for name, symbol in chosen.items()}, units, owner or repr(self.name))
 
     def parameters(self, extra: Mapping[str, sp.Symbol] | None = None) -> Parameters:
-        """The parameters as a function sees them: parameters, memory and ``extra`` symbols by name."""
-        symbols = {**self.p, **self.m, **(extra or {})}
+        """The parameters as a function sees them: parameters, memory, inputs and ``extra`` symbols by name."""
+        symbols = {**self.p, **self.m, **self.inputs, **(extra or {})}
         return Parameters({name: Scalar(s) for name, s in symbols.items()}, self.units, repr(self.name))
 
 

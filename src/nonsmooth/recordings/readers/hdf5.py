@@ -1,4 +1,4 @@
-"""MATLAB files of version 7.3, which are HDF5: read by h5py, within limits, following nothing out of the file."""
+"""HDF5, that of MATLAB 7.3 too: read by h5py, within limits, following nothing out of the file."""
 
 from __future__ import annotations
 
@@ -9,19 +9,23 @@ import numpy as np
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.limits import MAX_COLUMNS, MAX_DEPTH, inflation_limit
+from nonsmooth.recordings.readers.group import Group
 from nonsmooth.recordings.reading import Source
 from nonsmooth.recordings.remarks import Remarks
 
-__all__ = ["load_v73"]
+__all__ = ["load_hdf5"]
+
+#: Attributes that give the sample rate of a group's arrays, in Hz.
+_RATES = ("sample_rate", "sampling_rate", "sampling_frequency", "rate", "fs")
 
 
-def load_v73(data: bytes, source: Source, remarks: Remarks) -> dict[str, Any]:
+def load_hdf5(data: bytes, source: Source, remarks: Remarks, *, matlab: bool) -> dict[str, Any]:
     """The variables of a file, as dicts (structs), lists (cells, arrays of structs), text and arrays."""
     import h5py
 
     try:
         with h5py.File(io.BytesIO(data), "r") as opened:
-            return _Reader(h5py, opened, source, remarks, inflation_limit(len(data))).group(opened, 0)
+            return _Reader(h5py, opened, source, remarks, inflation_limit(len(data)), matlab).group(opened, 0)
     except DataFileError:
         raise
     # A damaged file surfaces as almost any exception of the library.
@@ -31,15 +35,17 @@ def load_v73(data: bytes, source: Source, remarks: Remarks) -> dict[str, Any]:
 
 
 class _Reader:
-    def __init__(self, h5py: Any, opened: Any, source: Source, remarks: Remarks, limit: int) -> None:
-        self._h5py, self._file, self._source, self._remarks = h5py, opened, source, remarks
+    def __init__(
+        self, h5py: Any, opened: Any, source: Source, remarks: Remarks, limit: int, matlab: bool
+    ) -> None:  # fmt: skip
+        self._h5py, self._file, self._source, self._remarks, self._matlab = h5py, opened, source, remarks, matlab
         self._left = self._limit = limit
         self._members = 16 * MAX_COLUMNS
 
     def group(self, group: Any, depth: int) -> dict[str, Any]:
         if depth > MAX_DEPTH:
             raise self._source.error(str(group.name), f"is nested deeper than {MAX_DEPTH}")
-        found: dict[str, Any] = {}
+        found = {} if self._matlab else Group(rate=_rate(group))
         for name in group:
             place = f"{group.name.rstrip('/')}/{name}"
             # What MATLAB keeps for itself is reached by references only.
@@ -49,6 +55,10 @@ class _Reader:
                 self._remarks.say(f"{place}: is a link; left out")
                 continue
             found[name] = self._value(group[name], place, depth)
+            if isinstance(found, Group):
+                units = group[name].attrs.get("units", group[name].attrs.get("unit", ""))
+                found.units[name] = units.decode("utf-8", "replace") if isinstance(units, bytes) else str(units)
+                found.rate = found.rate or _rate(group[name])
         return found
 
     def _value(self, item: Any, place: str, depth: int) -> Any:
@@ -91,6 +101,8 @@ class _Reader:
                 raise self._source.error(place, f"is nested deeper than {MAX_DEPTH}")
             return members if kind == "cell" else _Column(members)
         values = np.asarray(values)
+        if compound and not self._matlab:
+            return Group({name: values[name] for name in values.dtype.names or ()}, rate=_rate(item))
         if compound:
             if values.dtype.names != ("real", "imag"):
                 self._remarks.say(f"{place}: holds compound values; left out")
@@ -99,7 +111,12 @@ class _Reader:
         if kind == "char":
             codes = values.T.ravel(order="F")
             return codes.astype("<u2").tobytes().decode("utf-16-le", errors="replace")
-        return values.T  # MATLAB's order
+        return values.T if self._matlab else values  # MATLAB's order
+
+
+def _rate(item: Any) -> float | None:
+    found = [np.asarray(item.attrs[name]) for name in _RATES if name in item.attrs]
+    return float(found[0].ravel()[0]) if found and found[0].size == 1 and found[0].dtype.kind in "iuf" else None
 
 
 class _Column(list[Any]):

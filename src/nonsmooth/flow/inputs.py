@@ -1,0 +1,232 @@
+"""`Input`: a measured or chosen function of time that drives a run, held or linear between its samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.arrays import FloatArray
+from nonsmooth.errors import shortened
+from nonsmooth.flow.arguments import float_array, real_number
+from nonsmooth.flow.engines.engine import Changes
+from nonsmooth.flow.saltation import Jump
+from nonsmooth.system.names import unknown
+
+if TYPE_CHECKING:
+    from nonsmooth.flow.variational import VariationalFlow
+    from nonsmooth.system.system import System
+
+__all__ = ["Course", "Driven", "Input", "driven"]
+
+BETWEEN = ("linear", "steps")
+
+
+@dataclass(frozen=True, eq=False)
+class Input:
+    """Samples of an input of a system: linear between them, or held until the next.
+
+    Parameters
+    ----------
+    time, values : array
+        Instants, increasing, and the input there. Before the first and behind the last sample the nearest value holds.
+    between : {"linear", "steps"}
+        The course between samples.
+    delay : float or str
+        The input acts so much later than its samples say; the name of a parameter of the system, so that it can be
+        found by a fit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import nonsmooth as ns
+    >>> cart = ns.mechanical(2.0, 0.0, 0.0, forcing={"q": lambda t, p: p.force}, inputs={"force": "N"})
+    >>> run = ns.simulate(cart, duration=3.0, inputs={"force": ns.Input([0, 1, 2], [4, 0, -4], between="steps")})
+    >>> float(round(run.u.sel(state="q").values[-1], 12))
+    4.0
+    """
+
+    time: Any
+    values: Any
+    between: str = "linear"
+    delay: float | str = 0.0
+
+    def __post_init__(self) -> None:
+        t, y = float_array(self.time, "the time of an input"), float_array(self.values, "the values of an input")
+        if t.ndim != 1 or t.shape != y.shape or not len(t):
+            raise ValueError(f"an input is as many values as instants, in one row; got shapes {y.shape} and {t.shape}")
+        if not (np.isfinite(t).all() and np.isfinite(y).all()):
+            where = int(np.flatnonzero(~(np.isfinite(t) & np.isfinite(y)))[0])
+            raise ValueError(
+                f"sample {where} of an input is not finite; drop such samples or fill them: nothing is said about the "
+                "input there"
+            )
+        if (np.diff(t) <= 0).any():
+            where = int(np.flatnonzero(np.diff(t) <= 0)[0])
+            raise ValueError(
+                f"the time of an input must increase; sample {where + 1} is at {t[where + 1]:.9g} after {t[where]:.9g}"
+            )
+        if self.between not in BETWEEN:
+            raise ValueError(f"between = {self.between!r}; allowed: {', '.join(map(repr, BETWEEN))}")
+        if not isinstance(self.delay, str):
+            object.__setattr__(self, "delay", real_number(self.delay, "delay"))
+        for name, array in (("time", t), ("values", y)):
+            array = array.copy()
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    def course(self, delay: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Instants of change, values and rates behind them."""
+        t, y = self.time + delay, self.values
+        rates = np.zeros(len(t))
+        if self.between == "linear":
+            rates[:-1] = np.diff(y) / np.diff(t)
+        return t, y, rates
+
+    def data(self) -> dict[str, Any]:
+        """The input as data that a result can record."""
+        about = {"samples": len(self.time), "first": float(self.time[0]), "last": float(self.time[-1])}
+        return {**about, "between": self.between, "delay": self.delay}
+
+
+class Driven:
+    """The inputs of one run of a system, all of them."""
+
+    def __init__(self, system: System, inputs: Mapping[str, Input]) -> None:
+        self.inputs = {name: inputs[name] for name in system.inputs}
+        self.first = len(system.states) - 2 * len(system.inputs)
+        self._known: dict[tuple[float, ...], Course] = {}
+
+    def at(self, values: Mapping[str, float]) -> Course:
+        """The inputs at values of the parameters, among which delays may be."""
+        delays = tuple(values[one.delay] if isinstance(one.delay, str) else one.delay for one in self.inputs.values())
+        if delays not in self._known:
+            self._known = {delays: Course(self, delays)}
+        return self._known[delays]
+
+    def data(self) -> dict[str, Any]:
+        """The inputs as data that a result can record."""
+        return {name: one.data() for name, one in self.inputs.items()}
+
+
+class Course:
+    """The inputs of a run with known delays.
+
+    Attributes
+    ----------
+    times : array (K,)
+        Instants at which an input changes.
+    table : array (K, 2 m)
+        Values and rates of all m inputs behind them.
+    own : array (K, m) of bool
+        Those that change there; the others go on.
+    """
+
+    def __init__(self, drive: Driven, delays: Sequence[float]) -> None:
+        self.first, self.delays = drive.first, [one.delay for one in drive.inputs.values()]
+        courses = [one.course(delay) for one, delay in zip(drive.inputs.values(), delays, strict=True)]
+        self.times = courses[0][0] if len(courses) == 1 else np.unique(np.concatenate([t for t, _, _ in courses]))
+        self.table = np.empty((len(self.times), 2 * len(courses)))
+        self.own = np.empty((len(self.times), len(courses)), dtype=bool)
+        for i, (t, y, rate) in enumerate(courses):
+            at = np.searchsorted(t, self.times, "right") - 1
+            k = np.maximum(at, 0)
+            slope = np.where(at >= 0, rate[k], 0.0)
+            self.table[:, 2 * i] = y[k] + slope * (self.times - t[k])
+            self.table[:, 2 * i + 1] = slope
+            self.own[:, i] = self.times == t[k]
+
+    def at(self, time: float) -> FloatArray:
+        """Values and rates of all inputs just behind an instant."""
+        k = int(np.searchsorted(self.times, time, "right")) - 1
+        found: FloatArray = self.table[max(k, 0)].copy()
+        if k < 0:
+            found[1::2] = 0.0
+        else:
+            found[::2] += found[1::2] * (time - self.times[k])
+        return found
+
+    def changes(self, begin: float, until: float) -> Changes:
+        """The changes between two instants, the ends left out."""
+        here = slice(np.searchsorted(self.times, begin, "right"), np.searchsorted(self.times, until, "left"))
+        return Changes(self.times[here], self.table[here], self.first)
+
+    def by_delays(self, flow: VariationalFlow, rates: FloatArray) -> FloatArray:
+        """Derivatives (n, n_active) of the states that are inputs in the active parameters: in their delays."""
+        found = np.zeros((flow.n, flow.n_active))
+        for i, delay in enumerate(self.delays):
+            if delay in flow.active:
+                found[self.first + 2 * i, flow.active.index(str(delay))] = -rates[self.first + 2 * i]
+        return found
+
+    def jump(self, flow: VariationalFlow, time: float, z: FloatArray, before: FloatArray, after: FloatArray) -> Jump:
+        """A change of inputs as a jump to z, from the rates before it to those behind it.
+
+        Inputs take values of their own. One with a delay changes later where that is greater: what moves has the rates
+        before it for so much longer."""
+        n, size = flow.n, flow.n + flow.n_active
+        S, fields, instant = np.eye(size), np.zeros((3, size)), np.zeros(size)
+        S[self.first : flow.n_u] = 0.0
+        S[self.first : flow.n_u, n:] = self.by_delays(flow, after)[self.first : flow.n_u]
+        changed = self.own[np.searchsorted(self.times, time)]
+        moved = {delay for delay, one in zip(self.delays, changed, strict=True) if one}
+        for j in (n + k for k, name in enumerate(flow.active) if name in moved):
+            instant[j] = 1.0
+            S[: self.first, j] = (before - after)[: self.first]
+        fields[0, :n], fields[1, :n] = before, after
+        R = S.copy()
+        R[: self.first, n:] = 0.0
+        return Jump(z, R, fields, 0.0, np.zeros(n), 1.0, np.zeros(flow.n_active), S, instant, -1, -1)
+
+
+def driven(system: System, given: Any) -> Driven | None:
+    """The inputs of a run as they were given: a mapping of input to `Input` or (time, values); a table with ``time``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An input that is missing or that the system does not have.
+    """
+    if given is None:
+        if system.inputs:
+            raise ValueError(
+                f"{system.name!r} has the inputs {', '.join(map(repr, system.inputs))}: give inputs=, such as "
+                f'{{"{next(iter(system.inputs))}": (time, values)}}'
+            )
+        return None
+    if not system.inputs:
+        raise ValueError(f'{system.name!r} has no inputs; declare them: ns.System(..., inputs={{"force": "N"}})')
+    if isinstance(given, Mapping) and not hasattr(given, "data_vars") and "time" not in given:
+        for name in given:
+            if name not in system.inputs:
+                raise ValueError(f"inputs: {unknown(str(name), 'an input', repr(system.name), system.inputs)}")
+        table = given
+    elif isinstance(given, Mapping) or hasattr(given, "columns") or hasattr(given, "data_vars"):
+        try:
+            table = {name: (np.asarray(given["time"]), np.asarray(given[name])) for name in system.inputs}
+        except KeyError as error:
+            raise ValueError(
+                f"inputs: the table has no column {error}; it needs 'time' and {', '.join(map(repr, system.inputs))}"
+            ) from None
+    else:
+        raise TypeError(
+            f"inputs = {shortened(given)}: allowed are a mapping of input to (time, values) or ns.Input(...), and a "
+            "table with a column 'time'"
+        )
+    found = {}
+    for name in system.inputs:
+        if name not in table:
+            raise ValueError(f"inputs: {name!r} is missing; {system.name!r} has {', '.join(map(repr, system.inputs))}")
+        one = table[name]
+        if not isinstance(one, Input):
+            if not isinstance(one, list | tuple) or len(one) != 2:
+                raise TypeError(f"inputs[{name!r}] = {shortened(one)}: give (time, values) or ns.Input(...)")
+            one = Input(*one)
+        if isinstance(one.delay, str) and one.delay not in system.values:
+            raise ValueError(
+                f"the delay of {name!r}: {unknown(one.delay, 'a parameter', repr(system.name), system.values)}"
+            )
+        found[name] = one
+    return Driven(system, found)

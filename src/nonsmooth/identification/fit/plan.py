@@ -1,0 +1,216 @@
+"""``plan_experiment``: the information that runs not yet made would give about parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.arrays import FloatArray
+from nonsmooth.errors import SolveError, shortened
+from nonsmooth.flow.arguments import check_system, yes_or_no
+from nonsmooth.identification.arrow import inverted, reduced
+from nonsmooth.identification.blas import one_blas_thread
+from nonsmooth.identification.fit.rough import LEAST
+from nonsmooth.system.names import by_name, unknown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.system.system import System
+
+__all__ = ["plan_experiment"]
+
+_OF_A_RUN = ("duration", "periods", "samples", "start", "mode", "settings")
+
+
+@by_name
+@one_blas_thread()
+def plan_experiment(
+    system: System,
+    runs: Mapping[str, Mapping[str, Any]],
+    parameters: Sequence[str],
+    *,
+    measured: Any,
+    free_start: bool = True,
+    priors: Any = None,
+) -> xr.Dataset:
+    r"""Return the information of candidate runs about parameters, and the order in which to make them.
+
+    A run with readings y and noise :math:`\sigma` has the Fisher information
+
+    .. math:: F = \sum_{k, c} \frac{1}{\sigma_c^2}
+        \frac{\partial y_{kc}}{\partial \theta} \frac{\partial y_{kc}}{\partial \theta}^T
+
+    in all unknowns, with derivatives through every transition; starts and phases, which are unknowns of each run, are
+    eliminated. The inverse of what is known before and of F together is the covariance that a fit will have, where the
+    model is right and the noise white (Cramer and Rao's bound).
+
+    Parameters
+    ----------
+    system : System
+        At the parameters for which to plan: the best guess.
+    runs : mapping of str to mapping
+        The candidates: ``duration`` or ``periods`` and ``samples`` as in :func:`nonsmooth.simulate` (the number of
+        readings, or their times), and where needed ``start``, ``mode``, and ``settings``, the parameters that are set
+        in the run: ``{"slow": {"duration": 20, "samples": 2000, "settings": {"omega": 3.0}}}``.
+    parameters : sequence of str
+        The unknowns, as :func:`nonsmooth.fit` takes them.
+    measured : mapping of str to Sensor
+        What is measured, each with ``Sensor(noise=...)`` or ``Sensor(resolution=...)``.
+    free_start : bool
+        False: the start of each run is known.
+    priors : mapping of str to (value, standard uncertainty), or ParameterSet, optional
+        What is known before, from runs that were made.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``uncertainty(run, parameter)``: standard uncertainties with that run alone (and the priors), infinite where it
+        does not determine the parameter; ``best(parameter)`` names the run with the least. ``log_det(run)``: logarithm
+        of the determinant of the information about the parameters in units of their values, the D-optimal measure;
+        ``-inf`` where a direction is not determined. ``information(run, parameter, other)`` is F. ``order(step)``: the
+        runs, each the one that adds most to the determinant; ``uncertainty_after(step, parameter)`` and
+        ``log_det_after(step)``. ``["uncertainty"].to_pandas()`` is a table.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Arguments that do not fit; a quantity without noise.
+    SolveError
+        A run that cannot be simulated.
+
+    Notes
+    -----
+    The table holds for the parameters of ``system``: through impacts it may differ at others, so plan again when the
+    first run has been fitted.
+
+    References
+    ----------
+    A.C. Atkinson, A.N. Donev, R.D. Tobias, Optimum Experimental Designs, with SAS (2007), chapters 6 and 11.
+
+    Examples
+    --------
+    >>> import nonsmooth as ns
+    >>> s = ns.mechanical(1.0, "c", "k", parameters={"c": 0.2, "k": 4.0}, coordinates=["q"])
+    >>> decay = {"samples": 400, "start": {"q": 1.0}}
+    >>> plan = ns.plan_experiment(
+    ...     s, {"short": {"duration": 2, **decay}, "long": {"duration": 20, **decay}}, ["c", "k"],
+    ...     measured={"q": ns.Sensor(noise=0.01)},
+    ... )
+    >>> str(plan["order"].values[0])
+    'long'
+    """
+    import xarray as xr
+
+    from nonsmooth.identification.fit.sensors import read_sensors
+
+    check_system(system, "plan_experiment")
+    free = yes_or_no(free_start, "free_start")
+    if not isinstance(runs, Mapping) or not runs or not all(isinstance(one, Mapping) for one in runs.values()):
+        raise TypeError(
+            f"runs = {shortened(runs)}: give the candidates by name, "
+            "{'slow': {'duration': 20.0, 'samples': 2000, 'settings': {'omega': 3.0}}}"
+        )
+    sensors = {name: replace(one, channel=name) for name, one in read_sensors(system, measured, []).items()}
+    noise = np.array([np.hypot(one.noise or 0.0, one.floor) for one in sensors.values()])
+    for name, size in zip(sensors, noise, strict=True):
+        if not size > 0:
+            raise ValueError(f"measured[{name!r}] says no noise: give ns.Sensor(noise=...) or resolution=")
+    names: list[str] = []
+    found, precision, theta = [], np.zeros((0, 0)), np.zeros(0)
+    for name, run in runs.items():
+        for key in run:
+            if key not in _OF_A_RUN:
+                raise ValueError(f"runs[{name!r}]: {unknown(key, 'a property', 'a run', dict.fromkeys(_OF_A_RUN, ''))}")
+        names, told, precision, theta = _information(system, str(name), run, parameters, sensors, noise, free, priors)
+        found.append(told)
+    alone = np.array([_uncertainties(one + precision) for one in found])
+    size = np.where(theta != 0, np.abs(theta), 1.0)
+    left, total = list(range(len(found))), precision
+    order, after, measure = [], [], []
+    while left:
+        best = max(left, key=lambda i: _gain(total + found[i], size))
+        left.remove(best)
+        total = total + found[best]
+        order.append(best)
+        after.append(_uncertainties(total))
+        measure.append(_log_det(total, size))
+    labels = np.array(list(map(str, runs)), dtype=object)
+    units = np.array(_units(system, names), dtype=object)
+    return xr.Dataset(
+        {
+            "uncertainty": (("run", "parameter"), alone, {"long_name": "standard uncertainty by this run"}),
+            "log_det": (("run",), [_log_det(one + precision, size) for one in found], {
+                "long_name": "log det of the information, in units of the parameters' values"}),
+            "best": (("parameter",), labels[np.argmin(alone, axis=0)].astype(str), {
+                "long_name": "run with the least uncertainty"}),
+            "information": (("run", "parameter", "other"), np.array(found), {"long_name": "Fisher information"}),
+            "order": (("step",), labels[order].astype(str), {"long_name": "run that adds most to the determinant"}),
+            "uncertainty_after": (("step", "parameter"), np.array(after), {
+                "long_name": "standard uncertainty by this run and those before"}),
+            "log_det_after": (("step",), measure, {"long_name": "log det by this run and those before"}),
+        },
+        {
+            "run": labels.astype(str), "parameter": names, "other": names, "step": np.arange(1, len(order) + 1),
+            "unit": ("parameter", units.astype(str)),
+        },
+    )  # fmt: skip
+
+
+def _information(
+    system: System, name: str, run: Mapping[str, Any], parameters: Sequence[str], sensors: Mapping[str, Any],
+    noise: FloatArray, free: bool, priors: Any,
+) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:  # fmt: skip
+    """Names of the unknowns that runs share, what the run tells of them, what is known before, and their values."""
+    from nonsmooth.flow.simulate import simulate
+    from nonsmooth.identification.fit.first_windows import first_windows
+    from nonsmooth.identification.fit.fit import problem_of
+
+    settings = dict(run.get("settings", {}))
+    asked: dict[str, Any] = {key: run.get(key) for key in ("samples", "start", "mode")}
+    asked |= {key: run[key] for key in ("duration", "periods") if key in run}
+    motion = simulate(system.with_parameters(settings), **asked)
+    mode = list(system.modes)[int(motion["mode"].values[0])] if motion["mode"].dtype.kind in "iu" else None
+    problem = problem_of(system, motion, parameters, sensors, priors, settings, None, "time", run.get("mode") or mode)
+    problem = replace(problem, noise=noise)
+    theta = problem.unknowns.guess
+    begin = motion["u"].values[:1]
+    whole = problem.of(first_windows(problem, theta, np.inf, np.nan_to_num(begin), free))
+    state = whole.derivatives(theta, whole.starts)
+    if not whole.pieces or not all(np.isfinite(r).all() for r in state.residuals):
+        raise SolveError(f"run {name!r} cannot be followed to its end; shorten it", status="no_convergence")
+    used = np.ones(len(whole.pieces), dtype=bool)
+    normal = reduced(whole, state, whole.weights(None, 0.0), used, len(theta))[0]
+    shared = len(theta) - problem.unknowns.phases
+    own = np.linalg.pinv(normal[shared:, shared:], hermitian=True)
+    eliminated = normal[:shared, :shared] - normal[:shared, shared:] @ own @ normal[shared:, :shared]
+    known = problem.unknowns.precision[:shared, :shared]
+    return list(problem.unknowns.names[:shared]), eliminated, known, theta[:shared]
+
+
+def _uncertainties(information: FloatArray) -> FloatArray:
+    """Standard uncertainties; infinite of what a direction has in it that is not determined."""
+    covariance, loose = inverted(information, LEAST)
+    found = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    for direction in loose.T:
+        found[np.abs(direction) > 1e-3 * np.abs(direction).max()] = np.inf
+    return found
+
+
+def _log_det(information: FloatArray, size: FloatArray) -> float:
+    if not np.isfinite(_uncertainties(information)).all():
+        return -np.inf
+    return float(np.linalg.slogdet(information * np.outer(size, size))[1])
+
+
+def _gain(information: FloatArray, size: FloatArray) -> float:
+    """The determinant with a little known of every direction, so that runs can be compared that leave one open."""
+    scaled = information * np.outer(size, size)
+    return float(np.linalg.slogdet(scaled + 1e-9 * max(float(np.trace(scaled)), 1e-300) * np.eye(len(size)))[1])
+
+
+def _units(system: System, names: Sequence[str]) -> list[str]:
+    return [system.parameters[name].unit if name in system.parameters else "" for name in names]

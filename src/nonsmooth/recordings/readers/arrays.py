@@ -1,0 +1,198 @@
+"""Files of named arrays: containers with vectors in them become runs and channels.
+
+A container (the file itself, a struct, a group, an element of an array of structs or of a cell) that holds a vector
+with the name of the axis is a run; its other vectors of that length, and the columns of its matrices, are the channels.
+Text and single numbers beside them are kept as attributes of the run. Units are those that the file gives each array,
+or a text ``units`` with one word per vector, separated by commas.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.recordings.limits import MAX_COLUMNS, MAX_DEPTH
+from nonsmooth.recordings.readers.fields import Field, Table, label, traces_of
+from nonsmooth.recordings.readers.group import Group
+from nonsmooth.recordings.readers.loaders import LOADERS
+from nonsmooth.recordings.reading import Options, Reading, Source, is_axis_name, names_of
+from nonsmooth.recordings.remarks import Remarks
+
+__all__ = ["read"]
+
+_PICK = re.compile(r"(?P<path>.*?)\((?:(?P<column>:,(?P<k>\d{1,6}))|(?P<row>(?P<j>\d{1,6}),:))\)")
+_TOP = "Run #1"
+
+
+def read(data: bytes, source: Source, options: Options) -> Reading:
+    """Read the arrays of a file."""
+    reading = Reading()
+    variables, reading.header = LOADERS[source.format](data, source, reading.remarks)
+    if options.columns is not None:
+        reading.traces = list(traces_of(_chosen(variables, options, source), options, source, reading))
+        return reading
+    containers = list(_containers("", variables, 0))
+    holds = _is_vector if options.rate is None else _is_series
+    vectors = [
+        (path, node) for path, node in containers
+        if any(map(_is_series if getattr(node, "rate", None) else holds, node.values()))
+    ]  # fmt: skip
+    found: list[tuple[str, Mapping[str, Any], str | None]] = []
+    for path, node in vectors:
+        key = _axis_of(node, options.axis)
+        if key is not None or options.rate or getattr(node, "rate", None):
+            found.append((path, node, key))
+    if not found:
+        names = [f"{path}.{key}".lstrip(".") for path, node in vectors for key, v in node.items() if _is_vector(v)]
+        raise source.error(
+            "",
+            f"no vector {options.axis!r} beside others; there are {names_of(names) or 'no vectors at all'}. Name "
+            f"them, columns={{{options.axis!r}: 'data.t', 'x': 'data.x'}}, or give axis= or rate=",
+        )
+    used = {path for path, _, _ in found}
+    for path, _ in vectors:
+        if path not in used:
+            reading.remarks.say(f"{path or 'the file itself'}: holds vectors, but no {options.axis!r}; left out")
+    for path, node, key in found:
+        run = getattr(node, "run", None) or path or _TOP
+        notes = {name: _note(v) for name, v in node.items() if _note(v)}
+        own = {**getattr(node, "notes", {}), **{f"note_{name}": text for name, text in notes.items()}}
+        reading.run_attrs.setdefault(run, {}).update(own)
+        table = _table(run, path, node, key, options, reading.remarks)
+        reading.traces += traces_of(table, options, source, reading)
+        if len(reading.traces) > MAX_COLUMNS:
+            raise source.error("", f"holds more than {MAX_COLUMNS} channels")
+    return reading
+
+
+def _containers(path: str, node: Any, depth: int) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Every dict, with its path in MATLAB's notation."""
+    if depth > MAX_DEPTH:
+        return
+    if isinstance(node, dict):
+        yield path, node
+        for name, member in node.items():
+            yield from _containers(f"{path}.{name}" if path else name, member, depth + 1)
+    elif isinstance(node, list):
+        for k, member in enumerate(node, 1):
+            yield from _containers(f"{path}({k})", member, depth + 1)
+
+
+def _axis_of(node: Mapping[str, Any], axis: str) -> str | None:
+    """The vector that is the axis, where another array stands beside it."""
+    names = [name for name, value in node.items() if _is_vector(value)]
+    keys = [name for name in names if name.casefold() == axis]
+    keys = keys or [name for name in names if is_axis_name(label(name)[0], axis)]
+    return keys[0] if keys and sum(_is_array(v) and v.size > 1 for v in node.values()) > 1 else None
+
+
+def _is_array(value: Any) -> bool:
+    return isinstance(value, np.ndarray)
+
+
+def _is_vector(value: Any) -> bool:
+    return _is_array(value) and value.size > 1 and max(value.shape) == value.size
+
+
+def _is_series(value: Any) -> bool:
+    return _is_array(value) and value.size > 1 and value.ndim < 3
+
+
+def _note(value: Any) -> str:
+    if isinstance(value, str):
+        return value[:1000]
+    return str(value.ravel()[0]) if _is_array(value) and value.size == 1 else ""
+
+
+def _table(
+    run: str, path: str, node: Mapping[str, Any], key: str | None, options: Options, remarks: Remarks
+) -> Table:  # fmt: skip
+    arrays = {name: value for name, value in node.items() if _is_array(value) and value.size > 1}
+    units = _units(node, list(arrays), remarks, run)
+    lengths = [v.size for v in arrays.values() if _is_vector(v)] or [max(v.shape) for v in arrays.values()]
+    n = max(set(lengths), key=lengths.count) if key is None else arrays[key].size
+    fields = []
+    for name, value in arrays.items():
+        origin = f"{path}.{name}".lstrip(".")
+        said, unit = label(name)
+        columns = _columns(value, n)
+        if columns is None:
+            wanted = f"{n} of {options.axis}"
+            remarks.of(run, name, f"has the shape {value.shape}, which does not fit the {wanted}; left out")
+        elif value.dtype.kind not in "biufc" and name != key:
+            remarks.of(run, name, f"holds {value.dtype} values, no numbers; left out")
+        else:
+            ours = options.axis if name == key else said if unit else name
+            for k, column in enumerate(columns, 1):
+                number = f"({k})" if len(columns) > 1 else ""
+                attrs = getattr(node, "attrs", {}).get(name, {})
+                fields.append(Field(ours + number, units.get(name, "") or unit, column, origin + number, attrs=attrs))
+    return Table(run, fields, n, rate=getattr(node, "rate", None))
+
+
+def _columns(value: NDArray[Any], n: int) -> list[NDArray[Any]] | None:
+    if value.size == n and max(value.shape) == n:
+        return [value.ravel()]
+    if value.ndim == 2 and value.shape[0] == n:
+        return list(value.T)
+    if value.ndim == 2 and value.shape[1] == n:
+        return list(value)
+    return None
+
+
+def _units(node: Mapping[str, Any], names: list[str], remarks: Remarks, run: str) -> dict[str, str]:
+    if isinstance(node, Group):
+        return node.units
+    text = next((v for name, v in node.items() if name.casefold() in ("units", "unit") and isinstance(v, str)), "")
+    words = [word.strip() for word in text.split(",")]
+    if not text:
+        return {}
+    if len(words) != len(names):
+        remarks.say(f"run {run!r}: units are {text[:80]!r}, which is not one for each of {names_of(names)}; not used")
+        return {}
+    return dict(zip(names, words, strict=True))
+
+
+def _chosen(variables: Mapping[str, Any], options: Options, source: Source) -> Table:
+    """The channels that ``columns`` names by path: ``"data.x"``, ``"runs(2).x"``, ``"M(:,3)"``."""
+    found = [
+        (f"{path}.{name}".lstrip("."), value, getattr(node, "units", {}).get(name, ""), getattr(node, "rate", None))
+        for path, node in _containers("", variables, 0)
+        for name, value in node.items()
+        if _is_array(value) and value.size > 1
+    ]
+    arrays = {path: value for path, value, _, _ in found}
+    units = {path: unit for path, _, unit, _ in found}
+    fields = []
+    for ours, theirs in (options.columns or {}).items():
+        wanted, unit = theirs if isinstance(theirs, tuple) else (theirs, None)
+        values = _pick(wanted, arrays, source)
+        fields.append(Field(ours, units.get(str(wanted), "") if unit is None else unit, values, str(wanted)))
+    rate = options.rate or next((rate for *_, rate in found if rate), None)
+    axis = next((field for field in fields if field.name == options.axis), None)
+    if axis is None and rate is None:
+        wanted = f"columns names no {options.axis!r}; add it, or give the sample rate in Hz, rate=..."
+        raise source.error("", wanted)
+    n = len((axis or fields[0]).values)
+    for field in fields:
+        if len(field.values) != n:
+            raise source.error(field.origin, f"has {len(field.values)} values, the {options.axis} has {n}")
+    return Table(_TOP, fields, n, rate=rate)
+
+
+def _pick(wanted: str | int, arrays: Mapping[str, NDArray[Any]], source: Source) -> NDArray[Any]:
+    path = list(arrays)[wanted] if isinstance(wanted, int) and 0 <= wanted < len(arrays) else str(wanted)
+    if path in arrays and _is_vector(arrays[path]):
+        return arrays[path].ravel()
+    match = _PICK.fullmatch(path)
+    if match and match["path"] in arrays and arrays[match["path"]].ndim == 2:
+        table = arrays[match["path"]] if match["column"] else arrays[match["path"]].T
+        k = int(match["k"] or match["j"])
+        if 1 <= k <= table.shape[1]:
+            return table[:, k - 1]
+    shown = [f"{name} {value.shape}" for name, value in arrays.items()]
+    raise source.error("", f"no vector {path!r}; there are {names_of(shown)} (columns of a matrix as 'M(:,2)')")

@@ -1,0 +1,217 @@
+"""From named fields of a table to traces, for text, sheets and arrays alike: the axis, the runs, blanks, counters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth.arrays import FloatArray
+from nonsmooth.recordings.limits import MAX_COLUMNS
+from nonsmooth.recordings.readers.stamps import EPOCH, seconds_of
+from nonsmooth.recordings.reading import Options, Reading, Source, Trace, is_axis_name, names_of, scaled_time
+
+__all__ = ["Field", "Table", "chosen", "label", "places", "split_unit", "traces_of"]
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """One column under our name: numbers, or text or dates of an axis; the rows that hold them (None: all)."""
+
+    name: str
+    unit: str
+    values: NDArray[Any]
+    origin: str
+    rows: NDArray[np.int64] | None = None
+    attrs: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Fields over the same rows; ``rate`` where the file itself says how often they were taken."""
+
+    run: str
+    fields: list[Field]
+    rows: int
+    lines: NDArray[np.int64] | None = None
+    rate: float | None = None
+
+
+def split_unit(text: str, brackets: str = "()") -> tuple[str, str]:
+    """``"Force (push) (N/(m/s))"`` -> ``("Force (push)", "N/(m/s)")``: the last balanced bracket is the unit."""
+    stripped = text.strip()
+    opening, closing = brackets[0], brackets[1]
+    if not stripped.endswith(closing):
+        return stripped, ""
+    depth = 0
+    for i in range(len(stripped) - 1, -1, -1):
+        depth += (stripped[i] == closing) - (stripped[i] == opening)
+        if depth == 0:
+            name = stripped[:i].strip()
+            return (name, stripped[i + 1 : -1].strip()) if name else (stripped, "")
+    return stripped, ""
+
+
+def label(text: str) -> tuple[str, str]:
+    """Name and unit of ``Position (m)``, ``Position [m]`` or ``t_s``; ``pos (1)`` is a name."""
+    name, unit = split_unit(text)
+    if unit.isdigit():  # a channel's number
+        name, unit = text.strip(), ""
+    if not unit:
+        name, unit = split_unit(text, "[]")
+    tail = name.casefold().rpartition("_")[2]
+    return (name, tail) if not unit and tail in ("s", "ms", "us") and is_axis_name(name, "time") else (name, unit)
+
+
+def chosen(header: Sequence[str], options: Options, source: Source, rate: float | None) -> dict[str, tuple[int, str]]:
+    """Our name -> (column, unit): as ``columns`` says, else every column under its own name."""
+    named = [label(text) for text in header]
+    picked: dict[str, tuple[int, str]] = {}
+    if options.columns is not None:
+        for ours, theirs in options.columns.items():
+            wanted, unit = theirs if isinstance(theirs, tuple) else (theirs, None)
+            column = _find(wanted, header, named, source)
+            picked[ours] = (column, named[column][1] if unit is None else unit)
+    else:
+        for column, (name, unit) in enumerate(named):
+            if not header[column].strip():
+                continue
+            ours = options.axis if is_axis_name(name, options.axis) and options.axis not in picked else name
+            picked[ours if ours not in picked else f"{ours} (column {column + 1})"] = (column, unit)
+    if options.axis not in picked and rate is None:
+        hint = "or give its sample rate in Hz, rate=..." if options.axis == "time" else "or another axis="
+        raise source.error(
+            "", f"no {options.axis} column among {names_of(header)}; name it, columns={{{options.axis!r}: ...}}, {hint}"
+        )
+    return picked
+
+
+def _find(wanted: str | int, header: Sequence[str], named: list[tuple[str, str]], source: Source) -> int:
+    if isinstance(wanted, int):
+        if not 0 <= wanted < len(header):
+            raise source.error("", f"has {len(header)} columns; there is no column {wanted} (counted from 0)")
+        return wanted
+    for exact in ([text.strip() for text in header], [name for name, _ in named]):
+        fits = [k for k, text in enumerate(exact) if text == wanted.strip()]
+        if len(fits) > 1:
+            raise source.error("", f"{len(fits)} columns are called {wanted!r}; give the place, from 0: {fits}")
+        if fits:
+            return fits[0]
+    raise source.error("", f"no column {wanted!r}; the columns are {names_of(header)}")
+
+
+def traces_of(table: Table, options: Options, source: Source, reading: Reading) -> Iterator[Trace]:
+    """The channels of a table by run, over its axis or at its rate."""
+    fields = [_unwrapped(one, options) for one in table.fields]
+    axis, rate = next((one for one in fields if one.name == options.axis), None), options.rate or table.rate
+    numbers = next((one for one in fields if one.name == "run" and "run" in (options.columns or {})), None)
+    fields = [one for one in fields if one is not axis and one is not numbers]
+    if axis is not None and options.rate is not None:
+        reading.remarks.say(f"{axis.origin} is not used as the time, since rate= is given")
+        axis = None
+    if axis is None:
+        if rate is None:
+            raise source.error("", f"has no {options.axis}; name it, columns={{{options.axis!r}: ...}}, or give rate=")
+        held, along, unit = np.arange(table.rows), np.empty(0), "s"
+    else:
+        held = np.arange(table.rows) if axis.rows is None else axis.rows
+        along, unit = _along(axis, table, options, source, reading)
+    runs = _runs(table, numbers, source)
+    if len(runs) * (len(fields) + 1) > MAX_COLUMNS:
+        raise source.error("", f"holds {len(fields) + 1} columns in {len(runs)} runs; at most {MAX_COLUMNS} are read")
+    for one in fields:
+        rows = np.arange(table.rows) if one.rows is None else one.rows
+        if one.values.dtype.kind == "c":
+            raise source.error(one.origin, "holds complex numbers; save its parts as two real vectors")
+        for run, inside in runs:
+            whole = inside is None and len(rows) == table.rows
+            mine = slice(None) if inside is None else inside[rows]
+            at, values = rows[mine], np.ascontiguousarray(one.values[mine], np.float64)
+            blank = (len(held) if inside is None else int(np.count_nonzero(inside[held]))) - len(at)
+            if blank and len(at):
+                reading.remarks.of(run, one.name, f"{blank} blank fields dropped")
+            if axis is None:
+                first = 0 if inside is None else int(np.flatnonzero(inside)[0])
+                taken = (at - first) / float(rate or 1.0)
+            elif whole and len(held) == table.rows:
+                taken = along  # the same array for all: told at once to be one clock
+            else:
+                complaint = f"run {run!r}, channel {one.name!r} has a value where there is no {options.axis}"
+                place = places(at, held, table.lines, source, complaint)
+                taken = along[place]
+            lines = None if table.lines is None else table.lines[at]
+            yield Trace(run, one.name, one.unit, taken, values, one.origin, unit, lines=lines, attrs=one.attrs)
+
+
+def places(
+    held: NDArray[np.int64], axis: NDArray[np.int64], lines: NDArray[np.int64] | None, source: Source, complaint: str
+) -> NDArray[np.int64]:
+    """Place among the rows of the axis of each row in which a channel has a value; all must be there."""
+    place = np.minimum(np.searchsorted(axis, held), max(len(axis) - 1, 0))
+    missing = held[axis[place] != held] if len(axis) else held
+    if len(missing):
+        raise source.error(row_of(int(missing[0]), lines), complaint)
+    return place
+
+
+def row_of(row: int, lines: NDArray[np.int64] | None) -> str:
+    """Name of a row (from 0) in messages: its line in a text, else its number."""
+    return f"row {row + 1}" if lines is None else f"line {lines[row]}"
+
+
+def _unwrapped(field: Field, options: Options) -> Field:
+    """The field, with a counter that begins anew at its period put together."""
+    period = options.wraps.get(field.name)
+    if period is None or field.values.dtype.kind not in "iuf":
+        return field
+    values = np.array(field.values, np.float64)
+    good = np.isfinite(values)
+    values[good] = np.unwrap(values[good], period=period)
+    return replace(field, values=values)
+
+
+def _along(
+    axis: Field, table: Table, options: Options, source: Source, reading: Reading
+) -> tuple[FloatArray, str]:
+    """The axis and its unit: times in seconds."""
+    axis = replace(axis, unit=options.units.get(options.axis, axis.unit))
+    if options.axis != "time":
+        return np.ascontiguousarray(axis.values, np.float64), axis.unit
+    if axis.values.dtype.kind not in "iufb":
+        seconds, begun = seconds_of(axis, table.lines, source)
+        if begun:
+            reading.run_attrs.setdefault(table.run, {})["started"] = begun
+        period = options.wraps.get("time")
+        return (seconds if period is None else np.unwrap(seconds, period=period)), "s"
+    values = np.asarray(axis.values, np.float64)
+    scaled = scaled_time(values, axis.unit)
+    if scaled is None:
+        raise source.error(
+            "", f"the time column is in {axis.unit!r}, which is no unit of time; say its unit, units={{'time': 'ms'}}"
+        )
+    if not axis.unit:
+        reading.remarks.say("the time column has no unit; taken as seconds (else units={'time': 'ms'})")
+    if len(scaled) and scaled[0] > EPOCH:
+        reading.remarks.say(f"times count from an epoch, {scaled[0]:.15g} s ago at the first; they begin at 0 here")
+        scaled = np.asarray(scaled_time(values - values[0], axis.unit))
+    return scaled, "s"
+
+
+def _runs(table: Table, numbers: Field | None, source: Source) -> list[tuple[str, NDArray[np.bool_] | None]]:
+    """The runs, each with the mask of its rows; one run where no column numbers them."""
+    if numbers is None:
+        return [(table.run, None)]
+    if numbers.rows is not None and len(numbers.rows) != table.rows:
+        missing = int(np.setdiff1d(np.arange(table.rows), numbers.rows)[0])
+        raise source.error(row_of(missing, table.lines), "the column that numbers the runs is blank")
+    values = np.asarray(numbers.values, np.float64)
+    if not np.isfinite(values).all():
+        bad = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise source.error(row_of(bad, table.lines), f"the number of the run is {values[bad]}")
+    found, first = np.unique(values, return_index=True)
+    if len(found) > MAX_COLUMNS:
+        raise source.error("", f"holds {len(found)} runs; at most {MAX_COLUMNS} are read")
+    return [(f"Run #{value:.12g}", values == value) for value in found[np.argsort(first)]]

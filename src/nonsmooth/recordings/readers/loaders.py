@@ -1,0 +1,196 @@
+"""One loader per format of named arrays, each over its library: claims are checked before the library acts on them.
+
+A loader returns the file's arrays as nested dicts and lists, and what the file says of itself.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import tempfile
+import warnings
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nonsmooth.errors import DataFileError
+from nonsmooth.recordings.limits import MAX_COLUMNS, inflation_limit
+from nonsmooth.recordings.needed import needed
+from nonsmooth.recordings.readers.archive import Archive
+from nonsmooth.recordings.readers.group import Group
+from nonsmooth.recordings.reading import Source
+from nonsmooth.recordings.remarks import Remarks
+
+__all__ = ["LOADERS"]
+
+Loaded = tuple[Mapping[str, Any], dict[str, Any]]
+
+
+def _matlab(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+    from nonsmooth.recordings.readers.hdf5 import load_hdf5
+    from nonsmooth.recordings.readers.matlab_v5 import load_v5
+
+    is_hdf5 = data.startswith(b"\x89HDF") or data[512:516] == b"\x89HDF"
+    variables = load_hdf5(data, source, remarks, matlab=True) if is_hdf5 else load_v5(data, source, remarks)
+    # An HDF5 file that another program wrote has no text before its own mark.
+    text = b"" if data.startswith(b"\x89HDF") else data[:116].split(b"\0")[0]
+    return variables, {"version": "7.3" if is_hdf5 else "5", "text": text.decode("ascii", "replace")}
+
+
+def _hdf5(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+    from nonsmooth.recordings.readers.hdf5 import load_hdf5
+
+    return load_hdf5(data, source, remarks, matlab=False), {}
+
+
+def _tdms(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+    from nonsmooth.recordings.readers.tdms import load_tdms
+
+    return load_tdms(data, source, remarks)
+
+
+def _numpy(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+    if not data.startswith(b"PK"):
+        return Group({"values": _array(data, "values", source)}), {}
+    archive = Archive(data, source)
+    found = {name.removesuffix(".npy"): b"".join(archive.pieces(name)) for name in archive.names}
+    return Group({name: _array(content, name, source) for name, content in found.items()}), {"arrays": len(found)}
+
+
+def _array(data: bytes, name: str, source: Source) -> Any:
+    """The array of one .npy file; a structured one as a group of its fields."""
+    stream = io.BytesIO(data)
+    form = np.lib.format
+    try:
+        version = form.read_magic(stream)
+        shape, _, kind = (form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0)(stream)
+        size = math.prod(shape) * kind.itemsize
+        if kind.hasobject or size > len(data):
+            raise source.error(name, f"says it holds {kind} values of shape {shape}; expected numbers that fit it")
+        stream.seek(0)
+        values = np.load(stream, allow_pickle=False)
+    except DataFileError:
+        raise
+    # A damaged header surfaces as almost any exception of NumPy.
+    except Exception as error:
+        raise source.error(name, f"cannot be read as a .npy array ({type(error).__name__}: {error})"[:300]) from error
+    return Group({field: values[field] for field in values.dtype.names}) if values.dtype.names else values
+
+
+def _arrow(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+    pyarrow = needed("pyarrow", "pyarrow", source)
+    if data.startswith(b"PAR1"):
+        opened = needed("pyarrow.parquet", "pyarrow", source).ParquetFile(io.BytesIO(data))
+        shape = (opened.metadata.num_rows, opened.metadata.num_columns)
+        if math.prod(shape) * 8 > inflation_limit(len(data)) or shape[1] > MAX_COLUMNS:
+            raise source.error("", f"says it holds {shape[0]} rows of {shape[1]} columns, more than it warrants")
+        table = opened.read()
+    else:
+        table = pyarrow.ipc.open_file(io.BytesIO(data)).read_all()
+    units = {}
+    for field in table.schema:
+        said = {key.decode().lower(): value.decode() for key, value in (field.metadata or {}).items()}
+        units[field.name] = said.get("units", said.get("unit", ""))
+    columns = {name: table.column(name).to_numpy(zero_copy_only=False) for name in table.column_names}
+    return Group(columns, units), {"columns": len(columns), "rows": table.num_rows}
+
+
+def _wave(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+    from scipy.io import wavfile
+
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        rate, samples = wavfile.read(io.BytesIO(data))
+    for warning in said:
+        remarks.say(f"SciPy: {warning.message}"[:200])
+    kind = samples.dtype
+    if kind.kind in "iu":  # as parts of full scale, as audio programs show them
+        half = 128.0 if kind.kind == "u" else float(-np.iinfo(kind).min)
+        samples = (samples - (128.0 if kind.kind == "u" else 0.0)) / half
+    columns = samples.reshape(len(samples), -1)
+    remarks.say("values are parts of full scale; multiply by what full scale stands for")
+    names = [f"channel {k + 1}" for k in range(columns.shape[1])]
+    found = Group(dict(zip(names, columns.T, strict=True)), dict.fromkeys(names, "1"), float(rate))
+    return found, {"rate": float(rate), "samples": str(kind)}
+
+
+def _universal(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+    """Data sets 58; those over the same abscissa are one group."""
+    pyuff = needed("pyuff", "pyuff", source)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "data.uff"
+        path.write_bytes(data)
+        opened = pyuff.UFF(str(path))
+        kinds = [int(kind) for kind in opened.get_set_types()]
+        sets = [opened.read_sets(k) for k, kind in enumerate(kinds) if kind == 58]
+    groups: list[Group] = []
+    for k, one in enumerate(sets, 1):
+        axis = {17: "time", 18: "frequency"}.get(int(one.get("abscissa_spec_data_type", 0)), "abscissa")
+        group = next((g for g in groups if axis in g and np.array_equal(g[axis], one["x"])), None)
+        if group is None:
+            group = Group({axis: np.asarray(one["x"], np.float64)})
+            group.units[axis] = _unit(one, "abscissa") or {"time": "s", "frequency": "Hz"}.get(axis, "")
+            groups.append(group)
+        name = f"{one.get('rsp_node', k)}{_direction(one.get('rsp_dir', 0))}"
+        name = name if name not in group else f"{name} (set {k})"
+        group[name], group.units[name] = np.asarray(one["data"]), _unit(one, "ordinate")
+    return {f"group {k}": group for k, group in enumerate(groups, 1)}, {"sets": len(sets)}
+
+
+def _unit(one: Mapping[str, Any], of: str) -> str:
+    text = str(one.get(f"{of}_axis_units_lab", "")).strip()
+    return "" if text.upper() == "NONE" else text
+
+
+def _direction(number: Any) -> str:
+    return f"{'-' if number < 0 else '+'}{' XYZ'[abs(int(number))]}" if 1 <= abs(int(number)) <= 3 else ""
+
+
+def _measured(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+    """Channel groups of an MDF file: one run, each group with the clock of its master."""
+    asammdf = needed("asammdf", "asammdf", source, "mdf")
+    groups: dict[str, Any] = {}
+    with asammdf.MDF(io.BytesIO(data)) as opened:
+        cycles = sum(group.channel_group.cycles_nr * len(group.channels) for group in opened.groups)
+        if 8 * cycles > inflation_limit(len(data)):
+            raise source.error("", f"says it holds {cycles} samples, more than a file of {len(data)} bytes warrants")
+        for k, held in enumerate(opened.groups):
+            group = Group()
+            group.run = "Run #1"
+            for i in range(len(held.channels)):
+                signal = opened.get(group=k, index=i)
+                if i != opened.masters_db.get(k):
+                    group[signal.name], group.units[signal.name] = np.asarray(signal.samples), signal.unit or ""
+                    group["time"], group.units["time"] = np.asarray(signal.timestamps, np.float64), "s"
+            groups[f"group {k + 1}"] = group
+    return groups, {"version": str(opened.version)}
+
+
+def _guarded(load: Callable[[bytes, Source, Remarks], Loaded], what: str) -> Callable[[bytes, Source, Remarks], Loaded]:
+    """The loader; what a damaged file makes its library raise becomes a DataFileError."""
+
+    def guarded(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+        try:
+            return load(data, source, remarks)
+        except DataFileError:
+            raise
+        except Exception as error:
+            message = f"cannot be read as {what}, it is damaged or cut short ({type(error).__name__}: {error})"
+            raise source.error("", message[:300]) from error
+
+    return guarded
+
+
+#: Each format of arrays and what loads it.
+LOADERS = {
+    "mat": _matlab,
+    "hdf5": _hdf5,
+    "tdms": _tdms,
+    "npy": _numpy,
+    "arrow": _guarded(_arrow, "Parquet or Arrow"),
+    "wav": _guarded(_wave, "a WAV file"),
+    "uff": _guarded(_universal, "a universal file"),
+    "mf4": _guarded(_measured, "a measurement of ASAM MDF"),
+}

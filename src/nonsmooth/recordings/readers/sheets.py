@@ -1,0 +1,63 @@
+"""Workbooks (``.xlsx``): each sheet is read as a table of text, so that all options of tables hold for it."""
+
+from __future__ import annotations
+
+import datetime
+import io
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+from nonsmooth.errors import DataFileError
+from nonsmooth.recordings.needed import needed
+from nonsmooth.recordings.readers.archive import Archive
+from nonsmooth.recordings.readers.delimited import read_lines
+from nonsmooth.recordings.reading import Options, Reading, Source
+
+__all__ = ["read"]
+
+
+def read(data: bytes, source: Source, options: Options) -> Reading:
+    """Read a workbook; a sheet that is no table is left out, where another is one."""
+    openpyxl = needed("openpyxl", "openpyxl", source)
+    archive = Archive(data, source)
+    for name in archive.names:  # what it unpacks to is counted, and entities are refused, before another reads it
+        for piece in archive.pieces(name):
+            if name.endswith((".xml", ".rels")) and b"<!DOCTYPE" in piece:
+                raise source.error(name, "has a document type, which is refused")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True)
+            sheets = [(sheet.title, list(_lines(sheet))) for sheet in book.worksheets]
+    # What is wrong with a workbook surfaces as almost any exception of the library.
+    except Exception as error:
+        message = f"cannot be read as a workbook ({type(error).__name__}: {error})"
+        raise source.error("", message[:300]) from error
+    reading = Reading()
+    refused: list[DataFileError] = []
+    filled = [(title, lines) for title, lines in sheets if any(map(str.strip, lines))]
+    for title, lines in filled:
+        run = title if len(filled) > 1 else "Run #1"
+        try:
+            read_lines(lines, run, source, options, reading, delimiter="\t")
+        except DataFileError as error:
+            refused.append(error)
+            reading.remarks.say(f"sheet {title!r} is left out: {str(error).removeprefix(source.name + ': ')}")
+    if not reading.traces:
+        raise refused[0] if refused else source.error("", "holds no table")
+    reading.header["sheets"] = [title for title, _ in sheets]
+    return reading
+
+
+def _lines(sheet: Any) -> Iterator[str]:
+    for row in sheet.iter_rows(values_only=True):
+        yield "\t".join(map(_text, row)).rstrip("\t") + "\n"
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, datetime.datetime | datetime.time):
+        return value.isoformat()
+    if isinstance(value, datetime.timedelta):
+        return str(value)
+    return "" if value is None else " ".join(str(value).split()).replace('"', "'")

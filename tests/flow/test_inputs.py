@@ -1,0 +1,163 @@
+"""Systems driven by samples: closed forms, SciPy between the same breakpoints, and derivatives against differences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import nonsmooth as ns
+
+pytestmark = pytest.mark.physics
+CHATTER = (17,)  # draws whose load presses the mass on the stop
+
+
+def at(run: Any, times: np.ndarray, count: int) -> np.ndarray:
+    """The first states at some instants, behind what happens there."""
+    return run.u.values[np.searchsorted(run.time.values, times, side="right") - 1, :count]
+
+
+def test_a_cart_under_held_and_linear_forces() -> None:
+    cart = ns.mechanical(2.0, 0.0, 0.0, forcing={"q": lambda t, p: p.force}, inputs={"force": "N"})
+    held = ns.simulate(cart, duration=3.0, inputs={"force": ns.Input([0, 1, 2], [4, 0, -4], between="steps")})
+    np.testing.assert_allclose(held.u.values[-1], [4.0, 0.0, -4.0, 0.0], atol=1e-14)
+    times = np.linspace(0, 2, 9)
+    ramp = ns.simulate(cart, duration=2.0, samples=times, inputs={"force": ([0, 2], [0, 6])})
+    exact = np.transpose([times**3 / 4, 0.75 * times**2, 3 * times, 0 * times + 3])
+    np.testing.assert_allclose(at(ramp, times, 4)[:-1], exact[:-1], atol=1e-13)
+
+
+def test_a_block_with_friction_under_steps() -> None:
+    """It holds up to mu = .5, slides under .8 with a = .3 from t = 1, and under 0 stops at t = 2 + .3 / .5."""
+    block = ns.mechanical(
+        1.0, 0.0, 0.0, forcing={"q": lambda t, p: p.load}, inputs={"load": ""},
+        elements={"floor": ns.elements.Coulomb(at="q", friction=0.5)},
+    )  # fmt: skip
+    run = ns.simulate(
+        block, duration=4.0, samples=[0.5, 1.5, 2.3, 3.5],
+        inputs={"load": ns.Input([0, 1, 2, 3], [0.4, 0.8, 0.0, -0.45], between="steps")},
+    )  # fmt: skip
+    half = 0.15 + 0.3 * 0.3 - 0.25 * 0.09
+    np.testing.assert_allclose(at(run, np.array([0.5, 1.5, 2.3, 3.5]), 1)[:, 0], [0, 0.0375, half, 0.24], atol=1e-13)
+    np.testing.assert_allclose(run.crossing_time, [1.0, 2.6], atol=1e-13)
+    force = run["floor_force"].values[np.searchsorted(run.time.values, [0.5, 3.5], side="right") - 1]
+    np.testing.assert_allclose(force, [-0.4, 0.45], atol=1e-13)
+
+
+def test_a_mass_pressed_on_a_stop_lifts_where_the_load_turns() -> None:
+    """Modes made when visited, too; the force on the stop is the load."""
+    for rubs in (False, True):
+        more: dict[str, Any] = {"friction": 0.3, "tangent": "y"} if rubs else {}
+        box = ns.mechanical(
+            np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), coordinates=["x", "y"],
+            forcing={"x": lambda t, p: p.load}, inputs={"load": ""},
+            elements={"wall": ns.elements.Stop(at="x", position=0.0, **more)},
+        )  # fmt: skip
+        run = ns.simulate(box, duration=2.0, samples=[0.5, 2.0], inputs={"load": ([0, 2], [1, -1])})
+        np.testing.assert_allclose(at(run, np.array([2.0]), 1), [[-1 / 6]], atol=1e-13)
+        assert abs(run["wall_force"].values[np.searchsorted(run.time.values, 0.5)] - 0.5) < 1e-13
+
+
+def drawn(seed: int) -> tuple[ns.System, dict[str, Any], Callable[..., Any], np.ndarray, float]:
+    """A random oscillator with a rigid stop, driven by a force and a moving base, each with its clock."""
+    rng = np.random.default_rng(seed)
+    cubic, wall = float(rng.random() < 0.5), float(rng.uniform(0.1, 0.2))
+    k, c, e = rng.uniform(0.5, 2), rng.uniform(0.02, 0.2), rng.uniform(0.3, 0.9)
+    parameters = {"k": k, "c": c, "e": e, "late": 0.031}
+    system = ns.System(
+        states={"x": "m", "v": "m/s"}, parameters=parameters, inputs={"f": "N", "b": "m"},
+        modes={"one": lambda t, u, p: [
+            u.v, -p.k * (u.x - p.b) - p.c * (u.v - p.b_rate) - (u.x**3 if cubic else 0) + p.f]},
+        indicators={"gap": lambda t, u, p: u.x - wall},
+        transitions=[ns.Transition("one", "one", when="gap > 0", reset=lambda t, u, p: [u.x, -p.e * u.v])],
+    )  # fmt: skip
+    clocks = np.cumsum(rng.uniform(0.02, 0.2, 120)), np.cumsum(rng.uniform(0.1, 0.4, 60))
+    held = ns.Input(clocks[0], rng.standard_normal(120), between="steps", delay="late")
+    base = ns.Input(clocks[1], 0.2 * rng.standard_normal(60))
+
+    def field(t: float, x: np.ndarray, middle: float) -> list[float]:
+        i = np.searchsorted(held.time + 0.031, middle, "right") - 1
+        j = int(np.searchsorted(base.time, middle, "right")) - 1
+        rate = 0.0 if j < 0 else (base.values[j + 1] - base.values[j]) / (base.time[j + 1] - base.time[j])
+        b = base.values[max(j, 0)] + rate * (t - base.time[max(j, 0)])
+        force = held.values[max(i, 0)]
+        return [x[1], -k * (x[0] - b) - c * (x[1] - rate) - cubic * x[0] ** 3 + force]
+
+    breaks = np.unique(np.concatenate([held.time + 0.031, base.time]))
+    return system, {"f": held, "b": base}, field, breaks, wall
+
+
+def by_scipy(field: Any, breaks: np.ndarray, wall: float, e: float, times: np.ndarray) -> tuple[np.ndarray, int]:
+    found, x, t, hits = np.full((len(times), 2), np.nan), np.array([0.1, 0.0]), 0.0, 0
+    for end in [*breaks[(breaks > 0) & (breaks < times[-1])], times[-1]]:
+        middle = 0.5 * (t + end)
+        while t < end:
+
+            def contact(t: float, x: np.ndarray, middle: float) -> float:
+                return float(x[0] - wall)
+
+            contact.terminal, contact.direction = True, 1  # type: ignore[attr-defined]
+            one = solve_ivp(field, (t, end), x, "DOP853", args=(middle,), events=contact, rtol=1e-12, atol=1e-13,
+                            dense_output=True)  # fmt: skip
+            here = (times >= t) & (times <= one.t[-1])
+            if here.any():
+                found[here] = one.sol(times[here]).T
+            t, x = float(one.t[-1]), one.y[:, -1].copy()
+            if one.status == 1:
+                x[0], x[1], hits = wall, -e * x[1], hits + 1
+    return found, hits
+
+
+@pytest.mark.parametrize("seed", [1, 3, *(pytest.param(s, marks=pytest.mark.slow) for s in range(4, 24) if s not in CHATTER)])
+def test_random_systems_against_scipy(seed: int) -> None:
+    system, inputs, field, breaks, wall = drawn(seed)
+    times = np.linspace(0.0, 9.0, 91)
+    expected, hits = by_scipy(field, breaks, wall, system.values["e"], times)
+    run = ns.simulate(system, duration=9.0, samples=times, start={"x": 0.1}, inputs=inputs, rtol=1e-13)
+    assert len(run.crossing_time) == hits
+    away = np.abs(times[:, None] - run.crossing_time.values).min(axis=1, initial=1.0) > 1e-9
+    np.testing.assert_allclose(at(run, times, 2)[away], expected[away], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", [3, 8])
+def test_derivatives_against_differences(seed: int) -> None:
+    """In parameters, the start and a delay, through impacts."""
+    system, inputs, *_ = drawn(seed)
+    names = list(system.values)
+    found = ns.sensitivity(system, duration=7.0, start={"x": 0.1}, parameters=names, inputs=inputs)
+
+    def end(**changed: float) -> np.ndarray:
+        start = {"x": changed.pop("x", 0.1)}
+        run = ns.simulate(system.with_parameters(changed), duration=7.0, start=start, inputs=inputs, rtol=1e-14)
+        return np.asarray(run.u.values[-1])
+
+    assert len(found.crossing_time) > 0
+    for name in [*names, "x"]:
+        now, h = system.values.get(name, 0.1), 1e-6
+        slope = (end(**{name: now + h}) - end(**{name: now - h})) / (2 * h)
+        own = found.P.sel(parameter=name) if name in names else found.Phi.sel(initial_state=name)
+        np.testing.assert_allclose(own, slope, rtol=0, atol=1e-6 * (1 + np.abs(slope).max()))
+
+
+def test_text_and_what_is_refused() -> None:
+    system, inputs, *_ = drawn(1)
+    again = ns.System.from_text(system.to_text())
+    assert again == system
+    assert again.inputs == {"f": "N", "b": "m"}
+    with pytest.raises(ValueError, match=r"has the inputs 'f', 'b': give inputs="):
+        ns.simulate(system, duration=1.0)
+    with pytest.raises(ValueError, match="'b' is missing"):
+        ns.simulate(system, duration=1.0, inputs={"f": inputs["f"]})
+    with pytest.raises(ValueError, match="force"):
+        ns.simulate(system, duration=1.0, inputs={"force": ([0], [1])})
+    with pytest.raises(ValueError, match="sample 1 of an input is not finite"):
+        ns.Input([0, 1, 2], [0, np.nan, 1])
+    with pytest.raises(ValueError, match="sample 2 is at 1 after 1"):
+        ns.Input([0, 1, 1], [0, 2, 1])
+    with pytest.raises(ValueError, match="sweep takes systems without inputs"):
+        ns.sweep(system, "k", [1.0, 2.0], progress=False)
+    with pytest.raises(ValueError, match="has no inputs"):
+        ns.simulate(ns.models.discontinuous_support(), periods=1, inputs={"f": ([0], [1])})

@@ -1,0 +1,151 @@
+"""One fit of several runs: unknowns of each run, the recording's clock, windows left out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+pytestmark = pytest.mark.physics
+T = np.arange(0.0, 20.0, 0.05)
+
+
+def oscillator(**values: float) -> ns.System:
+    parameters = {"k": 9.0, "c": 0.15, "F": 0.0, "omega": 2.0, **values}
+    return ns.mechanical(
+        1.0, "c", "k", parameters=parameters, coordinates=["q"], forcing={"q": lambda t, p: p.F * np.cos(p.omega * t)}
+    )
+
+
+def decay(t: Any, c: float = 0.15, k: float = 9.0, q: float = 1.0, v: float = 0.0) -> Any:
+    w = np.sqrt(k - c**2 / 4)
+    return np.exp(-c / 2 * t) * (q * np.cos(w * t) + (v + c / 2 * q) / w * np.sin(w * t))
+
+
+def within(found: ns.ParameterSet, truth: dict[str, float], most: float = 4.0) -> None:
+    for name, value in truth.items():
+        estimate = found.estimate(name)
+        assert abs(estimate.value - value) < most * estimate.uncertainty, (name, estimate, value)
+
+
+def test_each_run_has_its_own_damping_and_offset_and_all_share_the_stiffness() -> None:
+    rng = np.random.default_rng(3)
+    truth = {"0": (0.1, 0.02), "1": (0.2, -0.01), "2": (0.4, 0.05)}
+    runs = [{"q": (T, decay(T, c=c) + o + 1e-3 * rng.standard_normal(T.size))} for c, o in truth.values()]
+    found = ns.fit(
+        oscillator(k=8.6), runs, ["k", "c", "q.offset"], per_run=["c", "q.offset"], progress=False, tries=2
+    )
+    assert list(found) == ["k"] and not found.anomalies
+    within(found, {"k": 9.0})
+    within(found, {f"c, {run}": c for run, (c, _) in truth.items()})
+    within(found, {f"q.offset, {run}": o for run, (_, o) in truth.items()})
+    alone = ns.fit(oscillator(k=8.6), runs[0], ["k", "c", "q.offset"], progress=False, tries=2)
+    assert found.uncertainty["k"] < alone.uncertainty["k"]
+
+
+def test_one_unknown_of_each_run_and_one_of_the_forcing() -> None:
+    """Two forced runs at amplitudes that were set differently: the closed form of the linear response."""
+    rng = np.random.default_rng(5)
+    k, c, w = 9.0, 0.15, 2.0
+    response = 1 / (k - w**2 + 1j * c * w)
+    runs = [{"q": (T, F * np.real(response * np.exp(1j * w * T)) + 1e-3 * rng.standard_normal(T.size))} for F in (1, 3)]
+    found = ns.fit(oscillator(F=2.0), runs, ["F"], per_run=["F"], progress=False, tries=2)
+    assert list(found) == []
+    within(found, {"F, 0": 1.0, "F, 1": 3.0})
+
+
+@pytest.mark.parametrize("clock", [1.002, 0.995])
+def test_the_clock_of_a_recording_is_found_where_the_forcing_is_known(clock: float) -> None:
+    """A recorder whose seconds are too long or too short, of a resonance and its transient, both in closed form."""
+    rng = np.random.default_rng(2)
+    k, c, w = 9.0, 0.15, 2.0
+    response = np.real(np.exp(1j * w * clock * T) / (k - w**2 + 1j * c * w))
+    y = response + decay(clock * T) + 1e-3 * rng.standard_normal(T.size)
+    found = ns.fit(oscillator(F=1.0, k=8.8), {"q": (T, y)}, ["k", "c", "clock"], progress=False, tries=2)
+    within(found, {"k": k, "c": c, "clock": clock})
+    assert found.estimate("clock").uncertainty < 2e-4 and not found.anomalies
+
+
+def test_derivatives_in_the_clock_and_in_unknowns_of_runs_are_those_of_differences() -> None:
+    from nonsmooth.identification.fit.first_windows import first_windows
+    from nonsmooth.identification.fit.fit import problem_of
+
+    rng = np.random.default_rng(1)
+    runs = [{"q": (T + 0.3, decay(T) + 1e-3 * rng.standard_normal(T.size))} for _ in range(2)]
+    stop = ns.elements.Stop(at="q", position=0.7, restitution=0.8)
+    s = ns.mechanical(
+        1.0, "c", "k", parameters={"k": 9.0, "c": 0.15, "F": 0.5}, coordinates=["q"], elements={"s": stop},
+        forcing={"q": lambda t, p: p.F * np.cos(2.0 * t)},
+    )  # fmt: skip
+    names = ["k", "c", "q.delay", "q.gain", "clock", "phase"]
+    problem = problem_of(s, runs, names, per_run=["c", "clock", "q.gain"])
+    theta = problem.unknowns.guess + 0.01 * np.arange(1, len(problem.unknowns.names) + 1) / 10
+    problem = problem.of(first_windows(problem, theta, 2.0, None, True)[:3])
+    exact, h = problem.derivatives(theta, problem.starts), 1e-6
+    for i, window in enumerate(problem.pieces):
+        n = len(window.readings[0])
+        for j, place in enumerate(window.which):
+            step = h * np.eye(len(theta))[place]
+            ahead, behind = (problem.residuals(theta + sign * step, problem.starts).residuals[i] for sign in (1, -1))
+            slope = -(ahead - behind)[:n] / (2 * h)
+            np.testing.assert_allclose(exact.in_parameters[i][:n, j], slope, rtol=2e-5, atol=2e-5)
+
+
+def test_a_knock_is_left_out_and_named() -> None:
+    """From 8 s on the mass moves on from another state; the readings of half a second before are of a hand."""
+    rng = np.random.default_rng(7)
+    y = np.where(T < 8.0, decay(T), decay(T - 8.0, q=0.5, v=1.2))
+    hand = (T > 7.4) & (T < 8.0)
+    y[hand] += 0.3 * np.sin(9.0 * (T[hand] - 7.4) / 0.6)
+    y = y + 2e-3 * rng.standard_normal(T.size)
+    guess = oscillator(k=8.7, c=0.2)
+    kept = ns.fit(guess, {"q": (T, y)}, ["k", "c"], progress=False, tries=2)
+    found = ns.fit(guess, {"q": (T, y)}, ["k", "c"], leave_out=True, progress=False, tries=2)
+    assert kept.anomalies and not found.anomalies
+    (note,) = [note for note in found.notes if note.startswith("left out")]
+    begin, end = (float(word.strip(",")) for word in np.array(note.split())[[4, 6]])
+    assert 6.0 < begin < 7.45 and 7.95 <= end < 9.2
+    within(found, {"k": 9.0, "c": 0.15})
+    y = decay(T) + 2e-3 * rng.standard_normal(T.size)
+    clean = ns.fit(guess, {"q": (T, y)}, ["k"], leave_out=True, progress=False)
+    assert not [note for note in clean.notes if note.startswith("left out")]
+
+
+def test_a_knock_in_one_of_two_driven_runs_with_a_stop() -> None:
+    """Phases and forces of each run stay those of all its parts; readings of 1.2 s are of something else."""
+    rng, t, period = np.random.default_rng(0), np.arange(0.0, 40.0, 0.04), np.pi
+    stop = ns.elements.Stop(at="q", position=0.15, restitution="e")
+    s = ns.mechanical(
+        1.0, "c", "k", parameters={"c": 0.1, "k": 9.0, "F": 0.5, "e": 0.8}, coordinates=["q"], elements={"s": stop},
+        forcing={"q": lambda t, p: p.F * np.cos(2.0 * t)},
+    )  # fmt: skip
+    runs = []
+    for phase, F in ((0.2, 0.5), (0.7, 0.55)):
+        at = t + phase * period
+        run = ns.simulate(s.with_parameters(F=F), duration=at[-1] + 0.1, samples=at, start={"q": 0.0, "v_q": 0.1})
+        q = run["u"].sel(state="q").groupby("time").last().sel(time=at, method="nearest").values
+        runs.append({"q": (t, q + 1e-3 * rng.standard_normal(t.size))})
+    runs[1]["q"][1][500:530] += 0.05 * np.sin(np.arange(30))
+    found = ns.fit(
+        s.with_parameters(k=8.7, e=0.7, c=0.15), runs, ["k", "c", "e", "F", "phase"], per_run=["F"], leave_out=True,
+        progress=False, tries=4,
+    )  # fmt: skip
+    within(found, {"k": 9.0, "c": 0.1, "e": 0.8, "F, 0": 0.5, "F, 1": 0.55, "phase, 0": 0.2, "phase, 1": 0.7})
+    assert len([note for note in found.notes if note.startswith("left out: run 1")]) == 1
+    assert "q(0), 1 from 21" in " ".join(found.extra) and found.estimate("q.noise").value < 1.2e-3
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"per_run": ["m"]}, "per_run: `m` is not an unknown of this fit"),
+        ({"leave_out": True, "free_start": False, "start": {"q": 1.0}}, "needs free starts"),
+        ({"leave_out": "maybe"}, "leave_out"),
+    ],
+)
+def test_what_does_not_fit_is_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=message):
+        ns.fit(oscillator(), {"q": (T, decay(T))}, ["k"], progress=False, **options)

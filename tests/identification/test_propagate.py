@@ -1,0 +1,221 @@
+"""Uncertainty through verbs: what draws and first order give, against closed forms and against each other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.identification import Estimate
+
+pytestmark = pytest.mark.physics
+QUIET: dict[str, Any] = {"progress": False}
+
+
+def known(system: ns.System, errors: dict[str, float], correlation: float = 0.0) -> ns.ParameterSet:
+    """Parameters at their values in ``system``, every pair with the same correlation."""
+    sizes = np.array(list(errors.values()))
+    matrix = np.outer(sizes, sizes) * (correlation + (1 - correlation) * np.eye(len(sizes)))
+    rows = {name: Estimate(system.values[name], error, "") for name, error in errors.items()}
+    return ns.ParameterSet(rows, matrix)
+
+
+def support() -> ns.System:
+    return ns.models.discontinuous_support().with_parameters(omega=3.69, g=0.02, rho=0.1)
+
+
+def grazing(p: dict[str, Any]) -> Any:
+    """Force at which the motion without contact touches the support."""
+    m, c, omega = p["m"], p["c"], p["omega"]
+    return p["g"] * m * np.sqrt((2 * p["k"] / m - omega**2) ** 2 + (c * omega / m) ** 2)
+
+
+def test_the_grazing_point_of_each_draw_is_the_closed_form_and_so_are_its_derivatives() -> None:
+    s = support()
+    found = known(s, {"k": 0.05, "c": 0.02, "m": 0.004}, correlation=0.4)
+    band = ns.propagate(
+        found, ns.continue_orbit, ns.find_orbit(s), "rho", (0.08, 0.15), draws=40, seed=3, first_order=True,
+        settings={"g": (0.02, 1e-4)}, **QUIET,
+    )  # fmt: skip
+    assert band["special_kind"].values[0] == "grazing" and int(band["failed"]) == 0
+    drawn = {**s.values, **{name: band[f"drawn_{name}"].values for name in ("k", "c", "m", "g")}}
+    np.testing.assert_allclose(band["special_value_draws"].values[:, 0], grazing(drawn), rtol=1e-9)
+    np.testing.assert_allclose(
+        band["special_value_quantiles"].values[:, 0], np.quantile(grazing(drawn), [0.025, 0.5, 0.975]), rtol=1e-9
+    )
+    slope = []
+    for name in band["source"].values:
+        h = 1e-5 * s.values[str(name)]
+        ahead, behind = ({**s.values, str(name): s.values[str(name)] + sign * h} for sign in (1, -1))
+        slope.append((grazing(ahead) - grazing(behind)) / (2 * h))
+    assert band["source"].values.tolist() == ["k", "c", "m", "g"]
+    np.testing.assert_allclose(band["special_slope"].values[0], slope, rtol=1e-6)
+    covariance = np.zeros((4, 4))
+    covariance[:3, :3], covariance[3, 3] = found.covariance.values, 1e-8
+    assert float(band["special_first_order"][0]) == pytest.approx(np.sqrt(slope @ covariance @ slope), rel=1e-6)
+
+
+def test_draws_and_first_order_agree_on_a_flip() -> None:
+    """100 draws give a standard deviation to 7 %: three of these are allowed."""
+    s = support().with_parameters(g=-0.0045, rho=0.42)
+    found = known(s, {"k": 0.004, "c": 0.002, "m": 0.0002})
+    band = ns.propagate(
+        found, ns.continue_orbit, ns.find_orbit(s), "rho", (0.38, 0.43), draws=100, first_order=True, step=0.5, **QUIET
+    )
+    assert band["special_kind"].values.tolist() == ["flip"]
+    draws, expected = band["special_value_draws"].values[:, 0], float(band["special_first_order"][0])
+    assert np.std(draws) == pytest.approx(expected, rel=0.21)
+    assert np.mean(draws) == pytest.approx(float(band["special_value"][0]), abs=3 * expected / 10)
+
+
+def test_a_hopf_point_to_first_order_is_that_of_its_draws() -> None:
+    """By differences; the valve's Hopf point moves by 1 % and less, in proportion."""
+    s = ns.models.relief_valve(q=9.0)
+    band = ns.propagate(
+        known(s, {"k": 1e-3, "beta": 0.01}), ns.continue_equilibrium, s, "q", (8.0, 9.5), draws=30, first_order=True,
+        start={"y1": 2.0, "y3": 12.0}, **QUIET,
+    )  # fmt: skip
+    assert band["special_kind"].values.tolist() == ["hopf"] and band["source"].values.tolist() == ["k", "beta"]
+    linear = band["special_value"].values[0] + sum(
+        band["special_slope"].values[0, i] * (band[f"drawn_{name}"].values - s.values[name])
+        for i, name in enumerate(("k", "beta"))
+    )
+    spread = float(band["special_first_order"][0])
+    np.testing.assert_allclose(band["special_value_draws"].values[:, 0], linear, atol=0.02 * spread)
+
+
+def scaled_stop() -> ns.System:
+    """A mass that meets an elastic stop; ``a`` scales force and gap, so that every motion is ``a`` times as large."""
+    stop = ns.elements.ElasticStop(at="q", position="a", stiffness=6.0, damping=0.0)
+    return ns.mechanical(
+        1.0, 0.1, 1.0, parameters={"a": 1.0, "omega": 1.0}, elements={"s": stop}, coordinates=["q"],
+        forcing={"q": lambda t, p: 0.5 * p.a * np.cos(p.omega * t)},
+    )  # fmt: skip
+
+
+def test_the_band_of_a_branch_with_folds_scales_as_its_motions_do() -> None:
+    s = scaled_stop()
+    orbit = ns.find_orbit(s)
+    found = known(s, {"a": 0.05})
+    band = ns.propagate(found, ns.continue_orbit, orbit, "omega", (0.8, 1.9), draws=12, step=0.01, **QUIET)
+    assert "fold" in band["special_kind"].values
+    amplitude = band["maximum"].sel(state="q").values
+    folds = band["special_value"].values[band["special_kind"].values == "fold"]
+    near = np.min(np.abs(band["omega"].values[:, None] - folds), axis=1) < 2e-3  # there a cubic says less
+    a = np.quantile(band["drawn_a"].values, band["quantile"].values)
+    found_band = band["maximum_quantiles"].sel(state="q").values
+    assert np.isfinite(found_band[:, ~near]).all()
+    np.testing.assert_allclose(found_band[:, ~near], (a[:, None] * amplitude)[:, ~near], rtol=2e-3)
+    np.testing.assert_allclose(np.ptp(band["special_value_draws"].values, axis=0), 0.0, atol=1e-8)
+
+
+def test_a_response_and_its_jumps_scale_too() -> None:
+    s = scaled_stop()
+    omega = np.linspace(0.9, 1.9, 41)
+    band = ns.propagate(
+        known(s, {"a": 0.05}), ns.frequency_response, s, omega, draws=6, transient=200, keep=20, **QUIET
+    )
+    a = np.quantile(band["drawn_a"].values, band["quantile"].values)
+    expected = a[:, None, None] * band["amplitude"].sel(state="q").values
+    np.testing.assert_allclose(band["amplitude_quantiles"].sel(state="q").values, expected, rtol=1e-5)
+    assert band.sizes["jump"] > 0
+    np.testing.assert_array_equal(band["jump_value_draws"].values, np.tile(band["jump_value"].values, (6, 1)))
+
+
+def test_the_probability_of_a_period_is_that_of_the_side_of_a_flip() -> None:
+    """Beyond the flip period 1 has become period 2; each draw is on the side that its own flip says."""
+    s = support().with_parameters(g=-0.0045, rho=0.41)
+    found = known(s, {"k": 0.05})
+    rho = np.array([0.34, 0.4])
+    plane = ns.propagate(
+        found, ns.sweep, s, "rho", rho, draws=30, transient=400, keep=20, direction=None, start={"x": 0.0, "v": 0.0},
+        **QUIET,
+    )  # fmt: skip
+    flips = ns.propagate(
+        found, ns.continue_orbit, ns.find_orbit(s.with_parameters(rho=0.45)), "rho", (0.3, 0.5), draws=30, step=0.1,
+        **QUIET,
+    )["special_value_draws"].values[:, 0]
+    of_one = plane["period_number_probability"].sel(period_value=1).values
+    far = np.abs(flips[:, None] - rho) > 2e-3
+    for j in np.flatnonzero(far.all(axis=0)):
+        assert of_one[j] == pytest.approx(np.mean(rho[j] > flips))
+    assert np.all(plane["period_number_probability"].sum("period_value").values == pytest.approx(1.0))
+
+
+def test_of_a_diagram_of_branches_the_special_points_have_distributions() -> None:
+    s = support().with_parameters(g=-0.0045, rho=0.42)
+    found = known(s, {"k": 0.004})
+    band = ns.propagate(found, ns.bifurcation_diagram, s, "rho", (0.38, 0.43), n=5, draws=3, **QUIET)
+    alone = ns.propagate(found, ns.continue_orbit, ns.find_orbit(s), "rho", (0.38, 0.43), draws=3, **QUIET)
+    at = int(np.flatnonzero(band["special_kind"].values == "flip")[0])
+    expected = alone["special_value_draws"].values[:, 0]
+    np.testing.assert_allclose(band["special_value_draws"].values[:, at], expected, rtol=1e-7)
+    assert "maximum_quantiles" not in band
+
+
+def test_a_number_of_a_function_and_bounds() -> None:
+    s = support()
+    found = known(s, {"c": 0.4})
+    band = ns.propagate(found, lambda one: one.values["c"] ** 2, s, draws=50, bounds={"c": (0.5, 1.2)}, **QUIET)
+    c = band["drawn_c"].values
+    assert c.min() > 0.5 and c.max() < 1.2 and c.max() - c.min() > 0.4
+    np.testing.assert_allclose(band["value_quantiles"], np.quantile(c**2, [0.025, 0.5, 0.975]), rtol=1e-12)
+
+
+def test_draws_that_fail_are_counted() -> None:
+    s = support()
+
+    def verb(one: ns.System) -> float:
+        if one.values["c"] > s.values["c"]:
+            raise ns.SolveError("too much")
+        return one.values["c"]
+
+    band = ns.propagate(known(s, {"c": 0.01}), verb, s, draws=40, **QUIET)
+    failed = int(np.sum(band["drawn_c"] > s.values["c"]))
+    assert int(band["failed"]) == failed > 0 and band["failed"].attrs["comment"] == "too much"
+    assert float(band["value_share"]) == pytest.approx(1 - failed / 40)
+
+
+def test_an_interruption_keeps_what_was_drawn(tmp_path: Any) -> None:
+    s = support()
+    calls = []
+
+    def verb(one: ns.System) -> float:
+        calls.append(one)
+        if len(calls) == 6:  # the first is that of the parameters found
+            raise KeyboardInterrupt
+        return one.values["c"]
+
+    with pytest.raises(ns.Interrupted, match="after 4 of 20 draws") as stopped:
+        ns.propagate(known(s, {"c": 0.01}), verb, s, draws=20, **QUIET)
+    assert stopped.value.result.sizes["draw"] == 4
+
+
+def test_the_result_is_saved_and_loaded(tmp_path: Any) -> None:
+    s = support()
+    band = ns.propagate(known(s, {"k": 0.05}), ns.sweep, s, "rho", [0.05, 0.06], draws=3, transient=50, keep=5, **QUIET)
+    ns.save(band, tmp_path / "band.nc")
+    again = ns.load(tmp_path / "band.nc")
+    np.testing.assert_array_equal(again["maximum_quantiles"].values, band["maximum_quantiles"].values)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        ({"start": 3}, TypeError, "takes a System or an Orbit"),
+        ({"verb": "sweep"}, TypeError, "a function such as ns.sweep"),
+        ({"draws": 1}, ValueError, "a band takes two and more"),
+        ({"quantiles": (0.9, 0.1)}, ValueError, "probabilities that rise"),
+        ({"bounds": {"c": (1.0, 0.0)}}, ValueError, "must be below"),
+        ({"bounds": {"cc": (1.0, None)}}, ValueError, "`cc` is not a parameter"),
+        ({"first_order": True}, ValueError, "concerns the special points of a branch"),
+        ({"verb": lambda s: "words"}, TypeError, "the verb returned str"),
+    ],
+)
+def test_what_does_not_fit_is_refused(change: dict[str, Any], error: type[Exception], message: str) -> None:
+    s = support()
+    given: dict[str, Any] = {"verb": lambda one: one.values["c"], "start": s, "draws": 3, **QUIET, **change}
+    with pytest.raises(error, match=message):
+        ns.propagate(known(s, {"c": 0.01}), given.pop("verb"), given.pop("start"), **given)
