@@ -32,6 +32,7 @@ class Input:
     ----------
     time, values : array
         Instants, increasing, and the input there. Before the first and behind the last sample the nearest value holds.
+        For a fit the name of a channel of the recording alone: ``Input("motor force", delay="late")``.
     between : {"linear", "steps"}
         The course between samples.
     delay : float or str
@@ -49,11 +50,17 @@ class Input:
     """
 
     time: Any
-    values: Any
+    values: Any = None
     between: str = "linear"
     delay: float | str = 0.0
 
     def __post_init__(self) -> None:
+        if self.between not in BETWEEN:
+            raise ValueError(f"between = {self.between!r}; allowed: {', '.join(map(repr, BETWEEN))}")
+        if not isinstance(self.delay, str):
+            object.__setattr__(self, "delay", real_number(self.delay, "delay"))
+        if isinstance(self.time, str) and self.values is None:
+            return
         t, y = float_array(self.time, "the time of an input"), float_array(self.values, "the values of an input")
         if t.ndim != 1 or t.shape != y.shape or not len(t):
             raise ValueError(f"an input is as many values as instants, in one row; got shapes {y.shape} and {t.shape}")
@@ -68,10 +75,6 @@ class Input:
             raise ValueError(
                 f"the time of an input must increase; sample {where + 1} is at {t[where + 1]:.9g} after {t[where]:.9g}"
             )
-        if self.between not in BETWEEN:
-            raise ValueError(f"between = {self.between!r}; allowed: {', '.join(map(repr, BETWEEN))}")
-        if not isinstance(self.delay, str):
-            object.__setattr__(self, "delay", real_number(self.delay, "delay"))
         for name, array in (("time", t), ("values", y)):
             array = array.copy()
             array.flags.writeable = False
@@ -161,23 +164,30 @@ class Course:
                 found[self.first + 2 * i, flow.active.index(str(delay))] = -rates[self.first + 2 * i]
         return found
 
-    def jump(self, flow: VariationalFlow, time: float, z: FloatArray, before: FloatArray, after: FloatArray) -> Jump:
-        """A change of inputs as a jump to z, from the rates before it to those behind it.
+    def jump(
+        self, flow: VariationalFlow, time: float, z: FloatArray, before: FloatArray, after: FloatArray,
+        then: Jump | None = None,
+    ) -> Jump:  # fmt: skip
+        """A change of inputs as a jump to z, from the rates before it to those behind it and the transitions that it
+        brings about (``then``), which happen at its time whatever their conditions.
 
         Inputs take values of their own. One with a delay changes later where that is greater: what moves has the rates
         before it for so much longer."""
         n, size = flow.n, flow.n + flow.n_active
-        S, fields, instant = np.eye(size), np.zeros((3, size)), np.zeros(size)
-        S[self.first : flow.n_u] = 0.0
-        S[self.first : flow.n_u, n:] = self.by_delays(flow, after)[self.first : flow.n_u]
+        R, fields, instant = np.eye(size), np.zeros((3, size)), np.zeros(size)
+        own = slice(self.first, flow.n_u)
+        R[own] = 0.0
+        if then is not None:
+            R, fields[2] = then.R @ R, then.fields[2]
+        fields[0, :n], fields[1, :n] = before, after
+        S = R.copy()
         changed = self.own[np.searchsorted(self.times, time)]
         moved = {delay for delay, one in zip(self.delays, changed, strict=True) if one}
         for j in (n + k for k, name in enumerate(flow.active) if name in moved):
             instant[j] = 1.0
-            S[: self.first, j] = (before - after)[: self.first]
-        fields[0, :n], fields[1, :n] = before, after
-        R = S.copy()
-        R[: self.first, n:] = 0.0
+            S[:n, j] += R[:n, :n] @ before + fields[2, :n] - after
+        S[own] = 0.0
+        S[own, n:] = self.by_delays(flow, after)[own]
         return Jump(z, R, fields, 0.0, np.zeros(n), 1.0, np.zeros(flow.n_active), S, instant, -1, -1)
 
 

@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["Variation", "apart", "sensitivity", "settled", "variation"]
+__all__ = ["Variation", "apart", "jump_between", "sensitivity", "settled", "variation"]
 
+CHANGE = -1  # of inputs, among transitions
 RTOL = 1e-15  # where the flow is not exact
 
 
@@ -39,7 +40,7 @@ class Variation:
     jumps : list of Jump
         Between the segments; transitions at one instant are one.
     transitions : list of tuple of int
-        Of each jump; none where inputs change.
+        Of each jump; ``CHANGE`` before them, or alone, where inputs change.
     start : Jump or None
         The transitions taken at the start because they held already: nothing moves in time there.
     Phi, P : array (n, n), (n, n_active)
@@ -60,12 +61,8 @@ class Variation:
         self.segments: Segments = flow.segments(values, self.modes, self.times, taus, starts)
         self.jumps: list[Jump] = []
         for i, (chain, t, z) in enumerate(zip(self.transitions, self.times[1:], before, strict=True)):
-            if chain:
-                self.jumps.append(flow.jump(values, chain, t, z))
-            else:
-                assert course is not None
-                rates = self.segments.f_end[i], self.segments.f_begin[i + 1]
-                self.jumps.append(course.jump(flow, t, starts[i + 1], *rates))
+            rates = self.segments.f_end[i], self.segments.f_begin[i + 1]
+            self.jumps.append(jump_between(flow, values, chain, t, z, starts[i + 1], rates, course))
         self.Phi, self.P = self.segments.Phi[0], self.segments.P[0]
         if course is not None:
             self.P = self.P + self.Phi @ course.by_delays(flow, self.segments.f_begin[0])
@@ -97,7 +94,7 @@ def apart(
     """Segments of a run that begins in ``first`` = (mode, z): their modes, starts and times; the transitions between
     them, those at one instant as one, and the state before each.
 
-    ``changes`` of inputs (their times, and the samples there) stand between segments too, as no transitions."""
+    ``changes`` of inputs (their times, and the samples there) stand between segments too, as ``CHANGE``."""
     flow.catch_up()
     n_u, targets = flow.n_u, [jump.target for jump in flow.traced.transitions]
     modes, starts, times = [first[0]], [first[1]], [t_begin]
@@ -113,7 +110,7 @@ def apart(
             state = np.concatenate([np.nan_to_num(log.sample_u[k]), memory])
             if crossing < crossings and log.crossing_time[crossing] == t:
                 state = np.concatenate([np.nan_to_num(log.u_before[crossing]), memory])
-            transitions.append(())
+            transitions.append((CHANGE,))
             before.append(state)
             modes.append(modes[-1])
             starts.append(state)
@@ -123,7 +120,7 @@ def apart(
         change(t, i)
         k = int(log.crossing_transition[i])
         after = np.concatenate([np.nan_to_num(log.u_after[i]), log.memory_after[i]])
-        if transitions and transitions[-1] and t == times[-1]:  # a chain at one instant
+        if transitions and t == times[-1]:  # a chain at one instant
             transitions[-1] += (k,)
             modes[-1], starts[-1] = targets[k], after
         else:
@@ -135,6 +132,18 @@ def apart(
         memory = log.memory_after[i]
     change(np.inf, crossings)
     return modes, starts, times, transitions, before
+
+
+def jump_between(
+    flow: VariationalFlow, values: FloatArray, chain: tuple[int, ...], t: float, before: FloatArray, after: FloatArray,
+    rates: tuple[FloatArray, FloatArray], course: Course | None,
+) -> Jump:  # fmt: skip
+    """What :func:`apart` says stands between two segments, with the rates at the end and the beginning of these."""
+    if chain[0] != CHANGE:
+        return flow.jump(values, chain, t, before)
+    assert course is not None
+    then = flow.jump(values, chain[1:], t, before) if chain[1:] else None
+    return course.jump(flow, t, after, *rates, then)
 
 
 def settled(
@@ -266,7 +275,7 @@ def sensitivity(
     crossings = [
         (t, chain[-1], jump)
         for t, chain, jump in zip(found.times[1:], found.transitions, found.jumps, strict=True)
-        if chain
+        if chain[-1] != CHANGE
     ]
     return derivatives_of_run(
         labels, provenance(labels, "sensitivity", options, method="variational"), names,

@@ -141,8 +141,9 @@ def _others(
         before = problem.pieces[i - 1]
         shift, clock = problem.shift(theta, window), problem.clock(theta, window.record)
         motion = problem.marcher.run(
-            values, clock * before.begin + shift, np.array([clock * window.begin + shift]), starts[i - 1], before.mode
-        )
+            values, clock * before.begin + shift, np.array([clock * window.begin + shift]), starts[i - 1], before.mode,
+            drive=record.drive,
+        )  # fmt: skip
         if motion is not None:
             found.append((replace(window, mode=int(motion.mode[0])), motion.z[0]))
     known = np.isfinite(told) & (window.spread > 0)

@@ -93,8 +93,9 @@ def _of_record(
         begin = float(time[first]) - early
         for candidate in [z] if first == 0 and start is not None else [set_, z]:  # beyond a stop: as it was going
             motion = problem.marcher.run(
-                values, clock * begin + shift, clock * (time[first:end] - early) + shift, candidate, mode
-            )
+                values, clock * begin + shift, clock * (time[first:end] - early) + shift, candidate, mode,
+                drive=record.drive,
+            )  # fmt: skip
             if motion is not None:
                 break
         if motion is None:  # the samples of this window come back when windows are joined
@@ -111,6 +112,7 @@ def _of_record(
         z, mode = motion.z[last - first].copy(), int(motion.mode[last - first])
         first = last
     wide = WIDE * np.append(np.where(sizes > 0, sizes, problem.system.scale_vector()), np.ones(len(memory)))
+    wide[n_u - 2 * len(problem.system.inputs) : n_u] = 0.0  # inputs are known
     return [replace(window, spread=window.spread * wide) for window in windows]
 
 
@@ -154,6 +156,7 @@ def states_from_samples(problem: Windows, theta: FloatArray, record: Record, whi
         told[:, k] = value
         if k in known and names[known[k]] not in measured:
             told[:, known[k]] = slope
+    told[:, len(names) - 2 * len(system.inputs) :] = 0.0  # inputs, which each run sets
     return told
 
 

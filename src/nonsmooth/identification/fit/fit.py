@@ -44,6 +44,7 @@ def fit(
     per_run: Sequence[str] = (),
     priors: Any = None,
     settings: Any = None,
+    inputs: Any = None,
     runs: Sequence[str] | None = None,
     time: str = "time",
     window: float | None = None,
@@ -95,6 +96,10 @@ def fit(
         What is known before of the unknowns.
     settings : mapping or sequence, optional
         Parameters that were set in each run, ``{run: {"omega": 3.0}}``, or in all.
+    inputs : mapping of input to channel, Input or (time, values), optional
+        The courses of the system's inputs: ``{"force": "motor force"}``, or
+        ``{"force": ns.Input("motor force", between="steps", delay="late")}``, where ``late`` may be a parameter that is
+        to be found. Channels named as inputs where not given.
     runs : sequence of str, optional
         Runs of a ``Recording``; all where not given.
     time : str
@@ -156,7 +161,9 @@ def fit(
     from nonsmooth.identification.fit.disagreeing import without_disagreeing
     from nonsmooth.identification.fit.outcome import outcome
 
-    problem = problem_of(system, recording, parameters, measured, priors, settings, runs, time, mode, loss, per_run)
+    problem = problem_of(
+        system, recording, parameters, measured, priors, settings, runs, time, mode, loss, per_run, inputs
+    )
     if start is not None and not is_one_start(start):
         raise ValueError("fit takes one first guess of the start, for all runs; settings= differ from run to run")
     begin = None if start is None else np.tile(start_states(system, start)[0], (len(problem.records), 1))
@@ -195,9 +202,10 @@ def fit(
 def problem_of(
     system: System, recording: Any, parameters: Any, measured: Any = None, priors: Any = None, settings: Any = None,
     runs: Any = None, time: str = "time", mode: Any = None, loss: Any = "linear", per_run: Sequence[str] = (),
+    inputs: Any = None,
 ) -> Windows:  # fmt: skip
     """The problem, without windows; the noise is the records' own irregularity."""
-    check_system(system, "fit")
+    check_system(system, "fit", inputs=True)
     from nonsmooth.identification.fit.first_modes import read_modes
     from nonsmooth.identification.fit.motion import Marcher
     from nonsmooth.identification.fit.records import irregularity, read_records
@@ -206,10 +214,12 @@ def problem_of(
 
     if system.is_map:
         raise ValueError(f"{system.name!r} is a map, whose time is a count: fit takes systems with vector fields")
-    sensors, records = read_records(system, recording, measured, runs=runs, time=time, settings=settings)
+    sensors, records = read_records(system, recording, measured, runs=runs, time=time, settings=settings, inputs=inputs)
     labels = [record.name for record in records]
     known = [record.settings for record in records]
     unknowns = read_unknowns(system, sensors, parameters, priors, labels, known, per_run)
+    if system.inputs and (unknowns.phases or unknowns.clock):
+        raise ValueError("inputs have the time of the recording: with them neither 'phase' nor 'clock' can be found")
     within = [[record.values[sensor.limit(y) == 0, c] for record in records for y in [record.values[:, c]]]
               for c, sensor in enumerate(sensors.values())]  # fmt: skip
     irregular = np.array([

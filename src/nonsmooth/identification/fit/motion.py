@@ -12,7 +12,8 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.engines.engine import Log, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
-from nonsmooth.flow.sensitivity import apart, settled
+from nonsmooth.flow.inputs import Course, Driven
+from nonsmooth.flow.sensitivity import apart, jump_between, settled
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 
@@ -69,8 +70,9 @@ class Marcher:
         self._tables: tuple[bytes, Any] = b"", None
 
     def run(
-        self, values: FloatArray, begin: float, times: FloatArray, z: FloatArray, mode: int, derivatives: bool = False
-    ) -> Motion | None:
+        self, values: FloatArray, begin: float, times: FloatArray, z: FloatArray, mode: int, derivatives: bool = False,
+        drive: Driven | None = None,
+    ) -> Motion | None:  # fmt: skip
         """March from (begin, z, mode) to the samples; None where the run does not come to its end."""
         period = self.system.period_at(values)
         n_u = len(self.traced.u)
@@ -81,22 +83,36 @@ class Marcher:
         # the start itself is a sample too: there the transitions that hold already have been taken
         if self._tables[0] != values.tobytes():  # many windows at the same parameters
             self._tables = values.tobytes(), self.engine.prepare(values[None, :])
-        log = self.engine.record(self._tables[1], state, times[-1], np.append(begin, times))
+        course, changes, instants = None, None, times
+        if drive is not None:
+            course = drive.at(dict(zip(self.traced.parameter_names, values.tolist(), strict=True)))
+            state.u[course.first :] = course.at(begin)
+            z, changes = np.concatenate([state.u, state.memory]), course.changes(begin, times[-1])
+            instants = np.union1d(times, changes.times)
+        log = self.engine.record(self._tables[1], state, times[-1], np.append(begin, instants), changes=changes)
         if log.status not in (codes.OK, codes.NOT_GUARANTEED):
             return None
         u = np.hstack([np.nan_to_num(log.sample_u), log.sample_memory])
         if not np.isfinite(u).all():
             return None
-        plain = Motion(times, u[1:], log.sample_mode[1:], log.sample_segment[1:], log)
-        return self._derived(plain, values, begin, z, mode) if derivatives else plain
+        at = slice(1, None) if changes is None else 1 + np.searchsorted(instants, times)
+        plain = Motion(times, u[at], log.sample_mode[at], log.sample_segment[at], log)
+        if not derivatives:
+            return plain
+        cuts = np.zeros(0) if changes is None else changes.times
+        places = 1 + np.searchsorted(instants, cuts)
+        return self._derived(plain, values, begin, z, mode, course, [*zip(cuts, places, strict=True)])
 
-    def _derived(self, plain: Motion, values: FloatArray, begin: float, z: FloatArray, mode: int) -> Motion:
+    def _derived(
+        self, plain: Motion, values: FloatArray, begin: float, z: FloatArray, mode: int, course: Course | None,
+        changes: list[tuple[float, int]],
+    ) -> Motion:  # fmt: skip
         """The same with derivatives: products over the pieces between samples and transitions."""
         flow, log, n = self.flow, plain.log, self.flow.n
         size = n + flow.n_active
         first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
         start = settled(flow, values, (mode, z), first, begin)
-        modes, starts, times, transitions, before = apart(flow, log, first, begin)
+        modes, starts, times, transitions, before = apart(flow, log, first, begin, changes)
         ends = np.searchsorted(plain.time, times[1:], "left")  # a sample at a crossing is the limit after it
         cuts = [0, *ends.tolist(), len(plain.time)]
         t0, t1, z0, of_mode, is_sample = [], [], [], [], []
@@ -115,7 +131,9 @@ class Marcher:
         steps[:, :n, :n], steps[:, :n, n:] = legs.Phi, legs.P
         steps[:, range(n, size), range(n, size)] = 1.0
         total = np.eye(size)
-        jumps = iter(zip(transitions, times[1:], before, strict=True))
+        if course is not None:
+            total[:n, n:] = course.by_delays(flow, legs.f_begin[0])
+        jumps = iter(zip(transitions, times[1:], before, starts[1:], strict=True))
         D = np.empty((len(plain.time), n, size))
         k = 0
         for leg, to_sample in enumerate(sample.tolist()):
@@ -124,8 +142,9 @@ class Marcher:
                 D[k] = total[:n]
                 k += 1
             else:
-                chain, at, state = next(jumps)
-                total = flow.jump(values, chain, at, state).S @ total
+                chain, at, state, after = next(jumps)
+                rates = legs.f_end[leg], legs.f_begin[leg + 1]
+                total = jump_between(flow, values, chain, at, state, after, rates, course).S @ total
         rate = legs.f_end[sample]
         of_time = rate - D[:, :, :n] @ legs.f_begin[0]
         if start is not None:  # transitions that are taken at once, whenever the window begins

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import float_array, real_number
+from nonsmooth.flow.inputs import Driven, Input, driven
 from nonsmooth.identification.fit.sensors import Sensor, read_sensors
 from nonsmooth.recordings.recording import Recording
 from nonsmooth.system.names import unknown
@@ -38,12 +39,15 @@ class Record:
     values : array (N, c)
         Readings; NaN where there is none.
     settings : mapping of str to float
+    drive : Driven or None
+        The inputs of the system in this run.
     """
 
     name: str
     time: FloatArray
     values: FloatArray
     settings: Mapping[str, float]
+    drive: Driven | None = None
 
     @property
     def duration(self) -> float:
@@ -58,7 +62,7 @@ def irregularity(y: FloatArray) -> float:
 
 def read_records(
     system: System, recording: Any, measured: Any, *, runs: Sequence[str] | None = None, time: str = "time",
-    settings: Any = None,
+    settings: Any = None, inputs: Any = None,
 ) -> tuple[dict[str, Sensor], list[Record]]:  # fmt: skip
     """The sensors and the records of a recording.
 
@@ -88,8 +92,27 @@ def read_records(
                     f"measured[{quantity!r}]: {unknown(sensor.channel, 'a channel', f'run {label!r}', list(table))}"
                 )
             columns.append(table[sensor.channel])
-        records.append(_joined(label, columns, per_run[label]))
+        records.append(replace(_joined(label, columns, per_run[label]), drive=_driven(system, inputs, label, table)))
     return sensors, records
+
+
+def _driven(
+    system: System, inputs: Any, label: str, table: Mapping[str, tuple[FloatArray, FloatArray]]
+) -> Driven | None:
+    """The inputs of a run: channels of its table by their names, or as they are given."""
+    if inputs is None and system.inputs:
+        inputs = {name: name for name in system.inputs if name in table}
+    if not isinstance(inputs, Mapping):
+        return driven(system, inputs)
+    found = {}
+    for name, one in inputs.items():
+        one = Input(one) if isinstance(one, str) else one
+        if isinstance(one, Input) and isinstance(one.time, str):
+            if one.time not in table:
+                raise ValueError(f"inputs[{name!r}]: {unknown(one.time, 'a channel', f'run {label!r}', list(table))}")
+            one = replace(one, time=table[one.time][0], values=table[one.time][1])
+        found[name] = one
+    return driven(system, found)
 
 
 def _joined(label: str, columns: list[tuple[FloatArray, FloatArray]], settings: Mapping[str, float]) -> Record:

@@ -12,6 +12,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import real_number
+from nonsmooth.system.inputs import input_states
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
@@ -101,7 +102,8 @@ def read_sensors(system: System, measured: Any, channels: Sequence[str]) -> dict
     ValueError, TypeError
         A name that is no state and no output; nothing measured.
     """
-    known = {**system.states, **system.outputs}
+    driven = input_states(system.inputs)
+    known = {name: unit for name, unit in {**system.states, **system.outputs}.items() if name not in driven}
     if measured is None:
         found = {name: Sensor(name) for name in known if name in channels}
         if not found:

@@ -165,7 +165,10 @@ class Windows:
         instants, begin = self.instants(theta, window), self.clock(theta, window.record) * window.begin
         if instants[0] < begin:  # a delay beyond what its bounds allow
             return None
-        return self.marcher.run(values, begin + shift, instants + shift, start, window.mode, derivatives)
+        return self.marcher.run(
+            values, begin + shift, instants + shift, start, window.mode, derivatives,
+            self.records[window.record].drive,
+        )  # fmt: skip
 
     def delays(self, theta: FloatArray, run: int) -> FloatArray:
         return np.array([sensor.delay for sensor in self.sensor_values(theta, run).values()])

@@ -1,0 +1,65 @@
+"""Fits of systems with a measured input: data by SciPy and by the exact flow of a system without inputs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+pytestmark = pytest.mark.physics
+TRUTH = {"k": 40.0, "c": 0.6, "e": 0.8, "late": 0.03}
+
+
+def rig(**values: float) -> ns.System:
+    return ns.System(
+        states={"x": "m", "v": "m/s"}, parameters=TRUTH | values, inputs={"f": "N"},
+        modes={"one": lambda t, u, p: [u.v, -p.k * u.x - p.c * u.v + p.f]},
+        indicators={"gap": lambda t, u, p: u.x - 0.05},
+        transitions=[ns.Transition("one", "one", when="gap > 0", reset=lambda t, u, p: [u.x, -p.e * u.v])],
+    )  # fmt: skip
+
+
+def motion(t: np.ndarray, force: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """The rig under a force that is held between its samples, in steps of .1 ms by the trapezoidal rule."""
+    h = 1e-4
+    A = np.array([[0.0, 1.0], [-TRUTH["k"], -TRUTH["c"]]])
+    left, right = np.eye(2) - h / 2 * A, np.eye(2) + h / 2 * A
+    whole, pushed = np.linalg.solve(left, right), np.linalg.solve(left, [0.0, h])
+    x, found, n = np.array([0.01, 0.0]), [], int(np.ceil(at[-1] / h)) + 1
+    now = force[np.maximum(np.searchsorted(t + TRUTH["late"], (np.arange(n) + 0.5) * h, "right") - 1, 0)]
+    for k in range(n):
+        found.append(x[0])
+        x = whole @ x + pushed * now[k]
+        if x[0] > 0.05 and x[1] > 0:
+            x = np.array([0.1 - x[0], -TRUTH["e"] * x[1]])
+    return np.interp(at, np.arange(n) * h, found)
+
+
+@pytest.fixture(scope="module")
+def recording() -> dict[str, Any]:
+    rng = np.random.default_rng(0)
+    t = np.arange(0.0, 12.0, 0.02)
+    force = 2 * np.interp(t, np.arange(0, 13, 0.15), rng.standard_normal(87))
+    at = np.arange(0.0, 11.9, 0.01)
+    return {"x": (at, motion(t, force, at) + 1e-3 * rng.standard_normal(len(at))), "motor": (t, force)}
+
+
+def test_parameters_and_the_delay_of_a_measured_force(recording: dict[str, Any]) -> None:
+    first = rig(k=44.0, c=0.4, e=0.7, late=0.02)
+    drive = {"f": ns.Input("motor", between="steps", delay="late")}
+    found = ns.fit(first, recording, list(TRUTH), inputs=drive, progress=False)
+    for name, value in TRUTH.items():
+        assert abs(found[name] - value) < 4 * found.uncertainty[name], name
+    assert found.uncertainty["late"] < 1e-3
+
+
+def test_what_is_refused(recording: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="`mot` is not a channel"):
+        ns.fit(rig(), recording, ["k"], inputs={"f": "mot"}, progress=False)
+    with pytest.raises(ValueError, match="'f' is missing"):
+        ns.fit(rig(), {"x": recording["x"]}, ["k"], progress=False)
+    with pytest.raises(ValueError, match="neither 'phase' nor 'clock'"):
+        ns.fit(rig(), recording, ["k", "clock"], inputs={"f": "motor"}, progress=False)
