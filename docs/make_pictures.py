@@ -67,15 +67,16 @@ def comparison_section() -> Any:
 
 
 def drawn_by(page: Path, elsewhere: set[str]) -> list[tuple[str, str]]:
-    """(name, all code of the page above it) for each picture of a page that its own code draws as ``ax``."""
+    """(file, all code of the page above it) for each picture of a page that its own code draws as ``ax``, and for each
+    animation that it makes as ``moving``."""
     text = page.read_text(encoding="utf-8")
     code = ""
     found = []
-    parts = r"^```python\n(.*?)^```(?=\n*(.{0,40}))|^!\[.*?\]\(\S*pictures/(\w+)\.png\)"
-    for block, after, picture in re.findall(parts, text, re.M | re.S):
+    parts = r"^```python\n(.*?)^```(?=\n*(.{0,40}))|^!\[.*?\]\(\S*pictures/(\w+)\.(png|gif)\)"
+    for block, after, picture, ending in re.findall(parts, text, re.M | re.S):
         code += "" if RAISES.match(after) else block
-        if picture and picture not in elsewhere and "ax = " in code:
-            found.append((picture, code))
+        if picture and picture not in elsewhere and {"png": "ax = ", "gif": "moving = "}[ending] in code:
+            found.append((f"{picture}.{ending}", code))
     return found
 
 
@@ -86,11 +87,12 @@ def main(wanted: list[str]) -> None:
     examples = sorted((DOCS.parent / "examples").glob("*.py"))
     elsewhere = {path.stem for path in examples} | {"comparison_section", "effect_of_eta", "chart_cost"}
     for page in sorted(DOCS.rglob("*.md")):
-        for name, code in drawn_by(page, elsewhere):
+        for file, code in drawn_by(page, elsewhere):
+            name, _, ending = file.partition(".")
             if wanted and name not in wanted:
                 continue
             if 'os.environ["NONSMOOTH_DATA"]' in code and not os.environ.get("NONSMOOTH_DATA"):
-                print(f"{name}.png: left as it is; NONSMOOTH_DATA names no folder")
+                print(f"{file}: left as it is; NONSMOOTH_DATA names no folder")
                 continue
             with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
                 for given in re.findall(r"\{download\}`[^`<]*<([^>`]+)>`", page.read_text(encoding="utf-8")):
@@ -98,7 +100,11 @@ def main(wanted: list[str]) -> None:
                 names: dict[str, Any] = {}
                 with contextlib.redirect_stdout(None):
                     exec(code, names)
-                keep(names["ax"], name)
+                if ending == "gif":
+                    target = names["moving"].save(PICTURES / file)
+                    print(f"{file}: {target.stat().st_size // 1024} kB")
+                else:
+                    keep(names["ax"], name)
     if not wanted or "comparison_section" in wanted:
         keep(comparison_section(), "comparison_section")
     for path in examples:

@@ -149,6 +149,9 @@ def steps(folder: Path) -> dict[str, Callable[[dict[str, Any]], Any]]:
         "compare": compare,
         "identify": identify,
         "explore": explore,
+        "table": lambda found: ns.table(found["simulate"], ["x"], step=0.1, file=folder / "run.csv"),
+        "region": lambda found: ns.region(found["sweep"], "abs(x) < 1 and omega < 4.7"),
+        "animate": lambda found: ns.animate(found["simulate"], seconds=1, rate=4).save(folder / "run.gif"),
         "save": lambda found: [ns.save(found["sweep"], folder / f"swept{suffix}") for suffix in (".nc", ".zarr")],
         "load": lambda found: [ns.load(path) for path in found["save"]],
     }  # fmt: skip
@@ -192,6 +195,8 @@ FACTS: dict[str, Callable[[Any, dict[str, Any]], bool]] = {
     "compare": lambda found, _: int(found["measured_period_number"]) == int(found["theory_period_number"]) == 1,
     "control_based_continuation": lambda found, _: found.sizes["point"] == 2,
     "explore": lambda found, _: "nonsmooth explorer" in found,
+    "table": lambda found, all_: abs(found["x (m)"][0] - float(all_["simulate"]["u"][0, 0])) < 1e-12,
+    "region": lambda found, _: found.values.tolist() == [True, False],
     "load": lambda found, all_: all(one.identical(all_["sweep"]) for one in found),
 }
 

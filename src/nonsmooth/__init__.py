@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from nonsmooth.identification.fit.sensors import Sensor as Sensor
     from nonsmooth.identification.parameter_set import ParameterSet as ParameterSet
     from nonsmooth.identification.propagate import propagate as propagate
+    from nonsmooth.plot.animation import animate as animate
     from nonsmooth.recordings.load import load_recording as load_recording
     from nonsmooth.recordings.recording import Recording as Recording
     from nonsmooth.results.store import load as load
@@ -71,6 +72,8 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System as System
     from nonsmooth.system.transition import Surface as Surface
     from nonsmooth.system.transition import Transition as Transition
+    from nonsmooth.tables.region import region as region
+    from nonsmooth.tables.table import table as table
 
 _WHERE = {
     "System": "system.system",
@@ -122,6 +125,9 @@ _WHERE = {
     "compare": "identification.compare.compare",
     "propagate": "identification.propagate",
     "explore": "explorer.serve",
+    "animate": "plot.animation",
+    "table": "tables.table",
+    "region": "tables.region",
     "save": "results.store",
     "load": "results.store",
     "SystemDefinitionError": "errors",

@@ -33,7 +33,9 @@ def texts(ax) -> list[str]:
 def test_a_chart_shows_each_period_once_with_its_colour(support: ns.System) -> None:
     plane = chart(support, {"g": [-0.001, 0.0009, 0.0012, 0.0018], "rho": [0.33, 0.331]}, lyapunov=100, **QUIET)
     ax = draw_chart(plane)
-    assert texts(ax) == [str(p) for p in sorted(set(plane["period_number"].values.ravel().tolist()) - {0})] + ["none"]
+    assert texts(ax) == [str(p) for p in sorted(set(plane["period_number"].values.ravel().tolist()) - {0})] + [
+        "none found"
+    ]
     mesh = ax.collections[0]
     assert mesh.get_array().size == 8
     first = mesh.to_rgba(mesh.get_array().ravel())[0]

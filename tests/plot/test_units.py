@@ -127,3 +127,24 @@ def test_colour_bars_and_cursors_say_the_unit() -> None:
 def test_small_letters_are_seven_points_in_print() -> None:
     with plot.journal():
         assert plot.style.small(plt.figure().add_subplot()) == pytest.approx(7.0)
+
+
+@pytest.mark.parametrize(
+    ("axes", "labels"),
+    [
+        ((("m", 1.04), ("m/s", 0.54)), ("m", "m/s")),  # not metres beside millimetres per second
+        ((("m", 0.02), ("m/s", 0.3)), ("mm", "mm/s")),
+        ((("m", 0.02), ("m/s", 5.0)), ("mm", "m/s")),  # 0.02 m reads badly
+        ((("m", 2.0), ("N", 0.05)), ("m", "mN")),  # of different kinds
+    ],
+)
+def test_positions_and_speeds_have_one_unit_of_length(axes, labels) -> None:
+    from nonsmooth.plot.labels import name_axes
+
+    _, ax = plt.subplots()
+    (x, right), (y, top) = axes
+    ax.plot([-right, right], [-top, top])
+    ax.margins(0)
+    name_axes(ax, ("a", x), ("b", y))
+    assert (ax.get_xlabel(), ax.get_ylabel()) == tuple(f"{n} ({unit})" for n, unit in zip("ab", labels, strict=True))
+    plt.close("all")

@@ -78,8 +78,11 @@ def chart(
         GPU the rows run side by side, so it needs many of them.
     section : Stroboscopic or Poincare, optional
         ``Stroboscopic(0)`` where the system has a period.
-    transient, keep : int
-        Section returns passed over, then judged. A point that is still settling gets up to eight transients.
+    transient : int
+        Section returns passed over, so that the motion settles. A point that is still settling gets up to eight times
+        as many.
+    keep : int
+        Section returns after them, from which the period number follows.
     max_period : int, optional
         Longest period number searched, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
     stop_early : bool

@@ -79,9 +79,11 @@ def sweep(
         First state; zeros where not given. Several starts show attractors that coexist.
     section : Stroboscopic or Poincare, optional
         ``Stroboscopic(0)`` where the system has a period.
-    transient, keep : int
-        Section returns passed over, then recorded, at each value. A point that is still settling gets up to eight
-        transients; what is not settled then has the status ``slow``.
+    transient : int
+        Section returns passed over at each value, so that the motion settles. A point that is still settling gets up to
+        eight times as many; what is not settled then has the status ``slow``.
+    keep : int
+        Section returns recorded after them, at each value.
     max_period : int, optional
         Longest period number searched, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
     judge : bool

@@ -1,6 +1,7 @@
 """Figures of results: ``(result, ax=None, ...) -> ax``, one file per concept.
 
 Those of identified parameters stand in ``plot.identification``. Matplotlib is loaded when the first figure is drawn.
+All figures but sketches take ``title=``, ``legend=False``, ``unit="mm"`` and properties of lines (``linewidth=2``) too.
 """
 
 from typing import Any
@@ -15,11 +16,21 @@ from nonsmooth.plot.comparison import (
     comparison_section,
     comparison_time,
 )
+from nonsmooth.plot.finish import finished
+from nonsmooth.plot.mechanism import mechanism
 from nonsmooth.plot.planes import basin_fractions, basins, chart
 from nonsmooth.plot.regions import regions
-from nonsmooth.plot.style import COLORS, COLUMN, PAGE, journal, save_figure
+from nonsmooth.plot.style import COLORS, COLUMN, PAGE, journal, save_figure, slides
 from nonsmooth.plot.sweeps import bifurcation, bifurcation_diagram, density, frequency_response, smoothing_report
 from nonsmooth.plot.trajectories import amplitude_spectrum, orbit, phase_portrait, section, time_history
+
+for _figure in (
+    amplitude_spectrum, basin_fractions, basins, bifurcation, bifurcation_diagram, branch, chart, comparison_diagram,
+    comparison_distances, comparison_phase_portrait, comparison_response, comparison_section, comparison_time,
+    controlled_branch, curve, density, frequency_response, manifolds, multipliers, orbit, phase_portrait, regions,
+    section, smoothing_report, time_history,
+):  # fmt: skip
+    globals()[_figure.__name__] = finished(_figure)
 
 __all__ = [
     "COLORS",
@@ -45,12 +56,14 @@ __all__ = [
     "identification",
     "journal",
     "manifolds",
+    "mechanism",
     "multipliers",
     "orbit",
     "phase_portrait",
     "regions",
     "save_figure",
     "section",
+    "slides",
     "smoothing_report",
     "time_history",
 ]

@@ -38,11 +38,12 @@ def with_unit(text: str, unit: str) -> str:
 
 def name_axes(ax: Axes, x: tuple[str, str] | None = None, y: tuple[str, str] | None = None) -> None:
     """Label the axes with quantities and units, in the prefixes that suit what is drawn: see ``plot.units``."""
-    from nonsmooth.plot.units import name_axis
+    from nonsmooth.plot.units import name_axis, together
 
-    for axis, named in ((ax.xaxis, x), (ax.yaxis, y)):
-        if named is not None:
-            name_axis(axis, *named)
+    named = [(axis, *one) for axis, one in ((ax.xaxis, x), (ax.yaxis, y)) if one is not None]
+    largest = together([(unit, float(np.abs(axis.get_view_interval()).max())) for axis, _, unit in named])
+    for one, most in zip(named, largest, strict=True):
+        name_axis(*one, most)
 
 
 def name_plane(ax: Axes, result: xr.Dataset, x: str, y: str, before: str = "") -> None:

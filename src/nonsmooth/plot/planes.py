@@ -9,13 +9,16 @@ import numpy as np
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.labels import in_words, name_and_unit, name_axes, name_plane, only_states, variable_along
 from nonsmooth.results.labels import kind_of
+from nonsmooth.tables.quantities import quantities_of, quantity
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import xarray as xr
     from matplotlib.axes import Axes
 
 __all__ = [
-    "basin_fractions", "basins", "cell_edges", "chart", "classes_of", "legend_of", "names_of", "section_mark",
+    "basin_fractions", "basins", "cell_edges", "chart", "classes_of", "held", "legend_of", "names_of", "section_mark",
     "told_apart",
 ]  # fmt: skip
 
@@ -30,9 +33,16 @@ def cell_edges(values: np.ndarray) -> np.ndarray:
 
 
 def chart(
-    result: xr.Dataset, ax: Axes | None = None, *, show: str = "period_number", y: str | None = None, start: int = 0
+    result: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    show: str = "period_number",
+    y: str | None = None,
+    start: int = 0,
+    contours: Mapping[str, Any] | None = None,
+    region: str | xr.DataArray | None = None,
 ) -> Axes:
-    """Draw a ``chart``: each point of the plane in the colour of its period number.
+    """Draw a ``chart``: each point of the plane in the colour of its period number, or of another quantity.
 
     Parameters
     ----------
@@ -41,36 +51,93 @@ def chart(
     ax
         Where to draw; a new figure of one column if None. The legend, or the colour bar, takes its room from it.
     show
-        ``"period_number"``; or any variable of the result: ``"lyapunov"`` (colours diverge from zero),
-        ``"contacts_per_period"``, ``"n_attractors"``, ``"confidence"``, ``"maximum"``, ...
+        ``"period_number"``; or any quantity of the result: ``"lyapunov"`` (colours diverge from zero),
+        ``"contacts_per_period"``, ``"n_attractors"``, ``"x_amplitude"``, ``"stop_impact_speed_maximum"``, ...
     y
-        The state, for ``"maximum"`` and ``"minimum"``; by default the first.
+        The state, for ``"maximum"``, ``"minimum"`` and ``"amplitude"``; by default the first.
     start
         Which start, where there are several.
+    contours
+        Lines of equal value: quantities and their values in the units of the result, ``{"x_amplitude": [1e-3, 2e-3]}``
+    region
+        A condition, or what :func:`nonsmooth.region` gave: it is outlined, and what lies outside is drawn pale.
 
     Raises
     ------
     ValueError
-        A result of another verb, or without the variable.
+        A result of another verb, or without the quantity.
     """
     variable_along(result, "contacts_per_period", "chart")
     if len([dim for dim in result["status"].dims if dim not in ("start", "direction")]) != 2:
         raise ValueError("this result does not span two parameters: it is not the result of chart")
-    variable_along(result, show, "chart")
     first, second = (str(dim) for dim in result["status"].dims[:2])
     one = result.isel(start=start) if "start" in result["status"].dims else result
     one = one.sortby([first, second])  # values may come in any order, cells cannot
+    if show in ("maximum", "minimum", "amplitude"):
+        show = f"{only_states(result, y)[0]}_{show}"
+    known = quantities_of(one)
+    values = quantity(one, show, known)
+    lines = {name: (quantity(one, name, known), np.sort(np.atleast_1d(at))) for name, at in (contours or {}).items()}
+    inside = held(one, region)
     with style.axes(ax, ratio=0.8) as drawn:
         if show == "period_number":
             _periods(one, drawn, first, second)
         else:
-            values = one[show]
-            if "state" in values.dims:
-                (name,) = only_states(result, y)
-                values = values.sel(state=name)
             _numbers(values, drawn, first, second, show)
+        for name, (heights, levels) in lines.items():
+            _contours(heights, levels, drawn, first, second, name)
+        if inside is not None:
+            inside = inside.isel(start=start) if "start" in inside.dims else inside
+            _outlined(inside.sortby([first, second]), drawn, first, second)
         name_plane(drawn, result, first, second)
     return drawn
+
+
+def held(result: xr.Dataset, region: Any) -> Any:
+    """A region given as a condition or as what ``region`` gave."""
+    if not isinstance(region, str):
+        return region
+    from nonsmooth.tables.region import region as region_of
+
+    return region_of(result, region)
+
+
+def _contours(values: xr.DataArray, levels: Any, drawn: Axes, first: str, second: str, name: str) -> None:
+    """Lines of equal value, each with its value in the unit that suits it."""
+    from nonsmooth.plot.units import PREFIXES, power_for
+
+    table, unit = values.transpose(second, first).values.astype(float), str(values.attrs.get("units", "1"))
+    at = (values[first].values, values[second].values)
+    found = drawn.contour(*at, table, levels, colors=style.COLORS["section"], linestyles="--", linewidths=0.8)
+    found.set_path_effects(style.halo())
+    power = power_for(unit, float(np.abs(levels).max()))
+    words = {at: f"{at / 10.0**power:g} {PREFIXES[power]}{unit.removesuffix('1')}".strip() for at in found.levels}
+    for text in drawn.clabel(found, fmt=words, fontsize=style.small(drawn), inline_spacing=1):
+        text.set_path_effects(style.halo())
+    _title(drawn, f"dashed: {name}")
+
+
+def _outlined(inside: xr.DataArray, drawn: Axes, first: str, second: str) -> None:
+    """The outline of a region along the edges of its cells, what is outside drawn pale."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import ListedColormap
+
+    there = inside.transpose(second, first).values.astype(bool)
+    x, y = (cell_edges(inside[name].values) for name in (first, second))
+    pale = np.ma.masked_where(there, np.zeros(there.shape))
+    drawn.pcolormesh(x, y, pale, shading="flat", cmap=ListedColormap(["white"]), alpha=0.6, rasterized=True)
+    padded = np.pad(there, 1)
+    up = np.argwhere(padded[1:-1, 1:] != padded[1:-1, :-1])  # vertical edges: row, edge
+    across = np.argwhere(padded[1:, 1:-1] != padded[:-1, 1:-1])
+    edges = [[(x[i], y[j]), (x[i], y[j + 1])] for j, i in up] + [[(x[i], y[j]), (x[i + 1], y[j])] for j, i in across]
+    drawn.add_collection(LineCollection(edges, colors=style.COLORS["section"], linewidths=1.4, capstyle="round"))
+    _title(drawn, f"outlined: {inside.attrs.get('long_name', 'region')}")
+
+
+def _title(drawn: Axes, words: str) -> None:
+    """A line more above the axes, on the left."""
+    before = drawn.get_title(loc="left")
+    drawn.set_title(f"{before}\n{words}" if before else words, loc="left", fontsize=style.small(drawn))
 
 
 def classes_of(result: xr.Dataset) -> tuple[Any, list[tuple[str, str]]]:
@@ -107,7 +174,7 @@ def _periods(result: xr.Dataset, drawn: Axes, first: str, second: str) -> None:
         cmap=ListedColormap([color for _, color in entries]), vmin=-0.5, vmax=len(entries) - 0.5,
     )  # fmt: skip
     looks: dict[str, Any] = {"edgecolor": "black", "linewidth": 0.4}
-    shown = {words.replace("no period", "none"): color for words, color in legend_of(classes, entries)}
+    shown = {words.replace("no period", "none found"): color for words, color in legend_of(classes, entries)}
     drawn.legend(
         handles=[Patch(facecolor=color, label=words, **looks) for words, color in shown.items()], title="period",
         loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, handlelength=1.0, handleheight=1.0,
@@ -125,7 +192,7 @@ def _numbers(values: xr.DataArray, drawn: Axes, first: str, second: str, show: s
     edges = (cell_edges(values[name].values) for name in (first, second))
     mesh = drawn.pcolormesh(*edges, table, shading="flat", rasterized=True, **options)
     extend = "both" if show == "lyapunov" else "neither"
-    named = values.attrs.get("long_name", show), values.attrs.get("units", "1")
+    named = str(values.attrs.get("long_name", show)), str(values.attrs.get("units", "1"))
     name_axes(drawn.figure.colorbar(mesh, ax=drawn, extend=extend).ax, y=named)
 
 

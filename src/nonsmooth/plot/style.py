@@ -11,9 +11,11 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -23,8 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
 
 __all__ = [
-    "ABOVE", "COLORS", "COLUMN", "PAGE", "axes", "clear_legend", "cloud", "even_dots", "halo", "journal", "make_room",
-    "mark", "once", "save_figure", "small",
+    "ABOVE", "COLORS", "COLUMN", "PAGE", "apart", "axes", "clear_legend", "cloud", "even_dots", "halo", "journal",
+    "make_room", "mark", "once", "save_figure", "slides", "small",
 ]  # fmt: skip
 
 #: Widths of one column (84 mm) and of the page (174 mm), in inches.
@@ -49,12 +51,17 @@ ABOVE: Mapping[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), 
 _DOT = 7.0  # of a point cloud in a legend, in points; the mark "." is half of it wide
 
 
+#: The style in which new figures are made, and that of each figure made so.
+_style: ContextVar[str] = ContextVar("style", default="journal")
+_made: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
+
+
 @cache
-def _settings() -> Any:
-    """The settings of ``journal.mplstyle``."""
+def _settings(name: str = "journal") -> Any:
+    """The settings of a style's file."""
     import matplotlib as mpl
 
-    return mpl.rc_params_from_file(Path(__file__).with_name("journal.mplstyle"), use_default_template=False)
+    return mpl.rc_params_from_file(Path(__file__).with_name(f"{name}.mplstyle"), use_default_template=False)
 
 
 @contextmanager
@@ -70,8 +77,36 @@ def journal() -> Iterator[None]:
     >>> with ns.plot.journal():
     ...     figure, ax = plt.subplots()
     """
-    with _set(_settings()):
+    with _in("journal"):
         yield
+
+
+@contextmanager
+def slides() -> Iterator[None]:
+    """A style for slides, for the figures made inside the ``with`` block: wide, large letters, strong lines.
+
+    ``plt.style.use("nonsmooth.plot.slides")`` sets it for figures of your own that follow.
+
+    Examples
+    --------
+    >>> import nonsmooth as ns
+    >>> run = ns.simulate(ns.models.impact_oscillator(), periods=2)
+    >>> with ns.plot.slides():
+    ...     ax = ns.plot.time_history(run)
+    """
+    with _in("slides"):
+        yield
+
+
+@contextmanager
+def _in(name: str) -> Iterator[None]:
+    """Set a style, and make it that of the figures made inside."""
+    token = _style.set(name)
+    try:
+        with _set(_settings(name)):
+            yield
+    finally:
+        _style.reset(token)
 
 
 @contextmanager
@@ -106,8 +141,13 @@ def axes(ax: Axes | None, *, width: float = COLUMN, ratio: float = 0.72) -> Iter
         return
     import matplotlib.pyplot as plt
 
-    with journal():
-        yield plt.figure(figsize=(width, width * ratio)).add_subplot()
+    name = _style.get()
+    with _in(name):
+        wide, high = _settings(name)["figure.figsize"]
+        size = (width, width * ratio) if name == "journal" else (wide * width / COLUMN, high * width / COLUMN)
+        figure = plt.figure(figsize=size)
+        _made[figure] = name
+        yield figure.add_subplot()
 
 
 @contextmanager
@@ -125,7 +165,7 @@ def _own_legend(ax: Axes) -> Iterator[None]:
 
 def small(ax: Axes) -> float:
     """Size of letters within axes: 7/8 of their labels', as in legends; 7 pt in the package's style."""
-    settings = _settings()
+    settings = _settings(_style.get())
     return float(settings["legend.fontsize"] / settings["axes.labelsize"] * ax.xaxis.label.get_fontsize())
 
 
@@ -184,6 +224,25 @@ def clear_legend(ax: Axes) -> Legend:
     return legend
 
 
+def apart(ax: Axes, labels: Iterable[Any]) -> None:
+    """Move labels that stand over others up or down, towards the middle of the axes; call it when all is drawn."""
+    whole: Any = ax.figure.canvas.figure
+    whole.draw_without_rendering()
+    middle = 0.5 * sum(ax.get_window_extent().intervaly)
+    placed: list[Any] = []
+    for label in labels:
+        rises = sum(label.get_window_extent().intervaly) < 2.0 * middle
+        for _ in placed:
+            box = label.get_window_extent()
+            other = next((one for one in placed if one.overlaps(box)), None)
+            if other is None:
+                break
+            x, y = label.xyann
+            by = other.y1 - box.y0 + 1.0 if rises else other.y0 - box.y1 - 1.0
+            label.xyann = x, y + by * 72.0 / whole.dpi
+        placed.append(label.get_window_extent())
+
+
 def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
     """Save a figure (or the figure of some axes) in the format of the path's ending.
 
@@ -193,6 +252,6 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     owner: Any = getattr(figure, "figure", figure)
     metadata: dict[str, Any] | None = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}.get(target.suffix)
-    with journal():
+    with _in(_made.get(owner, "journal")):
         owner.savefig(target, metadata=metadata)
     return target

@@ -9,8 +9,18 @@ from numpy.typing import NDArray
 
 from nonsmooth.plot import style
 from nonsmooth.plot.branches import draw_branch
-from nonsmooth.plot.labels import column, first_states, name_plane, only_states, variable_along
-from nonsmooth.plot.planes import cell_edges
+from nonsmooth.plot.labels import (
+    column,
+    first_states,
+    name_and_unit,
+    name_axes,
+    name_plane,
+    only_states,
+    variable_along,
+)
+from nonsmooth.plot.planes import cell_edges, held
+from nonsmooth.tables.quantities import quantities_of
+from nonsmooth.tables.quantities import quantity as quantity_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,7 +57,8 @@ def bifurcation(
     ax
         Where to draw; a new one-column figure if None.
     y
-        The state of the ordinate; by default the first.
+        The state of the ordinate; by default the first. Or a quantity of each point, such as ``"x_amplitude"`` or a
+        load (``"stop_impact_speed_maximum"``), which :func:`nonsmooth.table` lists.
     size
         Diameter of a point in typographic points; of a rising sweep under a falling one, half of it.
     color
@@ -63,7 +74,9 @@ def bifurcation(
     (name,) = first_states(result, y)
     parameter = str(result["maximum"].dims[0])
     ax, branches = sorted_out(over, ax, parameter)
-    points = column(result, "section", name)
+    of_state = name in result["state"].values
+    points = column(result, "section", name) if of_state else quantity_of(result, name).expand_dims("iterate")
+    size = size if of_state else 3.0 * size
     directions = [str(word) for word in np.atleast_1d(result["direction"].values)]
     with style.axes(ax) as drawn:
         for i, direction in enumerate(directions):
@@ -83,10 +96,18 @@ def bifurcation(
         # The whole sweep shows, its ends too where every point diverged.
         drawn.dataLim.update_from_data_x(result[parameter].values, ignore=False)
         drawn.margins(x=0)
-        name_plane(drawn, result, parameter, name)
+        _name(drawn, result, parameter, name, points)
         if len(directions) > 1 or branches:
             style.even_dots(style.clear_legend(drawn))
     return drawn
+
+
+def _name(ax: Axes, result: xr.Dataset, parameter: str, name: str, values: xr.DataArray, before: str = "") -> None:
+    """Label the axes with a parameter and a state, an output or another quantity."""
+    if name in result["state"].values:
+        return name_plane(ax, result, parameter, name, before)
+    own = before + name_and_unit(result, name)[0]
+    return name_axes(ax, name_and_unit(result, parameter), (own, str(values.attrs.get("units", "1"))))
 
 
 def sorted_out(
@@ -173,6 +194,7 @@ def frequency_response(
     quantity: str = "amplitude",
     jumps: bool = True,
     digits: int = 4,
+    region: str | xr.DataArray | None = None,
 ) -> Axes:
     """Draw a ``frequency_response`` result.
 
@@ -186,12 +208,16 @@ def frequency_response(
     ax
         Where to draw; a new one-column figure if None.
     y
-        The state; by default the first. Or a variable over the parameter alone, such as a load (``"stop_energy"``).
+        The state or the output; by default the first state. Or a quantity of each point, such as a load
+        (``"stop_energy"``).
     quantity
-        ``"amplitude"`` (half the peak-to-peak value), ``"maximum"`` or ``"minimum"``.
+        ``"amplitude"`` (half the peak-to-peak value), ``"maximum"`` or ``"minimum"`` of a state or an output.
     jumps
         Mark each jump of what is drawn by a dotted arrow and its value of the parameter with ``digits`` significant
         digits.
+    region
+        A condition, or what :func:`nonsmooth.region` gave: the values of the parameter at which it holds, in every
+        direction and from every start, are shaded.
     """
     variable_along(result, "amplitude", "frequency_response")
     if quantity not in ("amplitude", "maximum", "minimum"):
@@ -199,9 +225,12 @@ def frequency_response(
     (name,) = first_states(result, y)
     parameter = str(result["maximum"].dims[0])
     values = result[parameter].values
-    alone = name in result.data_vars and result[name].dims == result["status"].dims
-    heights = result[name] if alone else column(result, quantity, name)
+    known = quantities_of(result)
+    alone = f"{name}_{quantity}" not in known
+    heights = quantity_of(result, name if alone else f"{name}_{quantity}", known)
+    inside = held(result, region)
     ax, branches = sorted_out(over, ax, parameter)
+    marks: list[Any] = []
     with style.axes(ax) as drawn:
         for i, direction in enumerate(np.atleast_1d(result["direction"].values).astype(str)):
             one = heights.isel(direction=i) if "direction" in heights.dims else heights
@@ -213,13 +242,27 @@ def frequency_response(
                 drawn.plot(*broken, label=_WORDS[direction] if k == 0 else None, **_LOOKS[direction])
                 if jumps:
                     for place, i in found:
-                        _mark(drawn, curve, i, values[0] <= values[-1], place, direction, digits)
+                        marks.append(_mark(drawn, curve, i, values[0] <= values[-1], place, direction, digits))
         for behind in branches:
             draw_branch(drawn, behind, y=name, quantity=quantity, color=style.COLORS["section"], width=0.7, behind=True)
         drawn.margins(x=0)
-        name_plane(drawn, result, parameter, name, "" if alone else f"{quantity} of ")
+        if inside is not None:
+            _shade(drawn, inside, parameter)
+        _name(drawn, result, parameter, name, heights, "" if alone else f"{quantity} of ")
         style.clear_legend(drawn)
+        style.apart(drawn, marks)
     return drawn
+
+
+def _shade(ax: Axes, inside: xr.DataArray, parameter: str) -> None:
+    """Shade the cells of an axis in which a condition holds."""
+    whole = inside.all([dim for dim in inside.dims if dim != parameter]).sortby(parameter)
+    edges = cell_edges(whole[parameter].values)
+    words = str(inside.attrs.get("long_name", "region"))
+    for i in np.flatnonzero(whole.values):
+        ax.axvspan(edges[i], edges[i + 1], color=style.COLORS["third"], alpha=0.15, linewidth=0, zorder=0,
+                   label=style.once(ax, words))  # fmt: skip
+    ax.set_xlim(*whole[parameter].values[[0, -1]])
 
 
 def _jumps(result: xr.Dataset, name: str, direction: str, start: int) -> list[float]:
@@ -254,8 +297,8 @@ def _intervals(values: NDArray[np.float64], curve: NDArray[np.float64], places: 
 
 def _mark(
     ax: Axes, curve: NDArray[np.float64], at: int, rising: bool, place: float, direction: str, digits: int
-) -> None:
-    """An arrow from the height before the jump to the height after it, in the sense of the sweep."""
+) -> Any:
+    """An arrow from the height before the jump to the height after it, in the sense of the sweep; its label."""
     before, after = (curve[at - 1], curve[at]) if (direction == "up") == rising else (curve[at], curve[at - 1])
     color = _LOOKS[direction]["color"]
     arrow = {"arrowstyle": "->", "color": color, "linestyle": ":", "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
@@ -263,7 +306,7 @@ def _mark(
     side = 2 if direction == "up" else -2
     small = abs(after - before) < 0.2 * np.ptp(curve[np.isfinite(curve)])  # no room beside the arrow: below it
     where, offset = (min(before, after), (side, -3)) if small else ((before + after) / 2, (side, 0))
-    ax.annotate(
+    return ax.annotate(
         f"{place:.{digits}g}", (place, where), offset, textcoords="offset points", color=color, rotation=90,
         fontsize=style.small(ax), va="top" if small else "center", ha="left" if side > 0 else "right", zorder=6,
         path_effects=style.halo(),

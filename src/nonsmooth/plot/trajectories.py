@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,10 +42,12 @@ def pieces_by_mode(mode: NDArray[np.integer], *curves: NDArray[np.float64]) -> l
     return [[np.where(mode == k, curve, np.nan) for curve in curves] for k in range(int(mode.max(initial=0)) + 1)]
 
 
-def time_history(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, shade: bool = True) -> Axes:
+def time_history(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, shade: bool | str = True) -> Axes:
     """Draw ``y`` (a state, by default the first, or an output) of a ``simulate`` result over time.
 
-    The curve is cut where a reset makes the state jump. ``shade`` marks the time spent in any mode but the first.
+    The curve is cut where a reset makes the state jump. ``shade`` marks the time spent in any mode but the first; of a
+    system with several elements the time in which a contact is closed (without contacts: in which something sticks).
+    The name of an element, ``"stop"``: the time in which it does something else than in the first mode.
     """
     variable_along(result, "u", "simulate")
     (name,) = first_states(result, y)
@@ -52,7 +55,7 @@ def time_history(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = 
         time = result["time"].values
         drawn.plot(*with_gaps(result, time, column(result, "u", name).values), color=style.COLORS["first"])
         if shade:
-            away = result["mode"].values > 0
+            away = _away(result, shade)
             drawn.fill_between(
                 time, 0, 1, where=away, transform=drawn.get_xaxis_transform(),
                 color=style.COLORS["zone"], alpha=0.25, linewidth=0,
@@ -60,6 +63,32 @@ def time_history(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = 
         drawn.margins(x=0)
         name_plane(drawn, result, "time", name)
     return drawn
+
+
+_CLOSED, _STUCK = {"rest", "contact", "above", "below"}, {"stick", "held"}  # phases of elements
+
+
+def _away(result: xr.Dataset, shade: bool | str) -> NDArray[np.bool_]:
+    """The samples in another mode than the first, with a closed contact, or with an element in another phase."""
+    mode = result["mode"]
+    words = words_of_flags(mode)
+
+    def phases(name: str) -> list[str]:
+        found = (re.search(rf"(?:^|_){re.escape(name)}_([a-z]+)", word) for word in words)
+        return ["" if one is None else one[1] for one in found]
+
+    if isinstance(shade, str):
+        own = phases(shade)
+        if not own[0]:
+            raise ValueError(f"shade = {shade!r}: no element of this name in the modes {', '.join(words[:6])}")
+        return np.array([phase != own[0] for phase in own])[mode.values]
+    forces = [str(name).removesuffix("_force") for name in result.data_vars if str(name).endswith("_force")]
+    several = [own for name in forces if all(own := phases(name))]
+    if len(several) < 2:
+        return np.asarray(mode.values > 0)
+    of = [set(now) for now in zip(*several, strict=True)]
+    wanted = _CLOSED if any(now & _CLOSED for now in of) else _STUCK
+    return np.array([bool(now & wanted) for now in of])[mode.values]
 
 
 ZONE = "contact zone"  # in legends

@@ -8,6 +8,7 @@ anew in the plain unit, or a formatter of the caller's own, brings the plain num
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from matplotlib.ticker import ScalarFormatter
 
 from nonsmooth.plot.labels import with_unit
 
-__all__ = ["PREFIXES", "name_axis", "power_for", "prefixed"]
+__all__ = ["PREFIXES", "in_unit", "name_axis", "power_for", "prefixed"]
 
 PREFIXES = {0: "", -3: "m", -6: "\N{MICRO SIGN}", -9: "n"}
 #: Units that take a prefix; the first one of a compound does: ``m``, ``m/s``, ``m s``, ``N/m``.
@@ -25,6 +26,7 @@ _FIRST = re.compile(r"(m|s|N|V|A|Pa|W|J|rad)(?=$|[/ ])")
 #: Below this a prefix is used. Lengths and speeds are read in millimetres up to a metre.
 _WHOLE = {"m": 1.0}
 _ALMOST_WHOLE = 0.1
+_READ = 0.05  # of the other axis' unit: from there on both have it
 
 
 def power_for(unit: str, largest: float) -> int:
@@ -36,6 +38,19 @@ def power_for(unit: str, largest: float) -> int:
         return 0
     # 0.1 mm to 1 m are millimetres
     return max(-3 * int(np.ceil((-np.log10(largest) - 1) / 3 - 1e-9)) or -3, min(PREFIXES))
+
+
+def together(axes: Sequence[tuple[str, float]]) -> list[float]:
+    """Largest values (unit, largest) by which axes choose their prefixes: metres beside metres per second, where the
+    smaller one is still read easily."""
+    found = [most for _, most in axes]
+    firsts = {match[1] for unit, _ in axes if (match := _FIRST.match(unit))}
+    powers = [power_for(unit, most) for unit, most in axes]
+    if len(axes) == 2 and len(firsts) == 1 and powers[0] != powers[1] and all(_FIRST.match(unit) for unit, _ in axes):
+        low = powers.index(min(powers))
+        if found[low] >= _READ * 10.0 ** max(powers):
+            found[low] = found[1 - low]
+    return found
 
 
 def prefixed(value: float, unit: str) -> tuple[str, str]:
@@ -74,6 +89,24 @@ def name_axis(axis: Axis, name: str, unit: str, largest: float | None = None) ->
     power = power_for(unit, float(np.abs(axis.get_view_interval()).max()) if largest is None else largest)
     axis.set_major_formatter(_Prefixed(unit))
     ticks.write(power)
+
+
+def in_unit(axis: Axis, unit: str) -> None:
+    """Write an axis that :func:`name_axis` has named in a unit with another prefix, or with none.
+
+    Raises
+    ------
+    ValueError
+        An axis whose unit takes no prefix, or a unit that is not its own with one of them.
+    """
+    ticks = axis.major
+    if not isinstance(ticks, _Ticks) or (plain := ticks.units.get(axis)) is None:
+        raise ValueError(f"unit = {unit!r}: this axis ({axis.get_label_text()!r}) has no unit that takes a prefix")
+    allowed = {prefix + plain: power for power, prefix in PREFIXES.items()}
+    wanted = {f"u{plain}": PREFIXES[-6] + plain}.get(unit, unit)
+    if wanted not in allowed:
+        raise ValueError(f"unit = {unit!r} is not one of {', '.join(allowed)}, the units of this axis")
+    ticks.write(allowed[wanted])
 
 
 class _Ticks(Ticker):

@@ -4,6 +4,8 @@ What the file formats cannot hold is converted on the way out and back on the wa
 a last dim ``part`` = re, im; strings keep NumPy's fixed-width type; integer flags keep their type.
 Files are written beside their place and moved there when whole, so an interrupted save leaves the old file. Each
 carries the hash of its content, which ``save`` compares with what it wrote and ``load`` with what it read.
+For readers without this package a file tells system, verb, parameters and states in plain attributes too, which
+``load`` leaves out again.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ from nonsmooth.errors import DataFileError, not_installed
 from nonsmooth.results import claims
 from nonsmooth.results.content import bytes_as_written, content, digest, stamp, trailer, unstamp
 from nonsmooth.results.memory import room_for
-from nonsmooth.results.provenance import ATTRIBUTE
+from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
 from nonsmooth.results.whole import beside, replace, told
 
 __all__ = ["check_place", "load", "needs_zarr", "save"]
@@ -39,6 +41,7 @@ _KEPT = (
     "nonsmooth.save(error.result, PATH)"
 )
 _COMPRESS_FROM = 4096  # elements; smaller arrays do not gain
+_PLAIN = f"{ATTRIBUTE}_"  # begins the names of the plain attributes
 
 
 def save(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
@@ -70,7 +73,7 @@ def save(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
                 f"lost it, copy it from the result: new.attrs[{ATTRIBUTE!r}] = result.attrs[{ATTRIBUTE!r}]"
             )
         held = content(result.attrs, _variables(result))
-        encoded = _encode(result).assign_attrs({ATTRIBUTE: stamp(record, digest(held))})
+        encoded = _encode(result).assign_attrs({ATTRIBUTE: stamp(record, digest(held)), **_plain(result)})
         with told(target, _KEPT), beside(target) as folder:
             fresh = folder / f"new{target.suffix}"
             if target.suffix == ".nc":
@@ -124,7 +127,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
                 f"{source}: has no attribute {ATTRIBUTE!r}, so it is not a result of this package; {_EXPECTED}"
             )
         expected, record = unstamp(str(raw.attrs[ATTRIBUTE]))
-        attributes = {**raw.attrs, ATTRIBUTE: record}
+        attributes = _own(raw.attrs) | {ATTRIBUTE: record}
         variables = list(_decoded(raw))
         if expected is not None and digest(content(attributes, variables)) != expected:
             raise DataFileError(f"{source}: {_ALTERED}")
@@ -225,7 +228,7 @@ def _opened(source: Path) -> Iterator[xr.Dataset]:
 def _compare(target: Path, fresh: Path, held: Mapping[str, Any]) -> None:
     """Read what was written, one variable after the other: a file that would come back as something else is no file."""
     with _opened(fresh) as raw:
-        found = content({**raw.attrs, ATTRIBUTE: unstamp(raw.attrs[ATTRIBUTE])[1]}, _decoded(raw))
+        found = content(_own(raw.attrs) | {ATTRIBUTE: unstamp(raw.attrs[ATTRIBUTE])[1]}, _decoded(raw))
     if found != held:
         names = sorted(name for name in {**held, **found} if held.get(name) != found.get(name))
         raise TypeError(
@@ -238,6 +241,33 @@ def _variables(result: xr.Dataset) -> Iterator[tuple[str, bool, xr.Variable]]:
     """Name, coordinate or not, and variable."""
     for name, variable in result.variables.items():
         yield str(name), name in result.coords, variable
+
+
+def _own(attributes: Mapping[Any, Any]) -> dict[Any, Any]:
+    """The attributes of a file that are the result's."""
+    return {name: value for name, value in attributes.items() if not str(name).startswith(_PLAIN)}
+
+
+def _plain(result: xr.Dataset) -> dict[str, str]:
+    """System, verb, version, parameters that are not varied and states, as ``ncdump -h`` shows them."""
+    try:
+        record = read_provenance(result)
+    except ValueError:  # a part of it was dropped
+        record = {}
+    units = {
+        name: (float(one), str(one.attrs["units"]))
+        for name, one in result.coords.items() if not one.dims and one.dtype.kind == "f" and "units" in one.attrs
+    }  # fmt: skip
+    told: dict[str, str] = {key: str(record[key]) for key in ("verb", "version") if key in record}
+    if isinstance(system := record.get("system"), dict):
+        told["system"] = str(system.get("name"))
+    if units:
+        pairs = [f"{name} = {value:.15g} {unit.removesuffix('1')}" for name, (value, unit) in units.items()]
+        told["parameters"] = ", ".join(map(str.strip, pairs))
+    if "state_unit" in result.coords:
+        states = zip(result["state"].values, result["state_unit"].values, strict=True)
+        told["states"] = ", ".join(f"{name} ({unit})" if unit != "1" else str(name) for name, unit in states)
+    return {_PLAIN + key: text for key, text in told.items()}
 
 
 def _encode(result: xr.Dataset) -> xr.Dataset:

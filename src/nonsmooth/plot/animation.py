@@ -1,0 +1,278 @@
+"""``animate``: the moving sketch of a run, its phase plane and its history, as a file or in a notebook."""
+
+from __future__ import annotations
+
+import base64
+import io
+import os
+import uuid
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.errors import DataFileError
+from nonsmooth.flow.arguments import real_number, whole_number
+from nonsmooth.plot import style
+from nonsmooth.plot.labels import column, first_states, name_plane, variable_along
+from nonsmooth.plot.mechanism import FLOOR, Sketch
+from nonsmooth.plot.scheme import scheme_of
+from nonsmooth.plot.trajectories import with_gaps
+from nonsmooth.system.names import by_name
+from nonsmooth.system.origin import system_of
+from nonsmooth.tables.sampled import sampled
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from PIL import Image
+
+__all__ = ["Animation", "animate"]
+
+_COLORS = 48  # of a palette: lines and letters need few
+_TRAIL = 0.2  # of the run: the length of the bright end of an orbit
+
+
+@by_name
+def animate(
+    run: xr.Dataset,
+    *,
+    x: str | None = None,
+    y: str | None = None,
+    history: str | None = None,
+    seconds: float = 6.0,
+    rate: int = 20,
+    pixels: int = 720,
+) -> Animation:
+    """Animate a run: the sketch of its mechanism, the plane of two states and the history of one, together.
+
+    Parameters
+    ----------
+    run : xarray.Dataset
+        Of :func:`nonsmooth.simulate`; whole periods make a loop without a seam.
+    x, y : str, optional
+        States or outputs of the plane; the first coordinate and its speed where not given.
+    history : str, optional
+        State or output over time, such as a force; ``x`` where not given.
+    seconds : float
+        How long the whole run lasts on the screen.
+    rate : int
+        Pictures per second.
+    pixels : int
+        Width of a picture.
+
+    Returns
+    -------
+    Animation
+        ``.save("run.gif")`` (also ``.mp4`` and ``.html``, a page with a player of its own); a notebook shows the
+        player. Positions are those at even instants, computed as :func:`nonsmooth.table` does. Displacements and gaps
+        in the sketch are to one scale, the size of the masses is not. A system without masses on a line has no sketch.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Not a run; a name that it does not have; lengths that are not positive.
+
+    Examples
+    --------
+    >>> import nonsmooth as ns
+    >>> oscillator = ns.models.impact_oscillator(omega=0.8, d=0.5)
+    >>> moving = ns.animate(ns.simulate(oscillator, periods=2, transient=50), seconds=1.0, rate=10)
+    >>> len(moving)
+    10
+    """
+    variable_along(run, "u", "simulate")
+    length, per_second = real_number(seconds, "seconds"), whole_number(rate, "rate", 1)
+    if not 0 < length * per_second <= 5000:
+        raise ValueError(f"seconds = {seconds!r} at rate = {rate!r}: from 1 to 5000 pictures are made")
+    wide = whole_number(pixels, "pixels", 100)
+    try:
+        sketch: Sketch | None = Sketch(scheme_of(system_of(run)))
+    except ValueError:
+        sketch = None
+    first = (sketch.scheme.coordinates[0], None) if sketch is not None else (None, None)
+    names = first_states(run, x or first[0], y or _speed(run, first[0]))
+    n = max(1, round(length * per_second))
+    time = run["time"].values
+    at = sampled(run, None, np.linspace(time[0], time[-1], n, endpoint=False) if n > 1 else time[:1])
+    return Animation(run, at, sketch, names, history or names[0], per_second, wide)
+
+
+def _speed(run: xr.Dataset, name: str | None) -> str | None:
+    """The speed of a coordinate: the state behind the coordinates at the same place; the second of two."""
+    states = [str(one) for one in run["state"].values]
+    if name is None or len(states) < 2:
+        return None
+    return next((one for one in (f"v_{name}", "v") if one in states), states[min(len(states) // 2, len(states) - 1)])
+
+
+class Animation:
+    """Pictures of a run in motion, drawn when they are asked for; :func:`animate` makes it."""
+
+    def __init__(
+        self, run: xr.Dataset, at: xr.Dataset, sketch: Sketch | None, names: list[str], history: str, rate: int,
+        pixels: int,
+    ) -> None:  # fmt: skip
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        self.rate = rate
+        self._at, self._sketch = at, sketch
+        self._time = at["time"].values
+        width, plots = 6.0, 2.1
+        high = 0.0
+        if sketch is not None:
+            self._q = np.stack([at["u"].sel(state=name).values for name in sketch.scheme.coordinates], axis=1)
+            self._scale = sketch.scale_for(np.nan_to_num(self._q))
+            if not sketch.above:  # forces and names of coordinates are left out
+                sketch.top = min(sketch.top, FLOOR + sketch.tall + 0.15)
+            high = min(2.2, width * (sketch.top - sketch.bottom) / max(sketch.width, 4.2))
+        with style.journal():
+            self.figure = Figure(figsize=(width, plots + high + 0.1), dpi=pixels / width)
+            FigureCanvasAgg(self.figure)
+            grid = self.figure.add_gridspec(
+                2 if high else 1, 2, height_ratios=[high, plots] if high else None, width_ratios=[1.0, 1.5],
+                left=0.1, right=0.98, bottom=0.42 / (plots + high), top=0.98, hspace=0.1, wspace=0.24,
+            )  # fmt: skip
+            plane, over = (self.figure.add_subplot(grid[-1, k]) for k in (0, 1))
+            if sketch is not None:
+                self._paper = self.figure.add_subplot(grid[0, :])
+                sketch.frame(self._paper, room=max(0.0, 0.5 * (4.2 - sketch.width)))
+            self._drawn, self._curves = run["time"].values, [column(run, "u", one).values for one in (*names, history)]
+            self._run = run
+            pale: dict[str, Any] = {"color": style.COLORS["pale"], "linewidth": 0.8}
+            plane.plot(*with_gaps(run, *self._curves[:2]), **pale)
+            name_plane(plane, run, *names)
+            over.plot(*with_gaps(run, self._drawn, self._curves[2]), **pale)
+            over.set_xlim(*self._drawn[[0, -1]])
+            name_plane(over, run, "time", history)
+            end: dict[str, Any] = {"color": style.COLORS["first"], "linewidth": 1.3}
+            dot: dict[str, Any] = {"color": style.COLORS["second"], "markersize": 5}
+            self._ends = [plane.plot([], [], **end)[0], over.plot([], [], **end)[0]]
+            self._dots = [plane.plot([], [], "o", **dot)[0], over.plot([], [], "o", **dot)[0]]
+        self._plane = [column(at, "u", name).values for name in names]
+        self._over = column(at, "u", history).values
+        self._made: list[Any] = []
+
+    def __len__(self) -> int:
+        """Number of pictures."""
+        return len(self._time)
+
+    def draw(self, k: int) -> None:
+        """Bring the figure to picture k."""
+        with style.journal():
+            if self._sketch is not None:
+                for one in self._made:
+                    one.remove()
+                self._made = self._sketch.draw(
+                    self._paper, self._scale * np.nan_to_num(self._q[k]), self._scale, time=float(self._time[k])
+                )
+            now, whole = self._time[k], self._drawn[-1] - self._drawn[0]
+            rows = slice(*np.searchsorted(self._drawn, [now - _TRAIL * whole, now], side="right"))
+            part = self._run.isel(time=rows)
+            xs, ys, hs, times = with_gaps(part, *(one[rows] for one in (*self._curves, self._drawn)))
+            self._ends[0].set_data(xs, ys)
+            self._ends[1].set_data(times, hs)
+            self._dots[0].set_data([self._plane[0][k]], [self._plane[1][k]])
+            self._dots[1].set_data([self._time[k]], [self._over[k]])
+
+    def images(self) -> Iterator[Image.Image]:
+        """The pictures, with few colours, all of one palette."""
+        from PIL import Image
+
+        def picture(k: int) -> Image.Image:
+            self.draw(k)
+            canvas: Any = self.figure.canvas
+            canvas.draw()
+            return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+
+        palette = picture(len(self) // 2).quantize(_COLORS, dither=Image.Dither.NONE)
+        colors = np.reshape(palette.getpalette() or [], (-1, 3))
+        palette.putpalette(np.where(colors.min(axis=1, keepdims=True) > 245, 255, colors).ravel().tolist())  # paper
+        for k in range(len(self)):
+            yield picture(k).quantize(palette=palette, dither=Image.Dither.NONE)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write it to ``path``: ``.gif``, ``.mp4`` (needs the program ffmpeg) or ``.html``, a page with a player.
+
+        Raises
+        ------
+        ValueError
+            Another ending.
+        ImportError
+            ``.mp4`` where there is no ffmpeg.
+        DataFileError
+            A folder that does not exist.
+        """
+        target = Path(path)
+        if target.suffix not in (".gif", ".mp4", ".html"):
+            raise ValueError(f"{target}: an animation is saved as .gif, .mp4 or .html")
+        if not target.parent.is_dir():
+            raise DataFileError(f"{target}: the folder {target.parent} does not exist; create it first")
+        if target.suffix == ".mp4":
+            self._film(target)
+        elif target.suffix == ".gif":
+            first, *others = self.images()
+            looks: dict[str, Any] = {"duration": round(1000 / self.rate), "loop": 0, "optimize": False, "disposal": 1}
+            first.save(target, save_all=True, append_images=others, **looks)
+        else:
+            head = '<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>nonsmooth</title>\n'
+            target.write_text(f"{head}<body>{self._repr_html_()}</body></html>\n", encoding="utf-8")
+        return target
+
+    def _film(self, target: Path) -> None:
+        import matplotlib as mpl
+        from matplotlib.animation import FFMpegWriter, FuncAnimation
+
+        settings: Any = {}
+        if not FFMpegWriter.isAvailable():
+            try:
+                import imageio_ffmpeg
+            except ImportError:
+                raise ImportError(
+                    f"{target}: .mp4 needs the program ffmpeg, which is not there: python -m pip install "
+                    "imageio-ffmpeg; a .gif or a .html needs nothing"
+                ) from None
+            settings = {"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()}
+        with mpl.rc_context(settings):
+            film = FuncAnimation(self.figure, self.draw, frames=len(self), repeat=False)
+            film.save(target, writer=FFMpegWriter(fps=self.rate, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]))
+
+    def _repr_html_(self) -> str:
+        """The pictures with a player of its own; nothing is loaded from elsewhere."""
+        frames = []
+        for image in self.images():
+            file = io.BytesIO()
+            image.save(file, format="png", optimize=True)
+            frames.append(base64.b64encode(file.getvalue()).decode())
+        name = f"a{uuid.uuid4().hex[:12]}"
+        player = _PLAYER.replace("NAME", name).replace("LAST", str(len(frames) - 1))
+        player = player.replace("DELAY", str(round(1000 / self.rate)))
+        return player.replace("FRAMES", ",".join(f'"{one}"' for one in frames))
+
+
+_PLAYER = """<div id="NAME" style="display:inline-block;max-width:100%">
+<img alt="A mechanism in motion, its phase plane and its history" style="max-width:100%;display:block">
+<div style="display:flex;gap:.6em;align-items:center;font:14px sans-serif">
+<button type="button">pause</button>
+<input type="range" min="0" max="LAST" value="0" aria-label="picture" style="flex:1">
+<label>speed <select><option value="4">1/4</option><option value="2">1/2</option><option value="1" selected>1</option>
+<option value="0.5">2</option></select></label></div>
+<script>
+(() => {
+  const box = document.getElementById("NAME"), frames = [FRAMES];
+  const [image, button, slider, speed] = ["img", "button", "input", "select"].map((tag) => box.querySelector(tag));
+  let timer = null;
+  const show = (k) => { slider.value = k; image.src = "data:image/png;base64," + frames[k]; };
+  const stop = () => { clearTimeout(timer); timer = null; button.textContent = "play"; };
+  const step = () => {
+    show((Number(slider.value) + 1) % frames.length);
+    timer = setTimeout(step, DELAY * Number(speed.value));
+  };
+  const play = () => { button.textContent = "pause"; step(); };
+  button.onclick = () => (timer === null ? play() : stop());
+  slider.oninput = () => { stop(); show(Number(slider.value)); };
+  show(0);
+  if (matchMedia("(prefers-reduced-motion: reduce)").matches) stop(); else play();
+})();
+</script></div>"""

@@ -1,0 +1,1 @@
+"""Numbers read off results: each quantity by its name, tables, regions that fulfil a condition."""

@@ -1,0 +1,211 @@
+"""``region``: where in a plane, along an axis or in time a condition on a result's quantities holds."""
+
+from __future__ import annotations
+
+import ast
+import operator
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy as sp
+
+from nonsmooth.errors import shortened
+from nonsmooth.system.names import by_name
+from nonsmooth.system.symbolic.expressions import read_expression
+from nonsmooth.tables.quantities import dataset_of, quantities_of, quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["region"]
+
+_LONGEST = 2000  # characters of a condition
+_COMPARE: dict[Any, Callable[[Any, Any], Any]] = {
+    sp.StrictLessThan: operator.lt, sp.LessThan: operator.le, sp.StrictGreaterThan: operator.gt,
+    sp.GreaterThan: operator.ge, sp.Eq: operator.eq, sp.Ne: operator.ne,
+}  # fmt: skip
+#: Loads that are asked for without their element: then of each of them.
+_OF_ELEMENTS = ("force", "friction_force", "impact_speed", "impacts", "impulse", "energy")
+_FORM = 'a condition such as "abs(q) < 2e-3 and impact_speed < 0.1"'
+
+
+@by_name
+def region(result: Any, condition: str) -> xr.DataArray:
+    r"""The points of a result at which a condition on its quantities holds.
+
+    Parameters
+    ----------
+    result : xarray.Dataset
+        Of ``chart``, ``sweep``, ``frequency_response``, a branch, a run.
+    condition : str
+        Comparisons of arithmetic expressions joined by ``and`` and ``or``: ``"abs(q3) < 2e-3 and period_number == 1"``.
+        It is read by the reader of systems in text; nothing is executed. Names are those of the result's variables, of
+        its parameters, and:
+
+        - a state or an output, ``q3``: **every value that it takes**, between its minimum and its maximum, must fulfil
+          the comparison, so ``abs(q3) < 2e-3`` means :math:`\max_t |q_3(t)| < 0.002`. In a run it is its value.
+        - ``q3_maximum``, ``q3_minimum``, ``q3_amplitude`` (half the difference), of an output too;
+        - loads of an element (of results with ``loads=True``), ``stop_impact_speed``, or of **each** element where none
+          is named: ``impact_speed``, ``force``, ``impulse``, ``impacts``, ``energy``.
+
+    Returns
+    -------
+    xarray.DataArray
+        True and False over the result's points, with the condition as its ``long_name``. Where a quantity is not known
+        (a point that failed or was not computed) it is False; ``unknown`` in its attributes counts these points.
+
+    Raises
+    ------
+    TypeError, ValueError
+        What is no result; a condition that cannot be read, or a name that the result does not hold.
+
+    See Also
+    --------
+    nonsmooth.plot.chart : draws it, ``region="..."``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import nonsmooth as ns
+    >>> plane = {"omega": np.linspace(3, 5, 5), "rho": np.linspace(0.1, 0.2, 3)}
+    >>> chart = ns.chart(ns.models.discontinuous_support(g=0.005), plane, progress=False)
+    >>> quiet = ns.region(chart, "abs(x) < 0.01 and period_number == 1")
+    >>> quiet.dims, int(quiet.sum())
+    (('omega', 'rho'), 6)
+    """
+    import xarray as xr
+
+    data = dataset_of(result)
+    known = quantities_of(data)
+    tree = _parsed(condition)
+    words = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - {"pi"}
+    called = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
+    names = sorted(words - called)
+    symbols = {name: sp.Symbol(name, real=True) for name in names}
+    read = read_expression(ast.unparse(tree), symbols)
+    held = {symbols[name]: _held(data, name, known) for name in names}
+    whole: Any = xr.DataArray(True)
+    for one in held.values():
+        for end in one.ends:
+            whole = whole & end.notnull()
+    inside = whole & _holds(read, held, condition)
+    kept = [dim for dim in data.dims if dim in inside.dims]
+    inside, whole = (array.transpose(*kept).astype(bool) for array in (inside, whole & xr.ones_like(inside)))
+    missing = int(inside.size - whole.sum())
+    inside.attrs = {"long_name": " ".join(condition.split()), "unknown": missing}
+    return inside.rename("region")
+
+
+@dataclass(frozen=True)
+class _Held:
+    """A quantity by the least and the largest value that it takes; of one value both are the same."""
+
+    ends: tuple[xr.DataArray, ...]
+    ranges: bool = field(default=False)
+
+
+def _held(data: xr.Dataset, name: str, known: Mapping[str, xr.DataArray]) -> _Held:
+    if name in known or name in data.coords:
+        return _Held((quantity(data, name, known),))
+    stems = [name] if f"{name}_maximum" in known else []
+    if not stems and name in _OF_ELEMENTS:
+        found = (re.fullmatch(rf"(.+_{name})(?:_maximum)?", key) for key in known)
+        stems = [one[1] for one in found if one is not None and not one[1].endswith(("_minimum", "_amplitude"))]
+        stems = [stem for stem in dict.fromkeys(stems) if name != "force" or not stem.endswith("friction_force")]
+    lower = [known[f"{stem}_minimum"] for stem in stems if f"{stem}_minimum" in known]
+    upper = [known.get(f"{stem}_maximum", known.get(stem)) for stem in stems]
+    every = [one for one in [*lower, *upper] if one is not None]
+    if not every:
+        return _Held((quantity(data, name, known),))  # which says what there is
+    if len(every) == 1:
+        return _Held((every[0],))
+    least: Any = every[0]
+    most: Any = every[0]
+    for one in every[1:]:
+        least, most = np.minimum(least, one), np.maximum(most, one)
+    return _Held((least, most), ranges=True)
+
+
+def _parsed(condition: Any) -> ast.expr:
+    """The condition, ``a < b < c`` as ``a < b and b < c``; what has no meaning for ranges is refused."""
+    if not isinstance(condition, str):
+        raise TypeError(f"condition is {_FORM}, not {shortened(condition)}")
+    if len(condition) > _LONGEST:
+        raise ValueError(f"a condition of {len(condition)} characters is too long; at most {_LONGEST} are read")
+    try:
+        tree = ast.parse(condition.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise ValueError(f"cannot read the condition {shortened(condition)}: {error}; write {_FORM}") from None
+    if any(isinstance(node, ast.Not) for node in ast.walk(tree)):
+        raise ValueError(f"`not` in {shortened(condition)}: write the opposite comparison, or take ~region(...)")
+    return ast.fix_missing_locations(_Chains().visit(tree))
+
+
+class _Chains(ast.NodeTransformer):
+    """Chains of comparisons as pairs joined by ``and``."""
+
+    def visit_Compare(self, node: ast.Compare) -> ast.expr:
+        if len(node.ops) == 1:
+            return node
+        terms = [node.left, *node.comparators]
+        pairs = zip(terms[:-1], node.ops, terms[1:], strict=True)
+        return ast.BoolOp(ast.And(), [ast.Compare(left, [op], [right]) for left, op, right in pairs])
+
+
+def _holds(read: Any, held: Mapping[sp.Symbol, _Held], condition: str) -> Any:
+    """The condition over the points."""
+    if read in (sp.true, sp.false):
+        return bool(read)
+    if isinstance(read, sp.And | sp.Or):
+        parts = [_holds(part, held, condition) for part in read.args]
+        join = operator.and_ if isinstance(read, sp.And) else operator.or_
+        found = parts[0]
+        for part in parts[1:]:
+            found = join(found, part)
+        return found
+    if type(read) not in _COMPARE:
+        raise ValueError(f"{shortened(condition)} is no condition: write {_FORM}")
+    left, right = read.args
+    found = True
+    for values in _cases(left - right, held, condition):
+        found = found & _COMPARE[type(read)](_value(left, values), _value(right, values))
+    return found
+
+
+def _cases(difference: sp.Expr, held: Mapping[sp.Symbol, _Held], condition: str) -> list[dict[sp.Symbol, Any]]:
+    """Values of the symbols at which a comparison is asked: where a quantity takes many, at the ends of its range, or
+    of the range of its absolute value. What is linear in it holds between them too."""
+    here = difference.free_symbols
+    values = {symbol: one.ends[0] for symbol, one in held.items() if symbol in here and not one.ranges}
+    wide = [symbol for symbol in here if held[symbol].ranges]
+    if not wide:
+        return [values]
+    symbol = wide[0]
+    size = sp.Symbol("size_", nonnegative=True)
+    plain = difference.subs(sp.Abs(symbol), size)
+    along = size if plain.has(size) else symbol
+    if len(wide) > 1 or (plain.has(size) and plain.has(symbol)) or sp.diff(plain, along).has(along):
+        names = " and ".join(sorted(map(str, wide)))
+        raise ValueError(
+            f"{shortened(condition)}: {names} stands for all values along the motion: a comparison may hold one such "
+            f"name, alone, times a number, or in abs(); for more of them together give the system an output, or take "
+            f"{symbol}_maximum, {symbol}_minimum"
+        )
+    lower: Any
+    upper: Any
+    lower, upper = held[symbol].ends
+    if along is size:
+        crossed = (lower <= 0) & (upper >= 0)
+        lower, upper = abs(lower), abs(upper)
+        lower, upper = np.minimum(lower, upper).where(~crossed, 0.0), np.maximum(lower, upper)
+    return [values | {symbol: end} for end in (lower, upper)]
+
+
+def _value(expression: sp.Expr, values: Mapping[sp.Symbol, Any]) -> Any:
+    symbols = sorted(expression.free_symbols, key=str)
+    if not symbols:
+        return float(expression)
+    return sp.lambdify(symbols, expression, modules="numpy")(*(values[one] for one in symbols))

@@ -1,0 +1,111 @@
+"""Options of every figure, and labels of jumps that stand apart."""
+
+from __future__ import annotations
+
+import re
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+
+@pytest.fixture(scope="module")
+def run():
+    return ns.simulate(ns.models.discontinuous_support(g=0.02, rho=0.33, omega=4.2), periods=2, transient=100)
+
+
+def test_title_unit_legend_and_lines(run) -> None:
+    ax = ns.plot.time_history(run, title="the support", unit="m", linewidth=2.5, color="black")
+    assert ax.get_title() == "the support"
+    assert ax.get_ylabel() == "$x$ (m)"
+    assert [line.get_linewidth() for line in ax.lines] == [2.5]
+    assert ax.lines[0].get_color() == "black"
+    ax.figure.canvas.draw()
+    assert "10^{\N{MINUS SIGN}2}" in ax.yaxis.get_offset_text().get_text()
+    numbers = [re.search(r"-?\d+(\.\d+)?", t.get_text().replace("\N{MINUS SIGN}", "-")) for t in ax.get_yticklabels()]
+    ticks = [0.01 * float(number[0]) for number in numbers]
+    assert ticks == pytest.approx(list(ax.get_yticks()), abs=1e-12)  # in metres, as the label says
+    assert ns.plot.time_history(run, unit="um").get_ylabel() == "$x$ (\N{MICRO SIGN}m)"
+    ax = ns.plot.phase_portrait(run, unit={"x": "mm", "y": "m/s"})
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$ (mm)", "$v$ (m/s)")
+    both = ns.sweep(ns.models.discontinuous_support(), "rho", [0.3, 0.4], direction="both", keep=3, progress=False)
+    assert ns.plot.bifurcation(both).get_legend() is not None
+    assert ns.plot.bifurcation(both, legend=False).get_legend() is None
+    plt.close("all")
+
+
+def test_lines_that_were_there_stay_as_they_were(run) -> None:
+    _, ax = plt.subplots()
+    ax.plot([0, 1], [0, 1], linewidth=7)
+    ns.plot.time_history(run, ax, linewidth=3)
+    assert [line.get_linewidth() for line in ax.lines] == [7, 3]
+    plt.close("all")
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        ({"unit": "kg"}, ValueError, "not one of m, mm"),
+        ({"unit": {"z": "m"}}, ValueError, "a unit of the ordinate"),
+        ({"linewith": 2}, TypeError, "`linewith` is not an option of time_history; nearest: linewidth"),
+        ({"shade": "stop"}, ValueError, "no element of this name"),
+    ],
+)
+def test_what_does_not_fit_is_said(run, options, error, words) -> None:
+    with pytest.raises(error, match=words):
+        ns.plot.time_history(run, **options)
+    plt.close("all")
+
+
+def test_the_phases_of_one_element_are_shaded() -> None:
+    rig = ns.mechanical(
+        1.0, 0.05, 1.0, coordinates=["x"], parameters={"w": 0.8},
+        forcing={"x": lambda t, p: np.cos(p.w * t)},
+        elements={
+            "rub": ns.elements.Coulomb(at="x", friction=0.3),
+            "soft": ns.elements.ElasticStop(at="x", position=0.5, stiffness=5.0),
+        },
+    )  # fmt: skip
+    run = ns.simulate(rig, periods=2, transient=20)
+    middle = 0.5 * (run.time.values[1:] + run.time.values[:-1])
+    x = np.interp(middle, run.time.values, run.u.sel(state="x").values)
+    clear = np.abs(x - 0.5) > 1e-3
+    for shade in ("soft", True):  # of several elements the closed contacts are shaded, not all that slips
+        (shaded,) = ns.plot.time_history(run, shade=shade).collections
+        ends = [path.vertices[:, 0] for path in shaded.get_paths()]
+        covered = np.any([(one.min() < middle) & (middle < one.max()) for one in ends], axis=0)
+        assert (covered == (x > 0.5))[clear].all()
+    plt.close("all")
+
+
+def test_labels_of_jumps_do_not_stand_over_each_other() -> None:
+    """Three times the same jump: the labels would lie on each other."""
+    response = ns.frequency_response(
+        ns.models.impact_oscillator(), np.arange(1.0, 2.2, 0.01), direction="both", progress=False
+    )
+    row = int(np.flatnonzero(response.jump_variable.values == "x")[0])
+    ax = ns.plot.frequency_response(response.isel(jump=[row, row, row]))
+    ax.figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in ax.texts if text.get_text()]
+    assert len(boxes) == 3
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+    plt.close("all")
+
+
+def test_slides_have_a_style_of_their_own(run, tmp_path) -> None:
+    from PIL import Image
+
+    with ns.plot.slides():
+        ax = ns.plot.time_history(run)
+    wide, high = ax.figure.get_size_inches()
+    assert wide / high == pytest.approx(16 / 9)
+    assert ax.xaxis.label.get_fontsize() == 11
+    assert ax.lines[0].get_linewidth() == 1.6
+    with Image.open(ns.plot.save_figure(ax, tmp_path / "slide.png")) as picture:
+        assert picture.size == (1920, 1080)
+    journal = ns.plot.time_history(run)  # behind the block it is the journal's again
+    assert journal.figure.get_size_inches()[0] == pytest.approx(84 / 25.4)
+    assert journal.lines[0].get_linewidth() == 0.8
+    plt.close("all")

@@ -1,0 +1,125 @@
+"""Regions: against closed forms, and against a chart evaluated by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import nonsmooth as ns
+
+
+@pytest.fixture(scope="module")
+def forced():
+    return ns.mechanical(
+        1.0, 0.5, 1.0, coordinates={"q": "m"}, parameters={"F": (2.0, "N"), "w": (1.0, "rad/s")},
+        forcing={"q": lambda t, p: p.F * np.cos(p.w * t)},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def struck():
+    """A chart of an oscillator between two stops with loads, 5 x 4 points."""
+    rig = ns.mechanical(
+        1.0, 0.2, 1.0, coordinates={"q": "m"}, parameters={"F": (1.0, "N"), "w": (1.0, "rad/s")},
+        forcing={"q": lambda t, p: p.F * np.cos(p.w * t)},
+        elements={
+            "left": ns.elements.Stop(at="q", position=-1.5, side=-1, restitution=0.6),
+            "right": ns.elements.Stop(at="q", position=1.0, restitution=0.6),
+        },
+    )  # fmt: skip
+    plane = {"w": np.linspace(0.7, 1.5, 5), "F": np.linspace(0.2, 1.1, 4)}
+    return ns.chart(rig, plane, loads=True, progress=False)
+
+
+def test_a_state_stands_for_all_its_values(forced) -> None:
+    w = np.linspace(0.3, 2.0, 18)
+    response = ns.frequency_response(forced, w, parameter="w", direction="up", progress=False)
+    exact = 2.0 / np.hypot(1 - w**2, 0.5 * w)
+    for bound in (1.0, 2.0, 3.0):
+        for text in ("abs(q) < {}", "q < {}", "q > -{}", "-{0} < q < {0}", "2*q + 1 < 2*{} + 1"):
+            assert (ns.region(response, text.format(bound)).values == (exact < bound)).all()
+        assert (ns.region(response, f"abs(v_q)/w < {bound}").values == (exact < bound)).all()
+    assert not ns.region(response, "abs(q) > 0.001").any()  # it passes zero
+    assert not ns.region(response, "q > 0 or q < 0").any()
+
+
+def test_against_a_chart_evaluated_by_hand(struck) -> None:
+    found = ns.region(struck, "abs(q) < 1.2 and impact_speed < 0.5 or period_number == 2")
+    assert found.dims == ("w", "F")
+    assert found.dtype == bool
+    hand = np.zeros((5, 4), dtype=bool)
+    for i in range(5):
+        for j in range(4):
+            one = struck.isel(w=i, F=j)
+            largest = max(abs(float(one.maximum[0])), abs(float(one.minimum[0])))
+            speed = max(float(one.left_impact_speed_maximum), float(one.right_impact_speed_maximum))
+            hand[i, j] = (largest < 1.2 and speed < 0.5) or int(one.period_number) == 2
+    assert (found.values == hand).all()
+    assert 0 < hand.sum() < 20
+    right = ns.region(struck, "right_impact_speed < 0.5").values
+    assert (right == (struck.right_impact_speed_maximum < 0.5).values).all()
+    assert found.attrs["long_name"].startswith("abs(q) < 1.2")
+
+
+def test_the_parameters_and_points_that_are_not_known(struck) -> None:
+    plane = ns.region(struck, "F < 0.6*w").values
+    assert (plane == (struck.F.values[None, :] < 0.6 * struck.w.values[:, None])).all()
+    gone = struck.assign(maximum=struck.maximum.where(struck.w > 0.8))
+    found = ns.region(gone, "abs(q) < 100")
+    assert not found.isel(w=0).any()
+    assert found.isel(w=slice(1, None)).all()
+    assert found.attrs["unknown"] == 4
+
+
+def test_a_run_by_its_values(forced) -> None:
+    run = ns.simulate(forced, periods=1, start={"q": 1.0})
+    assert (ns.region(run, "q > 0.5 and time < 2").values == ((run.u[:, 0] > 0.5) & (run.time < 2)).values).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("q < v_q", "q and v_q stands for all values"),
+        ("q*q < 1", "stands for all values"),
+        ("abs(q) + q < 1", "stands for all values"),
+        ("q", "is no condition"),
+        ("q + 1", "is no condition"),
+        ("not q < 1", "write the opposite comparison"),
+        ("foo < 1", "`foo` is not a quantity of this result"),
+        ("q <", "cannot read the condition"),
+        ("__import__('os').system('true') < 1", "is not allowed"),
+        ("q.real < 1", "is not allowed"),
+        ("(lambda: 1)() < 2", "is not allowed"),
+        ("q" + " " * 3000 + "< 1", "too long"),
+    ],
+)
+def test_what_cannot_be_read_is_said(struck, text: str, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        ns.region(struck, text)
+
+
+def test_no_result_no_text(struck) -> None:
+    with pytest.raises(TypeError, match="a result is wanted"):
+        ns.region(3, "q < 1")
+    with pytest.raises(TypeError, match="condition is a condition such as"):
+        ns.region(struck, 3)
+    without = struck[[name for name in struck if not str(name).startswith(("left", "right"))]]
+    with pytest.raises(ValueError, match="loads=True"):
+        ns.region(without, "impact_speed < 1")
+
+
+def test_it_is_drawn(struck) -> None:
+    import matplotlib.pyplot as plt
+
+    inside = ns.region(struck, "impact_speed < 0.5")
+    assert isinstance(inside, xr.DataArray)
+    ax = ns.plot.chart(struck, show="right_impact_speed_maximum", contours={"q_amplitude": [0.5, 1.0]}, region=inside)
+    assert ax.get_title(loc="left") == "dashed: q_amplitude\noutlined: impact_speed < 0.5"
+    (outline,) = [one for one in ax.collections if type(one).__name__ == "LineCollection"]
+    cells = np.pad(inside.values, 1)
+    edges = int((cells[1:] != cells[:-1]).sum() + (cells[:, 1:] != cells[:, :-1]).sum())
+    assert len(outline.get_segments()) == edges
+    assert (ns.plot.chart(struck, show="amplitude", y="v_q").collections[0].get_array().ravel()
+            == 0.5 * (struck.maximum - struck.minimum).sel(state="v_q").values.T.ravel()).all()  # fmt: skip
+    plt.close("all")
