@@ -138,7 +138,7 @@ def jump_between(
     flow: VariationalFlow, values: FloatArray, chain: tuple[int, ...], t: float, before: FloatArray, after: FloatArray,
     rates: tuple[FloatArray, FloatArray], course: Course | None,
 ) -> Jump:  # fmt: skip
-    """What :func:`apart` says stands between two segments, with the rates at the end and the beginning of these."""
+    """The jump between two segments that :func:`apart` names; ``rates`` are those at the end and beginning of these."""
     if chain[0] != CHANGE:
         return flow.jump(values, chain, t, before)
     assert course is not None
@@ -164,7 +164,7 @@ def settled(
         mode = flow.traced.transitions[chain[-1]].target if chain else start[0]
         visited = {start[0], *(flow.traced.transitions[k].target for k in chain)}
         for k, jump in enumerate(flow.traced.transitions):
-            if jump.source != mode or jump.target in visited or jump.at is not None or not flow.traced.keeps(jump):
+            if jump.source != mode or jump.target in visited or jump.at is not None:
                 continue
             if jump.target == first[0]:
                 found = flow.jump(values, (*chain, k), t, start[1])

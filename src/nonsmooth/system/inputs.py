@@ -30,7 +30,7 @@ def input_states(inputs: Mapping[str, str]) -> dict[str, str]:
 
 
 def with_inputs(inputs: Mapping[str, str], given: dict[str, Any]) -> dict[str, Any]:
-    """What a system is made of (``describe``), with the states of its inputs and their motion."""
+    """The parts of a system (``describe``) with the states of its inputs and their motion."""
     name = given["name"]
     for what in ("symmetry", "bands"):
         if given[what]:

@@ -68,7 +68,7 @@ def next_end(goal, seen, work):
 
 @once
 def change_inputs(goal, seen, work):
-    """Where inputs change by now, give the states that stand for them their values; returns whether they do."""
+    """Give the states that stand for inputs their values where these change by now; returns whether they do."""
     k, first = work.tally[CHANGES], seen.inputs
     if k >= seen.changes.shape[0] or work.memo[DONE] < seen.changes[k]:
         return False
