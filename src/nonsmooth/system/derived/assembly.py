@@ -90,7 +90,7 @@ class Assembler(ABC):
 
     @abstractmethod
     def holding(self, field: Any, rate: Any, pull: Any) -> Any:
-        """The field with the derivative of a held rate as ``pull`` without rounding, where the rate is of one state only
+        """The field with the derivative of a held rate as ``pull``, without rounding, where the rate is that of a state
         and constant in time: else what is left of large forces moves what rests, in each mode elsewhere."""
 
     @abstractmethod
