@@ -110,6 +110,11 @@ class Traced:
         """Return whether elements are asked what they do together (:mod:`nonsmooth.system.derived.deciding`)."""
         return self.decider is not None or self.patterns is not None
 
+    def __hash__(self) -> int:
+        """A hash of names and counts: one of all expressions takes milliseconds where there are many modes."""
+        names = self.name, self.state_names, self.parameter_names
+        return hash((*names, len(self.mode_names), len(self.transitions)))
+
     def without_answers(self, rows: bool = False) -> tuple[Traced, tuple[int, ...]]:
         """The system without the answers that change states as a transition before them, with ``rows`` one by the same
         conditions, so that nothing is compiled anew; and for each transition the one there that reads the same."""
