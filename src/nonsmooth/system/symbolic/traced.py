@@ -112,7 +112,7 @@ class Traced:
 
     def __hash__(self) -> int:
         """A hash of names and counts: one of all expressions takes milliseconds where there are many modes."""
-        names = self.name, self.state_names, self.parameter_names, self.decider, self.patterns
+        names = self.name, self.state_names, self.parameter_names
         return hash((*names, len(self.mode_names), len(self.transitions)))
 
     def __eq__(self, other: object) -> bool:
@@ -121,7 +121,7 @@ class Traced:
             return self is other
         mine, its = (one.__dict__.get("_mark") for one in (self, other))
         if mine is None or mine is not its:
-            if any(getattr(self, one.name) != getattr(other, one.name) for one in fields(self)):
+            if any(getattr(self, one.name) != getattr(other, one.name) for one in fields(self) if one.compare):
                 return False
             mark = mine or its or object()
             for one in (self, other):
