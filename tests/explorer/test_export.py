@@ -93,8 +93,19 @@ def test_a_system_of_ones_own_and_a_smoothed_one_are_written_whole(results: dict
         script = write(tmp_path, "history", "py", {"run": made}, state)
         by(script)
         same(script.with_suffix(".nc"), made)
-    with pytest.raises(ValueError, match="save the Python script"):
-        exported("history", "toml", {"run": made}, own)
+    study = write(tmp_path, "portrait", "toml", {"run": made}, own)  # it carries the system, in text
+    assert cli.main(["run", str(study), "--quiet"]) == 0
+    same(study.with_suffix(".nc"), made)
+
+
+def test_a_motion_moves_in_a_file_and_other_views_say_that_they_do_not(results: dict[str, Any], tmp_path: Path) -> None:
+    from PIL import Image
+
+    with Image.open(write(tmp_path, "portrait", "gif", results)) as picture:
+        assert picture.n_frames > 50
+    assert "<script>" in write(tmp_path, "history", "html", results).read_text()
+    with pytest.raises(ValueError, match="'Phase plane' and 'Time history'"):
+        exported("diagram", "gif", results, STATE)
 
 
 @pytest.mark.parametrize("view", ["branches", "spectrum"])

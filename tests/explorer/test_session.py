@@ -92,7 +92,7 @@ def test_nothing_of_a_model_stands_under_the_name_of_the_next(tabs: list[Session
     assert tab.told("readout") == []
     assert not tab.session.sheet.views["portrait"].zone.visible
     for plot in [tab.session.sheet.views[name].figure.plot for name in ("portrait", "history", "section")]:
-        assert [axis.axis_label for axis in plot.axis] == [None, None]
+        assert (plot.xaxis[0].axis_label, plot.title.text) == (None, "")
 
 
 def test_a_compile_is_said(tabs: list[Session], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -79,14 +79,15 @@ def study_schema() -> dict[str, Any]:
         "system": _table(
             {
                 "model": {"anyOf": [name, file], "description": 'A name of `nonsmooth models`, or "file.py:object".'},
+                "text": {"type": "string", "description": "A system as System.to_text writes it, in place of a model."},
                 "parameters": numbers | {"description": "Parameters that differ from the model's own values."},
                 "smoothed": {
                     "anyOf": [{"type": "number"}, numbers],
                     "description": "Half width of the smoothed switch, in the indicators' units.",
                 },
             },
-            ["model"],
-        ),
+        )
+        | {"oneOf": [{"required": ["model"]}, {"required": ["text"]}]},
         "output": _table({key: _place(key, endings) for key, endings in OUTPUT.items()}),
     }
     for verb in VERBS:

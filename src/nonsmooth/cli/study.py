@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["OUTPUT", "SYSTEM", "Study", "load_model", "named_model", "read_study", "system_of"]
 
-SYSTEM = {"model": TEXT, "parameters": ANY, "smoothed": ANY}
+SYSTEM = {"model": TEXT, "text": TEXT, "parameters": ANY, "smoothed": ANY}
 _FORMATS = (".pdf", ".png", ".svg", ".eps", ".ps", ".pgf", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 #: Keys of the table [output], with the endings that a name may have.
 OUTPUT = {"data": (".nc", ".zarr"), "figure": _FORMATS, "store": (".zarr",), "x": (), "y": ()}
@@ -115,9 +115,10 @@ def read_study(path: Path) -> Study:
         )
     output = document.get("output", {})
     _check_output(output, path)
-    if "model" not in document.get("system", {}):
+    if len({"model", "text"} & document.get("system", {}).keys()) != 1:
         raise ValueError(
-            f'{where}: needs a table [system] with model = "name" (see `nonsmooth models`) or model = "file.py:object"'
+            f'{where}: needs a table [system] with model = "name" (see `nonsmooth models`), model = "file.py:object" or '
+            "text = what System.to_text gave, one of them"
         )
     system = system_of(document["system"], path.parent)
     options = _options(verbs[0], document[verbs[0]], where)
@@ -231,8 +232,10 @@ def _check_axes(output: Mapping[str, Any], figure: str, system: Any, place: str)
 
 
 def system_of(table: Mapping[str, Any], folder: Path) -> Any:
-    """The system of a table [system], its file relative to ``folder``."""
-    system = load_model(table["model"], folder)
+    """The system of a table [system], its file relative to ``folder``; one in text is data, and nothing is executed."""
+    from nonsmooth.system.system import System
+
+    system = System.from_text(table["text"]) if "text" in table else load_model(table["model"], folder)
     if "parameters" in table:
         system = system.with_parameters(table["parameters"])
     return system.smoothed(table["smoothed"]) if "smoothed" in table else system

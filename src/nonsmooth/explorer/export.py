@@ -21,7 +21,10 @@ from nonsmooth.results.provenance import read_provenance
 __all__ = ["KINDS", "as_toml", "exported"]
 
 #: Kinds of files.
-KINDS = {"pdf": "PDF", "png": "PNG", "svg": "SVG", "nc": "NetCDF", "py": "Python script", "toml": "study file"}
+KINDS = {
+    "pdf": "PDF", "png": "PNG", "svg": "SVG", "nc": "NetCDF", "py": "Python script", "toml": "study file",
+    "gif": "GIF, moving", "html": "HTML, moving",
+}  # fmt: skip
 
 
 def exported(view: str, kind: str, results: Mapping[str, Any], state: Any) -> tuple[str, bytes]:
@@ -30,7 +33,7 @@ def exported(view: str, kind: str, results: Mapping[str, Any], state: Any) -> tu
     Raises
     ------
     ValueError
-        A view that is not computed yet, a kind that does not exist, and a study file of a system that has no name.
+        A view that is not computed yet, a kind that does not exist or that the view has not.
     """
     known = {name: one for name, one in VIEWS.items() if one.saved is not None}
     if view not in known or kind not in KINDS:
@@ -39,6 +42,10 @@ def exported(view: str, kind: str, results: Mapping[str, Any], state: Any) -> tu
     result = results.get(key)
     if result is None or (view == "diagram" and "period_number" not in result):
         raise ValueError(f"the view {view!r} has no result to save yet; show it, and wait until it is computed")
+    moves = kind in ("gif", "html")
+    if moves and key != "run":
+        of = " and ".join(repr(one.title) for one in known.values() if one.saved and one.saved[0] == "run")
+        raise ValueError(f"{kind}: a motion moves, and {view!r} shows many; choose {of} under Save")
     axes = {name: getattr(state, field) for name, field in known[view].axes.items()}
     stem = f"{state.model}_{view}"
     if kind == "py":
@@ -49,6 +56,8 @@ def exported(view: str, kind: str, results: Mapping[str, Any], state: Any) -> tu
         path = Path(folder) / f"{stem}.{kind}"
         if kind == "nc":
             ns.save(result, path)
+        elif moves:
+            ns.animate(result, x=state.x, y=state.y).save(path)
         else:
             import matplotlib.pyplot as plt
 
@@ -86,12 +95,12 @@ def python_of(result: Any, plot: str, axes: Mapping[str, str], model: str, stem:
 
 def study_of(result: Any, axes: Mapping[str, str], model: str, stem: str) -> str:
     """A study file for ``nonsmooth run``."""
-    if model not in ns.models.names():
-        raise ValueError("a study file names a model of nonsmooth.models or a file; save the Python script instead")
     record, system = read_provenance(result), ns.system_of(result)
     if record["verb"] in ("bifurcation_diagram", "amplitude_spectrum"):
         raise ValueError(f"{record['verb']} has no table in a study file; save the Python script instead")
-    lines = ["[system]", f'model = "{model}"', f"parameters = {as_toml(_values(system, record))}"]
+    named = model in ns.models.names()
+    made = f'model = "{model}"' if named else f"text = {as_toml(record['system']['text'])}"
+    lines = ["[system]", made, f"parameters = {as_toml(_values(system, record))}"]
     if system.is_smoothed:
         lines.append(f"smoothed = {as_toml(system.eta)}")
     lines += ["", f"[{record['verb']}]"]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from bokeh.models import ColumnDataSource, CustomJSTickFormatter, HoverTool, Range1d, Span
+from bokeh.models import ColumnDataSource, CustomJSTickFormatter, HoverTool, NoOverlap, Range1d, Span
 from bokeh.plotting import figure
 from bokeh.themes import Theme
 
@@ -32,6 +32,9 @@ def theme(dark: bool, large: bool) -> Theme:
     return Theme(json={"attrs": {
         "Plot": {"background_fill_color": paper, "border_fill_color": None, "outline_line_color": line},
         "Grid": {"grid_line_color": faint},
+        "BasicTicker": {"desired_num_ticks": 4 if large else 6},
+        "Title": {"text_color": ink, "text_font": "system-ui, sans-serif", "text_font_style": "normal",
+                  "text_font_size": f"{size + 2}px", "standoff": 4},
         "Axis": {
             "axis_line_color": line, "major_tick_line_color": line, "minor_tick_line_color": None,
             "axis_label_text_color": ink, "axis_label_text_font_style": "normal",
@@ -44,19 +47,29 @@ def theme(dark: bool, large: bool) -> Theme:
 
 @dataclass
 class _Axis:
-    """An axis with a quantity in the unit whose prefix suits what it shows."""
+    """An axis with a quantity in the unit whose prefix suits what it shows.
+
+    The words of the ordinate stand level above the frame: beside it a frame that is lower than they are long cuts them.
+    """
 
     axis: Any
     range: Any
+    title: Any = None  # of the figure, for the ordinate
 
-    def name(self, latex: str, unit: str) -> None:
+    def name(self, latex: str, unit: str, of: str = "") -> None:
         power = power_of(unit, self.range.start, self.range.end)
-        self.axis.axis_label = axis_label(latex, unit, power)
+        self.say(of + axis_label(latex, unit, power))
         self.axis.formatter.args = {"power": power}
+
+    def say(self, words: str | None) -> None:
+        if self.title is None:
+            self.axis.axis_label = words
+        else:
+            self.title.text = words or ""
 
 
 class Panel:
-    """A figure without title, with zoom, axes that have units, and ranges that the page sets."""
+    """A figure with zoom, axes that have units, and ranges that the page sets."""
 
     def __init__(self, name: str, tools: str = "pan,box_zoom,wheel_zoom,reset", **options: Any) -> None:
         self.plot: Any = figure(
@@ -67,8 +80,10 @@ class Panel:
         self.plot.toolbar.autohide = True
         for axis in self.plot.axis[:] if "y_axis_type" not in options else self.plot.xaxis:
             axis.formatter = CustomJSTickFormatter(args={"power": 0}, code=_TICKS)
+        for axis in self.plot.axis:
+            axis.major_label_policy = NoOverlap(min_distance=6)
         self.x = _Axis(self.plot.xaxis[0], self.plot.x_range)
-        self.y = _Axis(self.plot.yaxis[0], self.plot.y_range)
+        self.y = _Axis(self.plot.yaxis[0], self.plot.y_range, self.plot.title)
         self.beside: tuple[Any, Any] = ([], [])  # what else the axes must show
         self._sources: list[tuple[ColumnDataSource, dict[str, Any]]] = []
 
@@ -93,7 +108,7 @@ class Panel:
         for source, data in self._sources:
             source.data = dict(data)
         for axis in (self.x, self.y):
-            axis.axis.axis_label = None
+            axis.say(None)
 
     def show(self, x: tuple[float, float] | None = None, y: tuple[float, float] | None = None) -> None:
         """Set the ranges, also those that a reset comes back to."""

@@ -153,6 +153,7 @@ KINDS: Mapping[str, Kind] = {
     "basins": Kind("Basins", "plane", ("first basins",), ("basins", "fine basins"), ("basins", "basins"), settings={
         f"basins.{end}": Setting("", lambda system, state: None) for end in ("left", "right", "bottom", "top")
     }),
+    "mechanism": Kind(quick=("sketch",)),
     "spectrum": Kind("Spectrum", "lower", ("spectrum",), (), ("spectrum", "amplitude_spectrum"), {"y": "x"}),
 }  # fmt: skip
 PANELS: dict[str, dict[str, str]] = {

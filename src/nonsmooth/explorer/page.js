@@ -97,7 +97,8 @@
     $("eta-label").hidden = ui.state.method !== "smoothed";
     [$("undo").disabled, $("redo").disabled] = ui.can.map(can => !can);
     for (const [name, legend] of Object.entries(ui.legends)) if ($("legend-" + name))
-      $("legend-" + name).replaceChildren(...legend.flatMap(([text, color]) => [node("i", {style: "background:" + color}), text]));
+      $("legend-" + name).replaceChildren(...legend.map(([text, color, sign]) => node("span", {}, sign
+        ? node("i", {className: "sign", style: "color:" + color, textContent: sign}) : node("i", {style: "background:" + color}), text)));
     $("tabs").hidden = ui.tabs < 2;
     $("tabs").textContent = `${ui.tabs} tabs`;
     tabs(ui);

@@ -26,6 +26,7 @@ from nonsmooth.explorer.kinds import KINDS as VIEWS
 from nonsmooth.explorer.kinds import PANELS
 from nonsmooth.explorer.schedule import Schedule, key_of
 from nonsmooth.explorer.sheet import Sheet
+from nonsmooth.explorer.sketch import equations_of
 from nonsmooth.explorer.state import History, State, changed
 from nonsmooth.explorer.worker import Answer
 
@@ -36,11 +37,12 @@ if TYPE_CHECKING:
 __all__ = ["Session"]
 
 #: To the browser, each one line of JSON; what comes from it is ``act``.
-CHANNELS = ("ui", "readout", "busy", "notes", "file", "recording", "building")
+CHANNELS = ("ui", "readout", "busy", "notes", "file", "recording", "building", "sketch", "equations")
 MOST_TABS = 8  # that compute at a time
 #: Files that make the page; what a part of the page does comes before the page itself.
 TEXTS = (
-    "page.html", "recording.html", "building.html", "page.css", "recording.js", "building.js", "tour.js", "page.js",
+    "page.html", "recording.html", "building.html", "page.css", "recording.js", "building.js", "tour.js", "sketch.js",
+    "page.js",
 )  # fmt: skip
 
 
@@ -119,7 +121,8 @@ class Session:
         document.template = Environment(loader=DictLoader(texts)).get_template("page.html")
         program = "\n".join(text for name, text in texts.items() if name.endswith(".js"))
         document.template_variables.update(
-            link=LINK, kinds=KINDS, style=texts["page.css"], program=program, panels=PANELS, views=VIEWS, files=FILES
+            link=LINK, kinds=KINDS, style=texts["page.css"], program=program, panels=PANELS, views=VIEWS, files=FILES,
+            channels=("act", *CHANNELS),
         )
         for view in self.sheet.views.values():
             if view.figure is not None:
@@ -309,4 +312,5 @@ class Session:
         self.work.go_on()  # before the page hears that its message has been taken in
         self.bench.tell()
         self.workshop.tell()
+        self.tell("equations", equations_of(self.system))
         self.tell_ui()

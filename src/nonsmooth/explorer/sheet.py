@@ -11,7 +11,7 @@ from nonsmooth.explorer.catalogue import GIVEN, presets_of, slider_range
 from nonsmooth.explorer.kinds import KINDS, ORDER, SETTINGS, setting
 from nonsmooth.explorer.labels import html_of, plain_of, symbols_of
 from nonsmooth.explorer.state import CHOICES, to_query
-from nonsmooth.explorer.views.motion import History, Portrait, Readout, Section
+from nonsmooth.explorer.views.motion import History, Mechanism, Portrait, Readout, Section
 from nonsmooth.explorer.views.over_parameters import Branches, Diagram, Response
 from nonsmooth.explorer.views.planes import Basins, Chart
 from nonsmooth.explorer.views.recording import Recording
@@ -25,7 +25,7 @@ __all__ = ["Sheet"]
 
 #: Drawing of each of ``KINDS``; what draws into another's figure comes behind it.
 _VIEWS = (
-    Portrait, Diagram, Section, Readout, History, Branches, Response, Chart, Basins, Spectrum, Recording,
+    Portrait, Diagram, Section, Readout, History, Branches, Response, Chart, Basins, Spectrum, Mechanism, Recording,
 )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
@@ -22,6 +23,10 @@ CHOICES: dict[str, dict[str, str]] = {
 }  # fmt: skip
 #: Whole numbers, with their limits.
 _WHOLE = {"transient": (0, 100_000), "keep": (4, 2000), "columns": (10, 4000)}
+
+
+#: Numbers as they are written; ``float`` takes underscores and the digits of every script besides.
+_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\s*", re.ASCII | re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -167,8 +172,9 @@ def number_of(value: Any, name: str) -> float:
     ValueError
         Anything else.
     """
+    text = isinstance(value, str)
     try:
-        number = math.nan if isinstance(value, bool) else float(value)
+        number = math.nan if isinstance(value, bool) or (text and not _NUMBER.fullmatch(value)) else float(value)
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):

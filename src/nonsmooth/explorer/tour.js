@@ -1,4 +1,4 @@
-/* Three steps for a first visit. The page stays usable beside them; Escape ends them, and ? begins again. */
+/* Three steps for a first visit, in a line of their own above the views: they cover nothing. The page stays usable beside them; Escape ends them, and ? begins again. */
 (window.parts = window.parts || []).push(({$, on}) => {
   const box = $("tour"), known = "nonsmooth-tour";
   const steps = [
@@ -21,11 +21,6 @@
     $("tour-title").textContent = `${step + 1} / ${steps.length}  ${title}`;
     $("tour-text").textContent = text;
     $("tour-next").textContent = step + 1 < steps.length ? "Next" : "Done";
-    const there = target.getBoundingClientRect(), own = box.getBoundingClientRect();
-    const right = there.right + 12 + own.width < innerWidth;
-    const left = right ? there.right + 12 : Math.max(8, there.left - own.width - 12);
-    box.style.left = left + "px";
-    box.style.top = Math.min(there.top + 24, innerHeight - own.height - 8) + "px";
     $("tour-next").focus();
   }
   on($("tour-next"), "click", () => show(at + 1));

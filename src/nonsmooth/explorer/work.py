@@ -12,6 +12,7 @@ import numpy as np
 
 import nonsmooth as ns
 from nonsmooth.explorer.measured import fitted, laid_over, read
+from nonsmooth.explorer.sketch import moving
 
 __all__ = ["Heard", "Job", "compute", "periods_shown"]
 
@@ -21,6 +22,7 @@ Heard = Callable[[float], bool]
 _CHAOTIC = 40  # periods drawn of an orbit without a period
 _LONGEST = 12  # periods drawn of one that has a long one
 _POINTS = 3000  # of a section
+_PICTURES, _MOST_MOVED = 36, 4  # of the sketch in a period, and periods of it
 _STARTS = 8
 _MEASURED = 1000  # periods over which exponents are measured
 _CHARTS = {"first chart": (40, 30), "chart": (144, 108), "exponents": (48, 36), "fine chart": (288, 216)}
@@ -127,6 +129,18 @@ def _section(job: Job) -> dict[str, Any]:
     )}  # fmt: skip
 
 
+def _sketch(job: Job) -> dict[str, Any]:
+    """Pictures of the mechanism over one period of the motion, or some periods where it has none."""
+    period, system = job["period"], _system(job["text"]).with_parameters(job["values"])
+    shown = min(period, _MOST_MOVED) or 3
+    if job.forced:
+        span: dict[str, Any] = {"periods": shown, "transient": job["transient"]}
+    else:
+        span = {"duration": job["span"] * shown / periods_shown(period), "transient": 10 * job["span"]}
+    run = ns.simulate(job.system, start=job["start"], **span, **job.options)
+    return {"sketch": moving(system, run, _PICTURES * shown)}
+
+
 def _stability(job: Job) -> dict[str, Any]:
     """Floquet multipliers of a periodic orbit, or the Lyapunov exponents of a motion without a period."""
     if job["period"]:
@@ -223,7 +237,7 @@ def _spectrum(job: Job) -> dict[str, Any]:
 
 
 _WORK: dict[str, Callable[[Job], dict[str, Any]]] = {
-    "orbit": _orbit, "section": _section, "stability": _stability, "first look": _first_look, "diagram": _diagram,
+    "orbit": _orbit, "section": _section, "sketch": _sketch, "stability": _stability, "first look": _first_look, "diagram": _diagram,
     "branches": _branches, "first response": _response, "response": _response, **dict.fromkeys(_CHARTS, _chart),
     **dict.fromkeys(_BASINS, _basins), "spectrum": _spectrum, "recording": laid_over, "fit": fitted,
 }  # fmt: skip

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["FLOOR", "Sketch", "mechanism"]
+__all__ = ["FLOOR", "Paper", "Pen", "Sketch", "mechanism"]
 
 _WIDTH, _ZONE, FLOOR = 1.1, 1.75, 0.2  # of a mass, between two of them, below them
 _LANE = 0.44  # height that one link takes
@@ -65,7 +65,7 @@ def mechanism(system: System, ax: Axes | None = None, *, labels: bool = True) ->
     sketch = Sketch(scheme_of(system))
     with style.axes(ax, width=min(0.56 * sketch.width, style.PAGE), ratio=sketch.height / sketch.width) as drawn:
         sketch.frame(drawn)
-        sketch.draw(drawn, labels=labels)
+        sketch.draw(Paper(drawn, labels))
     return drawn
 
 
@@ -116,16 +116,15 @@ class Sketch:
         return float(min(0.5 / largest, 0.7 / max(gaps, default=largest))) * _ZONE if largest > 0 else 1.0
 
     def draw(
-        self, ax: Axes, moved: Sequence[float] | None = None, scale: float | None = None, labels: bool = True,
-        time: float = 0.0,
-    ) -> list[Any]:  # fmt: skip
+        self, pen: Pen, moved: Sequence[float] | None = None, scale: float | None = None, time: float = 0.0
+    ) -> None:
         """Draw it with the masses ``moved`` by so much on the paper at an instant; ``scale``: length on the paper of
-        one unit of a coordinate, to which gaps are drawn then. What was drawn is returned."""
-        pen, self.time = _Pen(ax, labels, moved is not None), time
+        one unit of a coordinate, to which gaps are drawn then."""
+        pen.moving, self.time = moved is not None, time
         shift = np.zeros(len(self.faces)) if moved is None else np.asarray(moved, dtype=float)
         self._ground(pen)
         for i, face in enumerate(self.faces):
-            self._mass(pen, i, face + shift[i], moved is not None)
+            self._mass(pen, i, face + shift[i])
         for z, zone in enumerate(self.zones):
             for k, link in enumerate(zone):
                 y = FLOOR + self.tall * (1 - (k + 0.5) / len(zone))
@@ -138,11 +137,10 @@ class Sketch:
             self._between(pen, link, first, last, y, _WIDTH + _ZONE, scale)
         for k, words in enumerate(self.scheme.others):
             pen.text(self.left, self.bottom + 0.24 * (len(self.scheme.others) - 1 - k), words, ha="left", va="bottom")
-        return pen.made
 
     # What stands still
 
-    def _ground(self, pen: _Pen) -> None:
+    def _ground(self, pen: Pen) -> None:
         high = FLOOR + self.tall + 0.1
         belts = [self.faces[i] for i, link in self.below.items() if link.words]
         edges = [self.left, *[x for face in belts for x in (face - 0.3, face + _WIDTH + 0.3)], self.right]
@@ -172,7 +170,7 @@ class Sketch:
         held = {link.left == GROUND for link in self.zones[z] if GROUND in (link.left, link.right)}
         return self.faces[z] - (0.5 if len(held) > 1 else 0.68 if True in held else 0.32) * _ZONE
 
-    def _mass(self, pen: _Pen, i: int, x: float, moving: bool) -> None:
+    def _mass(self, pen: Pen, i: int, x: float) -> None:
         pen.box(x, FLOOR, _WIDTH, self.tall, _FILL)
         middle, top = x + 0.5 * _WIDTH, FLOOR + self.tall
         if self.scheme.masses[i]:
@@ -187,17 +185,17 @@ class Sketch:
                 pen.text(middle, 0.5 * FLOOR, f"${rubs.label}$", size=0.9)
             if rubs.words:
                 pen.belt(self.faces[i] - 0.2, self.faces[i] + _WIDTH + 0.2, f"${rubs.words}$")
-        if not moving:
+        if not pen.moving:
             pen.line([middle, middle], [top + 0.06, top + 0.26], color=_GREY)
             pen.arrow(middle, middle + 0.38, top + 0.16, color=_GREY)
             pen.text(middle + 0.43, top + 0.16, f"${_symbol(self.scheme.coordinates[i])}$", ha="left")
-        if (force := self.scheme.forces.get(i)) and not moving:
+        if (force := self.scheme.forces.get(i)) and not pen.moving:
             pen.arrow(middle - 0.2, middle + 0.34, top + 0.46, color=style.COLORS["first"], heavy=True)
             pen.text(middle + 0.42, top + 0.46, f"${force}$", ha="left", color=style.COLORS["first"])
 
     # What joins
 
-    def _link(self, pen: _Pen, z: int, link: Link, y: float, shift: Any, scale: float | None) -> None:
+    def _link(self, pen: Pen, z: int, link: Link, y: float, shift: Any, scale: float | None) -> None:
         """A link in a zone, between two faces or a face and the ground."""
         near = self.faces[z - 1] + _WIDTH + shift[z - 1] if z else self.left
         far = self.faces[z] + shift[z] if z < len(self.faces) else self.right
@@ -213,7 +211,7 @@ class Sketch:
             self._between(pen, link, left, right, y, _ZONE, scale)
 
     def _between(
-        self, pen: _Pen, link: Link, left: float, right: float, y: float, rest: float, scale: float | None
+        self, pen: Pen, link: Link, left: float, right: float, y: float, rest: float, scale: float | None
     ) -> None:
         words = f"${link.label}$" if link.label else ""
         match link.kind:
@@ -236,7 +234,7 @@ class Sketch:
                 pen.pad(face, max(face, pad) if link.kind == "elastic" else pad, right, y, link)
 
     def _pad(
-        self, pen: _Pen, link: Link, face: float, rest: float, ground: float, y: float, scale: float | None
+        self, pen: Pen, link: Link, face: float, rest: float, ground: float, y: float, scale: float | None
     ) -> None:
         sign = 1.0 if ground > rest else -1.0
         pad = rest + sign * self._room(link, _ZONE, scale)
@@ -261,30 +259,33 @@ def _symbol(name: str) -> str:
     return latex_name(name)
 
 
-class _Pen:
-    """Draws parts on axes and keeps what it has drawn."""
+class Pen:
+    """Parts of a sketch, made of lines, boxes, circles, arrows and words, which each kind of paper draws its own way."""
 
-    def __init__(self, ax: Axes, labels: bool, moving: bool) -> None:
-        self.ax, self.labels, self.moving, self.made = ax, labels, moving, list[Any]()
+    labels = True
+    moving = False
 
     def line(self, x: Any, y: Any, color: str = _DARK, width: float = 0.9) -> None:
-        self.made += self.ax.plot(x, y, "-", color=color, linewidth=width, solid_capstyle="butt", clip_on=False)
+        raise NotImplementedError
 
-    def text(self, x: float, y: float, words: str, color: str = _DARK, size: float = 1.0, **looks: Any) -> None:
-        if self.labels and words:
-            looks = {"ha": "center", "va": "center", **looks}
-            self.made.append(self.ax.text(x, y, words, color=color, fontsize=size * style.small(self.ax), **looks))
+    def words(self, x: float, y: float, words: str, color: str, size: float, ha: str, va: str) -> None:
+        raise NotImplementedError
 
     def box(self, x: float, y: float, width: float, height: float, fill: str, alpha: float = 1.0) -> None:
-        from matplotlib.patches import Rectangle
-
-        looks: dict[str, Any] = {"edgecolor": _DARK, "linewidth": 0.9, "alpha": alpha}
-        self.made.append(self.ax.add_patch(Rectangle((x, y), width, height, facecolor=fill, **looks)))
+        raise NotImplementedError
 
     def circle(self, x: float, y: float, radius: float) -> None:
-        from matplotlib.patches import Circle
+        raise NotImplementedError
 
-        self.made.append(self.ax.add_patch(Circle((x, y), radius, facecolor="white", edgecolor=_DARK, linewidth=0.9)))
+    def arrow(self, a: float, b: float, y: float, color: str = _DARK, both: bool = False, heavy: bool = False) -> None:
+        raise NotImplementedError
+
+    def text(
+        self, x: float, y: float, words: str, color: str = _DARK, size: float = 1.0, ha: str = "center",
+        va: str = "center",
+    ) -> None:  # fmt: skip
+        if self.labels and words:
+            self.words(x, y, words, color, size, ha, va)
 
     def hatch(self, a: float, b: float, at: float, upright: int = 0) -> None:
         """Strokes behind a line of the ground: below it, or to the left (-1) or right (1) of an upright one."""
@@ -293,11 +294,6 @@ class _Pen:
         one = np.stack([places, places - 0.1, gone], axis=1).ravel()
         other = np.stack([np.full(len(places), at), np.full(len(places), at + (0.1 * upright or -0.1)), gone], axis=1)
         self.line(*((other.ravel(), one) if upright else (one, other.ravel())), color=_GREY, width=0.6)
-
-    def arrow(self, a: float, b: float, y: float, color: str = _DARK, both: bool = False, heavy: bool = False) -> None:
-        looks = {"arrowstyle": "<|-|>" if both else "-|>", "color": color, "shrinkA": 0, "shrinkB": 0,
-                 "linewidth": 1.3 if heavy else 0.8, "mutation_scale": 8 if heavy else 6}  # fmt: skip
-        self.made.append(self.ax.annotate("", (b, y), (a, y), arrowprops=looks, annotation_clip=False))
 
     def belt(self, a: float, b: float, words: str) -> None:
         for x in (a, b):
@@ -390,3 +386,33 @@ class _Pen:
             self.arrow(face, pad, low, color=_GREY, both=True)
         if link.words and (room > 0.12 or not self.moving):
             self.text(0.5 * (face + pad), y - 0.23, f"${link.words}$", va="top", size=0.95)
+
+
+class Paper(Pen):
+    """Draws on axes, and keeps what it has drawn."""
+
+    def __init__(self, ax: Axes, labels: bool = True) -> None:
+        self.ax, self.labels, self.made = ax, labels, list[Any]()
+
+    def line(self, x: Any, y: Any, color: str = _DARK, width: float = 0.9) -> None:
+        self.made += self.ax.plot(x, y, "-", color=color, linewidth=width, solid_capstyle="butt", clip_on=False)
+
+    def words(self, x: float, y: float, words: str, color: str, size: float, ha: str, va: str) -> None:
+        size *= style.small(self.ax)
+        self.made.append(self.ax.text(x, y, words, color=color, fontsize=size, ha=ha, va=va))
+
+    def box(self, x: float, y: float, width: float, height: float, fill: str, alpha: float = 1.0) -> None:
+        from matplotlib.patches import Rectangle
+
+        looks: dict[str, Any] = {"edgecolor": _DARK, "linewidth": 0.9, "alpha": alpha}
+        self.made.append(self.ax.add_patch(Rectangle((x, y), width, height, facecolor=fill, **looks)))
+
+    def circle(self, x: float, y: float, radius: float) -> None:
+        from matplotlib.patches import Circle
+
+        self.made.append(self.ax.add_patch(Circle((x, y), radius, facecolor="white", edgecolor=_DARK, linewidth=0.9)))
+
+    def arrow(self, a: float, b: float, y: float, color: str = _DARK, both: bool = False, heavy: bool = False) -> None:
+        looks = {"arrowstyle": "<|-|>" if both else "-|>", "color": color, "shrinkA": 0, "shrinkB": 0,
+                 "linewidth": 1.3 if heavy else 0.8, "mutation_scale": 8 if heavy else 6}  # fmt: skip
+        self.made.append(self.ax.annotate("", (b, y), (a, y), arrowprops=looks, annotation_clip=False))

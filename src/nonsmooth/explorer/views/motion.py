@@ -18,9 +18,9 @@ from nonsmooth.plot.trajectories import pieces_by_mode, with_gaps
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import State
 
-__all__ = ["History", "Portrait", "Readout", "Section"]
+__all__ = ["History", "Mechanism", "Portrait", "Readout", "Section"]
 
-_MODES = [COLORS[name] for name in ("first", "second", "third", "fourth")]
+_MODES = [BLUE, *((COLORS[name],) * 2 for name in ("second", "third", "fourth"))]
 _MANY_MODES = 8
 
 
@@ -31,10 +31,10 @@ class _Curves(View):
         self.figure = Panel(self.name)
         self.sources = [self.figure.source("x", "y") for _ in range(_MANY_MODES)]
         self.lines = [
-            self.figure.plot.line("x", "y", source=source, line_color=_MODES[k % len(_MODES)], line_width=1.6)
-            for k, source in enumerate(self.sources)
+            self.figure.plot.line("x", "y", source=source, line_width=1.6) for source in self.sources
         ]
-        self.ink(BLUE, self.lines[0])
+        for k, line in enumerate(self.lines):
+            self.ink(_MODES[k % len(_MODES)], line)
 
     def put(self, run: Any, xs: Any, ys: Any) -> None:
         """Draw a curve of a trajectory."""
@@ -139,6 +139,16 @@ class History(_Curves):
         self.figure.y.name(*self.quantity(self.state.x))
 
 
+    def legend(self) -> list[tuple[str, ...]]:
+        """Modes that the motion visits, in the colours that they have in the phase plane too."""
+        run = self.sheet.results.get("run")
+        seen = [] if run is None else np.unique(run["mode"].values).tolist()
+        if not 1 < len(seen) <= len(_MODES) or max(seen) >= len(_MODES):
+            return []
+        words = dict(zip(run["mode"].values.tolist(), in_words(run["mode"]).tolist(), strict=True))
+        return [(str(words[k]).replace("_", " "), _MODES[k][self.dark]) for k in seen if k >= 0]
+
+
 class Section(View):
     """Section points in the phase plane."""
 
@@ -178,6 +188,25 @@ class Section(View):
         self.sheet.views["portrait"].points.data = dict(self.points.data)
 
     tapped = Portrait.tapped
+
+
+class Mechanism(View):
+    """The sketch of the masses, which moves with the motion."""
+
+    name = "mechanism"
+
+    def requests(self, base: Requests) -> Requests:
+        """Pictures, once the orbit is there."""
+        return {} if "motion" not in base or self.system.is_map else self.each(base["motion"])
+
+    def redraw(self) -> None:
+        """Hand the pictures to the page; nothing of a system without masses on a line."""
+        self.page.tell("sketch", self.results.get("sketch"))
+
+    def clear(self) -> None:
+        """Take the sketch away."""
+        super().clear()
+        self.redraw()
 
 
 class Readout(View):

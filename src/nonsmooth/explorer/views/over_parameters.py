@@ -25,11 +25,13 @@ if TYPE_CHECKING:
 __all__ = ["Branches", "Diagram", "Response"]
 
 _HEIGHT = 400  # pixels of an image before the page has said how large it is
-#: Names of a cloud in the legend, with their colours and the height of a dot.
+#: Of a sweep up and down, on a light and a dark ground, in every view.
+_DIRECTIONS = {"up": BLUE, "down": (COLORS["second"],) * 2}
+#: Clouds of the diagram: their colours, and the height of a dot.
 _CLOUDS = {
-    "first look": ("#7F7F7F", 2), "up": (COLORS["pale"], 4), "down": (COLORS["second"], 2),
-    "rest": (COLORS["first"], 2), "many": (COLORS["third"], 2),
-}  # fmt: skip
+    "first look": (("#7F7F7F",) * 2, 2), "up": (BLUE, 4), "down": (_DIRECTIONS["down"], 2),
+    "rest": (BLUE, 2), "many": ((COLORS["third"],) * 2, 2),
+}
 
 
 class Diagram(View):
@@ -98,6 +100,11 @@ class Diagram(View):
         super().clear()
         self._shown, self._fitted = {}, ()
 
+    def paint(self, dark: bool) -> None:
+        """Draw the image in the colours of the ground."""
+        super().paint(dark)
+        self.redraw()
+
     def redraw(self) -> None:
         """Draw the points anew, as at another zoom."""
         result, state = self.results.get("diagram"), self.state
@@ -137,7 +144,10 @@ class Diagram(View):
         each = [points.sel(direction=word) for word in words] if "direction" in points.dims else [points]
         over = self.state.over
         flat = (one.transpose(over, ...).values.reshape(one.sizes[over], -1) for one in each)
-        return [(cloud, *_CLOUDS[word]) for cloud, word in zip(flat, words, strict=True)]
+        return [
+            (cloud, colors[self.dark], size)
+            for cloud, (colors, size) in zip(flat, map(_CLOUDS.__getitem__, words), strict=True)
+        ]
 
     def place(self) -> None:
         """Mark the value that the page is at, in the range that it has."""
@@ -146,10 +156,11 @@ class Diagram(View):
         if (shown.start, shown.end) != (state.low, state.high):
             self.figure.show(x=(state.low, state.high))
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Clouds in the direction of the page."""
-        names = {"first look": "first look, from rest, not judged", **CHOICES["direction"]}
-        return [(names[word], _CLOUDS[word][0]) for word in self._clouds(self.state.direction)]
+    def legend(self) -> list[tuple[str, ...]]:
+        """Clouds in the direction of the page, and the signs of the branches over them."""
+        names = {"first look": "quick preview", **CHOICES["direction"]}
+        clouds = [(names[word], _CLOUDS[word][0][self.dark]) for word in self._clouds(self.state.direction)]
+        return [*clouds, *self.sheet.views["branches"].signs()]
 
     def tapped(self, x: float, y: float) -> State:
         """Go to the next column, and start at the section point of it next to the click."""
@@ -172,10 +183,13 @@ class Diagram(View):
 
 #: Lines by their stability: name, dash and width.
 _LINES = {"-": ("stable", "solid", 1.8), "--": ("unstable", "dashed", 1.3), ":": ("virtual", "dotted", 1.3)}
-#: Markers of Bokeh for the kinds of special points.
+_STROKES = {"-": "━", "--": "╍", ":": "┈"}  # in the legend
+#: Markers of Bokeh for the kinds of special points, and the letter that shows each in the legend.
 _SIGNS = dict(zip(MARKS, (
-    "circle", "square", "diamond", "triangle", "triangle_pin", "inverted_triangle", "x", "cross", "hex", "star",
+    ("circle", "○"), ("square", "□"), ("diamond", "◇"), ("triangle", "△"), ("triangle_pin", "▲"),
+    ("inverted_triangle", "▽"), ("x", "×"), ("cross", "+"), ("hex", "⬡"), ("star", "☆"),
 ), strict=True))  # fmt: skip
+_OTHER = "asterisk", "∗"
 _WORDS = {"neimark_sacker": "Neimark-Sacker bifurcation", "flip": "flip (period doubling)"}
 
 
@@ -201,10 +215,14 @@ class Branches(View):
 
     def build(self) -> None:
         """Put lines and marks into the diagram."""
+        self._kinds: dict[str, None] = {}  # of the special points that are drawn
         figure = self.sheet.views["diagram"].figure
         self._lines = {line: figure.source("x", "y", name=f"{one[0]} branches") for line, one in _LINES.items()}
-        for line, (_, dash, width) in _LINES.items():
-            self.ink(INK, figure.plot.line("x", "y", source=self._lines[line], line_dash=dash, line_width=width))
+        self._drawn = [
+            figure.plot.line("x", "y", source=self._lines[line], line_dash=dash, line_width=width)
+            for line, (_, dash, width) in _LINES.items()
+        ]
+        self.ink(INK, *self._drawn)
         self._points = figure.source("x", "y", "words")
         near = figure.plot.scatter("x", "y", source=self._points, size=9, fill_alpha=0.0, line_alpha=0.0)
         figure.tell(near, attachment="left", limit=1)
@@ -212,6 +230,12 @@ class Branches(View):
         special = figure.plot.scatter("x", "y", marker="marker", source=self._marks, size=9, line_width=1.4)
         self.ink(INK, special)
         self.ink(("#FFFFFF", "#171B20"), special, field="fill_color")
+        self._drawn += [near, special]
+
+    def place(self) -> None:
+        """Show them where the page does."""
+        for renderer in self._drawn:
+            renderer.visible = self.setting("show") == "yes"
 
     def redraw(self) -> None:
         """Draw all section points of every branch over the parameter."""
@@ -223,7 +247,7 @@ class Branches(View):
         lines: dict[str, list[Any]] = {line: [np.empty((2, 0))] for line in self._lines}
         points: dict[str, list[Any]] = {key: [] for key in self._points.data}
         marks: dict[str, list[Any]] = {key: [] for key in self._marks.data}
-        whole = "branch" in result
+        whole, self._kinds = "branch" in result, {}
         for branch in [one_branch(result, k) for k in range(result.sizes["branch_id"])] if whole else [result]:
             values, period = branch[parameter].values, branch.sizes.get("return", 1)
             places = [number(float(value), unit, 6) for value in values]
@@ -245,7 +269,8 @@ class Branches(View):
                 for some, of in ((np.arange(len(values)), told), (at, named)):
                     for key, more in (("x", values[some].tolist()), ("y", row[some].tolist()), ("words", of)):
                         points[key][:0] = more
-                signs = [_SIGNS.get(kind, "asterisk") for kind in kinds]
+                signs = [_SIGNS.get(kind, _OTHER)[0] for kind in kinds]
+                self._kinds |= dict.fromkeys(kinds)
                 new = {"x": values[at].tolist(), "y": row[at].tolist(), "marker": signs, "words": named}
                 for key, more in new.items():
                     marks[key] += more
@@ -253,9 +278,18 @@ class Branches(View):
             source.data = dict(zip("xy", np.concatenate(lines[line], axis=1), strict=True))
         self._points.data, self._marks.data = points, marks
 
+    def signs(self) -> list[tuple[str, ...]]:
+        """Lines and marks that are drawn, each with the sign that shows it."""
+        if self.setting("show") != "yes":
+            return []
+        lines = [(_LINES[line][0], _STROKES[line]) for line, source in self._lines.items() if len(source.data["x"])]
+        marks = [(MARKS.get(kind, ("", kind.replace("_", " ")))[1], _SIGNS.get(kind, _OTHER)[1]) for kind in self._kinds]
+        return [(words, INK[self.dark], sign) for words, sign in lines + marks]
+
     def clear(self) -> None:
         """Show no branch."""
         super().clear()
+        self._kinds = {}
         for source in (*self._lines.values(), self._points, self._marks):
             source.data = {key: [] for key in source.data}
 
@@ -293,13 +327,14 @@ class Response(View):
         self.figure = Panel("response")
         plot = self.figure.plot
         self._curves = {word: self.figure.source("x", "y", "words", name=f"response {word}") for word in ("up", "down")}
-        self._up, down = (plot.line("x", "y", source=source, line_width=2) for source in self._curves.values())
-        down.glyph.update(line_color=COLORS["second"], line_dash="dashed")
-        self.figure.tell(self._up, down, mode="vline")
+        up, down = (plot.line("x", "y", source=source, line_width=2) for source in self._curves.values())
+        down.glyph.line_dash = "dashed"
+        self.figure.tell(up, down, mode="vline")
         self._here = self.figure.mark()
         self._measured = self.figure.source("x", "y", name="recorded response")
         rings = plot.scatter("x", "y", source=self._measured, size=8, fill_color=None, line_width=1.3)
-        self.ink(BLUE, self._up)
+        self.ink(_DIRECTIONS["up"], up)
+        self.ink(_DIRECTIONS["down"], down)
         self.ink(GREY, rings)
 
     def redraw(self) -> None:
@@ -320,8 +355,7 @@ class Response(View):
             source.data = {"x": values, "y": amplitude, "words": words}
         self.figure.show((float(values[0]), float(values[-1])))
         self._fit()
-        self.name_axes(over, shown)
-        self.figure.y.axis.axis_label = f"amplitude of {self.figure.y.axis.axis_label}"
+        self.name_axes(over, shown, "amplitude of ")
         self.place()
 
     def place(self) -> None:
@@ -338,9 +372,9 @@ class Response(View):
         drawn = [source.data["y"] for source in (*self._curves.values(), self._measured)]
         self.figure.show(y=(0.0, extent(np.concatenate(drawn))[1]))
 
-    def legend(self) -> list[tuple[str, str]]:
+    def legend(self) -> list[tuple[str, ...]]:
         """Directions of the sweep."""
-        return [("up", COLORS["first"]), ("down, dashed", COLORS["second"])]
+        return [(words, _DIRECTIONS[words.split(",")[0]][self.dark]) for words in ("up", "down, dashed")]
 
     def tapped(self, x: float, y: float) -> State:
         """Go to the nearest frequency, on the curve that is nearer to the click."""

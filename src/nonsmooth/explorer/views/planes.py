@@ -76,9 +76,9 @@ class Cells(View):
             "dh": [steps[1] * len(y)], "stage": [stage],
         }  # fmt: skip
 
-    def name_axes(self, x: str, y: str) -> None:
+    def name_axes(self, x: str, y: str, of: str = "") -> None:
         """Label the axes, in the prefixes that the words below the mouse have too."""
-        super().name_axes(x, y)
+        super().name_axes(x, y, of)
         for key, axis, name in (("x", self.figure.x, x), ("y", self.figure.y, y)):
             unit = self.quantity(name)[1]
             power = power_of(unit, axis.range.start, axis.range.end)
@@ -143,7 +143,7 @@ class Chart(Cells):
         if "chart" in self.results and across in values:
             self.here.data = {"x": [values[self.state.over]], "y": [values[across]]}
 
-    def legend(self) -> list[tuple[str, str]]:
+    def legend(self) -> list[tuple[str, ...]]:
         """The classes that the chart has."""
         return self._legend if "chart" in self.results else []
 
@@ -253,7 +253,7 @@ class Basins(Cells):
         super().clear()
         self._known = []
 
-    def legend(self) -> list[tuple[str, str]]:
+    def legend(self) -> list[tuple[str, ...]]:
         """Attractors with their shares."""
         return self._legend if "basins" in self.results else []
 

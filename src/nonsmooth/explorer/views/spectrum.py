@@ -56,5 +56,5 @@ class Spectrum(View):
         self._curve.glyph.line_alpha = 0.0 if discrete else 1.0
         self.figure.show((0.0, float(x.max(initial=1.0)) * 1.02), (FLOOR * largest, 3 * largest))
         times = "frequency / forcing frequency" if system.period() is not None else "frequency / that of the returns"
-        self.figure.x.axis.axis_label = "frequency per iterate" if system.is_map else times
-        self.figure.y.axis.axis_label = f"amplitude of {axis_label(latex, unit)}"
+        self.figure.x.say("frequency per iterate" if system.is_map else times)
+        self.figure.y.say(f"amplitude of {axis_label(latex, unit)}")

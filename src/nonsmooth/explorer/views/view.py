@@ -60,10 +60,10 @@ class View:
         parameter = self.system.parameters.get(name)
         return symbols_of(self.system)[name], self.system.states[name] if parameter is None else parameter.unit
 
-    def name_axes(self, x: str, y: str) -> None:
-        """Label the axes with states or parameters."""
-        for axis, name in ((self.figure.x, x), (self.figure.y, y)):
-            axis.name(*self.quantity(name))
+    def name_axes(self, x: str, y: str, of: str = "") -> None:
+        """Label the axes with states or parameters; ``of``: words before the ordinate."""
+        self.figure.x.name(*self.quantity(x))
+        self.figure.y.name(*self.quantity(y), of)
 
     def ink(self, colors: tuple[str, str], *renderers: Any, field: str = "line_color") -> None:
         """Draw in one colour on a light ground, and in another on a dark one."""
@@ -71,6 +71,7 @@ class View:
 
     def paint(self, dark: bool) -> None:
         """Take the colours that show on a light or a dark ground."""
+        self.dark = dark
         for glyph, field, colors in self._inked:
             glyph.update(**{field: colors[dark]})
 
@@ -111,8 +112,8 @@ class View:
         if self.figure is not None:
             self.figure.clear()
 
-    def legend(self) -> list[tuple[str, str]]:
-        """Words and colours."""
+    def legend(self) -> list[tuple[str, ...]]:
+        """Words and colours; a sign in place of a dot where a third text says so."""
         return []
 
     def tapped(self, x: float, y: float) -> State:

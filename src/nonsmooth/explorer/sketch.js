@@ -1,0 +1,72 @@
+/* The mechanism in motion beside the sliders, and the equations of the system. */
+(window.parts = window.parts || []).push(({$, node, on}) => {
+  const canvas = $("sketch"), paint = canvas.getContext("2d");
+  let told = null, at = 0, held = matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+  function draw() {
+    const [left, right, bottom, top] = told.paper, width = canvas.clientWidth, dense = window.devicePixelRatio || 1;
+    const unit = Math.min(width / (right - left), 9 * parseFloat(getComputedStyle(canvas).fontSize) / (top - bottom));
+    const high = unit * (top - bottom), aside = (width - unit * (right - left)) / 2;
+    if (canvas.width !== Math.round(width * dense) || canvas.height !== Math.round(high * dense)) {
+      canvas.width = Math.round(width * dense); canvas.height = Math.round(high * dense); canvas.style.height = high + "px";
+    }
+    paint.setTransform(dense, 0, 0, dense, 0, 0);
+    paint.clearRect(0, 0, width, high);
+    const x = one => aside + unit * (one - left), y = one => unit * (top - one);
+    const stroke = (points, color, weight) => {
+      let down = false;
+      paint.beginPath();
+      for (const [a, b] of points) {
+        if (a === null || b === null) { down = false; continue; }
+        down ? paint.lineTo(x(a), y(b)) : paint.moveTo(x(a), y(b));
+        down = true;
+      }
+      paint.strokeStyle = color || "#1B1F24"; paint.lineWidth = weight; paint.stroke();
+    };
+    const kinds = {
+      line: (xs, ys, color, weight) => stroke(xs.map((one, i) => [one, ys[i]]), color, 1.15 * weight),
+      box: (a, b, w, h, fill, alpha) => {
+        paint.globalAlpha = alpha; paint.fillStyle = fill;
+        paint.fillRect(x(a), y(b + h), unit * w, unit * h);
+        paint.globalAlpha = 1;
+        stroke([[a, b], [a + w, b], [a + w, b + h], [a, b + h], [a, b]], "", 1);
+      },
+      circle: (a, b, r) => {
+        paint.beginPath(); paint.arc(x(a), y(b), unit * r, 0, 7);
+        paint.fillStyle = "#FFFFFF"; paint.fill(); paint.lineWidth = 1; paint.strokeStyle = "#1B1F24"; paint.stroke();
+      },
+      arrow: (a, b, h, both) => {
+        const s = Math.sign(b - a) * 0.1, head = (tip, way) => stroke([[tip - way, h + 0.06], [tip, h], [tip - way, h - 0.06]], "", 1);
+        stroke([[a, h], [b, h]], "", 1); head(b, s);
+        if (both) head(a, -s);
+      },
+      text: (a, b, words, across, up, size) => {
+        paint.font = `italic ${Math.max(0.24 * unit * size, 9)}px "STIX Two Text", Georgia, "Liberation Serif", serif`;
+        paint.textAlign = across; paint.textBaseline = {center: "middle", va: "middle"}[up] || up;
+        paint.fillStyle = "#1B1F24"; paint.fillText(words, x(a), y(b));
+      },
+    };
+    for (const [kind, ...given] of [...told.still, ...told.frames[at]]) kinds[kind](...given);
+    canvas.dataset.at = at;
+  }
+  const hold = () => { held = !held; };
+  on(canvas, "click", hold);
+  on(canvas, "keydown", event => { if (event.key === " ") { event.preventDefault(); hold(); } });
+  setInterval(() => {
+    if (!told || held || document.hidden) return;
+    at = (at + 1) % told.frames.length;
+    draw();
+  }, 50);
+
+  return {
+    sketch(now) {
+      told = now;
+      canvas.hidden = !told;
+      if (told) { at %= told.frames.length; draw(); }
+    },
+    equations(rows) {
+      $("equations").lastElementChild.replaceChildren(...rows.flatMap(([head, html]) =>
+        [...(head ? [node("b", {textContent: head})] : []), node("div", {innerHTML: html})]));
+    },
+  };
+});

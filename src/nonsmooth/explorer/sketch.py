@@ -1,0 +1,144 @@
+"""The moving sketch and the equations of a system, as the page draws them: strokes, and MathML."""
+
+from __future__ import annotations
+
+import json
+import re
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy as sp
+
+from nonsmooth.explorer.labels import plain_of, symbols_of
+from nonsmooth.plot.mechanism import FLOOR, Pen, Sketch
+from nonsmooth.plot.scheme import scheme_of
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+__all__ = ["equations_of", "moving"]
+
+_LONGEST = 12  # of the equations' modes that are shown
+
+
+class _Strokes(Pen):
+    """Parts as plain lists, for the canvas of a browser: their kind, then numbers and colours."""
+
+    def __init__(self) -> None:
+        self.made: list[list[Any]] = []
+
+    def line(self, x: Any, y: Any, color: str = "", width: float = 0.9) -> None:
+        self.made.append(["line", [_short(one) for one in x], [_short(one) for one in y], color, width])
+
+    def words(self, x: float, y: float, words: str, color: str, size: float, ha: str, va: str) -> None:
+        if text := _plain(words):
+            self.made.append(["text", _short(x), _short(y), text, ha, va, size])
+
+    def box(self, x: float, y: float, width: float, height: float, fill: str, alpha: float = 1.0) -> None:
+        self.made.append(["box", *map(_short, (x, y, width, height)), fill, alpha])
+
+    def circle(self, x: float, y: float, radius: float) -> None:
+        self.made.append(["circle", *map(_short, (x, y, radius))])
+
+    def arrow(self, a: float, b: float, y: float, color: str = "", both: bool = False, heavy: bool = False) -> None:
+        self.made.append(["arrow", *map(_short, (a, b, y)), both])
+
+
+def _short(value: float) -> float | None:
+    return round(float(value), 2) if np.isfinite(value) else None
+
+
+def _plain(latex: str) -> str:
+    """A label in plain text; nothing of a formula that needs more than a line."""
+    text = re.sub(r"(\\?[A-Za-z]+)_\{([^{}]*)\}", lambda found: plain_of(found[0]), latex.strip("$"))
+    text = re.sub(r"\\[A-Za-z]+", lambda found: plain_of(found[0]), text.replace(r"\pm", "±"))
+    return "" if re.search(r"[\\{}]|frac|left", text) else text.replace("-", "\N{MINUS SIGN}")
+
+
+def moving(system: System, run: Any, pictures: int) -> dict[str, Any] | None:
+    """Pictures of a run at even instants: the frame of the paper, what stands still, and what moves in each of them.
+
+    None of a system that has no masses on a line. Positions between the run's samples are interpolated: a picture of
+    some 200 pixels shows no more.
+    """
+    try:
+        sketch = Sketch(scheme_of(system))
+    except ValueError:
+        return None
+    time = run["time"].values
+    instants = np.linspace(time[0], time[-1], pictures, endpoint=False)
+    q = np.stack(
+        [np.interp(instants, time, run["u"].sel(state=name).values) for name in sketch.scheme.coordinates], axis=1
+    )
+    if not np.isfinite(q).all():
+        return None
+    scale = sketch.scale_for(q)
+    drawn = []
+    for instant, place in zip(instants, q, strict=True):
+        pen = _Strokes()
+        sketch.draw(pen, scale * place, scale, float(instant))
+        drawn.append(pen.made)
+    still = set.intersection(*({json.dumps(part) for part in one} for one in drawn))
+    top = sketch.top if sketch.above else min(sketch.top, FLOOR + sketch.tall + 0.15)
+    paper = [sketch.left - 0.1, sketch.right + 0.1, sketch.bottom, top]
+    frames = [[part for part in one if json.dumps(part) not in still] for one in drawn]
+    return {"paper": paper, "still": [json.loads(part) for part in sorted(still)], "frames": frames}
+
+
+@lru_cache(maxsize=16)
+def equations_of(system: System) -> list[tuple[str, str]]:
+    """The equations as the page shows them: a heading (a mode, an element) and MathML, or the words of an element."""
+    patterns, loads = system.traced.patterns, system._description.loads
+    traced = system.traced if patterns is None else patterns.plain
+    latex = symbols_of(system)
+    names = {traced.t: "t"} | {
+        symbol: plain_of(latex[name])
+        for symbols, known in ((traced.u, traced.state_names), (traced.p, traced.parameter_names))
+        for symbol, name in zip(symbols, known, strict=True)
+    }
+    written = {symbol: sp.Symbol(name) for symbol, name in names.items()}
+
+    def mathml(e: Any) -> str:
+        return str(sp.mathml(e, printer="presentation")).replace("<mo>-</mo>", "<mo>−</mo>")
+
+    def equation(left: str, right: Any) -> str:
+        """One formula for each term, so that a long equation goes on in the next line."""
+        above, below = sp.fraction(sp.sympify(right).xreplace(written))
+        terms = above.as_ordered_terms()
+        shown = []
+        for k, term in enumerate(terms if len(terms) > 1 else [above / below]):
+            minus = k > 0 and term.could_extract_minus_sign()
+            sign = ("−&nbsp;" if minus else "+&nbsp;") if k else ""
+            shown.append(f"{sign}<math displaystyle='true'>{mathml(-term if minus else term)}</math>")
+        text = " ".join(shown)
+        if len(terms) > 1 and below != 1:
+            text = f"({text})&nbsp;/&nbsp;<math>{mathml(below)}</math>"
+        return f"<p><math>{left}</math>&nbsp;= {text}</p>"
+
+    def rate(symbol: Any) -> str:
+        if system.is_map:
+            return f"<msup><mi>{names[symbol]}</mi><mo>′</mo></msup>"
+        return f"<mover><mi>{names[symbol]}</mi><mo>˙</mo></mover>"
+
+    fields = dict(zip(traced.mode_names, traced.fields, strict=True))
+    if loads is not None and loads.elements:
+        fields = dict(loads.fields)
+    found: list[tuple[str, str]] = []
+    seen: set[tuple[Any, Any]] = set()
+    for mode, field in [*fields.items()][:_LONGEST]:
+        new = [pair for pair in zip(traced.u, field, strict=True) if pair not in seen]  # of the first mode all
+        seen |= set(new)
+        rows = "".join(equation(rate(symbol), e) for symbol, e in new)
+        if rows:
+            found.append(("" if len(fields) == 1 else mode.replace("_", " "), rows))
+    if loads is not None and loads.elements:
+        found += [(one.name, _escaped(one.text)) for one in loads.elements]
+    else:
+        indicators = [*zip(traced.indicator_names, traced.indicators, strict=True)][:_LONGEST]
+        found.append(("changes at", "".join(equation("<mn>0</mn>", e) for _, e in indicators)))
+    return found
+
+
+def _escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

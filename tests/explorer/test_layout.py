@@ -1,0 +1,202 @@
+"""The page as it is seen: large type, narrow windows, legends, the sketch, the equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from tests.explorer.conftest import FEW
+
+LARGE = "localStorage.setItem('nonsmooth-look', JSON.stringify({dark: false, large: true}))"
+SIZES = [(1280, 800, False), (1280, 800, True), (400, 800, False), (400, 800, True)]
+#: Notes what is written on every canvas since it was cleared: words, and the box that they take on it.
+NOTE = """(() => {
+    const of = CanvasRenderingContext2D.prototype, {fillText, clearRect} = of;
+    window.written = new Map();
+    of.clearRect = function (...given) { window.written.set(this.canvas, []); return clearRect.apply(this, given); };
+    of.fillText = function (words, x, y, ...more) {
+        const size = this.measureText(words), turn = this.getTransform(), [a, b] = [x - size.actualBoundingBoxLeft, x + size.actualBoundingBoxRight];
+        const at = (x, y) => [turn.a * x + turn.c * y + turn.e, turn.b * x + turn.d * y + turn.f];
+        const [left, top] = at(a, y - size.actualBoundingBoxAscent), [right, bottom] = at(b, y + size.actualBoundingBoxDescent);
+        if (!window.written.has(this.canvas)) window.written.set(this.canvas, []);
+        window.written.get(this.canvas).push([words, left, top, right, bottom]);
+        return fillText.call(this, words, x, y, ...more);
+    };
+})()"""
+
+
+def opened(server: Any, new_page: Callable[..., Any], width: int, height: int, large: bool, more: str = "") -> Any:
+    page = new_page(width, height)
+    page.tab.add_init_script(NOTE)
+    if large:
+        page.tab.add_init_script(LARGE)
+    page.open(f"{server.address}&{FEW}{more}")
+    page.until_done()
+    return page
+
+
+def box(page: Any, which: str) -> dict[str, float]:
+    return dict(page.tab.locator(which).first.bounding_box())
+
+
+def frame(page: Any, figure: str) -> list[float]:
+    """Width and height of the frame of a figure."""
+    return list(page.tab.evaluate(
+        "name => { const one = Bokeh.documents[0].get_model_by_name(name); return [one.inner_width, one.inner_height]; }",
+        figure,
+    ))  # fmt: skip
+
+
+@pytest.mark.parametrize(("width", "height", "large"), SIZES)
+def test_every_picture_and_every_word_has_room(
+    server: Any, new_page: Callable[..., Any], width: int, height: int, large: bool
+) -> None:
+    page = opened(server, new_page, width, height, large, "&upper=response")
+    assert page.tab.evaluate("document.documentElement.scrollWidth") <= width
+    type_size = 19 if large else 13
+    for figure in ("response", "portrait", "history", "section"):
+        assert min(frame(page, figure)) > 8 * type_size, figure  # high enough to read a value from
+    strip, readout = box(page, "#strip"), box(page, "#readout")
+    assert readout["y"] >= strip["y"]
+    assert readout["y"] + readout["height"] <= strip["y"] + strip["height"] + 1
+    first = page.tab.locator("#readout span").first
+    assert first.inner_text() == "motion period 1"
+    shown = first.bounding_box()
+    assert shown["y"] >= strip["y"]
+    assert 0 <= shown["x"] and shown["x"] + shown["width"] <= width
+    cut = page.tab.evaluate("""() => [...document.querySelectorAll("main select, main button, main label, aside b, aside input")]
+        .filter(one => { const box = one.getBoundingClientRect(); return box.width && (box.right > innerWidth || box.left < 0); })
+        .map(one => one.id || one.textContent)""")
+    assert cut == []
+    for figure, words in (("response", "amplitude of v (mm/s)"), ("portrait", "v (mm/s)")):
+        wide = page.tab.evaluate(
+            """([name, size]) => {
+                const title = Bokeh.documents[0].get_model_by_name(name).title, paint = document.createElement("canvas").getContext("2d");
+                paint.font = `${title.text_font_size} ${title.text_font}`;
+                return [title.text, paint.measureText(title.text).width];
+            }""",
+            [figure, type_size],
+        )
+        assert wide[0] == words
+        assert wide[1] <= frame(page, figure)[0] + 1
+
+
+@pytest.mark.parametrize(("width", "height", "large"), SIZES)
+def test_the_numbers_of_an_axis_stand_apart(
+    server: Any, new_page: Callable[..., Any], width: int, height: int, large: bool
+) -> None:
+    page = opened(server, new_page, width, height, large)
+    page.tab.wait_for_timeout(300)
+    written = page.tab.evaluate("""[...window.written].filter(([canvas]) => canvas.id !== "sketch").map(([canvas, some]) =>
+        some.filter(([words]) => /^[\\d\\u2212.]+$/.test(words)))""")
+    axes = [some for some in written if some]
+    assert sum(map(len, axes)) >= 16  # of eight axes
+    for some in axes:
+        for k, (words, left, top, right, bottom) in enumerate(some):
+            for other, a, b, c, d in some[:k]:
+                assert right <= a or c <= left or bottom <= b or d <= top, (words, other, large, width)
+
+
+def test_the_tour_covers_nothing(server: Any, new_page: Callable[..., Any]) -> None:
+    for width, height, large in SIZES:
+        page = new_page(width, height, first_visit=True)
+        if large:
+            page.tab.add_init_script(LARGE)
+        page.open(f"{server.address}&{FEW}")
+        for _ in range(3):
+            assert page.tab.evaluate("""() => {
+                const tour = document.getElementById("tour").getBoundingClientRect();
+                return [...document.querySelectorAll("#bar *, aside, main, .panel")].every(one => {
+                    const box = one.getBoundingClientRect();
+                    return box.bottom <= tour.top + 1 || box.top >= tour.bottom - 1 || !box.width;
+                });
+            }""")  # fmt: skip
+            page.tab.click("#tour-next")
+        assert not page.tab.is_visible("#tour")
+
+
+def test_one_colour_says_up_in_every_view_and_marks_of_branches_are_told(
+    server: Any, new_page: Callable[..., Any]
+) -> None:
+    page = opened(server, new_page, 1280, 800, False, "&branches.show=yes&low=0.38&high=0.42")
+    legends = page.ui()["legends"]
+    up = dict((words, color) for words, color, *_ in legends["diagram"])["up"]
+    assert up == dict(legends["response"])["up"]
+    drawn = page.tab.evaluate("""(color => {
+        const source = Bokeh.documents[0].get_model_by_name("diagram image"), seen = new Uint8Array(source.data.image[0].buffer);
+        const [red, green, blue] = [1, 3, 5].map(i => parseInt(color.slice(i, i + 2), 16));
+        for (let i = 0; i < seen.length; i += 4)
+            if (seen[i + 3] && seen[i] === red && seen[i + 1] === green && seen[i + 2] === blue) return true;
+        return false;
+    })""", up)  # fmt: skip
+    assert drawn
+    page.until('document.getElementById("legend-diagram").textContent.includes("flip")')
+    told = page.tab.inner_text("#legend-diagram").replace("\n", "")
+    assert "━stable" in told
+    assert "╍unstable" in told
+    assert "□flip" in told
+    marks = page.tab.evaluate('[...Bokeh.documents[0].get_model_by_name("special points").data.marker]')
+    assert set(marks) == {"square"}
+    page.tab.select_option('[id="branches.show"]', "no")
+    page.until('!document.getElementById("legend-diagram").textContent.includes("flip")')
+
+
+def test_equations_and_a_moving_sketch_stand_beside_the_sliders(page: Any) -> None:
+    page.until_done()
+    equations = page.tab.inner_text("#equations")
+    assert "free" in equations
+    assert "contact" in equations
+    assert page.tab.locator("#equations math").count() > 5
+    assert page.tab.evaluate("""(() => {
+        const [first] = document.querySelectorAll("#equations math");
+        return first.namespaceURI === "http://www.w3.org/1998/Math/MathML";
+    })()""")
+    mass = """(() => {
+        const told = JSON.parse(Bokeh.documents[0].get_model_by_name("sketch").value);
+        return told && told.frames.map(one => one.find(part => part[0] === "box" && part[3] > 1)[1]);
+    })()"""
+    places = page.tab.evaluate(mass)
+    assert len(places) == 36  # one period
+    x = page.tab.evaluate("""(() => {
+        const run = Bokeh.documents[0].get_model_by_name("history").renderers.map(one => one.data_source.data);
+        return run.flatMap(one => [...(one.x ?? [])].map((t, i) => [t, one.y[i]])).filter(([t, y]) => y === y).map(([, y]) => y);
+    })()""")
+    assert (max(places) - min(places)) > 0
+    at = max(range(36), key=places.__getitem__)  # furthest to the right where x is largest, by one scale
+    scale = (max(places) - min(places)) / (max(x) - min(x))
+    assert places[at] - places[0] == pytest.approx(scale * (max(x) - x[-1]), abs=0.1)
+    seen = page.tab.evaluate('document.getElementById("sketch").dataset.at')
+    page.until(f'document.getElementById("sketch").dataset.at !== "{seen}"')
+    page.tab.click("#sketch")
+    held = page.tab.evaluate('document.getElementById("sketch").dataset.at')
+    page.tab.wait_for_timeout(300)
+    assert page.tab.evaluate('document.getElementById("sketch").dataset.at') == held
+    page.tab.select_option("#model", "chua_circuit")
+    page.until_done()
+    assert not page.tab.is_visible("#sketch")
+    assert "diode" in page.tab.inner_text("#equations")
+
+
+def test_numbers_that_no_form_of_ours_has_are_refused(page: Any) -> None:
+    page.until_done()
+    for text in ("1_000", "\uff10.\uff13", "0x1", "\u0663"):
+        page.write("v-p.rho", text)
+        page.until('document.getElementById("wrong-p.rho").textContent.includes("is no number")')
+        assert page.value("rho") == 0.45
+        page.write("v-p.rho", "0.45")
+        page.until('!document.getElementById("wrong-p.rho").textContent')
+
+
+def test_what_is_seen_is_saved_in_motion(page: Any, tmp_path: Any) -> None:
+    from PIL import Image
+
+    page.until_done()
+    page.tab.select_option("#save-view", "history")
+    page.tab.select_option("#save-kind", "gif")
+    with page.tab.expect_download() as download:
+        page.tab.click("#save")
+    assert download.value.suggested_filename == "discontinuous_support_history.gif"
+    download.value.save_as(tmp_path / "run.gif")
+    with Image.open(tmp_path / "run.gif") as picture:
+        assert picture.n_frames > 50
