@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.plot.mechanism import Paper, Sketch
+from nonsmooth.plot.mechanism import Sketch, put
 from nonsmooth.plot.parts import GROUND
 from nonsmooth.plot.scheme import scheme_of
 
@@ -116,7 +116,7 @@ def test_gaps_and_displacements_are_to_one_scale() -> None:
     sketch = Sketch(scheme_of(ns.models.impact_oscillator(d=0.5)))
     scale = sketch.scale_for(np.array([[-0.8], [0.5]]))
     _, ax = plt.subplots()
-    sketch.draw(Paper(ax, labels=False), [0.5 * scale], scale)
+    put(ax, sketch.parts([0.5 * scale], scale, labels=False))
     mass, pad = (one for one in ax.patches if type(one).__name__ == "Rectangle")
     assert mass.get_x() + mass.get_width() == pytest.approx(pad.get_x(), abs=1e-12)
     plt.close("all")

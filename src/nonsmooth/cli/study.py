@@ -117,8 +117,8 @@ def read_study(path: Path) -> Study:
     _check_output(output, path)
     if len({"model", "text"} & document.get("system", {}).keys()) != 1:
         raise ValueError(
-            f'{where}: needs a table [system] with model = "name" (see `nonsmooth models`), model = "file.py:object" or '
-            "text = what System.to_text gave, one of them"
+            f'{where}: needs a table [system] with model = "name" (see `nonsmooth models`), model = "file.py:object" '
+            "or text = what System.to_text gave, one of them"
         )
     system = system_of(document["system"], path.parent)
     options = _options(verbs[0], document[verbs[0]], where)

@@ -121,7 +121,13 @@ class Session:
         document.template = Environment(loader=DictLoader(texts)).get_template("page.html")
         program = "\n".join(text for name, text in texts.items() if name.endswith(".js"))
         document.template_variables.update(
-            link=LINK, kinds=KINDS, style=texts["page.css"], program=program, panels=PANELS, views=VIEWS, files=FILES,
+            link=LINK,
+            kinds=KINDS,
+            style=texts["page.css"],
+            program=program,
+            panels=PANELS,
+            views=VIEWS,
+            files=FILES,
             channels=("act", *CHANNELS),
         )
         for view in self.sheet.views.values():

@@ -35,15 +35,15 @@
         paint.beginPath(); paint.arc(x(a), y(b), unit * r, 0, 7);
         paint.fillStyle = "#FFFFFF"; paint.fill(); paint.lineWidth = 1; paint.strokeStyle = "#1B1F24"; paint.stroke();
       },
-      arrow: (a, b, h, both) => {
-        const s = Math.sign(b - a) * 0.1, head = (tip, way) => stroke([[tip - way, h + 0.06], [tip, h], [tip - way, h - 0.06]], "", 1);
-        stroke([[a, h], [b, h]], "", 1); head(b, s);
+      arrow: (a, b, h, color, both) => {
+        const s = Math.sign(b - a) * 0.1, head = (tip, way) => stroke([[tip - way, h + 0.06], [tip, h], [tip - way, h - 0.06]], color, 1);
+        stroke([[a, h], [b, h]], color, 1); head(b, s);
         if (both) head(a, -s);
       },
-      text: (a, b, words, across, up, size) => {
+      text: (a, b, words, color, size, across, up) => {
         paint.font = `italic ${Math.max(0.24 * unit * size, 9)}px "STIX Two Text", Georgia, "Liberation Serif", serif`;
         paint.textAlign = across; paint.textBaseline = {center: "middle", va: "middle"}[up] || up;
-        paint.fillStyle = "#1B1F24"; paint.fillText(words, x(a), y(b));
+        paint.fillStyle = color; paint.fillText(words, x(a), y(b));
       },
     };
     for (const [kind, ...given] of [...told.still, ...told.frames[at]]) kinds[kind](...given);

@@ -11,7 +11,7 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.explorer.labels import plain_of, symbols_of
-from nonsmooth.plot.mechanism import FLOOR, Pen, Sketch
+from nonsmooth.plot.mechanism import FLOOR, Sketch
 from nonsmooth.plot.scheme import scheme_of
 
 if TYPE_CHECKING:
@@ -22,31 +22,13 @@ __all__ = ["equations_of", "moving"]
 _LONGEST = 12  # of the equations' modes that are shown
 
 
-class _Strokes(Pen):
-    """Parts as plain lists, for the canvas of a browser: their kind, then numbers and colours."""
-
-    def __init__(self) -> None:
-        self.made: list[list[Any]] = []
-
-    def line(self, x: Any, y: Any, color: str = "", width: float = 0.9) -> None:
-        self.made.append(["line", [_short(one) for one in x], [_short(one) for one in y], color, width])
-
-    def words(self, x: float, y: float, words: str, color: str, size: float, ha: str, va: str) -> None:
-        if text := _plain(words):
-            self.made.append(["text", _short(x), _short(y), text, ha, va, size])
-
-    def box(self, x: float, y: float, width: float, height: float, fill: str, alpha: float = 1.0) -> None:
-        self.made.append(["box", *map(_short, (x, y, width, height)), fill, alpha])
-
-    def circle(self, x: float, y: float, radius: float) -> None:
-        self.made.append(["circle", *map(_short, (x, y, radius))])
-
-    def arrow(self, a: float, b: float, y: float, color: str = "", both: bool = False, heavy: bool = False) -> None:
-        self.made.append(["arrow", *map(_short, (a, b, y)), both])
-
-
-def _short(value: float) -> float | None:
-    return round(float(value), 2) if np.isfinite(value) else None
+def _short(part: Any) -> Any:
+    """A part as JSON holds it: numbers with two digits behind the point, breaks of a line as None, plain words."""
+    if isinstance(part, str):
+        return _plain(part) if part.startswith("$") else part
+    if np.ndim(part) or isinstance(part, tuple):
+        return [_short(one) for one in part]
+    return part if isinstance(part, bool) else round(float(part), 2) if np.isfinite(part) else None
 
 
 def _plain(latex: str) -> str:
@@ -74,11 +56,10 @@ def moving(system: System, run: Any, pictures: int) -> dict[str, Any] | None:
     if not np.isfinite(q).all():
         return None
     scale = sketch.scale_for(q)
-    drawn = []
-    for instant, place in zip(instants, q, strict=True):
-        pen = _Strokes()
-        sketch.draw(pen, scale * place, scale, float(instant))
-        drawn.append(pen.made)
+    drawn = [
+        [_short(part) for part in sketch.parts(scale * place, scale, float(instant))]
+        for instant, place in zip(instants, q, strict=True)
+    ]
     still = set.intersection(*({json.dumps(part) for part in one} for one in drawn))
     top = sketch.top if sketch.above else min(sketch.top, FLOOR + sketch.tall + 0.15)
     paper = [sketch.left - 0.1, sketch.right + 0.1, sketch.bottom, top]

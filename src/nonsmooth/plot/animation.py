@@ -16,7 +16,7 @@ from nonsmooth.errors import DataFileError
 from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import column, first_states, name_plane, variable_along
-from nonsmooth.plot.mechanism import FLOOR, Paper, Sketch
+from nonsmooth.plot.mechanism import FLOOR, Sketch, put
 from nonsmooth.plot.scheme import scheme_of
 from nonsmooth.plot.trajectories import with_gaps
 from nonsmooth.system.names import by_name
@@ -137,7 +137,7 @@ class Animation:
             plane, over = (self.figure.add_subplot(grid[-1, k]) for k in (0, 1))
             if sketch is not None:
                 self._paper = self.figure.add_subplot(grid[0, :])
-                self._pen = Paper(self._paper)
+                self._made: list[Any] = []
                 sketch.frame(self._paper, room=max(0.0, 0.5 * (4.2 - sketch.width)))
             self._drawn, self._curves = run["time"].values, [column(run, "u", one).values for one in (*names, history)]
             self._run = run
@@ -162,12 +162,10 @@ class Animation:
         """Bring the figure to picture k."""
         with style.journal():
             if self._sketch is not None:
-                for one in self._pen.made:
+                for one in self._made:
                     one.remove()
-                self._pen = Paper(self._paper)
-                self._sketch.draw(
-                    self._pen, self._scale * np.nan_to_num(self._q[k]), self._scale, time=float(self._time[k])
-                )
+                moved = self._scale * np.nan_to_num(self._q[k])
+                self._made = put(self._paper, self._sketch.parts(moved, self._scale, float(self._time[k])))
             now, whole = self._time[k], self._drawn[-1] - self._drawn[0]
             rows = slice(*np.searchsorted(self._drawn, [now - _TRAIL * whole, now], side="right"))
             part = self._run.isel(time=rows)

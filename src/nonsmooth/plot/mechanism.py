@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.parts import GROUND, Link, Scheme
+from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from nonsmooth.system.system import System
 
-__all__ = ["FLOOR", "Paper", "Pen", "Sketch", "mechanism"]
+__all__ = ["FLOOR", "Sketch", "mechanism", "put"]
 
 _WIDTH, _ZONE, FLOOR = 1.1, 1.75, 0.2  # of a mass, between two of them, below them
 _LANE = 0.44  # height that one link takes
 _GAP = 0.32  # of a contact in a sketch that is not to scale
 _ORDER = ("spring", "preload", "damper", "backlash", "slider", "stop", "elastic")  # from above
 _DARK, _GREY, _FILL = style.COLORS["section"], style.COLORS["muted"], "#DCE6EE"
-_STOP, _RUB = style.COLORS["second"], style.COLORS["fourth"]
+_STOP, _RUB, _FORCE = (style.COLORS[name] for name in ("second", "fourth", "first"))
 
 
 def mechanism(system: System, ax: Axes | None = None, *, labels: bool = True) -> Axes:
@@ -65,7 +66,7 @@ def mechanism(system: System, ax: Axes | None = None, *, labels: bool = True) ->
     sketch = Sketch(scheme_of(system))
     with style.axes(ax, width=min(0.56 * sketch.width, style.PAGE), ratio=sketch.height / sketch.width) as drawn:
         sketch.frame(drawn)
-        sketch.draw(Paper(drawn, labels))
+        put(drawn, sketch.parts(labels=labels))
     return drawn
 
 
@@ -115,12 +116,13 @@ class Sketch:
         gaps = [abs(one.gap) for one in self.scheme.links if np.isfinite(one.gap) and 0 < abs(one.gap) < 3 * largest]
         return float(min(0.5 / largest, 0.7 / max(gaps, default=largest))) * _ZONE if largest > 0 else 1.0
 
-    def draw(
-        self, pen: Pen, moved: Sequence[float] | None = None, scale: float | None = None, time: float = 0.0
-    ) -> None:
-        """Draw it with the masses ``moved`` by so much on the paper at an instant; ``scale``: length on the paper of
+    def parts(
+        self, moved: Sequence[float] | None = None, scale: float | None = None, time: float = 0.0, labels: bool = True
+    ) -> list[tuple[Any, ...]]:
+        """Its parts with the masses ``moved`` by so much on the paper at an instant; ``scale``: length on the paper of
         one unit of a coordinate, to which gaps are drawn then."""
-        pen.moving, self.time = moved is not None, time
+        pen, self.time = Pen(labels), time
+        pen.moving = moved is not None
         shift = np.zeros(len(self.faces)) if moved is None else np.asarray(moved, dtype=float)
         self._ground(pen)
         for i, face in enumerate(self.faces):
@@ -133,10 +135,18 @@ class Sketch:
             y = FLOOR + self.tall + (0.8 if self.scheme.forces else 0.46) + 0.45 * k
             first, last = (self.faces[i] + shift[i] + 0.25 * _WIDTH for i in (link.left, link.right))
             for x in (first, last):
-                pen.line([x, x], [FLOOR + self.tall, y])
+                pen.path(0, x, FLOOR + self.tall, x, y)
             self._between(pen, link, first, last, y, _WIDTH + _ZONE, scale)
         for k, words in enumerate(self.scheme.others):
-            pen.text(self.left, self.bottom + 0.24 * (len(self.scheme.others) - 1 - k), words, ha="left", va="bottom")
+            pen.text(
+                self.left,
+                self.bottom + 0.24 * (len(self.scheme.others) - 1 - k),
+                words,
+                ha="left",
+                va="bottom",
+                plain=True,
+            )
+        return pen.made
 
     # What stands still
 
@@ -145,21 +155,21 @@ class Sketch:
         belts = [self.faces[i] for i, link in self.below.items() if link.words]
         edges = [self.left, *[x for face in belts for x in (face - 0.3, face + _WIDTH + 0.3)], self.right]
         for a, b in zip(edges[::2], edges[1::2], strict=True):
-            pen.line([a, b], [0, 0], width=1.2)
+            pen.path(0, a, 0, b, 0, width=1.2)
             pen.hatch(a, b, 0.0)
         for side, x in ((-1, self.left), (1, self.right)):
             if self.zones[0 if side < 0 else -1]:
-                pen.line([x, x], [0, high], width=1.2)
+                pen.path(0, x, 0, x, high, width=1.2)
                 pen.hatch(0.0, high, x, upright=side)
         if self.scheme.base:
             y = self.bottom + 0.24 * len(self.scheme.others) + 0.22
             pen.arrow(self.left + 0.1, self.left + 0.9, y, both=True)
-            pen.text(self.left + 1.0, y, f"${self.scheme.base}$", ha="left")
+            pen.text(self.left + 1.0, y, self.scheme.base, ha="left")
         for z, zone in enumerate(self.zones):
             grounded = [k for k, link in enumerate(zone) if GROUND in (link.left, link.right)]
             if 0 < z < len(self.zones) - 1 and grounded:
                 x = self._anchor(z)
-                pen.line([x, x], [0, FLOOR + self.tall * (1 - (grounded[0] + 0.5) / len(zone)) + 0.14], width=2.2)
+                pen.path(0, x, 0, x, FLOOR + self.tall * (1 - (grounded[0] + 0.5) / len(zone)) + 0.14, width=2.2)
 
     def _anchor(self, z: int) -> float:
         """The place of the ground in a zone: a wall, or a post with room beside it."""
@@ -173,25 +183,23 @@ class Sketch:
     def _mass(self, pen: Pen, i: int, x: float) -> None:
         pen.box(x, FLOOR, _WIDTH, self.tall, _FILL)
         middle, top = x + 0.5 * _WIDTH, FLOOR + self.tall
-        if self.scheme.masses[i]:
-            pen.text(middle, FLOOR + 0.5 * self.tall, f"${self.scheme.masses[i]}$", size=1.25)
+        pen.text(middle, FLOOR + 0.5 * self.tall, self.scheme.masses[i], size=1.25)
         rubs = self.below.get(i)
         if rubs is None:
             for at in (0.25, 0.75):
                 pen.circle(x + at * _WIDTH, 0.5 * FLOOR, 0.5 * FLOOR)
         else:
             pen.box(x + 0.15 * _WIDTH, 0.0, 0.7 * _WIDTH, FLOOR, _RUB, alpha=0.55)
-            if rubs.label:
-                pen.text(middle, 0.5 * FLOOR, f"${rubs.label}$", size=0.9)
+            pen.text(middle, 0.5 * FLOOR, rubs.label, size=0.9)
             if rubs.words:
-                pen.belt(self.faces[i] - 0.2, self.faces[i] + _WIDTH + 0.2, f"${rubs.words}$")
+                pen.belt(self.faces[i] - 0.2, self.faces[i] + _WIDTH + 0.2, rubs.words)
         if not pen.moving:
-            pen.line([middle, middle], [top + 0.06, top + 0.26], color=_GREY)
+            pen.path(top, middle, 0.06, middle, 0.26, color=_GREY)
             pen.arrow(middle, middle + 0.38, top + 0.16, color=_GREY)
-            pen.text(middle + 0.43, top + 0.16, f"${_symbol(self.scheme.coordinates[i])}$", ha="left")
-        if (force := self.scheme.forces.get(i)) and not pen.moving:
-            pen.arrow(middle - 0.2, middle + 0.34, top + 0.46, color=style.COLORS["first"], heavy=True)
-            pen.text(middle + 0.42, top + 0.46, f"${force}$", ha="left", color=style.COLORS["first"])
+            pen.text(middle + 0.43, top + 0.16, latex_name(self.scheme.coordinates[i]), ha="left")
+            if force := self.scheme.forces.get(i):
+                pen.arrow(middle - 0.2, middle + 0.34, top + 0.46, color=_FORCE, heavy=True)
+                pen.text(middle + 0.42, top + 0.46, force, ha="left", color=_FORCE)
 
     # What joins
 
@@ -205,7 +213,7 @@ class Sketch:
         elif link.kind in ("stop", "elastic"):
             on_right = link.right == GROUND  # of the mass
             face, rest = (near, self.faces[z - 1] + _WIDTH) if on_right else (far, self.faces[z])
-            self._pad(pen, link, face, rest, self._anchor(z), y, scale)
+            self._pad(pen, link, face, rest, self._anchor(z), y, _ZONE, scale)
         else:
             left, right = (near, self._anchor(z)) if z == n else (self._anchor(z), far)
             self._between(pen, link, left, right, y, _ZONE, scale)
@@ -213,34 +221,29 @@ class Sketch:
     def _between(
         self, pen: Pen, link: Link, left: float, right: float, y: float, rest: float, scale: float | None
     ) -> None:
-        words = f"${link.label}$" if link.label else ""
+        words = link.label
         match link.kind:
-            case "spring":
-                pen.spring(left, right, y, words)
-            case "preload":
-                pen.spring(left, right, y, words, boxed=True)
+            case "spring" | "preload":
+                pen.spring(left, right, y, words, boxed=link.kind == "preload")
             case "damper":
                 pen.damper(left, right, y, words)
             case "friction":
                 pen.slider(left, right, y, words)
             case "backlash":
                 half = 0.16 if scale is None else min(0.6 * rest, scale * link.half)
-                pen.play(left, right, y, half, rest, words, f"$\\pm {link.words}$" if link.words else "")
+                pen.play(left, right, y, half, rest, words, link.words and rf"\pm {link.words}")
             case "stop" | "elastic" if link.pulls:
                 gap = self._room(link, rest, scale)
-                pen.catch(left, right, y, rest, gap, f"${link.words}$" if link.words else words)
+                pen.catch(left, right, y, rest, gap, link.words or words)
             case "stop" | "elastic":
-                face, pad = left, right - rest + self._room(link, rest, scale)
-                pen.pad(face, max(face, pad) if link.kind == "elastic" else pad, right, y, link)
+                self._pad(pen, link, left, right - rest, right, y, rest, scale)
 
     def _pad(
-        self, pen: Pen, link: Link, face: float, rest: float, ground: float, y: float, scale: float | None
-    ) -> None:
-        sign = 1.0 if ground > rest else -1.0
-        pad = rest + sign * self._room(link, _ZONE, scale)
-        if link.kind == "elastic":
-            pad = sign * max(sign * pad, sign * face)
-        pen.pad(face, pad, ground, y, link)
+        self, pen: Pen, link: Link, face: float, at: float, ground: float, y: float, rest: float, scale: float | None
+    ) -> None:  # fmt: skip
+        sign = 1.0 if ground > at else -1.0
+        pad = at + sign * self._room(link, rest, scale)
+        pen.pad(face, sign * max(sign * pad, sign * face) if link.kind == "elastic" else pad, ground, y, link)
 
     def _room(self, link: Link, rest: float, scale: float | None) -> float:
         gap = link.gap if link.gap_at is None else float(link.gap_at(self.time))
@@ -253,53 +256,45 @@ def _kind(link: Link) -> str:
     return "slider" if link.kind == "friction" else link.kind
 
 
-def _symbol(name: str) -> str:
-    from nonsmooth.system.parameter import latex_name
-
-    return latex_name(name)
-
-
 class Pen:
-    """Parts of a sketch, made of lines, boxes, circles, arrows and words, which each kind of paper draws its own way."""
+    """Parts of a sketch as data, made of lines, boxes, circles, arrows and words: :func:`put` draws them."""
 
-    labels = True
-    moving = False
+    def __init__(self, labels: bool = True) -> None:
+        self.labels, self.moving, self.made = labels, False, list[tuple[Any, ...]]()
 
-    def line(self, x: Any, y: Any, color: str = _DARK, width: float = 0.9) -> None:
-        raise NotImplementedError
-
-    def words(self, x: float, y: float, words: str, color: str, size: float, ha: str, va: str) -> None:
-        raise NotImplementedError
-
-    def box(self, x: float, y: float, width: float, height: float, fill: str, alpha: float = 1.0) -> None:
-        raise NotImplementedError
-
-    def circle(self, x: float, y: float, radius: float) -> None:
-        raise NotImplementedError
-
-    def arrow(self, a: float, b: float, y: float, color: str = _DARK, both: bool = False, heavy: bool = False) -> None:
-        raise NotImplementedError
+    def path(self, y: float, *places: float, color: str = _DARK, width: float = 0.9) -> None:
+        """A line through places, each by its abscissa and its height above y."""
+        self.made.append(("line", places[::2], [y + high for high in places[1::2]], color, width))
 
     def text(
         self, x: float, y: float, words: str, color: str = _DARK, size: float = 1.0, ha: str = "center",
-        va: str = "center",
+        va: str = "center", plain: bool = False,
     ) -> None:  # fmt: skip
         if self.labels and words:
-            self.words(x, y, words, color, size, ha, va)
+            self.made.append(("text", x, y, words if plain else f"${words}$", color, size, ha, va))
+
+    def box(self, x: float, y: float, width: float, height: float, fill: str, alpha: float = 1.0) -> None:
+        self.made.append(("box", x, y, width, height, fill, alpha))
+
+    def circle(self, x: float, y: float, radius: float) -> None:
+        self.made.append(("circle", x, y, radius))
+
+    def arrow(self, a: float, b: float, y: float, color: str = _DARK, both: bool = False, heavy: bool = False) -> None:
+        self.made.append(("arrow", a, b, y, color, both, heavy))
 
     def hatch(self, a: float, b: float, at: float, upright: int = 0) -> None:
         """Strokes behind a line of the ground: below it, or to the left (-1) or right (1) of an upright one."""
         places = np.arange(a + 0.08, b + 1e-9, 0.13)
         gone = np.full(len(places), np.nan)
         one = np.stack([places, places - 0.1, gone], axis=1).ravel()
-        other = np.stack([np.full(len(places), at), np.full(len(places), at + (0.1 * upright or -0.1)), gone], axis=1)
-        self.line(*((other.ravel(), one) if upright else (one, other.ravel())), color=_GREY, width=0.6)
+        other = np.tile([at, at + (0.1 * upright or -0.1), np.nan], len(places))
+        self.made.append(("line", *((other, one) if upright else (one, other)), _GREY, 0.6))
 
     def belt(self, a: float, b: float, words: str) -> None:
         for x in (a, b):
             self.circle(x, -0.12, 0.12)
         for y in (0.0, -0.24):
-            self.line([a, b], [y, y], width=1.4)
+            self.path(y, a, 0, b, 0, width=1.4)
         middle = 0.5 * (a + b)
         self.arrow(middle - 0.3, middle + 0.3, -0.12, color=_RUB, heavy=True)
         self.text(middle, -0.28, words, va="top")
@@ -309,35 +304,32 @@ class Pen:
     ) -> None:
         a, b = min(a, b), max(a, b)
         end = min(0.18, 0.15 * (b - a))
-        x = np.linspace(a + end, b - end, 14)
-        zigzag = np.r_[0.0, [high * (-1) ** k for k in range(12)], 0.0]
-        self.line(np.r_[a, x, b], y + np.r_[0.0, zigzag, 0.0], color=color)
+        zigzag = [0.0, *(high * (-1) ** k for k in range(12)), 0.0]
+        inner = [one for pair in zip(np.linspace(a + end, b - end, 14), zigzag, strict=True) for one in pair]
+        self.path(y, a, 0, *inner, b, 0, color=color)
         if boxed:
-            self.line(np.r_[a, b, b, a, a][[0, 0]] + end, [y - 0.15, y + 0.15])
-            for sign in (-1, 1):
-                self.line([a + end, b - end], [y + 0.15 * sign] * 2)
-            self.line([b - end] * 2, [y - 0.15, y + 0.15])
+            low, far = a + end, b - end
+            self.path(y, low, -0.15, low, 0.15, far, 0.15, far, -0.15, low, -0.15)
         self.text(0.5 * (a + b), y + (0.19 if boxed else 0.13), words, va="bottom")
 
     def damper(self, a: float, b: float, y: float, words: str = "", color: str = _DARK, high: float = 0.11) -> None:
         a, b = min(a, b), max(a, b)
         middle, half = 0.5 * (a + b), 0.2 * min(1.0, b - a)
-        self.line([a, middle], [y, y], color=color)
-        self.line([middle, middle], [y - 0.7 * high, y + 0.7 * high], color=color, width=1.6)
-        mouth, end = middle - half, middle + half
-        self.line([mouth, end, end, mouth], [y + high, y + high, y - high, y - high], color=color)
-        self.line([middle + half, b], [y, y], color=color)
+        end = middle + half
+        self.path(y, a, 0, middle, 0, color=color)
+        self.path(y, middle, -0.7 * high, middle, 0.7 * high, color=color, width=1.6)
+        self.path(y, middle - half, high, end, high, end, -high, middle - half, -high, color=color)
+        self.path(y, end, 0, b, 0, color=color)
         self.text(middle, y + 0.13, words, va="bottom")
 
     def slider(self, a: float, b: float, y: float, words: str) -> None:
         """Friction between two masses: a block on a rod between two plates."""
         middle = 0.5 * (a + b)
-        self.line([a, middle - 0.16], [y, y])
+        end = middle + 0.36
+        self.path(y, a, 0, middle - 0.16, 0)
         self.box(middle - 0.16, y - 0.07, 0.32, 0.14, _RUB, alpha=0.55)
-        for sign in (-1, 1):
-            self.line([middle - 0.3, middle + 0.36], [y + 0.1 * sign] * 2, width=1.4)
-        self.line([middle + 0.36] * 2, [y - 0.1, y + 0.1], width=1.4)
-        self.line([middle + 0.36, b], [y, y])
+        self.path(y, middle - 0.3, -0.1, end, -0.1, end, 0.1, middle - 0.3, 0.1, width=1.4)
+        self.path(y, end, 0, b, 0)
         self.text(middle, y + 0.13, words, va="bottom")
 
     def play(self, a: float, b: float, y: float, half: float, rest: float, words: str, room: str) -> None:
@@ -345,22 +337,20 @@ class Pen:
         pin = a + 0.3 * rest  # at rest in the middle of the fork
         fork = b - 0.7 * rest
         fork += pin - fork - np.clip(pin - fork, -half, half)
-        self.line([a, pin], [y, y])
-        self.line([pin, pin], [y - 0.1, y + 0.1], color=_STOP, width=1.8)
-        for sign in (-1, 1):
-            self.line([fork + sign * (half + 0.03)] * 2, [y - 0.14, y - 0.04], color=_STOP, width=1.8)
-        self.line([fork - half - 0.03, fork + half + 0.03], [y - 0.14] * 2, color=_STOP)
-        self.line([fork + half + 0.03] * 2, [y - 0.14, y], color=_STOP)
-        self.spring(fork + half + 0.03, b, y, words)
+        low, far = fork - half - 0.03, fork + half + 0.03
+        self.path(y, a, 0, pin, 0)
+        for x, foot, top in ((pin, -0.1, 0.1), (low, -0.14, -0.04), (far, -0.14, -0.04)):
+            self.path(y, x, foot, x, top, color=_STOP, width=1.8)
+        self.path(y, low, -0.14, far, -0.14, far, 0, color=_STOP)
+        self.spring(far, b, y, words)
         self.text(fork, y + 0.13, room, va="bottom")
 
     def catch(self, a: float, b: float, y: float, rest: float, gap: float, words: str) -> None:
         """A hook on each mass: they meet where the masses have parted by the gap."""
         hook, pin = a + 0.6 * rest, b - 0.4 * rest - gap
-        self.line([a, hook], [y + 0.1] * 2, color=_STOP)
-        self.line([hook] * 2, [y - 0.02, y + 0.1], color=_STOP, width=2.2)
-        self.line([pin, b], [y - 0.1] * 2, color=_STOP)
-        self.line([pin] * 2, [y - 0.1, y + 0.03], color=_STOP, width=2.2)
+        for end, at, rod, tip in ((a, hook, 0.1, -0.02), (b, pin, -0.1, 0.03)):
+            self.path(y, end, rod, at, rod, color=_STOP)
+            self.path(y, at, rod, at, tip, color=_STOP, width=2.2)
         if gap > 0.1:
             self.text(0.5 * (hook + pin), y - 0.13, words, va="top")
 
@@ -369,50 +359,41 @@ class Pen:
         sign = 1.0 if ground > pad else -1.0
         back = pad + 0.07 * sign
         self.box(min(pad, back), y - 0.13, 0.07, 0.26, _STOP)
-        words = f"${link.label}$" if link.label else ""
         if link.kind == "stop":
-            self.line([back, ground], [y, y], color=_STOP, width=2.0)
-            self.text(0.5 * (back + ground), y + 0.06, words, va="bottom")
-        elif link.damped:
-            self.spring(back, ground, y + 0.08, words, color=_STOP, high=0.05)
-            self.damper(back, ground, y - 0.08, color=_STOP, high=0.06)
+            self.path(y, back, 0, ground, 0, color=_STOP, width=2.0)
+            self.text(0.5 * (back + ground), y + 0.06, link.label, va="bottom")
         else:
-            self.spring(back, ground, y, words, color=_STOP)
+            raised, high = (0.08, 0.05) if link.damped else (0.0, 0.1)
+            self.spring(back, ground, y + raised, link.label, color=_STOP, high=high)
+            if link.damped:
+                self.damper(back, ground, y - 0.08, color=_STOP, high=0.06)
         room = abs(pad - face)
         if self.labels and room > 0.12 and (pad - face) * sign > 0:
-            low = y - 0.19
             for x in (face, pad):
-                self.line([x, x], [low - 0.04, y - 0.13], color=_GREY, width=0.5)
-            self.arrow(face, pad, low, color=_GREY, both=True)
-        if link.words and (room > 0.12 or not self.moving):
-            self.text(0.5 * (face + pad), y - 0.23, f"${link.words}$", va="top", size=0.95)
+                self.path(y, x, -0.23, x, -0.13, color=_GREY, width=0.5)
+            self.arrow(face, pad, y - 0.19, color=_GREY, both=True)
+        if room > 0.12 or not self.moving:
+            self.text(0.5 * (face + pad), y - 0.23, link.words, va="top", size=0.95)
 
 
-class Paper(Pen):
-    """Draws on axes, and keeps what it has drawn."""
+def put(ax: Axes, parts: Iterable[tuple[Any, ...]]) -> list[Any]:
+    """Draw parts of a sketch on axes; the artists are returned."""
+    from matplotlib.patches import Circle, Rectangle
 
-    def __init__(self, ax: Axes, labels: bool = True) -> None:
-        self.ax, self.labels, self.made = ax, labels, list[Any]()
-
-    def line(self, x: Any, y: Any, color: str = _DARK, width: float = 0.9) -> None:
-        self.made += self.ax.plot(x, y, "-", color=color, linewidth=width, solid_capstyle="butt", clip_on=False)
-
-    def words(self, x: float, y: float, words: str, color: str, size: float, ha: str, va: str) -> None:
-        size *= style.small(self.ax)
-        self.made.append(self.ax.text(x, y, words, color=color, fontsize=size, ha=ha, va=va))
-
-    def box(self, x: float, y: float, width: float, height: float, fill: str, alpha: float = 1.0) -> None:
-        from matplotlib.patches import Rectangle
-
-        looks: dict[str, Any] = {"edgecolor": _DARK, "linewidth": 0.9, "alpha": alpha}
-        self.made.append(self.ax.add_patch(Rectangle((x, y), width, height, facecolor=fill, **looks)))
-
-    def circle(self, x: float, y: float, radius: float) -> None:
-        from matplotlib.patches import Circle
-
-        self.made.append(self.ax.add_patch(Circle((x, y), radius, facecolor="white", edgecolor=_DARK, linewidth=0.9)))
-
-    def arrow(self, a: float, b: float, y: float, color: str = _DARK, both: bool = False, heavy: bool = False) -> None:
-        looks = {"arrowstyle": "<|-|>" if both else "-|>", "color": color, "shrinkA": 0, "shrinkB": 0,
-                 "linewidth": 1.3 if heavy else 0.8, "mutation_scale": 8 if heavy else 6}  # fmt: skip
-        self.made.append(self.ax.annotate("", (b, y), (a, y), arrowprops=looks, annotation_clip=False))
+    made: list[Any] = []
+    edge: dict[str, Any] = {"edgecolor": _DARK, "linewidth": 0.9}
+    for part in parts:
+        match part:
+            case "line", x, y, color, width:
+                made += ax.plot(x, y, "-", color=color, linewidth=width, solid_capstyle="butt", clip_on=False)
+            case "text", x, y, words, color, size, ha, va:
+                made.append(ax.text(x, y, words, color=color, fontsize=size * style.small(ax), ha=ha, va=va))
+            case "box", x, y, width, height, fill, alpha:
+                made.append(ax.add_patch(Rectangle((x, y), width, height, facecolor=fill, alpha=alpha, **edge)))
+            case "circle", x, y, radius:
+                made.append(ax.add_patch(Circle((x, y), radius, facecolor="white", **edge)))
+            case "arrow", a, b, y, color, both, heavy:
+                looks = {"arrowstyle": "<|-|>" if both else "-|>", "color": color, "shrinkA": 0, "shrinkB": 0,
+                         "linewidth": 1.3 if heavy else 0.8, "mutation_scale": 8 if heavy else 6}  # fmt: skip
+                made.append(ax.annotate("", (b, y), (a, y), arrowprops=looks, annotation_clip=False))
+    return made

@@ -30,9 +30,7 @@ class _Curves(View):
     def build(self) -> None:
         self.figure = Panel(self.name)
         self.sources = [self.figure.source("x", "y") for _ in range(_MANY_MODES)]
-        self.lines = [
-            self.figure.plot.line("x", "y", source=source, line_width=1.6) for source in self.sources
-        ]
+        self.lines = [self.figure.plot.line("x", "y", source=source, line_width=1.6) for source in self.sources]
         for k, line in enumerate(self.lines):
             self.ink(_MODES[k % len(_MODES)], line)
 
@@ -138,12 +136,11 @@ class History(_Curves):
         self.figure.x.name("t", str(run["time"].attrs.get("units", "1")))
         self.figure.y.name(*self.quantity(self.state.x))
 
-
     def legend(self) -> list[tuple[str, ...]]:
         """Modes that the motion visits, in the colours that they have in the phase plane too."""
         run = self.sheet.results.get("run")
         seen = [] if run is None else np.unique(run["mode"].values).tolist()
-        if not 1 < len(seen) <= len(_MODES) or max(seen) >= len(_MODES):
+        if run is None or not 1 < len(seen) <= len(_MODES) or max(seen) >= len(_MODES):
             return []
         words = dict(zip(run["mode"].values.tolist(), in_words(run["mode"]).tolist(), strict=True))
         return [(str(words[k]).replace("_", " "), _MODES[k][self.dark]) for k in seen if k >= 0]

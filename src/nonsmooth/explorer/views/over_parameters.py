@@ -29,8 +29,11 @@ _HEIGHT = 400  # pixels of an image before the page has said how large it is
 _DIRECTIONS = {"up": BLUE, "down": (COLORS["second"],) * 2}
 #: Clouds of the diagram: their colours, and the height of a dot.
 _CLOUDS = {
-    "first look": (("#7F7F7F",) * 2, 2), "up": (BLUE, 4), "down": (_DIRECTIONS["down"], 2),
-    "rest": (BLUE, 2), "many": ((COLORS["third"],) * 2, 2),
+    "first look": (("#7F7F7F",) * 2, 2),
+    "up": (BLUE, 4),
+    "down": (_DIRECTIONS["down"], 2),
+    "rest": (BLUE, 2),
+    "many": ((COLORS["third"],) * 2, 2),
 }
 
 
@@ -283,7 +286,9 @@ class Branches(View):
         if self.setting("show") != "yes":
             return []
         lines = [(_LINES[line][0], _STROKES[line]) for line, source in self._lines.items() if len(source.data["x"])]
-        marks = [(MARKS.get(kind, ("", kind.replace("_", " ")))[1], _SIGNS.get(kind, _OTHER)[1]) for kind in self._kinds]
+        marks = [
+            (MARKS.get(kind, ("", kind.replace("_", " ")))[1], _SIGNS.get(kind, _OTHER)[1]) for kind in self._kinds
+        ]
         return [(words, INK[self.dark], sign) for words, sign in lines + marks]
 
     def clear(self) -> None:

@@ -132,7 +132,7 @@ class Chart(Cells):
             more = known.sel({over: x, across: y}, method="nearest").transpose(across, over).values
             unit = str(known.attrs.get("units", "1"))
         self.put(x, y, classes, entries, self._stage, more, unit)
-        self._legend = legend_of(classes, entries)
+        self._legend: list[tuple[str, ...]] = [*legend_of(classes, entries)]
         self.figure.show((self.state.low, self.state.high), (float(y[0]), float(y[-1])))
         self.name_axes(over, across)
         self.place()
@@ -216,7 +216,7 @@ class Basins(Cells):
         )]  # fmt: skip
         classes = np.maximum(result["label"].transpose(second, first).values, -2) + 2
         self.put(x, y, classes, entries, self._stage)
-        self._legend = [entries[k] for k in np.unique(classes)]
+        self._legend: list[tuple[str, ...]] = [entries[k] for k in np.unique(classes)]
         marks = [_MARKS[numbers[k] % len(_MARKS)] if periods[k] else "dot" for k in of]
         self.points.data = {"x": points[:, 0], "y": points[:, 1], "marker": marks}
         half = [0.5 * np.ptp(one) / max(len(one) - 1, 1) for one in (x, y)]
