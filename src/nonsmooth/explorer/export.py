@@ -57,7 +57,7 @@ def exported(view: str, kind: str, results: Mapping[str, Any], state: Any) -> tu
         if kind == "nc":
             ns.save(result, path)
         elif moves:
-            ns.animate(result, x=state.x, y=state.y).save(path)
+            ns.animate(result, x=state.x, y=state.y, seconds=4.0, rate=15).save(path)
         else:
             import matplotlib.pyplot as plt
 

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Asked", "Schedule", "key_of"]
 
-_BLINK = 0.4  # seconds: a first look that took no longer the last time comes before the orbit, for a hand that moves
 _PATIENCE = 1.0  # seconds after which short work is cancelled like any other
 _DEAF = 10.0  # seconds in which cancelled work must end by itself
 _VAIN = 3  # times in a row that the worker ended before it could take work; then it is not started again
@@ -55,7 +54,6 @@ class Schedule:
         self._vain = 0
         self._running: Asked | None = None
         self._count = 0
-        self._looked = "", float("inf")  # the model of the last first look, and the seconds that it took
         self.worker: Worker | None = None  # a request that opens no page starts no process
 
     def begin(self, hear: Callable[[Answer], None]) -> bool:
@@ -86,8 +84,6 @@ class Schedule:
             for view in ORDER
             if view in wanted and wanted[view][1] not in (self.done.get(view), self._failed.get(view))
         ]
-        if "first look" in missing and self._looked[0] == self.page.subject[0] and self._looked[1] < _BLINK:
-            missing.sort(key=lambda view: view != "first look")
         now, running, order = time.monotonic(), self._running, [*ORDER]
         if running is not None:
             stale = running.view not in wanted or wanted[running.view][1] != running.key
@@ -151,8 +147,6 @@ class Schedule:
             self.page.sheet.forget(running.view)
         elif kind == "done":
             found, warned = content
-            if running.view == "first look":
-                self._looked = running.of[0], time.monotonic() - running.since
             self.done[running.view] = running.key
             self._failed.pop(running.view, None)
             if warned:

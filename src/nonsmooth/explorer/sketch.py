@@ -26,7 +26,7 @@ def _short(part: Any) -> Any:
     """A part as JSON holds it: numbers with two digits behind the point, breaks of a line as None, plain words."""
     if isinstance(part, str):
         return _plain(part) if part.startswith("$") else part
-    if np.ndim(part) or isinstance(part, tuple):
+    if isinstance(part, tuple) or np.ndim(part):
         return [_short(one) for one in part]
     return part if isinstance(part, bool) else round(float(part), 2) if np.isfinite(part) else None
 
