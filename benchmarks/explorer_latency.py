@@ -20,8 +20,9 @@ sys.path.insert(0, str(ROOT))
 
 WATCH = """() => {
     window.shown = {};
-    const note = (name, model, property) => model.properties[property].change.connect(() =>
-        requestAnimationFrame(() => setTimeout(() => { window.shown[name] ??= performance.now() - window.begun; })));
+    const drawn = name =>
+        requestAnimationFrame(() => setTimeout(() => { window.shown[name] ??= performance.now() - window.begun; }));
+    const note = (name, model, property) => model.properties[property].change.connect(() => drawn(name));
     const one = name => Bokeh.documents[0].get_model_by_name(name);
     note("orbit", one("portrait").renderers[0].data_source, "data");
     note("history", one("history").renderers[0].data_source, "data");
@@ -30,7 +31,7 @@ WATCH = """() => {
     image.properties.data.change.connect(() => {
         const {of, stage} = image.data;
         if (JSON.parse(of[0]).values.g === window.sent)
-            requestAnimationFrame(() => setTimeout(() => { window.shown[stage[0]] ??= performance.now() - window.begun; }));
+            drawn(stage[0]);
     });
 }"""
 MOVE = """value => {
@@ -41,7 +42,13 @@ MOVE = """value => {
     window.begun = performance.now();
     slider.dispatchEvent(new Event("input"));
 }"""
-ANSWERS = {"orbit": "orbit", "history": "history", "sketch": "sketch", "first look": "quick preview", "judged": "diagram"}
+ANSWERS = {
+    "orbit": "orbit",
+    "history": "history",
+    "sketch": "sketch",
+    "first look": "quick preview",
+    "judged": "diagram",
+}
 
 
 def main() -> None:

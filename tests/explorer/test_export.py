@@ -123,7 +123,14 @@ def test_what_has_no_table_in_a_study_file_is_saved_as_the_script_that_makes_it(
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("py", "toml")])
 def test_figures_and_data(kind: str, results: dict[str, Any], tmp_path: Path) -> None:
-    begins = {"pdf": b"%PDF", "png": b"\x89PNG", "svg": b"<?xml", "nc": b"\x89HDF", "gif": b"GIF8", "html": b"<!doctype"}[kind]
+    begins = {
+        "pdf": b"%PDF",
+        "png": b"\x89PNG",
+        "svg": b"<?xml",
+        "nc": b"\x89HDF",
+        "gif": b"GIF8",
+        "html": b"<!doctype",
+    }[kind]
     path = write(tmp_path, "history", kind, results)
     assert path.read_bytes().startswith(begins)
     if kind == "nc":

@@ -239,5 +239,6 @@ def _spectrum(job: Job) -> dict[str, Any]:
 _WORK: dict[str, Callable[[Job], dict[str, Any]]] = {
     "orbit": _orbit, "section": _section, "sketch": _sketch, "stability": _stability, "first look": _first_look,
     "diagram": _diagram, "branches": _branches, "first response": _response, "response": _response,
-    **dict.fromkeys(_CHARTS, _chart), **dict.fromkeys(_BASINS, _basins), "spectrum": _spectrum, "recording": laid_over, "fit": fitted,
+    **dict.fromkeys(_CHARTS, _chart), **dict.fromkeys(_BASINS, _basins), "spectrum": _spectrum, "recording": laid_over,
+    "fit": fitted,
 }  # fmt: skip
