@@ -2,8 +2,8 @@
 
 One parameter is moved at a time, and the next move waits until all is drawn. Each answer is timed in the browser, from
 the event of the slider to the frame behind the change of what is drawn: the orbit, the history, the sketch, the quick
-preview of the diagram (600 columns of 300 and 100 periods) and the diagram with its period numbers. Needs playwright and
-Chromium (or the environment variable CHROMIUM); run it on a quiet machine.
+preview of the diagram (600 columns of 300 and 100 periods) and the diagram with its period numbers. Needs playwright
+and Chromium (or the environment variable CHROMIUM); run it on a quiet machine.
 """
 
 from __future__ import annotations
