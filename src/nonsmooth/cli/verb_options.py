@@ -17,7 +17,7 @@ __all__ = ["VERBS", "Option", "options_of"]
 
 VERBS = ("simulate", "sweep", "frequency_response", "poincare", "chart", "basins", "basin_fractions")
 #: Arguments of verbs that belong to the command line, or that a file cannot hold.
-_NOT_IN_FILES = ("system", "progress", "client", "store")
+_NOT_IN_FILES = ("system", "inputs", "progress", "client", "store")  # `inputs` are arrays
 #: A verb that hands its further options on to another takes that one's keys too.
 _HANDS_ON_TO = {"frequency_response": "sweep"}
 
