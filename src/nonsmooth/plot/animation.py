@@ -216,6 +216,7 @@ class Animation:
             first.save(target, save_all=True, append_images=others, **looks)
         else:
             head = '<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>nonsmooth</title>\n'
+            head += '<meta name="viewport" content="width=device-width">\n'
             target.write_text(f"{head}<body>{self._repr_html_()}</body></html>\n", encoding="utf-8")
         return target
 
