@@ -31,7 +31,7 @@ def test_free_decay_finds_frequency_and_damping_of_the_closed_form():
     error = np.sqrt(np.diag(found.covariance))
     assert np.all(np.abs(found.values - [w, b, 0.0, 0.0]) < 3.5 * error)
     assert error[0] < 1e-3 and error[1] < 1e-3
-    assert found.fit.jitter == pytest.approx(5e-5, rel=0.5)
+    assert found.jitter(COUNT) == pytest.approx(5e-5, rel=0.5)
 
 
 def test_free_decay_tells_viscous_damping_from_dry_friction():

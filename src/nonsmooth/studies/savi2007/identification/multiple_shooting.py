@@ -132,7 +132,7 @@ def shoot_contacts(
         precision.append(own_precision)
     if not pieces:
         raise ValueError("no run shows a contact: the gap and the support cannot be found from them")
-    joint = _Joint(pieces, np.array(values), np.array(steps), precision, resolution, decay.fit.jitter)
+    joint = _Joint(pieces, np.array(values), np.array(steps), precision, resolution, decay.jitter(resolution))
     fit, kept, short = joint.best(len(taken))
     moved = joint.by_turns(fit, kept)
     return ContactFit(
