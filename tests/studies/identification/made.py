@@ -5,7 +5,7 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 from nonsmooth import ParameterSet
-from nonsmooth.identification import Estimate, Finding
+from nonsmooth.identification import Estimate
 from nonsmooth.studies.savi2007.identification.evidence import Run
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit
 
@@ -34,12 +34,8 @@ def run(procedure, time, x=None, *, force=None, turns=None, name="Run #1", **set
 
 def decay_of(omega_0, b, f, zero=0.0, error=1e-6):
     """The free oscillator as a free decay would have told it, without a fit behind it."""
-    residuals = xr.Dataset(
-        {"fitted": ("sample", [0.0, 1.0]), "run": ("sample", [0, 0])}, {"time": ("sample", [0.0, 1.0])}
-    )
-    noise = Estimate(float(np.hypot(COUNT / np.sqrt(12), 5e-5)), 0.0, "m")  # at 1 m/s: a clock that jitters by 50 us
-    finding = Finding("fit", noise, "", 2, (), data=residuals)
-    fit = ParameterSet({}, np.zeros((1, 1)), extra={"x.noise": noise}, findings=[finding])
+    noise = Estimate(COUNT / np.sqrt(12), 0.0, "m")
+    fit = ParameterSet({}, np.zeros((1, 1)), extra={"x.noise": noise})
     return DecayFit(np.array([omega_0, b, f, zero]), error**2 * np.eye(4), (0,), ((0, 2),), fit)
 
 

@@ -31,7 +31,7 @@ _CHAOS = 1e3  # growth of a start's change within a window, from which neighbour
 _REGULAR = 10.0  # that growth, below which a motion is regular enough to be followed over twice the time
 _WORSE = 1.5  # chi^2 per degree of freedom against that of the level before: a longer window does not fit
 _GOOD, _WHITE = 1.3, 5.0  # residuals over irregularity, and readings that share an error, of a fit that needs no other
-_NEAR = 0.6  # residuals of a guess over the readings' own size, up to which whole records are fitted from it
+_NEAR = 0.6  # residuals of a guess over the readings' own size, up to which the longest windows are fitted from it
 SHORT = 0.05  # standard uncertainties from the minimum, beyond which a fit is said not to have come to its end
 _ROUNDS = 12  # of noise from residuals and residuals from noise
 
@@ -146,14 +146,10 @@ def grow(
     return replace(final, stuck=stuck)
 
 
-def _at_once(
-    problem: Windows, theta: FloatArray, start: FloatArray | None, free: bool, longest: float
-) -> Grown | None:
-    """The fit over whole records, from a guess so near that it needs no shorter windows; None where it is not."""
-    if not max(record.duration for record in problem.records) < longest:
-        return None
-    now = problem.of(first_windows(problem, theta, np.inf, start, free))
-    if len(now.pieces) != len(problem.records):
+def _at_once(problem: Windows, theta: FloatArray, start: FloatArray | None, free: bool, longest: float) -> Grown | None:
+    """The fit over the longest windows, from a guess so near that it needs no shorter ones; None where it is not."""
+    now = problem.of(first_windows(problem, theta, longest, start, free))
+    if not now.pieces:
         return None
     state = now.residuals(theta, now.starts)
     for c in range(len(problem.sensors)):

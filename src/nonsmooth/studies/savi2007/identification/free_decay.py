@@ -64,14 +64,6 @@ class DecayFit:
         """Standard deviation of a reading (m)."""
         return self.fit.extra["x.noise"].value
 
-    def jitter(self, resolution: float) -> float:
-        """Standard deviation of the sampling instants (s): what the residuals have more than rounding, over speed."""
-        data, speed = self.fit.residuals, []
-        for run in range(len(self.runs)):
-            mine = data["run"].values == run
-            speed.append(np.gradient(data["fitted"].values[mine], data["time"].values[mine]))
-        return float(np.sqrt(max(self.noise**2 - resolution**2 / 12, 0.0) / np.mean(np.concatenate(speed) ** 2)))
-
     def error(self, name: str) -> float:
         """Standard uncertainty of one of the four."""
         i = _NAMES.index(name)
@@ -263,9 +255,10 @@ def _agreeing(
     """
     alone: dict[int, tuple[FloatArray, FloatArray]] = {}
     left: dict[int, float] = {}
+    first = _guess(records)
     for i, r in enumerate(records):
         try:
-            values, covariance, found = _fit([r], friction, resolution)
+            values, covariance, found = _fit([r], friction, resolution, first)
             alone[i] = values, covariance + _doubt([r], runs, resolution, slowest, friction, values)
         except SolveError:
             continue
