@@ -72,7 +72,8 @@ def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: Quantity, *, resol
     c_error, friction_error = (float(e) for e in np.sqrt(np.diag(covariance)))
     related = float(own[0, 1] / np.sqrt(own[0, 0] * own[1, 1])) if own[1, 1] else 0.0
     notes = [
-        f"by their logarithmic decrement, without friction, the same decays give {plain:.4g} N s/m, {100 * (plain / c - 1):+.1f} %",
+        f"by their logarithmic decrement, without friction, the same decays give {plain:.4g} N s/m, "
+        f"{100 * (plain / c - 1):+.1f} %",
         f"c and the dry friction are told apart by the shape; correlation {related:+.2f}",
         *decay.notes,
     ]
