@@ -262,6 +262,7 @@ def best_of(
                 if best is None or found.good or found.rank < best.rank:
                     best = found
                 if found.good:
+                    advance(left[0])
                     return best
             advance(left[0])
     if best is None:
