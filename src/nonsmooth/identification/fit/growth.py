@@ -158,6 +158,8 @@ def _at_once(problem: Windows, theta: FloatArray, start: FloatArray | None, free
             return None
     try:
         found = level(now, theta, now.starts)
+        if _reduced(now, found[2]) > 2.0 * _GOOD**2:
+            return None
         final = _begun(_final(now, *found[:2], problem.noise, _ROUNDS), problem.noise, _ROUNDS)
     except SolveError:
         return None
@@ -230,14 +232,12 @@ def _reduced(problem: Windows, state: State) -> float:
 def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: FloatArray, rounds: int) -> Grown:
     """The fit at its minimum, with the noise of each quantity from its residuals."""
     u, short, left = problem.unknowns, 0.0, np.zeros(len(theta))
-    for k in range(rounds):
+    for _ in range(rounds):
         colour = colours(problem, problem.plain.residuals(theta, starts))
         problem, before = replace(problem, colour=colour), problem
         noise = _noise(problem, problem.residuals(theta, starts))
         changed = float(max(np.max(np.abs(noise / before.noise - 1.0)), np.max(np.abs(colour - before.colour))))
         problem = replace(problem, noise=noise)
-        if k and changed < 0.02:  # by weights that are the same the minimum is the same
-            break
         try:
             theta, starts, _, _ = settle(
                 problem, theta, starts, 0.0, [True] * len(starts), u.centre, u.precision, 50, False, (u.low, u.high),
@@ -247,6 +247,8 @@ def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: F
         except Unsettled as reason:  # a sum of squares with corners: grazes, rest
             theta, starts = reason.values, reason.starts
             short, left = float(np.max(reason.distance)), reason.step
+        if changed < 0.02:
+            break
     state = problem.residuals(theta, starts)
     far, missing = strange(problem, problem.plain.residuals(theta, starts), state, irregular)
     return Grown(problem, theta, starts, state, short, left, far, missing)

@@ -129,7 +129,6 @@ def read_unknowns(
         if pair is not None:
             low[i], high[i] = _bounds(name, pair, guess[i])
     centre, precision = _known(tuple(names), priors, guess)
-    guess = np.where([name in each for name in base], np.clip(centre, low, high), guess)
     return Unknowns(
         tuple(names), active, of_sensors, clock, phases, tuple(of_names[name] for name in base), guess, low, high,
         centre, precision, places,
