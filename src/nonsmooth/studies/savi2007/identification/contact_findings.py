@@ -69,7 +69,7 @@ def contact_finding(found: ContactFit, mass: Quantity, *, resolution: float) -> 
 
 
 def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: float, kappa_error: float) -> Finding:
-    r"""The profile of c_s over a single window with contact: what one contact tells on its own.
+    r"""The profile of c_s over a window with a single contact: what one contact tells on its own.
 
     Known besides is what does not come from contacts: the free oscillator, k_s/m, and the drive as set. Gap, place and
     the drive's details are this window's own to find, as they were for all together.
@@ -91,7 +91,7 @@ def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: 
     Finding
         ``c_s_one_contact``, from the window that is the median one, of some, in how well it tells c_s.
     """
-    kappa, gamma, windows = float(found.values[_KAPPA]), float(found.values[_GAMMA]), found.windows()
+    kappa, gamma, windows = float(found.values[_KAPPA]), float(found.values[_GAMMA]), found.single()
     alone = []
     for i, first, last in windows[:: max(len(windows) // _TRIED, 1)]:
         run = found.runs[i]
@@ -108,7 +108,7 @@ def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: 
         if np.isfinite(one.uncertainty["gamma"]):
             alone.append((float(one.uncertainty["gamma"]), run, one))
     if not alone:
-        raise ValueError("no window with contact can be fitted on its own")
+        raise ValueError("no contact can be fitted on its own")
     width, run, one = sorted(alone, key=lambda row: row[0])[len(alone) // 2]
     data = next(finding.data for finding in one.findings if finding.name == "gamma, profile")
     assert data is not None
@@ -119,7 +119,7 @@ def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: 
     shown = shown.assign_coords(value=("value", mass * data["value"].values, {"units": "N s/m"}))
     return Finding(
         "c_s_one_contact", Estimate(best, error, "N s/m", logarithmic=True),
-        "profile likelihood of one window with contact, its gap, place and drive found with it",
+        "profile likelihood of one contact, its gap, place and drive found with it",
         int(one.residuals.sizes["sample"]), (run.name,),
         (
             (f"95 % limits {low:.3g} to {high:.3g} N s/m" if bounded else "the profile does not bound it on both sides")
@@ -131,11 +131,10 @@ def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: 
 
 
 def _data(found: ContactFit, resolution: float) -> xr.Dataset:
-    """The run with the most contacts, sample by sample."""
+    """The longest run, sample by sample."""
     import xarray as xr
 
-    each = [i for i, _, _ in found.windows()]
-    which = max(range(len(found.runs)), key=each.count)
+    which = max(range(len(found.runs)), key=lambda i: found.fits[i].residuals.sizes["sample"])
     run, fitted_of = found.runs[which], found.fits[which].residuals
     time, x = run.time, run.positions
     fitted, segment = np.full(len(x), np.nan), np.full(len(x), -1)

@@ -77,14 +77,15 @@ class ContactFit:
         above = [one.residuals["fitted"].values > self.values[self.place(i, 0)] for i, one in enumerate(self.fits)]
         return sum(int(np.count_nonzero(np.diff(each.astype(int)) > 0)) for each in above)
 
-    def windows(self) -> list[tuple[int, float, float]]:
-        """Run, first and last time (s) of each window with a contact."""
+    def single(self) -> list[tuple[int, float, float]]:
+        """Run, first and last time (s) of each window with one contact."""
         found = []
         for i, one in enumerate(self.fits):
             data = one.residuals
             for k in np.unique(data["window"].values):
                 mine = data["window"].values == k
-                if float(data["fitted"].values[mine].max()) > self.values[self.place(i, 0)]:
+                above = data["fitted"].values[mine] > self.values[self.place(i, 0)]
+                if np.count_nonzero(np.diff(above.astype(int)) > 0) == 1:
                     time = data["time"].values[mine]
                     found.append((i, float(time[0]), float(time[-1])))
         return found
