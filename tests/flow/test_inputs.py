@@ -60,6 +60,30 @@ def test_a_step_that_lets_a_block_go_does_so_at_its_own_time() -> None:
     np.testing.assert_allclose(found.P.sel(parameter="late")[:2], [-0.27, -0.3], atol=1e-12)
 
 
+def test_a_delay_moves_a_ramp_from_the_start_on() -> None:
+    """v(2) = (1/m) times the integral of 3 (t - late) + 3 over 0 < t < 2."""
+    cart = ns.mechanical(2.0, 0.0, 0.0, parameters={"late": 0.1}, forcing={"q": lambda t, p: p.force},
+                         inputs={"force": "N"})  # fmt: skip
+    force = ns.Input([-1, 5], [0, 18], delay="late")
+    found = ns.sensitivity(cart, duration=2.0, parameters=["late"], inputs={"force": force})
+    np.testing.assert_allclose(found.end[:2], [(3 * 8 / 6 + 2.7 * 2) / 2, (6 + 2.7 * 2) / 2], atol=1e-13)
+    np.testing.assert_allclose(found.P.sel(parameter="late"), [-3.0, -3.0, -3.0, 0.0], atol=1e-13)
+
+
+def test_a_step_that_brings_a_reset_about() -> None:
+    """v is halved where the force rises above 1, at t = 1 + late: v(2) = (1 + (1 + late)/2)/2 + 2 (1 - late)."""
+    rig = ns.System(
+        states=["x", "v"], parameters={"late": 0.1}, inputs={"f": ""},
+        modes={"low": lambda t, u, p: [u.v, p.f], "high": lambda t, u, p: [u.v, p.f]},
+        indicators={"level": lambda t, u, p: p.f - 1},
+        transitions=[ns.Transition("low", "high", when="level > 0", reset=lambda t, u, p: [u.x, u.v / 2])],
+    )  # fmt: skip
+    step = ns.Input([0, 1], [0.5, 2.0], between="steps", delay="late")
+    found = ns.sensitivity(rig, duration=2.0, start={"v": 1.0}, parameters=["late"], inputs={"f": step})
+    assert abs(found.end[1] - (0.5 + 0.25 * 1.1 + 1.8)) < 1e-13
+    np.testing.assert_allclose(found.P.sel(parameter="late")[1], 0.25 - 2.0, atol=1e-12)
+
+
 def test_a_mass_pressed_on_a_stop_lifts_where_the_load_turns() -> None:
     """Modes made when visited, too; the force on the stop is the load."""
     for rubs in (False, True):

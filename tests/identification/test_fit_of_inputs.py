@@ -57,8 +57,8 @@ def test_parameters_and_the_delay_of_a_measured_force(recording: dict[str, Any])
 
 
 def test_what_is_refused(recording: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match="`mot` is not a channel"):
-        ns.fit(rig(), recording, ["k"], inputs={"f": "mot"}, progress=False)
+    with pytest.raises(ValueError, match="`moto` is not a channel"):
+        ns.fit(rig(), recording, ["k"], inputs={"f": "moto"}, progress=False)
     with pytest.raises(ValueError, match="'f' is missing"):
         ns.fit(rig(), {"x": recording["x"]}, ["k"], progress=False)
     with pytest.raises(ValueError, match="neither 'phase' nor 'clock'"):

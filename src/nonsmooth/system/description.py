@@ -175,7 +175,8 @@ def describe(
     slid = [(item, sliding_mode(item, transitions)) for item in _surfaces(transitions)]
     check_names(
         {
-            "state": units, "parameter": known, "memory": remembered, "mode": modes, "indicator": indicators,
+            "state": [key for key in units if key not in input_states(driven)], "input": input_states(driven),
+            "parameter": known, "memory": remembered, "mode": modes, "indicator": indicators,
             "output": shown, "memory of a band": sorted(inside), "sliding mode": [mode for _, mode in slid],
         },
         name,

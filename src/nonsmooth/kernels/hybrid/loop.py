@@ -196,6 +196,9 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
         alone = MAY_WAIT != 0 and net.transitions[t, 4] == ALONE and net.transitions[t, 1] == RESET
         asks = MAY_WAIT != 0 and net.transitions[t, 4] == ASKS_BEHIND
         t = next_holding(mode, tables, net, work)
+        if MAY_WAIT != 0 and t >= 0 and net.transitions[t, 4] == ALONE and net.together[mode] >= 0:
+            if meets_another(mode, net.rows[net.row_start[t], 0], net, tables, work):
+                t = net.together[mode]
         if asks and (t < 0 or net.transitions[t, 4] < OWN):
             t = net.together[mode]
         if alone and meets_another(mode, fired, net, tables, work):  # an impact has ended other rates too

@@ -89,6 +89,11 @@ class Assembler(ABC):
         """A vector of states, or field, with ``amount`` times the direction of an element added."""
 
     @abstractmethod
+    def holding(self, field: Any, rate: Any, pull: Any) -> Any:
+        """The field with the derivative of a held rate as ``pull``, without rounding, where the rate is that of a state
+        and constant in time: else what is left of large forces moves what rests, in each mode elsewhere."""
+
+    @abstractmethod
     def joined(self, part: Part, other: Part, share: Any) -> Part:
         """An element whose force brings ``share`` of it along as the force of another."""
 
@@ -249,9 +254,11 @@ class Assembler(ABC):
             parts = [self.pushing(k, mode, pattern) for k in chosen]
             matrix = self.effects(chosen, mode, parts)
             needed = self.solved(matrix, [-self.along(self.rate(k, mode), f) for k in chosen])
-            back = self.solved(matrix, [self.parts[k].element.pull(self.place(k, mode, pattern)) for k in chosen])
-            for part, force, extra in zip(parts, needed, back, strict=True):
+            pulls = [self.parts[k].element.pull(self.place(k, mode, pattern)) for k in chosen]
+            for part, force, extra in zip(parts, needed, self.solved(matrix, pulls), strict=True):
                 f = self.moved(f, part, force + extra)
+            for k, pull in zip(chosen, pulls, strict=True):
+                f = self.holding(f, self.rate(k, mode), pull)
             if len(chosen) == len(held):
                 forces |= dict(zip(held, needed, strict=True))
             else:

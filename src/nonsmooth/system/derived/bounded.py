@@ -15,13 +15,14 @@ def least(G: FloatArray, a: FloatArray, low: FloatArray, high: FloatArray) -> Fl
     """Minimise 1/2 x' G x + a' x between bounds, for G not negative and symmetric by factors (:mod:`.convex`)."""
     size, scale = len(a), _symmetric(G)
     x, sets, factor = np.empty((2, size)), np.empty((2, size), dtype=np.int64), np.empty((size, size + 1))
-    status = convex.least(G * scale, a + 0.0, low / scale, high / scale, x[0], *sets, factor, x[1])
+    unit = max(1.0, np.abs(a).max(initial=0.0))  # high derivatives may be beyond what counts as endless there
+    status = convex.least(G * scale, a / unit, low / scale / unit, high / scale / unit, x[0], *sets, factor, x[1])
     if status:
         raise SolveError(
             "the forces of contacts and frictions that decide together were not found: "
             + ("no set is the last" if status == 1 else "contacts close on what cannot give way")
         )
-    return x[0] * scale
+    return x[0] * scale * unit
 
 
 def least_within(sums: FloatArray, total: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

@@ -278,6 +278,12 @@ class _Instant:
                 continue
             amounts = np.linalg.lstsq(self.numbers.effects(by, by), -off, rcond=1e-10)[0]
             self.numbers.shift(sum(self.numbers.direction(k) * x for k, x in zip(by, amounts, strict=True)))
+        for _ in range(2):  # of one state no rounding is left, which would move what rests
+            for one in expressions:
+                slopes = self.numbers.slopes(one)
+                if np.count_nonzero(slopes) == 1:
+                    alone = slopes != 0.0
+                    self.numbers.shift(np.where(alone, -self.numbers.value(one) / np.where(alone, slopes, 1.0), 0.0))
 
     def _states(self, candidates: list[int], slips: dict[int, int]) -> dict[int, int]:
         """The contact states of the candidates, and of frictions that slip at a contact: those of the convex problem,

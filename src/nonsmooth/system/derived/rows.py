@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SolveError, SystemDefinitionError
 from nonsmooth.system.codegen.linear import put_together
 from nonsmooth.system.derived.assembly import Assembler, Part, Pattern, VaryingError
 
@@ -178,6 +178,13 @@ class Rows(Assembler):
     def moved(self, vector: FloatArray, part: Part, amount: Any) -> FloatArray:
         return vector + np.outer(part.direction, amount.values) if isinstance(amount, Row) else vector
 
+    def holding(self, field: FloatArray, rate: Row, pull: Any) -> FloatArray:
+        some, waves = np.flatnonzero(rate.values[: self.n]), rate.values[self.n + 1 :]
+        if len(some) == 1 and not waves.any():
+            field = field.copy()
+            field[some[0]] = pull.values / rate.values[some[0]] if isinstance(pull, Row) else 0.0
+        return field
+
     def joined(self, part: Part, other: Part, share: Any) -> Part:
         return replace(part, direction=part.direction + share * other.direction)
 
@@ -192,7 +199,15 @@ class Rows(Assembler):
 
     def solved(self, matrix: list[list[float]], right: list[Any]) -> list[Row]:
         rows = [one.values if isinstance(one, Row) else np.zeros(self.field.shape[1]) for one in right]
-        return [Row(values, self.n) for values in np.linalg.solve(np.array(matrix), np.array(rows))]
+        try:
+            found = np.linalg.solve(np.array(matrix), np.array(rows))
+        except np.linalg.LinAlgError:
+            raise SolveError(
+                "contacts that depend on each other are struck at once, as a mass between two walls at one place: "
+                "leave one of them out",
+                status="not_unique",
+            ) from None
+        return [Row(values, self.n) for values in found]
 
     def slopes(self, expression: Row, draw: int = 0) -> FloatArray:
         return expression.values[: self.n].real

@@ -6,7 +6,7 @@ derivatives, the code generator, the smoothed switch and the text form.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -109,6 +109,24 @@ class Traced:
     def asks(self) -> bool:
         """Return whether elements are asked what they do together (:mod:`nonsmooth.system.derived.deciding`)."""
         return self.decider is not None or self.patterns is not None
+
+    def __hash__(self) -> int:
+        """A hash of names and counts: one of all expressions takes milliseconds where there are many modes."""
+        names = self.name, self.state_names, self.parameter_names
+        return hash((*names, len(self.mode_names), len(self.transitions)))
+
+    def __eq__(self, other: object) -> bool:
+        """Compared once, entry by entry: two that are equal remember it, since caches ask again and again."""
+        if self is other or not isinstance(other, Traced):
+            return self is other
+        mine, its = (one.__dict__.get("_mark") for one in (self, other))
+        if mine is None or mine is not its:
+            if any(getattr(self, one.name) != getattr(other, one.name) for one in fields(self) if one.compare):
+                return False
+            mark = mine or its or object()
+            for one in (self, other):
+                object.__setattr__(one, "_mark", mark)
+        return True
 
     def without_answers(self, rows: bool = False) -> tuple[Traced, tuple[int, ...]]:
         """The system without the answers that change states as a transition before them, with ``rows`` one by the same

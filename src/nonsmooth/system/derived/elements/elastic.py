@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from nonsmooth.system.derived.elements.element import Condition, Contact, Element, Law, Leaving
+from nonsmooth.system.derived.elements.element import SMALL, Condition, Contact, Element, Law, Leaving
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.place import Place
@@ -124,7 +124,7 @@ class PreloadedSpring(Displaced):
 
     phases: ClassVar[tuple[str, ...]] = ("above", "below", "held")
     laws: ClassVar[tuple[str, ...]] = ("preload", "stiffness")
-    conditions: ClassVar[tuple[str, ...]] = ("over", "under", "side", "fast")
+    conditions: ClassVar[tuple[str, ...]] = ("over", "under", "side", "fast", "beyond")
     held: ClassVar[tuple[str, ...]] = ("held",)
     sides: ClassVar[tuple[str, str]] = ("above", "below")
 
@@ -150,6 +150,9 @@ class PreloadedSpring(Displaced):
         side, rate = Condition(here.where, sign, "side"), here.rate()
         fast = Condition(rate - sign * self.slow * here.size(rate), sign, "fast")
         crossed = [Leaving(to, [side, one]) for one in (fast, over, under)]
+        if here.begins_alone():
+            off = SMALL * here.size(here.where)
+            crossed.insert(0, Leaving(to, [Condition(here.where - sign * off, sign, "beyond")]))
         return [*crossed, Leaving("held", [side], here.struck(0))]
 
 
