@@ -9,7 +9,6 @@ import pytest
 
 import nonsmooth as ns
 
-pytestmark = pytest.mark.physics
 T = np.arange(0.0, 20.0, 0.05)
 
 

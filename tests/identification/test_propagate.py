@@ -10,7 +10,6 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.identification import Estimate
 
-pytestmark = pytest.mark.physics
 QUIET: dict[str, Any] = {"progress": False}
 
 
