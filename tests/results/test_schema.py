@@ -70,7 +70,8 @@ def test_what_is_done_to_one_result_does_not_reach_the_next(labels: Labels) -> N
     first = build(labels, ("up",), 1, ())
     for state in (first["state"], first.coords["state"], first.variables["state"]):
         state.attrs["note"] = "mine"
-        assert not state.values.flags.writeable
+        if state.values.flags.writeable:  # a copy, which pandas 3.1 makes of names
+            state.values[0] = "y"
     second = build(labels, ("up",), 1, ())
     assert second["state"].attrs == {"long_name": "state"}
     assert list(second["state"].values) == list(labels.states)
