@@ -194,6 +194,14 @@ def test_text_and_what_is_refused() -> None:
         ns.Input([0, 1, 2], [0, np.nan, 1])
     with pytest.raises(ValueError, match="sample 2 is at 1 after 1"):
         ns.Input([0, 1, 1], [0, 2, 1])
+    with pytest.raises(ValueError, match="start: 'f' is that of an input"):
+        ns.simulate(system, duration=1.0, start={"f": 1.0}, inputs=inputs)
+    with pytest.raises(ValueError, match="names the channel 'load cell'"):
+        ns.simulate(system, duration=1.0, inputs=inputs | {"f": ns.Input("load cell")})
+    with pytest.raises(ns.SystemDefinitionError, match="'f' is given to a state and to an input"):
+        ns.System(states=["x", "f"], parameters={}, inputs=["f"], modes={"one": lambda t, u, p: [p.f, 0]})
+    run = ns.simulate(system, duration=1.0, start=[0.1, 0.2], inputs=inputs)
+    assert run.u.values[0, :2].tolist() == [0.1, 0.2]
     with pytest.raises(ValueError, match="sweep takes systems without inputs"):
         ns.sweep(system, "k", [1.0, 2.0], progress=False)
     with pytest.raises(ValueError, match="has no inputs"):

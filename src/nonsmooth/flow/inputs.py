@@ -234,6 +234,11 @@ def driven(system: System, given: Any) -> Driven | None:
             if not isinstance(one, list | tuple) or len(one) != 2:
                 raise TypeError(f"inputs[{name!r}] = {shortened(one)}: give (time, values) or ns.Input(...)")
             one = Input(*one)
+        if isinstance(one.time, str):
+            raise ValueError(
+                f"inputs[{name!r}] names the channel {one.time!r}, which fit takes from its recording; here give its "
+                "samples: ns.Input(time, values)"
+            )
         if isinstance(one.delay, str) and one.delay not in system.values:
             raise ValueError(
                 f"the delay of {name!r}: {unknown(one.delay, 'a parameter', repr(system.name), system.values)}"

@@ -92,7 +92,7 @@ def plain_start(system: System, start: Any) -> Any:
     """``start`` as data that a result can record: arrays and results as lists of numbers."""
     if start is None or (isinstance(start, Mapping) and not hasattr(start, "data_vars")):
         return start  # as it was named
-    states = start_states(system, start)
+    states = start_states(system, start)[:, : len(system.states) - 2 * len(system.inputs)]
     return states[0].tolist() if is_one_start(start) else states.tolist()
 
 
@@ -149,7 +149,9 @@ def first_state(system: System, start: Any, mode: str | None = None) -> State:
 
 
 def _state(system: System, start: Any) -> FloatArray:
-    names = list(system.states)
+    """One start as numbers; those of inputs, which a run sets, are zero."""
+    names, rest = list(system.states), np.zeros(2 * len(system.inputs))
+    own = names[: len(names) - len(rest)]
     if start is None:
         return np.zeros(len(names))
     if hasattr(start, "data_vars"):
@@ -163,19 +165,21 @@ def _state(system: System, start: Any) -> FloatArray:
     if isinstance(start, Mapping):
         for name in start:
             if name not in names:
-                raise ValueError(unknown(name, "a state", repr(system.name), dict(system.states)))
-        return _finite(np.array([_number(start.get(name, 0.0), name) for name in names]), names)
+                raise ValueError(unknown(name, "a state", repr(system.name), {key: system.states[key] for key in own}))
+            if name not in own:
+                raise ValueError(f"start: {name!r} is that of an input, which begins as its samples say: leave it out")
+        return _finite(np.array([*(_number(start.get(name, 0.0), name) for name in own), *rest]), names)
     if not _is_list(start):
         raise TypeError(
-            f"start must be a state ({_form(names)}), a result of simulate, or a list of states, not {shortened(start)}"
+            f"start must be a state ({_form(own)}), a result of simulate, or a list of states, not {shortened(start)}"
         )
     values = float_array(start, "the numbers of a start")
-    if values.shape != (len(names),):
+    if values.shape != (len(own),):
         raise ValueError(
-            f"a start of {system.name!r} has {len(names)} numbers ({', '.join(names)}), not shape {values.shape}; "
-            f"or name them: {_form(names)}"
+            f"a start of {system.name!r} has {len(own)} numbers ({', '.join(own)}), not shape {values.shape}; "
+            f"or name them: {_form(own)}"
         )
-    return _finite(values, names)
+    return _finite(np.concatenate([values, rest]), names)
 
 
 def _form(names: Sequence[str]) -> str:

@@ -127,6 +127,7 @@ def describe(
     driven = _units(inputs or {}, "inputs", name)
     if driven:
         made_of = {"name": name, "modes": modes, "transitions": transitions, "symmetry": symmetry, "bands": bands}
+        check_names({"state": units, "input": input_states(driven)}, name)
         made_of = with_inputs(driven, made_of)
         modes, transitions, units = made_of["modes"], made_of["transitions"], units | input_states(driven)
     _is_mapping(parameters, "parameters", name, '{"m": (0.838, "kg"), "k": 8.47}')

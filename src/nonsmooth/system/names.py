@@ -77,10 +77,14 @@ def check_names(groups: Mapping[str, Iterable[str]], system: str) -> None:
                 )
             if name in seen:
                 raise SystemDefinitionError(
-                    f"{system!r}: the name {name!r} is given to a {seen[name]} and to a {what}; "
+                    f"{system!r}: the name {name!r} is given to {_a(seen[name])} and to {_a(what)}; "
                     f"all names of a system must be different"
                 )
             seen[name] = what
+
+
+def _a(word: str) -> str:
+    return f"an {word}" if word[0] in "aeio" else f"a {word}"
 
 
 def check_keys(table: Iterable[str], allowed: Iterable[str], where: str, what: str) -> None:
