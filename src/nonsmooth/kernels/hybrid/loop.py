@@ -175,7 +175,7 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
     mode, code, fired = tally[MODE], OK, tally[FIRED]
     jumps = tally[TAKEN] if MAY_WAIT != 0 else 0
     if jumps == 0:
-        if MAY_WAIT != 0 and net.transitions[t, 4] == ALONE and meets_another(mode, fired, net, tables, work):
+        if MAY_WAIT != 0 and net.transitions[t, 4] == ALONE and meets_another(mode, fired, fired, net, tables, work):
             t = net.together[mode]
         tally[SOURCE], tally[FIRST] = mode, t
         approach(mode, fired, goal, seen, tables, work)
@@ -197,11 +197,11 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
         asks = MAY_WAIT != 0 and net.transitions[t, 4] == ASKS_BEHIND
         t = next_holding(mode, tables, net, work)
         if MAY_WAIT != 0 and t >= 0 and net.transitions[t, 4] == ALONE and net.together[mode] >= 0:
-            if meets_another(mode, net.rows[net.row_start[t], 0], net, tables, work):
+            if meets_another(mode, fired, net.rows[net.row_start[t], 0], net, tables, work):
                 t = net.together[mode]
         if asks and (t < 0 or net.transitions[t, 4] < OWN):
             t = net.together[mode]
-        if alone and meets_another(mode, fired, net, tables, work):  # an impact has ended other rates too
+        if alone and meets_another(mode, fired, fired, net, tables, work):  # an impact has ended other rates too
             t = net.together[mode]
     tally[TAKEN] = 0
     depart(jumps, goal, seen, work)

@@ -102,12 +102,13 @@ def holds(t, mode, tables, net, work):
 
 
 @once
-def meets_another(mode, fired, net, tables, work):
-    """Return whether another functional vanishes at the present instant that is asked for with the one that fired."""
+def meets_another(mode, fired, own, net, tables, work):
+    """Return whether a functional vanishes at the present instant that is asked for with others, but for the one that
+    fired and that of the transition which is to be taken (``own``)."""
     found, w, m, step = False, work.w, width_of(tables.field), tables.info[mode, 0]
     for k in range(net.meets_start[mode], net.meets_start[mode + 1]):
         f = net.meets[k]
-        if f != fired:
+        if f != fired and f != own:
             near = rounding(tables, mode, f, 0, w) + 0.25 * step * rounding(tables, mode, f, m, w)
             if fabs(value_of(tables, mode, f, w)) <= TOGETHER * near:
                 found = True

@@ -145,12 +145,13 @@ def take(i, t, fired, form, tables, net, work):
 
 
 @once
-def meets_another(mode, fired, net, tables, work):
-    """Return whether another indicator vanishes at the present instant that is asked for with the one that fired."""
+def meets_another(mode, fired, own, net, tables, work):
+    """Return whether an indicator vanishes at the present instant that is asked for with others, but for the one that
+    fired and that of the transition which is to be taken (``own``)."""
     found = False
     for k in range(net.meets_start[mode], net.meets_start[mode + 1]):
         f = net.meets[k]
-        if f != fired and fabs(work.vals[f]) <= TOGETHER * work.scale[f]:
+        if f != fired and f != own and fabs(work.vals[f]) <= TOGETHER * work.scale[f]:
             found = True
             break
     return found

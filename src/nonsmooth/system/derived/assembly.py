@@ -89,6 +89,10 @@ class Assembler(ABC):
         """A vector of states, or field, with ``amount`` times the direction of an element added."""
 
     @abstractmethod
+    def mapped(self, states: Any, before: Any) -> Any:
+        """One map of the states behind another."""
+
+    @abstractmethod
     def holding(self, field: Any, rate: Any, pull: Any) -> Any:
         """The field with the derivative of a held rate as ``pull``, without rounding, where the rate is that of a state
         and constant in time: else what is left of large forces moves what rests, in each mode elsewhere."""
@@ -324,16 +328,19 @@ class Assembler(ABC):
 
     def impact(self, some: Sequence[int], mode: str, factor: Any = None) -> Any:
         """States behind impulses of several elements that take their rates to -factor times these; without one, by the
-        restitution of each, of ~k without any.
+        restitution of each, of ~k without any; then those of elements that have the number of all added, which take
+        their rates to zero.
 
         Of those that keep their rate at zero, as at rest, the rate is zero before it as well."""
+        still = [k - len(self.parts) for k in some if k >= len(self.parts)]
+        some = [k for k in some if k < len(self.parts)]
         factors = [0 if k < 0 else self.law(k, "restitution") if factor is None else factor for k in some]
         some = [max(k, ~k) for k in some]
         wanted = [-(1 + e) * self.rate(k, mode) for k, e in zip(some, factors, strict=True)]
         after = self.identity()
         for k, amount in zip(some, self.solved(self.effects(some, mode), wanted), strict=True):
             after = self.moved(after, self.parts[k], amount)
-        return self.tidy(after)
+        return self.tidy(self.mapped(self.impact(still, mode, 0), after) if still else after)
 
     def leaving(self, k: int, mode: str, pattern: Pattern) -> list[Leaving]:
         """The ways of element k out of its phase; those that it decides with others have none behind it."""

@@ -44,7 +44,8 @@ ORDERS = 24  # derivatives that are looked at where all before are zero
 @dataclass(frozen=True)
 class Outcome:
     """The phases behind an instant and the states there; the contacts that bore an impulse, ~k for a contact k that
-    gave back nothing of its approach although it has a restitution.
+    gave back nothing of its approach although it has a restitution, and with the number of elements added those that
+    hold from then on although their rate behind the impact was not zero, but slow.
 
     ``rubbed``: of an impact that rubs the elements that bore impulses, and the derivatives of these in their rates;
     ``ends`` and ``names``: the status of a run that cannot go on, and the elements for which it cannot."""
@@ -239,14 +240,56 @@ class _Instant:
         return self.numbers.value(self.place(r).law("friction"))
 
     def outcome(self, contacts: list[int], struck: tuple[int, ...]) -> Outcome:
-        """Those that hold and those that let go, with the rates as they are now."""
+        """Those that hold and those that let go, with the rates as they are now.
+
+        Where a place decides, a slow rate may hold as zero does: the others are asked as if it did, and again with its
+        own where it does not."""
+        slow, own = [k for k in self.frictions if self.speeds[k] and not self._side(k)], self.speeds
+        while True:
+            self.speeds = self._stilled(own, slow)
+            candidates, slips = self._candidates(contacts, slow)
+            states = self._states(candidates, slips) if candidates and not self.ends else {}
+            if self.ends:
+                return self.end(self.ends, [*candidates, *slips] or contacts)
+            if all(states[k] == HELD for k in slow):
+                break
+            slow = [k for k in slow if states[k] == HELD]
+        for k, state in states.items():
+            element = self.parts[k].element
+            self.put(k, element.held[0] if state == HELD else element.sides[state < 0] if state else element.phases[0])
+        self.pressed = {k: states.get(k) == HELD for k in self.contacts}
+        self._set_to_zero([self.parts[k].where for k in candidates if self.pressed.get(k)], None)
+        self._set_to_zero([self.rates[k] for k in candidates], candidates)
+        if struck and slow:
+            struck += tuple(len(self.parts) + k for k in self._independent([*slow, *candidates]))
+        return Outcome(self.pattern, self.numbers.u.copy(), struck, self.rubbed)
+
+    def _side(self, k: int, may_be_slow: bool = True) -> int:
+        """The side on which a friction slips; 0 where it may hold."""
+        element = self.parts[k].element
+        slow = element.slow * float(self.make.size(self.rates[k])) if may_be_slow else 0.0
+        return element.lies(self.places[k], self.speeds[k], slow)
+
+    def _stilled(self, speeds: dict[int, float], slow: list[int]) -> dict[int, float]:
+        """The rates behind impulses of some elements that take theirs to zero."""
+        if not slow:
+            return speeds
+        off = -np.array([speeds[k] for k in slow])
+        amounts = np.linalg.lstsq(self.numbers.effects(slow, slow), off, rcond=1e-10)[0]
+        found = {}
+        for k, effects in zip(speeds, self.numbers.effects(list(speeds), slow), strict=True):
+            total, terms = speeds[k] + effects @ amounts, abs(speeds[k]) + np.abs(effects) @ np.abs(amounts)
+            found[k] = 0.0 if k in slow or abs(total) <= ZERO * terms else float(total)
+        return found
+
+    def _candidates(self, contacts: list[int], slow: list[int]) -> tuple[list[int], dict[int, int]]:
+        """Those that may hold, and the sides of frictions that slip at contacts that may; others get their phases."""
         candidates = [k for k in contacts if self.speeds[k] == 0.0 and self._may_rest(k)]
-        slips: dict[int, int] = {}  # at contacts that may stay closed
+        slips: dict[int, int] = {}
         for k in self.contacts:
             self.put(k, "open")
         for k in self.frictions:
-            element = self.parts[k].element
-            side = element.lies(self.places[k], self.speeds[k], element.slow * float(self.make.size(self.rates[k])))
+            element, side = self.parts[k].element, 0 if k in slow else self._side(k, False)
             if k in self.stops and self.stops[k] not in candidates:
                 self.put(k, element.phases[0])
                 continue
@@ -255,16 +298,16 @@ class _Instant:
                 candidates.append(k)
             elif k in self.stops:
                 slips[k] = side
-        states = self._states(candidates, slips) if candidates and not self.ends else {}
-        if self.ends:
-            return self.end(self.ends, [*candidates, *slips] or contacts)
-        for k, state in states.items():
-            element = self.parts[k].element
-            self.put(k, element.held[0] if state == HELD else element.sides[state < 0] if state else element.phases[0])
-        self.pressed = {k: states.get(k) == HELD for k in self.contacts}
-        self._set_to_zero([self.parts[k].where for k in candidates if self.pressed.get(k)], None)
-        self._set_to_zero([self.rates[k] for k in candidates], candidates)
-        return Outcome(self.pattern, self.numbers.u.copy(), struck, self.rubbed)
+        return candidates, slips
+
+    def _independent(self, some: list[int]) -> list[int]:
+        """Those of some elements, the first of them first, whose rates do not depend on each other."""
+        found: list[int] = []
+        for k in dict.fromkeys(some):
+            G = self.numbers.effects([*found, k], [*found, k])
+            if np.linalg.matrix_rank(G, tol=1e-10 * np.abs(G).max(initial=0.0)) == len(G):
+                found.append(k)
+        return found
 
     def _set_to_zero(self, expressions: list[Any], by: list[int] | None) -> None:
         """Set gaps or rates that are zero to zero: by impulses of some elements, or the shortest way."""

@@ -137,6 +137,9 @@ class Expressions(Assembler):
     def behind(self, expression: sp.Expr, states: Sequence[sp.Expr]) -> sp.Expr:
         return sp.sympify(expression).subs(dict(zip(self.u, states, strict=True)), simultaneous=True)
 
+    def mapped(self, states: Sequence[sp.Expr], before: Sequence[sp.Expr]) -> list[sp.Expr]:
+        return [self.behind(one, before) for one in states]
+
     def solved(self, matrix: list[list[sp.Expr]], right: list[Any]) -> list[sp.Expr]:
         found = list(sp.Matrix(matrix).LUsolve(sp.Matrix(right)))
         return [sp.cancel(value) for value in found] if len(found) > 1 else found

@@ -197,6 +197,11 @@ class Rows(Assembler):
         values[self.n :] += expression.values[self.n :]
         return Row(values, self.n)
 
+    def mapped(self, states: FloatArray, before: FloatArray) -> FloatArray:
+        found: FloatArray = states[:, : self.n] @ before
+        found[:, self.n :] += states[:, self.n :]
+        return found
+
     def solved(self, matrix: list[list[float]], right: list[Any]) -> list[Row]:
         rows = [one.values if isinstance(one, Row) else np.zeros(self.field.shape[1]) for one in right]
         try:
