@@ -63,3 +63,19 @@ def test_what_is_refused(recording: dict[str, Any]) -> None:
         ns.fit(rig(), {"x": recording["x"]}, ["k"], progress=False)
     with pytest.raises(ValueError, match="neither 'phase' nor 'clock'"):
         ns.fit(rig(), recording, ["k", "clock"], inputs={"f": "motor"}, progress=False)
+
+
+def test_a_run_that_begins_at_rest_in_a_mode_that_slips() -> None:
+    """Friction catches the block at once, by a transition that sets its rate to zero: derivatives know that."""
+    block = ns.mechanical(
+        1.0, 0.0, 0.0, parameters={"mu": 0.5}, forcing={"q": lambda t, p: 0.3 + 0.9 * np.sin(t)},
+        elements={"floor": ns.elements.Coulomb(at="q", friction="mu")},
+    )  # fmt: skip
+    found = ns.sensitivity(block, duration=3.0, start={"v_q": 0.0}, mode="floor_forward", parameters=["mu"])
+    h = 1e-6
+    ends = [
+        ns.simulate(block.with_parameters(mu=0.5 + s * h), duration=3.0, start={"v_q": 0.0}, mode="floor_forward")
+        for s in (1, -1)
+    ]
+    slope = (ends[0].u.values[-1] - ends[1].u.values[-1]) / (2 * h)
+    np.testing.assert_allclose(found.P.sel(parameter="mu"), slope, atol=1e-6)

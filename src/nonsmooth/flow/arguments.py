@@ -14,7 +14,9 @@ from nonsmooth.flow.engines.engine import FloatArray
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["check_options", "check_system", "float_array", "real_number", "swept_values", "whole_number", "yes_or_no"]
+__all__ = [
+    "check_options", "check_system", "ends", "float_array", "real_number", "swept_values", "whole_number", "yes_or_no",
+]  # fmt: skip
 
 _MOST = 2**53  # whole numbers up to here are exact in floating point
 
@@ -69,6 +71,19 @@ def real_number(value: Any, name: str) -> float:
     from nonsmooth.system.parameter import finite_number
 
     return finite_number(value, name)
+
+
+def ends(pair: Any, name: str) -> tuple[float, float]:
+    """``pair`` as (low, high), None for no end; TypeError, ValueError for what is none."""
+    if not isinstance(pair, list | tuple) or len(pair) != 2:
+        raise TypeError(f"bounds of {name!r}: allowed is (low, high), None for no end; not {shortened(pair)}")
+    low, high = (
+        sign * np.inf if end is None else real_number(end, f"bounds of {name!r}")
+        for end, sign in zip(pair, (-1, 1), strict=True)
+    )
+    if not low < high:
+        raise ValueError(f"bounds of {name!r}: {low:g} must be below {high:g}")
+    return low, high
 
 
 def whole_number(value: Any, name: str, least: int) -> int:

@@ -21,6 +21,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.equilibria import VANISHING, mode_field
+from nonsmooth.flow.polytopes import TOUCHING, Extreme, Polytope, best
 from nonsmooth.system.symbolic.traced import NOT_UNIQUE
 
 if TYPE_CHECKING:
@@ -30,10 +31,9 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.rows import Rows
     from nonsmooth.system.system import System
 
-__all__ = ["EquilibriumSet", "Extreme", "equilibrium_sets", "modes_of_sets"]
+__all__ = ["EquilibriumSet", "equilibrium_sets", "modes_of_sets"]
 
 FREE = 1e-9  # a singular value as small as this, beside the largest, leaves its direction free
-TOUCHING = 1e-8  # of the states' scales: polytopes nearer than this are one set
 MOST = 20  # linear problems, each beside the solution of the one before
 TIMES = 64  # of a forcing period, at which conditions are asked
 INSTANTS = np.array([0.0, 0.137, 0.262, 0.419, 0.548, 0.683, 0.811, 0.943])  # and at which a field must vanish
@@ -47,58 +47,6 @@ class Condition(NamedTuple):
     top: float
     bottom: float
     size: float  # of the terms
-
-
-@dataclass(frozen=True)
-class Extreme:
-    """The point of a set where a state is least or greatest (``side``: the state, -1 or 1), and the conditions
-    (indicator, sign) of its mode that vanish there."""
-
-    u: FloatArray
-    mode: int
-    side: tuple[int, int] = (0, 0)
-    keys: tuple[tuple[int, int], ...] = ()
-
-
-@dataclass(frozen=True)
-class Polytope:
-    """Equilibria of one mode: ``origin + ways @ z`` with ``slopes @ z <= room``; all in units of the scales."""
-
-    mode: int
-    scale: FloatArray
-    origin: FloatArray
-    ways: FloatArray  # (n, d)
-    slopes: FloatArray
-    room: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-    extremes: tuple[Extreme, ...]
-
-    def holds(self, u: FloatArray, tolerance: Any) -> NDArray[np.bool_]:
-        """Marks of the states (J, n) that lie in it, or nearer than a distance."""
-        off = u / self.scale - self.origin
-        z = off @ self.ways
-        apart = np.abs(off - z @ self.ways.T).max(axis=1, initial=0.0)
-        return np.asarray(np.maximum(apart, (z @ self.slopes.T - self.room).max(axis=1, initial=0.0)) <= tolerance)
-
-    def distance(self, other: Polytope | FloatArray) -> float:
-        """The distance to another polytope, or to a state, in the largest of all states."""
-        if isinstance(other, Polytope):
-            origin, ways, slopes, room = other.origin, other.ways, other.slopes, other.room
-        else:
-            origin, ways = other / self.scale, np.zeros((len(other), 0))
-            slopes, room = np.zeros((0, 0)), np.zeros(0)
-        d, e = self.ways.shape[1], ways.shape[1]
-        gap = np.hstack([self.ways, -ways])
-        if not d + e:
-            return float(np.abs(self.origin - origin).max())
-        one = np.ones((len(gap), 1))
-        both = np.zeros((len(slopes) + len(self.slopes), d + e))
-        both[: len(self.slopes), :d], both[len(self.slopes) :, d:] = self.slopes, slopes
-        rows = np.vstack([np.hstack([gap, -one]), np.hstack([-gap, -one]), np.pad(both, ((0, 0), (0, 1)))])
-        off = origin - self.origin
-        z = _best(np.append(np.zeros(d + e), 1.0), rows, np.concatenate([off, -off, self.room, room]))
-        return np.inf if z is None else float(z[-1])
 
 
 @dataclass(frozen=True)
@@ -245,7 +193,7 @@ class _Faces:
 
     def farthest(self, way: FloatArray) -> tuple[FloatArray, tuple[tuple[int, int], ...]] | None:
         """The vertex farthest along a direction, with its conditions: infinite where unbounded; None where empty."""
-        z = _best(-way @ self.ways, self.slopes, self.room)
+        z = best(-way @ self.ways, self.slopes, self.room)
         if z is None or not np.isfinite(z).all():
             return None if z is None else (np.full(len(self.origin), np.inf), ())
         slack = self.room - self.slopes @ z
@@ -348,26 +296,6 @@ def _free(matrix: FloatArray) -> FloatArray:
 
 def _alike(a: tuple[FloatArray, float, tuple[int, int]], b: tuple[FloatArray, float, tuple[int, int]]) -> bool:
     return bool(np.abs(a[0] - b[0]).max() < FREE and abs(a[1] - b[1]) <= FREE * max(1.0, abs(a[1])))
-
-
-def _best(cost: FloatArray, slopes: FloatArray, room: FloatArray) -> FloatArray | None:
-    """Minimise cost @ z where slopes @ z <= room; infinite where it has no bound, None where nothing fulfils that."""
-    if len(cost) == 1 and cost[0]:
-        way = -slopes[:, 0] * np.sign(cost[0])
-        ends = room / np.where(way, np.abs(way), np.nan)
-        least, most = -np.min(ends[way < 0], initial=np.inf), np.min(ends[way > 0], initial=np.inf)
-        return None if least > most + TOUCHING else np.array([-np.sign(cost[0]) * most])
-    from scipy.optimize import linprog
-
-    exact = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
-    found = linprog(cost, slopes, room, bounds=(None, None), method="highs-ds", options=exact)
-    if found.status == 0:
-        return np.asarray(found.x)
-    if found.status == 2:
-        return None
-    # the solver may not tell an unbounded problem from an empty one: is there any solution?
-    some = linprog(np.zeros(len(cost)), slopes, room, bounds=(None, None), method="highs-ds", options=exact)
-    return np.full(len(cost), np.inf) if some.status == 0 else None
 
 
 def _joined(parts: list[Polytope]) -> list[EquilibriumSet]:

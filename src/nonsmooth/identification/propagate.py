@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.errors import Interrupted, SolveError, shortened
 from nonsmooth.flow.arguments import real_number, whole_number, yes_or_no
 from nonsmooth.identification.compare.draws import (
-    Setting,
     draw_systems,
     drawn_variables,
     nominal,
     read_settings,
 )
+from nonsmooth.identification.first_order import to_first_order
+from nonsmooth.identification.gathered import Gathered
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as watched
 from nonsmooth.system.system import System
@@ -29,13 +29,8 @@ if TYPE_CHECKING:
 
 __all__ = ["propagate"]
 
-#: Dims over which results list what they found, however much it was: the value of each and what its rows share.
-LISTS = {"jump": ("jump_value", ("jump_variable", "jump_direction")), "special": (None, ("special_kind", "kind"))}
 COARSE = 0.02  # the largest step of draws' branches: values between points lie on a cubic
-FINER = 8  # points to a step of a drawn branch, on that cubic
 FAILURES = 3  # reasons that are repeated
-DIFFERENCE = 0.1  # of a standard uncertainty, to either side
-MOST = 10**8  # numbers kept over all draws
 
 
 def propagate(
@@ -120,11 +115,16 @@ def propagate(
 
     Examples
     --------
+    The amplitude of a linear oscillator is F / |k - m w^2 + i c w|:
+
+    >>> import numpy as np
     >>> import nonsmooth as ns
-    >>> s = ns.models.discontinuous_support(g=0.0018, rho=0.33, omega=11.15)
-    >>> found = ns.ParameterSet({"k": Estimate(8.47, 0.05, "N/m")}, [[0.0025]])           # doctest: +SKIP
-    >>> band = ns.propagate(found, ns.frequency_response, s, omega_values, draws=200)     # doctest: +SKIP
-    >>> band["jump_value_quantiles"]                                                      # doctest: +SKIP
+    >>> s = ns.mechanical(1.0, 0.1, 1.0, parameters={"F": 1.0, "w": 2.0},
+    ...                   forcing={"q": lambda t, p: p.F * np.cos(p.w * t)})
+    >>> band = ns.propagate({}, ns.sweep, s, "w", [2.0], settings={"F": (1.0, 0.1)}, draws=50, progress=False)
+    >>> amplitude = band["maximum_quantiles"].sel(state="q").values[:, 0]
+    >>> bool(np.allclose(amplitude, np.quantile(band["drawn_F"], [0.025, 0.5, 0.975]) / np.hypot(3.0, 0.2)))
+    True
     """
     count, many = whole_number(draws, "draws", 0), whole_number(seed, "seed", 0)
     linear = yes_or_no(first_order, "first_order")
@@ -146,9 +146,9 @@ def propagate(
     base = nominal(system, found, known)
     centre = call(base, coarse=False)
     systems, drawn = draw_systems(system, found, known, count, many, bounds)
-    gathered = _Gathered(centre)
+    gathered = Gathered(centre)
     failures: list[str] = []
-    linear_part = _to_first_order(centre, found, known, base, call) if linear else {}
+    linear_part = to_first_order(centre, found, known, base, call) if linear else {}
 
     def banded() -> xr.Dataset:
         n = len(gathered.rows)
@@ -215,259 +215,3 @@ class _Call:
             given = type(result).__name__
             raise TypeError(f"the verb returned {given}; propagate takes Datasets, numbers and mappings of numbers")
         return result
-
-
-class _Gathered:
-    """The results of draws, brought to the dims of the one at the parameters found."""
-
-    def __init__(self, centre: xr.Dataset) -> None:
-        self.centre = centre
-        self.branch = str(centre.attrs.get("parameter", "")) if "point" in centre.dims else ""
-        names = [*centre.data_vars, *([self.branch] if self.branch else [])]
-        numbers = [str(name) for name in names if centre[name].dtype.kind in "fiub" and name != "status"]
-        listed = {str(name) for name in numbers if set(centre[name].dims) & set(LISTS)}
-        along = {name for name in numbers if "point" in centre[name].dims}
-        self.plain = [name for name in numbers if name not in listed | along]
-        left = {self.branch, "unknowns", "tangent", "layout", "mode"}
-        self.along = [] if "branch" in centre else [name for name in along if name not in left]  # one branch alone
-        self.lists = [dim for dim in LISTS if dim in centre.dims and (dim != "special" or self.branch)]
-        self.rows: list[dict[str, Any]] = []
-        self.sheets = _Sheets(centre, self.branch, self.along) if self.along else None
-
-    def add(self, result: xr.Dataset | None) -> None:
-        """Keep what a draw gave; None where it failed."""
-        row: dict[str, Any] = {}
-        if result is not None:
-            for name in self.plain:
-                if name in result and result[name].shape == self.centre[name].shape:
-                    row[name] = result[name].values
-            if self.sheets is not None:
-                row |= self.sheets.brought(result)
-            for dim in self.lists:
-                row[dim] = _matched(self.centre, result, dim)
-            if len(self.rows) * sum(np.size(values) for values in row.values()) > MOST:
-                raise ValueError("the draws hold more than 1e8 numbers: take fewer draws, or a smaller result")
-        self.rows.append(row)
-
-    def variables(self, edges: list[float]) -> dict[str, Any]:
-        """Quantiles, shares and probabilities."""
-        found: dict[str, Any] = {}
-        for name in (*self.plain, *self.along):
-            if kept := [row[name] for row in self.rows if name in row]:
-                found |= self._of(name, np.stack(kept), edges)
-        for dim in self.lists:
-            value = LISTS[dim][0] or "special_value"
-            dims, size = self.centre[value].dims, self.centre[value].shape
-            kept = [row.get(dim, np.full(size, np.nan)) for row in self.rows]
-            if kept:
-                attrs = {**self.centre[value].attrs, "long_name": f"{dim} for drawn parameters"}
-                found[f"{value}_draws"] = (("draw", *dims), np.stack(kept), attrs)
-                found |= self._numbers(value, np.stack(kept), edges)
-        return found
-
-    def _of(self, name: str, stack: FloatArray, edges: list[float]) -> dict[str, Any]:
-        array = self.centre[name]
-        if name.rpartition("_")[2] == "stable" or array.dtype.kind == "b":
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", RuntimeWarning)  # no draw has this point
-                mean = np.nanmean(np.asarray(stack, float), axis=0)
-            return {f"{name}_probability": (array.dims, mean, {"long_name": f"share of draws: {name}"})}
-        if name == "period_number":
-            numbers = np.unique(np.append(stack, array.values))
-            shares = np.stack([np.mean(stack == number, axis=0) for number in numbers])
-            return {
-                "period_number_probability": (("period_value", *array.dims), shares, {
-                    "long_name": "share of draws with this period number (0: none found)"}),
-                "period_value": ("period_value", numbers, {"long_name": "period number"}),
-            }  # fmt: skip
-        if array.dtype.kind != "f":
-            return {}
-        return self._numbers(name, stack, edges)
-
-    def _numbers(self, name: str, stack: FloatArray, edges: list[float]) -> dict[str, Any]:
-        array = self.centre[name]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # no draw has a value here
-            bands = np.nanquantile(stack, edges, axis=0)
-        attrs = {key: value for key, value in array.attrs.items() if isinstance(value, str)}
-        found: dict[str, Any] = {f"{name}_quantiles": (("quantile", *array.dims), bands, attrs)}
-        share = np.isfinite(stack).sum(axis=0) / len(self.rows)
-        if (share < 1).any():
-            found[f"{name}_share"] = (array.dims, share, {"long_name": f"share of draws that have {name} here"})
-        return found
-
-
-class _Sheets:
-    """A branch between its turning points: values of another one at the same parameter, on the same sheet."""
-
-    def __init__(self, centre: xr.Dataset, name: str, along: list[str]) -> None:
-        self.name, self.along, self.centre = name, along, centre
-        self.value = centre[name].values
-        self.sheet = _sheet_numbers(self.value)
-
-    def brought(self, result: xr.Dataset) -> dict[str, Any]:
-        """Values of a drawn branch at the points of the branch itself; NaN where its sheet does not reach."""
-        value = result[self.name].values
-        sheet, finer = _sheet_numbers(value), _finer(_length(result, self.name))
-        first = self._first(sheet, result)
-        found = {}
-        dense = finer(value)
-        of = np.repeat(sheet, FINER)[: len(dense)] if len(sheet) > 1 else sheet
-        for name in self.along:
-            if name not in result:
-                continue
-            values = np.asarray(result[name].values, float)
-            rows = np.full((len(self.value), *values.shape[1:]), np.nan)
-            flag = result[name].dtype.kind in "iub"
-            other = np.repeat(values, FINER, axis=0)[: len(dense)] if flag else finer(values)
-            for k in np.unique(self.sheet):
-                here, there = self.sheet == k, of == k - first
-                if np.count_nonzero(there) > 1:
-                    rows[here] = _at(self.value[here], dense[there], other[there], flag)
-            found[name] = rows
-        return found
-
-    def _first(self, sheet: FloatArray, result: xr.Dataset) -> int:
-        """Number by which sheets are counted differently, where a draw has fewer turning points before the same one."""
-        begins = self.centre[self.name].values[:2], result[self.name].values[:2]
-        same = np.sign(np.diff(begins[0])) == np.sign(np.diff(begins[1]))
-        return 0 if same.all() else 1
-
-
-def _sheet_numbers(value: FloatArray) -> FloatArray:
-    """The number of turning points before each point."""
-    up = np.sign(np.diff(value))
-    turns = np.concatenate([[0], np.cumsum(up[1:] * up[:-1] < 0)]) if len(up) else np.zeros(0)
-    return np.append(turns, turns[-1:]).astype(int) if len(turns) else np.zeros(len(value), int)
-
-
-def _length(branch: xr.Dataset, name: str) -> FloatArray:
-    """Length along a branch, its parameter and the amplitudes of the states scaled to one."""
-    columns = [branch[name].values[:, None]]
-    columns += [branch[key].values for key in ("maximum", "minimum", "u") if key in branch]
-    whole = np.concatenate(columns, axis=1)
-    sizes = np.ptp(whole, axis=0)
-    steps = np.linalg.norm(np.diff(whole / np.where(sizes > 0, sizes, 1.0), axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1e-12))])
-
-
-def _finer(length: FloatArray) -> Callable[[FloatArray], FloatArray]:
-    """Values at FINER points to a step, by cubics that do not overshoot."""
-    from scipy.interpolate import PchipInterpolator
-
-    fine = np.interp(np.arange((len(length) - 1) * FINER + 1) / FINER, np.arange(len(length)), length)
-
-    def finer(values: FloatArray) -> FloatArray:
-        if len(length) < 2:
-            return values
-        if not np.isfinite(values).all():
-            flat = values.reshape(len(values), -1)
-            dense = np.stack([np.interp(fine, length, column) for column in flat.T], axis=-1)
-            return dense.reshape(-1, *values.shape[1:])
-        return np.asarray(PchipInterpolator(length, values, axis=0)(fine))
-
-    return finer
-
-
-def _at(wanted: FloatArray, value: FloatArray, other: FloatArray, flag: bool) -> FloatArray:
-    """``other`` where ``value``, which rises or falls, has the wanted values; NaN beyond its ends."""
-    order = np.argsort(value, kind="stable")
-    value, flat = value[order], other[order].reshape(len(value), -1)
-    if flag:
-        rows = flat[np.clip(np.searchsorted(value, wanted), 0, len(value) - 1)]
-    else:
-        rows = np.stack([np.interp(wanted, value, column) for column in flat.T], axis=-1)
-    near = 1e-9 * (abs(value[0]) + abs(value[-1]))  # an edge of the range, to rounding
-    rows[(wanted < value[0] - near) | (wanted > value[-1] + near)] = np.nan
-    return rows.reshape(len(wanted), *other.shape[1:])
-
-
-def _matched(centre: xr.Dataset, result: xr.Dataset, dim: str) -> FloatArray:
-    """The value of each listed row in a draw: the nearest of the same kind; NaN where it has none."""
-    from scipy.optimize import linear_sum_assignment
-
-    value, shared = LISTS[dim]
-    value = value or "special_value"
-    found = np.full(centre[value].shape, np.nan)
-    if value not in result or not result[value].size or not found.size:
-        return found
-    keys = [key for key in shared if key in centre]
-    ours = list(zip(*(centre[key].values.astype(str) for key in keys), strict=True))
-    theirs = list(zip(*(result[key].values.astype(str) for key in keys), strict=True))
-    far = np.abs(centre[value].values[:, None] - result[value].values[None, :])
-    other = np.array([[a != b for b in theirs] for a in ours])
-    beyond = 1e3 * (far.max() + 1.0)
-    for i, j in zip(*linear_sum_assignment(far + beyond * other), strict=True):
-        if not other[i, j]:
-            found[i] = result[value].values[j]
-    return found
-
-
-def _sources(found: Any, settings: Mapping[str, Setting], system: System) -> tuple[list[tuple[str, float]], FloatArray]:
-    """Uncertain parameters with their standard uncertainties, and their covariance."""
-    covariance = getattr(found, "covariance", None)
-    names = [] if covariance is None else [str(n) for n in covariance[covariance.dims[0]].values]
-    held = [i for i, n in enumerate(names) if n in found and n in system.values and n not in settings]
-    joint = np.zeros((0, 0)) if covariance is None else np.asarray(covariance.values, float)[np.ix_(held, held)]
-    own = [(n, one.uncertainty) for n, one in settings.items() if one.uncertainty > 0 and not one.follows]
-    matrix = np.zeros((len(held) + len(own), len(held) + len(own)))
-    matrix[: len(held), : len(held)] = joint
-    matrix[range(len(held), len(matrix)), range(len(held), len(matrix))] = [error**2 for _, error in own]
-    return [(names[i], float(np.sqrt(joint[k, k]))) for k, i in enumerate(held)] + own, matrix
-
-
-def _to_first_order(
-    branch: xr.Dataset, found: Any, settings: Mapping[str, Setting], system: System, call: _Call
-) -> dict[str, Any]:
-    """Derivatives of special points in the uncertain parameters, and their standard uncertainties."""
-    from nonsmooth.continuation.special import special_points
-
-    if "special_point" not in branch:
-        raise ValueError("first_order concerns the special points of a branch: give continue_orbit as the verb")
-    if any(one.follows for one in settings.values()):
-        raise ValueError("first_order takes settings with values: one that is a function is left to the draws")
-    sources, covariance = _sources(found, settings, system)
-    own = str(branch.attrs["parameter"])
-    table = special_points(branch)
-    slope = np.array([
-        [0.0 if name == own else _slope(table.isel(special=i), name) for name, _ in sources]
-        for i in range(table.sizes["special"])
-    ]).reshape(table.sizes["special"], len(sources))  # fmt: skip
-    for i, (name, error) in enumerate(sources):
-        if (lost := np.isnan(slope[:, i])).any() and error > 0:  # of equilibria: by differences of whole branches
-            value, h = system.values[name], DIFFERENCE * error
-            ends = [call(system.with_parameters({name: value + sign * h}), coarse=True) for sign in (1, -1)]
-            ahead, behind = (_matched(branch, one, "special") for one in ends)
-            slope[lost, i] = ((ahead - behind) / (2 * h))[lost]
-    variance = np.einsum("si,ij,sj->s", slope, covariance, slope)
-    unit = system.parameters[own].unit or "1"
-    return {
-        "source": ("source", [name for name, _ in sources]),
-        "special_slope": (("special", "source"), slope, {"long_name": f"derivative of {own} at a special point"}),
-        "special_first_order": (("special",), np.sqrt(variance), {
-            "long_name": f"standard uncertainty of {own} to first order", "units": unit}),
-    }  # fmt: skip
-
-
-def _slope(row: xr.Dataset, name: str) -> float:
-    """Derivative of a special point in another parameter: the tangent of its curve in both; NaN where it has none."""
-    from nonsmooth.continuation.branches.reading import special_row
-    from nonsmooth.continuation.events.codimension_two import KINDS
-    from nonsmooth.continuation.problems.locus import Locus
-    from nonsmooth.continuation.problems.orbits import size_of
-    from nonsmooth.continuation.problems.shooting import Shooting
-
-    if "unknowns" not in row or str(row["kind"].values) not in KINDS:
-        return np.nan
-    system, kind, own, point, period_number, span = special_row(row, "propagate")
-    system = system.with_parameters({own: point.value})
-    shooting = Shooting(system, point.signature, period_number, (name, own))
-    size = size_of(point.maximum, point.minimum, system)
-    X = np.concatenate([point.X[: shooting.size], [system.values[name], point.value]])
-    shooting.prepare(X, size)
-    widths = (abs(system.values[name]) or 1.0, abs(span[1] - span[0]))
-    locus = Locus(shooting, kind, size, point.period, widths)
-    first = locus.first(X)
-    if first is None or first.tangent[-2] == 0.0:
-        return np.nan
-    return float(first.tangent[-1] * locus.scale[-1] / (first.tangent[-2] * locus.scale[-2]))

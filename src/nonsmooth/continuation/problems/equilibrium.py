@@ -11,7 +11,8 @@ import numpy as np
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.curve import Curve, Point
 from nonsmooth.flow.equilibria import ModeField, sorted_eigenvalues
-from nonsmooth.flow.equilibrium_sets import EquilibriumSet, Extreme, equilibrium_sets, modes_of_sets
+from nonsmooth.flow.equilibrium_sets import EquilibriumSet, equilibrium_sets, modes_of_sets
+from nonsmooth.flow.polytopes import Extreme
 from nonsmooth.system.system import System
 
 __all__ = ["FREE", "Equilibria", "Rest", "equilibria_near", "goes_on"]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.flow.arguments import real_number
+from nonsmooth.flow.arguments import ends, real_number
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -163,13 +163,7 @@ def _ends(bounds: Mapping[str, Any], system: System) -> dict[str, tuple[float, f
         if name not in system.parameters:
             units = {key: item.unit for key, item in system.parameters.items()}
             raise ValueError(unknown(name, "a parameter", repr(system.name), units))
-        if not isinstance(pair, list | tuple) or len(pair) != 2:
-            raise TypeError(f"bounds of {name!r}: allowed is (low, high), None for no end; got {pair!r}")
-        low, high = (real_number(e, f"bounds of {name!r}") if e is not None else s * np.inf
-                     for e, s in zip(pair, (-1, 1), strict=True))  # fmt: skip
-        if not low < high:
-            raise ValueError(f"bounds of {name!r}: {low:g} must be below {high:g}")
-        found[name] = (low, high)
+        found[name] = ends(pair, name)
     return found
 
 

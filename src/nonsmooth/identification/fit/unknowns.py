@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import real_number
+from nonsmooth.flow.arguments import ends, real_number
 from nonsmooth.identification.fit.sensors import OF_A_SENSOR, Sensor
 from nonsmooth.system.names import unknown
 
@@ -142,11 +142,7 @@ def _allowed(system: System, sensors: Mapping[str, Sensor]) -> dict[str, str]:
 
 
 def _bounds(name: str, pair: Any, guess: float) -> tuple[float, float]:
-    if not isinstance(pair, list | tuple) or len(pair) != 2:
-        raise TypeError(f"bounds of {name!r}: allowed are None and (low, high), not {shortened(pair)}")
-    low, high = (float(end) if end is not None else sign * np.inf for end, sign in zip(pair, (-1, 1), strict=True))
-    if not low < high:
-        raise ValueError(f"bounds of {name!r}: {low:g} must be below {high:g}")
+    low, high = ends(pair, name)
     if not low <= guess <= high:
         raise ValueError(
             f"the first guess {name} = {guess:g} lies outside its bounds {low:g} ... {high:g}; set another with "
