@@ -31,7 +31,7 @@ class Gathered:
         numbers = [str(name) for name in names if centre[name].dtype.kind in "fiub" and name != "status"]
         listed = {str(name) for name in numbers if set(centre[name].dims) & set(LISTS)}
         along = {name for name in numbers if "point" in centre[name].dims}
-        self.plain = [name for name in numbers if name not in listed | along]
+        self.plain = [name for name in numbers if name not in listed | along and centre[name].size]
         left = {self.branch, "unknowns", "tangent", "layout", "mode"}
         self.along = [] if "branch" in centre else [name for name in along if name not in left]  # one branch alone
         self.lists = [dim for dim in LISTS if dim in centre.dims and (dim != "special" or self.branch)]
