@@ -23,8 +23,9 @@ from nonsmooth.recordings.remarks import Remarks
 __all__ = ["load_v5"]
 
 _HEADER = 128
-_INT32, _MATRIX, _COMPRESSED = 5, 14, 15
-_PLAIN = {1, 2, 4, *range(6, 16)}  # classes: cells, structs, text, numbers
+_INT8, _INT32, _MATRIX, _COMPRESSED = 1, 5, 14, 15
+_NUMERIC, _TEXT = {1, 2, 3, 4, 5, 6, 7, 9, 12, 13}, {1, 2, 3, 4, 16, 17, 18}
+_CELL, _STRUCT, _CHAR, _NUMBERS = 1, 2, 4, range(6, 16)  # classes
 
 
 class _LeftOut(Exception):
@@ -108,15 +109,29 @@ def _name(body: memoryview, order: str, place: str, source: Source, depth: int =
     dims = struct.unpack(f"{order}{len(shape) // 4}i", shape[: len(shape) // 4 * 4])
     if len(flags) != 8 or kind != _INT32 or not 2 <= len(dims) <= 32 or min(dims) < 0:
         raise source.error(place, f"expected the flags and the dimensions of a matrix, got {dims[:4]}")
-    class_ = struct.unpack_from(order + "I", flags)[0] & 0xFF
-    if class_ not in _PLAIN:
+    (word, _), n, rest = struct.unpack(order + "II", flags), math.prod(dims), [*parts]
+    class_, held = word & 0xFF, [kind for kind, *_ in rest]
+    if class_ not in (_CELL, _STRUCT, _CHAR, *_NUMBERS):
         raise _LeftOut(f"a MATLAB array of class {class_} (sparse, object or function)")
-    if math.prod(dims) > len(body):
-        raise source.error(place, f"says it has {math.prod(dims)} elements, more than its {len(body)} bytes can hold")
-    for kind, member, _ in parts:
+    if class_ == _STRUCT:
+        named = held[:2] == [_INT32, _INT8] and len(rest[0][1]) == 4
+        width = max(struct.unpack(order + "i", rest[0][1])[0], 1) if named else 1
+        fits = named and _are_matrices(held[2:], n * (len(rest[1][1]) // width))
+    elif class_ == _CELL:
+        fits = _are_matrices(held, n)
+    else:
+        parts_of, count = (_TEXT, 1) if class_ == _CHAR else (_NUMERIC, 2 if word & 0x0800 else 1)
+        fits = n <= len(body) and len(held) == count and set(held) <= parts_of
+    if not fits:
+        raise source.error(place, f"says it has {n} elements, which are not what its {len(body)} bytes hold")
+    for kind, member, _ in rest:
         if kind == _MATRIX and len(member):
             _name(member, order, place, source, depth + 1)
     return bytes(name).split(b"\0")[0]
+
+
+def _are_matrices(kinds: list[int], count: int) -> bool:
+    return len(kinds) == count and set(kinds) <= {_MATRIX}
 
 
 def _plain(value: Any) -> Any:
