@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from nonsmooth.errors import DataFileError
+from nonsmooth.recordings.reading import Options
 from nonsmooth.system.names import check_keys, unknown
 
 __all__ = [
@@ -52,9 +53,6 @@ SETTINGS: Mapping[str, tuple[type, str, str]] = MappingProxyType({
     "figure": (int, "", "number of the published figure whose setting this is"),
     "note": (str, "", "a remark"),
 })  # fmt: skip
-
-_READ = ("format", "columns", "axis", "rate", "units", "delimiter", "decimal", "thousands", "header", "units_row",
-         "skip", "na", "wraps")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -119,7 +117,7 @@ def entry_of(given: Any, folder: Path, where: str) -> Entry:
             raise ValueError(f"{where}: run {name!r} is named twice")
         runs[name] = settings
     read = table_of(table.get("read", {}), f"{where}, read")
-    check_keys(read, _READ, f"{where}, read", "an option of load_recording")
+    check_keys(read, ("format", *vars(Options())), f"{where}, read", "an option of load_recording")
     options = dict(read)
     if isinstance(options.get("columns"), dict):  # TOML has lists where load_recording takes (column, unit)
         options["columns"] = {k: tuple(v) if isinstance(v, list) else v for k, v in options["columns"].items()}

@@ -6,9 +6,10 @@ bytes, touches no disk, raises only ``DataFileError``, and leaves rates, groupin
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +17,11 @@ from numpy.typing import NDArray
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.remarks import Remarks
+from nonsmooth.system.names import check_keys
 
 __all__ = [
-    "TIME_SCALES", "TIME_WORDS", "Column", "Options", "Reading", "Source", "Trace", "is_axis_name", "names_of",
-    "scaled_time",
+    "TIME_SCALES", "TIME_WORDS", "Column", "Options", "Reading", "Source", "TableOptions", "Trace", "is_axis_name",
+    "names_of", "scaled_time",
 ]  # fmt: skip
 
 #: What instruments call the time column, lower case, in the languages their programs speak.
@@ -53,9 +55,22 @@ class Source:
         return DataFileError(": ".join(part for part in (self.name, place, message) if part))
 
 
+class TableOptions(TypedDict, total=False):
+    """Options of ``load_recording`` for tables and counters; see there."""
+
+    delimiter: str | None
+    decimal: str | None
+    thousands: str | None
+    header: int | None
+    units_row: int | None
+    skip: int | str | Sequence[str]
+    na: str | Sequence[str]
+    wraps: Mapping[str, float] | None
+
+
 @dataclass(frozen=True)
 class Options:
-    """The arguments of ``load_recording`` that concern readers."""
+    """The options of ``load_recording`` that concern readers; lines are 0 and texts () where none are given."""
 
     columns: Mapping[str, Column] | None = None
     axis: str = "time"
@@ -66,10 +81,64 @@ class Options:
     thousands: str | None = None
     header: int = 0
     units_row: int = 0
-    skip: int = 0
-    leave: tuple[str, ...] = ()
+    skip: int | tuple[str, ...] = 0
     na: tuple[str, ...] = ()
     wraps: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> Options:
+        """The options of a call, checked.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An option that is not known, or a value that it cannot have.
+        """
+        check_keys(given, [one.name for one in fields(cls)], "load_recording", "an option")
+        read = {name: value for name, value in given.items() if value is not None}
+        for name in {"header", "units_row", "skip"} & set(read):
+            line = read[name]
+            if isinstance(line, bool) or not isinstance(line, int if name != "skip" else int | Iterable) or (
+                isinstance(line, int) and line < (name != "skip")
+            ):
+                raise ValueError(f"{name} must be the number of a line, counted from 1, got {line!r}")
+        for name in {"skip", "na"} & set(read):
+            if not isinstance(texts := read[name], int):
+                read[name] = (texts,) if isinstance(texts, str) else tuple(texts)
+                if not all(isinstance(text, str) and text.strip() for text in read[name]):
+                    raise TypeError(f"{name} must be a text or several, {name}='#N/A', got {texts!r}")
+        options = cls(**read)
+        options.check()
+        return options
+
+    def check(self) -> None:
+        """Refuse values that do not fit."""
+        columns, axis, rate, decimal, marks = self.columns or {}, self.axis, self.rate, self.decimal, self.thousands
+        if self.columns is not None and (not isinstance(columns, Mapping) or not columns):
+            raise TypeError("columns must map our names to the file's, as {'time': 't', 'x': ('pos', 'mm')}")
+        for ours, theirs in columns.items():
+            given = theirs[0] if isinstance(theirs, tuple) and len(theirs) == 2 else theirs
+            if isinstance(given, bool) or not isinstance(given, str | int) or not isinstance(ours, str):
+                raise TypeError(
+                    f"columns[{ours!r}] must be a header, a place from 0, or (one of these, unit): {theirs!r}"
+                )
+        if not isinstance(axis, str) or not axis.isidentifier() or axis == "run":
+            raise ValueError(f"axis must be a name such as 'time' or 'frequency', got {axis!r}")
+        if rate is not None and not (isinstance(rate, int | float) and math.isfinite(rate) and rate > 0):
+            raise ValueError(f"rate must be a positive number of samples per second, got {rate!r}")
+        if rate is not None and (axis != "time" or axis in columns):
+            raise ValueError("rate makes a time axis where the file has none; give it without columns['time'] and axis")
+        if (cut := self.delimiter) is not None and (not isinstance(cut, str) or len(cut) != 1 or cut in '"\r\n'):
+            raise ValueError(f"delimiter must be one character such as ',', ';' or a tab, got {cut!r}")
+        if decimal not in (None, ".", ","):
+            raise ValueError(f"decimal must be '.' or ',', got {decimal!r}")
+        if decimal == "," == cut:
+            raise ValueError("delimiter and decimal cannot both be ','")
+        if marks is not None and (marks not in (".", ",", " ", "'", "\u00a0", "\u202f") or marks == decimal):
+            raise ValueError(f"thousands must be one of . , ' or a space, and not the decimal mark, got {marks!r}")
+        for name, period in self.wraps.items():
+            if isinstance(period, bool) or not isinstance(period, int | float) or not 0 < period < math.inf:
+                raise ValueError(f"wraps[{name!r}] must be the count at which it begins anew, as 65536, got {period!r}")
 
 
 @dataclass(frozen=True, eq=False)
