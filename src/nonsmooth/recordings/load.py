@@ -18,8 +18,17 @@ import numpy as np
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.assemble import assemble
-from nonsmooth.recordings.limits import MAX_FILE_BYTES, inflation_limit
-from nonsmooth.recordings.reading import Column, Options, Reading, Source, TableOptions, Trace, names_of
+from nonsmooth.recordings.reading import (
+    MAX_FILE_BYTES,
+    Column,
+    Options,
+    Reading,
+    Source,
+    TableOptions,
+    Trace,
+    inflation_limit,
+    names_of,
+)
 from nonsmooth.recordings.recording import Recording, RecordingWarning
 
 __all__ = ["FORMATS", "content_of", "load_recording", "parse_recording"]

@@ -1,28 +1,87 @@
-"""Result of every reader: traces (one channel of one run), remarks, and the file they came from.
+"""Matter of every reader: its options, and its result: traces, remarks, and the file they came from.
 
 A reader is a function ``read(data: bytes, source: Source, options: Options) -> Reading``. It takes the whole file as
-bytes, touches no disk, raises only ``DataFileError``, and leaves rates, grouping and labels to ``assemble``.
+bytes, touches no disk, raises only ``DataFileError``, and leaves rates, grouping and labels to ``assemble``. Recordings
+come from elsewhere: what a file claims is checked against its size.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from importlib import import_module
+from types import ModuleType
 from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import DataFileError
-from nonsmooth.recordings.remarks import Remarks
+from nonsmooth.errors import DataFileError, not_installed
 from nonsmooth.system.names import check_keys
 
 __all__ = [
-    "TIME_SCALES", "TIME_WORDS", "Column", "Options", "Reading", "Source", "TableOptions", "Trace", "is_axis_name",
-    "names_of", "scaled_time",
+    "MAX_COLUMNS", "MAX_DEPTH", "MAX_FILE_BYTES", "TIME_SCALES", "TIME_WORDS", "Column", "Group", "Options",
+    "Reading", "Remarks", "Source", "TableOptions", "Trace", "inflation_limit", "is_axis_name", "names_of",
+    "needed", "scaled_time",
 ]  # fmt: skip
+
+MAX_FILE_BYTES = 1 << 30  # read whole into memory, so that the hash is that of what was read
+MAX_COLUMNS = 4096  # over all runs of one file; each becomes a labelled array
+MAX_DEPTH = 32  # of nested containers
+
+_FLOOR = 16 << 20  # small files may hold long constant signals, which compress without bound
+_RATIO = 100
+
+
+def inflation_limit(n_bytes: int) -> int:
+    """The most bytes that the compressed parts of a file of ``n_bytes`` may become, all together."""
+    return max(_FLOOR, _RATIO * n_bytes)
+
+
+_NAMED = 4  # channels named in one remark
+_ALIKE = 3  # more runs than this of which the same is to be said, but for numbers, share one sentence
+
+
+class Remarks:
+    """Sentences on a file, a run, or a channel of a run."""
+
+    def __init__(self) -> None:
+        self._channels: dict[tuple[str, str], list[str]] = {}
+
+    def say(self, sentence: str) -> None:
+        """Something about the file as a whole."""
+        self._channels.setdefault(("", sentence), [])
+
+    def of(self, run: str, channel: str, sentence: str) -> None:
+        """Something about a channel of a run ("" where it concerns all runs)."""
+        self._channels.setdefault((run, sentence), []).append(channel)
+
+    def sentences(self) -> tuple[str, ...]:
+        """All of them; channels of one run of which the same is to be said stand together, and so do many runs."""
+        alike: dict[tuple[str, ...], list[tuple[str, list[str], str]]] = {}
+        for (run, text), channels in self._channels.items():
+            kind = (re.sub(r"\d+", "#", text), *channels) if run else (run, text)
+            alike.setdefault(kind, []).append((run, channels, text))
+        said: list[str] = []
+        for group in alike.values():
+            if len(group) <= _ALIKE:
+                said += [_sentence(*one) for one in group]
+            else:
+                said.append(f"{_sentence(*group[0])} (and likewise {len(group) - 1} more runs, to {group[-1][0]!r})")
+        return tuple(said)
+
+
+def _sentence(run: str, channels: list[str], text: str) -> str:
+    channels = list(dict.fromkeys(channels))
+    named = ", ".join(map(repr, channels[:_NAMED]))
+    more = f" and {len(channels) - _NAMED} more" if len(channels) > _NAMED else ""
+    which = f"channel{'s' if len(channels) > 1 else ''} {named}{more}" if channels else ""
+    place = ", ".join(part for part in (f"run {run!r}" if run else "", which) if part)
+    return f"{place}: {text}" if place else text
+
 
 #: What instruments call the time column, lower case, in the languages their programs speak.
 TIME_WORDS = frozenset(
@@ -197,3 +256,24 @@ def names_of(candidates: Sequence[str], most: int = 12) -> str:
     """A list for a message, cut where it would be long."""
     shown = ", ".join(repr(name if len(name) <= 60 else name[:57] + "...") for name in candidates[:most])
     return shown + (f", and {len(candidates) - most} more" if len(candidates) > most else "")
+
+
+def needed(module: str, package: str, source: Source, extra: str = "experiment") -> ModuleType:
+    """Import ``module``; where it is missing, a DataFileError that says how to get it."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise source.error("", f"reading it needs {not_installed(package, extra)}") from error
+
+
+class Group(dict[str, Any]):
+    """Arrays by name: their units and attributes, the rate at which they were sampled, the run they belong to."""
+
+    def __init__(
+        self, members: Mapping[str, Any] | None = None, units: Mapping[str, str] | None = None,
+        rate: float | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(members or {})
+        self.units, self.rate, self.run = dict(units or {}), rate, ""
+        self.attrs: dict[str, dict[str, str]] = {}
+        self.notes: dict[str, str] = {}

@@ -16,9 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.recordings.limits import MAX_DEPTH, inflation_limit
-from nonsmooth.recordings.reading import Source
-from nonsmooth.recordings.remarks import Remarks
+from nonsmooth.recordings.reading import MAX_DEPTH, Remarks, Source, inflation_limit
 
 __all__ = ["load_v5"]
 

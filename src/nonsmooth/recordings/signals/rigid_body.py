@@ -126,9 +126,8 @@ def corner_restitution(
         apart = np.array([before.heights(s, points)[corner] - after.heights(s, points)[corner] for s in grid])
         when = _nearest_zero(grid, apart)
         heights, point = before.heights(when, points), points[corner]
-        late, early = (
-            -after.velocity(when + s, point)[0] / before.velocity(when + s, point)[0] for s in (half_sample, -half_sample)
-        )
+        moved = (when + half_sample, when - half_sample)
+        late, early = (-after.velocity(s, point)[0] / before.velocity(s, point)[0] for s in moved)
         v0, e0 = before.velocity(when, point)
         touching = int(np.count_nonzero(heights < heights[corner] + reach))
         same = corner == int(np.argmin(after.heights(when, points)))
