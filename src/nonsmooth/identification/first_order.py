@@ -64,7 +64,7 @@ def to_first_order(
     return {
         "source": ("source", [name for name, _ in sources]),
         "special_slope": (("special", "source"), slope, {"long_name": f"derivative of {own} at a special point"}),
-        "special_first_order": (("special",), np.sqrt(variance), {
+        "special_first_order": ("special", np.sqrt(variance), {
             "long_name": f"standard uncertainty of {own} to first order", "units": unit}),
     }  # fmt: skip
 

@@ -17,12 +17,17 @@ __all__ = ["Sandwich", "sandwich"]
 
 
 class Sandwich(NamedTuple):
-    """State at the best fit, covariance (p, p), chi^2 per degree of freedom, samples that share an error."""
+    """State at the best fit, covariance (p, p), chi^2 per degree of freedom, samples that share an error.
+
+    ``normal`` and ``back`` are those of :func:`nonsmooth.identification.arrow.reduced` there.
+    """
 
     state: State
     covariance: FloatArray
     reduced: float
     correlation: float
+    normal: FloatArray
+    back: list[Any]
 
 
 def sandwich(
@@ -64,7 +69,7 @@ def sandwich(
     inverse, _ = inverted(normal + prior, least)
     part = sum(rows) / freedom
     covariance = not_below(inverse @ (meat * part + prior) @ inverse, inverse @ (normal * size + prior) @ inverse)
-    return Sandwich(state, covariance, size, tau)
+    return Sandwich(state, covariance, size, tau, normal, back)
 
 
 def _meat(scores: Sequence[tuple[Any, FloatArray, FloatArray]], p: int) -> FloatArray:

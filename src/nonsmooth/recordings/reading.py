@@ -7,9 +7,8 @@ come from elsewhere: what a file claims is checked against its size.
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from importlib import import_module
 from types import ModuleType
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import DataFileError, not_installed
+from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.system.names import check_keys
 
 __all__ = [
@@ -156,11 +156,8 @@ class Options:
         check_keys(given, [one.name for one in fields(cls)], "load_recording", "an option")
         read = {name: value for name, value in given.items() if value is not None}
         for name in {"header", "units_row", "skip"} & set(read):
-            line = read[name]
-            if isinstance(line, bool) or not isinstance(line, int if name != "skip" else int | Iterable) or (
-                isinstance(line, int) and line < (name != "skip")
-            ):
-                raise ValueError(f"{name} must be the number of a line, counted from 1, got {line!r}")
+            if name != "skip" or isinstance(read[name], int):
+                read[name] = whole_number(read[name], f"{name}, the number of a line,", int(name != "skip"))
         for name in {"skip", "na"} & set(read):
             if not isinstance(texts := read[name], int):
                 read[name] = (texts,) if isinstance(texts, str) else tuple(texts)
@@ -183,7 +180,7 @@ class Options:
                 )
         if not isinstance(axis, str) or not axis.isidentifier() or axis == "run":
             raise ValueError(f"axis must be a name such as 'time' or 'frequency', got {axis!r}")
-        if rate is not None and not (isinstance(rate, int | float) and math.isfinite(rate) and rate > 0):
+        if rate is not None and not real_number(rate, "rate") > 0:
             raise ValueError(f"rate must be a positive number of samples per second, got {rate!r}")
         if rate is not None and (axis != "time" or axis in columns):
             raise ValueError("rate makes a time axis where the file has none; give it without columns['time'] and axis")
@@ -196,7 +193,7 @@ class Options:
         if marks is not None and (marks not in (".", ",", " ", "'", "\u00a0", "\u202f") or marks == decimal):
             raise ValueError(f"thousands must be one of . , ' or a space, and not the decimal mark, got {marks!r}")
         for name, period in self.wraps.items():
-            if isinstance(period, bool) or not isinstance(period, int | float) or not 0 < period < math.inf:
+            if not real_number(period, f"wraps[{name!r}]") > 0:
                 raise ValueError(f"wraps[{name!r}] must be the count at which it begins anew, as 65536, got {period!r}")
 
 

@@ -50,13 +50,13 @@ def compare_diagram(
         periods = theory["period_number"].transpose(..., name).values.reshape(-1, len(grid))
     over = (name, "direction", "iterate", "state")
     variables: dict[str, Any] = {
-        f"measured_{name}": (("sample",), at, {"long_name": f"measured {name}", "units": unit}),
+        f"measured_{name}": ("sample", at, {"long_name": f"measured {name}", "units": unit}),
         "measured_section": (("sample", "state"), points, {"long_name": "measured section points"}),
-        "measured_period_number": (("sample",), numbers, {"long_name": "measured period number (0: none found)"}),
+        "measured_period_number": ("sample", numbers, {"long_name": "measured period number (0: none found)"}),
         "theory_section": (over, np.moveaxis(sections, 0, 1), {"long_name": "predicted section points"}),
         "theory_period_number": ((name, "direction"), periods.T, {"long_name": "predicted period number (0: none)"}),
-        name: ((name,), grid, {"long_name": name, "units": unit}),
-        "direction": (("direction",), np.array(words), {"long_name": "direction of the sweep"}),
+        name: (name, grid, {"long_name": name, "units": unit}),
+        "direction": ("direction", np.array(words), {"long_name": "direction of the sweep"}),
     }  # fmt: skip
     drawn_flips: list[dict[str, float]] = []
     if model.system is not None and model.draws:
@@ -132,7 +132,7 @@ def _flips(
     nothing = Flip(np.nan, np.nan, np.nan)
     m, error, read = np.array([measured.get(word, nothing) for word in words], dtype=float).reshape(-1, 3).T
     t = np.array([theory.get(word, np.nan) for word in words], dtype=float)
-    over = ("flip",)
+    over = "flip"
     variables: dict[str, Any] = {
         "flip": (over, np.array(words, dtype=str), {"long_name": "period numbers on the two sides of the flip"}),
         "measured_flip": (over, m, {"long_name": "measured flip (NaN: none was seen)", "units": unit}),

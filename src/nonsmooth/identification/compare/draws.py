@@ -172,7 +172,7 @@ def _ends(bounds: Mapping[str, Any], system: System) -> dict[str, tuple[float, f
 def drawn_variables(drawn: Mapping[str, np.ndarray], system: System) -> dict[str, Any]:
     """The draws as variables ``drawn_<name>`` over ``draw``, to be kept with a comparison."""
     return {
-        f"drawn_{name}": (("draw",), column, {
+        f"drawn_{name}": ("draw", column, {
             "long_name": f"drawn {name}", "units": system.parameters[name].unit or "1"})
         for name, column in drawn.items()
     }  # fmt: skip

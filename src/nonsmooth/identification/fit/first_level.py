@@ -20,7 +20,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, shortened
-from nonsmooth.identification.fit.first_windows import first_windows, states_from_samples
+from nonsmooth.identification.fit.first_windows import first_windows, told_start
 from nonsmooth.identification.fit.rough import alone, level, misfits, own_size
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.identification.pieces import State
@@ -79,8 +79,7 @@ def other_beginnings(
     window = problem.pieces[i]
     if window.first or len(problem.modes[window.record]) == 1:
         return []
-    told = states_from_samples(problem, theta, problem.records[window.record], slice(0, 1))[0]
-    told = np.append(told, np.full(len(window.start) - len(told), np.nan))
+    told = told_start(problem, theta, window)
     known = np.isfinite(told) & (window.spread > 0)
     rng, found = np.random.default_rng(0), []
     for mode in problem.modes[window.record]:
@@ -179,17 +178,12 @@ def _soft(problem: Windows, noise: FloatArray) -> Windows:
     return replace(problem, noise=noise, unknowns=replace(u, low=low, high=high))
 
 
-def _rows(problem: Windows, state: State) -> list[tuple[Window, FloatArray]]:
-    return [(w, r[: len(w.readings[0])]) for w, r in zip(problem.pieces, state.residuals, strict=True)]
-
-
 def _sizes(problem: Windows, state: State) -> FloatArray:
     """Size of the residuals of each quantity, of most windows."""
     found = np.zeros(len(problem.sensors))
     for c in range(len(found)):
-        each = [
-            float(np.mean(r[w.readings[1] == c] ** 2)) for w, r in _rows(problem, state) if (w.readings[1] == c).any()
-        ]
+        rows = [r[w.readings[1] == c] for w, r in problem.rows(state)]
+        each = [float(np.mean(r**2)) for r in rows if len(r)]
         found[c] = np.sqrt(np.median(each))
     return found
 
@@ -211,18 +205,11 @@ def _others(
 ) -> list[tuple[Window, FloatArray]]:
     """Other starts of a window: as the window before it ends, as the samples tell, and drawn about these."""
     window = problem.pieces[i]
-    record = problem.records[window.record]
-    told = states_from_samples(problem, theta, record, slice(window.first, window.first + 1))[0]
-    told = np.append(told, np.full(len(window.start) - len(told), np.nan))
+    told, run = told_start(problem, theta, window), window.record
     found = [(window, starts[i])]
-    values = problem.values(theta, window.record)
-    if i and problem.pieces[i - 1].record == window.record and values is not None:
-        before = problem.pieces[i - 1]
-        shift, clock = problem.shift(theta, window), problem.clock(theta, window.record)
-        motion = problem.marcher.run(
-            values, clock * before.begin + shift, np.array([clock * window.begin + shift]), starts[i - 1], before.mode,
-            drive=record.drive,
-        )  # fmt: skip
+    if i and problem.pieces[i - 1].record == run:
+        before, begin = problem.pieces[i - 1], np.array([problem.clock(theta, run) * window.begin])
+        motion = problem.march(theta, run, before.begin, begin, starts[i - 1], before.mode)
         if motion is not None:
             found.append((replace(window, mode=int(motion.mode[0])), motion.z[0]))
     known = np.isfinite(told) & (window.spread > 0)

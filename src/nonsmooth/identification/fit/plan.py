@@ -11,9 +11,8 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, shortened
 from nonsmooth.flow.arguments import check_system, yes_or_no
-from nonsmooth.identification.arrow import inverted, reduced
+from nonsmooth.identification.arrow import LEAST, inverted, reduced
 from nonsmooth.identification.blas import one_blas_thread
-from nonsmooth.identification.fit.rough import LEAST
 from nonsmooth.system.names import by_name, unknown
 
 if TYPE_CHECKING:
@@ -143,15 +142,15 @@ def plan_experiment(
     return xr.Dataset(
         {
             "uncertainty": (("run", "parameter"), alone, {"long_name": "standard uncertainty by this run"}),
-            "log_det": (("run",), [_log_det(one + precision, size) for one in found], {
+            "log_det": ("run", [_log_det(one + precision, size) for one in found], {
                 "long_name": "log det of the information, in units of the parameters' values"}),
-            "best": (("parameter",), labels[np.argmin(alone, axis=0)].astype(str), {
+            "best": ("parameter", labels[np.argmin(alone, axis=0)].astype(str), {
                 "long_name": "run with the least uncertainty"}),
             "information": (("run", "parameter", "other"), np.array(found), {"long_name": "Fisher information"}),
-            "order": (("step",), labels[order].astype(str), {"long_name": "run that adds most to the determinant"}),
+            "order": ("step", labels[order].astype(str), {"long_name": "run that adds most to the determinant"}),
             "uncertainty_after": (("step", "parameter"), np.array(after), {
                 "long_name": "standard uncertainty by this run and those before"}),
-            "log_det_after": (("step",), measure, {"long_name": "log det by this run and those before"}),
+            "log_det_after": ("step", measure, {"long_name": "log det by this run and those before"}),
         },
         {
             "run": labels.astype(str), "parameter": names, "other": names, "step": np.arange(1, len(order) + 1),

@@ -9,14 +9,10 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.arrow import settle
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.identification.pieces import State
 
-__all__ = ["LEAST", "alone", "level", "misfits", "own_size"]
-
-LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction counts as determined
-
+__all__ = ["alone", "level", "misfits", "own_size"]
 
 def level(
     problem: Windows, theta: FloatArray, starts: FloatArray, used: Any = None
@@ -28,11 +24,8 @@ def level(
     """
     if not np.isfinite(np.concatenate(problem.residuals(theta, starts).residuals)).all():
         raise SolveError("a motion over longer windows does not come to its end")
-    u = problem.unknowns
-    used = np.ones(len(starts), dtype=bool) if used is None else used
-    known = u.precision + np.diag(own_size(problem) ** -2.0)
-    found = settle(problem, theta, starts, 0.0, used, u.centre, known, 30, True, (u.low, u.high), LEAST)
-    return found[0], found[1], found[2]
+    known = problem.unknowns.precision + np.diag(own_size(problem) ** -2.0)
+    return problem.settle(theta, starts, used, known, rough=True)
 
 
 def own_size(problem: Windows) -> FloatArray:
@@ -42,8 +35,7 @@ def own_size(problem: Windows) -> FloatArray:
 
 def misfits(problem: Windows, state: State) -> FloatArray:
     """Mean squared residual over the noise, of each window."""
-    rows = zip(problem.pieces, state.residuals, strict=True)
-    return np.array([float(np.mean((r[: len(c)] / problem.noise[c]) ** 2)) for w, r in rows for _, c in [w.readings]])
+    return np.array([float(np.mean((r / problem.noise[w.readings[1]]) ** 2)) for w, r in problem.rows(state)])
 
 
 def alone(
