@@ -11,6 +11,7 @@ import numpy as np
 
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.flow.arguments import ends, real_number
+from nonsmooth.identification.uncertainty import normal_draws
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -191,13 +192,8 @@ def _identified(parameters: Any, count: int, seed: int) -> dict[str, np.ndarray]
         return {name: np.full(count, float(parameters[name])) for name in parameters}
     names = [str(name) for name in covariance[covariance.dims[0]].values]
     held = [i for i, name in enumerate(names) if name in parameters]
-    matrix = np.asarray(covariance.values, dtype=float)[np.ix_(held, held)]
-    mean = np.array([float(parameters[names[i]]) for i in held])
-    sizes = np.sqrt(np.diag(matrix))
-    scale = np.where(sizes > 0, sizes, 1.0)  # parameters differ by 10^5 in size: draw in units of their own errors
-    correlation = matrix / np.outer(scale, scale)
-    unit = np.random.default_rng(seed).multivariate_normal(np.zeros(len(held)), correlation, count, method="eigh")
-    table = mean + unit * scale
+    mean, matrix = [float(parameters[names[i]]) for i in held], np.asarray(covariance.values, float)
+    table = normal_draws(mean, matrix[np.ix_(held, held)], count, seed)
     return {names[i]: table[:, k] for k, i in enumerate(held)}
 
 
