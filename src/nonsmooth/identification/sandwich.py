@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.pieces import Fittable, State
 from nonsmooth.identification.uncertainty import newey_west, not_below
@@ -31,7 +30,7 @@ class Sandwich(NamedTuple):
 
 
 def sandwich(
-    problem: Fittable, theta: FloatArray, starts: FloatArray, spread: float, used: NDArray[np.bool_], prior: FloatArray,
+    problem: Fittable, theta: FloatArray, starts: FloatArray, spread: float, used: BoolArray, prior: FloatArray,
     least: float = 0.0,
 ) -> Sandwich:  # fmt: skip
     """Covariance of the parameters, never smaller along any of them than that of white residuals of the same size.

@@ -9,7 +9,7 @@ import numpy as np
 
 from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.identification.blas import one_blas_thread
-from nonsmooth.identification.compare.draws import Model, nominal, read_settings
+from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
 from nonsmooth.identification.compare.measured import recorded_motion
 from nonsmooth.system.names import unknown
 
@@ -281,9 +281,8 @@ def _noise(measured: xr.Dataset, noise: Any, states: list[str]) -> np.ndarray:
 
 
 def _parameter(name: str, theory: Any) -> str:
-    if hasattr(theory, "parameters") and name not in theory.parameters:
-        units = {key: item.unit for key, item in theory.parameters.items()}
-        raise ValueError(unknown(name, "a parameter", repr(theory.name), units))
+    if hasattr(theory, "parameters"):
+        check_parameter(name, theory)
     return name
 
 

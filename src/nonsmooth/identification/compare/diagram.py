@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.identification.compare.draws import Model
-from nonsmooth.identification.compare.flips import Flip, delayed_flips
-from nonsmooth.identification.compare.periods import flips, measured_period, period_numbers
+from nonsmooth.identification.compare.periods import Flip, delayed_flips, flips, measured_period, period_numbers
 from nonsmooth.identification.compare.predict import Motions
 
 if TYPE_CHECKING:
@@ -36,7 +34,7 @@ def compare_diagram(
     grid = np.linspace(at.min(), at.max(), FINE) if values is None else np.asarray(values, dtype=float)
     words = ["up", "down"] if direction == "both" else [direction]
 
-    def diagram(system: System) -> tuple[FloatArray, NDArray[np.int64]]:
+    def diagram(system: System) -> tuple[FloatArray, IntArray]:
         return _marched(system, model, name, grid, words, max_period, phase)
 
     theory = model.theory
@@ -83,7 +81,7 @@ def compare_diagram(
 
 def _marched(
     system: System, model: Model, name: str, grid: FloatArray, words: Sequence[str], max_period: int, phase: float
-) -> tuple[FloatArray, NDArray[np.int64]]:
+) -> tuple[FloatArray, IntArray]:
     """The diagram, the state carried along; settings that follow from the parameter change with it."""
     rules = {key: setting for key, setting in model.settings.items() if setting.follows and key != name}
     # A drawn system is off its rule by an error that stays the same along the diagram.
@@ -92,10 +90,7 @@ def _marched(
     for value in grid:
         here = {**system.values, name: float(value)}
         systems.append(system.with_parameters(here | {k: rule.at(here) + beside[k] for k, rule in rules.items()}))
-    motions = Motions(
-        systems, transient=model.transient, keep=KEEP, max_period=max_period, options=model.options, phase=phase,
-        places=model.places,
-    )  # fmt: skip
+    motions = Motions(systems, model, keep=KEEP, max_period=max_period, phase=phase)
     rising = np.argsort(grid, kind="stable").tolist()
     found = [motions.carried(rising if word == "up" else rising[::-1]) for word in words]
     return np.stack([sections for sections, _ in found]), np.stack([periods for _, periods in found])
@@ -103,7 +98,7 @@ def _marched(
 
 def _measured(
     measured: xr.Dataset, name: str, noise: FloatArray, max_period: int
-) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+) -> tuple[FloatArray, FloatArray, IntArray]:
     """Values, points and period numbers, one row for each point: steady runs, or one slow rise."""
     section = measured["section"]
     if name in section.dims:

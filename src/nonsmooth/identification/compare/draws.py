@@ -12,11 +12,15 @@ import numpy as np
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.flow.arguments import ends, real_number
 from nonsmooth.identification.uncertainty import normal_draws
+from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Model", "Setting", "Settings", "draw_systems", "drawn_variables", "nominal", "read_settings", "settled"]
+__all__ = [
+    "Model", "Setting", "Settings", "check_parameter", "draw_systems", "drawn_variables", "nominal", "read_settings",
+    "settled",
+]  # fmt: skip
 
 Rule = Callable[[Mapping[str, float]], float]
 
@@ -53,13 +57,9 @@ def read_settings(settings: Mapping[str, Any] | None, system: System) -> dict[st
     ValueError
         A name that is no parameter of the system, or a negative uncertainty.
     """
-    from nonsmooth.system.names import unknown
-
     read: dict[str, Setting] = {}
     for name, given in (settings or {}).items():
-        if name not in system.parameters:
-            units = {key: item.unit for key, item in system.parameters.items()}
-            raise ValueError(unknown(name, "a parameter", repr(system.name), units))
+        check_parameter(name, system)
         if isinstance(given, Mapping):
             extra = set(given) - {"value", "uncertainty"}
             if extra or "value" not in given:
@@ -159,15 +159,16 @@ def draw_systems(
 
 
 def _ends(bounds: Mapping[str, Any], system: System) -> dict[str, tuple[float, float]]:
-    from nonsmooth.system.names import unknown
+    for name in bounds:
+        check_parameter(name, system)
+    return {name: ends(pair, name) for name, pair in bounds.items()}
 
-    found = {}
-    for name, pair in bounds.items():
-        if name not in system.parameters:
-            units = {key: item.unit for key, item in system.parameters.items()}
-            raise ValueError(unknown(name, "a parameter", repr(system.name), units))
-        found[name] = ends(pair, name)
-    return found
+
+def check_parameter(name: str, system: System) -> None:
+    """Refuse a name that is no parameter of the system."""
+    if name not in system.parameters:
+        units = {key: item.unit for key, item in system.parameters.items()}
+        raise ValueError(unknown(name, "a parameter", repr(system.name), units))
 
 
 def drawn_variables(drawn: Mapping[str, np.ndarray], system: System) -> dict[str, Any]:

@@ -10,8 +10,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.clouds import cloud_distance, energy_distance, wasserstein
 from nonsmooth.identification.compare.draws import Model
-from nonsmooth.identification.compare.fold import fold, mean_orbit
-from nonsmooth.identification.compare.orbits import common_length, orbit_distance
+from nonsmooth.identification.compare.orbits import common_length, fold, mean_orbit, orbit_distance
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.identification.compare.predict import Attractor, Motions, Prediction, from_result, predict
 
@@ -40,10 +39,7 @@ def compare_motion(
     motions = None
     if model.system is not None:
         starts = _starts(sections[0] if phases[0] == 0 else None, folded, model, start)
-        motions = Motions(
-            [model.system], transient=model.transient, keep=KEEP, max_period=max_period, options=model.options,
-            places=model.places,
-        )  # fmt: skip
+        motions = Motions([model.system], model, keep=KEEP, max_period=max_period)
         predicted = predict(motions, sections, phases, scale, starts=starts, n=max(CLOUD, len(sections[0])), grid=grid)
     else:
         predicted = from_result(model.theory, model.states, phases, grid, max_period)
@@ -262,9 +258,7 @@ def motion_band(
     distances = np.full((draws, len(phases)), np.nan)
     to_measured = np.full(draws, np.nan)
     orbits: list[FloatArray] = []
-    motions = Motions(
-        systems, transient=model.transient, keep=64, max_period=max_period, options=model.options, places=model.places
-    )
+    motions = Motions(systems, model, keep=64, max_period=max_period)
     for i in range(draws):
         (one,) = motions.attractors(i, nearest.point)
         numbers[i] = one.period_number

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.compare.fold import fold
+from nonsmooth.identification.compare.orbits import fold
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,10 +13,9 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.fit.first_level import settle_soft
+from nonsmooth.identification.fit.first_level import misfits, settle_soft
 from nonsmooth.identification.fit.first_windows import WIDE, first_windows, told_start
 from nonsmooth.identification.fit.growth import POOR
-from nonsmooth.identification.fit.rough import misfits
 from nonsmooth.identification.fit.windows import Window, Windows
 
 __all__ = ["beginnings", "drawn"]

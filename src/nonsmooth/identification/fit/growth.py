@@ -16,9 +16,8 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import Unsettled
-from nonsmooth.identification.fit.first_level import BETTER, other_beginnings, rechosen, settle_first
+from nonsmooth.identification.fit.first_level import BETTER, level, other_beginnings, rechosen, settle_first
 from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
-from nonsmooth.identification.fit.rough import level
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.identification.pieces import State
 

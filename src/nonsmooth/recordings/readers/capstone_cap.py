@@ -21,9 +21,8 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import DataFileError
-from nonsmooth.recordings.readers.archive import Archive
 from nonsmooth.recordings.readers.text_table import number
-from nonsmooth.recordings.reading import MAX_COLUMNS, Options, Reading, Remarks, Source, Trace
+from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Options, Reading, Remarks, Source, Trace
 
 __all__ = ["RECORD", "SYNTHETIC", "Experiment", "Segment", "parse", "read"]
 

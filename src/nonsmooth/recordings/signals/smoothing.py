@@ -13,9 +13,9 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal, whose
 
@@ -124,7 +124,7 @@ class _Intervals:
             )
         self.begin, self.end = begin, end
 
-    def hold(self, times: FloatArray) -> NDArray[np.bool_]:
+    def hold(self, times: FloatArray) -> BoolArray:
         """Mask of the times that lie inside one of them."""
         k = np.searchsorted(self.begin, times, side="right") - 1
         return (k >= 0) & (times < np.append(self.end, -np.inf)[k])
