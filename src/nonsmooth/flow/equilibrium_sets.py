@@ -20,15 +20,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.flow.equilibria import VANISHING, mode_field
+from nonsmooth.flow.equilibria import VANISHING
+from nonsmooth.flow.mode_fields import every_mode, held_places, mode_field
 from nonsmooth.flow.polytopes import TOUCHING, Extreme, Polytope, best
 from nonsmooth.system.symbolic.traced import NOT_UNIQUE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nonsmooth.system.derived.patterns import Patterns
-    from nonsmooth.system.derived.rows import Rows
     from nonsmooth.system.system import System
 
 __all__ = ["EquilibriumSet", "equilibrium_sets", "modes_of_sets"]
@@ -96,13 +95,15 @@ def equilibrium_sets(
     system: System, near: FloatArray, *, values: FloatArray | None = None, memory: FloatArray | None = None,
     modes: Sequence[int] | None = None,
 ) -> list[EquilibriumSet]:  # fmt: skip
-    """The sets of equilibria of a system: all of them where its modes are affine, else those beside a state."""
+    """The sets of equilibria of a system: all of them where its modes are affine, else those beside a state; none where
+    it has more modes than can be looked at."""
     values = system.parameter_vector() if values is None else values
     memory = system.memory_vector() if memory is None else memory
     if system.explicit_time:
         return []
-    traced, parts = system.traced, []
-    for mode in range(len(traced.mode_names)) if modes is None else modes:
+    modes, parts = every_mode(system.traced, values) if modes is None else modes, []
+    traced = system.traced  # with the modes that were made for it
+    for mode in modes or ():
         timed = any(jump.at is not None and jump.source == mode for jump in traced.transitions)
         if not timed and not traced.mode_names[mode].endswith(NOT_UNIQUE):
             parts += _polytopes(system, mode, near, values, memory)
@@ -114,7 +115,7 @@ def modes_of_sets(system: System) -> tuple[int, ...]:
     """The modes that leave some direction free; none where fields or indicators are not affine in the states."""
     u, values, memory = np.zeros(len(system.states)), system.parameter_vector(), system.memory_vector()
     found, scale = [], system.scale_vector()
-    for mode in range(len(system.modes)):
+    for mode in every_mode(system.traced, values) or ():
         field = mode_field(system.traced, mode)
         if not field.affine:
             return ()
@@ -132,13 +133,12 @@ def _equations(
     times = np.zeros(1) if period is None else period * INSTANTS
     f, J, _ = field.evaluate(u, values, memory, times)
     matrix, right = [*J], [*-f]
-    if traced.decider is not None and traced.decider.rows is not None:
-        # a field holds what is independent: of the others too nothing moves
-        rows, (base, pattern) = _rows(traced.decider.rows, values.tobytes()), traced.decider.modes[mode]
-        for k in rows.held(pattern):
-            kept = np.array([rows.parts[k].where.values, rows.rate(k, base).values])
-            matrix += [kept[:, field.own]] * len(times)
-            right += [-kept @ rows.augmented(u, t) for t in times]
+    held = held_places(traced, mode, values)
+    if held is not None:  # a field holds what is independent: of the others too nothing moves
+        rows, kept = held
+        for one in kept:
+            matrix += [one[:, field.own]] * len(times)
+            right += [-one @ rows.augmented(u, t) for t in times]
     return np.vstack(matrix), np.concatenate(right)
 
 
@@ -163,12 +163,6 @@ def _conditions(
         for jump in traced.transitions
         if jump.source == mode and jump.rows and jump.fires
     ]  # fmt: skip
-
-
-@lru_cache(maxsize=16)
-def _rows(patterns: Patterns, values: bytes) -> Rows:
-    """The calculus of a system's elements at values of the parameters."""
-    return patterns.rows(patterns.form.evaluate(np.frombuffer(values)[None, :]), 0)
 
 
 def _peaks(at: FloatArray) -> FloatArray:

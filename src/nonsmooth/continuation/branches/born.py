@@ -10,7 +10,7 @@ from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.rounds import Rounds
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.continuation.problems.signature import Signature, Visit
-from nonsmooth.flow.equilibria import ModeField
+from nonsmooth.flow.mode_fields import mode_field
 from nonsmooth.system.system import System
 
 __all__ = ["cycle_about_a_centre", "first_cycle"]
@@ -61,7 +61,7 @@ def cycle_about_a_centre(
     rested, own, omega = eigen
     n, values = len(system.states), system.parameter_vector()
     values[list(system.values).index(name)] = value
-    field = ModeField(system.traced, mode, ())
+    field = mode_field(system.traced, mode)
     turns = np.exp(2j * np.pi * np.arange(ANGLES) / ANGLES)
 
     def margins(amplitude: float) -> FloatArray:
