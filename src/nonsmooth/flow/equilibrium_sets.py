@@ -184,6 +184,7 @@ class _Faces:
     slopes: FloatArray
     room: FloatArray
     keys: tuple[tuple[int, int], ...]
+    edge: bool
 
     def farthest(self, way: FloatArray) -> tuple[FloatArray, tuple[tuple[int, int], ...]] | None:
         """The vertex farthest along a direction, with its conditions: infinite where unbounded; None where empty."""
@@ -230,9 +231,8 @@ def _polytopes(system: System, mode: int, near: FloatArray, values: FloatArray, 
             if np.isfinite(u).all():
                 extremes.append(Extreme(u * scale, mode, (k, sign), keys))
         else:
-            found.append(
-                Polytope(mode, scale, faces.origin, faces.ways, faces.slopes, faces.room, lower, upper, tuple(extremes))
-            )
+            bounds = faces.origin, faces.ways, faces.slopes, faces.room
+            found.append(Polytope(mode, scale, *bounds, lower, upper, tuple(extremes), faces.edge))
     return found
 
 
@@ -257,6 +257,7 @@ def _faces(system: System, mode: int, u: FloatArray, values: FloatArray, memory:
     ways = np.zeros((len(scale), free.shape[1]))
     ways[~lacking] = free
     choices: list[list[tuple[FloatArray, float, tuple[int, int]]]] = []
+    edge = False
     for conditions in _conditions(system, mode, u, values, memory):
         bounds, holds = [], 0
         for one in conditions:
@@ -273,12 +274,14 @@ def _faces(system: System, mode: int, u: FloatArray, values: FloatArray, memory:
                 choices.append([b for i, b in enumerate(bounds) if not any(_alike(b, a) for a in bounds[:i])])
             elif holds:  # it always holds: a transition leads away
                 return []
+            else:
+                edge = True
     found, u = [], u / scale
     for chosen in product(*choices):
         rows = [b for i, b in enumerate(chosen) if not any(_alike(b, a) for a in chosen[:i])]
         slopes = np.array([row for row, _, _ in rows]).reshape(len(rows), free.shape[1])
         room = np.array([limit for _, limit, _ in rows])
-        found.append(_Faces(u, ways, slopes, room, tuple(key for _, _, key in rows)))
+        found.append(_Faces(u, ways, slopes, room, tuple(key for _, _, key in rows), edge))
     return found
 
 
@@ -310,7 +313,7 @@ def _touch(a: Polytope, b: Polytope) -> bool:
 def _set_of(parts: list[Polytope]) -> EquilibriumSet:
     scale = parts[0].scale
     kept: list[Polytope] = []  # none within another, as slipping that has just stopped is within sticking
-    for part in sorted(parts, key=lambda one: -one.ways.shape[1]):
+    for part in sorted(parts, key=lambda one: (-one.ways.shape[1], one.edge)):
         corners = np.array([one.u for one in part.extremes])
         if not (len(corners) and any(other.holds(corners, TOUCHING).all() for other in kept)):
             kept.append(part)
