@@ -205,3 +205,14 @@ def test_friction_between_two_walls(impacts: str) -> None:
     )  # fmt: skip
     np.testing.assert_allclose(swept.equilibrium_minimum.sel(state="q"), [-0.1, 0.7, 1.0], atol=1e-9)
     np.testing.assert_allclose(swept.equilibrium_maximum.sel(state="q"), [0.3, 1.0, 1.0], atol=1e-9)
+
+
+def test_equal_elements_on_other_springs() -> None:
+    """Two systems that differ in what their modes hold beside elements: q = F / k in each."""
+    for k in (1.0, 2.0):
+        walls = [ns.elements.Stop(at="q", position=9.0), ns.elements.Stop(at="q", position=-9.0, side=-1)]
+        system = ns.mechanical(
+            1.0, 0.1, k, parameters={"F": 0.0}, forcing={"q": "F"}, impacts="sequential", elements=walls
+        )
+        branch = ns.continue_equilibrium(system, "F", (-1.0, 1.0))
+        np.testing.assert_allclose(branch.u.sel(state="q"), branch.F / k, atol=1e-12)
