@@ -307,7 +307,12 @@ def _joined(parts: list[Polytope]) -> list[EquilibriumSet]:
 
 def _touch(a: Polytope, b: Polytope) -> bool:
     off = TOUCHING * a.scale
-    return bool((a.lower <= b.upper + off).all() and (b.lower <= a.upper + off).all() and a.distance(b) <= TOUCHING)
+    if not ((a.lower <= b.upper + off).all() and (b.lower <= a.upper + off).all()):
+        return False
+    for one, other in ((a, b), (b, a)):  # most share a corner
+        if one.extremes and other.holds(np.array([end.u for end in one.extremes]), TOUCHING).any():
+            return True
+    return a.distance(b) <= TOUCHING
 
 
 def _set_of(parts: list[Polytope]) -> EquilibriumSet:
