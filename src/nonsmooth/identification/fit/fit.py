@@ -206,7 +206,7 @@ def problem_of(
 ) -> Windows:  # fmt: skip
     """The problem, without windows; the noise is the records' own irregularity."""
     check_system(system, "fit", inputs=True)
-    from nonsmooth.identification.fit.first_modes import read_modes
+    from nonsmooth.identification.fit.first_level import read_modes
     from nonsmooth.identification.fit.motion import Marcher
     from nonsmooth.identification.fit.records import irregularity, read_records
     from nonsmooth.identification.fit.unknowns import read_unknowns

@@ -16,8 +16,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import Unsettled, settle
-from nonsmooth.identification.fit.first_level import settle_first
-from nonsmooth.identification.fit.first_modes import BETTER, other_beginnings, rechosen
+from nonsmooth.identification.fit.first_level import BETTER, other_beginnings, rechosen, settle_first
 from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
 from nonsmooth.identification.fit.rough import LEAST, level
 from nonsmooth.identification.fit.windows import Window, Windows
