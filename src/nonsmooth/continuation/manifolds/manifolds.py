@@ -215,8 +215,8 @@ def _dataset(
     return build(
         labels, attrs,
         {"section": np.concatenate(sections), "arc_length": np.concatenate(lengths),
-         "iterate": np.concatenate(iterates), "piece": np.concatenate(pieces), "arc": np.concatenate(numbers)},
-        kinds=[one for one, *_ in arcs], sides=[side for _, side, *_ in arcs],
-        orbit_points=[j for _, _, j, _, _ in arcs], multipliers=[mu for _, _, _, mu, _ in arcs],
-        orbit_section=cycle * size, scale=size, endings=ENDS, ended=[arc.ending for *_, arc in arcs],
+         "iterate": np.concatenate(iterates), "piece": np.concatenate(pieces), "arc": np.concatenate(numbers),
+         "side": [side for _, side, *_ in arcs], "orbit_point": [j for _, _, j, _, _ in arcs],
+         "multiplier": [mu for _, _, _, mu, _ in arcs], "orbit_section": cycle * size, "size": size},
+        kinds=[one for one, *_ in arcs], endings=ENDS, ended=[arc.ending for *_, arc in arcs],
     )  # fmt: skip
