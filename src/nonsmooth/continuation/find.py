@@ -155,9 +155,8 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
     """Newton from each guess; the first orbit that is admissible, near, and stable (or asked for)."""
     reasons: list[tuple[str, str]] = []
     search.look()
-    for guess in [one for first in guesses for one in (*touching(first, system), first)]:
-        shooting = Shooting(system, guess.signature, guess.period_number)
-        X = shooting.join(guess.times, guess.states, guess.period)
+    for guess in [one for first in guesses for one in (*touching(first, system, first.kicks), first)]:
+        shooting, X = Shooting.of(system, guess)
         size = np.concatenate([guess.size, np.ones(shooting.n - len(guess.size))])
         name = _name(guess.period_number)
         search.doing = f"looking for a {name} orbit by Newton's method"

@@ -11,6 +11,7 @@ from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.branches.records import PointRecord
 from nonsmooth.continuation.problems.orbits import Orbits, size_of
 from nonsmooth.continuation.problems.shooting import Shooting
+from nonsmooth.continuation.problems.signature import Round
 from nonsmooth.system.system import System
 
 __all__ = ["curve_of", "resumed_at"]
@@ -19,9 +20,9 @@ __all__ = ["curve_of", "resumed_at"]
 def curve_of(orbit: Orbit, name: str, width: float) -> tuple[Orbits, FloatArray]:
     """The curve through an orbit, and its unknowns."""
     system = orbit.system
-    shooting = Shooting(system, orbit.signature, orbit.period_number, (name,))
     states = np.vstack([np.concatenate([orbit.u, orbit.memory]), orbit.crossing_states])
-    X = shooting.join(orbit.crossing_times, states, orbit.period, [system.values[name]])
+    once = Round(orbit.period_number, orbit.period, orbit.signature, orbit.crossing_times, states)
+    shooting, X = Shooting.of(system, once, (name,), [system.values[name]])
     return _through(shooting, X, orbit, width)
 
 

@@ -86,7 +86,7 @@ def cycle_about_a_centre(
         guess = rounds.free(values, z, mode, 0.0, period)
         if guess is None or not len(guess.times):
             continue
-        fresh, X = curve.with_signature(guess.signature, guess.times, guess.states, guess.period, [value])
+        fresh, X = curve.around(guess, [value])
         Y = X / fresh.scale
         border = np.zeros(fresh.n)
         border[: curve.shooting.n] = (X[: curve.shooting.n] - rested) / scale

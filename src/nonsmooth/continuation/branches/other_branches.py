@@ -16,6 +16,7 @@ from nonsmooth.continuation.march.march import March, Row
 from nonsmooth.continuation.problems.curve import tangents
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.shooting import Shooting
+from nonsmooth.continuation.problems.signature import Round
 from nonsmooth.errors import SolveError
 
 if TYPE_CHECKING:
@@ -102,19 +103,14 @@ def _check_parameter(name: str | None, own: str) -> None:
 
 def doubled(shooting: Shooting, X: FloatArray) -> tuple[Shooting, FloatArray]:
     """The same orbit gone round twice."""
-    n = shooting.period_number
-    times, states = shooting.split(X)
-    period = shooting.period(X)
-    signature = shooting.signature.repeated(2, n)
-    twice = Shooting(shooting.system, signature, 2 * n, shooting.active)
+    n, once = shooting.period_number, shooting.once(X)
+    times = np.concatenate([once.times, once.times + once.period])
     # The second round begins at the section within the last visit, which is not a crossing.
-    t2 = np.concatenate([times, times + period])
-    z2 = np.concatenate([states, states[1:]])
-    X2 = twice.join(t2, z2, 2 * period, X[shooting.size :])
-    twice.divided, twice.alone = 2 * shooting.divided, 2 * shooting.alone
-    if shooting.reference is not None:
-        twice.reference = shooting.reference
-    return twice, X2
+    states = np.concatenate([once.states, once.states[1:]])
+    twice = Round(2 * n, 2 * once.period, once.signature.repeated(2, n), times, states)
+    fresh, X2 = Shooting.of(shooting.system, twice, shooting.active, X[shooting.size :])
+    fresh.divided, fresh.alone, fresh.reference = 2 * shooting.divided, 2 * shooting.alone, shooting.reference
+    return fresh, X2
 
 
 def emanating(

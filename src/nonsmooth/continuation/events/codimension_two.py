@@ -249,7 +249,7 @@ def _with_contact(sign: float) -> Number:
 
     def number(locus: Locus, place: OrbitPoint) -> float:
         for change in inserted(locus, place):
-            M, far, near = both_sides(locus.shooting, place.solved, change)
+            M, far, near = both_sides(locus, place, change)
             if not (np.isfinite(far).all() and np.isfinite(near).all()):
                 continue
             one = np.eye(len(M))

@@ -156,7 +156,7 @@ def _is_centre(curve: Orbits, met: Met) -> bool:
     """Return whether an autonomous orbit has shrunk to a closed one of a linear mode."""
     if curve.shooting.forced:
         return False
-    free = [change.signature for change in met.kind.contacts(curve, met.point) if not change.gained]
+    free = [change.new.signature for change in met.kind.contacts(curve, met.point) if not change.gained]
     name = curve.shooting.active[0]
     return any(
         not one.crossings and Equilibria(curve.shooting.system, one.visits[0].mode, name, curve.width).linear
@@ -176,7 +176,7 @@ def mark(found: March, curve: Orbits, met: list[Met], beyond: tuple[Orbits, Orbi
     if beyond is not None:
         cycle = beyond[0].shooting.signature.cycle
         for change, there in contacts_of(curve, met):
-            if change.signature.cycle == cycle:
+            if change.new.signature.cycle == cycle:
                 _mark_graze(found, curve, there, change, beyond, sliding)
                 return "grazing"
         end = _from_behind(point, *beyond)

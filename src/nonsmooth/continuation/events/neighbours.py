@@ -19,7 +19,8 @@ from nonsmooth.continuation.events.change import Change, common_orbit
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.rounds import Rounds
 from nonsmooth.continuation.problems.shooting import Solved
-from nonsmooth.continuation.searches.settled import Guess, touching
+from nonsmooth.continuation.problems.signature import Round
+from nonsmooth.continuation.searches.settled import touching
 
 __all__ = ["beside"]
 
@@ -76,7 +77,7 @@ def _found(
             if guess is None or tried[guess.signature.cycle] >= AGAIN:
                 break
             tried[guess.signature.cycle] += 1
-            other, X = curve.with_signature(guess.signature, guess.times, guess.states, guess.period, there)
+            other, X = curve.around(guess, there)
             found = other.at_parameter(X / other.scale, float(there[0]))
             if found is None or not _apart(curve, point, found) < NEAR:
                 break
@@ -89,30 +90,23 @@ def _found(
 def _guesses(
     curve: Orbits, point: OrbitPoint, common: list[tuple[Orbits, Solved, FloatArray]], rounds: Rounds,
     values: FloatArray, side: float, aside: float,
-) -> Iterator[Guess | None]:  # fmt: skip
+) -> Iterator[Round | None]:  # fmt: skip
     """Rounds along the branch, from the end of the signature itself, and about it; that end without its touches.
 
     First the common orbits of contacts, along their tangents: beyond an impact without speed a round shows none nearby.
     """
     for other, there, tangent in common:
         if abs(float(tangent[-1])) > STEEP:
-            yield _as_guess(other, there, there.X + side * aside / float(tangent[-1]) * tangent * other.scale)
+            yield other.shooting.once(there.X + side * aside / float(tangent[-1]) * tangent * other.scale)
     shooting, slope = curve.shooting, float(point.tangent[-1])
     if abs(slope) > STEEP:
         yield rounds.read(shooting, point.X + side * aside / slope * point.tangent * curve.scale, values)
     yield rounds.read(shooting, point.X, values)
-    yield from touching(_as_guess(curve, point.solved, point.X), shooting.system)
+    yield from touching(shooting.once(point.X), shooting.system)
     random = np.random.default_rng(0)
     for i in range(PERTURBED):
         change = aside ** POWERS[i % 3] * random.uniform(-1.0, 1.0, shooting.n) * curve.size
         yield rounds.read(shooting, point.X, values, change)
-
-
-def _as_guess(curve: Orbits, near: Solved, X: FloatArray) -> Guess:
-    """Unknowns near a solved orbit of a curve as an interval of motion."""
-    shooting = curve.shooting
-    period = float(near.times[-1]) if shooting.forced else float(X[shooting.size - 1])
-    return Guess(shooting.period_number, period, shooting.signature, *shooting.split(X))
 
 
 def _apart(curve: Orbits, a: OrbitPoint, b: OrbitPoint) -> float:

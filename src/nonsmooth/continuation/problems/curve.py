@@ -284,6 +284,13 @@ class Curve(ABC, Generic[P]):
         null = self.null_vectors(solved)
         return self.point(solved, Y, null[-1], iterations) if len(null) else None
 
+    def nearest(self, Y: FloatArray, value: float) -> P | None:
+        """The point at a value of the parameter; where that cannot be held, at a fold, the one across the branch."""
+        point = self.at_parameter(Y, value)
+        if point is None and len(null := self.null_vectors(self.evaluate(Y))):
+            return self.near(Y, null[-1], most=20)
+        return point
+
     def at_edge(self, a: P, b: P, edge: float, which: int) -> P | None:
         """The point at the edge of a parameter's range, between two points."""
         edge_there = edge / self.scale[which]

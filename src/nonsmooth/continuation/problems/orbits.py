@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.continuation.problems.anchor import plane_across
 from nonsmooth.continuation.problems.curve import Curve, Point
 from nonsmooth.continuation.problems.path import Path, Walk
 from nonsmooth.continuation.problems.rounds import Rounds
-from nonsmooth.continuation.problems.shooting import Shooting, Solved
-from nonsmooth.continuation.problems.signature import Signature
+from nonsmooth.continuation.problems.shooting import Shooting, Solved, plane_across
+from nonsmooth.continuation.problems.signature import Round, Signature
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
@@ -94,15 +93,11 @@ class Orbits(Curve[OrbitPoint]):
         """Simulated rounds of its orbits."""
         return Rounds(self.shooting)
 
-    def with_signature(
-        self, signature: Signature, times: FloatArray, states: FloatArray, period: float, parameters: Any
-    ) -> tuple[Orbits, FloatArray]:
-        """The curve of another signature in the same units, and the unknowns there from instants and states."""
-        old = self.shooting
-        fresh = Shooting(old.system, signature, old.period_number, old.active)
-        X = fresh.join(times, states, period, parameters)
-        fresh.prepare(X, self.size)
-        return self._like(fresh, self.size), X
+    def around(self, once: Round, parameters: Any) -> tuple[Orbits, FloatArray]:
+        """The curve of another signature in the same units, and the unknowns of once round there."""
+        shooting, X = Shooting.of(self.shooting.system, once, self.shooting.active, parameters)
+        shooting.prepare(X, self.size)
+        return self._like(shooting, self.size), X
 
     def _like(self, shooting: Shooting, size: FloatArray) -> Orbits:
         """The curve of other equations of the same branch, or in other units."""

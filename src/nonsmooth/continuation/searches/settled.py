@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.problems.signature import Signature, Visit
-from nonsmooth.continuation.problems.visits import visits_of
+from nonsmooth.continuation.problems.signature import Round
+from nonsmooth.continuation.problems.visits import round_of
 from nonsmooth.flow.engines.engine import Section, State
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
@@ -29,14 +29,9 @@ NEAR = 0.2  # of the motion's size: a return farther off than this is no candida
 
 
 @dataclass
-class Guess:
-    """An interval of motion that nearly closes, read as an orbit; ``gap`` tells how far off it closes (scaled)."""
+class Guess(Round):
+    """An interval of motion that nearly closes; ``gap`` tells how far off it closes (scaled)."""
 
-    period_number: int  # 0: autonomous
-    period: float
-    signature: Signature
-    times: FloatArray  # of its crossings
-    states: FloatArray  # (m + 1, n_z): at the section and after the crossings
     gap: float = 0.0
     size: FloatArray = field(default_factory=lambda: np.empty(0))  # (n_u,) half the range of each state
     gaps: FloatArray = field(default_factory=lambda: np.empty(0))  # after 1, 2 ... forcing periods
@@ -131,45 +126,34 @@ def _read_round(system: System, settled: Settled, p: int, i: int, gaps: FloatArr
     if log.status not in (codes.OK, codes.NOT_GUARANTEED):
         return None
     flow, values = VariationalFlow.of(system), system.parameter_vector()
-    visits, states = visits_of(flow, values, log, start[len(state.u) :])
-    if visits and system.traced.transitions[visits[-1].transition].target != mode:
+    once = round_of(flow, values, log, start, mode, p * period, p)
+    if once is None:
         return None
-    signature = Signature((*visits, Visit(mode)))
     kicks = np.abs(np.nan_to_num(log.u_after - log.u_before) / settled.size).max(axis=1, initial=0.0)
-    if len(states):  # the memory returns too, or the round is a longer one
-        begun, ended = start[len(state.u) :], states[-1, len(state.u) :]
-        apart = np.abs(ended - begun) / np.maximum(np.maximum(np.abs(begun), np.abs(ended)), 1e-12)
-        gaps[-1] = max(gaps[-1], float(apart.max(initial=0.0)))
-    return Guess(
-        p, p * period, signature, log.crossing_time, np.vstack([start, states]), float(gaps[-1]), settled.size, gaps,
-        kicks,
-    )  # fmt: skip
+    begun, ended = once.states[[0, -1], len(state.u) :]  # the memory returns too, or the round is a longer one
+    apart = np.abs(ended - begun) / np.maximum(np.maximum(np.abs(begun), np.abs(ended)), 1e-12)
+    gaps[-1] = max(gaps[-1], float(apart.max(initial=0.0)))
+    return Guess(**vars(once), gap=float(gaps[-1]), size=settled.size, gaps=gaps, kicks=kicks)
 
 
-def touching(guess: Guess, system: System) -> list[Guess]:
+R = TypeVar("R", bound=Round)
+
+
+def touching(guess: R, system: System, kicks: FloatArray | None = None) -> list[R]:
     """The same motion without contacts that are no more than a touch: an orbit at its grazing point, or none such."""
-    signature, times, states = guess.signature, guess.times, guess.states
-    kicks = np.full(len(times), np.inf) if guess.kicks is None else guess.kicks
-    jumps = system.transitions
-    i = 0
-    while i < len(times):
-        visits = signature.visits
-        here = jumps[visits[i].transition]
-        if here.at is not None:  # it happens whether it changes the state or not
+    found, i, jumps = guess, 0, system.transitions
+    kicks = np.full(len(guess.times), np.inf) if kicks is None else kicks
+    while i < len(found.times):
+        visits, times = found.signature.visits, found.times
+        here, count = jumps[visits[i].transition], 0
+        if here.at is not None:
+            pass  # it happens whether it changes the state or not
+        elif here.reset is not None and here.source == here.target and kicks[i] < TOUCH:
+            count = 1
+        elif i + 1 < len(times) and times[i + 1] - times[i] < TOUCH * guess.period:
+            count = 2 if visits[i].mode == visits[i + 2].mode and visits[i + 1].row >= 0 else 0
+        if count:
+            found, kicks = found.without(i, count), np.delete(kicks, np.arange(i, i + count))
+        else:
             i += 1
-            continue
-        if here.reset is not None and here.source == here.target and kicks[i] < TOUCH:
-            kicks = np.delete(kicks, i)
-            signature = signature.without(i, 1)
-            times, states = np.delete(times, i), np.delete(states, i + 1, axis=0)
-            continue
-        short = i + 1 < len(times) and times[i + 1] - times[i] < TOUCH * guess.period
-        if short and visits[i].mode == visits[i + 2].mode and visits[i + 1].row >= 0:
-            signature = signature.without(i, 2)
-            kicks = np.delete(kicks, [i, i + 1])
-            times, states = np.delete(times, [i, i + 1]), np.delete(states, [i + 1, i + 2], axis=0)
-            continue
-        i += 1
-    if len(times) == len(guess.times):
-        return []
-    return [replace(guess, signature=signature, times=times, states=states)]
+    return [] if found is guess else [found]

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.problems.anchor import anchored
-from nonsmooth.continuation.problems.signature import Signature, Visit
-from nonsmooth.continuation.problems.visits import visits_of
+from nonsmooth.continuation.problems.signature import Round, Signature, Visit
+from nonsmooth.continuation.problems.visits import anchored, visits_of
 from nonsmooth.continuation.searches.settled import NEAR, Guess
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import Log, State
@@ -147,8 +146,8 @@ def _by_transitions(system: System, log: Log, most: int, given: int | None) -> l
         times = log.crossing_time[last - length + 1 :] - begin
         visits, states = visits_of(flow, values, log, log.memory_after[last - length], last - length + 1)
         signature = Signature((*visits, Visit(traced.transitions[k[last]].target)))
-        signature, times, states = anchored(flow, values, signature, times, np.vstack([states[-1:], states]), period)
-        guesses.append(Guess(0, period, signature, times, states, gap, size))
+        once = anchored(flow, values, Round(0, period, signature, times, np.vstack([states[-1:], states])))
+        guesses.append(Guess(**vars(once), gap=gap, size=size))
         if len(guesses) >= (given or most):
             break
     return guesses[given - 1 : given] if given else guesses
