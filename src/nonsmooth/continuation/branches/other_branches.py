@@ -10,7 +10,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.begin import resumed_at
 from nonsmooth.continuation.branches.born import cycle_about_a_centre, first_cycle
 from nonsmooth.continuation.branches.following import Asked, Start
-from nonsmooth.continuation.branches.reading import hopf_row, mark_of, one_row, special_row
+from nonsmooth.continuation.branches.reading import hopf_row, marks_of, one_row, special_row
 from nonsmooth.continuation.branches.records import record_of
 from nonsmooth.continuation.march.march import March, Row
 from nonsmooth.continuation.problems.curve import tangents
@@ -72,7 +72,7 @@ def straight_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset
     if first is None:
         raise SolveError(f"Newton's method did not converge at this {kind}", status="no_convergence")
     middle = record_of(Row(curve, first))
-    middle.marks.append(mark_of(one_row(start, "continue_orbit"), system))
+    middle.marks.extend(marks_of(one_row(start, "continue_orbit"), system))
     return branch.result(period_number, (curve, first.turned()), [middle], (curve, first), origin=kind)
 
 

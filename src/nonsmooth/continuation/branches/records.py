@@ -105,15 +105,14 @@ def record_of(row: Row) -> Any:
 def _of_orbit(row: Row) -> PointRecord:
     curve, point = row.curve, row.point
     shooting, path = curve.shooting, point.path
-    jumps, turns = shooting.system.traced.transitions, max(shooting.period_number, 1)
-    crossings, n_u = shooting.signature.crossings, len(shooting.system.states)
     # Exactly at a graze the multipliers are those of the side without contact.
     multipliers = point.multipliers if row.graze is None else row.graze.multipliers_free
+    crossings, contacts = shooting.signature.rates(shooting.system.traced.transitions, shooting.period_number)
     return PointRecord(
-        point.value, shooting.signature, point.X, point.tangent * curve.scale, shooting.at_section, point.X[:n_u],
-        path.maximum, path.minimum, float(point.solved.times[-1]), multipliers,
+        point.value, shooting.signature, point.X, point.tangent * curve.scale, shooting.at_section,
+        point.X[: len(path.maximum)], path.maximum, path.minimum, float(point.solved.times[-1]), multipliers,
         stable_by(multipliers, shooting.forced), curve.walk.clearance(path, len(shooting.system.indicators)),
-        len(crossings) / turns, sum(jumps[v.transition].contact for v in crossings) / turns, row.virtual,
+        crossings, contacts, row.virtual,
     )  # fmt: skip
 
 

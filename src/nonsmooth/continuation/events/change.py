@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
+from itertools import permutations
 
 import numpy as np
 
@@ -109,15 +110,11 @@ def by_others(curve: Orbits, point: OrbitPoint, place: int, indicator: int) -> l
     visit = visits[place]
     own = jumps[visit.transition]
     fired = own.rows[visit.row]
-    signs = {row.indicator: row.sign for row in own.rows}
     found = []
     for k, other in enumerate(jumps):
-        there = {row.indicator: row.sign for row in other.rows}
-        if (
-            (other.source, other.target) == (own.source, own.target)
-            and fired in other.rows
-            and (there.get(indicator, 0.0) * signs.get(indicator, 0.0) < 0.0)
-        ):
+        turned = any(a.indicator == b.indicator == indicator and a.sign * b.sign < 0.0
+                     for a in own.rows for b in other.rows)  # fmt: skip
+        if turned and (other.source, other.target) == (own.source, own.target) and fired in other.rows:
             new = replace(visit, transition=k, row=other.rows.index(fired))
             signature = Signature((*visits[:place], new, *visits[place + 1 :]))
             found.append(Change(replace(free, signature=signature), free, place, 1, indicator, True))
@@ -186,11 +183,10 @@ def is_tolerance(curve: Orbits, indicator: int) -> bool:
     flow, values = curve.shooting.flow, curve.shooting.values
     z = np.linspace(0.3, 0.7, flow.n) * flow.scale
     for jump in flow.traced.transitions:
-        signs = {row.indicator: row.sign for row in jump.rows}
-        for other, sign in signs.items():
-            if sign * signs.get(indicator, 0) >= 0:
+        for row, other in permutations(jump.rows, 2):
+            if row.indicator != indicator or row.sign * other.sign >= 0:
                 continue
-            one, two = (flow.indicator(values, i, jump.source, 0.0, z) for i in (indicator, other))
+            one, two = (flow.indicator(values, each.indicator, jump.source, 0.0, z) for each in (other, row))
             size = float(np.abs(two.h_z) @ flow.scale)
             if np.allclose(one.h_z, two.h_z, rtol=1e-9, atol=0.0) and 0.0 < abs(one.h - two.h) < TOLERANCE * size:
                 return True

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from nonsmooth.continuation.events.boundaries import BOUNDARIES, Boundary, Crossed, Unseen, passed_by
+from nonsmooth.continuation.events.boundaries import BOUNDARIES, Boundary, Crossed, Unseen
 from nonsmooth.continuation.events.change import Change, common_point, is_tolerance, past_the_section, rest_after
 from nonsmooth.continuation.events.grazing import graze
 from nonsmooth.continuation.events.neighbours import beside
 from nonsmooth.continuation.events.of_orbits import KINDS, SMALL
 from nonsmooth.continuation.events.sliding import sliding_bifurcation
-from nonsmooth.continuation.march.event import Met, Step, first_met
+from nonsmooth.continuation.march.event import BESIDE, LARGEST, Met, Step, first_met
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
@@ -90,8 +90,22 @@ class AlongOrbits(Policy):
         return None
 
     def passed_by(self, step: Step) -> list[Met]:
-        """Boundaries that a virtual branch passes on a step."""
-        return passed_by(step)
+        """Boundaries that a virtual branch passes, either way; of those met together the best explained.
+
+        Left out are those where the march begins, and what turns the section."""
+        found: list[Met] = []
+        begun = BESIDE if step.first else 0.0
+        for kind, was, now in zip(BOUNDARIES, *step.margins, strict=True):
+            met = kind.met(step) if was * now < 0.0 else None
+            if met is None or met.s > step.stop:
+                continue
+            ends = np.clip((was, now), -LARGEST, LARGEST)
+            counts = kind.confirmed(step.curve, met.point, *ends) and kind.counts(met.point)
+            if not counts or any(abs(met.s - one.s) <= BESIDE for one in found):
+                continue
+            if met.s > begun and not (step.cause == "change" and abs(met.s - step.stop) <= BESIDE):
+                found.append(met)
+        return found
 
     def record(self, found: March, step: Step, met: Met) -> None:
         """List a special point, or a boundary that a branch passes with its signature."""
@@ -149,7 +163,7 @@ def _completes(curve: Orbits, met: list[Met], fresh: Orbits) -> bool:
         return False
     kind, point = passed[0].kind, passed[0].point
     same = fresh.shooting.m == curve.shooting.m or not isinstance(kind, Crossed)
-    return same or rest_after(curve, point, kind.crossing(curve, point)[0]) is not None
+    return same or rest_after(curve, point, kind.visit(curve, point)) is not None
 
 
 def _is_centre(curve: Orbits, met: Met) -> bool:

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step
+from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Name, Step
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.equilibrium import FREE, Equilibria, Rest, equilibria_near, goes_on
 from nonsmooth.continuation.problems.multipliers import pairs
@@ -30,7 +30,7 @@ class Hopf(Event):
         i, j = pairs(len(point.eigenvalues))
         return float(np.prod(point.eigenvalues[i] + point.eigenvalues[j]).real)
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """None where the sum of two real eigenvalues vanishes."""
         nearest = point.eigenvalues[np.argmin(np.abs(point.eigenvalues.real))]
         if abs(nearest.imag) <= 1e-9:

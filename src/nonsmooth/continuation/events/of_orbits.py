@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.continuation.march.event import Crossing, Event, Fold, Step
+from nonsmooth.continuation.march.event import Crossing, Event, Fold, Name, Step
 from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
 from nonsmooth.continuation.problems.primitive import is_doubled
 
@@ -30,7 +30,7 @@ SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish
 class FoldOfOrbits(Fold):
     """Two orbits meet; a branch of cycles that emanates from a Hopf point turns there too."""
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """A Hopf point, which ends the branch, where the cycle is small."""
         if step.curve.shooting.forced and np.abs(point.multipliers - 1.0).min() > POLE:
             return None  # a contact of no length turns the parameter too, without a multiplier 1
@@ -40,7 +40,7 @@ class FoldOfOrbits(Fold):
 class CrossingOfOrbits(Crossing):
     """Another branch of orbits crosses."""
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """The flip of the orbit of half the period, which ends the branch, or a crossing by its name."""
         if step.curve.shooting.forced and np.abs(point.multipliers - 1.0).min() > POLE:
             return None  # a contact of no length turns the determinant's sign too
@@ -61,7 +61,7 @@ class Flip(Event):
             return float(1.0 + M[0, 0] + M[1, 1] + (M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]))
         return float(np.linalg.det(M + np.eye(len(M))))
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """None where no multiplier is near -1."""
         return None if np.abs(point.multipliers + 1.0).min() > POLE else (self.name, None)
 
@@ -75,7 +75,7 @@ class NeimarkSacker(Event):
         """The product of (mu_i mu_j - 1) over all pairs."""
         return product_of_pairs(without_own(point.multipliers, curve.shooting.forced))
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """None where two real multipliers have the product 1."""
         mu = point.multipliers
         near = mu[np.abs(np.abs(mu) - 1.0) < 1e-3]

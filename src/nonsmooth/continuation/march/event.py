@@ -18,7 +18,7 @@ import numpy as np
 from nonsmooth.continuation.problems.curve import Point, branch_point, tangents
 from nonsmooth.continuation.problems.solve import determinant
 
-__all__ = ["BESIDE", "Crossing", "Event", "Fold", "Met", "Step", "first_met", "locate", "special_on"]
+__all__ = ["BESIDE", "LARGEST", "Crossing", "Event", "Fold", "Met", "Name", "Step", "first_met", "locate", "special_on"]
 
 BEGUN = 1e-6
 ROUNDING = 1e-13  # of the numbers at both ends: smaller than this is zero, however short the step
@@ -30,6 +30,10 @@ ABOUT = 1e-2  # along the branch: steps are short beside a crossing of branches,
 TURNS = 1e-5  # of the other tangent's component in the parameter: smaller than this is zero
 SURE = 1e-3  # of the numbers at both ends: one larger than this at its root has jumped there
 SAME = 1e-9  # of the numbers at both ends: smaller than this at the place of another event is the same event
+
+
+#: The name by which an event is listed, with the ending where the branch ends there; None where it is none of its kind.
+Name = tuple[str, str | None] | None
 
 
 @dataclass
@@ -100,7 +104,7 @@ class Event(ABC):
         there = self.located(step)
         return None if there is None else Met(self, *there, self.name)
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """Its name, and the ending where the branch ends there; None where the number vanished for another reason."""
         return self.name, None
 
@@ -129,7 +133,7 @@ class Crossing(Event):
         """The sign of the bordered determinant."""
         return float(point.orientation)
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """A pitchfork where the parameter turns on one of the two branches, and a transcritical where it does not."""
         both = tangents(step.curve, point.Y)
         if both is None:

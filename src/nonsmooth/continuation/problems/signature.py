@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -75,6 +75,11 @@ class Signature:
             for v in self.crossings
         ]
         return Signature((*visits, self.visits[-1]))
+
+    def rates(self, transitions: Sequence[Any], turns: int) -> tuple[float, float]:
+        """Transitions, and entries into contact, per turn (0: once round)."""
+        taken = [transitions[v.transition] for v in self.crossings]
+        return len(taken) / max(turns, 1), sum(jump.contact for jump in taken) / max(turns, 1)
 
     def text(self, traced: Traced) -> str:
         """In words: ``free (penetration) contact (separation) free``."""
