@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.continuation.arguments import largest_step
-from nonsmooth.continuation.branches.begin import curve_of, resumed_at
-from nonsmooth.continuation.branches.following import Asked, Start
+from nonsmooth.continuation.branches.following import Asked, Start, curve_of, resumed_at
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.branches.other_branches import born, straight_on, switched
 from nonsmooth.continuation.branches.reading import read_branch
@@ -110,9 +109,9 @@ def _from_orbit(orbit: Orbit, name: str | None, asked: Asked) -> xr.Dataset:
     if first is None:
         raise SolveError("Newton's method did not converge at the orbit itself: give its parameter another value",
                          status="no_convergence")  # fmt: skip
-    ahead, back = (curve, first.facing(1.0)), (curve, first.facing(-1.0))
-    middle = [record_of(Row(*ahead))]
-    return branch.result(orbit.period_number, back, middle, ahead, closed=curve.landmark(first))
+    ahead = first.facing(1.0)
+    middle = [record_of(Row(ahead))]
+    return branch.result(orbit.period_number, first.facing(-1.0), middle, ahead, closed=curve.landmark(first))
 
 
 def _go_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
@@ -132,5 +131,5 @@ def _go_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
         curve, X = resumed_at(system, record.period_number, point, branch.name, branch.width)
         border = point.tangent / curve.scale * (1.0 if side else -1.0)
         begin = curve.near(X / curve.scale, border / np.linalg.norm(border))
-        ends.append(March(ending="no_convergence") if begin is None else (curve, begin))
+        ends.append(begin or March(ending="no_convergence"))
     return branch.result(record.period_number, ends[0], record.points, ends[1])

@@ -17,7 +17,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.records import BranchRecord, PointRecord, SpecialRecord
-from nonsmooth.continuation.events.leaving import ENDINGS
+from nonsmooth.continuation.events.of_orbits import ENDINGS
 from nonsmooth.continuation.problems.signature import AT_ONCE, SECTION, Signature, Visit
 from nonsmooth.system.system import System
 

@@ -35,23 +35,23 @@ class Boundary(Event):
     def __init__(self, place: int = -1) -> None:
         self.place = place
 
-    def number(self, curve: Any, point: Any) -> float:
+    def number(self, point: Any) -> float:
         """The margin."""
-        return float(curve.margins(point)[self.place])
+        return float(point.curve.margins(point)[self.place])
 
     def happened(self, step: Step, was: float, now: float) -> bool:
         """Return whether the boundary is passed on the step, or lies at the beginning of the march.
 
         A branch that goes straight on stops at a section that a crossing passes, and nowhere else."""
-        if step.virtual and not self.at_section(step.curve, step.b):
+        if step.virtual and not self.at_section(step.b):
             return False
         return now < 0.0 and (was >= 0.0 or (step.first and not step.virtual))
 
-    def at_section(self, curve: Any, point: Any) -> bool:
+    def at_section(self, point: Any) -> bool:
         """Return whether a crossing passes the section of a forced orbit here, and nothing else happens."""
         return False
 
-    def contacts(self, curve: Any, point: Any) -> list[Change]:
+    def contacts(self, point: Any) -> list[Change]:
         """Contacts that may begin or end here; none where it is about something else."""
         return []
 
@@ -60,7 +60,7 @@ class Boundary(Event):
         return True
 
     @abstractmethod
-    def surface(self, curve: Any, point: Any, beyond: Any = None) -> int:
+    def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator of the surface that is reached (-1: of none).
 
         ``beyond`` is the curve on which the branch goes on."""
@@ -70,17 +70,17 @@ class Crossed(Boundary):
     """A margin of a crossing, or of a visit that begins or ends with one: its row nearest to zero tells the surface."""
 
     @abstractmethod
-    def visit(self, curve: Any, point: Any) -> int:
+    def visit(self, point: Any) -> int:
         """The visit whose crossing it is."""
 
-    def crossing(self, curve: Any, point: Any, visit: int) -> tuple[int, Any, int]:
+    def crossing(self, point: Any, visit: int) -> tuple[int, Any, int]:
         """Transition, state, and the row that fires (-1: whichever): those at the end of the visit."""
-        return curve.shooting.signature.visits[visit].transition, point.solved.segments.z[visit], -1
+        return point.shooting.signature.visits[visit].transition, point.solved.segments.z[visit], -1
 
-    def surface(self, curve: Any, point: Any, beyond: Any = None) -> int:
+    def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator of the row that is nearest to zero (-1: of none)."""
-        visit, shooting = self.visit(curve, point), curve.shooting
-        k, z, fires = self.crossing(curve, point, visit)
+        visit, shooting = self.visit(point), point.shooting
+        k, z, fires = self.crossing(point, visit)
         t = float(point.solved.times[min(visit + 1, shooting.m)])
         near = [(abs(shooting.flow.jump(point.solved.values, k, t, z, r).h), row.indicator)
                 for r, row in enumerate(shooting.system.traced.transitions[k].rows) if r != fires]  # fmt: skip
@@ -90,20 +90,20 @@ class Crossed(Boundary):
 class Short(Crossed):
     """A visit shrinks to nothing."""
 
-    def at_section(self, curve: Any, point: Any) -> bool:
+    def at_section(self, point: Any) -> bool:
         """Return whether the visit begins or ends at the section of a forced orbit."""
-        return curve.shooting.forced and self.visit(curve, point) in (0, curve.shooting.m)
+        return point.shooting.forced and self.visit(point) in (0, point.shooting.m)
 
-    def contacts(self, curve: Any, point: Any) -> list[Change]:
+    def contacts(self, point: Any) -> list[Change]:
         """The orbit without a visit between two visits of one mode, where it shrinks without speed."""
-        visits, slopes, i = curve.shooting.signature.visits, point.path.slope, self.visit(curve, point)
+        visits, slopes, i = point.shooting.signature.visits, point.path.slope, self.visit(point)
         if i in (0, len(visits) - 1) or visits[i - 1].mode != visits[i + 1].mode or visits[i - 1].row < 0:
             return []
-        slope = slopes[curve.walk.conditional.tolist().index(i - 1)]
+        slope = slopes[point.curve.walk.conditional.tolist().index(i - 1)]
         slow = slope < NO_SPEED * max(float(np.abs(slopes).max()), 1e-300) or len(slopes) < 3
-        return [without(curve, point, i - 1, 2)] if slow else []
+        return [without(point, i - 1, 2)] if slow else []
 
-    def visit(self, curve: Any, point: Any) -> int:
+    def visit(self, point: Any) -> int:
         """The visit itself."""
         return int(point.path.tau.argmin())
 
@@ -113,36 +113,36 @@ class Slow(Crossed):
 
     name = "grazing"
 
-    def contacts(self, curve: Any, point: Any) -> list[Change]:
+    def contacts(self, point: Any) -> list[Change]:
         """The orbit without an impact of no speed."""
-        visits, i, count = curve.shooting.signature.visits, self.visit(curve, point), 1
+        visits, i, count = point.shooting.signature.visits, self.visit(point), 1
         while visits[i + count].row == AT_ONCE:  # an impact made of several transitions
             count += 1
-        return [without(curve, point, i, count)] if visits[i + count].mode == visits[i].mode else []
+        return [without(point, i, count)] if visits[i + count].mode == visits[i].mode else []
 
-    def visit(self, curve: Any, point: Any) -> int:
+    def visit(self, point: Any) -> int:
         """The visit before the slowest crossing."""
-        return int(curve.walk.conditional[int(point.path.slope.argmin())])
+        return int(point.curve.walk.conditional[int(point.path.slope.argmin())])
 
 
 class Own(Crossed):
     """Two rows of the condition that fires vanish together."""
 
-    def contacts(self, curve: Any, point: Any) -> list[Change]:
+    def contacts(self, point: Any) -> list[Change]:
         """At a tolerance: the same impact by the other transition, and the orbit without it or the last before rest."""
-        i, surface = self.visit(curve, point), self.surface(curve, point)
-        if not is_tolerance(curve, surface):
+        i, surface = self.visit(point), self.surface(point)
+        if not is_tolerance(point, surface):
             return []
-        found, count = by_others(curve, point, i, surface), rest_after(curve, point, i)
-        return found if count == 0 else [*found, without(curve, point, i, count or 1)]
+        found, count = by_others(point, i, surface), rest_after(point, i)
+        return found if count == 0 else [*found, without(point, i, count or 1)]
 
-    def visit(self, curve: Any, point: Any) -> int:
+    def visit(self, point: Any) -> int:
         """The visit before the crossing with the least other row."""
-        return int(curve.walk.conditional[int(point.path.own.argmin())])
+        return int(point.curve.walk.conditional[int(point.path.own.argmin())])
 
-    def crossing(self, curve: Any, point: Any, visit: int) -> tuple[int, Any, int]:
+    def crossing(self, point: Any, visit: int) -> tuple[int, Any, int]:
         """The row that fires is known."""
-        return (*super().crossing(curve, point, visit)[:2], curve.shooting.signature.visits[visit].row)
+        return (*super().crossing(point, visit)[:2], point.shooting.signature.visits[visit].row)
 
 
 class Touch(Boundary):
@@ -150,9 +150,9 @@ class Touch(Boundary):
 
     name = "grazing"
 
-    def contacts(self, curve: Any, point: Any) -> list[Change]:
+    def contacts(self, point: Any) -> list[Change]:
         """The orbit with the transition, and if it leads to another mode with each of the ways back."""
-        return inserted(curve, point)
+        return inserted(point)
 
     def counts(self, point: Any) -> bool:
         """Return whether the touch lies within its visit; at its end it is the other side of an impact of no speed."""
@@ -160,19 +160,19 @@ class Touch(Boundary):
         ends = np.abs(times[visit : visit + 2] - point.path.place[visit, k])
         return float(ends.min()) >= ENDS * float(times[-1])
 
-    def surface(self, curve: Any, point: Any, beyond: Any = None) -> int:
+    def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator that is touched."""
-        return int(curve.walk.net.rows[point.path.which[point.path.touched], 0])
+        return int(point.curve.walk.net.rows[point.path.which[point.path.touched], 0])
 
 
 class Others(Crossed):
     """The condition of another transition holds too at the end of a visit."""
 
-    def visit(self, curve: Any, point: Any) -> int:
+    def visit(self, point: Any) -> int:
         """The visit at whose end it does."""
         return int(point.path.others.argmax())
 
-    def crossing(self, curve: Any, point: Any, visit: int) -> tuple[int, Any, int]:
+    def crossing(self, point: Any, visit: int) -> tuple[int, Any, int]:
         """The other transition."""
         return int(point.path.other[visit]), point.solved.segments.z[visit], -1
 
@@ -186,13 +186,13 @@ class Landed(Crossed):
         """Return whether a reset led there, and not the section, which passes behind a boundary."""
         return int(point.path.landed.argmax()) != 0
 
-    def visit(self, curve: Any, point: Any) -> int:
+    def visit(self, point: Any) -> int:
         """The visit that begins there."""
         return int(point.path.landed.argmax())
 
-    def crossing(self, curve: Any, point: Any, visit: int) -> tuple[int, Any, int]:
+    def crossing(self, point: Any, visit: int) -> tuple[int, Any, int]:
         """The transition that is reached, where the visit begins."""
-        return int(point.path.landing[visit]), curve.shooting.split(point.X)[1][visit], -1
+        return int(point.path.landing[visit]), point.shooting.split(point.X)[1][visit], -1
 
 
 class Unseen(Boundary):
@@ -205,21 +205,21 @@ class Unseen(Boundary):
 
         Margins are looked at in parts of a step: of two extremes within a part none shows. A simulation isolates them.
         """
-        curve, low, high, there = step.curve, 0.0, step.end, step.b
+        low, high, there = 0.0, step.end, step.b
         while high - low > UNSEEN:
             middle = 0.5 * (low + high)
-            point = curve.between(step.a, step.b, middle)
+            point = step.curve.between(step.a, step.b, middle)
             if point is None:
                 return None
-            if curve.shows(point):
+            if step.curve.shows(point):
                 low = middle
             else:
                 high, there = middle, point
         return high, there
 
-    def surface(self, curve: Any, point: Any, beyond: Any = None) -> int:
+    def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator of the first transition that the signature beyond has more often."""
-        return gained(curve, beyond)
+        return gained(point, beyond)
 
 
 #: In the order of ``Path.margins``: what explains the others first.

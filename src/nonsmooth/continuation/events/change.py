@@ -20,12 +20,16 @@ from nonsmooth.continuation.problems.visits import anchored, led
 from nonsmooth.system.symbolic.traced import ASKED, FOUND, Traced
 
 __all__ = [
-    "Change", "by_others", "common_orbit", "common_point", "gained", "inserted", "is_tolerance", "past_the_section",
-    "rest_after", "without",
+    "Change", "Common", "by_others", "common_orbit", "common_point", "gained", "inserted", "is_tolerance",
+    "past_the_section", "rest_after", "without",
 ]  # fmt: skip
 
 BEFORE_REST = 1e-4  # of the period: flights after an impact as slow as impacts are followed are shorter
 TOLERANCE = 1e-5  # of an indicator's size: a band as narrow as this stands for no width
+
+
+#: The curve of a signature, its equations at the common orbit, and the tangent of the curve there.
+Common = tuple[Orbits, Solved, FloatArray]
 
 
 @dataclass
@@ -45,12 +49,12 @@ class Change:
         return self.contact if self.gained else self.free
 
 
-def inserted(curve: Orbits, point: OrbitPoint) -> list[Change]:
+def inserted(point: OrbitPoint) -> list[Change]:
     """The orbit with the transition that it touches, and if that leads to another mode with each of the ways back."""
-    path, flow, values, traced = point.path, curve.shooting.flow, point.solved.values, curve.shooting.system.traced
-    free = curve.shooting.once(point.X)
+    path, flow, values, traced = point.path, point.shooting.flow, point.solved.values, point.shooting.system.traced
+    free = point.shooting.once(point.X)
     place, k = path.touched
-    row = int(path.which[place, k] - curve.walk.net.row_start[k])
+    row = int(path.which[place, k] - point.curve.walk.net.row_start[k])
     t, begin = float(path.place[place, k]), float(point.solved.times[place])
     z = led(flow, values, free.signature.visits[place].mode, begin, t - begin, free.states[place])
     indicator = traced.transitions[k].rows[row].indicator
@@ -85,17 +89,17 @@ def _answers(traced: Traced, k: int) -> list[int]:
     ]  # fmt: skip
 
 
-def without(curve: Orbits, point: OrbitPoint, place: int, count: int) -> Change:
+def without(point: OrbitPoint, place: int, count: int) -> Change:
     """The orbit without ``count`` visits that have no length, from ``place`` on."""
-    contact = curve.shooting.once(point.X)
+    contact = point.shooting.once(point.X)
     visit = contact.signature.visits[place]
-    indicator = curve.shooting.system.traced.transitions[visit.transition].rows[visit.row].indicator
+    indicator = point.shooting.system.traced.transitions[visit.transition].rows[visit.row].indicator
     return Change(contact, contact.without(place, count), place, count, indicator, False)
 
 
-def rest_after(curve: Orbits, point: OrbitPoint, place: int) -> int | None:
+def rest_after(point: OrbitPoint, place: int) -> int | None:
     """The number of impacts from visit ``place`` on that rest follows at once; None where it does not."""
-    visits, times = curve.shooting.signature.visits, point.solved.times
+    visits, times = point.shooting.signature.visits, point.solved.times
     i = place
     while visits[i].row >= 0 and visits[i + 1].mode == visits[place].mode:
         i += 1
@@ -103,9 +107,9 @@ def rest_after(curve: Orbits, point: OrbitPoint, place: int) -> int | None:
     return i - place if visits[i].row >= 0 and soon else None
 
 
-def by_others(curve: Orbits, point: OrbitPoint, place: int, indicator: int) -> list[Change]:
+def by_others(point: OrbitPoint, place: int, indicator: int) -> list[Change]:
     """The same orbit where one of its transitions is another one that needs an indicator with the other sign."""
-    jumps, free = curve.shooting.system.traced.transitions, curve.shooting.once(point.X)
+    jumps, free = point.shooting.system.traced.transitions, point.shooting.once(point.X)
     visits = free.signature.visits
     visit = visits[place]
     own = jumps[visit.transition]
@@ -121,12 +125,12 @@ def by_others(curve: Orbits, point: OrbitPoint, place: int, indicator: int) -> l
     return found
 
 
-def common_orbit(curve: Orbits, point: OrbitPoint, change: Change) -> tuple[Orbits, Solved, FloatArray] | None:
-    """The common orbit in the new signature: its curve, the equations there, and the tangent of the curve."""
+def common_orbit(point: OrbitPoint, change: Change) -> Common | None:
+    """The common orbit in the new signature."""
     once = change.new
-    if not curve.shooting.forced and len(once.times):
-        once = anchored(curve.shooting.flow, point.solved.values, once)
-    fresh, X = curve.around(once, point.X[-1:])
+    if not point.shooting.forced and len(once.times):
+        once = anchored(point.shooting.flow, point.solved.values, once)
+    fresh, X = point.curve.around(once, point.X[-1:])
     solved = fresh.shooting.evaluate(X)
     if not np.isfinite(solved.jacobian).all():
         return None
@@ -134,20 +138,20 @@ def common_orbit(curve: Orbits, point: OrbitPoint, change: Change) -> tuple[Orbi
     return (fresh, solved, null[-1]) if len(null) else None
 
 
-def common_point(curve: Orbits, point: OrbitPoint, change: Change) -> OrbitPoint | None:
+def common_point(point: OrbitPoint, change: Change) -> OrbitPoint | None:
     """The common orbit as a point of the new signature."""
-    found = common_orbit(curve, point, change)
+    found = common_orbit(point, change)
     if found is None:
         return None
     fresh, solved, tangent = found
     return fresh.point(solved, solved.X / fresh.scale, tangent)
 
 
-def past_the_section(curve: Orbits, point: OrbitPoint) -> tuple[Orbits, OrbitPoint] | None:
+def past_the_section(point: OrbitPoint) -> OrbitPoint | None:
     """The same orbit where a crossing has passed the section: the last of the round in place of the first, or so.
 
     It faces in the same direction: that of the parameter, or of the state at the section near a fold."""
-    shooting, values = curve.shooting, point.solved.values
+    shooting, values = point.shooting, point.solved.values
     once = shooting.once(point.X)
     visits, times, end = once.signature.visits, once.times, once.period
     if int(point.path.tau.argmin()) == 0:
@@ -157,30 +161,30 @@ def past_the_section(curve: Orbits, point: OrbitPoint) -> tuple[Orbits, OrbitPoi
         before = point.solved.segments.z[-2]
         z = led(shooting.flow, values, visits[-2].mode, times[-1], end - times[-1], before)
         moved = once.begun(len(times) - 1, end, z)
-    fresh, X = curve.around(moved, point.X[-1:])
+    fresh, X = point.curve.around(moved, point.X[-1:])
     first = fresh.nearest(X / fresh.scale, point.value)
     if first is None:
         return None
     # The tangents of both live in different unknowns; the parameter and the later instants are common to them.
     new, old, n = first.tangent, point.tangent, shooting.n
     along = new[-1] * old[-1] if abs(old[-1]) > 1e-3 else float(new[:n] @ old[:n])
-    return fresh, first.turned() if along < 0.0 else first
+    return first.turned() if along < 0.0 else first
 
 
-def gained(curve: Orbits, fresh: Orbits) -> int:
+def gained(point: OrbitPoint, fresh: OrbitPoint) -> int:
     """The indicator of the first transition that another signature has more often (-1: none)."""
     more = Counter((v.transition, v.row) for v in fresh.shooting.signature.crossings)
-    more.subtract((v.transition, v.row) for v in curve.shooting.signature.crossings)
-    transitions = curve.shooting.system.traced.transitions
+    more.subtract((v.transition, v.row) for v in point.shooting.signature.crossings)
+    transitions = point.shooting.system.traced.transitions
     rows = [transitions[k].rows[row].indicator for (k, row), n in more.items() if n > 0 and row >= 0]
     return rows[0] if rows else -1
 
 
-def is_tolerance(curve: Orbits, indicator: int) -> bool:
+def is_tolerance(point: OrbitPoint, indicator: int) -> bool:
     """Return whether an indicator only sets a tolerance: below the creep of a stop impacts are completed as rest.
 
     It differs from another one of its condition, with the other sign, by a small number."""
-    flow, values = curve.shooting.flow, curve.shooting.values
+    flow, values = point.shooting.flow, point.shooting.values
     z = np.linspace(0.3, 0.7, flow.n) * flow.scale
     for jump in flow.traced.transitions:
         for row, other in permutations(jump.rows, 2):

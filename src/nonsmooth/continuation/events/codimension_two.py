@@ -17,7 +17,7 @@ grazing             grazing_fold det(I - M), grazing_flip det(I + M), for M- and
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -41,16 +41,16 @@ ENDED = ("resonance_1_1", "resonance_1_2")
 
 
 class CodimensionTwo(Event):
-    """A second number vanishes on a curve of special points: a function of the curve, the point, and given numbers."""
+    """A second number vanishes on a curve of special points: a function of the point and given numbers."""
 
     certain = False
 
     def __init__(self, name: str, function: Callable[..., float], *given: float) -> None:
         self.name, self._function, self._given = name, function, given
 
-    def number(self, curve: Any, point: Any) -> float:
+    def number(self, point: Any) -> float:
         """The number."""
-        return self._function(curve, point, *self._given)
+        return self._function(point, *self._given)
 
 
 class OfPair(CodimensionTwo):
@@ -68,7 +68,7 @@ class Coefficient(CodimensionTwo):
 
     def happened(self, step: Step, was: float, now: float) -> bool:
         """Return whether its sign changes, and it is not zero all along."""
-        balance = (abs(_coefficient(step.curve, end, 1)) for end in (step.a, step.b))
+        balance = (abs(_coefficient(end, 1)) for end in (step.a, step.b))
         return was * now < 0.0 and max(balance) >= NOISE
 
     def named(self, step: Step, point: Any) -> Name:
@@ -83,7 +83,7 @@ class Cusp(Event):
     name = "cusp"
     certain = False
 
-    def number(self, curve: Any, point: Any) -> float:
+    def number(self, point: Any) -> float:
         """Nothing to watch at one point: two directions are compared."""
         return np.nan
 
@@ -91,7 +91,7 @@ class Cusp(Event):
         """Return whether the direction of the parameters turns on the step."""
         return float(step.a.tangent[-2:] @ step.b.tangent[-2:]) < 0.0
 
-    def confirmed(self, curve: Any, point: Any, was: float, now: float) -> bool:
+    def confirmed(self, point: Any, was: float, now: float) -> bool:
         """Return True: it has no number of its own."""
         return True
 
@@ -120,57 +120,57 @@ class AlongCurve(Policy):
         self._graze, every, of_forced = KINDS[kind]
         self.kinds = (*every, *of_forced) if forced else every
 
-    def behind(self, found: March, curve: Locus, met: list[Met]) -> None:
+    def behind(self, found: March, met: list[Met]) -> None:
         """Record the point at which the curve meets a graze or a corner; it ends there."""
         found.ending = met[0].name
-        found.mark(self._graze if met[0].name == "grazing" else met[0].name, curve, met[0].point)
+        found.mark(self._graze if met[0].name == "grazing" else met[0].name, met[0].point)
 
 
-def _coefficient(locus: Locus, place: OrbitPoint, which: int = 0) -> float:
+def _coefficient(place: OrbitPoint, which: int = 0) -> float:
     """The normal form's coefficient (1: its balance), on a curve of flips or of Neimark-Sacker points; NaN: none."""
     try:
-        if locus.kind == "flip":
-            return flip_coefficient(locus.shooting, place.solved, locus.scale)[which]
-        mu = complex(place.multipliers[_pair(locus, place)[0]])
+        if cast(Locus, place.curve).kind == "flip":
+            return flip_coefficient(place.shooting, place.solved, place.curve.scale)[which]
+        mu = complex(place.multipliers[_pair(place)[0]])
         if abs(mu.imag) > PAIR:
-            return torus_coefficient(locus.shooting, place.solved, locus.scale, mu)[which]
+            return torus_coefficient(place.shooting, place.solved, place.curve.scale, mu)[which]
     except np.linalg.LinAlgError:  # at a resonance or another multiplier 1 there is none
         pass
     return np.nan
 
 
-def _polynomial(locus: Locus, place: OrbitPoint, x: float, order: int) -> float:
+def _polynomial(place: OrbitPoint, x: float, order: int) -> float:
     """The characteristic polynomial of M or a derivative at x; NaN where too few multipliers are left for it."""
-    own = 0 if locus.shooting.forced else 1  # derivatives that vanish at 1 anyway
+    own = 0 if place.shooting.forced else 1  # derivatives that vanish at 1 anyway
     if order > 0 and len(place.M) < 2 + own:
         return np.nan
     return float(np.polyval(np.polyder(np.poly(place.M), order + (own if x == 1.0 else 0)), x))
 
 
-def _others(locus: Locus, place: OrbitPoint, own: float) -> float:
+def _others(place: OrbitPoint, own: float) -> float:
     """prod (mu_i mu_j - 1) of the multipliers without the critical one; NaN without a complex pair."""
     mu = np.delete(place.multipliers, np.abs(place.multipliers - own).argmin())
-    mu = without_own(mu, locus.shooting.forced)
+    mu = without_own(mu, place.shooting.forced)
     return product_of_pairs(mu) if (np.abs(mu.imag) > PAIR).any() else np.nan
 
 
-def _sum_and(locus: Locus, place: OrbitPoint, x: float) -> float:
+def _sum_and(place: OrbitPoint, x: float) -> float:
     """The sum of the pair on the unit circle, and x."""
-    return float(place.multipliers[list(_pair(locus, place))].sum().real) + x
+    return float(place.multipliers[list(_pair(place))].sum().real) + x
 
 
-def _rest(locus: Locus, place: OrbitPoint, sign: float) -> float:
+def _rest(place: OrbitPoint, sign: float) -> float:
     """prod (1 +- mu) of the multipliers without the pair; NaN where there are none."""
-    rest = without_own(np.delete(place.multipliers, _pair(locus, place)), locus.shooting.forced)
+    rest = without_own(np.delete(place.multipliers, _pair(place)), place.shooting.forced)
     return float(np.prod(1.0 + sign * rest).real) if len(rest) else np.nan
 
 
-def _pair(locus: Locus, place: OrbitPoint) -> tuple[int, int]:
+def _pair(place: OrbitPoint) -> tuple[int, int]:
     """The two multipliers whose product is 1."""
     mu = place.multipliers
     i, j = pairs(len(mu))
     far = np.abs(mu[i] * mu[j] - 1.0)
-    if not locus.shooting.forced:  # the own multiplier 1 is none of them, unless it has become double
+    if not place.shooting.forced:  # the own multiplier 1 is none of them, unless it has become double
         own = int(np.abs(mu - 1.0).argmin())
         if len(mu) > 2:
             far[(i == own) | (j == own)] = np.inf
@@ -178,10 +178,10 @@ def _pair(locus: Locus, place: OrbitPoint) -> tuple[int, int]:
     return (int(i[at]), int(j[at])) if mu[i[at]].imag >= 0.0 else (int(j[at]), int(i[at]))
 
 
-def _with_contact(locus: Locus, place: OrbitPoint, sign: float) -> float:
+def _with_contact(place: OrbitPoint, sign: float) -> float:
     """det(I +- M+); where M+ is unbounded (a rigid impact), its leading coefficient."""
-    for change in inserted(locus, place):
-        M, far, near = both_sides(locus, place, change)
+    for change in inserted(place):
+        M, far, near = both_sides(place, change)
         if not (np.isfinite(far).all() and np.isfinite(near).all()):
             continue
         one = np.eye(len(M))

@@ -20,7 +20,7 @@ import numpy as np
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.events.change import Change
 from nonsmooth.continuation.problems.multipliers import multipliers_of
-from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.continuation.problems.signature import AT_ONCE, Round
 from nonsmooth.continuation.problems.visits import led
@@ -44,15 +44,15 @@ class Graze:
     doubled: bool  # an orbit of twice the period is born here
 
 
-def graze(curve: Orbits, point: OrbitPoint, first: OrbitPoint, change: Change) -> Graze | None:
-    """Judge the graze at ``point``, where ``curve`` ends; ``first`` is the first point behind it."""
-    M, M_far, M_near = both_sides(curve, point, change)
+def graze(point: OrbitPoint, first: OrbitPoint, change: Change) -> Graze | None:
+    """Judge the graze at ``point``, where its curve ends; ``first`` is the first point behind it."""
+    M, M_far, M_near = both_sides(point, change)
     if not (np.isfinite(M).all() and np.isfinite(M_far).all() and np.isfinite(M_near).all()):
         return None
     bounded = bool(np.abs(M_near).max() < 1.5 * np.abs(M_far).max())
     M_plus = 2 * M_near - M_far if bounded else M_near
     one = np.eye(len(M))
-    if curve.shooting.forced:
+    if point.shooting.forced:
         same = bool(np.linalg.det(one - M) * np.linalg.det(one - M_plus) > 0)
     else:  # a multiplier 1 by nature makes det(I - M) vanish: the parameter's own turn tells the side
         same = float(point.tangent[-1]) * float(first.X[-1] - point.X[-1]) > 0.0
@@ -63,13 +63,13 @@ def graze(curve: Orbits, point: OrbitPoint, first: OrbitPoint, change: Change) -
     )  # fmt: skip
 
 
-def both_sides(curve: Orbits, point: OrbitPoint, change: Change) -> list[FloatArray]:
+def both_sides(point: OrbitPoint, change: Change) -> list[FloatArray]:
     """M-, and M+ looked at from ``ASIDE`` and from half of it (their limit, where there is one)."""
-    old, flow = curve.shooting, curve.shooting.flow
+    old, flow = point.shooting, point.shooting.flow
     found = []
     for once in (change.free, *(_beside(flow, point.solved.values, change, x) for x in (ASIDE, 0.5 * ASIDE))):
         shooting, X = Shooting.of(old.system, once, old.active, point.X[old.size :])
-        shooting.anchor(X[: old.n], point.solved.values, curve.size)
+        shooting.anchor(X[: old.n], point.solved.values, point.curve.size)
         found.append(shooting.evaluate(X).monodromy)
     return found
 

@@ -120,7 +120,7 @@ class Locus(Orbits):
         null = self.null_vectors(found[0], 1e-9)
         return self.point(found[0], found[1], null[-1]) if len(null) == 1 else None
 
-    def renewed(self, point: OrbitPoint) -> tuple[Orbits, OrbitPoint] | None:
+    def renewed(self, point: OrbitPoint) -> OrbitPoint | None:
         """The phase condition put through the last point; the units stay, psi was calibrated in them."""
         return None if self.shooting.reference is None else super().renewed(point)
 

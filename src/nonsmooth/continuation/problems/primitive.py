@@ -38,9 +38,9 @@ def primitive(shooting: Shooting, solved: Solved, size: FloatArray) -> tuple[Sho
     return None
 
 
-def is_doubled(curve: Any, point: Any) -> bool:
+def is_doubled(point: Any) -> bool:
     """Return whether an orbit is a shorter one gone round twice, as where a doubled branch meets its flip."""
-    return _once_round(curve.shooting, point.solved, curve.size, 2, DOUBLED) is not None
+    return _once_round(point.shooting, point.solved, point.curve.size, 2, DOUBLED) is not None
 
 
 def _once_round(shooting: Shooting, solved: Solved, size: FloatArray, rounds: int, near: float) -> Round | None:

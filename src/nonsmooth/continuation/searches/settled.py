@@ -1,4 +1,9 @@
-"""From a simulation to a first guess: let the motion settle, find its period, read off its signature."""
+"""From a simulation to a first guess: let the motion settle, find its period, read off its signature.
+
+Of autonomous systems by recurrence on a section that is found on the way. Where transitions happen they are the
+section: a cycle is a sequence of transitions that repeats, with the states after them. Else the section is the level
+half way up the state that swings most, passed upwards.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.problems.signature import Round
-from nonsmooth.continuation.problems.visits import round_of
-from nonsmooth.flow.engines.engine import Section, State
+from nonsmooth.continuation.problems.signature import Round, Signature, Visit
+from nonsmooth.continuation.problems.visits import anchored, round_of, visits_of
+from nonsmooth.errors import SolveError
+from nonsmooth.flow.engines.engine import IntArray, Log, Section, State
+from nonsmooth.flow.equilibria import AT_REST, ROUNDING, equilibrium_at
+from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 
@@ -20,12 +28,21 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engines.loop import Engine
     from nonsmooth.system.system import System
 
-__all__ = ["CLOSED", "NEAR", "Guess", "forced_guesses", "settle_forced", "touching"]
+__all__ = ["CLOSED", "NEAR", "Guess", "autonomous_guesses", "forced_guesses", "settle_forced", "touching"]
 
 CHOICE = 6  # candidates tried: period numbers, or returning points for a given one
 CLOSED = 1e-8  # a return nearer than this has closed: the shortest such period comes first
 TOUCH = 1e-6  # of the period, of the motion's size: a contact as short, an impact as weak as this may be a touch
 NEAR = 0.2  # of the motion's size: a return farther off than this is no candidate
+SAMPLES = 4001
+FEW, MANY = 8, 200  # rounds in a stretch of motion that is long, and short, enough to look at
+LONGEST = 1e6
+REST = 1e-7  # of its scale: a motion smaller than this has come to rest
+AT_ONCE = 1e-12  # of a unit of time: what happens within it happens at the start
+TENDS = "the motion tends to an equilibrium:"
+ELSEWHERE = (
+    "Give start=, a state away from it, or follow the equilibrium with continue_equilibrium to where a cycle emanates"
+)
 
 
 @dataclass
@@ -157,3 +174,123 @@ def touching(guess: R, system: System, kicks: FloatArray | None = None) -> list[
         else:
             i += 1
     return [] if found is guess else [found]
+
+
+@dataclass
+class _Stretch:
+    """A stretch of motion, and what its second half tells: passages of the level half way up, and half the ranges."""
+
+    log: Log
+    times: FloatArray  # of the passages upwards, interpolated
+    points: FloatArray  # the states there
+    modes: IntArray
+    rests: bool  # as good as still
+    size: FloatArray
+
+
+def autonomous_guesses(
+    system: System, engine: Engine, state: State, transient: int, most: int, given: int | None, search: Search
+) -> list[Guess]:
+    """Candidates for once round, the shortest first."""
+    tables = engine.prepare(system.parameter_vector()[None, :])
+
+    def run(duration: float) -> _Stretch:
+        begin = float(state.clock[0])
+        instants = begin + np.linspace(0.0, duration, SAMPLES)
+        log = search.record(engine, tables, state, begin + duration, instants)
+        if log.status not in (codes.OK, codes.NOT_GUARANTEED):
+            raise solve_error(log.status, begun=(system, state.u))
+        return _seen(log, instants, system)
+
+    first = state.copy()  # in the mode to which transitions that already hold lead
+    engine.record(tables, first, float(first.clock[0]) + AT_ONCE, np.empty(0))
+    _refuse_equilibrium(system, first, "the start", ROUNDING)
+    duration = 64.0
+    while True:
+        stretch = run(duration)
+        rounds = len(stretch.times)
+        if stretch.rests:
+            _refuse_equilibrium(system, state, TENDS, AT_REST, stable=True)
+        if rounds < FEW and duration < LONGEST:
+            duration *= 4.0
+        elif rounds > MANY:
+            duration *= FEW / rounds * 4.0
+        else:
+            break
+    if rounds < 2:  # a motion that drifts passes once
+        _refuse_equilibrium(system, state, TENDS, AT_REST)
+        raise SolveError(
+            f"the motion does not come back: over {duration:.3g} units of time the state that moves most passed the "
+            "middle of its range at most once. There is no cycle here; give another start",
+            status="not_periodic",
+        )
+    one = duration / rounds
+    if transient:
+        search.doing = f"letting {transient} rounds of some {one:.3g} units of time pass"
+        run(transient * one)
+    stretch = run(max((2 * (given or min(most, 8)) + 3), FEW) * one)
+    if stretch.rests:
+        _refuse_equilibrium(system, state, TENDS, AT_REST)
+        raise SolveError(f"{TENDS} there is no cycle here. {ELSEWHERE}", status="equilibrium")
+    found = _by_transitions(system, stretch, most, given) if len(stretch.log.crossing_time) > 1 else []
+    return found or _by_level(stretch, most, given)
+
+
+def _seen(log: Log, instants: FloatArray, system: System) -> _Stretch:
+    """The passages of the level half way up the state that swings most."""
+    u, scale = np.nan_to_num(log.sample_u), system.scale_vector()
+    begin = len(u) // 2
+    low, high = u[begin:].min(axis=0), u[begin:].max(axis=0)
+    half = 0.5 * (high - low)
+    j = int((half / scale).argmax())
+    x, rests = u[:, j] - 0.5 * (low[j] + high[j]), bool((half <= REST * scale).all())
+    at = begin + np.flatnonzero((x[begin:-1] < 0.0) & (x[begin + 1 :] >= 0.0) & (not rests))
+    part = x[at] / (x[at] - x[at + 1])
+    points = (1 - part)[:, None] * u[at] + part[:, None] * u[at + 1]
+    times = instants[at] + part * (instants[1] - instants[0])
+    return _Stretch(log, times, points, log.sample_mode[at], rests, np.maximum(half, 1e-3 * scale))
+
+
+def _refuse_equilibrium(system: System, state: State, what: str, near: float, stable: bool = False) -> None:
+    """SolveError where the state is an equilibrium (``stable``: a stable one), with its name."""
+    at = equilibrium_at(system, state.u, int(state.counters[0]), memory=state.memory, near=near)
+    if at is not None and (at.kind == "stable" or not stable):
+        raise SolveError(
+            f"{what} {at.words(list(system.states))}. No cycle passes there. {ELSEWHERE}", status="equilibrium"
+        )
+
+
+def _by_transitions(system: System, stretch: _Stretch, most: int, given: int | None) -> list[Guess]:
+    """Sequences of transitions that repeat."""
+    flow, values, log = VariationalFlow.of(system), system.parameter_vector(), stretch.log
+    k, after = log.crossing_transition, np.nan_to_num(log.u_after)
+    last, guesses = len(k) - 1, []
+    for length in range(1, min(last, 40 * most) + 1):
+        begun = last - length
+        gap = float(np.abs((after[last] - after[begun]) / stretch.size).max())
+        if k[begun] != k[last] or gap > NEAR:
+            continue
+        begin, end = float(log.crossing_time[begun]), float(log.crossing_time[last])
+        visits, states = visits_of(flow, values, log, log.memory_after[begun], begun + 1)
+        signature = Signature((*visits, Visit(system.traced.transitions[k[last]].target)))
+        times, states = log.crossing_time[begun + 1 :] - begin, np.vstack([states[-1:], states])
+        once = anchored(flow, values, Round(0, end - begin, signature, times, states))
+        guesses.append(Guess(**vars(once), gap=gap, size=stretch.size))
+        if len(guesses) >= (given or most):
+            break
+    return guesses[given - 1 : given] if given else guesses
+
+
+def _by_level(stretch: _Stretch, most: int, given: int | None) -> list[Guess]:
+    """Returns to the level half way up."""
+    times, points, guesses = stretch.times, stretch.points, []
+    for p in [given] if given else range(1, most + 1):
+        if p >= len(points) or p > most:
+            break
+        gap = float(np.abs((points[-1] - points[-1 - p]) / stretch.size).max())
+        if gap <= NEAR:
+            z = np.concatenate([points[-1], stretch.log.sample_memory[-1]])[None, :]
+            signature = Signature((Visit(int(stretch.modes[-1])),))
+            guesses.append(Guess(0, float(times[-1] - times[-1 - p]), signature, np.empty(0), z, max(gap, 1e-3),
+                                 stretch.size))  # fmt: skip
+    return guesses
