@@ -39,6 +39,7 @@ class _Field:
 class Rest(Point):
     """An equilibrium on a branch."""
 
+    curve: Equilibria
     solved: _Field
     u: FloatArray
     jacobian: FloatArray  # (n, n)
@@ -101,16 +102,20 @@ class Equilibria(Curve[Rest]):
         """The vector field after a last step."""
         return self.evaluate(Y)
 
-    def described(
-        self, Y: FloatArray, tangent: FloatArray, orientation: float, iterations: int, solved: _Field
-    ) -> Rest | None:
+    def described(self, point: Point) -> Rest | None:
         """The equilibrium with its eigenvalues and margins."""
-        jacobian = solved.J[:, :-1] / self.scale[:-1]
-        u, values = self._at(solved.X)
+        u, values = self._at(point.X)
         h, h_u = self.field.indicators(u, values, self.memory)
         margins = self.field.margins(h, EDGE * (np.abs(h_u) @ (self.system.scale_vector() + np.abs(u))))
+        return self._measured(point, u, point.solved.J[:, :-1] / self.scale[:-1], margins, u, u)
+
+    def _measured(
+        self, point: Point, u: FloatArray, jacobian: FloatArray, margins: FloatArray, lower: FloatArray,
+        upper: FloatArray,
+    ) -> Rest:  # fmt: skip
         eigenvalues = sorted_eigenvalues(jacobian)
-        return Rest(Y, tangent, orientation, iterations, solved, u, jacobian, eigenvalues, margins, u, u)
+        return Rest(**vars(point), u=u, jacobian=jacobian, eigenvalues=eigenvalues, margins=margins, lower=lower,
+                    upper=upper)  # fmt: skip
 
     def stable(self, rest: Rest) -> bool:
         """Return whether all eigenvalues have negative real parts."""
@@ -221,11 +226,9 @@ class SetOfEquilibria(Equilibria):
         X = Y * self.scale
         return _Field(X, *self.corners[0].equations(*self._at(X)))
 
-    def described(
-        self, Y: FloatArray, tangent: FloatArray, orientation: float, iterations: int, solved: _Field
-    ) -> Rest | None:
+    def described(self, point: Point) -> Rest | None:
         """The middle of the set with its extent; None where an extreme point is not found."""
-        first, values = self._at(solved.X)
+        first, values = self._at(point.X)
         ends = [first]
         for corner in self.corners[1:]:
             if (end := corner.solved(values)) is None:
@@ -237,8 +240,7 @@ class SetOfEquilibria(Equilibria):
         upper = np.where(np.isinf(self.found.upper), np.inf, np.max(ends, axis=0))
         middle = np.mean(ends, axis=0)
         jacobian = self.field.evaluate(middle, values, self.memory)[1]
-        eigenvalues = sorted_eigenvalues(jacobian)
-        return Rest(Y, tangent, orientation, iterations, solved, middle, jacobian, eigenvalues, margins, lower, upper)
+        return self._measured(point, middle, jacobian, margins, lower, upper)
 
     def word(self) -> Any:
         """The conditions at the extreme points, and their modes."""
@@ -252,7 +254,7 @@ class SetOfEquilibria(Equilibria):
 
 def equilibria_near(
     system: System, parameter: str, width: float, u: FloatArray, value: float, modes: Sequence[int] | None = None
-) -> Iterator[tuple[Equilibria, Rest]]:
+) -> Iterator[Rest]:
     """Equilibria and sets of them at a value of the parameter, the nearest to a state first."""
     values = system.parameter_vector()
     values[list(system.values).index(parameter)] = value
@@ -266,7 +268,7 @@ def equilibria_near(
             curve.watched = tuple({*watched, *one.modes})
         rest = curve.at(curve.corners[0].u if isinstance(curve, SetOfEquilibria) else one.point, value)
         if rest is not None:
-            yield curve, rest
+            yield rest
 
 
 def goes_on(rest: Rest, other: Rest, size: FloatArray) -> bool:
