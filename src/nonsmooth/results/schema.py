@@ -173,7 +173,7 @@ def dataset(
     if starts is not None:
         states = np.atleast_2d(floats(starts))
         along |= {"start": np.arange(len(states)), "start_state": states}
-    whole = {name: one for name, one in along.items() if isinstance(one, tuple) and isinstance(one[-1], dict)}
+    whole = {name: one for name, one in along.items() if isinstance(one, tuple) and one and isinstance(one[-1], dict)}
     coords = whole | columns(labels, _ALONG, {name: one for name, one in along.items() if name not in whole})
     dims = {dim for one in (*variables.values(), *coords.values()) for dim in np.atleast_1d(one[0])}
     if "state" in dims and "state" not in coords:
