@@ -94,8 +94,8 @@ def test_derivatives_in_sensor_clock_and_phase_are_those_of_differences(names: l
         slope = (at < 0) * v * at  # a little before the start
         return own.get("q.gain", 1.0) * (motion.sel(time=np.maximum(at, 0.0), method="nearest").values + slope)
 
-    known = {"k": 9.0, "c": 0.15, "clock": 1.0, "q.gain": 1.0}
-    centre = np.array([known.get(name, 0.0) for name in names] + [0.1, 3.0])
+    first = {"k": 9.0, "c": 0.15, "clock": 1.0, "q.gain": 1.0}
+    centre = np.array([*(first.get(name, 0.0) for name in names), 0.1, 3.0])
     h, columns = 1e-6, []
     for step in h * np.eye(len(centre)):
         ahead, behind = (readings(dict(zip(names, x, strict=False)), *x[-2:]) for x in (centre + step, centre - step))

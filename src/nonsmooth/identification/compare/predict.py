@@ -10,12 +10,12 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.attractors.mapper import Mapper
-from nonsmooth.attractors.settle import longest_period
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.flow.engines.engine import Kept, Section, State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import solve_error
+from nonsmooth.flow.options import longest_period
 from nonsmooth.flow.sections import Stroboscopic, section_plan
 from nonsmooth.flow.simulate import check_complete
 from nonsmooth.identification.compare.clouds import energy_distance
@@ -76,7 +76,6 @@ class Motions:
         keep = max(keep, max_period + 1)
         self.settler = Settler(
             self.system, self.engine, self._plan(phase), model.transient, keep, longest_period(keep, max_period), False,
-            rtol=model.options.get("rtol"),
         )  # fmt: skip
 
     def _plan(self, phase: float) -> Section:
