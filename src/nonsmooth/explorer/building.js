@@ -2,8 +2,9 @@
 (window.parts = window.parts || []).push(({$, node, on, act, show, file}) => {
   let told = {built: 0}, drawn = "";
 
+  const words = {at: "at", other: "against", side: "side"};
   const control = ([set, label]) => label ? node("input", {set, className: "short", inputMode: "decimal", ariaLabel: label})
-    : node("select", {set, ariaLabel: {at: "first mass", other: "second mass", side: "side"}[set.split(".").pop()]});
+    : node("select", {set, ariaLabel: words[set.split(".").pop()]});
   const remove = (name, disabled) =>
     node("button", {textContent: "×", title: "remove", ariaLabel: "remove", disabled, onclick: () => act("build remove", name)});
 
@@ -21,8 +22,8 @@
       drawn = key;
       $("building-masses").replaceChildren(...now.masses.map((row, i) => node("tr", {}, node("td", {textContent: "mass " + (i + 1)}),
         ...row.map(one => node("td", {}, control(one))), node("td", {}, remove("masses." + i, now.masses.length === 1)))));
-      $("building-elements").replaceChildren(...now.elements.map((row, i) => node("div", {className: "element"}, node("b", {textContent: now.labels[i]}), " at ",
-        ...row.map(one => node("label", {}, one[1] + " ", control(one), node("span", {className: "unit", textContent: one[2] === "1" ? "" : " " + one[2]}))), remove("elements." + i))));
+      $("building-elements").replaceChildren(...now.elements.map((row, i) => node("div", {className: "element"}, node("b", {textContent: now.labels[i]}),
+        ...row.map(one => node("label", {}, (one[1] || words[one[0].split(".").pop()]) + " ", control(one), node("span", {className: "unit", textContent: one[2] === "1" ? "" : " " + one[2]}))), remove("elements." + i))));
       show();
     }
     for (const one of $("building").querySelectorAll("[data-add]"))

@@ -12,9 +12,15 @@ from nonsmooth.plot.comparison import MEASURED
 from nonsmooth.plot.identification.picture import Picture, number, picture
 
 __all__ = [
-    "amplitude_fit", "backbone", "drop_decay", "forced_responses", "free_decay", "half_power", "modal_damping",
+    "amplitude_fit",
+    "backbone",
+    "drop_decay",
+    "forced_responses",
+    "free_decay",
+    "half_power",
+    "modal_damping",
     "nyquist",
-]  # fmt: skip
+]
 
 _TIME = ("time", "s")
 _OMEGA, _AMPLITUDE = (r"$\omega$", "rad/s"), ("amplitude of $x$", "m")
@@ -49,10 +55,8 @@ def amplitude_fit(one: Picture, finding: Any) -> None:
             curve = one.data[f"{name}_amplitude"].values
             one.line(fine, curve, word + one.text(f"c_{name}", "N s/m", before=": "), color, line)
             left, error = error, None  # bars on the first residuals alone
-            one.residual(
-                omega, heights - np.interp(omega, fine, curve), f"residual, {word}", error=left, marker=mark,
-                color=style.COLORS[color],
-            )  # fmt: skip
+            rest = heights - np.interp(omega, fine, curve)
+            one.residual(omega, rest, f"residual, {word}", error=left, marker=mark, color=style.COLORS[color])
     one.ax.set_ylim(bottom=0)
 
 
@@ -213,11 +217,9 @@ def forced_responses(one: Picture, finding: Any, *, responses: Sequence[Any] = (
             one.line(f, np.where(wide, a, np.nan), "", "second", "--", zorder=4)
         if len(a):
             top = int(np.argmax(a))
-            one.ax.annotate(
-                f"{curve.attrs['force']:.2g} N", (f[top], a[top]), xytext=(3, 2), textcoords="offset points",
-                ha="left", va="bottom", fontsize=style.small(one.ax), color=style.COLORS["second"], zorder=6,
-                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.4},
-            )  # fmt: skip
+            paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.4}
+            looks = {"color": style.COLORS["second"], "ha": "left", "va": "bottom", "bbox": paper}
+            style.label(one.ax, f"{curve.attrs['force']:.2g} N", (f[top], a[top]), (3, 2), **looks)
     natural, a = one.values("f_n", "amplitude")
     one.line(natural, a, "backbone", linewidth=1.1, zorder=5)
     one.ax.set_ylim(bottom=0, top=1.32 * float(height.max()))

@@ -237,10 +237,9 @@ def coverage(finding: Any, ax: Axes | None = None) -> Axes:
             for mine, color in ((held[:, k], "section"), (~held[:, k], "second")):
                 drawn.plot(k + spread[mine], off[mine, k], ".", color=style.COLORS[color], markersize=3)
             rms = float(np.sqrt(np.nanmean(off[:, k] ** 2)))
-            drawn.annotate(
-                f"{np.count_nonzero(held[:, k])}/{rigs}\nrms {rms:.2f}", (k, 1.02), xycoords=("data", "axes fraction"),
-                ha="center", va="bottom", fontsize=style.small(drawn),
-            )  # fmt: skip
+            words = f"{np.count_nonzero(held[:, k])}/{rigs}\nrms {rms:.2f}"
+            above: dict[str, Any] = {"transform": drawn.get_xaxis_transform(), "ha": "center", "va": "bottom"}
+            drawn.text(k, 1.02, words, fontsize=style.small(drawn), **above)
         reach = max(3.0, 1.08 * float(np.nanmax(np.abs(off[np.isfinite(off)]), initial=0.0)))
         drawn.set_ylim(-reach, reach)
         drawn.set_xticks(range(len(names)), [symbol_of(name) for name in names])

@@ -14,9 +14,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
-    "grazing", "impulse_history", "impulse_response", "multiple_shooting", "restitution", "steady_amplitude",
-    "steady_phase", "toss",
-]  # fmt: skip
+    "grazing",
+    "impulse_history",
+    "impulse_response",
+    "multiple_shooting",
+    "restitution",
+    "steady_amplitude",
+    "steady_phase",
+    "toss",
+]
 
 _TIME, _DISPLACEMENT = ("time", "s"), ("displacement", "m")
 _BINS = 9  # shown on either side of the peak
@@ -122,10 +128,7 @@ def multiple_shooting(one: Picture, finding: Any, *, seconds: float = 6.0) -> No
     curve = np.insert(np.where(segment >= 0, fitted, np.nan), cut, np.nan)
     one.line(np.insert(time, cut, np.nan), curve, "fitted, segment by segment", linewidth=0.9)
     if "in_contact" in data:
-        one.ax.fill_between(
-            time, 0, 1, where=data["in_contact"].values.astype(bool), color=style.COLORS["zone"],
-            transform=one.ax.get_xaxis_transform(), alpha=0.3, linewidth=0, zorder=0, label="contact",
-        )  # fmt: skip
+        style.shade(one.ax, time, data["in_contact"].values.astype(bool), alpha=0.3, label="contact", zorder=0)
     one.level(number(data, "gap"), one.text("gap", "mm", 1e3, "$g$ = "))
     one.residual(time, data["residual"].values if "residual" in data else x - fitted)
 

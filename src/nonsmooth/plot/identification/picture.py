@@ -125,10 +125,7 @@ class Picture:
         value, error = (scale * number(self.data, key) for key in (name, f"{name}_error"))
         return before + with_error(value, error, unit) if np.isfinite(value) else ""
 
-    def points(
-        self, x: str, y: str, label: str = "", *, where: Any = True, scale: float = 1.0, mark: str = "o",
-        face: str = MEASURED,
-    ) -> None:  # fmt: skip
+    def points(self, x: str, y: str, label: str = "", *, where: Any = True, scale: float = 1.0, **looks: Any) -> None:
         """Measured points of two variables, with the error of the second where the data have one."""
         here = np.broadcast_to(where, self.data[y].shape)
         if here.size and not here.any():
@@ -136,7 +133,7 @@ class Picture:
         error = scale * self.data[f"{y}_error"].values[here] if f"{y}_error" in self.data else np.nan
         at, heights = (self.data[name].values[here] for name in (x, y))
         words = style.once(self.ax, label or self.word)
-        style.points(self.ax, at, scale * heights, yerr=error, face=face, size=2.8, mark=mark, label=words)
+        style.points(self.ax, at, scale * heights, yerr=error, size=2.8, label=words, **looks)
 
     def cloud(self, x: Any, y: Any, label: str = "", color: str = MEASURED) -> None:
         """Small dots of many samples."""
@@ -162,10 +159,9 @@ class Picture:
     def note(self, x: float, y: float, *lines: str) -> None:
         """Words in the axes, at a place in their own units."""
         sides = "left" if x < 0.5 else "right" if x > 0.5 else "center", "top" if y > 0.5 else "bottom"
-        self.ax.annotate(
-            "\n".join(filter(None, lines)), (x, y), xycoords="axes fraction", ha=sides[0],
-            va="center" if y == 0.5 else sides[1], fontsize=style.small(self.ax),
-        )  # fmt: skip
+        looks: dict[str, Any] = {"ha": sides[0], "va": "center" if y == 0.5 else sides[1]}
+        text, size = "\n".join(filter(None, lines)), style.small(self.ax)
+        self.ax.text(x, y, text, transform=self.ax.transAxes, fontsize=size, **looks)
 
     def residual(
         self, x: Any, left: Any, label: str = "", *, error: Any = None, band: Any = None, **looks: Any
