@@ -11,8 +11,7 @@ import numpy as np
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.branches.reading import fields_of, layout_attributes, layouts_of, recorded, undamaged
 from nonsmooth.continuation.problems.multipliers import stability, stable_by
-from nonsmooth.continuation.problems.path import Path
-from nonsmooth.continuation.problems.shooting import Shooting, Solved
+from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.signature import Signature
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import State
@@ -228,14 +227,16 @@ class Orbit:
             return cls(system=system, signature=signature, options=source["options"], loads=loads, **values)
 
 
-def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArray, virtual: bool) -> Orbit:
+def orbit_of(point: OrbitPoint, virtual: bool) -> Orbit:
     """The record of a solved orbit, at the parameters of its system."""
-    system, once = shooting.system, shooting.once(solved.X)
+    shooting, path, once = point.shooting, point.path, point.shooting.once(point.X)
+    system, mu = shooting.system, point.multipliers
     u, memory = np.split(once.states[0], [len(system.states)])
+    clearance = point.curve.walk.clearance(path, len(system.indicators))
     return Orbit(
         system=system, u=u, mode=system.modes[shooting.at_section], memory=memory, period=once.period,
         period_number=shooting.period_number, signature=shooting.signature, crossing_times=once.times,
-        crossing_states=once.states[1:], monodromy_matrix=solved.monodromy, floquet_multipliers=solved.multipliers,
-        stable=stable_by(solved.multipliers, shooting.forced), maximum=path.maximum.copy(), minimum=path.minimum.copy(),
+        crossing_states=once.states[1:], monodromy_matrix=point.M, floquet_multipliers=mu,
+        stable=stable_by(mu, shooting.forced), maximum=path.maximum.copy(), minimum=path.minimum.copy(),
         clearance=dict(zip(system.indicators, map(float, clearance), strict=True)), virtual=virtual,
     )  # fmt: skip

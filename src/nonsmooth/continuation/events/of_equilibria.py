@@ -95,9 +95,9 @@ class AlongEquilibria(Policy):
             found.ending = "boundary"
         corner = rest.margins[len(rest.curve.system.transitions) :].max(initial=-np.inf) > -0.5 * FREE
         if after is None or not corner:  # else another point of the set is its extreme from here on
-            ahead = after is not None and float(rest.tangent[-1]) * float(after.tangent[-1]) > 0.0
+            ahead = after is not None and rest.rise * after.rise > 0.0
             graze = "" if after is None else "persistence" if ahead else "non_smooth_fold"
-            found.mark(met[0].name, rest, graze=graze)
+            found.mark(met[0].name, rest, grazing=graze)
         return after
 
 

@@ -123,7 +123,7 @@ class Fold(Event):
 
     def number(self, point: Any) -> float:
         """The last component of the tangent."""
-        return float(point.tangent[-1])
+        return point.rise
 
 
 class Crossing(Event):

@@ -9,10 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.march.event import Event, Met, Step, first_met, special_on
 from nonsmooth.continuation.problems.curve import Place, Point, passing
 
-__all__ = ["INTERRUPTED", "Limits", "March", "Policy", "march"]
+__all__ = ["INTERRUPTED", "Limits", "March", "Policy", "Row", "SpecialRecord", "march"]
 
 INTERRUPTED = "Interrupted: what was found until then stands"
 FIRST = 1e-3  # step
@@ -34,15 +35,32 @@ class Limits:
 
 
 @dataclass
+class SpecialRecord:
+    """A special point: its kind, its data, and its place ``point`` in the branch; at a graze both sides of it."""
+
+    kind: str
+    indicator: str = ""
+    grazing: str = ""
+    sliding: str = ""
+    bounded: bool = True
+    doubled: bool = False
+    contact: ComplexArray = field(default_factory=lambda: np.empty(0, dtype=complex))  # in the limit
+    determinants: FloatArray = field(default_factory=lambda: np.empty(0))
+    point: int = -1
+
+
+@dataclass
 class Row:
-    """A point of a branch, and what belongs to its kind where it is a special one."""
+    """A point of a branch, and what it is as a special one."""
 
     point: Any
     virtual: bool = False  # beyond a boundary that its path should obey
-    kind: str = ""  # of a special point
-    indicator: int = -1
-    sliding: str = ""
-    graze: Any = None  # an events.grazing.Graze
+    mark: SpecialRecord | None = None
+
+    @property
+    def kind(self) -> str:
+        """The kind of a special point, else nothing."""
+        return self.mark.kind if self.mark else ""
 
 
 @dataclass
@@ -56,7 +74,7 @@ class March:
     @property
     def special(self) -> list[Row]:
         """The rows that are special points."""
-        return [row for row in self.rows if row.kind]
+        return [row for row in self.rows if row.mark]
 
     def add(self, point: Point) -> None:
         """Append a point."""
@@ -64,7 +82,7 @@ class March:
 
     def mark(self, kind: str, point: Point, virtual: bool = False, **more: Any) -> None:
         """Append a special point; on a boundary itself no path is virtual."""
-        self.rows.append(Row(point, virtual, kind, **more))
+        self.rows.append(Row(point, virtual, SpecialRecord(kind, **more)))
 
 
 class Policy(ABC):

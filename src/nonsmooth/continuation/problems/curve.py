@@ -52,6 +52,11 @@ class Point:
         return float(self.X[-1])
 
     @property
+    def rise(self) -> float:
+        """How the last parameter changes along the branch."""
+        return float(self.tangent[-1])
+
+    @property
     def virtual(self) -> bool:
         """True for a point that belongs to no motion of the system."""
         return False
@@ -62,7 +67,7 @@ class Point:
 
     def facing(self, sign: float) -> Self:
         """The same point with its tangent towards rising (1) or falling (-1) values."""
-        return self if (float(self.tangent[-1]) or 1.0) * sign > 0 else self.turned()
+        return self if (self.rise or 1.0) * sign > 0 else self.turned()
 
 
 P = TypeVar("P", bound=Point)
@@ -145,6 +150,12 @@ class Curve(ABC, Generic[P]):
 
     # --- along the curve
 
+    def jacobian(self, solved: Any) -> FloatArray:
+        """The scaled Jacobian (n - 1, n)."""
+        matrix = np.empty((self.n - 1, self.n))
+        self.fill(solved, matrix)
+        return matrix
+
     def bordered(self, solved: Any, border: FloatArray) -> FloatArray:
         """The scaled Jacobian with a last row."""
         matrix = np.empty((self.n, self.n))
@@ -206,9 +217,7 @@ class Curve(ABC, Generic[P]):
 
     def null_vectors(self, solved: Any, tolerance: float = 1e-7) -> FloatArray:
         """Orthonormal vectors (k, n) that the scaled Jacobian takes to zero."""
-        matrix = np.empty((self.n - 1, self.n))
-        self.fill(solved, matrix)
-        _, values, right = np.linalg.svd(matrix)
+        _, values, right = np.linalg.svd(self.jacobian(solved))
         rank = int((values > tolerance * values[0]).sum())
         return np.asarray(right[rank:])
 
@@ -314,7 +323,7 @@ def tangents(curve: Curve[Any], Y: FloatArray) -> FloatArray | None:
     """
 
     def jacobian(Z: FloatArray) -> FloatArray:
-        return curve.bordered(curve.evaluate(Z), np.zeros(curve.n))[:-1]
+        return curve.jacobian(curve.evaluate(Z))
 
     left, _, right = np.linalg.svd(jacobian(Y))
     plane, psi = right[-2:], left[:, -1]
@@ -339,7 +348,7 @@ def branch_point(curve: Curve[Any], Y: FloatArray, *, tolerance: float = 1e-11, 
 
     def scaled(Z: FloatArray) -> tuple[FloatArray, FloatArray]:
         solved = curve.evaluate(Z)
-        return curve.residual(solved), curve.bordered(solved, np.zeros(n + 1))[:-1]
+        return curve.residual(solved), curve.jacobian(solved)
 
     _, J = scaled(Y)
     psi = np.linalg.svd(J)[0][:, -1]
