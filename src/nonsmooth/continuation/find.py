@@ -113,7 +113,7 @@ def find_orbit(
         raise ValueError(f"budget = {budget!r}: a search takes a positive number of seconds")
     wanted = bool(checked_loads(system, loads, "find_orbit"))
     state = first_state(system, start)
-    with search_within(seconds, "find_orbit", progress) as search:
+    with search_within(seconds, "find_orbit", progress, looks=True) as search:
         guesses = _guesses(system, state, period_number, transient, max_period, search)
         orbit = _polished(system, guesses, period_number is not None, transient == 0, search)
     warn_if_slow(system, orbit.maximum, orbit.minimum)
@@ -140,10 +140,10 @@ def _guesses(
     else:
         keep = 2 * max(max_period, period_number or 1) + 2
         begun = state.copy()
-        settled = settle_forced(system, engine, state, transient, keep, search)
+        settled = settle_forced(system, engine, state, transient, keep)
         if settled.status not in GOOD and not transient and period_number is not None:
             # The motion leaves an unstable orbit and fails later: its first rounds are enough.
-            settled = settle_forced(system, engine, begun, 0, period_number + 1, search)
+            settled = settle_forced(system, engine, begun, 0, period_number + 1)
         if settled.status not in GOOD:
             raise solve_error(settled.status, begun=(system, begun.u))
         guesses = forced_guesses(system, engine, settled, period_number, max_period)

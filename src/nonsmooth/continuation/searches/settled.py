@@ -66,29 +66,10 @@ class Settled:
     status: int
 
 
-def settle_forced(system: System, engine: Engine, state: State, transient: int, keep: int, search: Search) -> Settled:
+def settle_forced(system: System, engine: Engine, state: State, transient: int, keep: int) -> Settled:
     """Run a forced system through a transient and keep the section points after it."""
-    tables = engine.prepare(system.parameter_vector()[None, :])
-    passed, left, begun = engine.kept(1, 1), transient, state.copy()
-
-    def march(piece: float) -> bool:
-        nonlocal left
-        some = min(max(1, round(piece)), left)
-        if some:
-            engine.chain(tables, 0, 1, state, None, Section(), some - 1, 1, passed)
-            left -= some
-        return int(passed.status[0]) in (codes.OK, codes.NOT_GUARANTEED)
-
-    search.in_pieces(float(transient), march)
-    if passed.status[0] == codes.BEYOND_STOP:  # an impact on the section: a motion that was cut there cannot begin
-        state, left, passed.status[0] = begun, transient, codes.OK
-    out = engine.kept(1, keep)
-    if passed.status[0] in (codes.OK, codes.NOT_GUARANTEED):
-        engine.chain(tables, 0, 1, state, None, Section(), left, keep, out)
-    else:
-        out.status[0] = passed.status[0]
-    search.look()
-    scale = system.scale_vector()
+    out, scale = engine.kept(1, keep), system.scale_vector()
+    engine.chain(engine.prepare(system.parameter_vector()[None, :]), 0, 1, state, None, Section(), transient, keep, out)
     size = np.maximum(0.5 * (out.high - out.low)[0, : len(scale)], 1e-3 * scale)
     return Settled(np.nan_to_num(out.section[0]), out.section_mode[0], size, state, int(out.status[0]))
 
@@ -188,7 +169,8 @@ def autonomous_guesses(
     def run(duration: float) -> _Stretch:
         begin = float(state.clock[0])
         instants = begin + np.linspace(0.0, duration, SAMPLES)
-        log = search.record(engine, tables, state, begin + duration, instants)
+        state.settled = False  # an event just where it begins is taken as at any start
+        log = engine.record(tables, state, begin + duration, instants)
         if log.status not in (codes.OK, codes.NOT_GUARANTEED):
             raise solve_error(log.status, begun=(system, state.u))
         return _seen(log, instants, system)
