@@ -80,10 +80,10 @@ def born(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
     kind = str(start["kind"].values)
     if kind not in ("hopf", "focus_centre"):
         raise ValueError(f"no cycle emanates from a {kind}: that happens at a hopf point or a focus_centre")
-    system, own, value, mode, u, before = hopf_row(start)
+    system, own, rest, before = hopf_row(start)
     _check_parameter(name, own)
-    branch = asked.follow(system, own, before, value)
-    first = first_cycle(kind, system, own, value, mode, u, branch.width)
+    branch = asked.follow(system, own, before, rest.value)
+    first = first_cycle(kind, system, own, rest, branch.width)
     if first is None:
         raise SolveError(f"no cycle was found at this {kind}", status="no_convergence")
     # The first cycle of a Hopf point is small; about a centre the one that touches the boundary is followed back to.

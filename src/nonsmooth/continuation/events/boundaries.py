@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.continuation.events.change import Change, by_others, gained, inserted, is_tolerance, rest_after, without
-from nonsmooth.continuation.march.event import Event, Step
+from nonsmooth.continuation.march.event import Event, Step, first_beyond
 from nonsmooth.continuation.problems.signature import AT_ONCE
 
 __all__ = ["BOUNDARIES", "Boundary", "Crossed", "Unseen"]
@@ -205,17 +205,7 @@ class Unseen(Boundary):
 
         Margins are looked at in parts of a step: of two extremes within a part none shows. A simulation isolates them.
         """
-        low, high, there = 0.0, step.end, step.b
-        while high - low > UNSEEN:
-            middle = 0.5 * (low + high)
-            point = step.curve.between(step.a, step.b, middle)
-            if point is None:
-                return None
-            if step.curve.shows(point):
-                low = middle
-            else:
-                high, there = middle, point
-        return high, there
+        return first_beyond(step, step.curve.shows, UNSEEN)
 
     def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator of the first transition that the signature beyond has more often."""

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Name, Step
+from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Name, Step, first_beyond
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.equilibrium import FREE, Rest, equilibria_near, goes_on
 from nonsmooth.continuation.problems.multipliers import pairs
@@ -71,18 +71,10 @@ class AlongEquilibria(Policy):
 
     def unseen(self, step: Step) -> Met | None:
         """The place on a step where another set of equilibria runs into this one."""
-        curve, near, far = step.curve, 0.0, step.end
-        if curve.alone(step.b):
+        if step.curve.alone(step.b):
             return None
-        point = step.b
-        while far - near > LOCATED * step.end:
-            s = 0.5 * (near + far)
-            there = curve.between(step.a, step.b, s)
-            if there is not None and curve.alone(there):
-                near = s
-            else:
-                far, point = s, there or point
-        return Met(self.boundaries[0], far, point, self.boundaries[0].name)
+        there = first_beyond(step, step.curve.alone, LOCATED * step.end)
+        return Met(self.boundaries[0], *there, self.boundaries[0].name)
 
     def behind(self, found: March, met: list[Met]) -> Rest | None:
         """Record the boundary, and whether the branch goes on behind it or turns back; the equilibrium there, or None.

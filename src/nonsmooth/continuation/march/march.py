@@ -235,15 +235,11 @@ class _Marching:
     def _within(self, new: Any) -> Step | None:
         """The step to the new point, or to the edge of the range before it; None where that is not found."""
         reached, s = new, np.inf
-        for which, low, high in self.limits.box:
-            value = float(new.X[which])
-            if low <= value <= high:
-                continue
-            last = self.curve.at_edge(self.point, new, low if value < low else high, which)
+        for which, edge in self._beyond(new):
+            last = self.curve.at_edge(self.point, new, edge, which)
             if last is None:
                 return None
-            there = float(self.point.tangent @ (last.Y - self.point.Y))
-            if there < s:
+            if (there := self.point.along(last.Y)) < s:
                 reached, s = last, there
         numbers, margins = self._watched(reached)
         return Step(
@@ -268,10 +264,8 @@ class _Marching:
         if step.virtual:
             met = sorted([*met, *self.policy.passed_by(step)], key=lambda one: one.s)
         for one in met:
-            edge = self._beyond(one.point)
-            if edge is not None:  # a fold just beyond the edge of the range
-                which, end = edge
-                step.ends("range", one.s, self.curve.at_edge(step.a, one.point, end, which) or one.point)
+            for which, edge in self._beyond(one.point):  # a fold just beyond the edge of the range
+                step.ends("range", one.s, self.curve.at_edge(step.a, one.point, edge, which) or one.point)
                 return False
             self.policy.record(self.found, step, one)
             if one.ending is not None:
@@ -279,13 +273,10 @@ class _Marching:
                 return True
         return False
 
-    def _beyond(self, point: Any) -> tuple[int, float] | None:
-        """The edge of the range that a point lies beyond: the place of the parameter, and the edge."""
-        for which, low, high in self.limits.box:
-            value = float(point.X[which])
-            if not low <= value <= high:
-                return which, low if value < low else high
-        return None
+    def _beyond(self, point: Any) -> list[tuple[int, float]]:
+        """The edges of the range that a point lies beyond: places of parameters, each with its edge."""
+        return [(which, low if point.X[which] < low else high) for which, low, high in self.limits.box
+                if not low <= point.X[which] <= high]  # fmt: skip
 
     def _ended(self, step: Step) -> bool:
         """Take the step; True where the branch ends with it."""
@@ -325,7 +316,6 @@ def came_back(place: Place | None, step: Step) -> float | None:
     word, X, seen = place
     if word == step.curve.word():
         Y = X / step.curve.scale
-        along = float(step.a.tangent @ (Y - step.a.Y))
-        return along if passing(Y, step.a.Y, step.b.Y) is not None else None
+        return step.a.along(Y) if passing(Y, step.a.Y, step.b.Y) is not None else None
     x = passing(seen, step.curve.seen(step.a), step.curve.seen(step.b))
     return None if x is None else x * step.end
