@@ -262,6 +262,7 @@ def _dataset(
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
 
-    attrs = dict(provenance(labels_of(system), "bifurcation_diagram", options, method="multiple shooting"))
+    labels = labels_of(system)
+    attrs = dict(provenance(labels, "bifurcation_diagram", options, method="multiple shooting"))
     branches, returns, parents = zip(*((one.data, one.returns, one.parent) for one in found), strict=True)
-    return diagram(attrs, name, branches, returns, parents, swept, complete)
+    return diagram(labels, attrs, name, branches, returns, parents, swept, complete)

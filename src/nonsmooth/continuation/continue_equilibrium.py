@@ -14,6 +14,7 @@ from nonsmooth.continuation.march.march import Limits, Row
 from nonsmooth.continuation.problems.equilibrium import Rest, equilibria_near
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
+from nonsmooth.flow.mode_fields import MOST, every_mode
 from nonsmooth.flow.starts import first_state
 from nonsmooth.system.names import by_name
 from nonsmooth.system.system import System
@@ -74,7 +75,8 @@ def continue_equilibrium(
     from nonsmooth.results.branches import EQUILIBRIUM, SPECIAL_EQUILIBRIUM
 
     check_system(system, "continue_equilibrium")
-    system.refuse_patterns("continue_equilibrium")
+    if every_mode(system.traced, system.parameter_vector()) is None:
+        raise ValueError(f"{system.name!r} has more than {MOST} combinations of contact states: take fewer elements")
     if system.depends_on_time:
         raise ValueError(f"{system.name!r} depends on time: it has no equilibria; find_orbit finds its periodic orbits")
     low, high = limits(system, parameter, range, system.values.get(parameter), what="the system")

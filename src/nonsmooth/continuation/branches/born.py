@@ -9,7 +9,7 @@ from nonsmooth.continuation.branches.records import RestRecord
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.continuation.problems.signature import Round, Signature, Visit
-from nonsmooth.flow.equilibria import ModeField, mode_field
+from nonsmooth.flow.mode_fields import ModeField, mode_field
 from nonsmooth.system.system import System
 
 __all__ = ["first_cycle"]

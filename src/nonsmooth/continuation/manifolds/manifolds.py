@@ -205,8 +205,8 @@ def _dataset(
     attrs = provenance(labels, "manifolds", options, method="images of a fundamental segment")
     return build(
         labels, attrs,
-        {"section": x * size, "arc_length": lengths, "iterate": iterates, "piece": pieces, "arc": numbers},
-        kinds=[one for one, *_ in arcs], sides=[side for _, side, *_ in arcs],
-        orbit_points=[j for _, _, j, _, _ in arcs], multipliers=[mu for _, _, _, mu, _ in arcs],
-        orbit_section=cycle * size, scale=size, endings=ENDS, ended=[arc.ending for *_, arc in arcs],
+        {"section": x * size, "arc_length": lengths, "iterate": iterates, "piece": pieces, "arc": numbers,
+         "side": [side for _, side, *_ in arcs], "orbit_point": [j for _, _, j, _, _ in arcs],
+         "multiplier": [mu for _, _, _, mu, _ in arcs], "orbit_section": cycle * size, "size": size},
+        kinds=[one for one, *_ in arcs], endings=ENDS, ended=[arc.ending for *_, arc in arcs],
     )  # fmt: skip

@@ -10,8 +10,9 @@ import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.curve import Curve, Point
-from nonsmooth.flow.equilibria import ModeField, sorted_eigenvalues
+from nonsmooth.flow.equilibria import sorted_eigenvalues
 from nonsmooth.flow.equilibrium_sets import EquilibriumSet, equilibrium_sets, modes_of_sets
+from nonsmooth.flow.mode_fields import mode_field
 from nonsmooth.flow.polytopes import Extreme
 from nonsmooth.system.system import System
 
@@ -68,7 +69,7 @@ class Equilibria(Curve[Rest]):
         self.system, self.mode, self.parameter, self.width = system, mode, parameter, width
         self.place = list(system.values).index(parameter)
         self.values, self.memory = system.parameter_vector(), system.memory_vector()
-        self.field = ModeField(system.traced, mode, (self.place,))
+        self.field = mode_field(system.traced, mode, (self.place,))
         self.own = self.field.own
         self.scale = np.append(system.scale_vector()[self.own], width)
 
@@ -149,7 +150,7 @@ class _Corner:
         self.curve, self.u, self.side, self.keys = curve, extreme.u, extreme.side, [i for i, _ in extreme.keys]
         place, traced = curve.place, curve.system.traced
         same = extreme.mode == curve.mode
-        self.field = curve.field if same else ModeField(traced, extreme.mode, (place,))
+        self.field = curve.field if same else mode_field(traced, extreme.mode, (place,))
         self.own, self.scale = self.field.own, curve.system.scale_vector()[self.field.own]
         self.unit = np.eye(len(curve.values))[place] * STEP * curve.width
         # conditions that are met there by construction
@@ -165,9 +166,9 @@ class _Corner:
         if not len(self.across):
             left, sizes, _ = np.linalg.svd(J[:, :-1])
             self.across = left[:, : int((sizes > FREE * max(float(sizes[0]), FREE)).sum())].T
-        h, h_u = curve.field.indicators(u, values, curve.memory)
+        h, h_u = self.field.indicators(u, values, curve.memory)
         # indicators are differentiated in the states only
-        there = [curve.field.indicators(u, values + one, curve.memory)[0] for one in (self.unit, -self.unit)]
+        there = [self.field.indicators(u, values + one, curve.memory)[0] for one in (self.unit, -self.unit)]
         slopes = np.column_stack([h_u[:, self.own] * self.scale, (there[0] - there[1]) / (2.0 * STEP)])[keys]
         J, f = np.vstack([self.across @ J, slopes]), np.append(self.across @ f, h[keys])
         if (missing := len(self.own) - len(f)) > 0:
@@ -194,7 +195,7 @@ class _Corner:
 
     def margins(self, u: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
         """Margins of the conditions that are not met by construction; and how nearly another corner is as extreme."""
-        h, h_u = self.curve.field.indicators(u, values, self.curve.memory)
+        h, h_u = self.field.indicators(u, values, self.curve.memory)
         edge = EDGE * (np.abs(h_u) @ (self.curve.system.scale_vector() + np.abs(u)))
         margins = np.where(self.met, -np.inf, self.field.margins(h, edge))
         if not self.keys:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from nonsmooth.arrays import FloatArray
 from nonsmooth.diagrams.response import jumps_in
 from nonsmooth.diagrams.sweep import sweep
+from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.jumps import Jump, Jumps, jumps_in_steps, match_jumps
-from nonsmooth.identification.compare.model import Model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -114,7 +114,7 @@ def _runs(measured: xr.Dataset, name: str, state: str) -> dict[str, NDArray[Any]
 
 def _curves(
     system: System, model: Model, name: str, state: str, values: FloatArray, runs: dict[str, NDArray[Any]],
-    directions: list[str],
+    directions: list[Any],
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """The predicted curve on a regular grid, and at the runs: one carried sweep over both for each direction."""
     curves = np.empty((len(values), len(directions)))
