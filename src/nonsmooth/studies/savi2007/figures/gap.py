@@ -199,8 +199,10 @@ def _draw_16(canvas: Canvas, data: Datasets) -> None:
 
     def cell(ax: Axes, i: int, j: int) -> None:
         points = result[f"{list(SIDES)[i]}_section"].isel(section_phase=j).values
-        looks: dict[str, Any] = {"color": (THEORY, MEASURED)[i], "markersize": 1.4, "markeredgewidth": 0, "rasterized": True}
-        ax.plot(points[:, 0], points[:, 1], ".", **looks)
+        ax.plot(
+            points[:, 0], points[:, 1], ".", color=(THEORY, MEASURED)[i], markersize=1.4, markeredgewidth=0,
+            rasterized=True,
+        )  # fmt: skip
         name_axes(ax, name_and_unit(result, "x"), name_and_unit(result, "v"))
 
     _draw_attractor(canvas, list(SIDES.values()), cell)
