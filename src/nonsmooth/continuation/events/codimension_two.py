@@ -181,7 +181,7 @@ def _pair(place: OrbitPoint) -> tuple[int, int]:
 def _with_contact(place: OrbitPoint, sign: float) -> float:
     """det(I +- M+); where M+ is unbounded (a rigid impact), its leading coefficient."""
     for change in inserted(place):
-        M, far, near = both_sides(place, change)
+        M, far, near = both_sides(change)
         if not (np.isfinite(far).all() and np.isfinite(near).all()):
             continue
         one = np.eye(len(M))

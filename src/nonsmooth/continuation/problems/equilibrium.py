@@ -135,11 +135,7 @@ class Equilibria(Curve[Rest]):
             return True
         found = equilibrium_sets(self.system, rest.u, values=self._at(rest.X)[1], modes=self.watched)
         size = ALIKE * self.system.scale_vector()
-        return any(
-            _within(rest.lower, rest.upper, one.lower, one.upper, size)
-            and _within(one.lower, one.upper, rest.lower, rest.upper, size)
-            for one in found
-        )
+        return any(_within(rest, one, size) and _within(one, rest, size) for one in found)
 
     def at(self, u: FloatArray, value: float) -> Rest | None:
         """The equilibrium at a value of the parameter, by Newton from a state."""
@@ -273,9 +269,9 @@ def equilibria_near(
 
 def goes_on(rest: Rest, other: Rest, size: FloatArray) -> bool:
     """Return whether of two sets beside each other one is part of the other."""
-    ends = rest.lower, rest.upper, other.lower, other.upper
-    return _within(*ends, size) or _within(*ends[2:], *ends[:2], size)
+    return _within(rest, other, size) or _within(other, rest, size)
 
 
-def _within(low: FloatArray, high: FloatArray, lower: FloatArray, upper: FloatArray, size: FloatArray) -> bool:
-    return bool((low >= lower - size).all() and (high <= upper + size).all())
+def _within(a: Any, b: Any, size: FloatArray) -> bool:
+    """Return whether the extent of a set is part of that of another."""
+    return bool((a.lower >= b.lower - size).all() and (a.upper <= b.upper + size).all())

@@ -8,7 +8,7 @@ half way up the state that swings most, passed upwards.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,93 +57,65 @@ class Guess(Round):
 
 @dataclass
 class Settled:
-    """Section points after the transient."""
+    """Section points after the transient, and the state at the last of them."""
 
     points: FloatArray  # (keep, n_u)
     modes: NDArray[np.int64]  # (keep,)
     size: FloatArray
     state: State
     status: int
-    engine: Engine
-    tables: Any
 
 
-def settle_forced(system: System, engine: Engine, state: State, transient: int, keep: int, search: Search) -> Settled:
+def settle_forced(system: System, engine: Engine, state: State, transient: int, keep: int) -> Settled:
     """Run a forced system through a transient and keep the section points after it."""
-    tables = engine.prepare(system.parameter_vector()[None, :])
-    passed, left, begun = engine.kept(1, 1), transient, state.copy()
-
-    def march(piece: float) -> bool:
-        nonlocal left
-        some = min(max(1, round(piece)), left)
-        if some:
-            engine.chain(tables, 0, 1, state, None, Section(), some - 1, 1, passed)
-            left -= some
-        return int(passed.status[0]) in (codes.OK, codes.NOT_GUARANTEED)
-
-    search.in_pieces(float(transient), march)
-    if passed.status[0] == codes.BEYOND_STOP:  # an impact on the section: a motion that was cut there cannot begin
-        state, left, passed.status[0] = begun, transient, codes.OK
-    out = engine.kept(1, keep)
-    if passed.status[0] in (codes.OK, codes.NOT_GUARANTEED):
-        engine.chain(tables, 0, 1, state, None, Section(), left, keep, out)
-    else:
-        out.status[0] = passed.status[0]
-    search.look()
-    scale = system.scale_vector()
+    out, scale = engine.kept(1, keep), system.scale_vector()
+    engine.chain(engine.prepare(system.parameter_vector()[None, :]), 0, 1, state, None, Section(), transient, keep, out)
     size = np.maximum(0.5 * (out.high - out.low)[0, : len(scale)], 1e-3 * scale)
-    return Settled(np.nan_to_num(out.section[0]), out.section_mode[0], size, state, int(out.status[0]), engine, tables)
+    return Settled(np.nan_to_num(out.section[0]), out.section_mode[0], size, state, int(out.status[0]))
 
 
-def forced_guesses(system: System, settled: Settled, period_number: int | None, most: int) -> list[Guess]:
+def forced_guesses(
+    system: System, engine: Engine, settled: Settled, period_number: int | None, most: int
+) -> list[Guess]:
     """Candidates for the period number, the smallest first, from the last section point.
 
     For a given period number: from the section points that return nearest to themselves. A return is one in the mode
     it began in.
     """
-    points = settled.points / settled.size
+    points, modes = settled.points / settled.size, settled.modes
+    last = len(points) - 1
 
     def gap(i: int, j: int) -> float:
-        return float(np.abs(points[i] - points[j]).max()) if settled.modes[i] == settled.modes[j] else np.inf
+        return float(np.abs(points[i] - points[j]).max()) if modes[i] == modes[j] else np.inf
 
-    guesses = []
     if period_number is not None:
-        p = period_number
-        gaps = np.array([gap(i, i + p) for i in range(len(points) - p)])
-        places = [int(i) for i in np.argsort(gaps, kind="stable")[:CHOICE]]
-        if len(settled.state.memory):  # the memory is known at the last point only
-            places = [len(gaps) - 1]
-        starts = [(p, i, float(gaps[i])) for i in places]
+        way, p = 1, period_number
+        # The memory is known at the last point only.
+        places = [last - p] if len(settled.state.memory) else range(last - p + 1)
+        starts = [(p, i) for i in sorted(places, key=lambda i: gap(i, i + p))[:CHOICE]]
     else:
-        last = len(points) - 1
-        gaps = np.array([gap(last, last - p) for p in range(1, most + 1)])
-        starts = [(p, last, float(gaps[p - 1])) for p in range(1, most + 1) if gaps[p - 1] <= NEAR]
+        way, near = -1, [p for p in range(1, most + 1) if gap(last, last - p) <= NEAR]
         # Chaos comes near its beginning again and again: the nearest few are tried.
-        starts = sorted(sorted(starts, key=lambda start: (max(start[2], CLOSED), start[0]))[:CHOICE])
-    for p, i, _ in starts:
-        back = period_number is None
-        returns = np.array([gap(i, i - q if back else i + q) for q in range(1, p + 1)])
-        guess = _read_round(system, settled, p, i, returns) if np.isfinite(returns[-1]) else None
-        if guess is not None:
-            guesses.append(guess)
-    return guesses
+        near.sort(key=lambda p: max(gap(last, last - p), CLOSED))
+        starts = [(p, last) for p in sorted(near[:CHOICE])]
+    rounds = ((p, i, np.array([gap(i, i + way * q) for q in range(1, p + 1)])) for p, i in starts)
+    guesses = [_read_round(system, engine, settled, *one) for one in rounds if np.isfinite(one[2][-1])]
+    return [guess for guess in guesses if guess is not None]
 
 
-def _read_round(system: System, settled: Settled, p: int, i: int, gaps: FloatArray) -> Guess | None:
+def _read_round(
+    system: System, engine: Engine, settled: Settled, p: int, i: int, gaps: FloatArray
+) -> Guess | None:
     """The motion over p forcing periods from section point i, as an orbit; None where it ends in another mode."""
     state = settled.state.copy()
     if i < len(settled.points) - 1:
-        state.u[:], state.counters[0] = settled.points[i], settled.modes[i]
-        state.counters[1:] = (-1, 0, 0)
+        state.u[:], state.counters[:] = settled.points[i], (settled.modes[i], -1, 0, 0)
     state.clock[:], state.settled = 0.0, True
-    period = float(system.period() or 0.0)
-    start = np.concatenate([state.u, state.memory])
-    mode = int(state.counters[0])
-    log = settled.engine.record(settled.tables, state, p * period, np.empty(0))
-    if log.status not in (codes.OK, codes.NOT_GUARANTEED):
-        return None
-    flow, values = VariationalFlow.of(system), system.parameter_vector()
-    once = round_of(flow, values, log, start, mode, p * period, p)
+    values, period = system.parameter_vector(), p * float(system.period() or 0.0)
+    start, mode = np.concatenate([state.u, state.memory]), int(state.counters[0])
+    log = engine.record(engine.prepare(values[None, :]), state, period, np.empty(0))
+    flow, good = VariationalFlow.of(system), log.status in (codes.OK, codes.NOT_GUARANTEED)
+    once = round_of(flow, values, log, start, mode, period, p) if good else None
     if once is None:
         return None
     kicks = np.abs(np.nan_to_num(log.u_after - log.u_before) / settled.size).max(axis=1, initial=0.0)
@@ -197,7 +169,8 @@ def autonomous_guesses(
     def run(duration: float) -> _Stretch:
         begin = float(state.clock[0])
         instants = begin + np.linspace(0.0, duration, SAMPLES)
-        log = search.record(engine, tables, state, begin + duration, instants)
+        state.settled = False  # an event just where it begins is taken as at any start
+        log = engine.record(tables, state, begin + duration, instants)
         if log.status not in (codes.OK, codes.NOT_GUARANTEED):
             raise solve_error(log.status, begun=(system, state.u))
         return _seen(log, instants, system)
