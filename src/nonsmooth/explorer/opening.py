@@ -54,7 +54,7 @@ def _opened(system: System, options: Mapping[str, Any], output: Mapping[str, str
     section, start = options.get("section"), options.get("start")
     if isinstance(start, Mapping):
         start = [start.get(one, 0.0) for one in states] if set(start) <= set(states) else None
-    found = {
+    found: dict[str, Any] = {
         field: within(field, options[field]) for field in ("transient", "keep") if isinstance(options.get(field), int)
     }
     found |= {field: options.get(field) for field in ("direction", "method")}
