@@ -53,7 +53,7 @@ class Point:
 
     @property
     def rise(self) -> float:
-        """How the last parameter changes along the branch."""
+        """The change of the last parameter along the branch."""
         return float(self.tangent[-1])
 
     @property
