@@ -301,7 +301,7 @@ def _guesses(
 
     given, rng = with_phases(u.guess), np.random.default_rng(seed)
     hidden = free and any(
-        np.isnan(states_from_samples(problem, given, record, slice(0, 1))).any() for record in problem.records
+        np.isnan(states_from_samples(problem, given, run, slice(0, 1))).any() for run in range(len(problem.records))
     )
 
     def others() -> Iterator[tuple[FloatArray, float, FloatArray | None]]:

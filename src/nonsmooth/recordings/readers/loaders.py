@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.errors import DataFileError
-from nonsmooth.recordings.readers.archive import Archive
-from nonsmooth.recordings.reading import MAX_COLUMNS, Group, Remarks, Source, inflation_limit, needed
+from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Group, Remarks, Source, inflation_limit, needed
 
 __all__ = ["LOADERS"]
 
