@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.signature import Round, Signature, Visit
-from nonsmooth.continuation.problems.visits import anchored, round_of, visits_of
+from nonsmooth.continuation.problems.visits import anchored, round_of
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import IntArray, Log, Section, State
 from nonsmooth.flow.equilibria import AT_REST, ROUNDING, equilibrium_at
@@ -237,18 +237,15 @@ def _by_transitions(system: System, interval: _Interval, most: int, given: int |
     """Sequences of transitions that repeat."""
     flow, values, log = VariationalFlow.of(system), system.parameter_vector(), interval.log
     k, after = log.crossing_transition, np.nan_to_num(log.u_after)
-    last, guesses = len(k) - 1, []
-    for length in range(1, min(last, 40 * most) + 1):
-        begun = last - length
+    last, mode, guesses = len(k) - 1, system.traced.transitions[k[-1]].target, []
+    for begun in range(last - 1, max(last - 40 * most, 0) - 1, -1):
         gap = float(np.abs((after[last] - after[begun]) / interval.size).max())
         if k[begun] != k[last] or gap > NEAR:
             continue
-        begin, end = float(log.crossing_time[begun]), float(log.crossing_time[last])
-        visits, states = visits_of(flow, values, log, log.memory_after[begun], begun + 1)
-        signature = Signature((*visits, Visit(system.traced.transitions[k[last]].target)))
-        times, states = log.crossing_time[begun + 1 :] - begin, np.vstack([states[-1:], states])
-        once = anchored(flow, values, Round(0, end - begin, signature, times, states))
-        guesses.append(Guess(**vars(once), gap=gap, size=interval.size))
+        begin, z = float(log.crossing_time[begun]), np.append(after[begun], log.memory_after[begun])
+        once = round_of(flow, values, log, z, mode, float(log.crossing_time[last]) - begin, 0, begun + 1, begin)
+        if once is not None:
+            guesses.append(Guess(**vars(anchored(flow, values, once)), gap=gap, size=interval.size))
         if len(guesses) >= (given or most):
             break
     return guesses[given - 1 : given] if given else guesses
