@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth.studies.savi2007.claims.rig_response import against, grazing_of_paper, main_jump, small_jump
+from nonsmooth.studies.savi2007.claims.response import against, grazing_of_paper
 from nonsmooth.studies.savi2007.claims.rows import Cell, Data, Row, printed_cell
 from nonsmooth.studies.savi2007.claims.verdicts import CLOSE, Verdict, agreed
 from nonsmooth.studies.savi2007.figures.amplitude import flip_of, rate_of, slowest
 from nonsmooth.studies.savi2007.figures.motions import measured_periods_at
-from nonsmooth.studies.savi2007.measure import APERIODIC, Interval, measured_jumps
+from nonsmooth.studies.savi2007.measure import APERIODIC, Interval, jumps, main_jump, small_jump
 from nonsmooth.studies.savi2007.printed import (
     FIGURE_9,
     FIGURE_10,
@@ -180,7 +180,7 @@ def f18(data: Data) -> list[Cell]:
 def c1(data: Data) -> list[Cell]:
     """Jumps, flips and chaos; jumps at grazing."""
     ninth, tenth = (data[name]["runs"] for name in ("fig09_rig", "fig10_rig"))
-    count = sum(len(measured_jumps(runs, d)) for runs in (ninth, tenth) for d in ("up", "down"))
+    count = sum(len(jumps(runs, d)) for runs in (ninth, tenth) for d in ("up", "down"))
     flips = int(np.isfinite(slowest(data["fig11_rig"])["measured_flip"].values).sum())
     chaos = int(data["fig16"]["attractor"]["measured_period_number"]) == APERIODIC
     pairs = [

@@ -37,9 +37,9 @@ from nonsmooth.studies.savi2007.figures.portraits import (
     draw_portraits,
     portraits,
     sheet_size,
+    twins,
 )  # fmt: skip
 from nonsmooth.studies.savi2007.figures.resonance import grazing_of
-from nonsmooth.studies.savi2007.figures.twins import twins
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 from nonsmooth.studies.savi2007.printed import FIGURE_17, FIGURE_18
 

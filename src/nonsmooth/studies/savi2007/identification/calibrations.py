@@ -21,7 +21,7 @@ from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.uncertainty import coverage_factor, uniform
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth.studies.savi2007.identification.evidence import Run
-from nonsmooth.studies.savi2007.identification.lines import StraightLine, scattered_line
+from nonsmooth.studies.savi2007.identification.least_squares import StraightLine, scattered_line
 from nonsmooth.studies.savi2007.identification.steady import harmonics_of
 
 if TYPE_CHECKING:
