@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.results.statuses import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
     "APERIODIC", "UNSETTLED", "Interval", "changes", "highest", "jumps", "lowest", "main_jump", "measured_periods",
-    "periods_reached", "range_of", "regimes", "separation_rate", "small_jump", "with_uncertainty",
+    "periods_reached", "range_of", "regimes", "separation_rate", "small_jump", "status_names", "with_uncertainty",
 ]  # fmt: skip
 
 APERIODIC = 0  # no period found up to the longest looked for
@@ -64,10 +63,20 @@ def regimes(swept: xr.Dataset, direction: str | None = None) -> tuple[FloatArray
     one = swept if direction is None or "direction" not in swept.dims else swept.sel(direction=direction)
     values = one[str(one["maximum"].dims[0])].values
     order = np.argsort(values)
-    status = one["status"].values[order]
-    number = one["period_number"].values[order].astype(np.int64)
-    settled = np.isin(status, [by_name(word).code for word in ("ok", "not_periodic", "not_guaranteed")])
-    return values[order], np.where(settled, number, UNSETTLED)
+    return values[order], _regime(one)[order]
+
+
+def status_names(result: xr.Dataset) -> NDArray[np.str_]:
+    """The name of the status at each point, by the result's own attributes."""
+    attrs = result["status"].attrs
+    names = dict(zip(np.atleast_1d(attrs["flag_values"]).tolist(), attrs["flag_meanings"].split(), strict=True))
+    return np.array([names[code] for code in result["status"].values.ravel().tolist()]).reshape(result["status"].shape)
+
+
+def _regime(result: xr.Dataset) -> NDArray[np.int64]:
+    """The period number at each point, UNSETTLED where the transient did not decide it."""
+    settled = np.isin(status_names(result), ("ok", "not_periodic", "not_guaranteed"))
+    return np.where(settled, result["period_number"].values.astype(np.int64), UNSETTLED)
 
 
 def changes(swept: xr.Dataset, first: int, second: int, direction: str | None = None) -> list[Interval]:
@@ -146,8 +155,7 @@ def measured_periods(runs: xr.Dataset, direction: str | None = None) -> tuple[Fl
 def periods_reached(survey: xr.Dataset, value: float) -> dict[int, int]:
     """Number of starts of a ``survey`` (a sweep from several starts) that end in each regime at one parameter value."""
     one = survey.sel({str(survey["maximum"].dims[0]): value}, method="nearest")
-    ok = [by_name(word).code for word in ("ok", "not_periodic", "not_guaranteed")]
-    regime = np.where(np.isin(one["status"].values, ok), one["period_number"].values, UNSETTLED)
+    regime = _regime(one)
     return {int(r): int((regime == r).sum()) for r in np.unique(regime)}
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth.results.provenance import read_provenance
 from nonsmooth.studies.savi2007.claims.rows import Data, Row, against_closed_form, against_printed
 from nonsmooth.studies.savi2007.claims.verdicts import Cause, Verdict, agreed
 from nonsmooth.studies.savi2007.figures.coexisting import names_of
@@ -285,7 +284,7 @@ def _lasting(data: Data) -> str:
     short, long = (data["fig17"][f"exact_{word}"] for word in ("short", "long"))
     omega = float(short["omega"][0])
     left = [periods_reached(survey, omega).get(APERIODIC, 0) for survey in (short, long)]
-    waited = [read_provenance(survey)["options"]["transient"] for survey in (short, long)]
+    waited = [survey.attrs["transient"] for survey in (short, long)]
     return (
         "The transition at the higher frequency is abrupt. Above grazing chaos is a transient, which looks like "
         f"hysteresis: at {omega:g} rad/s {left[0]} of {short.sizes['start']} starts have no period after {waited[0]} "

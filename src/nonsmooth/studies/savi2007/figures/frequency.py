@@ -62,7 +62,7 @@ def _compute_17(settings: Settings) -> Datasets:
         data[f"exact_{word}"] = sweep(
             EXACT.system(**FIGURE_17), "omega", [_JUST_ABOVE], direction=None, start=starts(16), transient=transient,
             keep=64, progress=settings.progress, **EXACT.options,
-        )  # fmt: skip
+        ).assign_attrs(transient=transient)  # fmt: skip
     return data
 
 
