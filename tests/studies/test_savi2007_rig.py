@@ -12,8 +12,7 @@ import nonsmooth as ns
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.studies.savi2007.claims import response as claims_response
 from nonsmooth.studies.savi2007.claims import rig as claims_rig
-from nonsmooth.studies.savi2007.claims.rows import Cell, Row, printed_cell
-from nonsmooth.studies.savi2007.claims.verdicts import Verdict
+from nonsmooth.studies.savi2007.claims.verdicts import Cell, Row, Verdict, printed_cell
 from nonsmooth.studies.savi2007.figures.motions import chosen, measured_periods_at, said
 from nonsmooth.studies.savi2007.findings import Number, found_in, kept, the_finding
 from nonsmooth.studies.savi2007.flows import Settings

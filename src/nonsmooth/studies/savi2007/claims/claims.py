@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from nonsmooth.studies.savi2007.claims import diagrams, model, parameters, response, rig
-from nonsmooth.studies.savi2007.claims.rows import Cell, Data, Row
+from nonsmooth.studies.savi2007.claims.verdicts import Cell, Data, Row
 
 __all__ = ["CLAIMS", "Claim", "Row", "measure_claims"]
 

@@ -7,8 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth.studies.savi2007.claims.rows import Data, Row, against_closed_form, against_printed
-from nonsmooth.studies.savi2007.claims.verdicts import Cause, Verdict, agreed
+from nonsmooth.studies.savi2007.claims.verdicts import (
+    Cause,
+    Data,
+    Row,
+    Verdict,
+    against_closed_form,
+    against_printed,
+    agreed,
+)
 from nonsmooth.studies.savi2007.figures.coexisting import names_of
 from nonsmooth.studies.savi2007.figures.gap import PHASES
 from nonsmooth.studies.savi2007.figures.portraits import chosen_start, words_of

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.studies.savi2007.claims.rows import Data, Row
-from nonsmooth.studies.savi2007.claims.verdicts import Verdict, agreed, judge_step
+from nonsmooth.studies.savi2007.claims.verdicts import Data, Row, Verdict, agreed, judge_step
 from nonsmooth.studies.savi2007.figures.band import FITTED, order_in_eta
 from nonsmooth.studies.savi2007.figures.resonance import grazing_of
 from nonsmooth.studies.savi2007.flows import ETA

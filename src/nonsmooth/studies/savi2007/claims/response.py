@@ -11,8 +11,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth import special_points
-from nonsmooth.studies.savi2007.claims.rows import Cell, Data, Row, against_closed_form, against_printed, printed_cell
-from nonsmooth.studies.savi2007.claims.verdicts import Cause, Verdict, agreed, judge
+from nonsmooth.studies.savi2007.claims.verdicts import (
+    Cause,
+    Cell,
+    Data,
+    Row,
+    Verdict,
+    against_closed_form,
+    against_printed,
+    agreed,
+    judge,
+    printed_cell,
+)
 from nonsmooth.studies.savi2007.figures.resonance import grazing_of
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies
 from nonsmooth.studies.savi2007.measure import (

@@ -12,7 +12,7 @@ from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
 from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, two_rows
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Flow, Settings, starts
-from nonsmooth.studies.savi2007.measure import APERIODIC, periods_reached
+from nonsmooth.studies.savi2007.measure import APERIODIC, period_word, periods_reached
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -109,8 +109,7 @@ def describe(data: Datasets, shown: Mapping[float, int]) -> str:
 
 def words_of(reached: Mapping[int, int]) -> str:
     """``period 3 (8 starts), period 4 (8 starts)``."""
-    names = {APERIODIC: "no period", -1: "unsettled"}
-    return ", ".join(f"{names.get(p, f'period {p}')} ({n})" for p, n in reached.items())
+    return ", ".join(f"{period_word(p)} ({n})" for p, n in reached.items())
 
 
 def _parameter(survey: xr.Dataset) -> str:
