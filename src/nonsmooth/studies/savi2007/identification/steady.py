@@ -62,7 +62,7 @@ class Steady:
 
     @property
     def direction(self) -> list[str]:
-        """Whether each run was reached with rising (``up``) or falling frequency."""
+        """``up`` for a run that was reached with rising frequency, else ``down``."""
         return [str(run.settings.get("direction", "up")) for run in self.runs]
 
     @property
