@@ -207,7 +207,7 @@ def test_labels_only_stay_small(support: ns.System) -> None:
     ],
 )
 def test_bad_input_is_told_at_the_door(support: ns.System, grid, options, message) -> None:
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises((ValueError, TypeError), match=message):
         chart(support, grid, **options, **QUIET)
 
 

@@ -54,7 +54,7 @@ def test_free_memory_is_that_of_the_machine_or_the_container(tmp_path, monkeypat
     [
         ({"stop_early": "no"}, "allowed: True, False"),
         ({"extremes": "no"}, "allowed: True, False"),
-        ({"refine": "yes"}, "refine must be a real number, not 'yes'"),
+        ({"refine": "yes"}, "refine must be True, False or a real number, not 'yes'"),
         ({"store": 3}, "store = 3"),
     ],
 )

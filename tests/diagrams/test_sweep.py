@@ -402,5 +402,5 @@ def test_without_judgement_the_points_are_those_of_poincare_and_no_period_is_cla
         ns.sweep(system, "rho", values, extremes=False)
     with pytest.raises(ValueError, match="leave out density"):
         ns.sweep(system, "rho", values, density=True, judge=False)
-    with pytest.raises(TypeError, match="judge = 0"):
-        ns.sweep(system, "rho", values, judge=0)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="judge = .no."):
+        ns.sweep(system, "rho", values, judge="no")  # type: ignore[arg-type]

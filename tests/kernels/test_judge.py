@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nonsmooth.attractors.settle import longest_period
+from nonsmooth.flow.options import longest_period
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.judging.judge import MARGIN, ROUNDS, contraction, multiplier
 from nonsmooth.kernels.judging.settle import END, FRESH, PROBE, RUN, Jobs, Rules, begin_job, new_jobs, next_run

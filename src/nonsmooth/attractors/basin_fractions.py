@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 
@@ -14,16 +14,14 @@ from nonsmooth.attractors.basins_matching import numbered
 from nonsmooth.attractors.basins_measures import share_errors, starts_needed
 from nonsmooth.attractors.basins_work import StartsWork, settled_from
 from nonsmooth.campaign.run import run
-from nonsmooth.campaign.work import CHUNK, STORED, inputs
+from nonsmooth.campaign.work import inputs
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import check_options, check_system, real_number, swept_values, whole_number
-from nonsmooth.flow.engines.devices import BATCH, workers_of
+from nonsmooth.flow.arguments import real_number, swept_values
+from nonsmooth.flow.options import Campaign, Varied, as_called, kept_of
 from nonsmooth.flow.scales import warn_if_small
-from nonsmooth.flow.sections import Poincare, Stroboscopic
 from nonsmooth.flow.starts import random_starts, start_states
 from nonsmooth.results.memory import room_for
-from nonsmooth.results.progress import Progress
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import at_least, checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,29 +32,16 @@ if TYPE_CHECKING:
 __all__ = ["basin_fractions"]
 
 
-@by_name
+@checked
 def basin_fractions(
     system: System,
-    parameter: str,
+    parameter: Varied,
     values: Any,
     *,
-    n_starts: int = 200,
+    n_starts: Annotated[int, at_least(1)] = 200,
     box: Mapping[str, tuple[float, float]] | None = None,
-    seed: int = 0,
-    section: Stroboscopic | Poincare | None = None,
-    transient: int = 500,
-    keep: int = 60,
-    max_period: int | None = None,
-    method: str = "auto",
-    rtol: float | None = None,
-    atol: Any = None,
-    threads: int | None = None,
-    device: str = "cpu",
-    store: Any = None,
-    client: Any = None,
-    any_cpu: bool = False,
-    progress: Progress = True,
-    **expert: Any,
+    seed: Annotated[int, at_least(0)] = 0,
+    **options: Unpack[Campaign],
 ) -> xr.Dataset:
     """Attractors over a parameter, and the share of random starts that each attracts: the multistability diagram.
 
@@ -72,8 +57,6 @@ def basin_fractions(
         Lowest and highest value of each state at the start; states that are not named start at zero.
     seed : int
         Seed of the starts.
-    section, transient, keep, max_period, method, rtol, atol, threads, device, store, client, any_cpu, progress
-        See :func:`nonsmooth.basins`.
 
     Returns
     -------
@@ -94,31 +77,15 @@ def basin_fractions(
     ImportError, RuntimeError
         ``device="cuda"`` without the package numba-cuda, or without a GPU.
     """
-    check_system(system, "basin_fractions")
-    check_options(system, expert, basin_fractions)
+    asked = as_called(locals())
     numbers = swept_values(system, parameter, values)
-    n_starts = whole_number(n_starts, "n_starts", 1)
     # a start is named, state by state; of each run at each value a row is kept
     room_for((500.0 + 64.0 * len(numbers)) * n_starts, f"{n_starts:.6g} starts at {len(numbers)} values", "take fewer")
     starts = start_states(system, _starts(system, box, n_starts, seed))
-    section, settler = settler_of(
-        system, section, transient, keep, max_period, method, rtol, atol, expert, threads=threads, device=device,
-        verb="basin_fractions",
-    )  # fmt: skip
-    gpu, threads = device == "cuda", workers_of(device, threads, client)
-    options = {
-        "parameter": parameter, "values": numbers, "n_starts": n_starts, "box": box and dict(box), "seed": seed,
-        "section": section, "transient": transient, "keep": keep, "max_period": max_period, "method": method,
-        "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
-    }  # fmt: skip
-    points = system.parameter_points({parameter: numbers})
-    chunk = BATCH if gpu else CHUNK if store is None and client is None else STORED
-    work = StartsWork(settler, points, starts, chunk, inputs(system, "basin_fractions", options))
-    columns = run(
-        work, threads=threads, progress=progress, label=f"basins over {parameter}", store=store, client=client,
-        any_cpu=any_cpu,
-    )  # fmt: skip
-    runs = settled_from(columns)
+    settler, chunk = settler_of(system, "basin_fractions", options)
+    asked["values"], points = numbers, system.parameter_points({parameter: numbers})
+    work = StartsWork(settler, points, starts, chunk, inputs(system, "basin_fractions", asked))
+    runs = settled_from(run(work, label=f"basins over {parameter}", **kept_of(options)))
     warn_if_small(system, starts, runs.maximum, runs.minimum)
     rising = [int(i) for i in np.argsort(numbers, kind="stable")]
     per_value: list[dict[int, Attractor]] = [{} for _ in numbers]
@@ -137,7 +104,7 @@ def basin_fractions(
         per_value[i] = last
         labels[i] = np.append(ids, [-2, -1])[label] if len(ids) else label
     return _dataset(
-        system, settler.engine.name, parameter, numbers, per_value, labels, status, len(seen), options, seed
+        system, settler.engine.name, asked, per_value, labels, status, len(seen)
     )
 
 
@@ -149,18 +116,18 @@ def _starts(system: System, box: Any, n_starts: int, seed: int) -> Any:
         if np.shape(ends) != (2,):
             raise ValueError(f"box[{name!r}] = {shortened(ends)}: give its lowest and highest value; box={{{form}}}")
     low, high = ({name: real_number(ends[k], f"box[{name!r}]") for name, ends in box.items()} for k in (0, 1))
-    return random_starts(n_starts, low, high, whole_number(seed, "seed", 0))
+    return random_starts(n_starts, low, high, seed)
 
 
 def _dataset(
-    system: System, method: str, parameter: str, numbers: Any, per_value: list[dict[int, Attractor]],
-    labels: IntArray, status: IntArray, n_attractors: int, options: Mapping[str, Any], seed: int,
+    system: System, method: str, asked: Mapping[str, Any], per_value: list[dict[int, Attractor]], labels: IntArray,
+    status: IntArray, n_attractors: int,
 ) -> xr.Dataset:  # fmt: skip
     from nonsmooth.results.global_schema import basin_fractions as build
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
 
-    n_starts, n = labels.shape[1], len(system.states)
+    numbers, n_starts, n = asked["values"], labels.shape[1], len(system.states)
     count = np.stack([(labels == k).sum(axis=1) for k in range(n_attractors)], axis=1).reshape(len(numbers), -1)
     fraction, error = share_errors(count, n_starts)
     period = np.full(count.shape, -1, dtype=np.int64)
@@ -182,7 +149,5 @@ def _dataset(
         "n_starts_99": np.array([starts_needed(row) for row in fraction], dtype=np.int64),
     }  # fmt: skip
     named = labels_of(system)
-    return build(
-        named, provenance(named, "basin_fractions", options, method=method, seed=seed), parameter, numbers,
-        arrays,
-    )  # fmt: skip
+    record = provenance(named, "basin_fractions", asked, method=method, seed=asked["seed"])
+    return build(named, record, asked["parameter"], numbers, arrays)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 
@@ -17,21 +17,19 @@ from nonsmooth.attractors.basins_measures import (
     uncertain_part,
 )
 from nonsmooth.attractors.basins_work import StartsWork, settled_from
-from nonsmooth.attractors.settle import longest_period
 from nonsmooth.attractors.settled import usable
-from nonsmooth.attractors.settler import Settler
+from nonsmooth.attractors.settler import Settler, settler_for
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import CHUNK, STORED, inputs
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
-from nonsmooth.flow.engines.devices import BATCH, engine_on, on_gpu, workers_of
-from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.arguments import float_array, real_number
+from nonsmooth.flow.engines.devices import BATCH
+from nonsmooth.flow.options import Campaign, as_called, kept_of
 from nonsmooth.flow.scales import warn_if_small
-from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
+from nonsmooth.flow.sections import Poincare
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
-from nonsmooth.results.progress import Progress
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,26 +40,13 @@ if TYPE_CHECKING:
 __all__ = ["basins", "by_share", "failed", "settler_of"]
 
 
-@by_name
+@checked
 def basins(
     system: System,
     grid: Mapping[str, Any],
     *,
-    fixed: Mapping[str, float] | None = None,
-    section: Stroboscopic | Poincare | None = None,
-    transient: int = 500,
-    keep: int = 60,
-    max_period: int | None = None,
-    method: str = "auto",
-    rtol: float | None = None,
-    atol: Any = None,
-    threads: int | None = None,
-    device: str = "cpu",
-    store: Any = None,
-    client: Any = None,
-    any_cpu: bool = False,
-    progress: Progress = True,
-    **expert: Any,
+    fixed: Annotated[Mapping[str, float], "of the states not in the grid: fixed={name: value}"] | None = None,
+    **options: Unpack[Campaign],
 ) -> xr.Dataset:
     """Attractors and their basins on a plane of starts.
 
@@ -78,24 +63,9 @@ def basins(
     transient, keep : int
         Section returns passed over, then judged; a run ends earlier where its cycle is certain, and is followed for
         20 000 returns and more where it has no period.
-    max_period : int, optional
-        Longest period number searched, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
-    method, rtol, atol
-        See :func:`nonsmooth.flow.engines.methods.engine_for`.
-    threads : int, optional
-        Threads for independent work; the result does not depend on it. Default: one per core.
     device : {"cpu", "cuda"}
         ``"cuda"`` runs the starts on an NVIDIA GPU, one per thread, by the exact flow or by
         ``method="taylor"``: see the guide "A chart on a GPU". What a few single runs decide stays on the processor.
-    store : path, optional
-        A Zarr store for finished chunks; what is there already is not computed again.
-    client : dask.distributed.Client, optional
-        Computes the chunks on its workers.
-    any_cpu : bool
-        Go on with a store that was begun on another type of processor, or of GPU with ``device="cuda"``.
-    progress : bool, or function
-        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
-        work by returning False (:func:`nonsmooth.results.progress.progress`).
 
     Returns
     -------
@@ -134,33 +104,19 @@ def basins(
     rounding (below 1e-8). Where a Poincare section is used, ``lyapunov`` and ``multiplier`` are those of its map: the
     exponent 0 along the flow is not among them.
     """
-    check_system(system, "basins")
-    check_options(system, expert, basins)
+    asked = as_called(locals())
     values = _plane(system, grid)
     rest = _fixed(system, values, fixed)
-    section, settler = settler_of(
-        system, section, transient, keep, max_period, method, rtol, atol, expert, threads=threads, device=device
-    )
-    gpu, threads = device == "cuda", workers_of(device, threads, client)
+    settler, chunk = settler_of(system, "basins", options)
     names = list(system.states)
     (x_name, x), (y_name, y) = values.items()
     room_for(16.0 * len(names) * len(x) * len(y), f"a plane of {len(x)} x {len(y)} starts", "take fewer")
     starts = np.tile(rest, (len(x) * len(y), 1))
     starts[:, names.index(x_name)] = np.repeat(x, len(y))
     starts[:, names.index(y_name)] = np.tile(y, len(x))
-    options = {
-        "grid": values, "fixed": None if fixed is None else dict(fixed), "section": section,
-        "transient": transient, "keep": keep, "max_period": max_period, "method": method, "rtol": rtol, "atol": atol,
-        **({"device": device} if gpu else {}), **expert,
-    }  # fmt: skip
-    point = system.parameter_vector()[None, :]
-    chunk = BATCH if gpu else CHUNK if store is None and client is None else STORED
-    work = StartsWork(settler, point, starts, chunk, inputs(system, "basins", options))
-    columns = run(
-        work, threads=threads, progress=progress, label=f"basins over {x_name} and {y_name}", store=store,
-        client=client, any_cpu=any_cpu,
-    )  # fmt: skip
-    runs = settled_from(columns)
+    asked["grid"], point = values, system.parameter_vector()[None, :]
+    work = StartsWork(settler, point, starts, chunk, inputs(system, "basins", asked))
+    runs = settled_from(run(work, label=f"basins over {x_name} and {y_name}", **kept_of(options)))
     warn_if_small(system, starts, runs.maximum, runs.minimum)
     found, labels, status = find_attractors(settler, point, runs, Patience())
     found, labels = by_share(found, labels)
@@ -183,7 +139,7 @@ def basins(
     steps, parts = uncertain_part(label)
     named = labels_of(system)
     return build(
-        named, provenance(named, "basins", options, method=settler.engine.name), values, label, found,
+        named, provenance(named, "basins", asked, method=settler.engine.name), values, label, found,
         status=status.reshape(label.shape),
         fixed={name: rest[names.index(name)] for name in names if name not in values},
         per_attractor={"fraction": fraction, "fraction_error": error, "minimal_shock": np.array(shocks)},
@@ -195,32 +151,21 @@ def basins(
     )  # fmt: skip
 
 
-def settler_of(
-    system: System, section: Any, transient: Any, keep: Any, max_period: Any, method: str, rtol: Any, atol: Any,
-    expert: Mapping[str, Any], *, threads: Any = None, device: str = "cpu", verb: str = "basins",
-) -> tuple[Any, Settler]:  # fmt: skip
-    """Check the options that basins share, and the attractor mapper they describe."""
-    transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
-    max_period = longest_period(keep, max_period)
-    if threads is not None:
-        whole_number(threads, "threads", 1)
-    section, plan = section_plan(system, section)
+def settler_of(system: System, verb: str, options: Campaign) -> tuple[Settler, int]:
+    """The attractor mapper that the options of basins describe, and the runs of one of its chunks."""
+    section = options["section"]
     if isinstance(section, Poincare) and system.period() is not None:
         raise ValueError(
             f"{system.name!r} is forced: its fate depends on the phase at which a run starts, so its section must be "
             "one too: section=ns.Stroboscopic(phase)"
         )
-    if plan.every > 1:
+    if isinstance(section, Poincare) and section.every > 1:
         raise ValueError(
-            f"section with every = {plan.every}: the returns that are passed over make several attractors of one "
+            f"section with every = {section.every}: the returns that are passed over make several attractors of one "
             "cycle, by the one at which a run begins; leave `every` out"
         )
-    engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
-    on_gpu(device, verb, engine, plan)
-    settler = Settler(
-        system, engine, plan, transient, keep, max_period, rtol=rtol, atol=atol, expert=expert, device=device
-    )  # fmt: skip
-    return section, settler
+    settler, stored = settler_for(system, verb, options), options["store"] is not None or options["client"] is not None
+    return settler, BATCH if settler.device == "cuda" else STORED if stored else CHUNK
 
 
 def failed(status: Any) -> Any:
@@ -261,8 +206,6 @@ def _fixed(system: System, values: Mapping[str, Any], fixed: Any) -> FloatArray:
 
     names = list(system.states)
     rest = np.zeros(len(names))
-    if not isinstance(fixed, Mapping | None):
-        raise TypeError(f"fixed = {shortened(fixed)}: name the states that are not in the grid, fixed={{name: value}}")
     for name, value in (fixed or {}).items():
         if name not in names:
             raise ValueError(unknown(name, "a state", repr(system.name), dict(system.states)))

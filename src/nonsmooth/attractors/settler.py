@@ -19,11 +19,14 @@ from nonsmooth.attractors.settle import tolerance_of
 from nonsmooth.attractors.settle_cuda import separate_on_gpu, settle_on_gpu
 from nonsmooth.attractors.settled import ROUNDED, Settled, least_sizes, usable
 from nonsmooth.attractors.trace import Trace, mode_at
+from nonsmooth.flow.engines.devices import engine_on, on_gpu
 from nonsmooth.flow.engines.engine import FloatArray, Section, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.loads import meter_of
+from nonsmooth.flow.options import Settling, Solver, longest_period, solver_of
 from nonsmooth.flow.scales import LEAST
+from nonsmooth.flow.sections import section_plan
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.phases import varying_phases
@@ -32,7 +35,7 @@ if TYPE_CHECKING:
     from nonsmooth.kernels.judging.settle import Rules
     from nonsmooth.system.system import System
 
-__all__ = ["ATTEMPTS", "FIRST_LOOK", "Settler"]
+__all__ = ["ATTEMPTS", "FIRST_LOOK", "Settler", "settler_for"]
 
 ATTEMPTS = 3  # further transients for a point that is still settling: of 1, 2 and 4 times the first
 DIFFERENCE = 1e-6  # finite differences of the return map, in units of the motion's size
@@ -62,16 +65,14 @@ class Settler:
     max_period: int
     stop_early: bool = True
     extremes: bool = True
-    rtol: float | None = None
-    atol: Any = None
-    expert: Mapping[str, Any] = field(default_factory=dict)
+    solver: Solver = field(default_factory=lambda: Solver())
     device: str = "cpu"
     tolerance: float = field(init=False)
     width: int = field(init=False)  # numbers that say where a run stands on the section (``trace``)
 
     def __post_init__(self) -> None:
         room_for(16.0 * self.keep * len(self.system.states), f"keep = {self.keep:.6g} section points", "keep fewer")
-        object.__setattr__(self, "tolerance", tolerance_of(self.engine, self.rtol))
+        object.__setattr__(self, "tolerance", tolerance_of(self.engine))
         u, m, forced = self.system.traced.u, self.system.traced.m, self.system.traced.period is not None
         object.__setattr__(self, "width", len(u) + len(m) + int(forced and self.plan.indicator >= 0))
 
@@ -243,6 +244,27 @@ class Settler:
         return rates(sums, status)
 
 
+def settler_for(
+    system: System, verb: str, options: Settling, *, carried: bool = False, **changes: Any
+) -> Settler:  # fmt: skip
+    """The settler that a verb's options describe; what cannot be done on the device asked for is refused.
+
+    Parameters
+    ----------
+    carried : bool
+        Whether a state is carried from one parameter point to the next.
+    **changes
+        Fields of the settler beyond its options.
+    """
+    plan = section_plan(system, options["section"])[1]
+    longest = longest_period(options["keep"], options["max_period"])
+    solver, device = solver_of(options), options["device"]
+    engine = engine_on(device, engine_for(system, **solver), plan)
+    on_gpu(device, verb, engine, plan, carried=carried)
+    given = {"solver": solver, "device": device} | changes
+    return Settler(system, engine, plan, options["transient"], options["keep"], longest, **given)
+
+
 @lru_cache(maxsize=8)
 def _system_from(text: str) -> System:
     """The same object for the same text: tracing takes longer than a chunk."""
@@ -254,7 +276,5 @@ def _system_from(text: str) -> System:
 def _remade(text: str, values: Mapping[str, float], method: str, given: Mapping[str, Any]) -> Settler:
     system = _system_from(text).with_parameters(values)
     # "auto" takes tolerances that the exact flow has no use for
-    engine = engine_for(
-        system, "auto" if method == "exact" else method, given["rtol"], given["atol"], **given["expert"]
-    )
+    engine = engine_for(system, **given["solver"] | {"method": "auto" if method == "exact" else method})
     return Settler(system, engine, **given)

@@ -44,12 +44,11 @@ def _run(options: argparse.Namespace) -> int:
     study = read_study(options.study)
     if study.verb != "chart":
         raise ValueError(f"{options.study}: plan is for charts, this study runs {study.verb}")
-    given = {name: value for name, value in study.options.items() if name not in ("threads", "any_cpu", "device")}
-    work = plan_chart(study.system, **given).work
+    work = plan_chart(study.system, **{**study.options, "device": "cpu"}).work
     kept = BATCH if study.options.get("device") == "cuda" else STORED
     found = plan(work, seconds=options.seconds, kept=kept)
     print(found.text(options.workers))
-    print(_on_gpu(study.system, given, options.seconds))
+    print(_on_gpu(study.system, study.options, options.seconds))
     if study.options.get("refine"):
         print("refine      computes a part of these points; the time above is that of all")
     return 0
@@ -61,7 +60,7 @@ def _on_gpu(system: Any, given: Mapping[str, Any], seconds: float) -> str:
     from nonsmooth.diagrams.chart_plan import plan_on_gpu
 
     try:
-        work = plan_chart(system, **given, device="cuda").work
+        work = plan_chart(system, **{**given, "device": "cuda"}).work
     except (ValueError, ImportError, RuntimeError) as why:  # the processor's plan was made of the same options
         return f"gpu         not measured, so no estimate: {why}"
     return plan_on_gpu(work, seconds=seconds).text()

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import ast
 import inspect
 import json
+import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from nonsmooth.cli.files import with_folder
 from nonsmooth.cli.verb_options import VERBS, Option, options_of
@@ -18,14 +19,8 @@ __all__ = ["add", "study_schema"]
 
 _TYPES: dict[str, dict[str, Any]] = {
     "bool": {"type": "boolean"}, "int": {"type": "integer"}, "float": {"type": "number"}, "str": {"type": "string"},
-    "Mapping[str, Any]": {"type": "object"},
-    "Mapping[str, str]": {"type": "object", "additionalProperties": {"type": "string"}},
-    "Mapping[str, float]": {"type": "object", "additionalProperties": {"type": "number"}},
-    "Mapping[str, tuple[float, float]]": {
-        "type": "object",
-        "additionalProperties": {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2},
-    },
     "Stroboscopic": {"$ref": "#/definitions/stroboscopic"}, "Poincare": {"$ref": "#/definitions/poincare"},
+    "tuple": {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2},
 }  # fmt: skip
 #: Options that a file writes in a way of its own.
 _WRITTEN: dict[str, dict[str, Any]] = {
@@ -39,7 +34,8 @@ _WRITTEN: dict[str, dict[str, Any]] = {
     },
 }
 _NUMBERS = {"type": "array", "items": {"type": "number"}}
-_STATE = {"anyOf": [_NUMBERS, _TYPES["Mapping[str, float]"]]}
+_STATE_BY_NAME = {"type": "object", "additionalProperties": {"type": "number"}}
+_STATE = {"anyOf": [_NUMBERS, _STATE_BY_NAME]}
 
 
 def add(commands: Any) -> None:
@@ -74,7 +70,7 @@ def study_schema() -> dict[str, Any]:
 
     name = {"enum": list(models.names())}
     file = {"type": "string", "pattern": r"^.+\.py:\w+$"}
-    numbers = _TYPES["Mapping[str, float]"]
+    numbers = _STATE_BY_NAME
     tables: dict[str, Any] = {
         "system": _table(
             {
@@ -135,14 +131,7 @@ def _place(key: str, endings: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _option(option: Option) -> dict[str, Any]:
-    found = dict(_WRITTEN.get(option.name) or _of_annotation(option.annotation))
-    if option.name == "method":
-        from nonsmooth.flow.engines.methods import METHODS
-
-        found = {"enum": list(METHODS)}
-    elif option.kind.startswith("{"):
-        # a TOML file has no None: "none" is read as it
-        found = {"enum": ["none" if word is None else word for word in ast.literal_eval(f"[{option.kind[1:-1]}]")]}
+    found = dict(_WRITTEN.get(option.name) or _of_kind(option.kind))
     if option.text:
         found["description"] = option.text
     if not option.required and option.default is not None:
@@ -150,17 +139,34 @@ def _option(option: Option) -> dict[str, Any]:
     return found
 
 
-def _of_annotation(annotation: str) -> dict[str, Any]:
-    """Type of an argument; anything where its annotation says no more."""
-    parts = [part for part in annotation.split(" | ") if part != "None"]
-    kinds = [_TYPES.get(part, {}) for part in parts]
-    if {} in kinds or not kinds:
-        return {}
-    return dict(kinds[0]) if len(kinds) == 1 else {"anyOf": kinds}
+def _of_kind(kind: Any) -> dict[str, Any]:
+    """What a verb declares of an argument; anything where it declares nothing."""
+    from nonsmooth.system.arguments import Limit
+
+    parts = get_args(kind)
+    if get_origin(kind) is Annotated:
+        limit = next((mark for mark in parts if isinstance(mark, Limit)), None)
+        return _of_kind(parts[0]) | (_limits(limit) if limit else {})
+    if get_origin(kind) is Literal:  # a TOML file has no None: "none" is read as it
+        return {"enum": ["none" if word is None else word for word in parts]}
+    if get_origin(kind) in (Union, UnionType):
+        kinds = [_of_kind(part) for part in parts if part is not NoneType]
+        return kinds[0] if len(kinds) == 1 else {} if {} in kinds else {"anyOf": kinds}
+    if get_origin(kind) is Mapping:
+        return {"type": "object"} | ({"additionalProperties": values} if (values := _of_kind(parts[1])) else {})
+    return dict(_TYPES.get(getattr(get_origin(kind) or kind, "__name__", ""), {}))
+
+
+def _limits(limit: Any) -> dict[str, Any]:
+    ends = {"minimum": limit.low, "maximum": limit.high}
+    found: dict[str, Any] = {name: end for name, end in ends.items() if math.isfinite(end)}
+    return found | ({"exclusiveMinimum": True} if limit.without_low else {})
 
 
 def _arguments(function: Any, **written: dict[str, Any]) -> dict[str, Any]:
     """A table whose keys are the arguments of a function."""
-    items = inspect.signature(function).parameters
-    properties = {key: written.get(key) or _of_annotation(str(item.annotation)) for key, item in items.items()}
+    from nonsmooth.system.arguments import declared
+
+    items, kinds = inspect.signature(function).parameters, declared(function)
+    properties = {key: written.get(key) or _of_kind(kinds[key]) for key in items}
     return _table(properties, [key for key, item in items.items() if item.default is inspect.Parameter.empty])

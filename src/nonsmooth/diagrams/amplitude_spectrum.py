@@ -8,25 +8,24 @@ Hann window, and its lines are as wide as the record is short.
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 
-from nonsmooth.attractors.settle import longest_period
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.arguments import check_options, check_system, whole_number
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.equilibria import refuse_resting
+from nonsmooth.flow.options import Solver, as_called, longest_period, solver_of
 from nonsmooth.flow.poincare import poincare
 from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.simulate import simulate
-from nonsmooth.flow.starts import is_one_start, plain_start, start_states
+from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import at_least, checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,20 +41,17 @@ PATIENCE = (1, 2, 4, 8)  # transients tried until the record closes
 LEAST = 4096  # samples of a motion of a short period; more raise the highest line
 
 
-@by_name
+@checked
 def amplitude_spectrum(
     system: System,
     *,
     start: Any = None,
     section: Stroboscopic | Poincare | None = None,
-    transient: int = 500,
-    periods: int = 256,
-    samples: int = 512,
-    method: str = "auto",
-    rtol: float | None = None,
-    atol: Any = None,
+    transient: Annotated[int, at_least(0)] = 500,
+    periods: Annotated[int, at_least(8)] = 256,
+    samples: Annotated[int, at_least(8)] = 512,
     progress: Progress = False,
-    **expert: Any,
+    **options: Unpack[Solver],
 ) -> xr.Dataset:
     r"""Amplitude of every state over frequency, for the motion that a start leads to.
 
@@ -77,10 +73,6 @@ def amplitude_spectrum(
         Length of the record of a motion without a period number, in section returns.
     samples : int
         Per period of the forcing, or per return: lines up to half as many times the base frequency.
-    method, rtol, atol
-        See :func:`nonsmooth.flow.engines.methods.engine_for`.
-    progress : bool, or function
-        As in :func:`nonsmooth.sweep`.
 
     Returns
     -------
@@ -105,16 +97,13 @@ def amplitude_spectrum(
     >>> int(found.period_number), bool(found.amplitude.sel(state="x")[1] > 1e-4)
     (4, True)
     """
-    check_system(system, "amplitude_spectrum")
-    check_options(system, expert, amplitude_spectrum)
+    asked = as_called(locals())
     if not is_one_start(start):
         raise ValueError("amplitude_spectrum follows one trajectory: give one start")
-    transient = whole_number(transient, "transient", 0)
-    periods, samples = whole_number(periods, "periods", 8), whole_number(samples, "samples", 8)
-    engine = engine_for(system, method, rtol, atol, **expert)
-    how = {"method": method, "rtol": rtol, "atol": atol, **expert}
+    how = solver_of(options)
+    engine = engine_for(system, **how)
     with progress_bar(1, "amplitude_spectrum", progress) as advance:
-        count = _period_number(system, engine, section, start, transient, rtol)
+        count = _period_number(system, engine, section, start, transient)
         advance(1)
     length = count or periods
     each = max(samples, -(-LEAST // length)) if count else samples
@@ -143,30 +132,24 @@ def amplitude_spectrum(
     amplitude[0] /= 2.0
     if len(values) % 2 == 0:
         amplitude[-1] /= 2.0
-    options = {
-        "start": plain_start(system, start), "section": section, "transient": transient, "periods": periods,
-        "samples": samples, **how,
-    }  # fmt: skip
     frequency = np.arange(len(amplitude), dtype=np.float64) * (rate / len(values))
-    return _dataset(system, engine.name, options, frequency, amplitude, base, count)
+    return _dataset(system, engine.name, asked, frequency, amplitude, base, count)
 
 
-def _period_number(
-    system: System, engine: Engine, section: Any, start: Any, transient: int, rtol: float | None
-) -> int:  # fmt: skip
+def _period_number(system: System, engine: Engine, section: Any, start: Any, transient: int) -> int:
     """The period number of the attractor that a start leads to, as a sweep finds it."""
     plan, starts = section_plan(system, section)[1], start_states(system, start)
     points = system.parameter_vector()[None, :]
     if plan.indicator >= 0:
         refuse_resting(system, starts, points, "amplitude_spectrum")
-    settler = Settler(system, engine, plan, transient, KEPT, longest_period(KEPT, None), False, rtol=rtol)
+    settler = Settler(system, engine, plan, transient, KEPT, longest_period(KEPT, None), False)
     found = settler.run(points, [0], starts)
     warn_if_small(system, starts, found.maximum, found.minimum)
     return int(found.period_number[0])
 
 
 def _stretch(
-    system: System, start: Any, section: Any, transient: int, length: int, how: dict[str, Any]
+    system: System, start: Any, section: Any, transient: int, length: int, how: Solver
 ) -> tuple[float, float]:
     """Begin and duration of so many periods, or section returns."""
     period = system.period()
@@ -177,7 +160,7 @@ def _stretch(
 
 
 def _sampled(
-    system: System, start: Any, begin: float, span: float, number: int, how: dict[str, Any]
+    system: System, start: Any, begin: float, span: float, number: int, how: Solver
 ) -> FloatArray:  # fmt: skip
     """The states at ``number`` even instants, and at the end of the record, where a periodic motion is back."""
     times = begin + np.linspace(0.0, span, number + 1)

@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, Unpack, cast
 
 import numpy as np
 
-from nonsmooth.attractors.settle import longest_period
-from nonsmooth.attractors.settler import Settler
+from nonsmooth.attractors.settler import settler_for
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import CHUNK, STORED, inputs
 from nonsmooth.diagrams.chart_work import ChartWork
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import check_options, check_system, swept_values, whole_number, yes_or_no
-from nonsmooth.flow.engines.devices import BATCH, engine_on, on_gpu, workers_of
-from nonsmooth.flow.engines.linear import PlanarEngine
-from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.arguments import swept_values
+from nonsmooth.flow.engines.devices import BATCH
 from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.loads import Quantities, checked_loads
+from nonsmooth.flow.options import Campaign, as_called, kept_of, workers_of
 from nonsmooth.flow.scales import warn_if_small
-from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
-from nonsmooth.flow.starts import is_one_start, plain_start, start_states
-from nonsmooth.results.progress import Progress
-from nonsmooth.system.names import by_name
+from nonsmooth.flow.starts import is_one_start, start_states
+from nonsmooth.system.arguments import at_least, checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,32 +33,19 @@ __all__ = ["PlannedChart", "chart", "plan_chart"]
 EXPONENT_RETURNS = 1000
 
 
-@by_name
+@checked
 def chart(
     system: System,
     grid: Mapping[str, Any],
     *,
     start: Any = None,
-    carry: Mapping[str, str] | None = None,
-    section: Stroboscopic | Poincare | None = None,
-    transient: int = 500,
-    keep: int = 60,
-    max_period: int | None = None,
+    carry: Annotated[Mapping[str, str], 'write carry={"rho": "up"} (or "down")'] | None = None,
     stop_early: bool = True,
     extremes: bool = True,
     loads: bool = False,
-    lyapunov: bool | int = False,
+    lyapunov: bool | Annotated[int, at_least(0)] = False,
     refine: bool | float = False,
-    method: str = "auto",
-    rtol: float | None = None,
-    atol: Any = None,
-    threads: int | None = None,
-    device: str = "cpu",
-    store: Any = None,
-    client: Any = None,
-    any_cpu: bool = False,
-    progress: Progress = True,
-    **expert: Any,
+    **options: Unpack[Campaign],
 ) -> xr.Dataset:
     """Period numbers, contacts and extremes over a plane of two parameters.
 
@@ -76,15 +59,6 @@ def chart(
     carry : mapping, optional
         ``{"rho": "up"}`` or ``{"rho": "down"}``: along this parameter the state is carried from point to point. On a
         GPU the rows run side by side, so it needs many of them.
-    section : Stroboscopic or Poincare, optional
-        ``Stroboscopic(0)`` where the system has a period.
-    transient : int
-        Section returns passed over, so that the motion settles. A point that is still settling gets up to eight times
-        as many.
-    keep : int
-        Section returns after them, from which the period number follows.
-    max_period : int, optional
-        Longest period number searched, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
     stop_early : bool
         A point ends as soon as its period number is certain (a small return, and multipliers inside the unit circle)
         instead of at the end of its transient. Labels are the same, but for chaotic transients that end about then.
@@ -98,22 +72,9 @@ def chart(
     refine : bool or float
         Compute points near boundaries only and infer the rest; a number is the largest part of the points to compute.
         See Notes.
-    method, rtol, atol
-        See :func:`nonsmooth.flow.engines.methods.engine_for`.
-    threads : int, optional
-        Threads for independent work; the result does not depend on it. Default: one per core.
     device : {"cpu", "cuda"}
         ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, by the exact flow or by ``method="taylor"``;
         with ``carry`` by the exact flow of two states only. See the guide "A chart on a GPU".
-    store : path, optional
-        A Zarr store for finished chunks; what is there already is not computed again.
-    client : dask.distributed.Client, optional
-        Computes the chunks on its workers.
-    any_cpu : bool
-        Go on with a store that was begun on another type of processor, or of GPU with ``device="cuda"``.
-    progress : bool, or function
-        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
-        work by returning False (:func:`nonsmooth.results.progress.progress`).
 
     Returns
     -------
@@ -137,22 +98,20 @@ def chart(
     With ``refine`` a coarse grid is computed, cells whose corners differ are halved down to single points, and so are
     those beside them where a point in between disagrees; see :mod:`nonsmooth.diagrams.chart_refine`.
     """
-    given = dict(locals())
-    for name in ("system", "grid", "threads", "store", "client", "any_cpu", "progress", "expert"):
-        del given[name]
-    planned = plan_chart(system, grid, campaign=store is not None or client is not None, **given, **expert)
-    if threads is not None:
-        threads = whole_number(threads, "threads", 1)
-    threads = workers_of(device, threads, client)
+    asked = as_called(locals())
+    planned = plan_chart(system, **asked)
     work, label = planned.work, f"chart over {' and '.join(planned.values)}"
-    if not isinstance(refine, bool | np.bool_) or refine:
+    chunked = options["store"] is not None or options["client"] is not None
+    if not isinstance(refine, bool) or refine:
         from nonsmooth.diagrams.chart_refine import refined
 
-        if store is not None or client is not None:
+        if chunked:
             raise ValueError("refine decides from its results what to compute next: it takes no store and no client")
-        arrays = refined(work, refine, threads=threads, progress=progress, label=label)
+        arrays = refined(work, refine, threads=workers_of(options), progress=options["progress"], label=label)
     else:
-        flat = run(work, threads=threads, progress=progress, label=label, store=store, client=client, any_cpu=any_cpu)
+        if chunked and work.device == "cpu":
+            work = replace(work, chunk=STORED)
+        flat = run(work, label=label, **kept_of(options))
         arrays = {name: planned.order(column) for name, column in flat.items()}
     if "maximum" in arrays:
         warn_if_small(system, work.starts, arrays["maximum"], arrays["minimum"])
@@ -161,8 +120,9 @@ def chart(
     from nonsmooth.results.provenance import provenance
 
     labels = labels_of(system)
+    record = provenance(labels, "chart", asked | {"grid": planned.values}, method=work.settler.engine.name)
     return build(
-        labels, provenance(labels, "chart", planned.options, method=work.settler.engine.name), planned.values, arrays,
+        labels, record, planned.values, arrays,
         starts=work.starts, one_start=is_one_start(start) or len(work.starts) == 1, loads=planned.loads,
     )  # fmt: skip
 
@@ -173,56 +133,36 @@ class PlannedChart:
 
     work: ChartWork
     values: Mapping[str, FloatArray]
-    options: Mapping[str, Any]
     order: Callable[[Any], Any]
     loads: Quantities
 
 
-def plan_chart(
-    system: System, grid: Mapping[str, Any], *, start: Any = None, carry: Any = None, section: Any = None,
-    transient: Any = 500, keep: Any = 60, max_period: Any = None, stop_early: bool = True, extremes: bool = True,
-    loads: Any = False, lyapunov: Any = False, refine: Any = False, method: str = "auto", rtol: Any = None,
-    atol: Any = None, device: str = "cpu", campaign: bool = False, **expert: Any,
-) -> PlannedChart:  # fmt: skip
-    """Check the arguments of :func:`chart` and lay its work out, without computing anything."""
-    check_system(system, "chart")
-    check_options(system, expert, chart)
-    values = _grid(system, grid)
-    transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
-    max_period = longest_period(keep, max_period)
+@checked(of=chart)
+def plan_chart(system: System, grid: Mapping[str, Any], **options: Any) -> PlannedChart:
+    """The work of a :func:`chart`, checked and laid out, without computing anything."""
+    asked, values = as_called(locals()), _grid(system, grid)
     _check_edges(system, values)
-    section, plan = section_plan(system, section)
-    along = _carry(values, carry)
-    starts = start_states(system, start)
-    if plan.indicator >= 0:
-        refuse_resting(system, starts, _corners(system, values), "chart")
-    measured = checked_loads(system, loads, "chart")
-    n_exponent = (EXPONENT_RETURNS if lyapunov else 0) if isinstance(lyapunov, bool | np.bool_) else lyapunov
-    n_exponent = whole_number(n_exponent, "lyapunov", 0)
+    along = _carry(values, options["carry"])
+    starts = start_states(system, options["start"])
+    lyapunov = options["lyapunov"]
+    n_exponent = (EXPONENT_RETURNS if lyapunov else 0) if isinstance(lyapunov, bool) else lyapunov
     if 0 < n_exponent < 40:
         raise ValueError(f"lyapunov = {lyapunov} returns are too few for an exponent; at least 40")
-    # attractors are told apart by them; neighbours are as near as the motion is wide
-    stop_early = yes_or_no(stop_early, "stop_early")
-    extremes = yes_or_no(extremes, "extremes") or len(starts) > 1 or n_exponent > 0
-    engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
-    gpu = on_gpu(device, "chart", engine, plan, carried=along is not None and not isinstance(engine, PlanarEngine))
-    settler = Settler(
-        system, engine, plan, transient, keep, max_period, stop_early, extremes, rtol, atol, expert, device
-    )
-    options = {
-        "grid": values, "start": plain_start(system, start), "carry": None if carry is None else dict(carry),
-        "section": section, "transient": transient, "keep": keep, "max_period": max_period,
-        "stop_early": stop_early, "extremes": extremes, **({"loads": True} if measured else {}),
-        "lyapunov": n_exponent, "refine": refine,
-        "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
-    }  # fmt: skip
+    # attractors are told apart by extremes; neighbours are as near as the motion is wide
+    extremes = options["extremes"] or len(starts) > 1 or n_exponent > 0
+    settler = settler_for(
+        system, "chart", cast(Campaign, options), carried=along is not None, stop_early=options["stop_early"],
+        extremes=extremes,
+    )  # fmt: skip
+    if settler.plan.indicator >= 0:
+        refuse_resting(system, starts, _corners(system, values), "chart")
+    measured = checked_loads(system, options["loads"], "chart")
     axes, order = _axes(values, along)
-    chunk = BATCH if gpu else STORED if campaign else CHUNK
     work = ChartWork(
         settler, axes, starts, along is not None, n_exponent, tuple(measured),
-        chunk=chunk, described=inputs(system, "chart", options),
+        chunk=CHUNK if settler.device == "cpu" else BATCH, described=inputs(system, "chart", asked | {"grid": values}),
     )  # fmt: skip
-    return PlannedChart(work, values, options, order, measured)
+    return PlannedChart(work, values, order, measured)
 
 
 def _grid(system: System, grid: Any) -> dict[str, FloatArray]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import real_number, whole_number
+from nonsmooth.flow.arguments import real_number
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -23,21 +23,18 @@ COARSE = 48  # parameter values of the run that finds the ranges
 MARGIN = 0.05  # of the range found, added on either side
 
 
-def given_ranges(system: System, density: Any, bins: Any) -> tuple[dict[str, tuple[float, float]], int]:
-    """The ranges named by ``density`` (True: none), and the number of bins.
+def given_ranges(system: System, density: Any) -> dict[str, tuple[float, float]]:
+    """The ranges named by ``density``; True: none.
 
     Raises
     ------
     ValueError, TypeError
-        Neither True nor a mapping, a name that is no state, limits that are none.
+        A name that is no state, limits that are none.
     """
-    number = whole_number(bins, "bins", 1)
     if density is True:
-        return {}, number
+        return {}
     first = next(iter(system.states))
     form = f'density=True, or density={{"{first}": (lowest, highest)}}'
-    if not isinstance(density, Mapping):
-        raise TypeError(f"density = {shortened(density)}; allowed: {form}")
     ranges = {}
     for name, limits in density.items():
         if name not in system.states:
@@ -48,7 +45,7 @@ def given_ranges(system: System, density: Any, bins: Any) -> tuple[dict[str, tup
         if not (np.isfinite([low, high]).all() and low < high):
             raise ValueError(f"density of {name!r} from {low} to {high}: the first limit must be less than the second")
         ranges[name] = (low, high)
-    return ranges, number
+    return ranges
 
 
 def coarse_values(numbers: FloatArray) -> FloatArray:

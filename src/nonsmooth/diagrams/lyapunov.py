@@ -10,8 +10,8 @@ is reported as ``trace_defect`` and must be rounding. It sees determinants only,
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Unpack
 
 import numpy as np
 
@@ -27,24 +27,25 @@ from nonsmooth.diagrams.spectrum import (
     kaplan_yorke,
     spectrum_along,
 )
-from nonsmooth.diagrams.sweep import DIRECTIONS
-from nonsmooth.flow.arguments import check_options, check_system, real_number, swept_values, whole_number
+from nonsmooth.flow.arguments import swept_values, whole_number
 from nonsmooth.flow.engines.devices import on_gpu
-from nonsmooth.flow.engines.engine import FloatArray, State
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import solve_error
+from nonsmooth.flow.options import Length, Solver, Varied, as_called, solver_of
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.flow.scales import warn_if_slow
-from nonsmooth.flow.starts import first_state, is_one_start, plain_start
+from nonsmooth.flow.starts import first_state, is_one_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 from nonsmooth.results.statuses import EQUILIBRIA
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import at_least, checked
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from nonsmooth.flow.engines.loop import Engine
     from nonsmooth.system.system import System
 
 __all__ = ["kaplan_yorke", "lyapunov"]
@@ -52,24 +53,21 @@ __all__ = ["kaplan_yorke", "lyapunov"]
 UNITS = 4096  # pieces into which a duration is cut
 
 
-@by_name
+@checked
 def lyapunov(
     system: System,
     *,
-    parameter: str | None = None,
+    parameter: Varied | None = None,
     values: Any = None,
-    direction: str | None = "up",
-    periods: int | None = None,
-    duration: float | None = None,
-    transient: float | None = None,
+    direction: Literal["up", "down", None] = "up",
+    periods: Annotated[int, at_least(1)] | None = None,
+    duration: Length | None = None,
+    transient: Annotated[float, at_least(0)] | None = None,
     start: Any = None,
     mode: str | None = None,
-    method: str = "auto",
-    rtol: float | None = None,
-    atol: Any = None,
-    device: str = "cpu",
+    device: Literal["cpu", "cuda"] = "cpu",
     progress: Progress = True,
-    **expert: Any,
+    **options: Unpack[Solver],
 ) -> xr.Dataset:
     r"""Lyapunov exponents, all of them, at one parameter point or along a sweep.
 
@@ -87,15 +85,9 @@ def lyapunov(
         Passed over before, in the same unit: 500 periods, or a twentieth of the duration.
     start, mode
         First state and mode, as in :func:`nonsmooth.simulate`.
-    method, rtol, atol
-        Of the trajectory; see ``flow.engines.methods.engine_for``. Its derivatives are accurate to rounding where
-        the flow is exact, else to a tenth of ``rtol`` and at least 1e-11 in every step.
     device : {"cpu", "cuda"}
         ``"cuda"`` runs a sweep with ``direction=None`` on an NVIDIA GPU, one point per thread, for
         systems with the planar exact flow: see the guide "A chart on a GPU".
-    progress : bool, or function
-        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
-        work by returning False (:func:`nonsmooth.results.progress.progress`).
 
     Returns
     -------
@@ -116,6 +108,9 @@ def lyapunov(
 
     Notes
     -----
+    Derivatives are accurate to rounding where the flow is exact, else to a tenth of ``rtol`` and at least 1e-11 in
+    every step.
+
     There are as many exponents as states and memory. One is minus infinity where a transition has a saltation matrix
     without full rank (sticking, a plastic impact, memory that is written anew): such a direction is lost in finite
     time. So it is for each constraint that elements hold where the measurement begins (a mass that sticks, two for a
@@ -141,86 +136,85 @@ def lyapunov(
     >>> bool(found.exponents[0] > 0)
     True
     """
-    check_system(system, "lyapunov")
-    check_options(system, expert, lyapunov)
+    asked = as_called(locals())
     if (parameter is None) != (values is None):
         raise ValueError("parameter and values belong together: give both for a sweep, or neither")
-    if not isinstance(direction, str | None) or direction not in DIRECTIONS or direction == "both":
-        raise ValueError(f"direction = {direction!r}; allowed: 'up', 'down', None")
     if not is_one_start(start):
         raise ValueError("lyapunov follows one trajectory: give one start")
     numbers = None if parameter is None else swept_values(system, parameter, values)
     points = system.parameter_points({} if numbers is None else {str(parameter): numbers})
-    forced = system.period() is not None
-    count, length, wait = _length(system, periods, duration, transient, forced)
-    first_state(system, start, mode)  # refused before anything is compiled
-    engine = engine_for(system, method, rtol, atol, **expert)
-    options = {
-        "parameter": parameter, "values": values, "direction": direction, "periods": periods, "duration": duration,
-        "transient": transient, "start": plain_start(system, start), "mode": mode, "method": method, "rtol": rtol,
-        "atol": atol, **({"device": device} if device != "cpu" else {}), **expert,
-    }  # fmt: skip
+    length = _length(system, periods, duration, transient)
+    first = first_state(system, start, mode)  # refused before anything is compiled
+    engine = engine_for(system, **solver_of(options))
     if on_gpu(device, "lyapunov", engine, None, carried=numbers is not None and direction is not None):
-        if numbers is None or not forced or duration is not None:
+        if numbers is None or length.unit is not None or system.period() is None:
             raise ValueError(
                 'lyapunov with device="cuda" takes a sweep (parameter, values, direction=None) counted in forcing '
                 'periods: a single trajectory is one thread, which a processor runs faster; use device="cpu"'
             )
         with progress_bar(len(points), "lyapunov", progress) as advance:
-            first = first_state(system, start, mode)
-            done = _on_gpu(system, engine, points, first.copy(), count, int(wait), advance)
+            done = _on_gpu(system, engine, points, first.copy(), length.units, length.wait, advance)
             done = [at_rest(one, system, at, first, first) for one, at in zip(done, points, strict=True)]
-        return _dataset(system, engine.name, options, parameter, numbers, done)
-    tables = engine.prepare(points)
+        return _dataset(system, engine.name, asked, numbers, done)
     order = np.arange(len(points)) if numbers is None else np.argsort(numbers, kind="stable")
-    if direction == "down":
-        order = order[::-1]
-    found: list[Spectrum | None] = [None] * len(points)
-    state: State | None = None
-    sizes: list[FloatArray] = []
+    order = order[::-1] if direction == "down" else order
     with progress_bar(len(points), "lyapunov", progress if numbers is not None else False) as advance:
-        for i in order:
-            carried = state is not None and direction is not None
-            if state is None or direction is None:
-                state = first_state(system, start, mode)
-            kept = state.copy()
-            here = system.period_at(points[i]) if forced else None
-            unit = length if here is None or duration is not None else here
-            one = spectrum_along(system, engine, tables, int(i), points[i], state, here, unit, count, wait)
-            if carried and one.status == codes.BEYOND_STOP:  # a stop has moved past it: as in a sweep, begin anew
-                state = first_state(system, start, mode)
-                kept = state.copy()
-                one = spectrum_along(system, engine, tables, int(i), points[i], state, here, unit, count, wait)
-            found[i] = one
-            sizes.append(np.abs([kept.u, state.u]))
-            if one.status not in GOOD:
-                state = kept if i != order[0] else None
-            advance(1)
-    done = [one for one in found if one is not None]
+        done, sizes = _along(system, engine, points, order, first, length, direction is not None, advance)
     if numbers is None and done[0].status not in GOOD:
-        raise solve_error(done[0].status, begun=(system, first_state(system, start).u))
+        raise solve_error(done[0].status, begun=(system, first.u))
     warn_if_slow(system, *sizes)
-    return _dataset(system, engine.name, options, parameter, numbers, done)
+    return _dataset(system, engine.name, asked, numbers, done)
 
 
-def _length(system: System, periods: Any, duration: Any, transient: Any, forced: bool) -> tuple[int, float, int]:
-    """(units of time, the length of one where it is not the period, units of the transient)."""
+class _Length(NamedTuple):
+    """Length of a run: units of time, that of one (None: the forcing period), and units of the transient."""
+
+    units: int
+    unit: float | None
+    wait: int
+
+
+def _length(system: System, periods: int | None, duration: float | None, transient: float | None) -> _Length:
     if periods is not None and duration is not None:
         raise ValueError("give the length of the run once: periods=... or duration=...")
-    if periods is not None and not forced:
+    if periods is not None and system.period() is None:
         raise ValueError(f"{system.name!r} has no forcing period: give duration=... in place of periods")
     if duration is None:
-        if not forced:
+        if system.period() is None:
             raise ValueError(f"{system.name!r} has no forcing period: give the length of the run, duration=...")
-        count = whole_number(10_000 if periods is None else periods, "periods", 1)
-        return count, 0.0, whole_number(500 if transient is None else transient, "transient", 0)
-    time = real_number(duration, "duration")
-    if time <= 0:
-        raise ValueError(f"duration = {duration!r}: the length of a run must be positive")
-    before = 0.05 * time if transient is None else real_number(transient, "transient")
-    if before < 0:
-        raise ValueError(f"transient = {transient!r} must be zero or more")
-    return UNITS, time / UNITS, int(np.ceil(before / (time / UNITS)))
+        return _Length(periods or 10_000, None, whole_number(500 if transient is None else transient, "transient", 0))
+    unit = duration / UNITS
+    before = 0.05 * duration if transient is None else transient
+    return _Length(UNITS, unit, int(np.ceil(before / unit)))
+
+
+def _along(
+    system: System, engine: Engine, points: FloatArray, order: IntArray, first: State, length: _Length, carry: bool,
+    advance: Callable[..., None],
+) -> tuple[list[Spectrum], list[FloatArray]]:  # fmt: skip
+    """The spectrum at each point, in the order in which a state is carried along; with the sizes of states met."""
+    tables, sizes = engine.prepare(points), []
+    found: dict[int, Spectrum] = {}
+    state = first.copy()
+    for i in order:
+        kept = state.copy() if carry else first.copy()
+        here = system.period_at(points[i]) if system.period() is not None else None
+        unit = length.unit or here or np.nan
+
+        def run(begun: State, i: int = int(i), here: float | None = here, unit: float = unit) -> Spectrum:
+            return spectrum_along(system, engine, tables, i, points[i], begun, here, unit, length.units, length.wait)
+
+        state = kept.copy()
+        one = run(state)
+        if one.status == codes.BEYOND_STOP and found and carry:  # a stop has moved past it: begin anew, as in a sweep
+            kept, state = first.copy(), first.copy()
+            one = run(state)
+        found[int(i)] = one
+        sizes.append(np.abs([kept.u, state.u]))
+        if one.status not in GOOD:
+            state = kept if len(found) > 1 else first.copy()
+        advance(1)
+    return [found[i] for i in range(len(points))], sizes
 
 
 def _on_gpu(
@@ -249,15 +243,14 @@ def _on_gpu(
 
 
 def _dataset(
-    system: System, method: str, options: Mapping[str, Any], parameter: str | None, numbers: FloatArray | None,
-    found: list[Spectrum],
-) -> xr.Dataset:  # fmt: skip
+    system: System, method: str, asked: Mapping[str, Any], numbers: FloatArray | None, found: list[Spectrum]
+) -> xr.Dataset:
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
     from nonsmooth.results.variations import spectrum
 
-    labels = labels_of(system)
-    attrs = provenance(labels, "lyapunov", options, method=method)
+    labels, parameter = labels_of(system), asked["parameter"]
+    attrs = provenance(labels, "lyapunov", asked, method=method)
     if note := _note(system, parameter, numbers, found):
         attrs = {**attrs, "note": note}
     return spectrum(

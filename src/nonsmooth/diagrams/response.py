@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from nonsmooth.diagrams.sweep import sweep
-from nonsmooth.flow.arguments import check_system
 from nonsmooth.flow.engines.engine import FloatArray
-from nonsmooth.results.progress import Progress
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,14 +21,13 @@ STEEPER = 5.0  # a jump's step in amplitude exceeds both neighbouring steps by t
 LEAST = 5e-3  # and this fraction of the amplitude
 
 
-@by_name
+@checked(of=sweep)
 def frequency_response(
     system: System,
     values: Any,
     *,
     parameter: str = "omega",
-    direction: str | None = "both",
-    progress: Progress = True,
+    direction: Literal["up", "down", "both", None] = "both",
     **options: Any,
 ) -> xr.Dataset:
     r"""Amplitude over the forcing frequency (or another parameter), carried along up and down.
@@ -44,13 +41,6 @@ def frequency_response(
         Values of the parameter.
     parameter : str
         ``"omega"`` where not given.
-    direction : {"up", "down", "both", None}
-        See :func:`nonsmooth.sweep`.
-    progress : bool, or function
-        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
-        work by returning False (:func:`nonsmooth.results.progress.progress`).
-    **options
-        All other options of :func:`nonsmooth.sweep`.
 
     Returns
     -------
@@ -68,13 +58,12 @@ def frequency_response(
     from nonsmooth.results.provenance import attribute, read_provenance, with_short_record
     from nonsmooth.results.schema import response
 
-    check_system(system, "frequency_response")
     if parameter not in system.parameters:
         from nonsmooth.system.names import unknown
 
         known = {name: item.unit for name, item in system.parameters.items()}
         raise ValueError(unknown(parameter, "a parameter", repr(system.name), known) + "; choose one with parameter=")
-    swept = sweep(system, parameter, values, direction=direction, progress=progress, **options)
+    swept = sweep(system, parameter, values, direction=direction, **options)
     full = [("direction", 1), ("start", 1), (parameter, swept.sizes[parameter]), ("state", swept.sizes["state"])]
     half = 0.5 * (swept["maximum"] - swept["minimum"])
     expanded = half.expand_dims([dim for dim, _ in full if dim not in half.dims]).transpose(*[dim for dim, _ in full])

@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
 import numpy as np
 
-from nonsmooth.attractors.settle import longest_period
-from nonsmooth.attractors.settler import Settler
+from nonsmooth.attractors.settler import Settler, settler_for
 from nonsmooth.attractors.standing import standing_in_sweep
 from nonsmooth.diagrams.density import bin_edges, coarse_values, given_ranges
 from nonsmooth.diagrams.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
-from nonsmooth.flow.arguments import check_options, check_system, swept_values, whole_number
-from nonsmooth.flow.engines.devices import engine_on, on_gpu, workers_of
+from nonsmooth.flow.arguments import swept_values
 from nonsmooth.flow.engines.engine import FloatArray
-from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
+from nonsmooth.flow.engines.methods import warn_if_coarse
 from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.loads import Quantities, checked_loads
+from nonsmooth.flow.options import Settling, Varied, as_called, workers_of
 from nonsmooth.flow.scales import warn_if_small
-from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
-from nonsmooth.flow.starts import is_one_start, plain_start, start_states
+from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.results.memory import room_for
-from nonsmooth.results.progress import Progress
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import at_least, checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,30 +38,20 @@ DIRECTIONS: dict[str | None, tuple[str, ...]] = {
 }  # fmt: skip
 
 
-@by_name
+@checked(keep=100)
 def sweep(
     system: System,
-    parameter: str,
+    parameter: Varied,
     values: Any,
     *,
-    direction: str | None = "up",
+    direction: Literal["up", "down", "both", None] = "up",
     start: Any = None,
-    section: Stroboscopic | Poincare | None = None,
-    transient: int = 500,
-    keep: int = 100,
-    max_period: int | None = None,
     judge: bool = True,
     extremes: bool = True,
     loads: bool = False,
-    density: bool | Mapping[str, Any] = False,
-    bins: int = 400,
-    method: str = "auto",
-    rtol: float | None = None,
-    atol: Any = None,
-    threads: int | None = None,
-    device: str = "cpu",
-    progress: Progress = True,
-    **expert: Any,
+    density: Annotated[bool | Mapping[str, Any], 'write density=True, or {"x": (lowest, highest)}'] = False,
+    bins: Annotated[int, at_least(1)] = 400,
+    **options: Unpack[Settling],
 ) -> xr.Dataset:
     r"""Long-time behaviour over a parameter: section points, extremes, period numbers.
 
@@ -77,15 +67,6 @@ def sweep(
         at ``start``.
     start : state or list of states, optional
         First state; zeros where not given. Several starts show attractors that coexist.
-    section : Stroboscopic or Poincare, optional
-        ``Stroboscopic(0)`` where the system has a period.
-    transient : int
-        Section returns passed over at each value, so that the motion settles. A point that is still settling gets up to
-        eight times as many; what is not settled then has the status ``slow``.
-    keep : int
-        Section returns recorded after them, at each value.
-    max_period : int, optional
-        Longest period number searched, less than ``keep``; the smaller of 16 and ``keep`` - 1 where not given.
     judge : bool
         False: record what follows one transient, settled or not, and leave out ``period_number`` and ``residual``. A
         first look, in half the time.
@@ -100,16 +81,9 @@ def sweep(
         ``{"x": (lowest, highest)}``; where none is given it is that of a coarse sweep and a twentieth more either side.
     bins : int
         Bins of these histograms.
-    method, rtol, atol
-        See :func:`nonsmooth.flow.engines.methods.engine_for`.
-    threads : int, optional
-        Threads for independent work; the result does not depend on it. Default: one per core.
     device : {"cpu", "cuda"}
         ``"cuda"`` runs the points on an NVIDIA GPU, one per thread, with ``direction=None`` and without
         ``density``: by the exact flow or by ``method="taylor"``. See the guide "A chart on a GPU".
-    progress : bool, or function
-        A bar, on a terminal and in a notebook; nothing elsewhere. A function hears the fraction done, and cancels the
-        work by returning False (:func:`nonsmooth.results.progress.progress`).
 
     Returns
     -------
@@ -149,157 +123,143 @@ def sweep(
     ``work_of_damping`` and the energies of all elements (and ``work_of_stiffness`` where K is not symmetric). Forcing
     and damping of a system of another kind cannot be told apart, and their work is left out.
     """
-    check_system(system, "sweep")
-    check_options(system, expert, sweep)
+    asked = as_called(locals())
     numbers = swept_values(system, parameter, values)
-    directions = _directions(direction)
-    transient, keep = whole_number(transient, "transient", 0), whole_number(keep, "keep", 2)
-    max_period = longest_period(keep, max_period)
-    if threads is not None:
-        threads = whole_number(threads, "threads", 1)
-    section, plan = section_plan(system, section)
-    engine = engine_on(device, engine_for(system, method, rtol, atol, **expert), plan)
-    gpu = on_gpu(device, "sweep", engine, plan, carried=direction is not None)
-    if not isinstance(judge, bool):
-        raise TypeError(f"judge = {judge!r}: give True or False")
-    if not isinstance(extremes, bool):
-        raise TypeError(f"extremes = {extremes!r}: give True or False")
+    carried = direction is not None
+    settler = settler_for(system, "sweep", options, carried=carried, stop_early=False, device="cpu")
+    gpu = options["device"] == "cuda"
     if judge and not extremes:
         raise ValueError("a period number rests on the size of the motion: give judge=False with extremes=False")
     if not judge and (gpu or density is not False):
         raise ValueError('judge=False records section points on the processor: leave out density and device="cuda"')
     if gpu and density is not False:
         raise ValueError('section points are counted on the processor: leave out density, or device="cuda"')
-    threads = workers_of(device, threads)
-    starts = start_states(system, start)
+    threads, starts = workers_of(options), start_states(system, start)
+    settler = replace(
+        settler, plan=settler.plan._replace(extremes=extremes), max_period=settler.max_period if judge else 0
+    )
     points = system.parameter_points({parameter: numbers})
-    if plan.indicator >= 0:
+    if settler.plan.indicator >= 0:
         refuse_resting(system, starts, points, "sweep")
-    ranges, n_bins = ({}, 0) if density is False else given_ranges(system, density, bins)
-    width = keep * (len(system.states) + 2) if density is False else len(system.states) * (n_bins + 1) / 2
-    room_for(
-        16.0 * width * len(points) * len(directions) * len(starts), f"a sweep over {len(points)} values",
-        "take fewer values, starts or bins, keep fewer returns, or count them with density=True",
+    ranges = {} if density is False else given_ranges(system, density)
+    work = _Sweep(
+        settler, parameter, numbers, points, DIRECTIONS[direction], starts, 0 if density is False else bins,
+        checked_loads(system, loads, "sweep"),
     )  # fmt: skip
-    edges = None
-    measured = checked_loads(system, loads, "sweep")
+    work.room()
     if density is not False:
         coarse = None
         if len(ranges) < len(system.states):
-            few = min(keep, 1000)
+            few = min(settler.keep, 1000)
+            shorter: Settling = {"keep": few, "max_period": min(settler.max_period, few - 1), "progress": False}
             coarse = sweep(
-                system, parameter, coarse_values(numbers), direction=direction, start=start, section=section,
-                transient=transient, keep=few, max_period=min(max_period, few - 1), method=method, rtol=rtol,
-                atol=atol, threads=threads, progress=False, **expert,
+                system, parameter, coarse_values(numbers), direction=direction, start=start, **options | shorter
             )["section"].transpose(..., "state").values  # fmt: skip
-        edges = bin_edges(system, ranges, n_bins, coarse)
-    settler = Settler(
-        system, engine, plan._replace(extremes=extremes), transient, keep, max_period if judge else 0, False, rtol=rtol
-    )
-    slots = {(d, k): Slot(settler, points, edges, measured) for d in range(len(directions)) for k in range(len(starts))}
-    options = {
-        "parameter": parameter, "values": values, "direction": direction, "start": plain_start(system, start),
-        "section": section, "transient": transient, "keep": keep, "max_period": max_period,
-        **({} if judge else {"judge": False}), **({} if extremes else {"extremes": False}),
-        **({"loads": True} if measured else {}),
-        **({} if density is False else {"density": density, "bins": bins}),
-        "method": method, "rtol": rtol, "atol": atol, **({"device": device} if gpu else {}), **expert,
-    }  # fmt: skip
-    squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
+        work.edges = bin_edges(system, ranges, bins, coarse)
     if gpu:
-        run_on_gpu(points, starts, slots, progress, parameter)
+        run_on_gpu(points, starts, work.slots, options["progress"], parameter)
     else:
-        settler.load()
-        tables = engine.prepare(points)
+        pieces = pieces_of(work.directions, len(starts), numbers)
+        run_pieces(work.marching(), pieces, threads, options["progress"], parameter)
+    largest = largest_of(starts, work.slots.values(), extremes)
+    warn_if_coarse(system, settler.engine, largest)
+    warn_if_small(system, largest)
+    squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
+    return work.dataset(asked, squeeze)
+
+
+@dataclass
+class _Sweep:
+    """A sweep that has been checked: its points, how they settle, and what is kept of them."""
+
+    settler: Settler
+    parameter: str
+    numbers: FloatArray
+    points: FloatArray
+    directions: tuple[str, ...]
+    starts: FloatArray
+    bins: int  # 0: section points are kept
+    measured: Quantities
+    edges: FloatArray | None = None  # of bins in which they are counted
+
+    def room(self) -> None:
+        """Ask for the memory that is kept."""
+        n = len(self.settler.system.states)
+        width = n * (self.bins + 1) / 2 if self.bins else self.settler.keep * (n + 2)
+        room_for(
+            16.0 * width * len(self.points) * len(self.directions) * len(self.starts),
+            f"a sweep over {len(self.points)} values",
+            "take fewer values, starts or bins, keep fewer returns, or count them with density=True",
+        )
+
+    @cached_property
+    def slots(self) -> dict[tuple[int, int], Slot]:
+        """What is kept of each direction and start."""
+        both = product(range(len(self.directions)), range(len(self.starts)))
+        return {key: Slot(self.settler, self.points, self.edges, self.measured) for key in both}
+
+    def marching(self) -> Callable[[tuple[int, int], Sequence[int], Report], None]:
+        """The march of one slot along some of the points; compiled before threads ask for it."""
+        self.settler.load()
+        tables = self.settler.engine.prepare(self.points)
 
         def march(slot: tuple[int, int], order: Sequence[int], report: Report) -> None:
             d, k = slot
-            slots[slot].march(tables, order, starts[k], directions[d] != "none", report)
+            self.slots[slot].march(tables, order, self.starts[k], self.directions[d] != "none", report)
 
-        run_pieces(march, pieces_of(directions, len(starts), numbers), threads, progress, parameter)
-    largest = largest_of(starts, slots.values(), extremes)
-    warn_if_coarse(system, engine, largest)
-    warn_if_small(system, largest)
-    return _dataset(
-        system, engine.name, parameter, numbers, directions, starts, slots, options, squeeze, judge, extremes, measured
-    )
+        return march
 
+    def gather(self, read: Callable[[Slot], Any]) -> np.ndarray:
+        """Arrays of all slots, over direction and start."""
+        every = range(len(self.starts))
+        return np.stack([np.stack([read(self.slots[d, k]) for k in every]) for d in range(len(self.directions))])
 
-def _directions(direction: Any) -> tuple[str, ...]:
-    if not isinstance(direction, str | None) or direction not in DIRECTIONS:
-        raise ValueError(f"direction = {direction!r}; allowed: {', '.join(map(repr, DIRECTIONS))}")
-    return DIRECTIONS[direction]
+    def dataset(self, asked: Mapping[str, Any], squeeze: tuple[str, ...]) -> xr.Dataset:
+        """The result."""
+        from nonsmooth.results.labels import labels_of
+        from nonsmooth.results.provenance import provenance
+        from nonsmooth.results.schema import sweep as build
 
+        gather, settler, system = self.gather, self.settler, self.settler.system
+        failed = gather(lambda slot: ~ended(slot))
+        sides = armed_signs(system)
 
-def _dataset(
-    system: System,
-    method: str,
-    parameter: str,
-    numbers: FloatArray,
-    directions: Sequence[str],
-    starts: FloatArray,
-    slots: Mapping[tuple[int, int], Slot],
-    options: Mapping[str, Any],
-    squeeze: Iterable[str],
-    judge: bool,
-    extremes: bool,
-    measured: Quantities,
-) -> xr.Dataset:
-    from nonsmooth.results.labels import labels_of
-    from nonsmooth.results.provenance import provenance
-    from nonsmooth.results.schema import sweep as build
+        def whole(values: np.ndarray) -> np.ndarray:
+            """NaN where the point failed: the kernel's buffers hold what it had by then."""
+            return np.where(failed.reshape(failed.shape + (1,) * (values.ndim - 3)), np.nan, values)
 
-    def gather(read: Callable[[Slot], Any]) -> np.ndarray:
-        return np.stack([np.stack([read(slots[d, k]) for k in range(len(starts))]) for d in range(len(directions))])
+        arrays: dict[str, Any] = {
+            "crossings_per_period": whole(gather(lambda s: s.kept.crossings) / float(settler.keep)),
+            "contacts_per_period": whole(gather(lambda s: s.kept.contacts) / float(settler.keep)),
+            "status": gather(lambda s: s.status),
+        }
+        if self.edges is None:
+            arrays["section"] = whole(gather(lambda s: s.kept.section))
+        else:
+            arrays["density"] = gather(attrgetter("counter.counts"))
+            arrays["outside"] = gather(attrgetter("counter.outside"))
+        if asked["judge"]:
+            arrays["period_number"] = gather(lambda s: s.period_number)
+            arrays["residual"] = gather(lambda s: s.residual)
+        if asked["extremes"]:
+            arrays["maximum"] = whole(gather(lambda s: s.extremes()[0]))
+            arrays["minimum"] = whole(gather(lambda s: s.extremes()[3]))
+            arrays["clearance"] = whole(gather(lambda s: np.where(sides > 0, -s.extremes()[1], s.extremes()[4])))
+            if system.outputs and self.slots[0, 0].extremes()[2].shape[-1] == len(system.outputs):
+                arrays["output_maximum"] = whole(gather(lambda s: s.extremes()[2]))
+                arrays["output_minimum"] = whole(gather(lambda s: s.extremes()[5]))
+        if asked["judge"] and self.edges is None:
+            arrays |= standing_in_sweep(settler, self.points, arrays, gather(lambda s: s.kept.section[:, 0]))
+        def of_load(name: str) -> np.ndarray:
+            return gather(lambda s: s.loads[name])
 
-    failed = gather(lambda slot: ~ended(slot))
-    sides = armed_signs(system)
-
-    def whole(values: np.ndarray) -> np.ndarray:
-        """NaN where the point failed: the kernel's buffers hold what it had by then."""
-        return np.where(failed.reshape(failed.shape + (1,) * (values.ndim - 3)), np.nan, values)
-
-    returns = gather(lambda slot: np.full(len(numbers), slot.settler.keep, dtype=float))
-    arrays = {
-        "section": whole(gather(lambda s: s.kept.section)),
-        "maximum": whole(gather(lambda s: s.extremes()[0])),
-        "minimum": whole(gather(lambda s: s.extremes()[3])),
-        "period_number": gather(lambda s: s.period_number),
-        "residual": gather(lambda s: s.residual),
-        "crossings_per_period": whole(gather(lambda s: s.kept.crossings) / returns),
-        "contacts_per_period": whole(gather(lambda s: s.kept.contacts) / returns),
-        "clearance": whole(gather(lambda s: np.where(sides > 0, -s.extremes()[1], s.extremes()[4]))),
-        "output_maximum": whole(gather(lambda s: s.extremes()[2])),
-        "output_minimum": whole(gather(lambda s: s.extremes()[5])),
-        "status": gather(lambda s: s.status),
-    }
-    settler = slots[0, 0].settler
-    if judge and slots[0, 0].counter is None and settler.device == "cpu":
-        first = gather(lambda s: s.kept.section[:, 0])
-        arrays |= standing_in_sweep(settler, system.parameter_points({parameter: numbers}), arrays, first)
-    if not system.outputs or arrays["output_maximum"].shape[-1] != len(system.outputs):
-        del arrays["output_maximum"], arrays["output_minimum"]
-    if not judge:
-        del arrays["period_number"], arrays["residual"]
-    if not extremes:
-        for name in ("maximum", "minimum", "clearance", "output_maximum", "output_minimum"):
-            arrays.pop(name, None)
-    counter = next(iter(slots.values())).counter
-    if counter is not None:
-        del arrays["section"]
-        for name, part in (("density", "counts"), ("outside", "outside")):
-            arrays[name] = gather(attrgetter(f"counter.{part}"))
-
-    def of_load(name: str) -> np.ndarray:
-        return gather(lambda s: s.loads[name])
-
-    labels = labels_of(system)
-    return build(
-        labels, provenance(labels, "sweep", options, method=method), parameter, numbers, arrays,
-        directions=directions, starts=starts, squeeze=tuple(squeeze),
-        edges=None if counter is None else counter.edges,
-        loads={name: (of_load(name), *measured[name]) for name in measured},
-    )  # fmt: skip
+        labels = labels_of(system)
+        record = provenance(labels, "sweep", asked, method=settler.engine.name)
+        return build(
+            labels, record, self.parameter, self.numbers, arrays, directions=self.directions,
+            starts=self.starts, squeeze=squeeze, edges=self.edges,
+            loads={name: (of_load(name), *words) for name, words in self.measured.items()},
+        )  # fmt: skip
 
 
 def armed_signs(system: System) -> np.ndarray:

@@ -122,9 +122,7 @@ def _values(system: Any, record: Mapping[str, Any]) -> dict[str, float]:
 
 def _options(record: Mapping[str, Any], result: Any) -> dict[str, Any]:
     """The options of the verb that are not at their defaults; values of a parameter as an array."""
-    defaults = dict(inspect.signature(getattr(ns, record["verb"])).parameters)
-    if record["verb"] == "frequency_response":  # which hands its further options on
-        defaults = {**inspect.signature(ns.sweep).parameters, **defaults}
+    defaults = inspect.signature(getattr(ns, record["verb"])).parameters
     found = {
         name: value
         for name, value in record["options"].items()

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 
-from nonsmooth.flow.arguments import check_options, check_system, whole_number
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.failure import refuse_beyond_stops, solve_error
+from nonsmooth.flow.options import Solver, as_called, solver_of
 from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
-from nonsmooth.flow.starts import is_one_start, plain_start, start_states
+from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import at_least, checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,18 +30,15 @@ def result_status(code: int) -> int:
     return codes.NO_CONVERGENCE if code < 0 else int(code)
 
 
-@by_name
+@checked
 def poincare(
     system: System,
     *,
     section: Stroboscopic | Poincare | None = None,
-    n: int = 1000,
-    transient: int = 0,
+    n: Annotated[int, at_least(1)] = 1000,
+    transient: Annotated[int, at_least(0)] = 0,
     start: Any = None,
-    method: str = "auto",
-    rtol: float | None = None,
-    atol: Any = None,
-    **expert: Any,
+    **options: Unpack[Solver],
 ) -> xr.Dataset:
     """Section points of a trajectory, or of several.
 
@@ -56,8 +53,6 @@ def poincare(
         Returns to pass over first.
     start : state or list of states, optional
         Zeros where not given.
-    method, rtol, atol
-        See :func:`nonsmooth.flow.engines.methods.engine_for`.
 
     Returns
     -------
@@ -71,17 +66,15 @@ def poincare(
     SolveError
         A single run that could not be completed.
     """
-    check_system(system, "poincare")
-    check_options(system, expert, poincare)
-    n, transient = whole_number(n, "n", 1), whole_number(transient, "transient", 0)
-    section, plan = section_plan(system, section)
+    asked = as_called(locals())
+    plan = section_plan(system, section)[1]
     plan = plan._replace(extremes=False)
     starts = start_states(system, start)
     if is_one_start(start):
         refuse_beyond_stops(system, starts)
     if plan.indicator >= 0:
         refuse_resting(system, starts, system.parameter_vector()[None, :], "poincare")
-    engine = engine_for(system, method, rtol, atol, **expert)
+    engine = engine_for(system, **solver_of(options))
     out = engine.kept(len(starts), n)
     tables = engine.prepare(np.tile(system.parameter_vector(), (len(starts), 1)))
     state = State(starts[0].copy(), system.memory_vector())
@@ -93,13 +86,9 @@ def poincare(
     from nonsmooth.results.provenance import provenance
     from nonsmooth.results.schema import section_points
 
-    options = {
-        "section": section, "n": n, "transient": transient, "start": plain_start(system, start),
-        "method": method, "rtol": rtol, "atol": atol, **expert,
-    }  # fmt: skip
     labels = labels_of(system)
     return section_points(
-        labels, provenance(labels, "poincare", options, method=engine.name),
+        labels, provenance(labels, "poincare", asked, method=engine.name),
         section=out.section, time=out.section_time, mode=out.section_mode,
         status=[result_status(code) for code in out.status], starts=starts,
         squeeze=("start",) if is_one_start(start) else (),

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.arguments import check_system
 from nonsmooth.flow.engines.engine import FloatArray, Log, State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.inputs import Course, driven
+from nonsmooth.flow.options import Length, as_called
 from nonsmooth.flow.saltation import Jump
 from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.simulate import check_complete, run_length
-from nonsmooth.flow.starts import first_state, plain_start
+from nonsmooth.flow.starts import first_state
 from nonsmooth.flow.variational import Segments, VariationalFlow
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -198,12 +198,12 @@ def variation(
     return Variation(flow, values, log, start, 0.0, t_end, course, instants[1:].tolist()), log
 
 
-@by_name
+@checked
 def sensitivity(
     system: System,
     *,
-    periods: float | None = None,
-    duration: float | None = None,
+    periods: Length | None = None,
+    duration: Length | None = None,
     start: Any = None,
     mode: str | None = None,
     parameters: Sequence[str] = (),
@@ -249,12 +249,12 @@ def sensitivity(
     Transitions taken at the same instant stand as one crossing, with the last one's number. A parameter that has the
     name of a variable above (``P``, ``end``) is no coordinate of the result; `system_of` gives its value.
     """
-    check_system(system, "sensitivity", inputs=True)
+    asked = as_called(locals())
     drive = driven(system, inputs)
     course = None if drive is None else drive.at(system.values)
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     flow = VariationalFlow.of(system, names)
-    _, length = run_length(system, periods, duration, system.period(), 0.0)
+    _, length = run_length(system, periods, duration, system.period())
     found, log = variation(system, flow, first_state(system, start, mode), length, course)
     warn_if_slow(system, found.segments.z[:, : len(system.states)], log.u_before, log.u_after)
     parameter_part = found.P
@@ -266,11 +266,7 @@ def sensitivity(
     from nonsmooth.results.variations import derivatives_of_run
 
     labels = labels_of(system)
-    options = {
-        "periods": periods, "duration": duration, "start": plain_start(system, start), "mode": mode,
-        "parameters": list(names),
-        "inputs": None if drive is None else drive.data(),
-    }  # fmt: skip
+    asked |= {"parameters": list(names), "inputs": None if drive is None else drive.data()}
     n = flow.n
     crossings = [
         (t, chain[-1], jump)
@@ -278,7 +274,7 @@ def sensitivity(
         if chain[-1] != CHANGE
     ]
     return derivatives_of_run(
-        labels, provenance(labels, "sensitivity", options, method="variational"), names,
+        labels, provenance(labels, "sensitivity", asked, method="variational"), names,
         Phi=found.Phi, P=parameter_part, end=found.segments.z[-1], crossing_time=[t for t, _, _ in crossings],
         crossing_transition=[k for _, k, _ in crossings],
         saltation=np.array([jump.saltation for _, _, jump in crossings]).reshape(-1, n, n),

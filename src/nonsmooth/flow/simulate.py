@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 
-from nonsmooth.flow.arguments import check_options, check_system, float_array, real_number, whole_number
+from nonsmooth.flow.arguments import float_array, real_number, whole_number
 from nonsmooth.flow.engines.engine import FloatArray, Log, State
 from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
 from nonsmooth.flow.failure import refuse_beyond_stops, solve_error, wrong_way
 from nonsmooth.flow.inputs import driven
 from nonsmooth.flow.loads import meter_of
+from nonsmooth.flow.options import Length, Solver, as_called, solver_of
 from nonsmooth.flow.scales import warn_if_slow
-from nonsmooth.flow.starts import first_state, is_one_start, plain_start
+from nonsmooth.flow.starts import first_state, is_one_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import above, at_least, checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,23 +33,20 @@ SAMPLES_PER_PERIOD = 256
 SAMPLES = 4096
 
 
-@by_name
+@checked
 def simulate(
     system: System,
     *,
-    periods: float | None = None,
-    duration: float | None = None,
+    periods: Length | None = None,
+    duration: Length | None = None,
     start: Any = None,
     mode: str | None = None,
-    transient: float = 0,
+    transient: Annotated[float, at_least(0)] = 0,
     samples: Any = None,
-    step: float | None = None,
+    step: Annotated[float, above(0)] | None = None,
     ramps: Mapping[str, Any] | None = None,
     inputs: Any = None,
-    method: str = "auto",
-    rtol: float | None = None,
-    atol: Any = None,
-    **expert: Any,
+    **options: Unpack[Solver],
 ) -> xr.Dataset:
     """March one trajectory and return it as segments between crossings.
 
@@ -74,8 +72,6 @@ def simulate(
     inputs : mapping of input to (time, values) or Input, or a table with a column ``time``, optional
         The courses of the system's inputs, see :class:`nonsmooth.Input`. They begin at their own times, whatever the
         transient.
-    method, rtol, atol
-        See :func:`nonsmooth.flow.engines.methods.engine_for`; rtol is 1e-9 where not given.
 
     Returns
     -------
@@ -96,10 +92,9 @@ def simulate(
     SolveError
         The run could not be completed; it says where and why.
     """
-    check_system(system, "simulate", inputs=True)
-    check_options(system, expert, simulate)
+    asked = as_called(locals())
     period = system.period()
-    unit, length = run_length(system, periods, duration, period, transient)
+    unit, length = run_length(system, periods, duration, period)
     if not is_one_start(start):
         raise ValueError("simulate marches one trajectory: give one start; sweep and poincare take several")
     t_begin, t_end = transient * unit, transient * unit + length
@@ -108,7 +103,7 @@ def simulate(
         from nonsmooth.flow.ramps import values_along, with_ramps
 
         system.refuse_patterns("ramps")
-        if method == "exact":
+        if options["method"] == "exact":
             raise ValueError('method="exact" needs constant parameters; with ramps use "taylor" or "rkf45"')
         traced = with_ramps(system, ramps, t_begin, t_end)
     width = 2 * len(traced.u) + len(traced.outputs) + 3  # of the log and of the result
@@ -119,7 +114,7 @@ def simulate(
         state.u[course.first :] = course.at(0.0)
     if not ramps:
         refuse_beyond_stops(system, state.u[None, :])
-    engine = engine_for(system, method, rtol, atol, step, traced=traced if ramps else None, **expert)
+    engine = engine_for(system, **solver_of(options), step=step, traced=traced if ramps else None)
     begun = np.abs(state.u)
     tables = engine.prepare(system.parameter_vector()[None, :])
     if t_begin > 0:
@@ -133,15 +128,10 @@ def simulate(
     largest = np.nanmax(np.abs(np.vstack([begun, log.sample_u, log.u_before, log.u_after])), axis=0)
     warn_if_coarse(system, engine, largest)
     warn_if_slow(system, largest)
-    options = {
-        "periods": periods, "duration": duration, "start": plain_start(system, start), "mode": mode,
-        "transient": transient, "samples": samples, "step": step,
-        "ramps": None if not ramps else {k: v if not callable(v) else str(v) for k, v in ramps.items()},
-        "inputs": None if drive is None else drive.data(),
-        "method": method, "rtol": rtol, "atol": atol, **expert,
-    }  # fmt: skip
+    asked["ramps"] = None if not ramps else {k: v if not callable(v) else str(v) for k, v in ramps.items()}
+    asked["inputs"] = None if drive is None else drive.data()
     traced = engine.traced if ramps else system.traced  # with what the run has visited and found
-    found = _dataset(system, traced, engine.name, options, log, instants, period)
+    found = _dataset(system, traced, engine.name, asked, log, instants, period)
     meter = meter_of(system)
     if meter is not None and meter.striking:
         from nonsmooth.results.schema import with_impacts
@@ -178,21 +168,15 @@ def _resting(system: System, begun: FloatArray, log: Log, state: State) -> str:
 
 
 def run_length(
-    system: System, periods: float | None, duration: float | None, period: float | None, transient: float
+    system: System, periods: float | None, duration: float | None, period: float | None
 ) -> tuple[float, float]:
     """The unit of the length (the period, or 1) and the length in time."""
     if (periods is None) == (duration is None):
         raise ValueError("give the length of the run once: periods=... or duration=...")
     if periods is not None and period is None:
         raise ValueError(f"{system.name!r} has no forcing period: give duration=... in place of periods")
-    name, value = ("periods", periods) if periods is not None else ("duration", duration)
-    number = real_number(value, name)
-    if number <= 0:
-        raise ValueError(f"{name} = {value!r}: the length of a run must be positive")
-    if real_number(transient, "transient") < 0:
-        raise ValueError(f"transient = {transient!r} must be zero or more")
     unit = 1.0 if periods is None or period is None else period
-    return unit, number * unit
+    return unit, (periods or duration or 0.0) * unit
 
 
 def _instants(samples: Any, t_begin: float, t_end: float, period: float | None, width: int) -> FloatArray:

@@ -17,8 +17,9 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.pieces import Fittable, State
 
-__all__ = ["Unsettled", "inverted", "reduced", "settle"]
+__all__ = ["LEAST", "Unsettled", "inverted", "reduced", "settle"]
 
+LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction of a fit counts as determined
 _SETTLED = 1e-3  # of a standard uncertainty
 _RIDGE = 1e-13  # of a start's column: what keeps a start that is known or not seen from being divided by
 _LITTLE = 1e-4  # of the sum of squares: what a rough fit leaves to be gained
@@ -109,8 +110,7 @@ def settle(
     weights = problem.weights(state, spread)
 
     def cost(now: State, at: FloatArray) -> float:
-        data = sum(float(np.sum((r * w) ** 2)) for r, w, u in zip(now.residuals, weights, used, strict=True) if u)
-        return data + float((at - centre) @ prior @ (at - centre))
+        return now.chi2(weights, used) + float((at - centre) @ prior @ (at - centre))
 
     best = cost(state, theta)
     for count in range(1, iterations + 1):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import numpy as np
+
 from nonsmooth.arrays import FloatArray
 
 __all__ = ["Fittable", "State"]
@@ -18,6 +20,11 @@ class State:
     residuals: list[FloatArray]
     in_parameters: list[FloatArray]
     in_start: list[FloatArray]
+
+    def chi2(self, weights: list[FloatArray], used: Any = None) -> float:
+        """Sum of the weighted residuals' squares, of all pieces or of those that are used."""
+        rows = zip(self.residuals, weights, strict=True)
+        return sum(float(np.sum((r * w) ** 2)) for i, (r, w) in enumerate(rows) if used is None or used[i])
 
 
 class Fittable(Protocol):

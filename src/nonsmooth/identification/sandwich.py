@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.pieces import Fittable, State
 from nonsmooth.identification.uncertainty import newey_west, not_below
@@ -17,16 +16,21 @@ __all__ = ["Sandwich", "sandwich"]
 
 
 class Sandwich(NamedTuple):
-    """State at the best fit, covariance (p, p), chi^2 per degree of freedom, samples that share an error."""
+    """State at the best fit, covariance (p, p), chi^2 per degree of freedom, samples that share an error.
+
+    ``normal`` and ``back`` are those of :func:`nonsmooth.identification.arrow.reduced` there.
+    """
 
     state: State
     covariance: FloatArray
     reduced: float
     correlation: float
+    normal: FloatArray
+    back: list[Any]
 
 
 def sandwich(
-    problem: Fittable, theta: FloatArray, starts: FloatArray, spread: float, used: NDArray[np.bool_], prior: FloatArray,
+    problem: Fittable, theta: FloatArray, starts: FloatArray, spread: float, used: BoolArray, prior: FloatArray,
     least: float = 0.0,
 ) -> Sandwich:  # fmt: skip
     """Covariance of the parameters, never smaller along any of them than that of white residuals of the same size.
@@ -64,7 +68,7 @@ def sandwich(
     inverse, _ = inverted(normal + prior, least)
     part = sum(rows) / freedom
     covariance = not_below(inverse @ (meat * part + prior) @ inverse, inverse @ (normal * size + prior) @ inverse)
-    return Sandwich(state, covariance, size, tau)
+    return Sandwich(state, covariance, size, tau, normal, back)
 
 
 def _meat(scores: Sequence[tuple[Any, FloatArray, FloatArray]], p: int) -> FloatArray:

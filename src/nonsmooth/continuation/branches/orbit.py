@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.continuation.branches.reading import layout_attributes, layouts_of, recorded, undamaged
+from nonsmooth.continuation.branches.reading import fields_of, layout_attributes, layouts_of, recorded, undamaged
 from nonsmooth.continuation.problems.multipliers import stability, stable_by
-from nonsmooth.continuation.problems.path import Path
-from nonsmooth.continuation.problems.shooting import Shooting, Solved
+from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.signature import Signature
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import State
@@ -89,29 +88,27 @@ class Orbit:
     minimum: FloatArray
     clearance: dict[str, float]
     virtual: bool = False
-    reference: tuple[FloatArray, FloatArray] | None = field(default=None)
     options: Mapping[str, Any] = field(default_factory=dict)
     loads: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def crossings_per_period(self) -> float:
         """Transitions per forcing period (autonomous: once round)."""
-        return len(self.signature.crossings) / max(self.period_number, 1)
+        return self.signature.rates(self.system.transitions, self.period_number)[0]
 
     @property
     def contacts_per_period(self) -> float:
         """Entries into contact per forcing period (autonomous: once round)."""
-        jumps = self.system.transitions
-        return sum(jumps[v.transition].contact for v in self.signature.crossings) / max(self.period_number, 1)
+        return self.signature.rates(self.system.transitions, self.period_number)[1]
 
     def trajectory(self, samples: int | None = None) -> xr.Dataset:
         """The orbit once round, as a result of ``simulate``; begun behind the transitions that lie on the section."""
         from nonsmooth.flow.simulate import simulate
 
-        u, memory, mode = self._begin()
+        state = self._begin()
         return simulate(
-            self.system, duration=self.period, start=self._start(u, memory), mode=mode, samples=samples or 1025,
-            rtol=RTOL,
+            self.system, duration=self.period, start=self._start(state), mode=self.system.modes[state.counters[0]],
+            samples=samples or 1025, rtol=RTOL,
         )  # fmt: skip
 
     def with_loads(self) -> Orbit:
@@ -127,35 +124,33 @@ class Orbit:
         checked_loads(self.system, True, "with_loads")
         meter = meter_of(self.system)
         assert meter is not None
-        u, memory, mode = self._begin()
-        state = State(u.copy(), memory.copy())
-        state.counters[0] = self.system.modes.index(mode)
+        state = self._begin()
         engine, values = engine_for(self.system, rtol=RTOL), self.system.parameter_vector()
         loads = meter.over(engine, values, state, self.period, max(self.period_number, 1))
         if loads is None:
             raise SolveError("the orbit cannot be followed once round, so its loads are not known: it is unstable")
         return replace(self, loads=loads)
 
-    def _begin(self) -> tuple[FloatArray, FloatArray, str]:
+    def _begin(self) -> State:
         """State, memory and mode behind the transitions that lie on the section: a start cannot lead into a stop."""
-        u, memory, mode = self.u, self.memory, self.mode
-        n, visits = len(self.u), self.signature.visits
+        z, mode = np.append(self.u, self.memory), self.system.modes.index(self.mode)
         for i in np.flatnonzero(self.crossing_times <= AT_SECTION * self.period):
-            u, memory = np.split(self.crossing_states[i], [n])
-            mode = self.system.modes[visits[i + 1].mode]
-        return u, memory, mode
+            z, mode = self.crossing_states[i], self.signature.visits[i + 1].mode
+        state = State(z[: len(self.u)].copy(), z[len(self.u) :].copy())
+        state.counters[0] = mode
+        return state
 
-    def _start(self, u: FloatArray, memory: FloatArray) -> Any:
+    def _start(self, state: State) -> Any:
         """A state as a start; with the memory, where the system has one."""
-        if not len(memory):
-            return u
+        if not len(state.memory):
+            return state.u
         import xarray as xr
 
         variables: dict[str, Any] = {
-            "u": (("time", "state"), u[None, :]),
+            "u": (("time", "state"), state.u[None, :]),
             "mode": ("time", np.zeros(1, dtype=int), {"flag_meanings": "-"}),  # given by name beside it
         }
-        variables |= {name: ("time", [value]) for name, value in zip(self.system.memory, memory, strict=True)}
+        variables |= {name: ("time", [value]) for name, value in zip(self.system.memory, state.memory, strict=True)}
         return xr.Dataset(variables, {"state": list(self.system.states)})
 
     def __repr__(self) -> str:
@@ -219,13 +214,8 @@ class Orbit:
         if source["verb"] != "find_orbit":
             verb = source["verb"]
             raise ValueError(f"this Dataset was made by {verb!r}; Orbit.from_dataset reads those of find_orbit")
-        scalar: dict[str, Any] = {"flag": bool, "time": float, "text": str, "place": int}
         with undamaged("orbit"):
-            (signature,) = layouts_of(dataset, system)
-            values: dict[str, Any] = {column.field: dataset[column.name].values for column in FOUND}
-            for column in FOUND:
-                if not column.dims:
-                    values[column.field] = scalar[column.rule](values[column.field])
+            (signature,), (values,) = layouts_of(dataset, system), fields_of(dataset, FOUND)
             shape = len(signature.crossings), len(system.states) + len(system.memory)
             values["crossing_states"] = values["crossing_states"].reshape(shape)
             names = map(str, dataset["indicator"].values)
@@ -235,23 +225,16 @@ class Orbit:
             return cls(system=system, signature=signature, options=source["options"], loads=loads, **values)
 
 
-def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArray, virtual: bool) -> Orbit:
-    """The record of a solved orbit."""
-    X = solved.X
-    system = shooting.system.with_parameters(
-        dict(zip(shooting.system.values, map(float, solved.values), strict=True))
-    ) if shooting.n_active else shooting.system  # fmt: skip
-    times, states = shooting.split(X)
-    n_u = len(system.states)
-    M = solved.monodromy
-    multipliers = solved.multipliers
+def orbit_of(point: OrbitPoint, virtual: bool) -> Orbit:
+    """The record of a solved orbit, at the parameters of its system."""
+    shooting, path, once = point.shooting, point.path, point.shooting.once(point.X)
+    system, mu = shooting.system, point.multipliers
+    u, memory = np.split(once.states[0], [len(system.states)])
+    clearance = point.curve.walk.clearance(path, len(system.indicators))
     return Orbit(
-        system=system, u=states[0, :n_u].copy(), mode=system.modes[shooting.at_section],
-        memory=states[0, n_u:].copy(), period=float(solved.times[-1]), period_number=shooting.period_number,
-        signature=shooting.signature, crossing_times=times.copy(), crossing_states=states[1:].copy(),
-        monodromy_matrix=M, floquet_multipliers=multipliers,
-        stable=stable_by(multipliers, shooting.forced),
-        maximum=path.maximum.copy(), minimum=path.minimum.copy(),
+        system=system, u=u, mode=system.modes[shooting.at_section], memory=memory, period=once.period,
+        period_number=shooting.period_number, signature=shooting.signature, crossing_times=once.times,
+        crossing_states=once.states[1:], monodromy_matrix=point.M, floquet_multipliers=mu,
+        stable=stable_by(mu, shooting.forced), maximum=path.maximum.copy(), minimum=path.minimum.copy(),
         clearance=dict(zip(system.indicators, map(float, clearance), strict=True)), virtual=virtual,
-        reference=shooting.reference,
     )  # fmt: skip

@@ -9,10 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.march.event import Event, Met, Step, first_met, special_on
-from nonsmooth.continuation.problems.curve import Curve, Place, Point, passing
+from nonsmooth.continuation.problems.curve import Place, Point, passing
 
-__all__ = ["INTERRUPTED", "Limits", "March", "Policy", "march"]
+__all__ = ["INTERRUPTED", "Limits", "March", "Policy", "Row", "SpecialRecord", "march"]
 
 INTERRUPTED = "Interrupted: what was found until then stands"
 FIRST = 1e-3  # step
@@ -34,16 +35,32 @@ class Limits:
 
 
 @dataclass
-class Row:
-    """A point of a branch with the curve it lies on, and what belongs to its kind where it is a special one."""
+class SpecialRecord:
+    """A special point: its kind, its data, and its place ``point`` in the branch; at a graze both sides of it."""
 
-    curve: Any
+    kind: str
+    indicator: str = ""
+    grazing: str = ""
+    sliding: str = ""
+    bounded: bool = True
+    doubled: bool = False
+    contact: ComplexArray = field(default_factory=lambda: np.empty(0, dtype=complex))  # in the limit
+    determinants: FloatArray = field(default_factory=lambda: np.empty(0))
+    point: int = -1
+
+
+@dataclass
+class Row:
+    """A point of a branch, and what it is as a special one."""
+
     point: Any
     virtual: bool = False  # beyond a boundary that its path should obey
-    kind: str = ""  # of a special point
-    indicator: int = -1
-    sliding: str = ""
-    graze: Any = None  # an events.grazing.Graze
+    mark: SpecialRecord | None = None
+
+    @property
+    def kind(self) -> str:
+        """The kind of a special point, else nothing."""
+        return self.mark.kind if self.mark else ""
 
 
 @dataclass
@@ -57,15 +74,15 @@ class March:
     @property
     def special(self) -> list[Row]:
         """The rows that are special points."""
-        return [row for row in self.rows if row.kind]
+        return [row for row in self.rows if row.mark]
 
-    def add(self, curve: Curve[Any], point: Point) -> None:
+    def add(self, point: Point) -> None:
         """Append a point."""
-        self.rows.append(Row(curve, point, point.virtual))
+        self.rows.append(Row(point, point.virtual))
 
-    def mark(self, kind: str, curve: Curve[Any], point: Point, virtual: bool = False, **more: Any) -> None:
+    def mark(self, kind: str, point: Point, virtual: bool = False, **more: Any) -> None:
         """Append a special point; on a boundary itself no path is virtual."""
-        self.rows.append(Row(curve, point, virtual, kind, **more))
+        self.rows.append(Row(point, virtual, SpecialRecord(kind, **more)))
 
 
 class Policy(ABC):
@@ -90,11 +107,11 @@ class Policy(ABC):
 
     def record(self, found: March, step: Step, met: Met) -> None:
         """List an event that a branch passes."""
-        found.mark(met.name, step.curve, met.point, step.virtual and met.point.virtual)
+        found.mark(met.name, met.point, step.virtual and met.point.virtual)
 
     @abstractmethod
-    def behind(self, found: March, curve: Any, met: list[Met]) -> tuple[Any, Any] | None:
-        """Record the boundaries ``met`` at one place; the curve and the point behind, or None."""
+    def behind(self, found: March, met: list[Met]) -> Any:
+        """Record the boundaries ``met`` at one place; the point behind, on a curve of its own, or None."""
 
     def unseen(self, step: Step) -> Met | None:
         """The first place on a step that margins do not tell lies beyond a boundary."""
@@ -104,20 +121,20 @@ class Policy(ABC):
         """Boundaries that a branch passes on a step with the equations that it has."""
         return []
 
-    def over(self, curve: Any, point: Any) -> str | None:
+    def over(self, point: Any) -> str | None:
         """The ending of a branch whose last point this is; None where it goes on."""
         return None
 
-    def why(self, curve: Any, point: Any) -> str:
+    def why(self, point: Any) -> str:
         """The ending of a branch on which no point follows this one."""
         return "no_convergence"
 
 
-def march(curve: Curve[Any], point: Any, limits: Limits, policy: Policy) -> March:
+def march(point: Any, limits: Limits, policy: Policy) -> March:
     """Follow a branch from a point along its tangent until it ends; the first row is the point after it."""
     found = March()
     try:
-        _Marching(found, limits, policy).follow(curve, point)
+        _Marching(found, limits, policy).follow(point)
     except KeyboardInterrupt:  # `both_ways` raises it again, with what was found
         found.ending = "interrupted"
     return found
@@ -132,10 +149,10 @@ class _Marching:
         self.circle: Place | None = None  # a point that is met again if the branch goes round (Brent's method)
         self.again = 8
 
-    def follow(self, curve: Curve[Any], point: Any) -> None:
+    def follow(self, point: Any) -> None:
         """March on, point by point."""
         found = self.found
-        self._begin(*(curve.renewed(point) or (curve, point)))
+        self._begin(point.curve.renewed(point) or point)
         while len(found.rows) < self.limits.points:
             new = self._next()
             step = None if new is None else self._within(new)
@@ -147,7 +164,7 @@ class _Marching:
             if step is None or met is None:
                 limit = self._limit()
                 if not limit:
-                    found.ending = self.policy.why(self.curve, self.point)
+                    found.ending = self.policy.why(self.point)
                 if not limit or not self._change(limit):
                     return
                 continue
@@ -159,7 +176,7 @@ class _Marching:
             if self._special(step):
                 return
             if step.cause in ("range", "closed"):
-                found.add(self.curve, step.last)
+                found.add(step.last)
                 found.ending = step.cause
                 return
             if step.cause == "change":
@@ -170,33 +187,33 @@ class _Marching:
 
     def _change(self, met: list[Met]) -> bool:
         """Go on behind the boundaries ``met``; False where the branch ends there."""
-        after = self.policy.behind(self.found, self.curve, met)
+        after = self.policy.behind(self.found, met)
         if after is None:
             return False
-        self._begin(*after)
+        self._begin(after)
         self.ds = 0.1 * self.limits.largest
-        self.found.add(*after)
+        self.found.add(after)
         return True
 
     def _limit(self) -> list[Met]:
         """The boundaries to which the branch has come in the limit: its equations have no derivatives there."""
         point, near = self.point, np.full(len(self.policy.boundaries), np.inf)  # as chords of the margins end
         for row in self.found.rows:
-            if row.curve is self.curve:
+            if row.point.curve is self.curve:
                 fallen = np.nan_to_num(self.curve.margins(row.point)) - np.nan_to_num(self.margins)
                 s = np.where(fallen > 0.0, float(np.abs(point.Y - row.point.Y).max()), np.inf)
                 near = np.fmin(near, np.abs(self.margins) * s / np.abs(fallen))
         return [Met(kind, 0.0, point, kind.name) for kind, s in zip(self.policy.boundaries, near, strict=True)
                 if s < AT_LIMIT]  # fmt: skip
 
-    def _begin(self, curve: Curve[Any], point: Any) -> None:
+    def _begin(self, point: Any) -> None:
         """Go on from a point of a curve."""
-        self.curve, self.before, self.point = curve, None, point
+        self.curve, self.before, self.point = point.curve, None, point
         self.numbers, self.margins = self._watched(self.point)
 
     def _watched(self, point: Any) -> tuple[list[float], Any]:
         """The numbers of all kinds of events at a point, and its margins to the boundaries."""
-        return [kind.number(self.curve, point) for kind in self.policy.kinds], self.curve.margins(point)
+        return [kind.number(point) for kind in self.policy.kinds], self.curve.margins(point)
 
     def _next(self) -> Any:
         """The next point, at a distance at which it is like the last one; None where there is none."""
@@ -218,19 +235,15 @@ class _Marching:
     def _within(self, new: Any) -> Step | None:
         """The step to the new point, or to the edge of the range before it; None where that is not found."""
         reached, s = new, np.inf
-        for which, low, high in self.limits.box:
-            value = float(new.X[which])
-            if low <= value <= high:
-                continue
-            last = self.curve.at_edge(self.point, new, low if value < low else high, which)
+        for which, edge in self._beyond(new):
+            last = self.curve.at_edge(self.point, new, edge, which)
             if last is None:
                 return None
-            there = float(self.point.tangent @ (last.Y - self.point.Y))
-            if there < s:
+            if (there := self.point.along(last.Y)) < s:
                 reached, s = last, there
         numbers, margins = self._watched(reached)
         return Step(
-            self.curve, self.point, reached, (self.numbers, numbers), (self.margins, margins), not self.found.rows,
+            self.point, reached, (self.numbers, numbers), (self.margins, margins), not self.found.rows,
             self.limits.virtual, "" if reached is new else "range",
         )  # fmt: skip
 
@@ -251,10 +264,8 @@ class _Marching:
         if step.virtual:
             met = sorted([*met, *self.policy.passed_by(step)], key=lambda one: one.s)
         for one in met:
-            edge = self._beyond(one.point)
-            if edge is not None:  # a fold just beyond the edge of the range
-                which, end = edge
-                step.ends("range", one.s, self.curve.at_edge(step.a, one.point, end, which) or one.point)
+            for which, edge in self._beyond(one.point):  # a fold just beyond the edge of the range
+                step.ends("range", one.s, self.curve.at_edge(step.a, one.point, edge, which) or one.point)
                 return False
             self.policy.record(self.found, step, one)
             if one.ending is not None:
@@ -262,19 +273,16 @@ class _Marching:
                 return True
         return False
 
-    def _beyond(self, point: Any) -> tuple[int, float] | None:
-        """The edge of the range that a point lies beyond: the place of the parameter, and the edge."""
-        for which, low, high in self.limits.box:
-            value = float(point.X[which])
-            if not low <= value <= high:
-                return which, low if value < low else high
-        return None
+    def _beyond(self, point: Any) -> list[tuple[int, float]]:
+        """The edges of the range that a point lies beyond: places of parameters, each with its edge."""
+        return [(which, low if point.X[which] < low else high) for which, low, high in self.limits.box
+                if not low <= point.X[which] <= high]  # fmt: skip
 
     def _ended(self, step: Step) -> bool:
         """Take the step; True where the branch ends with it."""
         found, curve, new = self.found, self.curve, step.b
-        found.add(curve, new)
-        ending = self.policy.over(curve, new)
+        found.add(new)
+        ending = self.policy.over(new)
         if ending is None and new.virtual and came_back(self.circle, step) is not None:
             ending = "circle"
         if ending is not None:
@@ -284,7 +292,7 @@ class _Marching:
             self.circle, self.again = curve.landmark(new), len(found.rows)
         self.ds = min(self.ds * self.easy, self.limits.largest)
         if renewed := curve.renewed(new):
-            self._begin(*renewed)
+            self._begin(renewed)
         else:
             self.before, self.point = self.point, new
             self.numbers, self.margins = step.numbers[1], step.margins[1]
@@ -308,7 +316,6 @@ def came_back(place: Place | None, step: Step) -> float | None:
     word, X, seen = place
     if word == step.curve.word():
         Y = X / step.curve.scale
-        along = float(step.a.tangent @ (Y - step.a.Y))
-        return along if passing(Y, step.a.Y, step.b.Y) is not None else None
+        return step.a.along(Y) if passing(Y, step.a.Y, step.b.Y) is not None else None
     x = passing(seen, step.curve.seen(step.a), step.curve.seen(step.b))
     return None if x is None else x * step.end

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar, cast
 
 import numpy as np
 
@@ -34,6 +34,7 @@ Place = tuple[Any, FloatArray, FloatArray]
 class Point:
     """A solved point of a curve."""
 
+    curve: Any
     Y: FloatArray  # X / scale
     tangent: FloatArray  # unit length, in scaled unknowns
     orientation: float  # sign of the bordered determinant
@@ -51,9 +52,18 @@ class Point:
         return float(self.X[-1])
 
     @property
+    def rise(self) -> float:
+        """How the last parameter changes along the branch."""
+        return float(self.tangent[-1])
+
+    @property
     def virtual(self) -> bool:
         """True for a point that belongs to no motion of the system."""
         return False
+
+    def along(self, Y: FloatArray) -> float:
+        """The distance of another place along the tangent."""
+        return float(self.tangent @ (Y - self.Y))
 
     def turned(self) -> Self:
         """The same point looked at the other way along the branch; the bordered determinant turns with the tangent."""
@@ -61,7 +71,7 @@ class Point:
 
     def facing(self, sign: float) -> Self:
         """The same point with its tangent towards rising (1) or falling (-1) values."""
-        return self if (float(self.tangent[-1]) or 1.0) * sign > 0 else self.turned()
+        return self if (self.rise or 1.0) * sign > 0 else self.turned()
 
 
 P = TypeVar("P", bound=Point)
@@ -106,11 +116,9 @@ class Curve(ABC, Generic[P]):
     def moved(self, solved: Any, Y: FloatArray) -> Any:
         """The equations after a last step so small that their derivatives stay."""
 
-    @abstractmethod
-    def described(
-        self, Y: FloatArray, tangent: FloatArray, orientation: float, iterations: int, solved: Any
-    ) -> P | None:
+    def described(self, point: Point) -> P | None:
         """A solved point with all that is known of it; None where that cannot be computed."""
+        return cast(P, point)
 
     def word(self) -> Any:
         """Return what tells curves of one branch apart."""
@@ -140,11 +148,17 @@ class Curve(ABC, Generic[P]):
         """Difference of what is known of two neighbours, from 0 to 1."""
         return 0.0
 
-    def renewed(self, point: P) -> tuple[Curve[P], P] | None:
-        """The curve and the last point in other units, or with a phase condition put through it; None as they are."""
+    def renewed(self, point: P) -> P | None:
+        """The last point on a curve in other units, or with a phase condition put through it; None as it is."""
         return None
 
     # --- along the curve
+
+    def jacobian(self, solved: Any) -> FloatArray:
+        """The scaled Jacobian (n - 1, n)."""
+        matrix = np.empty((self.n - 1, self.n))
+        self.fill(solved, matrix)
+        return matrix
 
     def bordered(self, solved: Any, border: FloatArray) -> FloatArray:
         """The scaled Jacobian with a last row."""
@@ -207,16 +221,14 @@ class Curve(ABC, Generic[P]):
 
     def null_vectors(self, solved: Any, tolerance: float = 1e-7) -> FloatArray:
         """Orthonormal vectors (k, n) that the scaled Jacobian takes to zero."""
-        matrix = np.empty((self.n - 1, self.n))
-        self.fill(solved, matrix)
-        _, values, right = np.linalg.svd(matrix)
+        _, values, right = np.linalg.svd(self.jacobian(solved))
         rank = int((values > tolerance * values[0]).sum())
         return np.asarray(right[rank:])
 
     def point(self, solved: Any, Y: FloatArray, border: FloatArray, iterations: int = 0) -> P | None:
         """A solved point with its tangent along ``border``."""
         found = self.tangent(solved, border)
-        return None if found is None else self.described(Y, *found, iterations, solved)
+        return None if found is None else self.described(Point(self, Y, *found, iterations, solved))
 
     def near(self, Y: FloatArray, border: FloatArray, *, most: int | None = None) -> P | None:
         """The point across ``border`` through Y, with its tangent along it."""
@@ -225,16 +237,9 @@ class Curve(ABC, Generic[P]):
 
     def predicted(self, point: P, ds: float, before: P | None) -> FloatArray:
         """A guess at distance ds along the tangent: straight, or on the cubic through both last points and tangents."""
-        Y = point.Y + ds * point.tangent
-        if before is None:
-            return Y
-        back = point.Y - before.Y
-        h = float(before.tangent @ back)
-        if not (h > 0.0 and ds < FARTHEST * h):
-            return Y
-        second = (2 * before.tangent + 4 * point.tangent - 6 / h * back) / h
-        third = (6 * (before.tangent + point.tangent) - 12 / h * back) / (h * h)
-        return Y + ds * ds * (0.5 * second + ds / 6 * third)
+        if before is None or not 0.0 < ds < FARTHEST * before.along(point.Y):
+            return point.Y + ds * point.tangent
+        return _cubic(before, point, 1.0 + ds / _slope(before, point))
 
     def step(self, point: P, ds: float, before: P | None = None) -> P | None:
         """The point at distance ds along the tangent; with the point ``before`` from a better guess."""
@@ -250,14 +255,9 @@ class Curve(ABC, Generic[P]):
 
     def between(self, a: P, b: P, s: float) -> P | None:
         """The point at distance s from ``a`` towards ``b``, to the last digits."""
-        end = float(a.tangent @ (b.Y - a.Y))
+        end = a.along(b.Y)
         x = s / end
-        # Hermite's cubic through both points and tangents.
-        slope = end / max(float(a.tangent @ b.tangent), 1e-3)
-        Y = (
-            a.Y * (1 + 2 * x) * (1 - x) ** 2 + a.tangent * (end * x * (1 - x) ** 2)
-            + b.Y * x * x * (3 - 2 * x) - b.tangent * (slope * x * x * (1 - x))
-        )  # fmt: skip
+        Y = _cubic(a, b, x)
         level = float(a.tangent @ a.Y) + s
         found = self.correct(Y, a.tangent, level, tolerance=CLOSE, most=2 * self.most)
         if found is None or np.abs(found[1] - Y).max() > 0.1 * abs(end):
@@ -268,7 +268,7 @@ class Curve(ABC, Generic[P]):
         if point is None or float(point.tangent @ a.tangent) < 0.5:
             # At a crossing of branches any direction in their plane is null: keep that of the branch.
             towards = (1 - x) * a.tangent + x * b.tangent
-            return self.described(found[1], towards / np.linalg.norm(towards), 0.0, found[2], found[0])
+            return self.described(Point(self, found[1], towards / np.linalg.norm(towards), 0.0, found[2], found[0]))
         return point
 
     def at_parameter(self, Y: FloatArray, value: float, which: int = -1) -> P | None:
@@ -284,6 +284,13 @@ class Curve(ABC, Generic[P]):
         null = self.null_vectors(solved)
         return self.point(solved, Y, null[-1], iterations) if len(null) else None
 
+    def nearest(self, Y: FloatArray, value: float) -> P | None:
+        """The point at a value of the parameter; where that cannot be held, at a fold, the one across the branch."""
+        point = self.at_parameter(Y, value)
+        if point is None and len(null := self.null_vectors(self.evaluate(Y))):
+            return self.near(Y, null[-1], most=20)
+        return point
+
     def at_edge(self, a: P, b: P, edge: float, which: int) -> P | None:
         """The point at the edge of a parameter's range, between two points."""
         edge_there = edge / self.scale[which]
@@ -292,6 +299,19 @@ class Curve(ABC, Generic[P]):
         if point is None or np.abs(point.Y - a.Y).max() > 4 * np.abs(b.Y - a.Y).max():
             return None
         return point if float(point.tangent @ a.tangent) > 0.0 else point.turned()
+
+
+def _slope(a: Point, b: Point) -> float:
+    """The slope at both ends of the step from a to b by which its part is measured along the tangents."""
+    return a.along(b.Y) / max(float(a.tangent @ b.tangent), 1e-3)
+
+
+def _cubic(a: Point, b: Point, x: float) -> FloatArray:
+    """The place at the part x of a step on Hermite's cubic through both ends and tangents; beyond 1 it goes on."""
+    return np.asarray(
+        a.Y * (1 + 2 * x) * (1 - x) ** 2 + a.tangent * (a.along(b.Y) * x * (1 - x) ** 2)
+        + b.Y * x * x * (3 - 2 * x) - b.tangent * (_slope(a, b) * x * x * (1 - x))
+    )  # fmt: skip
 
 
 def passing(Y: FloatArray, a: FloatArray, b: FloatArray) -> float | None:
@@ -308,7 +328,7 @@ def tangents(curve: Curve[Any], Y: FloatArray) -> FloatArray | None:
     """
 
     def jacobian(Z: FloatArray) -> FloatArray:
-        return curve.bordered(curve.evaluate(Z), np.zeros(curve.n))[:-1]
+        return curve.jacobian(curve.evaluate(Z))
 
     left, _, right = np.linalg.svd(jacobian(Y))
     plane, psi = right[-2:], left[:, -1]
@@ -333,7 +353,7 @@ def branch_point(curve: Curve[Any], Y: FloatArray, *, tolerance: float = 1e-11, 
 
     def scaled(Z: FloatArray) -> tuple[FloatArray, FloatArray]:
         solved = curve.evaluate(Z)
-        return curve.residual(solved), curve.bordered(solved, np.zeros(n + 1))[:-1]
+        return curve.residual(solved), curve.jacobian(solved)
 
     _, J = scaled(Y)
     psi = np.linalg.svd(J)[0][:, -1]

@@ -23,15 +23,14 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.continuation.problems.anchor import plane_across
 from nonsmooth.continuation.problems.multipliers import multipliers_of
-from nonsmooth.continuation.problems.signature import AT_ONCE, Signature
+from nonsmooth.continuation.problems.signature import AT_ONCE, Round, Signature
 from nonsmooth.continuation.problems.surfaces import coincide, mean_along, one_surface
 from nonsmooth.flow.saltation import chained
 from nonsmooth.flow.variational import Jump, Segments, VariationalFlow
 from nonsmooth.system.system import System
 
-__all__ = ["Shooting", "Solved"]
+__all__ = ["Shooting", "Solved", "plane_across"]
 
 ROUNDING = 1e-16  # of the period
 SHORT = (0.0, 1e-6, 1e-2)  # of the period, by order: of a shorter visit the mean is taken in place of the quotient
@@ -125,25 +124,33 @@ class Shooting:
         self.alone = [False] * m  # crossings whose other rows vanish together with the one that fires
         self.divided = [0] * m  # the power of the visit's length by which the equations of exits are divided
 
+    @classmethod
+    def of(
+        cls, system: System, once: Round, active: tuple[str, ...] = (), values: Any = ()
+    ) -> tuple[Shooting, FloatArray]:
+        """The equations of once round, and its unknowns; ``values`` are those of the active parameters."""
+        shooting = cls(system, once.signature, once.period_number, active)
+        return shooting, shooting.join(once.times, once.states, once.period, values)
+
+    def once(self, X: FloatArray) -> Round:
+        """Once round the orbit with these unknowns."""
+        return Round(self.period_number, self.period(X), self.signature, *self.split(X))
+
     def _constants(self) -> list[int]:
         """Components of z that no visit moves and no transition sets."""
-        traced, signature = self.system.traced, self.signature
-        n_u = len(traced.u)
-        kept = []
-        for j in range(self.n):
-            if j < n_u:
-                moved = any(traced.fields[v.mode][j] != 0 for v in signature.visits)
-                jumps = [traced.transitions[v.transition] for v in signature.crossings]
-                resets = any(t.reset is not None and t.reset[j] != traced.u[j] for t in jumps)
-                dropped = any(traced.lacking[v.mode][j] for v in signature.visits)
-                never = all(traced.lacking[v.mode][j] for v in signature.visits)
-                if never or not (moved or resets or dropped):
-                    kept.append(j)
-            elif not any(
-                index == j - n_u for v in signature.crossings for index, _ in traced.transitions[v.transition].writes
-            ):
-                kept.append(j)
-        return kept
+        traced, crossings = self.system.traced, self.signature.crossings
+        taken, n_u = [traced.transitions[v.transition] for v in crossings], len(traced.u)
+        written = {index for jump in taken for index, _ in jump.writes}
+
+        def changes(j: int) -> bool:
+            if j >= n_u:
+                return j - n_u in written
+            lacks = [traced.lacking[mode][j] for mode in self.modes]
+            moved = any(traced.fields[mode][j] != 0 for mode in self.modes)
+            resets = any(jump.reset is not None and jump.reset[j] != traced.u[j] for jump in taken)
+            return not all(lacks) and (moved or resets or any(lacks))
+
+        return [j for j in range(self.n) if not changes(j)]
 
     def prepare(self, X: FloatArray, size: FloatArray) -> None:
         """Anchor the orbit at X, and look at the surfaces there."""
@@ -166,15 +173,11 @@ class Shooting:
         values = self.parameters(X)
         traced = self.system.traced
         for i, (k, row, at, _) in enumerate(self.jumps):
-            n_rows = len(traced.transitions[k].rows)
-            if at is None and n_rows > 1 and not self.at_once[i]:
-                found = [self.flow.jump(values, k, float(times[i]), z[i + 1], r) for r in range(n_rows)]
-                signs = [r.sign for r in traced.transitions[k].rows]
-                self.alone[i] = all(
-                    coincide(signs[row] * found[row].h_z, signs[row] * found[row].h, signs[r] * one.h_z,
-                              signs[r] * one.h, z[i + 1])
-                    for r, one in enumerate(found) if r != row
-                )  # fmt: skip
+            rows = traced.transitions[k].rows
+            if at is None and len(rows) > 1 and not self.at_once[i]:
+                jumps = [self.flow.jump(values, k, float(times[i]), z[i + 1], r) for r in range(len(rows))]
+                signed = [(one.sign * jump.h_z, one.sign * jump.h) for one, jump in zip(rows, jumps, strict=True)]
+                self.alone[i] = all(coincide(*signed[row], *one, z[i + 1]) for one in signed)
         for i in range(0 if self.forced and self.m > 1 else 1, self.m):
             if self.jumps[i][2] is self.jumps[i - 1][2] is None and not (self.at_once[i] or self.at_once[i - 1]):
                 self.divided[i] = self._order(i, values, float(times[i - 1]), z[i or -1])
@@ -367,3 +370,9 @@ class Shooting:
     def at_section(self) -> int:
         """The mode at the section."""
         return self.signature.visits[0].mode
+
+
+def plane_across(z: FloatArray, field: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(z_ref, f_ref) of the plane f_ref . (u - z_ref) = 0 through z across the flow, in states divided by ``size``."""
+    weighted = field / size**2
+    return z.copy(), weighted / max(float(np.abs(weighted * size).max()), 1e-300)

@@ -13,9 +13,8 @@ from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.patterns import PatternEngine
 from nonsmooth.flow.engines.series import SeriesEngine
 
-__all__ = ["BATCH", "DEVICES", "batch_size", "check_device", "engine_on", "gpu_name", "on_gpu", "workers_of"]
+__all__ = ["BATCH", "batch_size", "engine_on", "gpu_name", "on_gpu"]
 
-DEVICES = ("cpu", "cuda")
 BATCH = 65536  # trajectories of one chunk of work on a GPU
 SERIES = ("taylor",)  # methods of the series kernels that a GPU runs
 PER_MULTIPROCESSOR = 512  # of one launch: twice what its registers hold, so that a small GPU is not busy for long
@@ -42,36 +41,6 @@ def gpu_name() -> str:
 
 def _simulated() -> bool:
     return os.environ.get("NUMBA_ENABLE_CUDASIM", "0") not in ("", "0")
-
-
-def check_device(device: Any) -> str:
-    """``device`` where it is one.
-
-    Raises
-    ------
-    ValueError
-        No device of this package.
-    """
-    if not isinstance(device, str) or device not in DEVICES:
-        raise ValueError(f"device = {device!r} does not exist; allowed: {', '.join(map(repr, DEVICES))}")
-    return device
-
-
-def workers_of(device: str, threads: int | None, client: Any = None) -> int | None:
-    """Threads for chunks of work: one where a GPU runs them.
-
-    Raises
-    ------
-    ValueError
-        Threads or a cluster together with a GPU.
-    """
-    if device == "cpu":
-        return threads
-    if client is not None:
-        raise ValueError('device="cuda" uses the GPU of this machine: leave client out, or use device="cpu"')
-    if threads is not None:
-        raise ValueError('threads are those of device="cpu": leave threads out with device="cuda"')
-    return 1
 
 
 def engine_on(device: Any, engine: Engine, plan: Section | None) -> Engine:
@@ -116,7 +85,7 @@ def on_gpu(device: Any, verb: str, engine: Engine, plan: Section | None, *, carr
     RuntimeError
         No NVIDIA driver, or no GPU.
     """
-    if check_device(device) == "cpu":
+    if device == "cpu":
         return False
     if engine.phases is not None:
         raise ValueError(
@@ -141,7 +110,7 @@ def on_gpu(device: Any, verb: str, engine: Engine, plan: Section | None, *, carr
             f'{verb} with device="cuda" takes every return of a section, this one passes over some (every = '
             f'{plan.every}): leave `every` out, or use device="cpu"'
         )
-    if carried:
+    if carried and not (planar and verb == "chart"):
         raise ValueError(
             f'{verb} with device="cuda" runs all points at once, so none can go on from the state of another: begin '
             'each at start (chart: leave carry out; sweep, lyapunov: direction=None), or use device="cpu"'

@@ -9,9 +9,8 @@ import numpy as np
 
 from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.identification.blas import one_blas_thread
-from nonsmooth.identification.compare.draws import nominal, read_settings
+from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
 from nonsmooth.identification.compare.measured import recorded_motion
-from nonsmooth.identification.compare.model import Model
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
@@ -204,7 +203,7 @@ def compare(
             grid=whole_number(grid, "grid", 8), max_period=whole_number(max_period, "max_period", 1),
             splits=whole_number(splits, "splits", 20),
         )  # fmt: skip
-        variables["section_phase"] = (("section_phase",), np.array(phases), {
+        variables["section_phase"] = ("section_phase", np.array(phases), {
             "long_name": "phase of the section", "units": "forcing periods"})  # fmt: skip
     given = {
         "settings": {key: ["follows" if one.follows else one.value, one.uncertainty] for key, one in set_.items()},
@@ -282,9 +281,8 @@ def _noise(measured: xr.Dataset, noise: Any, states: list[str]) -> np.ndarray:
 
 
 def _parameter(name: str, theory: Any) -> str:
-    if hasattr(theory, "parameters") and name not in theory.parameters:
-        units = {key: item.unit for key, item in theory.parameters.items()}
-        raise ValueError(unknown(name, "a parameter", repr(theory.name), units))
+    if hasattr(theory, "parameters"):
+        check_parameter(name, theory)
     return name
 
 
@@ -330,7 +328,7 @@ def _dataset(
         "state_unit": ("state", np.array([units[name] for name in model.states]), {"long_name": "unit"}),
     }
     parameter_names = set(getattr(theory, "parameters", ()))
-    named = {key for key, (dims, _, _) in variables.items() if dims == (key,) or (not dims and key in parameter_names)}
+    named = {key for key, (dims, _, _) in variables.items() if dims == key or (not dims and key in parameter_names)}
     coords |= {key: variables.pop(key) for key in sorted(named)}
     data = {key: (dims, np.asarray(values), attrs) for key, (dims, values, attrs) in variables.items()}
     attrs = {"comparison": kind, "synthetic": synthetic, "title": str(measured.attrs.get("title", ""))}

@@ -8,20 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.compare.band import motion_band
-from nonsmooth.identification.compare.clouds import cloud_distance, wasserstein
-from nonsmooth.identification.compare.fold import fold, mean_orbit
-from nonsmooth.identification.compare.model import Model
-from nonsmooth.identification.compare.orbits import common_length, orbit_distance
+from nonsmooth.identification.compare.clouds import cloud_distance, energy_distance, wasserstein
+from nonsmooth.identification.compare.draws import Model
+from nonsmooth.identification.compare.orbits import common_length, fold, mean_orbit, orbit_distance
 from nonsmooth.identification.compare.periods import measured_period
-from nonsmooth.identification.compare.predict import Attractor, Motions
-from nonsmooth.identification.compare.theory import Prediction, from_result, predict
+from nonsmooth.identification.compare.predict import Attractor, Motions, Prediction, from_result, predict
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["compare_motion"]
+    from nonsmooth.system.system import System
 
+__all__ = ["compare_motion", "motion_band"]
 
 KEEP = 128  # section points by which a predicted motion is judged
 CLOUD = 2000  # section points of a predicted motion without a period number
@@ -41,10 +39,7 @@ def compare_motion(
     motions = None
     if model.system is not None:
         starts = _starts(sections[0] if phases[0] == 0 else None, folded, model, start)
-        motions = Motions(
-            [model.system], transient=model.transient, keep=KEEP, max_period=max_period, options=model.options,
-            places=model.places,
-        )  # fmt: skip
+        motions = Motions([model.system], model, keep=KEEP, max_period=max_period)
         predicted = predict(motions, sections, phases, scale, starts=starts, n=max(CLOUD, len(sections[0])), grid=grid)
     else:
         predicted = from_result(model.theory, model.states, phases, grid, max_period)
@@ -106,13 +101,13 @@ def _clouds(
     from scipy.stats import wasserstein_distance
 
     size = min(len(points) for points in sections)
-    at = ("section_phase",)
+    at = "section_phase"
     variables: dict[str, Any] = {
-        "measured_section": ((*at, "measured_iterate", "state"), np.stack([p[:size] for p in sections]),
+        "measured_section": ((at, "measured_iterate", "state"), np.stack([p[:size] for p in sections]),
                              {"long_name": "measured section points"}),
-        "theory_section": ((*at, "theory_iterate", "state"), np.stack(exact),
+        "theory_section": ((at, "theory_iterate", "state"), np.stack(exact),
                            {"long_name": "predicted section points"}),
-        "section_scale": (("state",), scale, {"long_name": "unit of each state in the distances of clouds"}),
+        "section_scale": ("state", scale, {"long_name": "unit of each state in the distances of clouds"}),
     }  # fmt: skip
     found = [
         cloud_distance(a / scale, b / scale, splits=splits, seed=seed) if min(len(a), len(b)) >= 40 else None
@@ -123,7 +118,7 @@ def _clouds(
         for a, b in zip(sections, blurred, strict=True)
     ]
     both = [wasserstein(a / scale, b / scale, seed) for a, b in zip(sections, blurred, strict=True)]
-    variables["wasserstein_distance"] = ((*at, "state"), np.array(moved), {
+    variables["wasserstein_distance"] = ((at, "state"), np.array(moved), {
         "long_name": "Wasserstein distance of the section clouds, in the state's unit"})  # fmt: skip
     variables["wasserstein_distance_joint"] = (at, np.array(both), {
         "long_name": "Wasserstein distance of the section clouds in all states, scaled"})  # fmt: skip
@@ -159,7 +154,7 @@ def _periods(
         "measured_period_number": ((), np.int64(number), {"long_name": "measured period number (0: none found)"}),
         "theory_period_number": ((), np.int64(predicted.period_number), {
             "long_name": "period number of the nearest predicted motion (0: none found)"}),
-        "coexisting_period_number": (("attractor",), coexisting, {
+        "coexisting_period_number": ("attractor", coexisting, {
             "long_name": "period numbers of all predicted motions"}),
         "period_agrees": ((), np.int8(number == predicted.period_number), {
             "long_name": "1 where the nearest predicted motion has the measured period number"}),
@@ -227,5 +222,73 @@ def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, grid:
         variables["measured_scatter"] = (over, scatter, {"long_name": "standard deviation of one pass"})
     for name, values in zip(names, (a, b), strict=True):
         coordinate = np.arange(len(values)) / grid
-        variables[name] = ((name,), coordinate, {"long_name": "phase of the drive", "units": "forcing periods"})
+        variables[name] = (name, coordinate, {"long_name": "phase of the drive", "units": "forcing periods"})
+    return variables
+
+
+POINTS = 500  # of the clouds whose distance is taken for each draw
+
+
+def motion_band(
+    systems: list[System], model: Model, nearest: Attractor, sections: list[FloatArray], phases: list[float],
+    noise: FloatArray, scale: FloatArray, closed: tuple[FloatArray, FloatArray] | None, *, grid: int, max_period: int,
+) -> dict[str, Any]:  # fmt: skip
+    """Carry the nearest motion on to each drawn system, and say how the prediction spreads.
+
+    Parameters
+    ----------
+    systems : list of System
+        As the model has drawn them.
+    model : Model
+    nearest : Attractor
+        The nominal motion; each drawn system begins on it.
+    sections : list of array (n, states)
+        The measured clouds.
+    closed : (measured, predicted) orbits of shape (periods * grid, states), optional
+        Where both motions are periodic.
+
+    Notes
+    -----
+    A draw with another period number has another motion, not a point of the band: ``band_share`` says how many kept
+    theirs.
+    """
+    rng = np.random.default_rng(model.seed)
+    draws = len(systems)
+    numbers = np.zeros(draws, dtype=np.int64)
+    distances = np.full((draws, len(phases)), np.nan)
+    to_measured = np.full(draws, np.nan)
+    orbits: list[FloatArray] = []
+    motions = Motions(systems, model, keep=64, max_period=max_period)
+    for i in range(draws):
+        (one,) = motions.attractors(i, nearest.point)
+        numbers[i] = one.period_number
+        for j, phase in enumerate(phases):
+            points = motions.cloud(i, one, phase, POINTS)
+            points = points + noise * rng.standard_normal(points.shape)
+            distances[i, j] = energy_distance(sections[j][-POINTS:] / scale, points / scale)
+        length = 0 if closed is None else len(closed[0]) // grid
+        if closed is not None and one.period_number and length % one.period_number == 0:
+            motion = common_length(motions.orbit(i, one, grid, one.period_number), one.period_number, length)
+            motion = np.roll(motion, orbit_distance(closed[1], motion, length).whole_shift * grid, axis=0)
+            orbits.append(motion)
+            to_measured[i] = orbit_distance(closed[0], motion, length).distance
+    variables: dict[str, Any] = {
+        "draw_period_number": ("draw", numbers, {"long_name": "period number for drawn parameters"}),
+        "draw_energy_distance": (("section_phase", "draw"), distances.T, {
+            "long_name": "energy distance of the section clouds for drawn parameters, scaled"}),
+    }  # fmt: skip
+    if closed is None:
+        return variables
+    variables["draw_orbit_distance"] = ("draw", to_measured, {
+        "long_name": "normalised distance of the orbits for drawn parameters"})  # fmt: skip
+    variables["band_share"] = ((), len(orbits) / draws, {
+        "long_name": "share of the draws that keep the period; these make the band"})  # fmt: skip
+    if orbits:
+        stack = np.stack(orbits)
+        low, middle, high = np.quantile(stack, model.quantiles, axis=0)
+        for word, values in (("low", low), ("median", middle), ("high", high)):
+            variables[f"theory_{word}"] = (("phase", "state"), values, {"long_name": f"{word} of the band"})
+        inside = ((closed[0] >= low) & (closed[0] <= high)).mean(axis=0)
+        variables["inside_band"] = ("state", inside, {
+            "long_name": "share of the measured orbit that lies inside the band"})  # fmt: skip
     return variables

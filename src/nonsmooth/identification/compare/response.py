@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from nonsmooth.arrays import FloatArray
 from nonsmooth.diagrams.response import jumps_in
 from nonsmooth.diagrams.sweep import sweep
+from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.jumps import Jump, Jumps, jumps_in_steps, match_jumps
-from nonsmooth.identification.compare.model import Model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,18 +39,18 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: st
         values = np.linspace(runs["value"].min(), runs["value"].max(), FINE)
         curves, at_runs = _curves(model.system, model, name, state, values, runs, directions)
     variables: dict[str, Any] = {
-        f"measured_{name}": (("run",), runs["value"], {"long_name": f"measured {name}", "units": unit}),
-        "measured_direction": (("run",), runs["direction"], {"long_name": "direction in which the run was reached"}),
-        "measured_amplitude": (("run",), runs["amplitude"], {"long_name": "measured amplitude"}),
-        "measured_amplitude_error": (("run",), runs["error"], {"long_name": "standard error of it"}),
-        "measured_period_number": (("run",), runs["period"], {
+        f"measured_{name}": ("run", runs["value"], {"long_name": f"measured {name}", "units": unit}),
+        "measured_direction": ("run", runs["direction"], {"long_name": "direction in which the run was reached"}),
+        "measured_amplitude": ("run", runs["amplitude"], {"long_name": "measured amplitude"}),
+        "measured_amplitude_error": ("run", runs["error"], {"long_name": "standard error of it"}),
+        "measured_period_number": ("run", runs["period"], {
             "long_name": "measured period number (0: none found, -1: not known)"}),
         "theory_amplitude": ((name, "direction"), curves, {"long_name": "predicted amplitude"}),
-        "theory_at_run": (("run",), at_runs, {"long_name": "predicted amplitude at the run"}),
-        "relative_difference": (("run",), at_runs / runs["amplitude"] - 1, {
+        "theory_at_run": ("run", at_runs, {"long_name": "predicted amplitude at the run"}),
+        "relative_difference": ("run", at_runs / runs["amplitude"] - 1, {
             "long_name": "prediction over measurement, minus 1"}),
-        name: ((name,), values, {"long_name": name, "units": unit}),
-        "direction": (("direction",), np.array(directions), {"long_name": "direction of the sweep"}),
+        name: (name, values, {"long_name": name, "units": unit}),
+        "direction": ("direction", np.array(directions), {"long_name": "direction of the sweep"}),
     }  # fmt: skip
     expected = _jumps(values, curves, directions)
     seen = _measured_jumps(measured, runs, directions)
@@ -114,7 +114,7 @@ def _runs(measured: xr.Dataset, name: str, state: str) -> dict[str, NDArray[Any]
 
 def _curves(
     system: System, model: Model, name: str, state: str, values: FloatArray, runs: dict[str, NDArray[Any]],
-    directions: list[str],
+    directions: list[Any],
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """The predicted curve on a regular grid, and at the runs: one carried sweep over both for each direction."""
     curves = np.empty((len(values), len(directions)))

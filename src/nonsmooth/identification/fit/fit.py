@@ -206,7 +206,7 @@ def problem_of(
 ) -> Windows:  # fmt: skip
     """The problem, without windows; the noise is the records' own irregularity."""
     check_system(system, "fit", inputs=True)
-    from nonsmooth.identification.fit.first_modes import read_modes
+    from nonsmooth.identification.fit.first_level import read_modes
     from nonsmooth.identification.fit.motion import Marcher
     from nonsmooth.identification.fit.records import irregularity, read_records
     from nonsmooth.identification.fit.unknowns import read_unknowns
@@ -301,7 +301,7 @@ def _guesses(
 
     given, rng = with_phases(u.guess), np.random.default_rng(seed)
     hidden = free and any(
-        np.isnan(states_from_samples(problem, given, record, slice(0, 1))).any() for record in problem.records
+        np.isnan(states_from_samples(problem, given, run, slice(0, 1))).any() for run in range(len(problem.records))
     )
 
     def others() -> Iterator[tuple[FloatArray, float, FloatArray | None]]:

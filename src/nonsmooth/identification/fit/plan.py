@@ -11,9 +11,8 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, shortened
 from nonsmooth.flow.arguments import check_system, yes_or_no
-from nonsmooth.identification.arrow import inverted, reduced
+from nonsmooth.identification.arrow import LEAST, inverted, reduced
 from nonsmooth.identification.blas import one_blas_thread
-from nonsmooth.identification.fit.rough import LEAST
 from nonsmooth.system.names import by_name, unknown
 
 if TYPE_CHECKING:
@@ -129,29 +128,22 @@ def plan_experiment(
         found.append(told)
     alone = np.array([_uncertainties(one + precision) for one in found])
     size = np.where(theta != 0, np.abs(theta), 1.0)
-    left, total = list(range(len(found))), precision
-    order, after, measure = [], [], []
-    while left:
-        best = max(left, key=lambda i: _gain(total + found[i], size))
-        left.remove(best)
-        total = total + found[best]
-        order.append(best)
-        after.append(_uncertainties(total))
-        measure.append(_log_det(total, size))
+    order, totals = _ordered(found, precision, size)
     labels = np.array(list(map(str, runs)), dtype=object)
     units = np.array(_units(system, names), dtype=object)
     return xr.Dataset(
         {
             "uncertainty": (("run", "parameter"), alone, {"long_name": "standard uncertainty by this run"}),
-            "log_det": (("run",), [_log_det(one + precision, size) for one in found], {
+            "log_det": ("run", [_log_det(one + precision, size) for one in found], {
                 "long_name": "log det of the information, in units of the parameters' values"}),
-            "best": (("parameter",), labels[np.argmin(alone, axis=0)].astype(str), {
+            "best": ("parameter", labels[np.argmin(alone, axis=0)].astype(str), {
                 "long_name": "run with the least uncertainty"}),
             "information": (("run", "parameter", "other"), np.array(found), {"long_name": "Fisher information"}),
-            "order": (("step",), labels[order].astype(str), {"long_name": "run that adds most to the determinant"}),
-            "uncertainty_after": (("step", "parameter"), np.array(after), {
+            "order": ("step", labels[order].astype(str), {"long_name": "run that adds most to the determinant"}),
+            "uncertainty_after": (("step", "parameter"), np.array([*map(_uncertainties, totals)]), {
                 "long_name": "standard uncertainty by this run and those before"}),
-            "log_det_after": (("step",), measure, {"long_name": "log det by this run and those before"}),
+            "log_det_after": ("step", [_log_det(one, size) for one in totals], {
+                "long_name": "log det by this run and those before"}),
         },
         {
             "run": labels.astype(str), "parameter": names, "other": names, "step": np.arange(1, len(order) + 1),
@@ -173,6 +165,7 @@ def _information(
     asked: dict[str, Any] = {key: run.get(key) for key in ("samples", "start", "mode")}
     asked |= {key: run[key] for key in ("duration", "periods") if key in run}
     motion = simulate(system.with_parameters(settings), **asked)
+    motion = motion.isel(time=~np.isin(motion["time"], motion["crossing_time"]))  # no readings are taken there
     mode = list(system.modes)[int(motion["mode"].values[0])] if motion["mode"].dtype.kind in "iu" else None
     problem = problem_of(system, motion, parameters, sensors, priors, settings, None, "time", run.get("mode") or mode)
     problem = replace(problem, noise=noise)
@@ -189,6 +182,18 @@ def _information(
     eliminated = normal[:shared, :shared] - normal[:shared, shared:] @ own @ normal[shared:, :shared]
     known = problem.unknowns.precision[:shared, :shared]
     return list(problem.unknowns.names[:shared]), eliminated, known, theta[:shared]
+
+
+def _ordered(
+    found: list[FloatArray], known: FloatArray, size: FloatArray
+) -> tuple[list[int], list[FloatArray]]:
+    """The runs, each the one that adds most to the determinant, and the information with each and those before."""
+    order: list[int] = []
+    totals: list[FloatArray] = []
+    while left := [i for i in range(len(found)) if i not in order]:
+        order.append(max(left, key=lambda i: _gain(known + found[i], size)))
+        totals.append(known := known + found[order[-1]])
+    return order, totals
 
 
 def _uncertainties(information: FloatArray) -> FloatArray:

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.arrow import Unsettled, inverted, settle
+from nonsmooth.identification.arrow import LEAST, Unsettled, inverted
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.growth import Grown
-from nonsmooth.identification.fit.rough import LEAST
 from nonsmooth.identification.profiles import Profile, profile_of
 from nonsmooth.results.progress import Progress, progress
 
@@ -57,7 +56,7 @@ def profiled(
 def _side(grown: Grown, i: int, step: float, scale: float) -> list[tuple[float, float]]:
     """Values of an unknown on one side and the rise of chi^2 there, up to where it is enough."""
     problem, u = grown.problem, grown.problem.unknowns
-    theta, starts, least = grown.theta, grown.starts, _cost(grown, grown.theta, grown.starts)
+    theta, starts, least = grown.theta, grown.starts, problem.cost(grown.theta, grown.starts)
     rows: list[tuple[float, float]] = []
     for k in range(1, _STEPS + 1):
         value = grown.theta[i] + k * _STEP * step
@@ -66,26 +65,16 @@ def _side(grown: Grown, i: int, step: float, scale: float) -> list[tuple[float, 
         low, high, theta = u.low.copy(), u.high.copy(), theta.copy()
         low[i] = high[i] = theta[i] = value
         try:
-            theta, starts, _, _ = settle(
-                replace(problem, unknowns=replace(u, low=low, high=high)), theta, starts, 0.0, [True] * len(starts),
-                u.centre, u.precision, 50, False, (low, high), LEAST,
-            )  # fmt: skip
+            theta, starts, _ = replace(problem, unknowns=replace(u, low=low, high=high)).settle(theta, starts)
         except Unsettled as reason:
             theta, starts = reason.values, reason.starts
-        rise = (_cost(grown, theta, starts) - least) * scale
+        rise = (problem.cost(theta, starts) - least) * scale
         if not np.isfinite(rise):
             break
         rows.append((float(value), rise))
         if rise > _ENOUGH:
             break
     return rows
-
-
-def _cost(grown: Grown, theta: FloatArray, starts: FloatArray) -> float:
-    problem, u = grown.problem, grown.problem.unknowns
-    state = problem.residuals(theta, starts)
-    data = sum(float(np.sum((r * w) ** 2)) for r, w in zip(state.residuals, problem.weights(state, 0.0), strict=True))
-    return data + float((theta - u.centre) @ u.precision @ (theta - u.centre))
 
 
 def _finding(grown: Grown, name: str, profile: Profile, estimate: Estimate, synthetic: bool) -> Finding:
@@ -97,9 +86,8 @@ def _finding(grown: Grown, name: str, profile: Profile, estimate: Estimate, synt
     note = f"{name}: 95 % limits {low} to {high} by its profile; {by_error} by its standard uncertainty"
     if not np.isfinite(list(ends.values())).all():
         note += "; the record does not bound it on both sides"
-    readings = sum(len(window.readings[0]) for window in grown.problem.pieces)
     return Finding(
-        f"{name}, profile", estimate, METHOD, readings, tuple(record.name for record in grown.problem.records), (note,),
+        f"{name}, profile", estimate, METHOD, grown.readings, grown.runs, (note,),
         data=xr.Dataset(
             {"cost": ("value", profile.cost), "best": ((), profile.best), **{k: ((), v) for k, v in ends.items()}},
             {"value": ("value", profile.values, {"units": estimate.unit})},

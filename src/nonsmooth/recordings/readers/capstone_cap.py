@@ -5,23 +5,26 @@
 trailing records have the flag 0, and the number of valid ones equals ``DataCacheDataSize``. A flag of 2 begins text
 that a user typed into a table; it is no measurement and is left out with a remark. ``BaseUnit`` is a unit, or the
 number of one in a table of the file (an element whose name holds ``Unit``, with that number as its ``...ID``).
+``main.xml`` is parsed by expat piece by piece, keeping only what is asked for; a document type (and with it every
+entity) is refused.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+from xml.parsers import expat
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.recordings.readers.archive import Archive
-from nonsmooth.recordings.readers.capstone_xml import Experiment, Segment, parse
-from nonsmooth.recordings.reading import Options, Reading, Source, Trace
-from nonsmooth.recordings.remarks import Remarks
+from nonsmooth.errors import DataFileError
+from nonsmooth.recordings.readers.text_table import number
+from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Options, Reading, Remarks, Source, Trace
 
-__all__ = ["RECORD", "SYNTHETIC", "read"]
+__all__ = ["RECORD", "SYNTHETIC", "Experiment", "Segment", "parse", "read"]
 
 RECORD = np.dtype([("valid", "<u4"), ("value", "<f8")])
 
@@ -85,10 +88,10 @@ def _trace(
         if stretch is None:
             remarks.of(run, name, f"{segment.values} holds text that a user typed, no measurement; left out")
             continue
-        if stretch.blank:
-            remarks.of(run, name, f"{stretch.blank} records between valid ones are marked invalid; they are NaN")
-        times.append(stretch.times)
-        values.append(stretch.values)
+        times.append(stretch[0])
+        values.append(stretch[1])
+        if stretch[2]:
+            remarks.of(run, name, f"{stretch[2]} records between valid ones are marked invalid; they are NaN")
     if not values:
         return None
     # As in the CSV export, so that a channel has one name in both.
@@ -106,86 +109,191 @@ def _trace(
     return Trace(run, name, unit, axis, column, origin, attrs=attrs)
 
 
-@dataclass(frozen=True, eq=False)
-class _Stretch:
-    times: FloatArray
-    values: FloatArray
-    blank: int
-
-
-def _stretch(segment: Segment, archive: Archive, comma: bool, source: Source) -> _Stretch | None:
+def _stretch(
+    segment: Segment, archive: Archive, comma: bool, source: Source
+) -> tuple[FloatArray, FloatArray, int] | None:
+    """Times and values of a block, and how many of its records are blank; None if it holds typed text."""
     place = f"main.xml, line {segment.line}"
     if not (segment.size.isascii() and segment.size.isdigit() and len(segment.size) < 16):
         raise source.error(place, f"DataCacheDataSize is {segment.size[:40]!r}, expected a number of records")
     size = int(segment.size)
     values = _records(segment.values, size, archive, source)
-    if values is None:
-        return None
-    if size == 0:
-        return _Stretch(np.empty(0), np.empty(0), 0)
-    blank = len(values) - size
+    if values is None or size == 0:
+        return None if values is None else (values, values, 0)
     if segment.times:
         times = _records(segment.times, size, archive, source)
         if times is None or len(times) != len(values):
             raise source.error(segment.times, f"does not hold one time for each of the {len(values)} values")
-        return _Stretch(times, values, blank)
-    start = _decimal(segment.start, comma)
-    interval = _decimal(segment.interval, comma)
-    if start is None or interval is None or not interval > 0:
+        return times, values, len(values) - size
+    start, interval = (
+        number(text.replace(",", ".") if comma else text, ".") for text in (segment.start, segment.interval)
+    )
+    if start is None or interval is None or not (math.isfinite(start) and 0 < interval < math.inf):
         raise source.error(
             place,
             f"the clock of {segment.values} is IntervalCacheStartValue = {segment.start[:40]!r}, "
             f"IntervalCacheInterval = {segment.interval[:40]!r}; expected a time and a step > 0",
         )
-    return _Stretch(start + interval * np.arange(len(values), dtype=np.float64), values, blank)
+    return start + interval * np.arange(len(values), dtype=np.float64), values, len(values) - size
 
 
 def _records(member: str, size: int, archive: Archive, source: Source) -> FloatArray | None:
     """The values up to the last valid one (an invalid one before it is NaN); None if the member holds typed text."""
-    found: list[FloatArray] = []
-    rest, records, valid, last = b"", 0, 0, 0
-    for piece in archive.pieces(member):
-        rest += piece
-        whole = len(rest) // RECORD.itemsize * RECORD.itemsize
-        table = np.frombuffer(rest[:whole], RECORD)
-        rest = rest[whole:]
-        if records == 0 and len(table) and table["valid"][0] == _TYPED_TEXT:
-            return None
-        odd = np.flatnonzero(table["valid"] > 1)
-        if len(odd):
-            k = int(odd[0])
-            raise source.error(
-                f"{member}, record {records + k + 1}", f"its valid flag is {table['valid'][k]}, expected 0 or 1"
-            )
-        marked = np.flatnonzero(table["valid"])
-        valid += len(marked)
-        if valid > size:
-            raise source.error(
-                f"{member}, record {records + len(table)}", f"has more valid records than the {size} of main.xml"
-            )
-        if len(marked):
-            last = records + int(marked[-1]) + 1
-        if valid < size or len(marked):
-            # Nothing behind the last valid record is kept.
-            end = int(marked[-1]) + 1 if valid == size else len(table)
-            found.append(np.where(table["valid"][:end] == 1, table["value"][:end], math.nan))
-        records += len(table)
+    content = b"".join(archive.pieces(member))
+    count, rest = divmod(len(content), RECORD.itemsize)
+    table = np.frombuffer(content, RECORD, count)
+    valid, marked = table["valid"], np.flatnonzero(table["valid"])
+
+    def error(record: int, message: str) -> DataFileError:
+        return source.error(f"{member}, record {record}", message)
+
+    if count and valid[0] == _TYPED_TEXT:
+        return None
+    if len(odd := np.flatnonzero(valid > 1)):
+        raise error(int(odd[0]) + 1, f"its valid flag is {valid[odd[0]]}, expected 0 or 1")
+    if len(marked) > size:
+        raise error(count, f"has more valid records than the {size} of main.xml")
     if rest:
-        raise source.error(f"{member}, record {records + 1}", f"is cut short: {len(rest)} of {RECORD.itemsize} bytes")
-    if valid < size:
-        raise source.error(
-            f"{member}, record {records}", f"{valid} of {records} records are valid, main.xml announces {size}"
-        )
-    return np.concatenate(found)[:last] if found else np.empty(0)
+        raise error(count + 1, f"is cut short: {rest} of {RECORD.itemsize} bytes")
+    if len(marked) < size:
+        raise error(count, f"{len(marked)} of {count} records are valid, main.xml announces {size}")
+    end = int(marked[-1]) + 1 if size else 0
+    return np.where(valid[:end] == 1, table["value"][:end], math.nan)
 
 
-def _decimal(text: str, comma: bool) -> float | None:
-    if comma:
-        text = text.replace(",", ".")
-    if not text.isascii() or "_" in text or len(text) > 64:
-        return None
+_MAX_NESTING = 256
+_UNIT_WORDS = ("UnitSymbol", "SymbolName", "Symbol", "ShortName", "UnitName", "Name")
+
+
+@dataclass
+class Segment:
+    """One block of one run: the members with its values and, where the clock is not even, its times."""
+
+    measurement: str
+    channel: str
+    unit: str
+    run: str
+    data_set: int
+    line: int
+    deleted: bool
+    values: str = ""
+    size: str = ""
+    times: str = ""
+    start: str = ""
+    interval: str = ""
+
+
+@dataclass
+class Experiment:
+    """Contents of ``main.xml``; ``units`` are those that its own tables name by a number."""
+
+    header: dict[str, str] = field(default_factory=dict)
+    sensors: list[dict[str, str]] = field(default_factory=list)
+    segments: list[Segment] = field(default_factory=list)
+    empty: list[tuple[str, str]] = field(default_factory=list)
+    units: dict[str, str] = field(default_factory=dict)
+
+
+def parse(pieces: Iterable[bytes], source: Source) -> Experiment:
+    """Read the pieces of ``main.xml``; DataFileError with its line for anything that is not as it should be."""
+    handler = _Handler(source)
+    parser = handler.parser
     try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
+        for piece in pieces:
+            parser.Parse(piece, False)
+        parser.Parse(b"", True)
+    except expat.ExpatError as error:
+        raise source.error(f"main.xml, line {error.lineno}", f"is not well-formed XML ({error})") from None
+    if not handler.rooted:
+        raise source.error("main.xml", "holds no element; expected the root DSProExperiment")
+    return handler.found
+
+
+class _Handler:
+    def __init__(self, source: Source) -> None:
+        self.found = Experiment()
+        self.rooted = False
+        self.parser = expat.ParserCreate()
+        self._source = source
+        self._open: list[str] = []
+        self._data_sources: list[dict[str, Any]] = []
+        self._data_set: dict[str, str] | None = None
+        self._data_sets = 0
+        self._segment: Segment | None = None
+        self.parser.StartDoctypeDeclHandler = self._refuse
+        self.parser.EntityDeclHandler = self._refuse
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+
+    def _error(self, message: str) -> DataFileError:
+        return self._source.error(f"main.xml, line {self.parser.CurrentLineNumber}", message)
+
+    def _refuse(self, *_: Any) -> None:
+        raise self._error("declares a document type or entities, which no Capstone file does; refused")
+
+    def _start(self, name: str, attributes: dict[str, str]) -> None:
+        if not self.rooted:
+            if name != "DSProExperiment":
+                raise self._error(f"the root is {name[:60]!r}, expected DSProExperiment")
+            self.rooted = True
+        self._open.append(name)
+        if len(self._open) > _MAX_NESTING:
+            raise self._error(f"elements are nested deeper than {_MAX_NESTING}")
+        if name == "Header":
+            self.found.header.update({key: attributes[key] for key in list(attributes)[:64]})
+        elif name == "Sensor" and len(self.found.sensors) < MAX_COLUMNS:
+            kept = ("Name", "DistanceForFullRotation", "SamplePeriod")
+            self.found.sensors.append({key: attributes[key] for key in kept if key in attributes})
+        elif name == "DataSource":
+            self._data_sources.append(attributes)
+        elif "Unit" in name and len(self.found.units) < MAX_COLUMNS:
+            self._unit(attributes)
+        elif name == "DataSet" and self._data_sources:
+            self._data_set = attributes
+            self._data_sets += 1
+        elif name == "DataSegmentElement" and self._data_set is not None:
+            self._begin(self._data_sources[-1], self._data_set)
+        elif self._segment is not None and name == "DependentStorageElement":
+            self._segment.values = _path(attributes.get("FileName", ""))
+            self._segment.size = attributes.get("DataCacheDataSize", "")
+        elif self._segment is not None and name == "IndependentStorageElement":
+            self._segment.times = _path(attributes.get("FileName", ""))
+            self._segment.start = attributes.get("IntervalCacheStartValue", "")
+            self._segment.interval = attributes.get("IntervalCacheInterval", "")
+
+    def _unit(self, attributes: dict[str, str]) -> None:
+        """A row of a table of units: a number, and the symbol or name that it stands for."""
+        code = next((value for key, value in attributes.items() if key.endswith("ID") and value.isdigit()), None)
+        text = next((attributes[key] for key in _UNIT_WORDS if attributes.get(key)), None)
+        if code is not None and text is not None:
+            self.found.units.setdefault(code, text)
+
+    def _begin(self, data_source: dict[str, Any], data_set: dict[str, str]) -> None:
+        self._segment = Segment(
+            measurement=data_source.get("MeasurementName", ""),
+            channel=data_source.get("ChannelIDName", ""),
+            unit=data_source.get("BaseUnit", ""),
+            run=data_set.get("DataGroupNumber", ""),
+            data_set=self._data_sets,
+            line=self.parser.CurrentLineNumber,
+            deleted=data_set.get("DataHasBeenDeleted", "").upper() == "TRUE",
+        )
+
+    def _end(self, name: str) -> None:
+        self._open.pop()
+        if name == "DataSegmentElement" and self._segment is not None:
+            if len(self.found.segments) >= 4 * MAX_COLUMNS:
+                raise self._error(f"holds more than {4 * MAX_COLUMNS} blocks of data")
+            if self._segment.values:
+                self.found.segments.append(self._segment)
+            elif len(self.found.empty) < MAX_COLUMNS:
+                self.found.empty.append((self._segment.run, self._segment.measurement))
+            self._segment = None
+        elif name == "DataSet":
+            self._data_set = None
+        elif name == "DataSource" and self._data_sources:
+            self._data_sources.pop()
+
+
+def _path(text: str) -> str:
+    return text.replace("\\", "/").removeprefix("./")
