@@ -22,13 +22,11 @@ __all__ = ["LinearLaw", "StraightLine", "linear_law", "nonlinear_fit", "scattere
 
 
 class StraightLine(NamedTuple):
-    """y = intercept + slope x, standard uncertainties, their covariance, and chi^2 per degree of freedom."""
+    """y = intercept + slope x, the covariance (2, 2) of slope and intercept, and chi^2 per degree of freedom."""
 
     slope: float
     intercept: float
-    slope_error: float
-    intercept_error: float
-    covariance: float
+    covariance: FloatArray
     reduced: float
 
 
@@ -75,10 +73,8 @@ def york(x: Any, y: Any, x_error: Any, y_error: Any) -> StraightLine:
     intercept = float(y_mean - slope * x_mean)
     intercept_var = 1.0 / float(np.sum(weight)) + centre**2 * slope_var
     chi2 = float(np.sum(weight * (ys - intercept - slope * xs) ** 2))
-    return StraightLine(
-        slope, intercept, float(np.sqrt(slope_var)), float(np.sqrt(intercept_var)), float(-centre * slope_var),
-        chi2 / max(len(xs) - 2, 1),
-    )  # fmt: skip
+    covariance = np.array([[slope_var, -centre * slope_var], [-centre * slope_var, intercept_var]])
+    return StraightLine(slope, intercept, covariance, chi2 / max(len(xs) - 2, 1))
 
 
 def scattered_line(x: Any, y: Any, x_error: Any, y_error: Any) -> tuple[StraightLine, float]:
