@@ -6,7 +6,7 @@ it can be stored as text and read back.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -140,7 +140,6 @@ def describe(
         name, units, {k: v.unit for k, v in known.items()}, {k: unit for k, (_, unit) in remembered.items()},
         tuple(input_states(driven)),
     )
-    derived: Collection[str] = ()
     ranges: Sequence[tuple[sp.Expr, str]] = ()
     patterns: Any = None
     made: Mapping[str, Any] = {}
@@ -162,7 +161,6 @@ def describe(
             given["transitions"] = ()
             between = {"all": relays.field}
             made = assembled(symbols, between, relays.elements, given, _scale(scale, units, name), now, relays.name)
-        derived = made["indicators"].keys() - (indicators or {}).keys()
         ranges, patterns = [*(relays.ranges if relays else ()), *made["ranges"]], made.get("patterns")
         plain = partial(_without_elements, name, symbols, units, modes, indicators, transitions, outputs)
         modes, indicators, transitions, outputs = (made[k] for k in ("modes", "indicators", "transitions", "outputs"))
@@ -183,7 +181,7 @@ def describe(
         name,
     )  # fmt: skip
     kinds = {key: _mode(mode, key, units) for key, mode in modes.items()}
-    traced = trace_system(name, symbols, kinds, indicators, transitions, shown, derived)
+    traced = trace_system(name, symbols, kinds, indicators, transitions, shown)
     _check_phases(traced)
     surfaces = tuple(trace_surface(item, mode, traced, symbols) for item, mode in slid)
     values = {symbol: known[key].value for key, symbol in symbols.p.items()}

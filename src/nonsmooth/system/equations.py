@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ from nonsmooth.system.names import unknown
 from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.symbolic.scalar import Scalar, as_written, to_expression
 from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
-from nonsmooth.system.symbolic.tracing import Symbols, call_scalar, call_vector, refuse_corners
+from nonsmooth.system.symbolic.tracing import Known, Symbols, call_scalar, call_vector, refuse_corners
 from nonsmooth.system.transition import Surface, Transition
 
 __all__ = ["TracedBand", "TracedSurface", "sliding_mode", "trace_band", "trace_surface", "trace_system"]
@@ -54,10 +54,8 @@ def trace_system(
     indicators: Mapping[str, Callable[..., Any]],
     transitions: Sequence[Transition | Surface],
     outputs: Mapping[str, tuple[Any, str]],
-    derived: Collection[str] = (),
 ) -> Traced:
-    """Trace everything but the period. ``modes``: name -> (function, its states); ``outputs``: name -> (f, unit);
-    ``derived``: indicators that may be without states, as one of several conditions."""
+    """Trace everything but the period. ``modes``: name -> (function, its states); ``outputs``: name -> (f, unit)."""
     time, p = Scalar(symbols.t), symbols.parameters()
     moving = {symbols.t, *symbols.u.values()}
     everything = tuple(symbols.u)
@@ -75,7 +73,7 @@ def trace_system(
         what = f"indicator {key!r}"
         expression = call_scalar(function, (time, symbols.states(), p), what)
         refuse_corners(expression, moving, what)
-        if key not in derived and not expression.free_symbols & set(symbols.u.values()):
+        if not isinstance(function, Known) and not expression.free_symbols & set(symbols.u.values()):
             raise SystemDefinitionError(
                 f"{what} never involves the state ({as_written(expression)}): nothing can cross it. "
                 f"For a switch at a given time use Transition(..., at=phase)"

@@ -22,7 +22,7 @@ from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.symbolic.expressions import read_expression, write_expression
 from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.traced import Row, Traced
-from nonsmooth.system.symbolic.tracing import Symbols
+from nonsmooth.system.symbolic.tracing import Known, Symbols
 from nonsmooth.system.transition import Surface, Transition
 from nonsmooth.system.variant import variant_of
 
@@ -268,16 +268,18 @@ class _Reader:
         self.symbols = {"t": symbols.t} | {f"u.{key}": s for key, s in symbols.u.items()}
         self.symbols |= {f"p.{key}": s for key, s in (symbols.p | symbols.m).items()}
 
-    def function(self, text: str, extra: Mapping[str, sp.Symbol] | None = None) -> Callable[..., Any]:
-        expression = read_expression(text, self.symbols | dict(extra or {}))
-        _check_kinds(expression, text)
-        return lambda *_: Scalar(expression)
+    def expression(self, text: str, extra: Mapping[str, sp.Symbol] | None = None) -> sp.Expr:
+        found = read_expression(text, self.symbols | dict(extra or {}))
+        _check_kinds(found, text)
+        return found
 
-    def vector(self, texts: Mapping[str, str], extra: Mapping[str, sp.Symbol] | None = None) -> Callable[..., Any]:
-        parts = [self.function(text, extra)() for text in texts.values()]
-        return lambda *_: parts
+    def function(self, text: str, extra: Mapping[str, sp.Symbol] | None = None) -> Known:
+        return Known(self.expression(text, extra))
 
-    def own(self, texts: Mapping[str, str]) -> Callable[..., Any]:
+    def vector(self, texts: Mapping[str, str], extra: Mapping[str, sp.Symbol] | None = None) -> Known:
+        return Known([self.expression(text, extra) for text in texts.values()])
+
+    def own(self, texts: Mapping[str, str]) -> Known:
         """A vector without the entries of inputs, whose motion is that of all inputs."""
         return self.vector({state: text for state, text in texts.items() if state not in self.driven})
 
@@ -320,7 +322,7 @@ class _Reader:
         kind = self.kind(entry["kind"])
 
         def law(text: str) -> Callable[..., Any]:
-            expression = self.function(text, {"speed": SPEED})().expression
+            expression = self.expression(text, {"speed": SPEED})
             if SPEED not in expression.free_symbols:
                 return lambda t, u, p: Scalar(expression)
             return lambda v, p: Scalar(expression.subs(SPEED, v.expression))
@@ -332,7 +334,7 @@ class _Reader:
 
     def within_ranges(self, system: System) -> System:
         """The system with what its parameters must fulfil beyond what its equations say."""
-        ranges = [(self.function(e["not negative"])().expression, e["else"]) for e in self.content.get("ranges", [])]
+        ranges = [(self.expression(e["not negative"]), e["else"]) for e in self.content.get("ranges", [])]
         if not ranges:
             return system
         description = replace(system._description, ranges=tuple(ranges), variants={})
@@ -350,7 +352,7 @@ class _Reader:
                 raise SystemDefinitionError(f"loads of an element {shortened(name)}, which is not there")
 
         def read(text: Any) -> sp.Expr | None:
-            return None if text is None else self.function(text)().expression
+            return None if text is None else self.expression(text)
 
         elements = tuple(
             Load(str(name), self.kind(e["kind"]).__name__, str(e["given"]), read(e["where"]), read(e.get("rate")),

@@ -21,7 +21,7 @@ from nonsmooth.system.derived.expressions import Expressions
 from nonsmooth.system.mode import Mode
 from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, OWN, TOGETHER
-from nonsmooth.system.symbolic.tracing import Symbols, call_vector
+from nonsmooth.system.symbolic.tracing import Known, Symbols, call_vector
 from nonsmooth.system.transition import Surface, Transition
 
 if TYPE_CHECKING:
@@ -111,9 +111,9 @@ def _written_out(
     for mode, pattern in pairs:
         here = name(mode, pattern)
         f, found = make.flow(mode, pattern)
-        fields[here] = _returns(f)
+        fields[here] = Known(f)
         for k, part in enumerate(make.parts):
-            forces[part.name][here] = _returns(found[k])
+            forces[part.name][here] = Known(found[k])
         for k, part in enumerate(make.parts):
             for way in make.leaving(k, mode, pattern):
                 if way.phase is None:
@@ -123,7 +123,7 @@ def _written_out(
                 there = make.place(k, mode, pattern).put(way.phase).pattern
                 if (mode, there) not in pairs:
                     continue  # more contacts than can be held by forces of their own
-                reset = None if way.states is None else _returns(way.states)
+                reset = None if way.states is None else Known(way.states)
                 when = make.condition(way.conditions, part.name)
                 transitions.append(Transition(here, name(mode, there), when=when, reset=reset))
                 kinds.append(ALONE if make.asks and part.element.held else "")
@@ -151,7 +151,7 @@ def _written_out(
         outputs[key] = function, unit
     return {
         "modes": fields, "transitions": transitions,
-        "indicators": {**(given["indicators"] or {}), **{key: _returns(g) for key, g in make.indicators.items()}},
+        "indicators": {**(given["indicators"] or {}), **{key: Known(g) for key, g in make.indicators.items()}},
         "outputs": outputs if named else {**outputs, **{f"{key}_force": (row, "") for key, row in forces.items()}},
         "ranges": make.ranges(next(iter(base))), "kinds": kinds, "asked": asked,
         "decider": Decider(make, pairs, _affine(make, base, given)) if make.asks else None, "make": make,
@@ -213,16 +213,7 @@ def _opened(
         )
     patterns = Patterns(make, next(iter(base)), why=why)
     return {
-        "modes": {key: _returns(list(field)) for key, field in base.items()}, "transitions": (),
-        "indicators": {key: _returns(e) for key, e in zip(patterns.labels, patterns.expressions, strict=True)},
+        "modes": {key: Known(list(field)) for key, field in base.items()}, "transitions": (),
+        "indicators": {key: Known(e) for key, e in zip(patterns.labels, patterns.expressions, strict=True)},
         "outputs": given["outputs"], "ranges": make.ranges(patterns.mode), "patterns": patterns, "make": make,
     }  # fmt: skip
-
-
-def _returns(found: Any) -> Callable[..., Any]:
-    """A function of t, u, p that gives these expressions."""
-    if isinstance(found, (list, tuple)):
-        entries = [Scalar(sp.sympify(one)) for one in found]
-        return lambda t, u, p: entries
-    value = Scalar(sp.sympify(found))
-    return lambda t, u, p: value

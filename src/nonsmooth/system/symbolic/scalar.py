@@ -17,7 +17,7 @@ import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 
-__all__ = ["Condition", "Scalar", "as_written", "to_expression", "where"]
+__all__ = ["Condition", "Scalar", "as_written", "exact", "to_expression", "where"]
 
 _DECISION = (
     "`{}` cannot be decided while the function is traced: a Python `if`, `max()`, `min()`, `np.where` on a state or "
@@ -28,6 +28,11 @@ _NUMBER = (
     "a symbolic number cannot become a float: use NumPy's functions (np.cos, np.sqrt, np.exp, ...) in place of "
     "those of `math`, and build arrays without dtype=float; the number was `{}`"
 )
+
+
+def exact(expression: sp.Expr) -> sp.Expr:
+    """The expression with whole numbers and halves exact, as they are read back from a text."""
+    return expression.xreplace({number: to_expression(float(number)) for number in expression.atoms(sp.Float)})
 
 
 def to_expression(value: Any) -> sp.Expr:

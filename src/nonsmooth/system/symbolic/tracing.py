@@ -12,9 +12,9 @@ import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.names import unknown
-from nonsmooth.system.symbolic.scalar import Scalar, as_written, to_expression
+from nonsmooth.system.symbolic.scalar import Scalar, as_written, exact, to_expression
 
-__all__ = ["Parameters", "States", "Symbols", "call_scalar", "call_vector", "refuse_corners"]
+__all__ = ["Known", "Parameters", "States", "Symbols", "call_scalar", "call_vector", "refuse_corners"]
 
 # What no method can see inside a mode: the derivative jumps and nothing says where.
 _CORNERS = (sp.Abs, sp.sign, sp.Max, sp.Min, sp.Piecewise, sp.floor, sp.ceiling, sp.Heaviside)
@@ -120,6 +120,19 @@ class Parameters(_Named):
         object.__setattr__(self, name, value)
 
 
+class Known:
+    """A function whose expressions are known, one or a list of them, as those of elements and those of a text are.
+
+    An indicator among them may be of time alone."""
+
+    def __init__(self, found: Any) -> None:
+        several = isinstance(found, (list, tuple))
+        self.found = [Scalar(sp.sympify(one)) for one in found] if several else Scalar(sp.sympify(found))
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.found
+
+
 def call_vector(function: Callable[..., Any], arguments: Sequence[Any], names: Sequence[str], what: str) -> tuple:
     """Call a user's function and return one expression per name.
 
@@ -217,7 +230,7 @@ def _entry(value: Any, what: str) -> sp.Expr:
         raise SystemDefinitionError(f"{what} is not real: {shortened(as_written(expression), quoted=False)}")
     if any(abs(number) > _LARGEST for number in expression.atoms(sp.Number)):
         raise SystemDefinitionError(f"{what} holds a number beyond {float(_LARGEST):.3g}, more than a float can hold")
-    return expression
+    return exact(expression)
 
 
 def refuse_corners(expression: sp.Expr, state: set[sp.Symbol], what: str) -> None:
