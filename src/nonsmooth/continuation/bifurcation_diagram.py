@@ -146,7 +146,7 @@ def bifurcation_diagram(
         for value, period, u in _periodic(swept, parameter):
             if any(int(one.data["period_number"]) == period and one.holds(value, u) for one in found):
                 continue
-            if not complete or _spent(search):
+            if not complete or search.over():
                 complete = False
                 break
             try:
@@ -197,15 +197,6 @@ def _periodic(swept: xr.Dataset, name: str) -> list[tuple[float, int, FloatArray
     return [(value, number, u) for _, number, value, u in found]
 
 
-def _spent(search: Search) -> bool:
-    """Return whether the budget is spent."""
-    try:
-        search.look()
-    except SolveError:
-        return True
-    return False
-
-
 def _switched(
     found: list[_Branch], depth: int, most: int, search: Search, more: dict[str, Any], near: float
 ) -> bool:
@@ -221,7 +212,7 @@ def _switched(
                 continue
             if any(other is not branch and other.begins_at(row, near) for other in found):
                 continue
-            if _spent(search):
+            if search.over():
                 return False
             try:
                 found.append(_branch(continue_orbit(row, **more), at, branch.level + 1))

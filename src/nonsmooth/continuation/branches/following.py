@@ -17,7 +17,7 @@ from nonsmooth.continuation.events.of_orbits import AlongOrbits
 from nonsmooth.continuation.march.event import BESIDE, Step
 from nonsmooth.continuation.march.march import Limits, March, Policy, march
 from nonsmooth.continuation.problems.curve import Place, Point
-from nonsmooth.continuation.problems.orbits import Orbits, size_of
+from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits, size_of
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.continuation.problems.signature import Round, Signature
 from nonsmooth.errors import Interrupted
@@ -136,6 +136,12 @@ class Following:
     def width(self) -> float:
         """The width of the range."""
         return self.range[1] - self.range[0]
+
+    def resumed(self, period_number: int, point: PointRecord, way: float = 1.0) -> OrbitPoint | None:
+        """The orbit of a recorded point on a curve of its own, facing along the branch (1) or back (-1)."""
+        curve, X = resumed_at(self.system, period_number, point, self.name, self.width)
+        border = way * point.tangent / curve.scale
+        return curve.near(X / curve.scale, border / np.linalg.norm(border))
 
     def result(
         self, period_number: int, back: Start, middle: Sequence[PointRecord], ahead: Start,

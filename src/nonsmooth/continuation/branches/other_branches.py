@@ -64,9 +64,7 @@ def straight_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset
     system, kind, own, point, period_number, before = special_row(start, "continue_orbit")
     _check_parameter(name, own)
     branch = asked.follow(system, own, before, point.value)
-    curve, X = resumed_at(system, period_number, point, own, branch.width)
-    border = point.tangent / curve.scale
-    first = curve.near(X / curve.scale, border / np.linalg.norm(border))
+    first = branch.resumed(period_number, point)
     if first is None:
         raise SolveError(f"Newton's method did not converge at this {kind}", status="no_convergence")
     middle = record_of(Row(first))

@@ -75,7 +75,7 @@ def one_row(start: xr.Dataset, verb: str) -> xr.Dataset:
 
 
 def fields_of(dataset: xr.Dataset, table: Sequence[Column], dim: str = "") -> Iterator[dict[str, Any]]:
-    """What the variables of a table hold, one record after the other along a dim; of one row that is all."""
+    """Fields of the records in a result, by the table of its variables, one after the other along a dim."""
     from nonsmooth.results.branches import STEMS
     from nonsmooth.results.schema import typed
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+from math import prod
 from typing import Any, ClassVar
 
 import numpy as np
@@ -9,7 +11,6 @@ import numpy as np
 from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Name, Step, first_beyond
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.equilibrium import FREE, Rest, equilibria_near, goes_on
-from nonsmooth.continuation.problems.multipliers import pairs
 
 __all__ = ["AlongEquilibria", "beyond"]
 
@@ -25,10 +26,7 @@ class Hopf(Event):
 
     def number(self, point: Any) -> float:
         """The product of all sums of two eigenvalues."""
-        if len(point.eigenvalues) < 2:
-            return 1.0
-        i, j = pairs(len(point.eigenvalues))
-        return float(np.prod(point.eigenvalues[i] + point.eigenvalues[j]).real)
+        return complex(prod(a + b for a, b in combinations(point.eigenvalues.tolist(), 2))).real
 
     def named(self, step: Step, point: Any) -> Name:
         """None where the sum of two real eigenvalues vanishes."""

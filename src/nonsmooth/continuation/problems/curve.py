@@ -53,7 +53,7 @@ class Point:
 
     @property
     def rise(self) -> float:
-        """How the last parameter changes along the branch."""
+        """The change of the last parameter along the branch."""
         return float(self.tangent[-1])
 
     @property
@@ -237,9 +237,13 @@ class Curve(ABC, Generic[P]):
 
     def predicted(self, point: P, ds: float, before: P | None) -> FloatArray:
         """A guess at distance ds along the tangent: straight, or on the cubic through both last points and tangents."""
-        if before is None or not 0.0 < ds < FARTHEST * before.along(point.Y):
-            return point.Y + ds * point.tangent
-        return _cubic(before, point, 1.0 + ds / _slope(before, point))
+        Y = point.Y + ds * point.tangent
+        if before is None or not ds < FARTHEST * (h := before.along(point.Y)):
+            return Y
+        back = point.Y - before.Y
+        second = (2 * before.tangent + 4 * point.tangent - 6 / h * back) / h
+        third = (6 * (before.tangent + point.tangent) - 12 / h * back) / (h * h)
+        return Y + ds * ds * (0.5 * second + ds / 6 * third)
 
     def step(self, point: P, ds: float, before: P | None = None) -> P | None:
         """The point at distance ds along the tangent; with the point ``before`` from a better guess."""
@@ -257,7 +261,12 @@ class Curve(ABC, Generic[P]):
         """The point at distance s from ``a`` towards ``b``, to the last digits."""
         end = a.along(b.Y)
         x = s / end
-        Y = _cubic(a, b, x)
+        # Hermite's cubic through both points and tangents.
+        slope = end / max(float(a.tangent @ b.tangent), 1e-3)
+        Y = (
+            a.Y * (1 + 2 * x) * (1 - x) ** 2 + a.tangent * (end * x * (1 - x) ** 2)
+            + b.Y * x * x * (3 - 2 * x) - b.tangent * (slope * x * x * (1 - x))
+        )  # fmt: skip
         level = float(a.tangent @ a.Y) + s
         found = self.correct(Y, a.tangent, level, tolerance=CLOSE, most=2 * self.most)
         if found is None or np.abs(found[1] - Y).max() > 0.1 * abs(end):
@@ -299,19 +308,6 @@ class Curve(ABC, Generic[P]):
         if point is None or np.abs(point.Y - a.Y).max() > 4 * np.abs(b.Y - a.Y).max():
             return None
         return point if float(point.tangent @ a.tangent) > 0.0 else point.turned()
-
-
-def _slope(a: Point, b: Point) -> float:
-    """The slope at both ends of the step from a to b by which its part is measured along the tangents."""
-    return a.along(b.Y) / max(float(a.tangent @ b.tangent), 1e-3)
-
-
-def _cubic(a: Point, b: Point, x: float) -> FloatArray:
-    """The place at the part x of a step on Hermite's cubic through both ends and tangents; beyond 1 it goes on."""
-    return np.asarray(
-        a.Y * (1 + 2 * x) * (1 - x) ** 2 + a.tangent * (a.along(b.Y) * x * (1 - x) ** 2)
-        + b.Y * x * x * (3 - 2 * x) - b.tangent * (_slope(a, b) * x * x * (1 - x))
-    )  # fmt: skip
 
 
 def passing(Y: FloatArray, a: FloatArray, b: FloatArray) -> float | None:

@@ -30,16 +30,8 @@ class Search:
         self._advance, self._shown, self._thread = advance, 0, threading.get_ident()
         self._compiled, self._since = False, time.thread_time()
 
-    def look(self) -> None:
-        """Count the time since the last look, unless kernels were compiled in it; other threads spend their own.
-
-        Raises
-        ------
-        SolveError
-            The budget is spent.
-        """
-        if threading.get_ident() != self._thread:
-            return
+    def over(self) -> bool:
+        """Count the time since the last call, unless kernels were compiled in it; whether the budget is spent."""
         now = time.thread_time()
         if not self._compiled:
             self.spent += now - self._since
@@ -47,7 +39,17 @@ class Search:
         if int(self.spent) > self._shown:
             self._advance(int(self.spent) - self._shown)
             self._shown = int(self.spent)
-        if self.spent > self.budget:
+        return self.spent > self.budget
+
+    def look(self) -> None:
+        """End the search where its budget is spent; other threads spend their own.
+
+        Raises
+        ------
+        SolveError
+            The budget is spent.
+        """
+        if threading.get_ident() == self._thread and self.over():
             raise SolveError(
                 f"no periodic orbit was found in the budget of {self.budget:g} s of processor time, spent while "
                 f"{self.doing}. Give a start nearer to the orbit, a shorter transient, a smaller max_period, or a "

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.signature import Round, Signature, Visit
-from nonsmooth.continuation.problems.visits import anchored, round_of, visits_of
+from nonsmooth.continuation.problems.visits import anchored, round_of
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import IntArray, Log, Section, State
 from nonsmooth.flow.equilibria import AT_REST, ROUNDING, equilibrium_at
@@ -35,7 +35,7 @@ CLOSED = 1e-8  # a return nearer than this has closed: the shortest such period 
 TOUCH = 1e-6  # of the period, of the motion's size: a contact as short, an impact as weak as this may be a touch
 NEAR = 0.2  # of the motion's size: a return farther off than this is no candidate
 SAMPLES = 4001
-FEW, MANY = 8, 200  # rounds in a stretch of motion that is long, and short, enough to look at
+FEW, MANY = 8, 200  # rounds in an interval of motion that is long, and short, enough to look at
 LONGEST = 1e6
 REST = 1e-7  # of its scale: a motion smaller than this has come to rest
 AT_ONCE = 1e-12  # of a unit of time: what happens within it happens at the start
@@ -149,8 +149,8 @@ def touching(guess: R, system: System, kicks: FloatArray | None = None) -> list[
 
 
 @dataclass
-class _Stretch:
-    """A stretch of motion, and what its second half tells: passages of the level half way up, and half the ranges."""
+class _Interval:
+    """An interval of motion, and what its second half tells: passages of the level half way up, and half the ranges."""
 
     log: Log
     times: FloatArray  # of the passages upwards, interpolated
@@ -166,7 +166,7 @@ def autonomous_guesses(
     """Candidates for once round, the shortest first."""
     tables = engine.prepare(system.parameter_vector()[None, :])
 
-    def run(duration: float) -> _Stretch:
+    def run(duration: float) -> _Interval:
         begin = float(state.clock[0])
         instants = begin + np.linspace(0.0, duration, SAMPLES)
         state.settled = False  # an event just where it begins is taken as at any start
@@ -180,9 +180,9 @@ def autonomous_guesses(
     _refuse_equilibrium(system, first, "the start", ROUNDING)
     duration = 64.0
     while True:
-        stretch = run(duration)
-        rounds = len(stretch.times)
-        if stretch.rests:
+        interval = run(duration)
+        rounds = len(interval.times)
+        if interval.rests:
             _refuse_equilibrium(system, state, TENDS, AT_REST, stable=True)
         if rounds < FEW and duration < LONGEST:
             duration *= 4.0
@@ -201,15 +201,15 @@ def autonomous_guesses(
     if transient:
         search.doing = f"letting {transient} rounds of some {one:.3g} units of time pass"
         run(transient * one)
-    stretch = run(max((2 * (given or min(most, 8)) + 3), FEW) * one)
-    if stretch.rests:
+    interval = run(max((2 * (given or min(most, 8)) + 3), FEW) * one)
+    if interval.rests:
         _refuse_equilibrium(system, state, TENDS, AT_REST)
         raise SolveError(f"{TENDS} there is no cycle here. {ELSEWHERE}", status="equilibrium")
-    found = _by_transitions(system, stretch, most, given) if len(stretch.log.crossing_time) > 1 else []
-    return found or _by_level(stretch, most, given)
+    found = _by_transitions(system, interval, most, given) if len(interval.log.crossing_time) > 1 else []
+    return found or _by_level(interval, most, given)
 
 
-def _seen(log: Log, instants: FloatArray, system: System) -> _Stretch:
+def _seen(log: Log, instants: FloatArray, system: System) -> _Interval:
     """The passages of the level half way up the state that swings most."""
     u, scale = np.nan_to_num(log.sample_u), system.scale_vector()
     begin = len(u) // 2
@@ -221,7 +221,7 @@ def _seen(log: Log, instants: FloatArray, system: System) -> _Stretch:
     part = x[at] / (x[at] - x[at + 1])
     points = (1 - part)[:, None] * u[at] + part[:, None] * u[at + 1]
     times = instants[at] + part * (instants[1] - instants[0])
-    return _Stretch(log, times, points, log.sample_mode[at], rests, np.maximum(half, 1e-3 * scale))
+    return _Interval(log, times, points, log.sample_mode[at], rests, np.maximum(half, 1e-3 * scale))
 
 
 def _refuse_equilibrium(system: System, state: State, what: str, near: float, stable: bool = False) -> None:
@@ -233,37 +233,34 @@ def _refuse_equilibrium(system: System, state: State, what: str, near: float, st
         )
 
 
-def _by_transitions(system: System, stretch: _Stretch, most: int, given: int | None) -> list[Guess]:
+def _by_transitions(system: System, interval: _Interval, most: int, given: int | None) -> list[Guess]:
     """Sequences of transitions that repeat."""
-    flow, values, log = VariationalFlow.of(system), system.parameter_vector(), stretch.log
+    flow, values, log = VariationalFlow.of(system), system.parameter_vector(), interval.log
     k, after = log.crossing_transition, np.nan_to_num(log.u_after)
-    last, guesses = len(k) - 1, []
-    for length in range(1, min(last, 40 * most) + 1):
-        begun = last - length
-        gap = float(np.abs((after[last] - after[begun]) / stretch.size).max())
+    last, mode, guesses = len(k) - 1, system.traced.transitions[k[-1]].target, []
+    for begun in range(last - 1, max(last - 40 * most, 0) - 1, -1):
+        gap = float(np.abs((after[last] - after[begun]) / interval.size).max())
         if k[begun] != k[last] or gap > NEAR:
             continue
-        begin, end = float(log.crossing_time[begun]), float(log.crossing_time[last])
-        visits, states = visits_of(flow, values, log, log.memory_after[begun], begun + 1)
-        signature = Signature((*visits, Visit(system.traced.transitions[k[last]].target)))
-        times, states = log.crossing_time[begun + 1 :] - begin, np.vstack([states[-1:], states])
-        once = anchored(flow, values, Round(0, end - begin, signature, times, states))
-        guesses.append(Guess(**vars(once), gap=gap, size=stretch.size))
+        begin, z = float(log.crossing_time[begun]), np.append(after[begun], log.memory_after[begun])
+        once = round_of(flow, values, log, z, mode, float(log.crossing_time[last]) - begin, 0, begun + 1, begin)
+        if once is not None:
+            guesses.append(Guess(**vars(anchored(flow, values, once)), gap=gap, size=interval.size))
         if len(guesses) >= (given or most):
             break
     return guesses[given - 1 : given] if given else guesses
 
 
-def _by_level(stretch: _Stretch, most: int, given: int | None) -> list[Guess]:
+def _by_level(interval: _Interval, most: int, given: int | None) -> list[Guess]:
     """Returns to the level half way up."""
-    times, points, guesses = stretch.times, stretch.points, []
+    times, points, guesses = interval.times, interval.points, []
     for p in [given] if given else range(1, most + 1):
         if p >= len(points) or p > most:
             break
-        gap = float(np.abs((points[-1] - points[-1 - p]) / stretch.size).max())
+        gap = float(np.abs((points[-1] - points[-1 - p]) / interval.size).max())
         if gap <= NEAR:
-            z = np.concatenate([points[-1], stretch.log.sample_memory[-1]])[None, :]
-            signature = Signature((Visit(int(stretch.modes[-1])),))
+            z = np.concatenate([points[-1], interval.log.sample_memory[-1]])[None, :]
+            signature = Signature((Visit(int(interval.modes[-1])),))
             guesses.append(Guess(0, float(times[-1] - times[-1 - p]), signature, np.empty(0), z, max(gap, 1e-3),
-                                 stretch.size))  # fmt: skip
+                                 interval.size))  # fmt: skip
     return guesses

@@ -21,9 +21,9 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, shortened
+from nonsmooth.identification.arrow import State, settle
 from nonsmooth.identification.fit.first_windows import first_windows, told_start
 from nonsmooth.identification.fit.windows import Window, Windows
-from nonsmooth.identification.pieces import State
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def level(
     if not np.isfinite(np.concatenate(problem.residuals(theta, starts).residuals)).all():
         raise SolveError("a motion over longer windows does not come to its end")
     known = problem.unknowns.precision + np.diag(own_size(problem) ** -2.0)
-    return problem.settle(theta, starts, used, known, rough=True)
+    return settle(problem, theta, starts, used, known, rough=True)
 
 
 def own_size(problem: Windows) -> FloatArray:

@@ -324,7 +324,7 @@ def _distances(problem: Windows, guess: FloatArray, start: FloatArray | None, fr
     total, count = np.zeros(len(problem.records)), np.zeros(len(problem.records))
     windows = problem.of(first_windows(problem, guess, length, start, free))
     if windows.pieces:
-        weights = windows.weights(None, 0.0)
+        weights = windows.weights(None)
         for w, r, weight in zip(
             windows.pieces, windows.residuals(guess, windows.starts).residuals, weights, strict=True
         ):

@@ -15,12 +15,11 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.arrow import Unsettled
+from nonsmooth.identification.arrow import State, Unsettled, settle
 from nonsmooth.identification.fit.first_level import BETTER, level, other_beginnings, rechosen, settle_first
 from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
 from nonsmooth.identification.fit.windows import Window, Windows
-from nonsmooth.identification.pieces import State
 
 __all__ = ["POOR", "SHORT", "Grown", "grow"]
 
@@ -243,7 +242,7 @@ def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: F
         changed = float(max(np.max(np.abs(noise / before.noise - 1.0)), np.max(np.abs(colour - before.colour))))
         problem = replace(problem, noise=noise)
         try:
-            theta, starts, _ = problem.settle(theta, starts)
+            theta, starts, _ = settle(problem, theta, starts)
             short, left = 0.0, np.zeros(len(theta))
         except Unsettled as reason:  # a sum of squares with corners: grazes, rest
             theta, starts = reason.values, reason.starts
@@ -259,7 +258,7 @@ def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:
     """The fit with each record in the mode in which it fits best from its beginning, all unknowns free."""
     begins = []
     for i in range(len(final.problem.pieces)):
-        now, best = final.state.chi2(final.problem.weights(final.state, 0.0)), None
+        now, best = final.state.chi2(final.problem.weights(final.state)), None
         others = other_beginnings(final.problem, final.theta, final.starts, i)
         if not others:
             continue
@@ -271,7 +270,7 @@ def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:
                 theta, starts, state = level(final.problem.of(pieces), final.theta, starts)
             except SolveError:
                 continue
-            if (far := state.chi2(final.problem.weights(state, 0.0))) < least:
+            if (far := state.chi2(final.problem.weights(state))) < least:
                 least, best = far, (final.problem.of(pieces), theta, starts)
         if best is not None and least < now - BETTER:
             final, mode = _final(*best, irregular, rounds), best[0].pieces[i].mode

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.identification.arrow import State
 from nonsmooth.identification.fit.windows import Windows
-from nonsmooth.identification.pieces import State
 
 __all__ = ["OUTLYING", "colours", "parts", "robust_size", "strange"]
 

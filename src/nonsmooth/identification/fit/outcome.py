@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.arrow import LEAST, inverted
+from nonsmooth.identification.arrow import Sandwich, inverted, sandwich
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.first_level import BETTER
 from nonsmooth.identification.fit.growth import SHORT, Grown
@@ -17,7 +17,6 @@ from nonsmooth.identification.fit.noise import OUTLYING, robust_size
 from nonsmooth.identification.fit.profile import profiled
 from nonsmooth.identification.fit.residuals import by_place, residual_data
 from nonsmooth.identification.parameter_set import ParameterSet
-from nonsmooth.identification.sandwich import Sandwich, sandwich
 from nonsmooth.results.progress import Progress
 
 if TYPE_CHECKING:
@@ -41,10 +40,10 @@ def outcome(
 ) -> ParameterSet:  # fmt: skip
     """The parameters, with what is known of how well."""
     problem, theta = grown.problem, grown.theta
-    u, used = problem.unknowns, np.ones(len(problem.pieces), dtype=bool)
-    found = sandwich(problem, theta, grown.starts, 0.0, used, u.precision, LEAST)
+    u = problem.unknowns
+    found = sandwich(problem, theta, grown.starts)
     normal = found.normal + u.precision
-    loose = _undetermined(inverted(normal, LEAST)[1])
+    loose = _undetermined(inverted(normal)[1])
     starts = _starts(grown, found)
     noise = _noise(grown, found)
     jacobian = np.vstack([np.eye(len(theta)), starts.jacobian])

@@ -11,7 +11,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, shortened
 from nonsmooth.flow.arguments import check_system, yes_or_no
-from nonsmooth.identification.arrow import LEAST, inverted, reduced
+from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.system.names import by_name, unknown
 
@@ -175,8 +175,7 @@ def _information(
     state = whole.derivatives(theta, whole.starts)
     if not whole.pieces or not all(np.isfinite(r).all() for r in state.residuals):
         raise SolveError(f"run {name!r} cannot be followed to its end; shorten it", status="no_convergence")
-    used = np.ones(len(whole.pieces), dtype=bool)
-    normal = reduced(whole, state, whole.weights(None, 0.0), used, len(theta))[0]
+    normal = reduced(whole, state, whole.weights(None), len(theta))[0]
     shared = len(theta) - problem.unknowns.phases
     own = np.linalg.pinv(normal[shared:, shared:], hermitian=True)
     eliminated = normal[:shared, :shared] - normal[:shared, shared:] @ own @ normal[shared:, :shared]
@@ -198,7 +197,7 @@ def _ordered(
 
 def _uncertainties(information: FloatArray) -> FloatArray:
     """Standard uncertainties; infinite of what a direction has in it that is not determined."""
-    covariance, loose = inverted(information, LEAST)
+    covariance, loose = inverted(information)
     found = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     for direction in loose.T:
         found[np.abs(direction) > 1e-3 * np.abs(direction).max()] = np.inf

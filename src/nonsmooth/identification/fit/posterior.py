@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, not_installed
-from nonsmooth.identification.arrow import LEAST, inverted, reduced
+from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.growth import Grown
 from nonsmooth.results.progress import Progress, progress
@@ -50,7 +50,7 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
             f"a posterior over {size} numbers ({p} unknowns and the starts of {len(problem.pieces)} windows) does not "
             f"mix; at most {_MOST}: fit a shorter part of the record"
         )
-    weights = problem.weights(problem.residuals(grown.theta, grown.starts), 0.0)
+    weights = problem.weights(problem.residuals(grown.theta, grown.starts))
 
     def log_density(x: FloatArray) -> float:
         theta, starts = x[:p], grown.starts.copy()
@@ -100,8 +100,8 @@ def _drawn(
     """First places of the walkers: from the normal law of the unknowns and the starts about the optimum."""
     problem, u, p = grown.problem, grown.problem.unknowns, len(grown.theta)
     state = problem.derivatives(grown.theta, grown.starts)
-    normal, _, back = reduced(problem, state, weights, [True] * len(problem.pieces), p)
-    covariance, loose = inverted(normal + u.precision, LEAST)
+    normal, _, back = reduced(problem, state, weights, p)
+    covariance, loose = inverted(normal + u.precision)
     if loose.size:
         names = [u.names[i] for i in np.flatnonzero(np.abs(loose).max(axis=1) > 1e-3)]
         raise SolveError(f"the records do not determine {', '.join(names)}: give a prior or a value, then sample")

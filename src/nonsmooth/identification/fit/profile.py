@@ -3,17 +3,60 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.arrow import LEAST, Unsettled, inverted
+from nonsmooth.identification.arrow import Unsettled, inverted, settle
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.growth import Grown
-from nonsmooth.identification.profiles import Profile, profile_of
 from nonsmooth.results.progress import Progress, progress
 
-__all__ = ["profiled"]
+__all__ = ["Profile", "profile_of", "profiled"]
+
+class Profile(NamedTuple):
+    """A parameter's profile likelihood: its values, the rise of chi^2 above its least, and the 95 % limits.
+
+    A limit is NaN where chi^2 does not rise to 3.84 within the values: the data do not bound the parameter there.
+    """
+
+    values: FloatArray
+    cost: FloatArray
+    best: float
+    low: float
+    high: float
+
+
+def profile_of(values: Any, rise: Any, best: float, *, level: float = 0.95) -> Profile:
+    """Profile of a rise of chi^2, with its limits.
+
+    Parameters
+    ----------
+    values, rise : array (m,)
+        The parameter in rising order, and chi^2 above its least there.
+    best : float
+        Where it is least, between the first and the last value.
+    level : float
+        Probability of the interval.
+    """
+    from scipy.stats import chi2
+
+    grid, above, bound = np.asarray(values, np.float64), np.asarray(rise, np.float64), float(chi2.ppf(level, 1))
+    middle = int(np.argmin(np.abs(grid - best)))
+    low = _crossed(grid[middle::-1], above[middle::-1], bound)
+    return Profile(grid, above, float(best), low, _crossed(grid[middle:], above[middle:], bound))
+
+
+def _crossed(values: FloatArray, rise: FloatArray, bound: float) -> float:
+    """Value at which the rise of chi^2 from the best value passes the bound; NaN where it does not."""
+    over = np.flatnonzero(rise > bound)
+    if len(over) == 0 or over[0] == 0:
+        return float("nan")
+    i = int(over[0])
+    part = (bound - rise[i - 1]) / (rise[i] - rise[i - 1])
+    return float(values[i - 1] + part * (values[i] - values[i - 1]))
+
 
 _STEP = 0.5  # of a standard uncertainty
 _STEPS = 16  # on either side, at most
@@ -36,7 +79,7 @@ def profiled(
     covariance : array (p, p)
         That of the fit, by which the rise of chi^2 is scaled.
     """
-    u, white, found = grown.problem.unknowns, np.diag(inverted(normal, LEAST)[0]), []
+    u, white, found = grown.problem.unknowns, np.diag(inverted(normal)[0]), []
     with progress(2 * len(names), "profiles", watched) as advance:
         for name in names:
             i = u.names.index(name)
@@ -65,7 +108,8 @@ def _side(grown: Grown, i: int, step: float, scale: float) -> list[tuple[float, 
         low, high, theta = u.low.copy(), u.high.copy(), theta.copy()
         low[i] = high[i] = theta[i] = value
         try:
-            theta, starts, _ = replace(problem, unknowns=replace(u, low=low, high=high)).settle(theta, starts)
+            held = replace(problem, unknowns=replace(u, low=low, high=high))
+            theta, starts, _ = settle(held, theta, starts)
         except Unsettled as reason:
             theta, starts = reason.values, reason.starts
         rise = (problem.cost(theta, starts) - least) * scale

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.identification.arrow import LEAST, settle
+from nonsmooth.identification.arrow import State
 from nonsmooth.identification.fit.motion import Marcher, Motion
 from nonsmooth.identification.fit.records import Record
 from nonsmooth.identification.fit.sensors import Readout, Sensor
 from nonsmooth.identification.fit.unknowns import Unknowns
-from nonsmooth.identification.pieces import State
 from nonsmooth.identification.uncertainty import correlation_times
 
 if TYPE_CHECKING:
@@ -272,20 +271,10 @@ class Windows:
         """The windows with the residuals of their readings."""
         return [(w, r[: len(w.readings[0])]) for w, r in zip(self.pieces, state.residuals, strict=True)]
 
-    def settle(
-        self, theta: FloatArray, starts: FloatArray, used: Any = None, known: FloatArray | None = None,
-        rough: bool = False,
-    ) -> tuple[FloatArray, FloatArray, State]:  # fmt: skip
-        """Unknowns, starts and state of the fit from these; ``known``: a precision in place of that of the priors."""
-        u = self.unknowns
-        used = np.ones(len(starts), dtype=bool) if used is None else used
-        known, steps = u.precision if known is None else known, 30 if rough else 50
-        return settle(self, theta, starts, 0.0, used, u.centre, known, steps, rough, (u.low, u.high), LEAST)[:3]
-
     def cost(self, theta: FloatArray, starts: FloatArray, weights: list[FloatArray] | None = None) -> float:
         """Sum of squares, priors included."""
         state, away = self.residuals(theta, starts), theta - self.unknowns.centre
-        weights = self.weights(state, 0.0) if weights is None else weights
+        weights = self.weights(state) if weights is None else weights
         return state.chi2(weights) + float(away @ self.unknowns.precision @ away)
 
     def residuals(self, theta: FloatArray, starts: FloatArray) -> State:
@@ -323,7 +312,7 @@ class Windows:
                 state.in_parameters.append(np.vstack([table[:, :p], np.zeros((len(free), p))]))
         return state
 
-    def weights(self, state: State | None, spread: float) -> list[FloatArray]:
+    def weights(self, state: State | None) -> list[FloatArray]:
         """One over the standard deviation of each row; less for those that the loss weighs down."""
         found = []
         for i, w in enumerate(self.pieces):
