@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.plot.mechanism import Sketch, put
+from nonsmooth.plot.mechanism import Sketch
 from nonsmooth.plot.parts import GROUND
+from nonsmooth.plot.pen import put
 from nonsmooth.plot.scheme import scheme_of
 
 E = ns.elements

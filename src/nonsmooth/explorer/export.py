@@ -69,55 +69,50 @@ def exported(view: str, kind: str, results: Mapping[str, Any], state: Any) -> tu
 
 def python_of(result: Any, plot: str, axes: Mapping[str, str], model: str, stem: str) -> str:
     """A script that computes a result, saves it and draws its figure."""
-    record, system = read_provenance(result), ns.system_of(result)
-    options = _options(record, result)
-    positional = []
-    for name in ("grid", "parameter", "values", "range"):
-        if name in options and not (record["verb"] == "frequency_response" and name == "parameter"):
-            positional.append(_python(options.pop(name)))
-    arguments = ", ".join(["system", *positional, *(f"{name}={_python(value)}" for name, value in options.items())])
+    record, system, values = _origin(result)
+    options, verb = _options(record, result), record["verb"]
+    names = ("grid", "values", "range") if verb == "frequency_response" else ("grid", "parameter", "values", "range")
+    given = ["system", *(_python(options.pop(name)) for name in names if name in options)]
+    given += [f"{name}={_python(value)}" for name, value in options.items()]
     marks = ", ".join(f"{name}={value!r}" for name, value in axes.items())
-    band = f".smoothed({system.eta!r})" if system.is_smoothed else ""
+    text, made, band = f"TEXT = {record['system']['text']!r}\n\n", "ns.System.from_text(TEXT)", ""
     if model in ns.models.names():
-        values = ", ".join(f"{name}={value!r}" for name, value in _values(system, record).items())
-        made = f"ns.models.{model}().with_parameters({values}){band}"
-    else:
-        values = ", ".join(f"{name!r}: {value!r}" for name, value in _values(system, record).items())
-        made = f"ns.System.from_text(TEXT).with_parameters({{{values}}})"
-    text = "" if model in ns.models.names() else f"TEXT = {record['system']['text']!r}\n\n"
+        text, made = "", f"ns.models.{model}()"
+        band = f".smoothed({system.eta!r})" if system.is_smoothed else ""
     return (
-        f'"""{record["verb"]} of {json.dumps(system.name)[1:-1]}, as the explorer showed it."""\n\n'
+        f'"""{verb} of {json.dumps(system.name)[1:-1]}, as the explorer showed it."""\n\n'
         "import numpy as np\n\nimport nonsmooth as ns\n\n"
-        f"{text}system = {made}\nresult = ns.{record['verb']}({arguments})\n"
+        f"{text}system = {made}.with_parameters({_python(values)}){band}\nresult = ns.{verb}({', '.join(given)})\n"
         f'ns.save(result, "{stem}.nc")\nns.plot.save_figure(ns.plot.{plot}(result, {marks}), "{stem}.pdf")\n'
     )
 
 
 def study_of(result: Any, axes: Mapping[str, str], model: str, stem: str) -> str:
     """A study file for ``nonsmooth run``."""
-    record, system = read_provenance(result), ns.system_of(result)
-    if record["verb"] in ("bifurcation_diagram", "amplitude_spectrum"):
-        raise ValueError(f"{record['verb']} has no table in a study file; save the Python script instead")
-    named = model in ns.models.names()
-    made = f'model = "{model}"' if named else f"text = {as_toml(record['system']['text'])}"
-    lines = ["[system]", made, f"parameters = {as_toml(_values(system, record))}"]
-    if system.is_smoothed:
-        lines.append(f"smoothed = {as_toml(system.eta)}")
-    lines += ["", f"[{record['verb']}]"]
-    lines += [f"{name} = {as_toml(value, name)}" for name, value in _options(record, result).items()]
-    shown = {name: value for name, value in axes.items() if record["verb"] != "simulate" or axes.keys() >= {"x", "y"}}
-    lines += ["", "[output]", f'data = "{stem}.nc"', f'figure = "{stem}.pdf"']
-    lines += [f'{name} = "{value}"' for name, value in shown.items()]
-    return "\n".join(lines) + "\n"
-
-
-def _values(system: Any, record: Mapping[str, Any]) -> dict[str, float]:
-    """The parameters that the verb was given."""
-    return {
-        name: float(record["system"]["parameters"][name] or system.values[name])
-        for name in system.parameters
-        if name != "eta" or not system.is_smoothed
+    record, system, values = _origin(result)
+    verb = record["verb"]
+    if verb in ("bifurcation_diagram", "amplitude_spectrum"):
+        raise ValueError(f"{verb} has no table in a study file; save the Python script instead")
+    made = {"model": model} if model in ns.models.names() else {"text": record["system"]["text"]}
+    tables: dict[str, Mapping[str, Any]] = {
+        "system": {**made, "parameters": values, **({"smoothed": system.eta} if system.is_smoothed else {})},
+        verb: _options(record, result),
+        "output": {"data": f"{stem}.nc", "figure": f"{stem}.pdf"},
     }
+    if verb != "simulate" or axes.keys() >= {"x", "y"}:
+        tables["output"] = {**tables["output"], **axes}
+    lines = [
+        [f"[{name}]", *(f"{key} = {as_toml(one, key)}" for key, one in of.items()), ""] for name, of in tables.items()
+    ]
+    return "\n".join(line for block in lines for line in block)
+
+
+def _origin(result: Any) -> tuple[dict[str, Any], Any, dict[str, float]]:
+    """The record of a result, its system, and the parameters that the verb was given."""
+    record, system = read_provenance(result), ns.system_of(result)
+    names = (name for name in system.parameters if name != "eta" or not system.is_smoothed)
+    values = {name: float(record["system"]["parameters"][name] or system.values[name]) for name in names}
+    return record, system, values
 
 
 def _options(record: Mapping[str, Any], result: Any) -> dict[str, Any]:

@@ -70,10 +70,12 @@ def explore(
     catalogue.state_of(parse_qsl(query))  # a query that does not fit is refused before anything is served
     access, number = Access(), _free(port)
     application = Application(FunctionHandler(partial(_open, catalogue, query, [])))
+    # No pings: on one machine nothing closes a silent socket, and one that fails takes the session from a connection
+    # whose last messages Bokeh has still to read.
     server: Any = Server(
         application, port=number, address="127.0.0.1", auth_provider=access, index=None,
         allow_websocket_origin=[f"127.0.0.1:{number}", f"localhost:{number}"],
-        websocket_max_message_size=256 * 1024 * 1024, keep_alive_milliseconds=10_000,
+        websocket_max_message_size=256 * 1024 * 1024, keep_alive_milliseconds=0,
         unused_session_lifetime_milliseconds=5_000, check_unused_sessions_milliseconds=2_000,
         session_token_expiration=3600,
     )  # fmt: skip

@@ -16,7 +16,8 @@ from nonsmooth.errors import DataFileError
 from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import column, first_states, name_plane, variable_along
-from nonsmooth.plot.mechanism import put, sketch_of_run
+from nonsmooth.plot.mechanism import sketch_of_run
+from nonsmooth.plot.pen import put
 from nonsmooth.plot.trajectories import with_gaps
 from nonsmooth.system.names import by_name
 from nonsmooth.system.origin import system_of

@@ -39,7 +39,7 @@ def figure(verb: str = "", *variables: str, **size: float) -> Callable[[Callable
 
         @wraps(draw)
         def drawn(*given: Any, **options: Any) -> Axes:
-            common = {name: options.pop(name, value) for name, value in _COMMON.items()}
+            common = _COMMON | {name: options.pop(name) for name in _COMMON if name in options and name not in known}
             looks = {key: options.pop(key) for key in [*options] if key not in known}
             for key in looks:
                 if key not in _LINE:
@@ -59,7 +59,9 @@ def figure(verb: str = "", *variables: str, **size: float) -> Callable[[Callable
             _finish(paper, [line for line in paper.lines if line not in there], looks, **common)
             return paper
 
-        added = [inspect.Parameter(name, _KEYWORD, default=value) for name, value in _COMMON.items()]
+        added = [
+            inspect.Parameter(name, _KEYWORD, default=value) for name, value in _COMMON.items() if name not in known
+        ]
         every = [*others, *added, inspect.Parameter("line", inspect.Parameter.VAR_KEYWORD)]
         drawn.__signature__ = taken.replace(parameters=every)  # type: ignore[attr-defined]
         return drawn

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.identification.picture import Picture, data_of, drawing, number, picture
+from nonsmooth.plot.figure import figure
+from nonsmooth.plot.identification.picture import Picture, data_of, number, picture
 from nonsmooth.plot.labels import symbol_of
 from nonsmooth.results.statuses import words_of_flags
 
@@ -98,7 +99,13 @@ _FEW = 3  # readings of a place, below which it has no bar
 
 
 def fit_residuals(
-    fitted: Any, ax: Axes | None = None, *, show: str = "time", quantity: str | None = None, run: str | None = None
+    fitted: Any,
+    ax: Axes | None = None,
+    *,
+    show: str = "time",
+    quantity: str | None = None,
+    run: str | None = None,
+    **common: Any,
 ) -> Axes:
     """Draw readings, fit and residuals over time, or the residuals' size at each place of the motion.
 
@@ -117,7 +124,9 @@ def fit_residuals(
     data = data_of(getattr(fitted, "residuals", fitted), "measured", "fitted", "residual", "place")
     if show not in ("time", "places"):
         raise ValueError(f"show = {show!r}; allowed: 'time', 'places'")
-    return _over_time(data, ax, quantity, run) if show == "time" else _by_place(data, ax)
+    if show == "time":
+        return _over_time(data, ax, quantity=quantity, run=run, **common)
+    return _by_place(data, ax, **common)
 
 
 def _chosen(data: Any, name: str, given: str | None) -> int:
@@ -130,52 +139,49 @@ def _chosen(data: Any, name: str, given: str | None) -> int:
     return words.index(asked)
 
 
-def _over_time(data: Any, ax: Axes | None, quantity: str | None, run: str | None) -> Axes:
+@picture("", ("time", ""), columns=3, margin=0.05, strip="standard deviations", ratio=0.9)
+def _over_time(one: Picture, data: Any, *, quantity: str | None, run: str | None) -> None:
     q, r = _chosen(data, "quantity", quantity), _chosen(data, "run", run)
-    part = data.isel(sample=np.flatnonzero((data["quantity"].values == q) & (data["run"].values == r)))
-    modes, unit = words_of_flags(data["mode"]), str(part["measured"].attrs.get("units", ""))
-    labels, numbers = (("time", ""), (words_of_flags(data["quantity"])[q], unit)), np.unique(part["mode"].values)
-    looks: dict[str, Any] = {"columns": min(3, len(numbers) + 1), "margin": 0.05, "ratio": 0.9}
-    with drawing(part, ax, "", *labels, strip="standard deviations", **looks) as one:
-        time, mode, window, residual = one.values("time", "mode", "window", "residual")
-        one.cloud(time, part["measured"].values)
-        for k, m in enumerate(numbers):
-            inside = (mode == m) & np.append(np.diff(window) == 0, False)
-            line = np.where(inside | np.roll(inside, 1), part["fitted"].values, np.nan)
-            one.line(time, line, f"fit: {modes[int(m)]}", _COLORS[k % len(_COLORS)], linewidth=0.9)
-        one.residual(time, residual)
-        near = part["place"].values >= len(modes)
-        if near.any():
-            color = style.COLORS["second"]
-            one.residual(time[near], residual[near], "residual at a transition or graze", color=color, markersize=3.5)
-    return one.ax
+    one.data = part = data.isel(sample=np.flatnonzero((data["quantity"].values == q) & (data["run"].values == r)))
+    one.y = words_of_flags(data["quantity"])[q], str(part["measured"].attrs.get("units", ""))
+    modes = words_of_flags(data["mode"])
+    time, mode, window, residual, fitted = one.values("time", "mode", "window", "residual", "fitted")
+    one.cloud(time, part["measured"].values)
+    for k, m in enumerate(np.unique(mode)):
+        inside = (mode == m) & np.append(np.diff(window) == 0, False)
+        line = np.where(inside | np.roll(inside, 1), fitted, np.nan)
+        one.line(time, line, f"fit: {modes[int(m)]}", _COLORS[k % len(_COLORS)], linewidth=0.9)
+    one.residual(time, residual)
+    near = part["place"].values >= len(modes)
+    if near.any():
+        color = style.COLORS["second"]
+        one.residual(time[near], residual[near], "residual at a transition or graze", color=color, markersize=3.5)
 
 
-def _by_place(data: Any, ax: Axes | None) -> Axes:
+@figure()
+def _by_place(ax: Axes, data: Any) -> None:
     names, place, residual = words_of_flags(data["place"]), data["place"].values, data["residual"].values
     held = [i for i in np.unique(place) if np.count_nonzero(place == i) >= _FEW]
     n_modes = len(words_of_flags(data["mode"]))
-    with style.axes(ax) as drawn:
-        for row, i in enumerate(held):
-            r = residual[place == i]
-            size = float(np.sqrt(np.mean(r**2)))
-            error = size / np.sqrt(2.0 * len(r))
-            color = style.COLORS["first" if i < n_modes else "second"]
-            drawn.barh(row, size, xerr=error, color=color, height=0.6, error_kw={"elinewidth": 0.8})
-            drawn.text(0.0, row, f" {len(r)}", va="center", fontsize=style.small(drawn), color="white")
-        drawn.axvline(1.0, color=style.COLORS["muted"], linewidth=0.7)
-        drawn.set_yticks(
-            range(len(held)), [names[i].replace("->", " \N{RIGHTWARDS ARROW} ").replace("_", " ") for i in held]
-        )
-        drawn.invert_yaxis()
-        drawn.set_xlabel("rms of the residuals (standard deviations)")
-    return drawn
+    for row, i in enumerate(held):
+        r = residual[place == i]
+        size = float(np.sqrt(np.mean(r**2)))
+        color = style.COLORS["first" if i < n_modes else "second"]
+        bars = {"xerr": size / np.sqrt(2.0 * len(r)), "error_kw": {"elinewidth": 0.8}}
+        ax.barh(row, size, color=color, height=0.6, **bars)
+        ax.text(0.0, row, f" {len(r)}", va="center", fontsize=style.small(ax), color="white")
+    ax.axvline(1.0, color=style.COLORS["muted"], linewidth=0.7)
+    words = [names[i].replace("->", " \N{RIGHTWARDS ARROW} ").replace("_", " ") for i in held]
+    ax.set_yticks(range(len(held)), words)
+    ax.invert_yaxis()
+    ax.set_xlabel("rms of the residuals (standard deviations)")
 
 
 CHI_SQUARE_95 = 3.841  # of one degree of freedom
 
 
-def profile(finding: Any, ax: Axes | None = None) -> Axes:
+@picture("value cost", y=(r"$\chi^2$ above its least", ""), loc="upper center", margin=0)
+def profile(one: Picture, finding: Any) -> None:
     """Draw the profile of chi square over one parameter, with the interval that it gives.
 
     A flat profile is a parameter that the data do not see.
@@ -187,24 +193,23 @@ def profile(finding: Any, ax: Axes | None = None) -> Axes:
     ax
         Where to draw; a new one-column figure if None.
     """
-    data = data_of(finding, "value", "cost")
+    data = one.data
     unit = str(data["value"].attrs.get("units", data.attrs.get("units", "")))
-    labels = (symbol_of(str(data.attrs.get("parameter", "value"))), unit), (r"$\chi^2$ above its least", "")
-    with drawing(data, ax, "", *labels, loc="upper center", margin=0) as one:
-        value, cost = one.values("value", "cost")
-        one.span(number(data, "low"), number(data, "high"), "95 % interval", ymax=0.74)
-        one.line(value, cost, f"profile, {one.word}", marker="o", markersize=1.5)
-        bound: dict[str, Any] = {"color": style.COLORS["muted"], "linestyle": "--", "linewidth": 0.7}
-        one.ax.axhline(CHI_SQUARE_95, label="95 % bound, 3.84", **bound)
-        if np.isfinite(best := number(data, "best")):
-            one.ax.axvline(best, ymax=0.74, color=style.COLORS["second"], linewidth=0.9, label="best fit")
-        one.ax.set_ylim(0, max(1.1 * CHI_SQUARE_95, min(float(np.nanmax(cost)), 5 * CHI_SQUARE_95)) * 1.35)
-        if value.min() > 0 and value.max() > 20 * value.min():
-            one.ax.set_xscale("log")
-    return one.ax
+    one.x = symbol_of(str(data.attrs.get("parameter", "value"))), unit
+    value, cost = one.values("value", "cost")
+    one.span(number(data, "low"), number(data, "high"), "95 % interval", ymax=0.74)
+    one.line(value, cost, f"profile, {one.word}", marker="o", markersize=1.5)
+    bound: dict[str, Any] = {"color": style.COLORS["muted"], "linestyle": "--", "linewidth": 0.7}
+    one.ax.axhline(CHI_SQUARE_95, label="95 % bound, 3.84", **bound)
+    if np.isfinite(best := number(data, "best")):
+        one.ax.axvline(best, ymax=0.74, color=style.COLORS["second"], linewidth=0.9, label="best fit")
+    one.ax.set_ylim(0, max(1.1 * CHI_SQUARE_95, min(float(np.nanmax(cost)), 5 * CHI_SQUARE_95)) * 1.35)
+    if value.min() > 0 and value.max() > 20 * value.min():
+        one.ax.set_xscale("log")
 
 
-def coverage(finding: Any, ax: Axes | None = None) -> Axes:
+@figure(width=style.PAGE, ratio=0.42)
+def coverage(ax: Axes, finding: Any) -> None:
     """Draw the normalised errors of the identified parameters over many virtual rigs.
 
     Each point is (estimate - truth) / standard uncertainty of one rig; in a fair statement they spread like a unit
@@ -230,20 +235,18 @@ def coverage(finding: Any, ax: Axes | None = None) -> Axes:
     off = (estimate - truth) / error
     rigs = len(truth)
     spread = (np.arange(rigs) / max(rigs - 1, 1) - 0.5) * 0.6
-    with style.axes(ax, width=style.PAGE, ratio=0.42) as drawn:
-        drawn.axhspan(-1.96, 1.96, color=style.COLORS["first"], alpha=0.10, linewidth=0)
-        drawn.axhline(0, color=style.COLORS["muted"], linewidth=0.6)
-        for k in range(len(names)):
-            for mine, color in ((held[:, k], "section"), (~held[:, k], "second")):
-                drawn.plot(k + spread[mine], off[mine, k], ".", color=style.COLORS[color], markersize=3)
-            rms = float(np.sqrt(np.nanmean(off[:, k] ** 2)))
-            words = f"{np.count_nonzero(held[:, k])}/{rigs}\nrms {rms:.2f}"
-            above: dict[str, Any] = {"transform": drawn.get_xaxis_transform(), "ha": "center", "va": "bottom"}
-            drawn.text(k, 1.02, words, fontsize=style.small(drawn), **above)
-        reach = max(3.0, 1.08 * float(np.nanmax(np.abs(off[np.isfinite(off)]), initial=0.0)))
-        drawn.set_ylim(-reach, reach)
-        drawn.set_xticks(range(len(names)), [symbol_of(name) for name in names])
-        drawn.tick_params(axis="x", top=False, length=0)
-        drawn.set_ylabel("(estimate − truth) / uncertainty")
-        drawn.set_xlabel(f"{rigs} virtual rigs (synthetic), by seed from left to right")
-    return drawn
+    ax.axhspan(-1.96, 1.96, color=style.COLORS["first"], alpha=0.10, linewidth=0)
+    ax.axhline(0, color=style.COLORS["muted"], linewidth=0.6)
+    for k in range(len(names)):
+        for mine, color in ((held[:, k], "section"), (~held[:, k], "second")):
+            ax.plot(k + spread[mine], off[mine, k], ".", color=style.COLORS[color], markersize=3)
+        rms = float(np.sqrt(np.nanmean(off[:, k] ** 2)))
+        words = f"{np.count_nonzero(held[:, k])}/{rigs}\nrms {rms:.2f}"
+        above: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "ha": "center", "va": "bottom"}
+        ax.text(k, 1.02, words, fontsize=style.small(ax), **above)
+    reach = max(3.0, 1.08 * float(np.nanmax(np.abs(off[np.isfinite(off)]), initial=0.0)))
+    ax.set_ylim(-reach, reach)
+    ax.set_xticks(range(len(names)), [symbol_of(name) for name in names])
+    ax.tick_params(axis="x", top=False, length=0)
+    ax.set_ylabel("(estimate − truth) / uncertainty")
+    ax.set_xlabel(f"{rigs} virtual rigs (synthetic), by seed from left to right")

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import MEASURED
-from nonsmooth.plot.identification.picture import Picture, drawing, number, picture
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from nonsmooth.plot.identification.picture import Picture, data_of, number, picture
 
 __all__ = [
     "grazing",
@@ -133,7 +130,8 @@ def multiple_shooting(one: Picture, finding: Any, *, seconds: float = 6.0) -> No
     one.residual(time, data["residual"].values if "residual" in data else x - fitted)
 
 
-def toss(time: Any, centre: Any, lowest: Any, impacts: Any, ax: Axes | None = None, *, unit: str = "m") -> Axes:
+@picture("", _TIME, loc="upper right")
+def toss(one: Picture, time: Any, centre: Any, lowest: Any, impacts: Any, *, unit: str = "m") -> None:
     """Draw the height of the centre and of the lowest corner over time, with the impacts that were found.
 
     Parameters
@@ -147,19 +145,19 @@ def toss(time: Any, centre: Any, lowest: Any, impacts: Any, ax: Axes | None = No
     unit : str
         Unit of the heights.
     """
-    with drawing(impacts, ax, "single impact_time", _TIME, (f"height ({unit})", ""), loc="upper right") as one:
-        one.cloud(time, centre, "centre")
-        one.cloud(time, lowest, "lowest corner", style.COLORS["muted"])
-        single, at = one.values("single", "impact_time")
-        for kind, color, line, word in _IMPACTS:
-            for moment in at[single.astype(bool) == kind]:
-                looks: dict[str, Any] = {"color": style.COLORS[color], "linestyle": line, "linewidth": 0.8}
-                one.ax.axvline(moment, ymax=0.72, label=style.once(one.ax, word), **looks)
-        one.ax.set_ylim(top=1.45 * float(np.max(centre)))
-    return one.ax
+    one.data, one.y = data_of(impacts, "single", "impact_time"), (f"height ({unit})", "")
+    one.cloud(time, centre, "centre")
+    one.cloud(time, lowest, "lowest corner", style.COLORS["muted"])
+    single, at = one.values("single", "impact_time")
+    for kind, color, line, word in _IMPACTS:
+        for moment in at[single.astype(bool) == kind]:
+            looks: dict[str, Any] = {"color": style.COLORS[color], "linestyle": line, "linewidth": 0.8}
+            one.ax.axvline(moment, ymax=0.72, label=style.once(one.ax, word), **looks)
+    one.ax.set_ylim(top=1.45 * float(np.max(centre)))
 
 
-def restitution(impacts: Any, ax: Axes | None = None, *, unit: str = "m/s") -> Axes:
+@picture("", y=("restitution", ""), loc="upper left", margin=0.08)
+def restitution(one: Picture, impacts: Any, *, unit: str = "m/s") -> None:
     """Draw the restitution of single impacts over the speed of approach, with their median.
 
     The bars are what half a sample of doubt about the instant of the impact does.
@@ -175,20 +173,19 @@ def restitution(impacts: Any, ax: Axes | None = None, *, unit: str = "m/s") -> A
     """
     single = impacts.isel(impact=impacts["single"].values.astype(bool))
     e = single["restitution"].values
-    data = single.assign(speed=-single["v_before"], restitution_error=single["half_sample"])
-    labels = (f"speed of the corner before ({unit})", ""), ("restitution", "")
-    with drawing(data, ax, "restitution", *labels, loc="upper left", margin=0.08) as one:
-        one.points("speed", "restitution", f"{len(e)} impacts of one corner")
-        if len(e):
-            looks: dict[str, Any] = {"color": style.COLORS["first"]}
-            one.ax.axhline(np.median(e), label=f"median {np.median(e):.2f}", **looks)
-            looks |= {"alpha": 0.15, "linewidth": 0, "zorder": 0}
-            one.ax.axhspan(*np.quantile(e, [0.25, 0.75]), label="middle half", **looks)
-        one.ax.set_ylim(0, 1.5 * float(np.max(e)) if len(e) else 1)
-    return one.ax
+    one.data = single.assign(speed=-single["v_before"], restitution_error=single["half_sample"])
+    one.x = f"speed of the corner before ({unit})", ""
+    one.points("speed", "restitution", f"{len(e)} impacts of one corner")
+    if len(e):
+        looks: dict[str, Any] = {"color": style.COLORS["first"]}
+        one.ax.axhline(np.median(e), label=f"median {np.median(e):.2f}", **looks)
+        looks |= {"alpha": 0.15, "linewidth": 0, "zorder": 0}
+        one.ax.axhspan(*np.quantile(e, [0.25, 0.75]), label="middle half", **looks)
+    one.ax.set_ylim(0, 1.5 * float(np.max(e)) if len(e) else 1)
 
 
-def steady_amplitude(response: Any, ax: Axes | None = None) -> Axes:
+@picture("", _TIME, ("amplitude, change (1/1000)", ""), loc="upper right", columns=1)
+def steady_amplitude(one: Picture, response: Any) -> None:
     """Draw how far the amplitude of each block is from their mean, and the fastest decay that could hide there.
 
     Parameters
@@ -199,33 +196,28 @@ def steady_amplitude(response: Any, ax: Axes | None = None) -> Axes:
     """
     blocks = response.blocks
     middle = float(np.exp(np.log(blocks["amplitude"]).mean()))
-    data = blocks.assign(
-        change=blocks["amplitude"] / middle - 1, change_error=blocks["amplitude_error"] / middle
-    ).assign_attrs(blocks.attrs)
-    labels = ("time", "s"), ("amplitude, change (1/1000)", "")
-    with drawing(data, ax, "", *labels, loc="upper right", columns=1) as one:
-        one.points("time", "change", f"blocks, {one.word}", scale=1e3)
-        t = data["time"].values
-        fine = np.linspace(t[0], t[-1], 50)
-        rate, error, bound = 1e3 * np.array([response.rate, response.rate_error, response.rate_bound])
-        one.line(fine, -rate * (fine - t.mean()), f"line: decay rate {rate:.2f} ± {error:.2f} per 1000 s")
-        words = f"fastest free decay at 95 %: {bound:.2f} per 1000 s"
-        one.line(fine, -bound * (fine - t.mean()), words, "second", "--")
-        reach = 1e3 * float((np.abs(data["change"]) + data["change_error"]).max())
-        one.ax.set_ylim(-1.3 * reach, 2.4 * reach)
-    return one.ax
+    change, error = blocks["amplitude"] / middle - 1, blocks["amplitude_error"] / middle
+    one.data = data = blocks.assign(change=change, change_error=error).assign_attrs(blocks.attrs)
+    one.points("time", "change", f"blocks, {one.word}", scale=1e3)
+    t = data["time"].values
+    fine = np.linspace(t[0], t[-1], 50)
+    rate, error, bound = 1e3 * np.array([response.rate, response.rate_error, response.rate_bound])
+    one.line(fine, -rate * (fine - t.mean()), f"line: decay rate {rate:.2f} ± {error:.2f} per 1000 s")
+    words = f"fastest free decay at 95 %: {bound:.2f} per 1000 s"
+    one.line(fine, -bound * (fine - t.mean()), words, "second", "--")
+    reach = 1e3 * float((np.abs(data["change"]) + data["change_error"]).max())
+    one.ax.set_ylim(-1.3 * reach, 2.4 * reach)
 
 
-def steady_phase(response: Any, ax: Axes | None = None) -> Axes:
+@picture("", _TIME, ("phase (mrad)", ""), loc="upper right", columns=1)
+def steady_phase(one: Picture, response: Any) -> None:
     """Draw the phase of each block less that of the fitted frequency, with the line of each other method."""
-    labels = ("time", "s"), ("phase (mrad)", "")
-    with drawing(response.blocks, ax, "", *labels, loc="upper right", columns=1) as one:
-        one.points("time", "phase", f"blocks, {one.word}", scale=1e3)
-        t, phase, error = one.values("time", "phase", "phase_error")
-        for name, (value, own) in response.by_method.items():
-            word, color, line = _METHODS[name]
-            drift = phase.mean() - 2 * np.pi * (value - response.frequency) * (t - t.mean())
-            one.line(t, 1e3 * drift, f"{word}: {value:.5f} ± {own:.5f} Hz", color, line)
-        reach = 1e3 * float(np.max(np.abs(phase) + error))
-        one.ax.set_ylim(-1.3 * reach, 2.9 * reach)
-    return one.ax
+    one.data = response.blocks
+    one.points("time", "phase", f"blocks, {one.word}", scale=1e3)
+    t, phase, error = one.values("time", "phase", "phase_error")
+    for name, (value, own) in response.by_method.items():
+        word, color, line = _METHODS[name]
+        drift = phase.mean() - 2 * np.pi * (value - response.frequency) * (t - t.mean())
+        one.line(t, 1e3 * drift, f"{word}: {value:.5f} ± {own:.5f} Hz", color, line)
+    reach = 1e3 * float(np.max(np.abs(phase) + error))
+    one.ax.set_ylim(-1.3 * reach, 2.9 * reach)

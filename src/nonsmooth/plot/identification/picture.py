@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["Picture", "data_of", "drawing", "number", "picture", "pictures", "with_error"]
+__all__ = ["Picture", "data_of", "number", "picture", "pictures", "with_error"]
 
 _SHARE = 0.30  # of the height of the axes, for residuals
 
@@ -55,56 +54,36 @@ def with_error(value: float, error: float, unit: str = "") -> str:
     return f"{value:.{digits}f} ± {error:.{digits}f}{tail}"
 
 
-@contextmanager
-def drawing(
-    finding: Any,
-    ax: Axes | None,
+def picture(
     needed: str,
-    x: tuple[str, str] | str,
-    y: tuple[str, str] | str,
+    x: tuple[str, str] | str = ("", ""),
+    y: tuple[str, str] | str = ("", ""),
     *,
     loc: str = "",
     columns: int = 2,
     margin: float = 0.02,
     strip: str | None = None,
     **size: float,
-) -> Iterator[Picture]:
-    """Draw within the block; then axes are named, residuals drawn below and the legend set, ``loc`` or above the axes.
-
-    ``x`` and ``y`` are names with units, or a variable of the data that has them. The unit of the residuals is that of
-    ``y``, or ``strip``.
-    """
-    data = data_of(finding, *needed.split())
-    with style.axes(ax, **size) as drawn:
-        one = Picture(drawn, data)
-        yield one
-        drawn.margins(x=margin)
-        named = [
-            name
-            if isinstance(name, tuple)
-            else (str(data[name].attrs.get("long_name", name)), str(data[name].attrs.get("units", "")))
-            for name in (x, y)
-        ]
-        name_axes(drawn, *named)
-        if one.left:
-            one.draw_residuals(named[1][1] if strip is None else strip)
-        above = {**style.ABOVE, "handlelength": 1.6}
-        style.even_dots(drawn.legend(**({"loc": loc} if loc else above), ncols=columns, columnspacing=1.0))
-
-
-def picture(*given: Any, **options: Any) -> Callable[[Callable[..., None]], Callable[..., Axes]]:
+) -> Callable[[Callable[..., None]], Callable[..., Axes]]:
     """Make a figure ``(finding, ax=None, ...) -> ax`` of a function ``(one, finding, ...)`` that draws with a
-    :class:`Picture`; further arguments are those of :func:`drawing`."""
+    :class:`Picture`; then axes are named, residuals drawn below and the legend set, ``loc`` or above the axes.
+
+    The data of the finding have the variables ``needed``; where none is, the function sets ``one.data``. ``x`` and
+    ``y`` are names with units, or a variable of the data that has them; the function may set ``one.x`` and ``one.y``.
+    The unit of the residuals is that of ``y``, or ``strip``.
+    """
 
     def made(draw: Callable[..., None]) -> Callable[..., Axes]:
         @wraps(draw)
-        def drawn(ax: Axes, finding: Any, **named: Any) -> None:
-            with drawing(finding, ax, *given, **options) as one:
-                draw(one, finding, **named)
+        def drawn(ax: Axes, *given: Any, **named: Any) -> None:
+            one = Picture(ax, data_of(given[0], *needed.split()) if needed else None, x, y)
+            draw(one, *given, **named)
+            if one.data is not None:
+                one.finish(margin, strip, {"loc": loc} if loc else {**style.ABOVE, "handlelength": 1.6}, columns)
 
         own, *others = inspect.signature(draw).parameters.values()
         drawn.__signature__ = inspect.Signature([own.replace(name="ax", annotation="Axes"), *others])  # type: ignore[attr-defined]
-        return figure(**{key: options[key] for key in ("ratio",) if key in options})(drawn)
+        return figure("", **size)(drawn)
 
     return made
 
@@ -112,9 +91,28 @@ def picture(*given: Any, **options: Any) -> Callable[[Callable[..., None]], Call
 class Picture:
     """Axes, the data that are drawn in them, and the words for what was measured."""
 
-    def __init__(self, ax: Axes, data: xr.Dataset) -> None:
-        self.ax, self.data, self.word = ax, data, measured_label(data)
+    def __init__(self, ax: Axes, data: Any, x: tuple[str, str] | str, y: tuple[str, str] | str) -> None:
+        self.ax, self.data, self.x, self.y = ax, data, x, y
         self.left: list[tuple[Any, Any, Any, Any, dict[str, Any]]] = []
+
+    @property
+    def word(self) -> str:
+        """Word for the measured side."""
+        return measured_label(self.data)
+
+    def finish(self, margin: float, strip: str | None, place: dict[str, Any], columns: int) -> None:
+        """Name the axes, draw the residuals and set the legend."""
+        self.ax.margins(x=margin)
+        x, y = (
+            name
+            if isinstance(name, tuple)
+            else (str(self.data[name].attrs.get("long_name", name)), str(self.data[name].attrs.get("units", "")))
+            for name in (self.x, self.y)
+        )
+        name_axes(self.ax, x, y)
+        if self.left:
+            self.draw_residuals(y[1] if strip is None else strip)
+        style.even_dots(self.ax.legend(**place, ncols=columns, columnspacing=1.0))
 
     def values(self, *names: str) -> list[Any]:
         """The values of variables."""
