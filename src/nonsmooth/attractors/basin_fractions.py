@@ -16,7 +16,7 @@ from nonsmooth.attractors.basins_work import StartsWork, settled_from
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import inputs
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import real_number, swept_values
+from nonsmooth.flow.arguments import swept_values
 from nonsmooth.flow.options import Campaign, Varied, as_called, kept_of
 from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import random_starts, start_states
@@ -108,14 +108,11 @@ def basin_fractions(
     )
 
 
-def _starts(system: System, box: Any, n_starts: int, seed: int) -> Any:
+def _starts(system: System, box: Mapping[str, tuple[float, float]] | None, n_starts: int, seed: int) -> Any:
     form = ", ".join(f'"{name}": (low, high)' for name in system.states)
-    if not isinstance(box, Mapping) or not box:
+    if not box:
         raise ValueError(f"box = {shortened(box)}: give the box from which starts are drawn, box={{{form}}}")
-    for name, ends in box.items():
-        if np.shape(ends) != (2,):
-            raise ValueError(f"box[{name!r}] = {shortened(ends)}: give its lowest and highest value; box={{{form}}}")
-    low, high = ({name: real_number(ends[k], f"box[{name!r}]") for name, ends in box.items()} for k in (0, 1))
+    low, high = ({name: ends[k] for name, ends in box.items()} for k in (0, 1))
     return random_starts(n_starts, low, high, seed)
 
 

@@ -13,14 +13,14 @@ P. Grassberger, I. Procaccia, Physica D 9 (1983) 189-208; J. Theiler, Phys. Rev.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import float_array, real_number, whole_number
+from nonsmooth.flow.arguments import float_array, real_number
 from nonsmooth.flow.engines.engine import FloatArray
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import Range, at_least, checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,9 +35,9 @@ LEAST_DECADES = 0.8
 BLOCK = 256  # points that are near each other, whose neighbours are counted at once
 
 
-@by_name
+@checked
 def correlation_dimension(
-    section: Any, *, window: int = 1, scale: Any = None, range: tuple[float, float] | None = None
+    section: Any, *, window: Annotated[int, at_least(0)] = 1, scale: Any = None, range: Range | None = None
 ) -> xr.Dataset:
     """Correlation dimension of section points, with the scaling range it rests on (Grassberger and Procaccia).
 
@@ -74,7 +74,6 @@ def correlation_dimension(
     import xarray as xr
 
     points = _points(section)
-    window = whole_number(window, "window", 0)
     size = points.std(axis=0) if scale is None else float_array(scale, "scale")
     if np.shape(size) != points.shape[1:] or not np.isfinite(size).all() or (np.asarray(size) < 0).any():
         raise ValueError(

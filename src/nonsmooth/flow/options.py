@@ -161,7 +161,7 @@ def as_called(arguments: Mapping[str, Any]) -> dict[str, Any]:
     record = {**own, **arguments.get("options", {})}
     if "start" in record:
         record["start"] = plain_start(arguments["system"], record["start"])
-    if "section" in record:
+    if "section" in record and (record["section"] is not None or arguments["system"].period() is not None):
         record["section"] = section_plan(arguments["system"], record["section"])[0]
     if "max_period" in record:
         record["max_period"] = longest_period(record["keep"], record["max_period"])

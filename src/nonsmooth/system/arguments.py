@@ -6,7 +6,9 @@
 ``judge: bool = True``                          yes or no, also 0 and 1 or of NumPy; no word
 ``side: Literal["up", "down", None] = "up"``    one of these
 ``rtol: float | None = None``                   that, or None
-``orbit: Orbit``, ``box: Mapping[...]``         one of a class; what stands in it is the verb's to read
+``range: Range``                                two ends, (low, high)
+``box: Mapping[str, float]``                    by name; what it holds is read too
+``orbit: Orbit``                                one of a class
 ``name: Annotated[str, "its name in quotes"]``  with what to do, for the sentence
 ``start: Any``                                  not read here
 ==============================================  =======================================================
@@ -21,7 +23,7 @@ import inspect
 import math
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, wraps
 from inspect import Parameter
@@ -79,6 +81,10 @@ class Limit:
         return self.low < number <= self.high if self.without_low else self.low <= number <= self.high
 
 
+#: Two ends, the first below the second.
+Range = Annotated[tuple[float, float], "rising"]
+
+
 def at_least(low: float) -> Limit:
     """No less than ``low``."""
     return Limit(f"at least {low:g}" if low else "zero or more", low)
@@ -133,10 +139,10 @@ def check_system(system: Any, verb: str, inputs: bool = False) -> Any:
 @overload
 def checked(function: F) -> F: ...
 @overload
-def checked(*, of: Verb | None = None, **defaults: Any) -> Callable[[F], F]: ...
+def checked(*, of: Verb | None = None, read: bool = True, **defaults: Any) -> Callable[[F], F]: ...
 
 
-def checked(function: Any = None, *, of: Verb | None = None, **defaults: Any) -> Any:
+def checked(function: Any = None, *, of: Verb | None = None, read: bool = True, **defaults: Any) -> Any:
     """Decorate a verb: its arguments are read as its signature declares them, or refused in a sentence.
 
     A call that does not fit is answered with how the verb is called, a misspelt name with the nearest.
@@ -147,22 +153,29 @@ def checked(function: Any = None, *, of: Verb | None = None, **defaults: Any) ->
         An argument ``system: System`` is checked by :func:`check_system`.
     of : callable, optional
         A checked verb whose further arguments are this one's ``**options``.
+    read : bool
+        False: names are checked alone, what is given is the function's own to read.
     **defaults
         Of options of the group, where they differ in this verb.
     """
 
     def decorated(function: F) -> F:
         door = _Door(function, of, defaults)
+        if not read:
+            door.readers = {}
 
         @wraps(function)
         def called(*given: Any, **named: Any) -> Any:
-            values = door.read(given, named)
-            return function(*(values.pop(name) for name in door.nameless if name in values), **values)
+            n = len(door.nameless)
+            return function(*given[:n], **door.read(given[n:], named))
 
         called.__doc__ = door.documentation()
         called.__signature__, called.door = door.signature, door  # type: ignore[attr-defined]
         return cast(F, called)
 
+    if isinstance(function, type):  # a class: the arguments of its objects
+        function.__init__ = decorated(function.__init__)  # type: ignore[misc]
+        return function
     return decorated if function is None else decorated(function)
 
 
@@ -172,17 +185,19 @@ class _Door:
     def __init__(self, function: Verb, of: Verb | None, defaults: Mapping[str, Any]) -> None:
         own = inspect.signature(function)
         self.function, self.verb = function, function.__qualname__.removesuffix(".__init__")
-        self.items = {name: item for name, item in own.parameters.items() if item.kind is not item.VAR_KEYWORD}
-        rest = next((item for item in own.parameters.values() if item.name not in self.items), None)
+        self.nameless = [name for name, item in own.parameters.items() if item.kind is item.POSITIONAL_ONLY]
+        self.items = {name: item for name, item in own.parameters.items() if name not in self.nameless}
+        rest = next((item for item in self.items.values() if item.kind is item.VAR_KEYWORD), None)
+        self.items.pop(rest.name if rest else "", None)
         self.group = None if rest is None else _group(rest.annotation, function)
         self.behind: _Door | None = getattr(of, "door", None)
         others = inspect.signature(of).parameters.values() if of else _parameters(self.group, defaults)
         others = [item.replace(kind=item.KEYWORD_ONLY) for item in others if item.name not in self.items]
         self.items |= {item.name: item for item in others}
         self.takes_any = rest is not None and not others
-        self.signature = own.replace(parameters=[*self.items.values(), *([rest] if rest and self.takes_any else [])])
+        first, last = [own.parameters[name] for name in self.nameless], [rest] if rest and self.takes_any else []
+        self.signature = own.replace(parameters=[*first, *self.items.values(), *last])
         self.shared = {item.name: item.default for item in others}
-        self.nameless = [name for name, item in self.items.items() if item.kind is item.POSITIONAL_ONLY]
         self.positional = [name for name, item in self.items.items() if item.kind is not item.KEYWORD_ONLY]
         self.needed = [name for name, item in self.items.items() if item.default is _NEEDED]
 
@@ -205,7 +220,7 @@ class _Door:
         shared = get_type_hints(self.group, include_extras=True) if self.group else {}
         if self.behind:
             shared = {name: self.behind.kinds[name] for name in self.shared}
-        own = {name: item.annotation for name, item in self.items.items() if name not in shared}
+        own = {name: item.annotation for name, item in self.items.items() if name not in shared and name != "self"}
         return {name: _evaluated(annotation, self.function) for name, annotation in own.items()} | shared
 
     @cached_property
@@ -218,12 +233,12 @@ class _Door:
 
     def misfit(self, given: tuple[Any, ...], named: Mapping[str, Any], values: Mapping[str, Any]) -> str:
         """The sentence for a call that does not fit the signature."""
-        own = [name for name in self.positional if name != "self"]
+        own = [name for name in (*self.nameless, *self.positional) if name != "self"]
         options = [name for name in self.items if name not in self.positional]
         usage = f"{self.verb}({', '.join([*own, *(f'{name}=' for name in options or ['name'])])})"
         if len(given) > len(self.positional):
             count = f"{len(own) or 'no'} argument{'s' * (len(own) != 1)}"
-            number = len(given) - (len(self.positional) - len(own))
+            number = len(given) + len(own) - len(self.positional)
             over = shortened(given[len(self.positional)])
             return f"{self.verb} takes {count} by position, not {number}: give {over} by its name; {usage}"
         if missing := [name for name in self.needed if name not in values]:
@@ -316,11 +331,15 @@ def reader_of(what: Any) -> Reader:
         limit = next((mark for mark in parts if isinstance(mark, Limit)), None)
         hint = next((mark for mark in parts if isinstance(mark, str)), None)
         read = reader_of(parts[0]) if limit is None else _number(parts[0], limit)
-        return read if hint is None else _hinted(read, hint)
+        return read if hint is None else _rising if hint == "rising" else _hinted(read, hint)
     if origin in (Union, UnionType):
         some = [part for part in parts if part is not NoneType]
         one = reader_of(some[0]) if len(some) == 1 else _one_of(some)
         return one if len(some) == len(parts) else lambda value, name: None if value is None else one(value, name)
+    if origin is tuple:
+        return _two_numbers
+    if origin is Mapping and parts[1] is not Any:
+        return lambda value, name: _mapping(value, name, reader_of(parts[1]))
     if origin is Literal:
         return lambda value, name: _chosen(value, name, parts)
     if what is bool:
@@ -328,7 +347,7 @@ def reader_of(what: Any) -> Reader:
     if what in (int, float):
         return _number(what, Limit("", -_MOST))
     kind = origin or what
-    if kind is Any or not isinstance(kind, type):
+    if kind in (Any, Sequence) or getattr(kind, "_is_protocol", False) or not isinstance(kind, type):
         return lambda value, name: value
     return lambda value, name: _instance(value, name, kind, what)
 
@@ -341,6 +360,24 @@ def _number(kind: type, limit: Limit) -> Reader:
         return value if type(value) is int else number
 
     return read
+
+
+def _two_numbers(value: Any, name: str) -> tuple[float, float]:
+    if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
+        raise ValueError(f"{name} = {shortened(value)}: give its two ends, (low, high)")
+    low, high = (real_number(end, f"an end of {name}") for end in value)
+    return low, high
+
+
+def _rising(value: Any, name: str) -> tuple[float, float]:
+    low, high = _two_numbers(value, name)
+    if not low < high:
+        raise ValueError(f"{name} = {shortened(value)}: the first end must be below the second")
+    return low, high
+
+
+def _mapping(value: Any, name: str, reader: Reader) -> dict[Any, Any]:
+    return {key: reader(one, f"{name}[{key!r}]") for key, one in _instance(value, name, Mapping, Mapping).items()}
 
 
 def _hinted(reader: Reader, hint: str) -> Reader:
@@ -365,7 +402,7 @@ def _one_of(kinds: list[Any]) -> Reader:
             try:
                 return reader(value, name)
             except ValueError as error:  # of this kind, but beyond its limits
-                wrong = error
+                wrong = wrong if isinstance(wrong, ValueError) else error
             except TypeError:
                 pass
         raise wrong
