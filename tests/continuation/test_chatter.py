@@ -10,7 +10,7 @@ import xarray as xr
 from test_random_branches import endings
 
 import nonsmooth as ns
-from nonsmooth.continuation.branches.begin import curve_of
+from nonsmooth.continuation.branches.following import curve_of
 
 
 def followed(template: str, seed: int, low: float, high: float, **begin: float) -> xr.Dataset:

@@ -29,19 +29,16 @@ class Circle(Curve[Point]):
     def moved(self, solved: Any, Y: Any) -> Any:
         return self.evaluate(Y)
 
-    def described(self, Y: Any, tangent: Any, orientation: float, iterations: int, solved: Any) -> Point:
-        return Point(Y, tangent, orientation, iterations, solved)
-
     def at_angle(self, angle: float) -> Point:
         Y = np.array([np.sin(angle), np.cos(angle)])
-        return self.described(Y, np.array([Y[1], -Y[0]]), 1.0, 0, self.evaluate(Y))
+        return Point(self, Y, np.array([Y[1], -Y[0]]), 1.0, 0, self.evaluate(Y))
 
 
 def step(a: float, b: float, cause: str = "") -> Step:
     circle = Circle()
     ends = circle.at_angle(a), circle.at_angle(b)
-    numbers = tuple([Fold().number(circle, end)] for end in ends)
-    return Step(circle, *ends, numbers, (np.empty(0), np.empty(0)), cause=cause)
+    numbers = tuple([Fold().number(end)] for end in ends)
+    return Step(*ends, numbers, (np.empty(0), np.empty(0)), cause=cause)
 
 
 @pytest.mark.parametrize(("first", "found"), [(-1e-9, True), (-5e-3, False), (-0.5, False)])

@@ -10,7 +10,7 @@ import reference_values as known
 import xarray as xr
 
 import nonsmooth as ns
-from nonsmooth.continuation.branches.begin import resumed_at
+from nonsmooth.continuation.branches.following import resumed_at
 from nonsmooth.continuation.branches.reading import read_branch
 
 support = ns.models.discontinuous_support

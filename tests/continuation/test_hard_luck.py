@@ -10,7 +10,7 @@ import reference_values as known
 import xarray as xr
 
 import nonsmooth as ns
-from nonsmooth.continuation.events.leaving import ENDINGS
+from nonsmooth.continuation.events.of_orbits import ENDINGS
 from nonsmooth.continuation.problems.curve import Curve
 from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.locus import Locus

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.continuation.branches.begin import curve_of
+from nonsmooth.continuation.branches.following import curve_of
 from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step, locate
 from nonsmooth.continuation.march.march import Limits, March, Policy, march
 from nonsmooth.continuation.problems.curve import Curve, Point, tangents
@@ -33,7 +33,7 @@ class Zero(Event):
 
     name = "zero"
 
-    def number(self, curve: Any, point: Any) -> float:
+    def number(self, point: Any) -> float:
         return float(point.X[0])
 
 
@@ -42,8 +42,8 @@ class Half(Event):
 
     name = "half"
 
-    def number(self, curve: Any, point: Any) -> float:
-        return float(curve.margins(point)[0])
+    def number(self, point: Any) -> float:
+        return float(point.curve.margins(point)[0])
 
     def happened(self, step: Step, was: float, now: float) -> bool:
         return now < 0.0 <= was
@@ -68,9 +68,6 @@ class Plane(Curve[Point]):
     def moved(self, solved: Solved, Y: Array) -> Solved:
         return self.evaluate(Y)
 
-    def described(self, Y: Array, tangent: Array, orientation: float, iterations: int, solved: Solved) -> Point:
-        return Point(Y, tangent, orientation, iterations, solved)
-
     def margins(self, point: Point) -> Array:
         return np.array([point.X[0] - 0.5 if self.next else np.inf])
 
@@ -79,10 +76,10 @@ class Along(Policy):
     kinds = (Fold(), Crossing(), Zero())
     boundaries = (Half(),)
 
-    def behind(self, found: March, curve: Plane, met: list[Met]) -> tuple[Plane, Point] | None:
-        found.mark(met[0].name, curve, met[0].point)
-        point = curve.next.at_parameter(met[0].point.X / curve.scale, met[0].point.value)
-        return curve.next, point.facing(met[0].point.tangent[-1])
+    def behind(self, found: March, met: list[Met]) -> Point | None:
+        point = met[0].point
+        found.mark(met[0].name, point)
+        return point.curve.next.at_parameter(point.X / point.curve.scale, point.value).facing(point.tangent[-1])
 
 
 def circle() -> Plane:
@@ -94,7 +91,7 @@ def run(curve: Plane, x: float, p: float, way: float, *, low: float = -4.0, high
     assert first is not None
     first = first.facing(way)
     closed = curve.landmark(first) if more.pop("closes", False) else None
-    return march(curve, first, Limits(((-1, low, high),), 0.05, more.pop("points", 500), closed), Along())
+    return march(first, Limits(((-1, low, high),), 0.05, more.pop("points", 500), closed), Along())
 
 
 def test_a_circle_closes_with_two_folds() -> None:
@@ -119,7 +116,7 @@ def test_a_branch_that_comes_back_in_another_word_closes(beside: float) -> None:
     curve = circle()
     first = curve.at_parameter(np.array([-0.8, 0.6]) / curve.scale, 0.6).facing(1.0)
     limits = Limits(((-1, -4.0, 4.0),), 0.05, 500, ("another word", first.X, first.Y + np.array([beside, 0.0])))
-    found = march(curve, first, limits, Along())
+    found = march(first, limits, Along())
     assert found.ending == ("points" if beside else "closed")
     if not beside:
         assert found.rows[-1].point.X == pytest.approx([-0.8, 0.6], abs=1e-12)
@@ -136,7 +133,7 @@ def test_a_fold_beside_a_boundary_is_met_where_the_same_equations_turn_back_beyo
     first = curve.at_parameter(np.array([low, 0.0]) / curve.scale, -f(low, 0.0)[0])
     assert first is not None
     down = first if first.tangent[0] < 0 else first.turned()
-    found = march(curve, down, Limits(((-1, 0.0, 4.0),), 0.05, 99), Along())
+    found = march(down, Limits(((-1, 0.0, 4.0),), 0.05, 99), Along())
     assert [one.kind for one in found.special] == ["fold", "half"]
     assert found.special[0].point.X[0] == pytest.approx(0.505, abs=1e-9)
 
@@ -159,7 +156,7 @@ def test_a_zero_at_the_beginning_is_not_met_once_more() -> None:
     line = Plane(lambda x, p: (x, 1.0, 0.0))
     a = line.at_parameter(np.array([0.0, 0.1]) / line.scale, 0.1).facing(1.0)
     b = line.step(a, 0.5)
-    step = Step(line, a, b, ([], []), (np.empty(0), np.empty(0)))
+    step = Step(a, b, ([], []), (np.empty(0), np.empty(0)))
     s, there = locate(step, lambda point: (point.value - a.value) * (0.2 - point.value))
     assert there.value == pytest.approx(0.2, abs=1e-14) and s == pytest.approx(0.2, abs=1e-14)
 

@@ -178,3 +178,41 @@ def test_a_mass_that_is_pulled_away() -> None:
     assert branch["P"].values[[0, -1]] == pytest.approx([-MU, MU], abs=1e-9)
     assert np.isinf(branch["u_upper"].values[:, 0]).all()
     assert all("boundary" in str(text) for text in branch["ended_because"].values)
+
+
+@pytest.mark.parametrize("impacts", ["simultaneous", "sequential"])  # modes written out, and made when visited
+def test_friction_between_two_walls(impacts: str) -> None:
+    """The ends of what friction leaves are F -+ mu, cut off by the walls: along a branch, and where sweeps and basins
+    end."""
+    walls = {"up": ns.elements.Stop(at="q", position=1.0), "down": ns.elements.Stop(at="q", position=-1.0, side=-1)}
+    system = ns.mechanical(
+        1.0, 0.1, 1.0, parameters={"F": 0.0, "mu": 0.2}, forcing={"q": "F"}, impacts=impacts,
+        elements={"friction": ns.elements.Coulomb(at="q", friction="mu"), **walls},
+    )  # fmt: skip
+    branch = ns.continue_equilibrium(system, "F", (-1.5, 1.5))
+    for side, sign in (("lower", -1.0), ("upper", 1.0)):
+        ends = np.clip(branch.F + sign * 0.2, -1.0, 1.0)
+        np.testing.assert_allclose(branch[f"u_{side}"].sel(state="q"), ends, atol=1e-9)
+    np.testing.assert_allclose(ns.special_points(branch).F, [-1.2, -0.8, 0.8, 1.2], atol=1e-9)
+
+    section, forces = ns.Poincare("friction_speed"), [0.1, 0.9, 1.4]
+    box = {"q": (-0.9, 0.9), "v_q": (-1.0, 1.0)}
+    found = ns.basin_fractions(system, "F", forces, box=box, n_starts=20, section=section, progress=False)
+    np.testing.assert_array_equal(found.fraction, 1.0)
+    swept = ns.sweep(
+        system, "F", forces, direction=None, start={"q": 0.3, "v_q": 0.5}, section=section, transient=20, keep=10,
+        progress=False,
+    )  # fmt: skip
+    np.testing.assert_allclose(swept.equilibrium_minimum.sel(state="q"), [-0.1, 0.7, 1.0], atol=1e-9)
+    np.testing.assert_allclose(swept.equilibrium_maximum.sel(state="q"), [0.3, 1.0, 1.0], atol=1e-9)
+
+
+def test_equal_elements_on_other_springs() -> None:
+    """Two systems that differ in what their modes hold beside elements: q = F / k in each."""
+    for k in (1.0, 2.0):
+        walls = [ns.elements.Stop(at="q", position=9.0), ns.elements.Stop(at="q", position=-9.0, side=-1)]
+        system = ns.mechanical(
+            1.0, 0.1, k, parameters={"F": 0.0}, forcing={"q": "F"}, impacts="sequential", elements=walls
+        )
+        branch = ns.continue_equilibrium(system, "F", (-1.0, 1.0))
+        np.testing.assert_allclose(branch.u.sel(state="q"), branch.F / k, atol=1e-12)

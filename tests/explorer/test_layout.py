@@ -158,7 +158,7 @@ def test_equations_and_a_moving_sketch_stand_beside_the_sliders(page: Any) -> No
     })()""")
     mass = """(() => {
         const told = JSON.parse(Bokeh.documents[0].get_model_by_name("sketch").value);
-        return told && told.frames.map(one => one.find(part => part[0] === "box" && part[3] > 1)[1]);
+        return told && told.frames.map(one => one.find(part => part[5] === "#DCE6EE")[1][0]);
     })()"""
     places = page.tab.evaluate(mass)
     assert len(places) == 36  # one period

@@ -360,3 +360,22 @@ def test_a_fit_tells_how_far_it_is_and_is_cancelled():
     assert heard == sorted(heard) and heard[0] == 0.0 and 0.02 < heard[-1] <= 1.0
     with pytest.raises(KeyboardInterrupt):
         ns.fit(free().with_parameters(k=9.0), {"x": (t, closed_form(t))}, ["k"], progress=lambda done: done < 0.01)
+
+
+def test_a_near_guess_needs_no_short_windows_and_gives_the_same(monkeypatch):
+    from nonsmooth.identification.fit import growth
+
+    t = np.arange(0, 12, 0.03)
+    noise = 1e-4 * np.random.default_rng(0).standard_normal(len(t))
+
+    def fitted():
+        return ns.fit(free().with_parameters(k=9.0), {"x": (t, closed_form(t) + noise)}, ["k", "c"], progress=False)
+
+    with monkeypatch.context() as changed:
+        changed.setattr(growth, "settle_first", lambda *given: pytest.fail("short windows were fitted"))
+        at_once = fitted()
+    monkeypatch.setattr(growth, "_at_once", lambda *given: None)
+    grown = fitted()
+    for name in ("k", "c"):
+        assert abs(at_once[name] - grown[name]) < 1e-3 * grown.uncertainty[name]
+        assert at_once.uncertainty[name] == pytest.approx(grown.uncertainty[name], rel=1e-3)

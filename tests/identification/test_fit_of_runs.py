@@ -9,6 +9,8 @@ import pytest
 
 import nonsmooth as ns
 
+pytestmark = pytest.mark.physics
+
 T = np.arange(0.0, 20.0, 0.05)
 
 
@@ -68,29 +70,45 @@ def test_the_clock_of_a_recording_is_found_where_the_forcing_is_known(clock: flo
     assert found.estimate("clock").uncertainty < 2e-4 and not found.anomalies
 
 
-def test_derivatives_in_the_clock_and_in_unknowns_of_runs_are_those_of_differences() -> None:
-    from nonsmooth.identification.fit.first_windows import first_windows
-    from nonsmooth.identification.fit.fit import problem_of
-
-    rng = np.random.default_rng(1)
-    runs = [{"q": (T + 0.3, decay(T) + 1e-3 * rng.standard_normal(T.size))} for _ in range(2)]
+@pytest.mark.parametrize("names", [["k", "c", "q.delay", "q.gain", "clock"], ["k", "c", "phase", "clock"]])
+def test_derivatives_in_sensor_clock_and_phase_are_those_of_differences(names: list[str]) -> None:
+    """Of motions that hit a stop, simulated anew at each value; the start, free in both, is eliminated."""
+    begin = -0.5 if "q.delay" in names else 0.0  # the window begins earlier by the longest delay
     stop = ns.elements.Stop(at="q", position=0.7, restitution=0.8)
     s = ns.mechanical(
-        1.0, "c", "k", parameters={"k": 9.0, "c": 0.15, "F": 0.5}, coordinates=["q"], elements={"s": stop},
-        forcing={"q": lambda t, p: p.F * np.cos(2.0 * t)},
+        1.0, "c", "k", parameters={"k": 9.0, "c": 0.15, "late": 0.0}, coordinates=["q"], elements={"s": stop},
+        forcing={"q": lambda t, p: 0.5 * np.cos(2.0 * (t + p.late))},
     )  # fmt: skip
-    names = ["k", "c", "q.delay", "q.gain", "clock", "phase"]
-    problem = problem_of(s, runs, names, per_run=["c", "clock", "q.gain"])
-    theta = problem.unknowns.guess + 0.01 * np.arange(1, len(problem.unknowns.names) + 1) / 10
-    problem = problem.of(first_windows(problem, theta, 2.0, None, True)[:3])
-    exact, h = problem.derivatives(theta, problem.starts), 1e-6
-    for i, window in enumerate(problem.pieces):
-        n = len(window.readings[0])
-        for j, place in enumerate(window.which):
-            step = h * np.eye(len(theta))[place]
-            ahead, behind = (problem.residuals(theta + sign * step, problem.starts).residuals[i] for sign in (1, -1))
-            slope = -(ahead - behind)[:n] / (2 * h)
-            np.testing.assert_allclose(exact.in_parameters[i][:n, j], slope, rtol=2e-5, atol=2e-5)
+    t, start, period = np.linspace(0.0, 4.0, 81), {"q": 0.1, "v_q": 3.0}, np.pi
+    unknowns = {name: (0.0, 0.5) if name == "q.delay" else None for name in names}
+    plan = ns.plan_experiment(
+        s, {"run": {"duration": 4.0, "samples": t, "start": start}}, unknowns if "q.delay" in names else names,
+        measured={"q": ns.Sensor(noise=1e-3)},
+    )  # fmt: skip
+
+    def readings(own: dict[str, float], q: float, v: float) -> Any:
+        at = own.get("clock", 1.0) * t - own.get("q.delay", 0.0) + own.get("phase", 0.0) * period - begin
+        one = s.with_parameters(k=own["k"], c=own["c"], late=begin)
+        run = ns.simulate(one, duration=5.0, samples=np.maximum(at, 0.0), start={"q": q, "v_q": v}, transient=0)
+        motion = run["u"].sel(state="q").groupby("time").last()
+        slope = (at < 0) * v * at  # a little before the start
+        return own.get("q.gain", 1.0) * (motion.sel(time=np.maximum(at, 0.0), method="nearest").values + slope)
+
+    first = {"k": 9.0, "c": 0.15, "clock": 1.0, "q.gain": 1.0}
+    centre = np.array([*(first.get(name, 0.0) for name in names), 0.1, 3.0])
+    h, columns = 1e-6, []
+    for step in h * np.eye(len(centre)):
+        ahead, behind = (readings(dict(zip(names, x, strict=False)), *x[-2:]) for x in (centre + step, centre - step))
+        columns.append((ahead - behind) / (2 * h) / 1e-3)
+    whole = np.array(columns) @ np.array(columns).T
+    shared = [i for i, name in enumerate(names) if name != "phase"]
+    free = [i for i in range(len(centre)) if i not in shared]
+    cross = whole[np.ix_(shared, free)]
+    expected = whole[np.ix_(shared, shared)] - cross @ np.linalg.solve(whole[np.ix_(free, free)], cross.T)
+    size = np.sqrt(np.diag(expected))
+    found = plan["information"].values[0]
+    assert plan["parameter"].values.tolist() == [name for name in names if name != "phase"]
+    np.testing.assert_allclose(found / np.outer(size, size), expected / np.outer(size, size), atol=1e-4)
 
 
 def test_a_knock_is_left_out_and_named() -> None:

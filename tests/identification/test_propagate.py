@@ -6,19 +6,28 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import nonsmooth as ns
-from nonsmooth.identification import Estimate
+
+pytestmark = pytest.mark.physics
 
 QUIET: dict[str, Any] = {"progress": False}
 
 
-def known(system: ns.System, errors: dict[str, float], correlation: float = 0.0) -> ns.ParameterSet:
+class Known(dict[str, float]):
+    """Values by name, with their covariance."""
+
+    covariance: xr.DataArray
+
+
+def known(system: ns.System, errors: dict[str, float], correlation: float = 0.0) -> Known:
     """Parameters at their values in ``system``, every pair with the same correlation."""
-    sizes = np.array(list(errors.values()))
+    sizes, names = np.array(list(errors.values())), list(errors)
     matrix = np.outer(sizes, sizes) * (correlation + (1 - correlation) * np.eye(len(sizes)))
-    rows = {name: Estimate(system.values[name], error, "") for name, error in errors.items()}
-    return ns.ParameterSet(rows, matrix)
+    found = Known({name: system.values[name] for name in names})
+    found.covariance = xr.DataArray(matrix, {"parameter": names, "other": names}, ("parameter", "other"))
+    return found
 
 
 def support() -> ns.System:

@@ -29,9 +29,9 @@ def test_each_picture_shows_its_instant(moving) -> None:
         plane, over = moving._dots
         assert [float(v[0]) for v in plane.get_data()] == pytest.approx([np.cos(t), -np.sin(t)], abs=1e-9)
         assert [float(v[0]) for v in over.get_data()] == pytest.approx([t, np.cos(t)], abs=1e-9)
-        (mass,) = [one for one in moving._paper.patches if type(one).__name__ == "Rectangle"]
-        rest = moving._sketch.faces[0]
-        assert mass.get_x() - rest == pytest.approx(moving._scale * np.cos(t), abs=1e-9)
+        (mass,) = [one.get_xy()[:, 0] for one in moving._paper.patches if len(one.get_xy()) == 5]
+        sketch, _ = moving._sketch
+        assert mass.min() - sketch.faces[0] == pytest.approx(sketch.scale * np.cos(t), abs=1e-9)
 
 
 def test_gif_and_page(moving, tmp_path) -> None:

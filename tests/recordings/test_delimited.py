@@ -93,7 +93,7 @@ def test_wrong_arguments_at_the_door(given: dict[str, object], message: str) -> 
 
 
 def test_wrong_columns_at_the_door() -> None:
-    with pytest.raises(TypeError, match="columns must be a mapping"):
+    with pytest.raises(TypeError, match="columns must map our names"):
         load_recording("absent.csv", columns=["t"])
     with pytest.raises(TypeError, match=r"columns\['x'\] must be a header"):
         load_recording("absent.csv", columns={"x": 1.5})

@@ -197,7 +197,7 @@ SEEDS: dict[str, Callable[[], Seed]] = {
     "stamps": lambda: Seed(b"time,x\n" + b"".join(b"2026-05-31T12:00:%02d.5,%d\n" % (k, k) for k in range(20)), None),
     "table, options": lambda: Seed(
         b"Bench\nt;x\ns;mm\n" + b"".join(b"%d;1.00%d,5\n" % (k, k) for k in range(9)), "csv",
-        Options(header=2, units_row=3, decimal=",", thousands=".", na=("n",), leave=("S",), wraps={"x": 64.0}),
+        Options(header=2, units_row=3, decimal=",", thousands=".", na=("n",), skip=("S",), wraps={"x": 64.0}),
     ),
 }
 

@@ -174,7 +174,7 @@ def test_only_so_many_warnings_are_shown(tmp_path: Path) -> None:
 
 
 def test_what_holds_for_many_runs_is_said_once() -> None:
-    from nonsmooth.recordings.remarks import Remarks
+    from nonsmooth.recordings.reading import Remarks
 
     remarks = Remarks()
     for i in range(30):

@@ -311,6 +311,8 @@ def test_what_is_refused_says_what_to_write() -> None:
         Stop(restitution=0.5)
     with pytest.raises(ns.SystemDefinitionError, match="between 0 and 1"):
         Stop(at="q", restitution=1.5)
+    with pytest.raises(ns.SystemDefinitionError, match="at= .* and gap= exclude each other"):
+        Stop(at="q", gap=lambda t, u, p: 1.0 - u.q)
     with pytest.raises(ns.SystemDefinitionError, match="nearest|parameters"):
         ns.mechanical(1.0, 0.0, 1.0, parameters={"mu": 0.1}, elements=[Coulomb(at="q", friction="mue")])
     with pytest.raises(ns.SystemDefinitionError, match="coordinate"):

@@ -60,10 +60,11 @@ class TestImpacts:
         assert v[0] + v[2] == pytest.approx(slip, abs=1e-12)
         assert v[0] - 1 == pytest.approx(-1.5 * friction if slip else -2 / 7, abs=1e-12)
 
-    def test_energy_never_rises_and_impulses_lie_in_the_cone(self):
+    @pytest.mark.parametrize("number", [2000, pytest.param(100_000, marks=pytest.mark.slow)])
+    def test_energy_never_rises_and_impulses_lie_in_the_cone(self, number):
         """Random directions, masses and laws; the impulses are of degree one in the rates (Euler)."""
         draw = np.random.default_rng(3)
-        for _ in range(2000):
+        for _ in range(number):
             size = int(draw.integers(2, 5))
             W = draw.normal(size=(size, size + int(draw.integers(0, 3))))
             effects, v = W @ W.T, draw.normal(size=size)

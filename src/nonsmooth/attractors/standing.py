@@ -13,8 +13,9 @@ from nonsmooth.attractors.basins_found import Attractor
 from nonsmooth.attractors.settled import Settled
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
-from nonsmooth.flow.equilibria import mode_field, sorted_eigenvalues
+from nonsmooth.flow.equilibria import sorted_eigenvalues
 from nonsmooth.flow.equilibrium_sets import EquilibriumSet, equilibrium_sets
+from nonsmooth.flow.mode_fields import mode_field
 from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:

@@ -272,7 +272,6 @@ def _dataset(system: System, found: _Found, swept: xr.Dataset, options: dict[str
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
 
-    attrs = dict(provenance(labels_of(system), "bifurcation_diagram", options, method="multiple shooting"))
-    return diagram(
-        attrs, found.name, found.branches, [points for _, points in found.lines], found.parents, swept, complete
-    )
+    labels, returns = labels_of(system), [points for _, points in found.lines]
+    attrs = dict(provenance(labels, "bifurcation_diagram", options, method="multiple shooting"))
+    return diagram(labels, attrs, found.name, found.branches, returns, found.parents, swept, complete)

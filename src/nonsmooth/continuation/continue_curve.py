@@ -83,9 +83,9 @@ def continue_curve(
     if first is None:
         raise SolveError(f"the curve of the {kind} could not be begun at this point", status="no_convergence")
     allowed = tuple((i - 2, *allowed_range(start, names[i], *ends)) for i, ends in enumerate(box))
-    policy, ahead = AlongCurve(kind, shooting.forced), (locus, first)
+    policy = AlongCurve(kind, shooting.forced)
     within = Limits(allowed, largest, most, locus.landmark(first))
-    record = both_ways(policy, within, (locus, first.turned()), [record_of(Row(*ahead))], ahead)
+    record = both_ways(policy, within, first.turned(), [record_of(Row(first))], first)
     options = {
         "ranges": {name: list(ends) for name, ends in zip(names, box, strict=True)}, "step": largest, "points": most,
         "kind": kind,

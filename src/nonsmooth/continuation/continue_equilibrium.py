@@ -11,9 +11,10 @@ from nonsmooth.continuation.branches.following import both_ways, dataset
 from nonsmooth.continuation.branches.records import record_of
 from nonsmooth.continuation.events.of_equilibria import AlongEquilibria, beyond
 from nonsmooth.continuation.march.march import Limits, Row
-from nonsmooth.continuation.problems.equilibrium import Equilibria, Rest, equilibria_near
+from nonsmooth.continuation.problems.equilibrium import Rest, equilibria_near
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, whole_number
+from nonsmooth.flow.mode_fields import MOST, every_mode
 from nonsmooth.flow.starts import first_state
 from nonsmooth.system.names import by_name
 from nonsmooth.system.system import System
@@ -74,7 +75,8 @@ def continue_equilibrium(
     from nonsmooth.results.branches import EQUILIBRIUM, SPECIAL_EQUILIBRIUM
 
     check_system(system, "continue_equilibrium")
-    system.refuse_patterns("continue_equilibrium")
+    if every_mode(system.traced, system.parameter_vector()) is None:
+        raise ValueError(f"{system.name!r} has more than {MOST} combinations of contact states: take fewer elements")
     if system.depends_on_time:
         raise ValueError(f"{system.name!r} depends on time: it has no equilibria; find_orbit finds its periodic orbits")
     low, high = limits(system, parameter, range, system.values.get(parameter), what="the system")
@@ -82,10 +84,10 @@ def continue_equilibrium(
     largest, most = largest_step(step), whole_number(points, "points", 1)
     state = first_state(system, start, mode)
     modes = None if mode is None else [list(system.modes).index(mode)]
-    first: tuple[Equilibria, Rest] | None = None
-    for curve, rest in equilibria_near(system, parameter, high - low, np.nan_to_num(state.u), here, modes):
+    first: Rest | None = None
+    for rest in equilibria_near(system, parameter, high - low, np.nan_to_num(state.u), here, modes):
         inside = (rest.margins < 0.0).all()
-        first = (curve, rest) if inside else beyond(curve, rest) if (rest.margins <= 0.0).all() else None
+        first = rest if inside else beyond(rest) if (rest.margins <= 0.0).all() else None
         if first is not None:
             break
     if first is None:
@@ -95,9 +97,8 @@ def continue_equilibrium(
             status="no_convergence",
         )
     box = ((-1, *allowed_range(system, parameter, low, high)),)
-    curve, rest = first
-    policy, ahead, back = AlongEquilibria(), (curve, rest.facing(1.0)), (curve, rest.facing(-1.0))
-    record = both_ways(policy, Limits(box, largest, most), back, [record_of(Row(*ahead))], ahead)
+    policy, ahead = AlongEquilibria(), first.facing(1.0)
+    record = both_ways(policy, Limits(box, largest, most), first.facing(-1.0), [record_of(Row(ahead))], ahead)
     options = {
         "parameter": parameter, "range": (low, high), "step": largest, "points": most, "mode": mode,
         "start": [float(x) for x in state.u],

@@ -6,16 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.arguments import largest_step
-from nonsmooth.continuation.branches.begin import curve_of, resumed_at
-from nonsmooth.continuation.branches.following import Asked, Start
+from nonsmooth.continuation.branches.following import Asked, Start, curve_of, resumed_at
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.branches.other_branches import born, straight_on, switched
 from nonsmooth.continuation.branches.reading import read_branch
 from nonsmooth.continuation.branches.records import record_of
 from nonsmooth.continuation.march.march import March, Row
-from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import whole_number
 from nonsmooth.system.names import by_name
@@ -108,22 +105,13 @@ def _from_orbit(orbit: Orbit, name: str | None, asked: Asked) -> xr.Dataset:
     if orbit.virtual:
         raise ValueError("this orbit is virtual: its path goes through a boundary that it should obey")
     curve, X = curve_of(orbit, name, branch.width)
-    first = curve.at_parameter(X / curve.scale, system.values[name]) or _near(curve, X)
+    first = curve.nearest(X / curve.scale, system.values[name])
     if first is None:
         raise SolveError("Newton's method did not converge at the orbit itself: give its parameter another value",
                          status="no_convergence")  # fmt: skip
-    ahead, back = (curve, first.facing(1.0)), (curve, first.facing(-1.0))
-    middle = [record_of(Row(*ahead))]
-    return branch.result(orbit.period_number, back, middle, ahead, closed=curve.landmark(first))
-
-
-def _near(curve: Orbits, X: FloatArray) -> OrbitPoint | None:
-    """The first point where the parameter cannot be held: at a fold."""
-    Y = X / curve.scale
-    null = curve.null_vectors(curve.shooting.evaluate(X))
-    if not len(null):
-        return None
-    return curve.near(Y, null[-1], most=20)
+    ahead = first.facing(1.0)
+    middle = [record_of(Row(ahead))]
+    return branch.result(orbit.period_number, first.facing(-1.0), middle, ahead, closed=curve.landmark(first))
 
 
 def _go_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
@@ -143,5 +131,5 @@ def _go_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
         curve, X = resumed_at(system, record.period_number, point, branch.name, branch.width)
         border = point.tangent / curve.scale * (1.0 if side else -1.0)
         begin = curve.near(X / curve.scale, border / np.linalg.norm(border))
-        ends.append(March(ending="no_convergence") if begin is None else (curve, begin))
+        ends.append(begin or March(ending="no_convergence"))
     return branch.result(record.period_number, ends[0], record.points, ends[1])

@@ -15,7 +15,15 @@ from nonsmooth.continuation.problems.primitive import primitive
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
 from nonsmooth.continuation.problems.solve import solve
 from nonsmooth.continuation.searches.search import search_within
-from nonsmooth.continuation.searches.settled import CLOSED, NEAR, Guess, forced_guesses, settle_forced, touching
+from nonsmooth.continuation.searches.settled import (
+    CLOSED,
+    NEAR,
+    Guess,
+    autonomous_guesses,
+    forced_guesses,
+    settle_forced,
+    touching,
+)
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.arguments import check_system, real_number, whole_number
 from nonsmooth.flow.engines.methods import engine_for
@@ -127,8 +135,6 @@ def _guesses(
     """
     engine = engine_for(system, rtol=RTOL)
     if system.period() is None:
-        from nonsmooth.continuation.searches.settled_autonomous import autonomous_guesses
-
         guesses = autonomous_guesses(system, engine, state, transient, max_period, period_number, search)
     else:
         keep = 2 * max(max_period, period_number or 1) + 2
@@ -155,9 +161,8 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
     """Newton from each guess; the first orbit that is admissible, near, and stable (or asked for)."""
     reasons: list[tuple[str, str]] = []
     search.look()
-    for guess in [one for first in guesses for one in (*touching(first, system), first)]:
-        shooting = Shooting(system, guess.signature, guess.period_number)
-        X = shooting.join(guess.times, guess.states, guess.period)
+    for guess in [one for first in guesses for one in (*touching(first, system, first.kicks), first)]:
+        shooting, X = Shooting.of(system, guess)
         size = np.concatenate([guess.size, np.ones(shooting.n - len(guess.size))])
         name = _name(guess.period_number)
         search.doing = f"looking for a {name} orbit by Newton's method"

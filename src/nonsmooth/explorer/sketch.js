@@ -13,32 +13,17 @@
     paint.setTransform(dense, 0, 0, dense, 0, 0);
     paint.clearRect(0, 0, width, high);
     const x = one => aside + unit * (one - left), y = one => unit * (top - one);
-    const stroke = (points, color, weight) => {
-      let down = false;
-      paint.beginPath();
-      for (const [a, b] of points) {
-        if (a === null || b === null) { down = false; continue; }
-        down ? paint.lineTo(x(a), y(b)) : paint.moveTo(x(a), y(b));
-        down = true;
-      }
-      paint.strokeStyle = color || "#1B1F24"; paint.lineWidth = weight; paint.stroke();
-    };
     const kinds = {
-      line: (xs, ys, color, weight) => stroke(xs.map((one, i) => [one, ys[i]]), color, 1.15 * weight),
-      box: (a, b, w, h, fill, alpha) => {
-        paint.globalAlpha = alpha; paint.fillStyle = fill;
-        paint.fillRect(x(a), y(b + h), unit * w, unit * h);
-        paint.globalAlpha = 1;
-        stroke([[a, b], [a + w, b], [a + w, b + h], [a, b + h], [a, b]], "", 1);
-      },
-      circle: (a, b, r) => {
-        paint.beginPath(); paint.arc(x(a), y(b), unit * r, 0, 7);
-        paint.fillStyle = "#FFFFFF"; paint.fill(); paint.lineWidth = 1; paint.strokeStyle = "#1B1F24"; paint.stroke();
-      },
-      arrow: (a, b, h, color, both) => {
-        const s = Math.sign(b - a) * 0.1, head = (tip, way) => stroke([[tip - way, h + 0.06], [tip, h], [tip - way, h - 0.06]], color, 1);
-        stroke([[a, h], [b, h]], color, 1); head(b, s);
-        if (both) head(a, -s);
+      line: (xs, ys, color, weight, fill) => {
+        let down = false;
+        paint.beginPath();
+        xs.forEach((a, i) => {
+          if (a === null || ys[i] === null) { down = false; return; }
+          down ? paint.lineTo(x(a), y(ys[i])) : paint.moveTo(x(a), y(ys[i]));
+          down = true;
+        });
+        if (fill) { paint.fillStyle = fill; paint.fill(); }
+        paint.strokeStyle = color; paint.lineWidth = 1.15 * weight; paint.stroke();
       },
       text: (a, b, words, color, size, across, up) => {
         paint.font = `italic ${Math.max(0.24 * unit * size, 9)}px "STIX Two Text", Georgia, "Liberation Serif", serif`;

@@ -11,8 +11,7 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.explorer.labels import plain_of, symbols_of
-from nonsmooth.plot.mechanism import FLOOR, Sketch
-from nonsmooth.plot.scheme import scheme_of
+from nonsmooth.plot.mechanism import sketch_of_run
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -38,33 +37,22 @@ def _plain(latex: str) -> str:
     return "" if re.search(r"[\\{}]|frac|left", text) else text.replace("-", "\N{MINUS SIGN}")
 
 
-def moving(system: System, run: Any, pictures: int) -> dict[str, Any] | None:
-    """Pictures of a run at even instants: the frame of the paper, what stands still, and what moves in each of them.
+def moving(system: System, run: Any) -> dict[str, Any] | None:
+    """Pictures at the instants of a run: the frame of the paper, what stands still, and what moves in each of them.
 
-    None of a system that has no masses on a line. Positions between the run's samples are interpolated: a picture of
-    some 200 pixels shows no more.
+    None of a system that has no masses on a line.
     """
-    try:
-        sketch = Sketch(scheme_of(system))
-    except ValueError:
+    made = sketch_of_run(system, run)
+    if made is None or not np.isfinite(run["u"].values).all():
         return None
-    time = run["time"].values
-    instants = np.linspace(time[0], time[-1], pictures, endpoint=False)
-    q = np.stack(
-        [np.interp(instants, time, run["u"].sel(state=name).values) for name in sketch.scheme.coordinates], axis=1
-    )
-    if not np.isfinite(q).all():
-        return None
-    scale = sketch.scale_for(q)
-    drawn = [
-        [_short(part) for part in sketch.parts(scale * place, scale, float(instant))]
-        for instant, place in zip(instants, q, strict=True)
-    ]
+    sketch, parts = made
+    drawn = [[_short(part) for part in parts(k)] for k in range(run.sizes["time"])]
     still = set.intersection(*({json.dumps(part) for part in one} for one in drawn))
-    top = sketch.top if sketch.above else min(sketch.top, FLOOR + sketch.tall + 0.15)
-    paper = [sketch.left - 0.1, sketch.right + 0.1, sketch.bottom, top]
-    frames = [[part for part in one if json.dumps(part) not in still] for one in drawn]
-    return {"paper": paper, "still": [json.loads(part) for part in sorted(still)], "frames": frames}
+    return {
+        "paper": [sketch.left - 0.1, sketch.right + 0.1, sketch.bottom, sketch.top],
+        "still": [part for part in drawn[0] if json.dumps(part) in still],
+        "frames": [[part for part in one if json.dumps(part) not in still] for one in drawn],
+    }
 
 
 @lru_cache(maxsize=16)

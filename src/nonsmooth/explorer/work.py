@@ -137,8 +137,11 @@ def _sketch(job: Job) -> dict[str, Any]:
         span: dict[str, Any] = {"periods": shown, "transient": job["transient"]}
     else:
         span = {"duration": job["span"] * shown / periods_shown(period), "transient": 10 * job["span"]}
-    run = ns.simulate(job.system, start=job["start"], **span, **job.options)
-    return {"sketch": moving(system, run, _PICTURES * shown)}
+    pictures = _PICTURES * shown
+    run = ns.simulate(job.system, start=job["start"], samples=pictures + 1, **span, **job.options)
+    time = run["time"].values
+    instants = np.linspace(time[0], time[-1], pictures + 1)[:-1]
+    return {"sketch": moving(system, run.isel(time=np.searchsorted(time, instants, side="right") - 1))}
 
 
 def _stability(job: Job) -> dict[str, Any]:

@@ -9,87 +9,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import ComplexArray, FloatArray
+from nonsmooth.flow.mode_fields import ModeField, arguments, mode_field
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
 
-__all__ = ["AT_REST", "ROUNDING", "Equilibrium", "ModeField", "equilibrium_at", "mode_field", "refuse_resting",
-           "sorted_eigenvalues"]  # fmt: skip
+__all__ = ["AT_REST", "ROUNDING", "Equilibrium", "equilibrium_at", "refuse_resting", "sorted_eigenvalues"]
 
 AT_REST = 1e-7  # of a state's size: nearer to an equilibrium than this is at it
 ROUNDING = 1e-14  # and nearer than this nothing but rounding leads away
 VANISHING = 1e-9  # of an eigenvalue's size, of an indicator's: zero
 STEPS = 256  # of a forcing period, over which the Jacobian is taken as constant
 SURE = 1e-3  # of a multiplier found so
-
-
-class ModeField:
-    """The vector field of one mode and the indicators, with their derivatives, as functions of numbers.
-
-    Parameters
-    ----------
-    traced : Traced
-    mode : int
-    places : sequence of int
-        Parameters in which derivatives are wanted.
-    """
-
-    def __init__(self, traced: Traced, mode: int, places: Sequence[int] = ()) -> None:
-        import sympy as sp
-
-        self.traced, self.mode, self._n_places = traced, mode, len(places)
-        # States that the mode lacks stay zero.
-        self.own = [i for i in range(len(traced.u)) if not traced.lacking[mode][i]]
-        u = [traced.u[i] for i in self.own]
-        f = [sp.sympify(traced.fields[mode][i]) for i in self.own]
-        jacobian = [e.diff(s) for e in f for s in u]
-        derived = [*jacobian, *(e.diff(traced.p[k]) for e in f for k in places)]
-        self._field = sp.lambdify(_arguments(traced), [*f, *derived], modules="numpy")
-        self._indicators, slopes = _indicators(traced)
-        moving = {*traced.u}
-        self.linear = not any(e.free_symbols & moving for e in jacobian)  # in the states, as are the indicators:
-        self.affine = self.linear and not any(e.free_symbols & moving for e in slopes)
-
-    def evaluate(
-        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """f (n,), its Jacobian (n, n) and its derivatives in the parameters (n, n_places), of the mode's own states; at
-        several times each with a leading dim."""
-        found, n = _numbers(self._field, t, u, values, memory), len(self.own)
-        shape = found.shape[:-1]
-        return (
-            found[..., :n], found[..., n : n + n * n].reshape(*shape, n, n),
-            found[..., n + n * n :].reshape(*shape, n, self._n_places),
-        )  # fmt: skip
-
-    def indicators(
-        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
-    ) -> tuple[FloatArray, FloatArray]:
-        """Indicators (n_indicators,) and their gradients (n_indicators, n_u); at several times with a leading dim."""
-        found = _numbers(self._indicators, t, u, values, memory)
-        n, n_u = len(self.traced.indicators), len(self.traced.u)
-        return found[..., :n], found[..., n:].reshape(*found.shape[:-1], n, n_u)
-
-    def margins(self, h: FloatArray, edge: FloatArray | float = 0.0) -> FloatArray:
-        """Margins by which conditions of transitions hold (n_transitions,), -inf for those that are not of the mode.
-
-        Rows nearer to zero than ``edge`` hold where another one of their condition does: a speed and an acceleration
-        vanish at every equilibrium, and what lies behind a stop is none."""
-        h = np.where(np.abs(h) <= edge, 0.0, h)
-        found = np.full(len(self.traced.transitions), -np.inf)
-        for k, jump in enumerate(self.traced.transitions):
-            if jump.source == self.mode and jump.rows and jump.fires:
-                rows = [row.sign * float(h[row.indicator]) for row in jump.rows]
-                found[k] = min((x for x in rows if x), default=0.0)
-        return found
 
 
 @dataclass(frozen=True)
@@ -196,35 +134,6 @@ def refuse_resting(system: System, starts: FloatArray, points: FloatArray, verb:
         )
 
 
-@lru_cache(maxsize=256)
-def mode_field(traced: Traced, mode: int) -> ModeField:
-    """The functions of a mode, made once."""
-    return ModeField(traced, mode)
-
-
-def _numbers(function: Any, t: Any, u: FloatArray, values: FloatArray, memory: FloatArray) -> FloatArray:
-    """The numbers that a function gives at a time (m,), or at several (T, m)."""
-    with np.errstate(all="ignore"):
-        found = function(t, u, values, memory)
-    if np.ndim(t) == 0:
-        return np.array(found, dtype=float)
-    return np.array([np.broadcast_to(one, np.shape(t)) for one in found], dtype=float).reshape(len(found), np.size(t)).T
-
-
-def _arguments(traced: Traced) -> list[Any]:
-    return [traced.t, list(traced.u), list(traced.p), list(traced.m)]
-
-
-@lru_cache(maxsize=8)
-def _indicators(traced: Traced) -> tuple[Any, list[Any]]:
-    """The indicators of a system with their slopes as a function of numbers, and the slopes as expressions."""
-    import sympy as sp
-
-    h = [sp.sympify(e) for e in traced.indicators]
-    slopes = [e.diff(s) for e in h for s in traced.u]
-    return sp.lambdify(_arguments(traced), [*h, *slopes], modules="numpy"), slopes
-
-
 def sorted_eigenvalues(J: FloatArray) -> ComplexArray:
     """Eigenvalues (n,) of a Jacobian, largest real part first."""
     found = np.linalg.eigvals(J).astype(complex)
@@ -260,7 +169,7 @@ def _fixed(traced: Traced, reset: Sequence[Any], u: FloatArray, values: FloatArr
     """Return whether a reset leaves the state alone."""
     import sympy as sp
 
-    image = sp.lambdify(_arguments(traced), list(reset), modules="numpy")
+    image = sp.lambdify(arguments(traced), list(reset), modules="numpy")
     moved = np.abs(np.array(image(0.0, u, values, memory), dtype=float) - u)
     return bool((moved <= 1e-12 * np.maximum(np.abs(u), 1e-3)).all())
 

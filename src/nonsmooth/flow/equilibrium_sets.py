@@ -20,15 +20,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.flow.equilibria import VANISHING, mode_field
+from nonsmooth.flow.equilibria import VANISHING
+from nonsmooth.flow.mode_fields import every_mode, held_places, mode_field
 from nonsmooth.flow.polytopes import TOUCHING, Extreme, Polytope, best
 from nonsmooth.system.symbolic.traced import NOT_UNIQUE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nonsmooth.system.derived.patterns import Patterns
-    from nonsmooth.system.derived.rows import Rows
     from nonsmooth.system.system import System
 
 __all__ = ["EquilibriumSet", "equilibrium_sets", "modes_of_sets"]
@@ -96,13 +95,15 @@ def equilibrium_sets(
     system: System, near: FloatArray, *, values: FloatArray | None = None, memory: FloatArray | None = None,
     modes: Sequence[int] | None = None,
 ) -> list[EquilibriumSet]:  # fmt: skip
-    """The sets of equilibria of a system: all of them where its modes are affine, else those beside a state."""
+    """The sets of equilibria of a system: all of them where its modes are affine, else those beside a state; none where
+    it has more modes than can be looked at."""
     values = system.parameter_vector() if values is None else values
     memory = system.memory_vector() if memory is None else memory
     if system.explicit_time:
         return []
-    traced, parts = system.traced, []
-    for mode in range(len(traced.mode_names)) if modes is None else modes:
+    modes, parts = every_mode(system.traced, values) if modes is None else modes, []
+    traced = system.traced  # with the modes that were made for it
+    for mode in modes or ():
         timed = any(jump.at is not None and jump.source == mode for jump in traced.transitions)
         if not timed and not traced.mode_names[mode].endswith(NOT_UNIQUE):
             parts += _polytopes(system, mode, near, values, memory)
@@ -114,7 +115,7 @@ def modes_of_sets(system: System) -> tuple[int, ...]:
     """The modes that leave some direction free; none where fields or indicators are not affine in the states."""
     u, values, memory = np.zeros(len(system.states)), system.parameter_vector(), system.memory_vector()
     found, scale = [], system.scale_vector()
-    for mode in range(len(system.modes)):
+    for mode in every_mode(system.traced, values) or ():
         field = mode_field(system.traced, mode)
         if not field.affine:
             return ()
@@ -132,13 +133,12 @@ def _equations(
     times = np.zeros(1) if period is None else period * INSTANTS
     f, J, _ = field.evaluate(u, values, memory, times)
     matrix, right = [*J], [*-f]
-    if traced.decider is not None and traced.decider.rows is not None:
-        # a field holds what is independent: of the others too nothing moves
-        rows, (base, pattern) = _rows(traced.decider.rows, values.tobytes()), traced.decider.modes[mode]
-        for k in rows.held(pattern):
-            kept = np.array([rows.parts[k].where.values, rows.rate(k, base).values])
-            matrix += [kept[:, field.own]] * len(times)
-            right += [-kept @ rows.augmented(u, t) for t in times]
+    held = held_places(traced, mode, values)
+    if held is not None:  # a field holds what is independent: of the others too nothing moves
+        rows, kept = held
+        for one in kept:
+            matrix += [one[:, field.own]] * len(times)
+            right += [-one @ rows.augmented(u, t) for t in times]
     return np.vstack(matrix), np.concatenate(right)
 
 
@@ -165,12 +165,6 @@ def _conditions(
     ]  # fmt: skip
 
 
-@lru_cache(maxsize=16)
-def _rows(patterns: Patterns, values: bytes) -> Rows:
-    """The calculus of a system's elements at values of the parameters."""
-    return patterns.rows(patterns.form.evaluate(np.frombuffer(values)[None, :]), 0)
-
-
 def _peaks(at: FloatArray) -> FloatArray:
     """The greatest values of periodic functions given at equal steps, as trigonometric polynomials."""
     fine = np.fft.irfft(np.fft.rfft(at, axis=0), n=16 * len(at), axis=0) * 16.0
@@ -190,6 +184,7 @@ class _Faces:
     slopes: FloatArray
     room: FloatArray
     keys: tuple[tuple[int, int], ...]
+    edge: bool
 
     def farthest(self, way: FloatArray) -> tuple[FloatArray, tuple[tuple[int, int], ...]] | None:
         """The vertex farthest along a direction, with its conditions: infinite where unbounded; None where empty."""
@@ -236,9 +231,8 @@ def _polytopes(system: System, mode: int, near: FloatArray, values: FloatArray, 
             if np.isfinite(u).all():
                 extremes.append(Extreme(u * scale, mode, (k, sign), keys))
         else:
-            found.append(
-                Polytope(mode, scale, faces.origin, faces.ways, faces.slopes, faces.room, lower, upper, tuple(extremes))
-            )
+            bounds = faces.origin, faces.ways, faces.slopes, faces.room
+            found.append(Polytope(mode, scale, *bounds, lower, upper, tuple(extremes), faces.edge))
     return found
 
 
@@ -263,6 +257,7 @@ def _faces(system: System, mode: int, u: FloatArray, values: FloatArray, memory:
     ways = np.zeros((len(scale), free.shape[1]))
     ways[~lacking] = free
     choices: list[list[tuple[FloatArray, float, tuple[int, int]]]] = []
+    edge = False
     for conditions in _conditions(system, mode, u, values, memory):
         bounds, holds = [], 0
         for one in conditions:
@@ -279,12 +274,14 @@ def _faces(system: System, mode: int, u: FloatArray, values: FloatArray, memory:
                 choices.append([b for i, b in enumerate(bounds) if not any(_alike(b, a) for a in bounds[:i])])
             elif holds:  # it always holds: a transition leads away
                 return []
+            else:
+                edge = True
     found, u = [], u / scale
     for chosen in product(*choices):
         rows = [b for i, b in enumerate(chosen) if not any(_alike(b, a) for a in chosen[:i])]
         slopes = np.array([row for row, _, _ in rows]).reshape(len(rows), free.shape[1])
         room = np.array([limit for _, limit, _ in rows])
-        found.append(_Faces(u, ways, slopes, room, tuple(key for _, _, key in rows)))
+        found.append(_Faces(u, ways, slopes, room, tuple(key for _, _, key in rows), edge))
     return found
 
 
@@ -310,13 +307,18 @@ def _joined(parts: list[Polytope]) -> list[EquilibriumSet]:
 
 def _touch(a: Polytope, b: Polytope) -> bool:
     off = TOUCHING * a.scale
-    return bool((a.lower <= b.upper + off).all() and (b.lower <= a.upper + off).all() and a.distance(b) <= TOUCHING)
+    if not ((a.lower <= b.upper + off).all() and (b.lower <= a.upper + off).all()):
+        return False
+    for one, other in ((a, b), (b, a)):  # most share a corner
+        if one.extremes and other.holds(np.array([end.u for end in one.extremes]), TOUCHING).any():
+            return True
+    return a.distance(b) <= TOUCHING
 
 
 def _set_of(parts: list[Polytope]) -> EquilibriumSet:
     scale = parts[0].scale
     kept: list[Polytope] = []  # none within another, as slipping that has just stopped is within sticking
-    for part in sorted(parts, key=lambda one: -one.ways.shape[1]):
+    for part in sorted(parts, key=lambda one: (-one.ways.shape[1], one.edge)):
         corners = np.array([one.u for one in part.extremes])
         if not (len(corners) and any(other.holds(corners, TOUCHING).all() for other in kept)):
             kept.append(part)

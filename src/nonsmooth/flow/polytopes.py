@@ -41,6 +41,7 @@ class Polytope:
     lower: FloatArray
     upper: FloatArray
     extremes: tuple[Extreme, ...]
+    edge: bool  # a condition vanishes on all of it, as the speed of what slips no more
 
     def holds(self, u: FloatArray, tolerance: Any) -> NDArray[np.bool_]:
         """Marks of the states (J, n) that lie in it, or nearer than a distance."""

@@ -1,4 +1,7 @@
-"""Sections: where a trajectory is looked at once per return."""
+"""Sections of a trajectory: at a phase of the forcing, or on a surface, and what counts as a return there.
+
+The rules in code are ``note_side`` of the steppers (:mod:`nonsmooth.kernels.linear.stepper`, ``series.stepper``).
+"""
 
 from __future__ import annotations
 

@@ -141,53 +141,49 @@ def amplitude_dependent(
     mode = fit.mode
     grid = np.linspace(mode.knots[0], mode.knots[-1], 101)
     basis = interpolation(mode.knots, grid)
-    K = len(mode.knots)
     # The unknowns are ln omega_n^2 and ln D at the knots; ln zeta = ln D - ln 2 - ln(omega_n^2) / 2.
-    square = mode.square(grid)
-    by_square = np.zeros((len(grid), fit.covariance.shape[0]))
-    by_square[:, :K] = basis * mode.squares / square[:, None]
+    by_square = np.zeros((len(grid), len(fit.covariance)))
+    by_square[:, fit.at["square"]] = basis * mode.squares / mode.square(grid)[:, None]
     by_zeta = -0.5 * by_square
-    by_zeta[:, K : 2 * K] += basis
-    frequency, zeta = mode.natural_frequency(grid), mode.damping_ratio(grid)
-    frequency_error = 0.5 * frequency * np.sqrt(np.einsum("ij,jk,ik->i", by_square, fit.covariance, by_square))
-    zeta_error = zeta * np.sqrt(np.einsum("ij,jk,ik->i", by_zeta, fit.covariance, by_zeta))
-    data = _data(fit, grid, frequency, frequency_error, zeta, zeta_error)
-
-    def at(i: int) -> tuple[Estimate, Estimate]:
-        return (
-            Estimate(float(frequency[i]), float(frequency_error[i]), "Hz"),
-            Estimate(float(zeta[i]), float(zeta_error[i])),
-        )
-
-    others = {"zeta": at(0)[1], "f_n at the largest amplitude": at(-1)[0], "zeta at the largest amplitude": at(-1)[1]}
+    by_zeta[:, fit.at["damping"]] += basis
+    rows = [
+        (values, values * np.sqrt(np.einsum("ij,jk,ik->i", slope, fit.covariance, slope)))
+        for values, slope in ((mode.natural_frequency(grid), 0.5 * by_square), (mode.damping_ratio(grid), by_zeta))
+    ]
+    data = _data(fit, grid, *rows)
+    ends = [
+        Estimate(float(values[i]), float(errors[i]), unit)
+        for i in (0, -1) for (values, errors), unit in zip(rows, ("Hz", ""), strict=True)
+    ]  # fmt: skip
+    f_n, *rest = ends
+    others = dict(zip(("zeta", "f_n at the largest amplitude", "zeta at the largest amplitude"), rest, strict=True))
     others |= _others(fit)
     finding = Finding(
-        "f_n", at(0)[0], _METHOD, sum(len(c.frequency) for c in curves), tuple(c.name for c in curves),
+        "f_n", f_n, _METHOD, sum(len(c.frequency) for c in curves), tuple(c.name for c in curves),
         tuple(_notes(fit)), others, None, data, "backbone",
     )  # fmt: skip
     return finding, mode
 
 
 def _data(
-    fit: ResponseFit, grid: FloatArray, f: FloatArray, f_error: FloatArray, zeta: FloatArray, zeta_error: FloatArray
+    fit: ResponseFit, grid: FloatArray, natural: tuple[FloatArray, FloatArray], damping: tuple[FloatArray, FloatArray]
 ) -> xr.Dataset:
-    """Data of the pictures."""
+    """Data of the pictures; the backbone as values and errors over the grid."""
     import xarray as xr
 
-    point = {"frequency": fit.omega / (2 * np.pi), "response": np.abs(fit.measured), "modal_amplitude": fit.amplitude}
-    units = {"frequency": "Hz", "response": "m", "modal_amplitude": "m"}
-    slope = fit.slopes()
-    rows: dict[str, Any] = {name: ("point", v, {"units": units[name]}) for name, v in point.items()}
-    if fit.force is not None:
-        rows["force"] = ("point", fit.force, {"units": "N"})
+    slope, (f, f_error), (zeta, zeta_error), own = fit.slopes(), natural, damping, fit.own()
+    rows: dict[str, Any] = {} if fit.force is None else {"force": ("point", fit.force, {"units": "N"})}
     rows |= {
+        "frequency": ("point", fit.omega / (2 * np.pi), {"units": "Hz"}),
+        "response": ("point", np.abs(fit.measured), {"units": "m"}),
+        "modal_amplitude": ("point", fit.amplitude, {"units": "m"}),
         "curve": ("point", fit.curve), "slope": ("point", slope, {"long_name": "d ln F / d ln a"}),
         "unstable": ("point", slope < 0),
         "f_n": ("amplitude", f, {"long_name": "natural frequency", "units": "Hz"}),
         "f_n_error": ("amplitude", f_error, {"units": "Hz"}),
         "zeta": ("amplitude", zeta, {"long_name": "damping ratio"}), "zeta_error": ("amplitude", zeta_error),
-        "curve_f_n": ("curves", fit.own()[0], {"units": "Hz"}), "curve_zeta": ("curves", fit.own()[1]),
-        "curve_amplitude": ("curves", fit.own()[2], {"units": "m"}),
+        "curve_f_n": ("curves", own[0], {"units": "Hz"}), "curve_zeta": ("curves", own[1]),
+        "curve_amplitude": ("curves", own[2], {"units": "m"}),
     }  # fmt: skip
     coords = {"amplitude": ("amplitude", grid, {"long_name": "amplitude of the mode", "units": "m"}),
               "curves": ("curves", list(fit.names))}  # fmt: skip
@@ -196,15 +192,14 @@ def _data(
 
 def _others(fit: ResponseFit) -> dict[str, Estimate]:
     """Modal mass, residual, and how far curves differ."""
-    K, (first, _) = len(fit.knots), fit.sizes
     error = np.sqrt(np.diag(fit.covariance))
     found: dict[str, Estimate] = {}
     if fit.forced and fit.mass is None:
-        found["modal mass"] = Estimate(fit.mode.mass, fit.mode.mass * float(error[2 * K]), "kg")
+        found["modal mass"] = Estimate(fit.mode.mass, fit.mode.mass * float(error[fit.at["load"]][0]), "kg")
     if fit.residual:
         R = fit.mode.residual
-        for name, k, value in (("real", first - 2, R.real), ("imag", first - 1, R.imag)):
-            found[f"residual, {name}"] = Estimate(1e6 * value, 1e6 * float(error[k]) * fit.unit, "µm/N")
+        for name, size, value in zip(("real", "imag"), error[fit.at["residual"]], (R.real, R.imag), strict=True):
+            found[f"residual, {name}"] = Estimate(1e6 * value, 1e6 * float(size) * fit.unit, "µm/N")
     if fit.shifts:
         n = np.sqrt(2.0 * len(fit.names))
         f = 0.5 * float(np.sqrt(np.mean(fit.mode.squares)) / (2 * np.pi)) * float(fit.spread[0])

@@ -8,12 +8,14 @@ maximisation around the fit (A.P. Dempster et al., J. R. Stat. Soc. B 39 (1977) 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.nonlinear_mode import NonlinearMode, interpolation
 
@@ -45,81 +47,57 @@ class ResponseFit:
         self.measured = size * np.exp(1j * self.phase) if self.phase is not None else size.astype(complex)
         self.knots = _knots(knots, size)
         self.shifts = len(curves) >= FEWEST_CURVES
+        self._basis = interpolation(self.knots, size)
         self._fit()
 
-    # ------------------------------------------------------------------------------------------------- the unknowns
-
-    @property
-    def sizes(self) -> tuple[int, int]:
-        """Index of the first shift, and the number of unknowns."""
+    @cached_property
+    def at(self) -> dict[str, slice]:
+        """Places of the unknowns, by what they are of."""
         K, n = len(self.knots), len(self.names)
-        first = 2 * K + (0 if self.mass is not None else 1 if self.forced else n) + 2 * self.residual
-        return first, first + 2 * n * self.shifts
+        load = 0 if self.mass is not None else 1 if self.forced else n
+        counts = {"square": K, "damping": K, "load": load, "residual": 2 * self.residual, "shift": 2 * n * self.shifts}
+        ends = np.cumsum(list(counts.values())).tolist()
+        return {name: slice(end - counts[name], end) for name, end in zip(counts, ends, strict=True)}
 
-    def _unpack(self, p: FloatArray) -> tuple[NonlinearMode, Any, FloatArray, FloatArray]:
-        """The mode, ln(F/m) of each point, and the shifts of the points' ln omega_n^2 and ln D."""
-        K, (first, _) = len(self.knots), self.sizes
-        R = complex(*p[first - 2 : first]) * self.unit if self.residual else 0j
+    def _unpack(self, p: FloatArray) -> tuple[NonlinearMode, Any, FloatArray]:
+        """The mode, ln(F/m) of each point, and the shifts of ln omega_n^2 and of ln D of each curve."""
+        R = complex(*p[self.at["residual"]]) * self.unit if self.residual else 0j
         if self.force is None:
-            mass, load = 1.0, p[2 * K : 2 * K + len(self.names)][self.curve]
+            mass, load = 1.0, p[self.at["load"]][self.curve]
         else:
-            mass = self.mass if self.mass is not None else float(np.exp(p[2 * K]))
+            mass = self.mass if self.mass is not None else float(np.exp(p[self.at["load"]][0]))
             load = np.log(self.force / mass)
-        mode = NonlinearMode(self.knots, np.exp(p[:K]), p[K : 2 * K], mass, R)
-        shift = p[first:].reshape(2, -1)[:, self.curve] if self.shifts else np.zeros((2, len(self.curve)))
-        return mode, load, shift[0], shift[1]
+        mode = NonlinearMode(self.knots, np.exp(p[self.at["square"]]), p[self.at["damping"]], mass, R)
+        return mode, load, p[self.at["shift"]].reshape(2, -1) if self.shifts else np.zeros((2, len(self.names)))
+
+    def _own(self, R: complex) -> ComplexArray:
+        """Displacement of the mode alone at each point."""
+        return np.asarray(self.measured if self.force is None else self.measured - R * self.force)
 
     def _left(self, p: FloatArray) -> FloatArray:
         """ln of force over what the mode needs (and its phase), for all points."""
-        mode, load, by_square, by_damping = self._unpack(p)
-        own = self.measured - mode.residual * self.force if self.force is not None else self.measured
-        a = np.abs(own)
-        G, D = mode.square(a) * np.exp(by_square), mode.damping(a) * np.exp(by_damping)
-        needed = (G - self.omega**2 + 1j * D * self.omega) * own
+        mode, load, shift = self._unpack(p)
+        own = self._own(mode.residual)
+        basis = interpolation(mode.knots, np.abs(own)) if self.residual else self._basis
+        square, damping = basis @ mode.squares, basis @ mode.log_damping
+        by_square, by_damping = shift[:, self.curve]
+        loss = np.exp(damping + by_damping) * self.omega
+        needed = (square * np.exp(by_square) - self.omega**2 + 1j * loss) * own
         size = load - np.log(np.abs(needed))
-        if not self.phased:
-            return np.asarray(size)
-        return np.concatenate([size, -np.angle(needed)])
-
-    def _jacobian(self, p: FloatArray) -> FloatArray:
-        """Derivatives of :meth:`_left`; those by the residual, which moves the amplitudes, by differences."""
-        mode, _, by_square, by_damping = self._unpack(p)
-        K, (first, count), n = len(self.knots), self.sizes, len(self.names)
-        a = np.abs(self.measured - mode.residual * self.force if self.force is not None else self.measured)
-        basis = interpolation(self.knots, a)
-        plain = basis @ mode.squares
-        G, D = plain * np.exp(by_square), np.exp(basis @ mode.log_damping + by_damping)
-        needed = G - self.omega**2 + 1j * D * self.omega
-        to_square, to_damping = -G / needed, -1j * D * self.omega / needed
-        J: Any = np.zeros((len(a), count), complex)
-        J[:, :K] = to_square[:, None] * basis * mode.squares / plain[:, None]
-        J[:, K : 2 * K] = to_damping[:, None] * basis
-        if self.force is None:
-            J[np.arange(len(a)), 2 * K + self.curve] = 1.0
-        elif self.mass is None:
-            J[:, 2 * K] = -1.0
-        if self.shifts:
-            J[np.arange(len(a)), first + self.curve] = to_square
-            J[np.arange(len(a)), first + n + self.curve] = to_damping
-        full: FloatArray = np.concatenate([J.real, J.imag] if self.phased else [J.real])
-        for k in range(first - 2, first) if self.residual else ():
-            step = np.zeros(count)
-            step[k] = 1e-6
-            full[:, k] = (self._left(p + step) - self._left(p - step)) / 2e-6
-        return full
-
-    # ------------------------------------------------------------------------------------------------------ the fit
+        return np.concatenate([size, -np.angle(needed)]) if self.phased else np.asarray(size)
 
     def _fit(self) -> None:
-        first, count = self.sizes
-        n, rows = len(self.names), len(self.omega) * (1 + self.phased)
-        if rows <= first:
-            raise ValueError(f"{rows} measured values cannot tell {first} unknowns: take fewer knots, or more points")
+        count, shift, n = self.at["shift"].stop, self.at["shift"], len(self.names)
+        rows = len(self.omega) * (1 + self.phased)
+        if rows <= shift.start:
+            raise ValueError(
+                f"{rows} measured values cannot tell {shift.start} unknowns: take fewer knots, or more points"
+            )
         p = self._start(count)
         sigma, spread = 0.05, np.array([1e-3, 0.1])
         for k in range(_ROUNDS):
             prior = np.zeros(count)
-            prior[first:] = np.repeat(1 / spread**2, n) if self.shifts else 0.0
+            prior[shift] = np.repeat(1 / spread**2, n) if self.shifts else 0.0
             p, normal = self._settle(p, sigma, prior)
             inverse = np.linalg.pinv(normal, hermitian=True)
             left = self._left(p)
@@ -129,10 +107,10 @@ class ResponseFit:
             # Points of a curve that err alike count less.
             sigma = max(float(np.sqrt(left @ left / freedom * self._alike(left))), 1e-9)
             if self.shifts:
-                own, own_error = p[first:].reshape(2, n), np.diag(inverse)[first:].reshape(2, n)
+                own, own_error = p[shift].reshape(2, n), np.diag(inverse)[shift].reshape(2, n)
                 spread = np.sqrt(np.maximum(np.mean(own**2 + own_error, axis=1), 1e-18))
                 # by how much of what the points of a curve say of its shift: towards 0 the way is long
-                told = np.mean(np.maximum(np.diag(normal - np.diag(prior))[first:], 1e-300).reshape(2, n), axis=1)
+                told = np.mean(np.maximum(np.diag(normal)[shift] - prior[shift], 1e-300).reshape(2, n), axis=1)
                 change = np.abs(spread - before[1:])
                 moved = float(np.max(np.minimum(change / spread, change * np.sqrt(told))))
             if k > 2 and moved < 1e-2 and abs(sigma / before[0] - 1) < 1e-2:
@@ -142,12 +120,15 @@ class ResponseFit:
                 f"the scatter of points and curves has not settled in {_ROUNDS} rounds: {before} and "
                 f"{(sigma, *spread)} in the last two; take fewer knots, or leave out a curve that stands apart"
             )
-        self.p, self.covariance, self.left = p, inverse, left
+        self.covariance = inverse
         self.sigma = float(np.sqrt(left @ left / freedom))
         self.spread = spread if self.shifts else np.array([np.nan, np.nan])
-        self.mode = self._unpack(p)[0]
-        R = self.mode.residual
-        self.amplitude = np.abs(self.measured - R * self.force if self.force is not None else self.measured)
+        self.mode, _, by_curve = self._unpack(p)
+        self.modes = [
+            replace(self.mode, squares=self.mode.squares * np.exp(square), log_damping=self.mode.log_damping + damping)
+            for square, damping in by_curve.T
+        ]
+        self.amplitude = np.abs(self._own(self.mode.residual))
 
     def _settle(self, p: FloatArray, sigma: float, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Least squares from ``p``; the outcome and its normal matrix. ``prior``: 1 / variance of unknowns."""
@@ -155,71 +136,55 @@ class ResponseFit:
 
         known = np.sqrt(prior)
         found = least_squares(
-            lambda q: np.concatenate([self._left(q) / sigma, known * q]), p,
-            lambda q: np.vstack([self._jacobian(q) / sigma, np.diag(known)]), method="lm", x_scale="jac",
-        )  # fmt: skip
+            lambda q: np.concatenate([self._left(q) / sigma, known * q]), p, method="lm", x_scale="jac"
+        )
         if not found.success:
             raise SolveError(f"the fit of the responses has not converged: {found.message} Take fewer knots")
         return found.x, found.jac.T @ found.jac
 
     def _start(self, count: int) -> FloatArray:
         """Natural frequencies by the tops of the curves; damping by the width of the lowest, the least bent of them."""
-        load = self.force if self.force is not None else np.ones_like(self.omega)
         size = np.abs(self.measured)
-        gain = size / load
+        gain = size if self.force is None else size / self.force
         tops = [int(np.argmax(np.where(self.curve == c, gain, 0.0))) for c in range(len(self.names))]
-        tops.sort(key=lambda i: size[i])
-        w, h = (v[self.curve == self.curve[tops[0]]] for v in (self.omega, gain))
-        top = int(np.argmax(h))
-        wide = w[h > h[top] / np.sqrt(2.0)]
+        lowest, *_ = tops = sorted(tops, key=lambda i: size[i])
+        w, h = (v[self.curve == self.curve[lowest]] for v in (self.omega, gain))
         step = float(np.median(np.abs(np.diff(w)))) if len(w) > 1 else 0.01 * w[0]
-        D = max(float(np.ptp(wide)), step)
-        K, n = len(self.knots), len(self.names)
+        D = max(float(np.ptp(w[h > h.max() / np.sqrt(2.0)])), step)
+        at_top = D * self.omega[lowest]  # displacement times this is force by mass there
         self.unit = 1.0 / float(np.median(1.0 / gain)) if self.residual else 1.0
         p = np.zeros(count)
-        p[:K] = 2 * np.log(np.interp(self.knots, size[tops], self.omega[tops]))
-        p[K : 2 * K] = np.log(D)
+        p[self.at["square"]] = 2 * np.log(np.interp(self.knots, size[tops], self.omega[tops]))
+        p[self.at["damping"]] = np.log(D)
         if self.force is None:
-            for c in range(n):
-                here = np.abs(self.measured[self.curve == c])
-                p[2 * K + c] = np.log(here.max() * D * w[top])
-        elif self.mass is None:
-            p[2 * K] = -np.log(h[top] * D * w[top])
+            p[self.at["load"]] = [np.log(size[self.curve == c].max() * at_top) for c in range(len(self.names))]
+        else:
+            p[self.at["load"]] = -np.log(h.max() * at_top)
         return p
 
     def _alike(self, left: FloatArray) -> float:
         """Number of neighbouring points of a curve that say as much as one."""
-        blocks = left.reshape(-1, len(self.curve))
-        total = cross = 0.0
-        for row in blocks:
-            for c in range(len(self.names)):
-                r = row[self.curve == c]
-                total += float(r @ r)
-                cross += float(r[1:] @ r[:-1])
-        rho = min(max(cross / total, 0.0), 0.9) if total > 0 else 0.0
+        rows, same = left.reshape(-1, len(self.curve)), np.diff(self.curve) == 0
+        power = float(left @ left)
+        rho = min(max(float(np.sum((rows[:, 1:] * rows[:, :-1])[:, same])) / power, 0.0), 0.9) if power > 0 else 0.0
         return (1 + rho) / (1 - rho)
-
-    # ----------------------------------------------------------------------------------------------------- outcomes
 
     def slopes(self) -> FloatArray:
         """d ln F / d ln a at the points' frequencies, each curve's own shift taken into account."""
-        mode, _, by_square, by_damping = self._unpack(self.p)
-        a, w, change = self.amplitude, self.omega, interpolation(self.knots, self.amplitude, 1)
-        G, D = mode.square(a) * np.exp(by_square), mode.damping(a) * np.exp(by_damping)
-        turn = (change @ mode.squares) * np.exp(by_square) + 1j * w * D * (change @ mode.log_damping)
-        return np.asarray(1.0 + np.real(a * turn / (G - w**2 + 1j * w * D)))
+        found = np.empty(len(self.omega))
+        for c, mode in enumerate(self.modes):
+            found[self.curve == c] = mode.slope(self.amplitude[self.curve == c], self.omega[self.curve == c])
+        return found
 
     def own(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Natural frequency (Hz) and damping ratio of each curve alone, at the amplitude of its phase resonance."""
-        places = np.zeros(len(self.names))
-        for c in range(len(places)):
-            here = self.curve == c
-            off = np.abs(np.log(self.mode.square(self.amplitude[here]) / self.omega[here] ** 2))
-            places[c] = self.amplitude[here][int(np.argmin(off))]
-        first, _ = self.sizes
-        shift = self.p[first:].reshape(2, -1) if self.shifts else np.zeros((2, len(places)))
-        omega = np.sqrt(self.mode.square(places) * np.exp(shift[0]))
-        return omega / (2 * np.pi), self.mode.damping(places) * np.exp(shift[1]) / (2 * omega), places
+        rows = []
+        for c, mode in enumerate(self.modes):
+            a, w = self.amplitude[self.curve == c], self.omega[self.curve == c]
+            place = a[int(np.argmin(np.abs(np.log(self.mode.square(a) / w**2))))]
+            rows.append((mode.natural_frequency(place), mode.damping_ratio(place), place))
+        frequency, ratio, place = np.array(rows, dtype=np.float64).T
+        return frequency, ratio, place
 
 
 def _all_or_none(curves: Sequence[Any], name: str) -> bool:

@@ -16,21 +16,12 @@ from nonsmooth.plot.comparison import (
     comparison_section,
     comparison_time,
 )
-from nonsmooth.plot.finish import finished
 from nonsmooth.plot.mechanism import mechanism
 from nonsmooth.plot.planes import basin_fractions, basins, chart
 from nonsmooth.plot.regions import regions
 from nonsmooth.plot.style import COLORS, COLUMN, PAGE, journal, save_figure, slides
 from nonsmooth.plot.sweeps import bifurcation, bifurcation_diagram, density, frequency_response, smoothing_report
 from nonsmooth.plot.trajectories import amplitude_spectrum, orbit, phase_portrait, section, time_history
-
-for _figure in (
-    amplitude_spectrum, basin_fractions, basins, bifurcation, bifurcation_diagram, branch, chart, comparison_diagram,
-    comparison_distances, comparison_phase_portrait, comparison_response, comparison_section, comparison_time,
-    controlled_branch, curve, density, frequency_response, manifolds, multipliers, orbit, phase_portrait, regions,
-    section, smoothing_report, time_history,
-):  # fmt: skip
-    globals()[_figure.__name__] = finished(_figure)
 
 __all__ = [
     "COLORS",

@@ -15,8 +15,7 @@ import numpy as np
 from nonsmooth.errors import DataFileError
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import column, first_states, name_plane, variable_along
-from nonsmooth.plot.mechanism import FLOOR, Sketch, put
-from nonsmooth.plot.scheme import scheme_of
+from nonsmooth.plot.mechanism import put, sketch_of_run
 from nonsmooth.plot.trajectories import with_gaps
 from nonsmooth.system.arguments import above, at_least, checked
 from nonsmooth.system.origin import system_of
@@ -83,16 +82,13 @@ def animate(
     variable_along(run, "u", "simulate")
     if not seconds * rate <= 5000:
         raise ValueError(f"seconds = {seconds!r} at rate = {rate!r}: from 1 to 5000 pictures are made")
-    try:
-        sketch: Sketch | None = Sketch(scheme_of(system_of(run)))
-    except ValueError:
-        sketch = None
-    first = (sketch.scheme.coordinates[0], None) if sketch is not None else (None, None)
-    names = first_states(run, x or first[0], y or _speed(run, first[0]))
     n = max(1, round(seconds * rate))
     time = run["time"].values
     at = sampled(run, None, np.linspace(time[0], time[-1], n, endpoint=False) if n > 1 else time[:1])
-    return Animation(run, at, sketch, names, history or names[0], rate, pixels)
+    sketch = sketch_of_run(system_of(run), at)
+    first = None if sketch is None else sketch[0].scheme.coordinates[0]
+    names = first_states(run, x or first, y or _speed(run, first))
+    return Animation(run, at, sketch, [*names, history or names[0]], rate, pixels)
 
 
 def _speed(run: xr.Dataset, name: str | None) -> str | None:
@@ -106,50 +102,41 @@ def _speed(run: xr.Dataset, name: str | None) -> str | None:
 class Animation:
     """Pictures of a run in motion, drawn when they are asked for; :func:`animate` makes it."""
 
-    def __init__(
-        self, run: xr.Dataset, at: xr.Dataset, sketch: Sketch | None, names: list[str], history: str, rate: int,
-        pixels: int,
-    ) -> None:  # fmt: skip
+    def __init__(self, run: xr.Dataset, at: xr.Dataset, sketch: Any, names: list[str], rate: int, pixels: int) -> None:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        self.rate = rate
-        self._at, self._sketch = at, sketch
-        self._time = at["time"].values
-        width, plots = 6.0, 2.1
-        high = 0.0
+        self.rate, self._run, self._sketch = rate, run, sketch
+        self._time, self._at = at["time"].values, [column(at, "u", name).values for name in names]
+        self._drawn, self._curves = run["time"].values, [column(run, "u", name).values for name in names]
+        width, plots, high = 6.0, 2.1, 0.0
         if sketch is not None:
-            self._q = np.stack([at["u"].sel(state=name).values for name in sketch.scheme.coordinates], axis=1)
-            self._scale = sketch.scale_for(np.nan_to_num(self._q))
-            if not sketch.above:  # forces and names of coordinates are left out
-                sketch.top = min(sketch.top, FLOOR + sketch.tall + 0.15)
-            high = min(2.2, width * (sketch.top - sketch.bottom) / max(sketch.width, 4.2))
+            paper = sketch[0]
+            high = min(2.2, width * (paper.top - paper.bottom) / max(paper.width, 4.2))
         with style.journal():
             self.figure = Figure(figsize=(width, plots + high + 0.1), dpi=pixels / width)
             FigureCanvasAgg(self.figure)
+            rows: dict[str, Any] = {"nrows": 2, "height_ratios": [high, plots]} if high else {"nrows": 1}
+            margins: dict[str, Any] = {"left": 0.1, "right": 0.98, "bottom": 0.42 / (plots + high), "top": 0.98}
             grid = self.figure.add_gridspec(
-                2 if high else 1, 2, height_ratios=[high, plots] if high else None, width_ratios=[1.0, 1.5],
-                left=0.1, right=0.98, bottom=0.42 / (plots + high), top=0.98, hspace=0.1, wspace=0.24,
-            )  # fmt: skip
+                **rows, ncols=2, width_ratios=[1.0, 1.5], hspace=0.1, wspace=0.24, **margins
+            )
             plane, over = (self.figure.add_subplot(grid[-1, k]) for k in (0, 1))
             if sketch is not None:
                 self._paper = self.figure.add_subplot(grid[0, :])
                 self._made: list[Any] = []
-                sketch.frame(self._paper, room=max(0.0, 0.5 * (4.2 - sketch.width)))
-            self._drawn, self._curves = run["time"].values, [column(run, "u", one).values for one in (*names, history)]
-            self._run = run
+                paper.frame(self._paper, room=max(0.0, 0.5 * (4.2 - paper.width)))
             pale: dict[str, Any] = {"color": style.COLORS["pale"], "linewidth": 0.8}
-            plane.plot(*with_gaps(run, *self._curves[:2]), **pale)
-            name_plane(plane, run, *names)
-            over.plot(*with_gaps(run, self._drawn, self._curves[2]), **pale)
-            over.set_xlim(*self._drawn[[0, -1]])
-            name_plane(over, run, "time", history)
             end: dict[str, Any] = {"color": style.COLORS["first"], "linewidth": 1.3}
             dot: dict[str, Any] = {"color": style.COLORS["second"], "markersize": 5}
-            self._ends = [plane.plot([], [], **end)[0], over.plot([], [], **end)[0]]
-            self._dots = [plane.plot([], [], "o", **dot)[0], over.plot([], [], "o", **dot)[0]]
-        self._plane = [column(at, "u", name).values for name in names]
-        self._over = column(at, "u", history).values
+            x, y, height = self._curves
+            plane.plot(*with_gaps(run, x, y), **pale)
+            name_plane(plane, run, names[0], names[1])
+            over.plot(*with_gaps(run, self._drawn, height), **pale)
+            over.set_xlim(*self._drawn[[0, -1]])
+            name_plane(over, run, "time", names[2])
+            self._ends = [ax.plot([], [], **end)[0] for ax in (plane, over)]
+            self._dots = [ax.plot([], [], "o", **dot)[0] for ax in (plane, over)]
 
     def __len__(self) -> int:
         """Number of pictures."""
@@ -161,16 +148,17 @@ class Animation:
             if self._sketch is not None:
                 for one in self._made:
                     one.remove()
-                moved = self._scale * np.nan_to_num(self._q[k])
-                self._made = put(self._paper, self._sketch.parts(moved, self._scale, float(self._time[k])))
+                self._made = put(self._paper, self._sketch[1](k))
             now, whole = self._time[k], self._drawn[-1] - self._drawn[0]
             rows = slice(*np.searchsorted(self._drawn, [now - _TRAIL * whole, now], side="right"))
             part = self._run.isel(time=rows)
-            xs, ys, hs, times = with_gaps(part, *(one[rows] for one in (*self._curves, self._drawn)))
-            self._ends[0].set_data(xs, ys)
-            self._ends[1].set_data(times, hs)
-            self._dots[0].set_data([self._plane[0][k]], [self._plane[1][k]])
-            self._dots[1].set_data([self._time[k]], [self._over[k]])
+            xs, ys, heights, times = with_gaps(part, *(one[rows] for one in (*self._curves, self._drawn)))
+            x, y, height = (one[k] for one in self._at)
+            for line, dot, trail, place in zip(
+                self._ends, self._dots, ((xs, ys), (times, heights)), ((x, y), (now, height)), strict=True
+            ):
+                line.set_data(*trail)
+                dot.set_data(*np.atleast_2d(place).T)
 
     def images(self) -> Iterator[Image.Image]:
         """The pictures, with few colours, all of one palette."""

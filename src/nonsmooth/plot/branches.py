@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
+from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import name_and_unit, name_axes, name_plane, only_states, variable_along, words_of_flags
 
 if TYPE_CHECKING:
@@ -16,9 +17,17 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = [
-    "MARKS", "branch", "controlled_branch", "curve", "draw_branch", "lines_of", "manifolds", "mark_special",
-    "multipliers", "ordinates_of", "with_breaks",
-]  # fmt: skip
+    "MARKS",
+    "branch",
+    "controlled_branch",
+    "curve",
+    "draw_branch",
+    "lines_of",
+    "manifolds",
+    "multipliers",
+    "ordinates_of",
+    "with_breaks",
+]
 
 #: Marker and words of each kind of special point.
 MARKS = {
@@ -42,15 +51,16 @@ _SEAM = 0.3  # opacity of a stable branch under the points that lie on it
 _WORDS = {"section": "", "maximum": "largest ", "minimum": "smallest ", "amplitude": "amplitude of "}
 
 
+@figure("continue_orbit", "stable")
 def branch(
+    ax: Axes,
     result: xr.Dataset,
-    ax: Axes | None = None,
     *,
     y: str | None = None,
     quantity: str = "section",
     special: bool = True,
     color: str | None = None,
-) -> Axes:
+) -> None:
     """Draw a branch over its parameter: stable parts solid, unstable ones dashed, virtual ones dotted.
 
     Parameters
@@ -69,13 +79,10 @@ def branch(
     color
         Colour of the lines.
     """
-    variable_along(result, "stable", "continue_orbit")
-    with style.axes(ax) as drawn:
-        draw_branch(drawn, result, y=y, quantity=quantity, special=special, color=color)
-        (name,) = only_states(result, y)
-        name_plane(drawn, result, result.attrs["parameter"], name, _WORDS[quantity])
-        style.clear_legend(drawn)
-    return drawn
+    draw_branch(ax, result, y=y, quantity=quantity, special=special, color=color)
+    (name,) = only_states(result, y)
+    name_plane(ax, result, result.attrs["parameter"], name, _WORDS[quantity])
+    style.clear_legend(ax)
 
 
 def draw_branch(
@@ -108,7 +115,7 @@ def draw_branch(
             label = style.once(ax, f"{_STATES[line]} branch")
             ax.plot(with_breaks(values, at), with_breaks(row, at), line, color=shade, label=label, **looks)
     if special and result.sizes.get("special", 0):
-        mark_special(ax, result, values, ordinates, MARKS)
+        _mark_special(ax, result, values, ordinates, MARKS)
 
 
 def ordinates_of(result: xr.Dataset, name: str, quantity: str) -> NDArray[np.float64]:
@@ -125,7 +132,7 @@ def ordinates_of(result: xr.Dataset, name: str, quantity: str) -> NDArray[np.flo
     return np.asarray(chosen.transpose(*others, "point").values, dtype=float).reshape(-1, result.sizes["point"])
 
 
-def mark_special(
+def _mark_special(
     ax: Axes, result: xr.Dataset, x: Any, heights: NDArray[np.float64], marks: Mapping[str, tuple[str, str]]
 ) -> None:
     """The special points on each of the lines (lines, point), every kind with its own sign and words."""
@@ -194,7 +201,8 @@ POINTS = {
 }
 
 
-def curve(result: xr.Dataset, ax: Axes | None = None, *, special: bool = True, color: str | None = None) -> Axes:
+@figure("continue_curve", "kind", "special_point")
+def curve(ax: Axes, result: xr.Dataset, *, special: bool = True, color: str | None = None) -> None:
     """Draw a curve of special points over its two parameters; call it again on the same axes for another curve.
 
     Parameters
@@ -208,43 +216,28 @@ def curve(result: xr.Dataset, ax: Axes | None = None, *, special: bool = True, c
     color
         Colour of the line in place of that of its kind.
     """
-    variable_along(result, "kind", "continue_curve")
-    variable_along(result, "special_point", "continue_curve")
-    # The two parameters are the only coordinates over the points, in the order in which they were given.
-    names = [str(name) for name, values in result.coords.items() if values.dims == ("point",)]
-    x, y = names
-    shade, line, words = KINDS[str(result["kind"].values)]
-    with style.axes(ax) as drawn:
-        drawn.plot(
-            result[x].values, result[y].values, line, color=color or style.COLORS[shade], linewidth=1.0, zorder=3,
-            label=style.once(drawn, words), path_effects=style.halo(1.8) if _over_chart(drawn) else None,
-        )  # fmt: skip
-        if special:
-            mark_special(drawn, result, result[x].values, result[y].values[None], POINTS)
-        name_plane(drawn, result, x, y)
-        _legend(drawn)
-    return drawn
-
-
-def _over_chart(ax: Axes) -> bool:
     from matplotlib.collections import QuadMesh
 
-    return any(isinstance(item, QuadMesh) for item in ax.collections)
-
-
-def _legend(ax: Axes) -> None:
-    """The legend of the curves; that of a chart beneath them stays, and the new one stands below it."""
+    # The two parameters are the only coordinates over the points, in the order in which they were given.
+    x, y = (str(name) for name, values in result.coords.items() if values.dims == ("point",))
+    shade, line, words = KINDS[str(result["kind"].values)]
+    over_chart = any(isinstance(item, QuadMesh) for item in ax.collections)
+    looks: dict[str, Any] = {"path_effects": style.halo(1.8)} if over_chart else {}
+    looks |= {"color": color or style.COLORS[shade], "linewidth": 1.0, "zorder": 3}
+    ax.plot(result[x].values, result[y].values, line, label=style.once(ax, words), **looks)
+    if special:
+        _mark_special(ax, result, result[x].values, result[y].values[None], POINTS)
+    name_plane(ax, result, x, y)
     own, before = ax.get_legend_handles_labels()[1], ax.get_legend()
     if before is not None and not {text.get_text() for text in before.get_texts()} <= set(own):
-        ax.add_artist(before)
+        ax.add_artist(before)  # the legend of a chart stays, and that of the curves stands below it
         before.set_clip_on(False)  # else the layout takes it for a thing within the axes, and cuts it
-    if _over_chart(ax):
-        ax.legend(loc="lower left", bbox_to_anchor=(1.01, 0.0), borderaxespad=0.0)
-    else:
-        ax.legend(loc="best")
+    below: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (1.01, 0.0), "borderaxespad": 0.0}
+    ax.legend(**(below if over_chart else {"loc": "best"}))
 
 
-def multipliers(result: xr.Dataset | Any, ax: Axes | None = None, *, limit: float | None = None) -> Axes:
+@figure(ratio=0.9)
+def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: float | None = None) -> None:
     """Draw the Floquet multipliers of an orbit, or those along a branch coloured by its parameter.
 
     Parameters
@@ -262,35 +255,30 @@ def multipliers(result: xr.Dataset | Any, ax: Axes | None = None, *, limit: floa
     values = data["floquet_multipliers"]
     along = "point" in values.dims
     mu = values.transpose("point", ...).values if along else values.values[None, :]
-    finite = mu[np.isfinite(mu)]
-    size = max([1.0, *np.abs(finite.real), *np.abs(finite.imag)]) * 1.12
-    half = min(size, 4.0) if limit is None else float(limit)
-    outside = int(((np.abs(mu.real) > half) | (np.abs(mu.imag) > half) | ~np.isfinite(mu)).any(axis=1).sum())
-    with style.axes(ax, ratio=0.9) as drawn:
-        angle = np.linspace(0, 2 * np.pi, 361)
-        drawn.plot(np.cos(angle), np.sin(angle), color=style.COLORS["muted"], linewidth=0.6, zorder=1)
-        for line in (drawn.axhline, drawn.axvline):
-            line(0.0, color=style.COLORS["muted"], linewidth=0.3, zorder=0)
-        if along:
-            name = str(data.attrs["parameter"])
-            shade = np.broadcast_to(data[name].values[:, None], mu.shape)
-            dots = drawn.scatter(
-                mu.real.ravel(), mu.imag.ravel(), c=shade.ravel(), s=4, cmap="viridis", linewidths=0, zorder=3
-            )
-            name_axes(drawn.figure.colorbar(dots, ax=drawn).ax, y=name_and_unit(data, name))
-        else:
-            drawn.plot(mu.real.ravel(), mu.imag.ravel(), "o", color=style.COLORS["first"], markersize=3.5, zorder=3)
-        drawn.set(
-            xlabel=r"Re $\mu$", ylabel=r"Im $\mu$", xlim=(-half, half), ylim=(-half, half), aspect="equal",
-        )  # fmt: skip
-        if outside:
-            drawn.set_title(f"{outside} of {len(mu)} points reach outside" if along else "a multiplier lies outside")
-    return drawn
+    x, y = mu.real, mu.imag
+    parts = np.abs([x, y])
+    half = min(1.12 * max(1.0, parts[:, np.isfinite(mu)].max(initial=0.0)), 4.0) if limit is None else float(limit)
+    outside = int((~(parts <= half)).any(axis=(0, 2)).sum())
+    angle, muted = np.linspace(0, 2 * np.pi, 361), style.COLORS["muted"]
+    ax.plot(np.cos(angle), np.sin(angle), color=muted, linewidth=0.6, zorder=1)
+    for line in (ax.axhline, ax.axvline):
+        line(0.0, color=muted, linewidth=0.3, zorder=0)
+    if along:
+        name = str(data.attrs["parameter"])
+        shade = np.broadcast_to(data[name].values[:, None], mu.shape)
+        dots = ax.scatter(x.ravel(), y.ravel(), c=shade.ravel(), s=4, cmap="viridis", linewidths=0, zorder=3)
+        name_axes(ax.figure.colorbar(dots, ax=ax).ax, y=name_and_unit(data, name))
+    else:
+        ax.plot(x.ravel(), y.ravel(), "o", color=style.COLORS["first"], markersize=3.5, zorder=3)
+    ax.set(xlabel=r"Re $\mu$", ylabel=r"Im $\mu$", xlim=(-half, half), ylim=(-half, half), aspect="equal")
+    if outside:
+        ax.set_title(f"{outside} of {len(mu)} points reach outside" if along else "a multiplier lies outside")
 
 
+@figure("manifolds", "arc_length", ratio=0.85)
 def manifolds(
-    result: xr.Dataset, ax: Axes | None = None, *, x: str | None = None, y: str | None = None, linewidth: float = 0.6
-) -> Axes:
+    ax: Axes, result: xr.Dataset, *, x: str | None = None, y: str | None = None, linewidth: float = 0.6
+) -> None:
     """Draw the manifolds of a saddle in the plane of two states, with the saddle's own section points.
 
     Parameters
@@ -304,49 +292,45 @@ def manifolds(
     linewidth
         In typographic points.
     """
-    variable_along(result, "arc_length", "manifolds")
     names = only_states(result, x, y)
     kinds = words_of_flags(result["manifold"])
-    columns = [result["section"].sel(state=name).values for name in names]
-    saddle = [result["orbit_section"].sel(state=name).values for name in names]
+    columns, saddle = ([result[key].sel(state=name).values for name in names] for key in ("section", "orbit_section"))
     numbers, piece = result["arc_number"].values, result["piece"].values
-    with style.axes(ax, ratio=0.85) as drawn:
-        for number, code in enumerate(result["manifold"].values):
-            chosen = np.flatnonzero(numbers == number)
-            if not len(chosen):
-                continue
-            breaks = np.flatnonzero(np.diff(piece[chosen]) > 0) + 1
-            kind = kinds[int(code)]
-            color = "second" if kind == "unstable" else "first"
-            # Each arc begins at the orbit itself.
-            j = int(result["orbit_point"].values[number])
-            xs, ys = (
-                np.insert(np.insert(values[chosen], breaks, np.nan), 0, own[j])
-                for values, own in zip(columns, saddle, strict=True)
-            )
-            drawn.plot(
-                xs, ys, color=style.COLORS[color], linewidth=linewidth, zorder=3 if kind == "unstable" else 2,
-                label=style.once(drawn, f"{kind} manifold"),
-            )  # fmt: skip
-        style.mark(drawn, saddle, "o", "saddle", zorder=5)
-        name_plane(drawn, result, *names)
-        style.clear_legend(drawn)
-    return drawn
+    for number, code in enumerate(result["manifold"].values):
+        chosen = np.flatnonzero(numbers == number)
+        if not len(chosen):
+            continue
+        breaks = np.flatnonzero(np.diff(piece[chosen]) > 0) + 1
+        # Each arc begins at the orbit itself.
+        j = int(result["orbit_point"].values[number])
+        xs, ys = (
+            np.insert(np.insert(values[chosen], breaks, np.nan), 0, own[j])
+            for values, own in zip(columns, saddle, strict=True)
+        )
+        kind = kinds[int(code)]
+        color, above = ("second", 3) if kind == "unstable" else ("first", 2)
+        looks: dict[str, Any] = {"color": style.COLORS[color], "zorder": above, "linewidth": linewidth}
+        ax.plot(xs, ys, label=style.once(ax, f"{kind} manifold"), **looks)
+    style.mark(ax, saddle, "o", "saddle", zorder=5)
+    name_plane(ax, result, *names)
+    style.clear_legend(ax)
 
 
 #: Filling and words of each ``stability``.
-_LOOKS = {1: ("first", "came back when let go: stable"), 0: ("white", "left when let go: unstable"),
-          -1: ("muted", "held; stability not known")}  # fmt: skip
+_LOOKS = {
+    1: (style.COLORS["first"], "came back when let go: stable"),
+    0: ("white", "left when let go: unstable"),
+    -1: (style.COLORS["muted"], "held; stability not known"),
+}
 _EFFORTS = (
-    ("control_effort_first", "s", "before the first correction"),
-    ("control_effort", "o", "converged"),
-    ("control_effort_noise", "_", "noise alone"),
+    ("control_effort_first", "s", "second", "before the first correction"),
+    ("control_effort", "o", "first", "converged"),
+    ("control_effort_noise", "_", "muted", "noise alone"),
 )
 
 
-def controlled_branch(
-    result: xr.Dataset, ax: Axes | None = None, *, y: str = "amplitude", theory: xr.Dataset | None = None
-) -> Axes:
+@figure("control_based_continuation", "control_effort")
+def controlled_branch(ax: Axes, result: xr.Dataset, *, y: str = "amplitude", theory: xr.Dataset | None = None) -> None:
     """Draw the result of ``control_based_continuation``.
 
     Parameters
@@ -366,56 +350,34 @@ def controlled_branch(
     ValueError, TypeError
         A result of another verb, another quantity, a branch in another parameter.
     """
-    variable_along(result, "control_effort", "control_based_continuation")
     if y not in ("amplitude", "control_effort"):
         raise ValueError(f"y = {y!r}; allowed: 'amplitude', 'control_effort'")
-    parameter = str(result.attrs["parameter"])
+    parameter, state = str(result.attrs["parameter"]), str(result["state"].values[0])
     if theory is not None and theory.attrs.get("parameter") != parameter:
         raise ValueError(f"the branch is in {theory.attrs.get('parameter')!r}, the result in {parameter!r}")
-    with style.axes(ax) as drawn:
-        if y == "amplitude":
-            _amplitudes(drawn, result, parameter, theory)
-        else:
-            _efforts(drawn, result)
-        drawn.legend(loc="best")
-    return drawn
-
-
-def _amplitudes(ax: Axes, result: xr.Dataset, parameter: str, theory: xr.Dataset | None) -> None:
-    values, amplitude = result[parameter].values, result["amplitude"].values
-    ax.plot(values, amplitude, "-", color=style.COLORS["muted"], linewidth=0.5, zorder=2)
-    if theory is not None:
-        draw_branch(ax, theory, y=str(result["state"].values[0]), quantity="amplitude", special=False, color="black")
-        ax.set_xlim(*_with_margin(values))
-        inside = amplitude[np.isfinite(amplitude)]
-        ax.set_ylim(*_with_margin(inside))
-    for kind, (color, words) in _LOOKS.items():
-        here = result["stability"].values == kind
-        if not here.any():
-            continue
-        ax.errorbar(
-            values[here], amplitude[here], yerr=2 * result["amplitude_uncertainty"].values[here], fmt="o", zorder=4,
-            color=style.COLORS["first"], markerfacecolor=style.COLORS.get(color, color), label=words, markersize=3.5,
-            markeredgewidth=0.7, elinewidth=0.6,
-        )  # fmt: skip
-    if result.sizes["special"]:
-        at = result["special_point"].values
-        ax.errorbar(
-            result["special_value"].values, amplitude[at], xerr=2 * result["special_value_uncertainty"].values,
-            color=style.COLORS["second"], markerfacecolor="none", markersize=6.5, elinewidth=0.8, zorder=5, fmt="D",
-            label="fold",
-        )  # fmt: skip
-    name_plane(ax, result, parameter, str(result["state"].values[0]), "amplitude of ")
-
-
-def _efforts(ax: Axes, result: xr.Dataset) -> None:
-    for (name, mark, words), color in zip(_EFFORTS, ("second", "first", "muted"), strict=True):
-        ax.semilogy(
-            np.arange(result.sizes["point"]), result[name].values, mark, color=style.COLORS[color], markersize=3.5,
-            label=words,
-        )  # fmt: skip
-    ax.set_xlabel("point along the branch")
-    name_axes(ax, None, ("rms of the control force", result["control_effort"].attrs.get("units", "1")))
+    if y == "control_effort":
+        for name, mark, color, words in _EFFORTS:
+            ax.semilogy(result[name].values, mark, color=style.COLORS[color], markersize=3.5, label=words)
+        ax.set_xlabel("point along the branch")
+        name_axes(ax, None, ("rms of the control force", result["control_effort"].attrs.get("units", "1")))
+    else:
+        values, amplitude = result[parameter].values, result["amplitude"].values
+        ax.plot(values, amplitude, "-", color=style.COLORS["muted"], linewidth=0.5, zorder=2)
+        if theory is not None:
+            draw_branch(ax, theory, y=state, quantity="amplitude", special=False, color="black")
+            ax.set(xlim=_with_margin(values), ylim=_with_margin(amplitude[np.isfinite(amplitude)]))
+        for kind, (face, words) in _LOOKS.items():
+            here = result["stability"].values == kind
+            if here.any():
+                bars = 2 * result["amplitude_uncertainty"].values[here]
+                looks: dict[str, Any] = {"color": style.COLORS["first"], "face": face, "size": 3.5, "label": words}
+                style.points(ax, values[here], amplitude[here], yerr=bars, **looks)
+        if result.sizes["special"]:
+            at, bars = result["special_point"].values, 2 * result["special_value_uncertainty"].values
+            looks = {"color": style.COLORS["second"], "face": "none", "size": 6.5, "mark": "D", "zorder": 5}
+            style.points(ax, result["special_value"].values, amplitude[at], xerr=bars, label="fold", **looks)
+        name_plane(ax, result, parameter, state, "amplitude of ")
+    ax.legend(loc="best")
 
 
 def _with_margin(values: Any) -> tuple[float, float]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
+from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import first_states, name_and_unit, name_axes, name_plane, with_unit
 from nonsmooth.plot.style import ABOVE
 from nonsmooth.plot.trajectories import shade_zone
@@ -16,10 +17,20 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
-    "ABOVE", "MEASURED", "THEORY", "check_kind", "comparison_diagram", "comparison_distances",
-    "comparison_phase_portrait", "comparison_response", "comparison_section", "comparison_time", "measured_label",
-    "one_phase", "shade_reach",
-]  # fmt: skip
+    "ABOVE",
+    "MEASURED",
+    "THEORY",
+    "check_kind",
+    "comparison_diagram",
+    "comparison_distances",
+    "comparison_phase_portrait",
+    "comparison_response",
+    "comparison_section",
+    "comparison_time",
+    "measured_label",
+    "one_phase",
+    "shade_reach",
+]
 
 #: Theory is a blue line or cloud with a pale band, the experiment black points.
 THEORY = style.COLORS["first"]
@@ -52,7 +63,8 @@ def one_phase(result: xr.Dataset, name: str, phase: int = 0) -> xr.DataArray:
     return array.isel(section_phase=phase) if "section_phase" in array.dims else array
 
 
-def comparison_time(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, periods: float = 8) -> Axes:
+@figure()
+def comparison_time(ax: Axes, result: xr.Dataset, *, y: str | None = None, periods: float = 8) -> None:
     """Draw a state over the phase of the drive: measured points, the predicted curve and its band.
 
     Parameters
@@ -69,37 +81,35 @@ def comparison_time(result: xr.Dataset, ax: Axes | None = None, *, y: str | None
     """
     _check_orbits(result)
     (name,) = first_states(result, y)
-    closed = "phase" in result.coords
-    looks: dict[str, Any]
-    with style.axes(ax) as drawn:
-        for side in ("theory", "measured"):
-            phase = result["phase" if closed else f"{side}_phase"].values
-            shown = np.flatnonzero(phase < min(periods, phase[-1] + 1))
-            values = result[f"{side}_orbit"].sel(state=name).values
-            if side == "theory":
-                looks = {"color": THEORY, "alpha": 0.25, "label": _band(result)}
-                here = result.sel(state=name)
-                shade_reach(drawn, here.isel({str(here["theory_orbit"].dims[0]): shown}), phase[shown], **looks)
-                drawn.plot(phase[shown], values[shown], color=THEORY, label="theory")
-            else:
-                some, looks = shown[:: max(1, len(shown) // 120)], {"markersize": 1.6, "markeredgewidth": 0.0}
-                drawn.plot(phase[some], values[some], "o", color=MEASURED, label=measured_label(result), **looks)
-        drawn.margins(x=0)
-        style.make_room(drawn, 0.22)
-        drawn.legend(loc="upper center", ncols=3, columnspacing=1.0, handlelength=1.4)
-        drawn.set_xlabel("time (forcing periods)")
-        name_axes(drawn, y=name_and_unit(result, name))
-    return drawn
+    closed, here = "phase" in result.coords, result.sel(state=name)
+    for side in ("theory", "measured"):
+        phase = result["phase" if closed else f"{side}_phase"].values
+        shown = np.flatnonzero(phase < min(periods, phase[-1] + 1))
+        values = here[f"{side}_orbit"].values
+        if side == "theory":
+            part = here.isel({str(here["theory_orbit"].dims[0]): shown})
+            shade_reach(ax, part, phase[shown], color=THEORY, alpha=0.25, label=_band(result))
+            ax.plot(phase[shown], values[shown], color=THEORY, label="theory")
+        else:
+            some = shown[:: max(1, len(shown) // 120)]
+            looks: dict[str, Any] = {"color": MEASURED, "markersize": 1.6, "markeredgewidth": 0.0}
+            ax.plot(phase[some], values[some], "o", label=measured_label(result), **looks)
+    ax.margins(x=0)
+    style.make_room(ax, 0.22)
+    ax.legend(loc="upper center", ncols=3, columnspacing=1.0, handlelength=1.4)
+    ax.set_xlabel("time (forcing periods)")
+    name_axes(ax, y=name_and_unit(result, name))
 
 
+@figure(ratio=0.85)
 def comparison_phase_portrait(
+    ax: Axes,
     result: xr.Dataset,
-    ax: Axes | None = None,
     *,
     x: str | None = None,
     y: str | None = None,
     zone: float | str | None = None,
-) -> Axes:
+) -> None:
     """Draw both motions in the plane of two states, each with its section points.
 
     Parameters
@@ -116,34 +126,32 @@ def comparison_phase_portrait(
     _check_orbits(result)
     names = first_states(result, x, y)
     closed = "phase" in result.coords
-    with style.axes(ax, ratio=0.85) as drawn:
-        for side, color in (("theory", THEORY), ("measured", MEASURED)):
-            curves = [result[f"{side}_orbit"].sel(state=name).values for name in names]
-            if closed:
-                curves = [np.append(curve, curve[0]) for curve in curves]
-            ours = side == "theory"
-            word, wide, line = ("theory", 1.2, "-") if ours else (measured_label(result), 0.6, (0, (4, 2)))
-            looks: dict[str, Any] = {"linewidth": wide, "linestyle": line} if closed else {"linewidth": 0.4}
-            drawn.plot(*curves, color=color, label=word, **looks)
-            section = one_phase(result, f"{side}_section")
-            points = [section.sel(state=name).values for name in names]
-            # Rings about the few points of a closed orbit; of an attractor a cloud, the measured points on it.
-            size, face, edge = (4.5, "none", 0.9) if ours and closed else (0.9 if ours else 2.0, color, 0)
-            drawn.plot(
-                *points, "o", color=color, markersize=size, markerfacecolor=face, markeredgewidth=edge,
-                zorder=4 if ours else 5, rasterized=points[0].size > 500, label=f"section points, {word}",
-            )  # fmt: skip
-        if zone is not None:
-            shade_zone(drawn, float(result[zone]) if isinstance(zone, str) else zone)
-        style.make_room(drawn, 0.15)
-        drawn.legend(loc="upper center", ncols=2)
-        name_plane(drawn, result, *names)
-    return drawn
+    for side, color in (("theory", THEORY), ("measured", MEASURED)):
+        curves = [result[f"{side}_orbit"].sel(state=name).values for name in names]
+        if closed:
+            curves = [np.append(curve, curve[0]) for curve in curves]
+        ours = side == "theory"
+        word, wide, line = ("theory", 1.2, "-") if ours else (measured_label(result), 0.6, (0, (4, 2)))
+        looks: dict[str, Any] = {"linewidth": wide, "linestyle": line} if closed else {"linewidth": 0.4}
+        ax.plot(*curves, color=color, label=word, **looks)
+        section = one_phase(result, f"{side}_section")
+        points = [section.sel(state=name).values for name in names]
+        # Rings about the few points of a closed orbit; of an attractor a cloud, the measured points on it.
+        size, face, edge = (4.5, "none", 0.9) if ours and closed else (0.9 if ours else 2.0, color, 0)
+        looks = {"color": color, "markersize": size, "markerfacecolor": face, "markeredgewidth": edge}
+        looks |= {"zorder": 4 if ours else 5, "rasterized": points[0].size > 500}
+        ax.plot(*points, "o", label=f"section points, {word}", **looks)
+    if zone is not None:
+        shade_zone(ax, float(result[zone]) if isinstance(zone, str) else zone)
+    style.make_room(ax, 0.15)
+    ax.legend(loc="upper center", ncols=2)
+    name_plane(ax, result, *names)
 
 
+@figure(ratio=0.85)
 def comparison_section(
-    result: xr.Dataset, ax: Axes | None = None, *, x: str | None = None, y: str | None = None, phase: int = 0
-) -> Axes:
+    ax: Axes, result: xr.Dataset, *, x: str | None = None, y: str | None = None, phase: int = 0
+) -> None:
     """Draw both section clouds in the plane of two states, with their energy distance beside that of halves.
 
     ``phase`` is the index of the section where several were compared.
@@ -151,51 +159,47 @@ def comparison_section(
     check_kind(result, "motion")
     names = first_states(result, x, y)
     few = int(result["theory_period_number"])
-    with style.axes(ax, ratio=0.85) as drawn:
-        clouds = [
-            [one_phase(result, f"{side}_section", phase).sel(state=name).values for name in names]
-            for side in ("measured", "theory")
-        ]
-        style.cloud(drawn, clouds[0], 1.7, MEASURED, measured_label(result))
-        if few:  # points that come round again: rings about the measured ones
-            looks: dict[str, Any] = {"markersize": 6, "markerfacecolor": "none", "markeredgewidth": 0.9}
-            drawn.plot(*(column[:few] for column in clouds[1]), "o", color=THEORY, label="theory", **looks)
-        else:
-            style.cloud(drawn, clouds[1], 1.2, THEORY, "theory")
-        keys = "energy_distance_matched", "measured_halves_p95"
-        distance, limit = (float(one_phase(result, name, phase)) for name in keys)
-        if np.isfinite(distance):
-            drawn.set_title(f"energy distance {distance:.3f}; 95 % of its own halves below {limit:.3f}", loc="left")
-        drawn.legend(markerscale=1 if few else 4, loc="best")
-        name_plane(drawn, result, *names)
-    return drawn
+    measured, theory = (
+        [one_phase(result, f"{side}_section", phase).sel(state=name).values for name in names]
+        for side in ("measured", "theory")
+    )
+    style.cloud(ax, measured, 1.7, MEASURED, measured_label(result))
+    if few:  # points that come round again: rings about the measured ones
+        looks: dict[str, Any] = {"markersize": 6, "markerfacecolor": "none", "markeredgewidth": 0.9}
+        ax.plot(*(column[:few] for column in theory), "o", color=THEORY, label="theory", **looks)
+    else:
+        style.cloud(ax, theory, 1.2, THEORY, "theory")
+    keys = "energy_distance_matched", "measured_halves_p95"
+    distance, limit = (float(one_phase(result, name, phase)) for name in keys)
+    if np.isfinite(distance):
+        ax.set_title(f"energy distance {distance:.3f}; 95 % of its own halves below {limit:.3f}", loc="left")
+    ax.legend(markerscale=1 if few else 4, loc="best")
+    name_plane(ax, result, *names)
 
 
-def comparison_distances(result: xr.Dataset, ax: Axes | None = None) -> Axes:
+@figure(ratio=0.5)
+def comparison_distances(ax: Axes, result: xr.Dataset) -> None:
     """Draw the energy distances of a comparison: measured to theory, drawn parameters, and the clouds' own halves.
 
     The bars of the halves reach from their median to their 95th percentile.
     """
     check_kind(result, "motion")
-    with style.axes(ax, ratio=0.5) as drawn:
-        word = "synthetic" if measured_label(result) != "measured" else "measured"
-        names: list[str] = []
-        for side, color in (("measured", MEASURED), ("theory", THEORY)):
-            median, high = (float(one_phase(result, f"{side}_halves_{q}")) for q in ("median", "p95"))
-            drawn.plot([median, high], [len(names)] * 2, "|-", color=color, linewidth=1.2, markersize=8)
-            names.append(f"halves, {word if side == 'measured' else 'theory'}")
-        if "draw_energy_distance" in result:
-            draws = one_phase(result, "draw_energy_distance").values
-            drawn.plot(draws, np.full(draws.shape, len(names)), ".", color=style.COLORS["muted"], markersize=3)
-            names.append("drawn parameters")
-        distance = float(one_phase(result, "energy_distance_matched"))
-        drawn.plot([distance], [len(names)], "D", color=style.COLORS["second"], markersize=4)
-        names.append(f"{word} to theory")
-        drawn.set_yticks(range(len(names)), names)
-        drawn.set_ylim(-0.6, len(names) - 0.4)
-        drawn.set_xlim(left=0)
-        drawn.set_xlabel("energy distance (scaled)")
-    return drawn
+    word = "synthetic" if measured_label(result) != "measured" else "measured"
+    names: list[str] = []
+    for side, own, color in (("measured", word, MEASURED), ("theory", "theory", THEORY)):
+        ends = [float(one_phase(result, f"{side}_halves_{q}")) for q in ("median", "p95")]
+        ax.plot(ends, [len(names)] * 2, "|-", color=color, linewidth=1.2, markersize=8)
+        names.append(f"halves, {own}")
+    if "draw_energy_distance" in result:
+        draws = one_phase(result, "draw_energy_distance").values
+        ax.plot(draws, np.full(draws.shape, len(names)), ".", color=style.COLORS["muted"], markersize=3)
+        names.append("drawn parameters")
+    distance = float(one_phase(result, "energy_distance_matched"))
+    ax.plot([distance], [len(names)], "D", color=style.COLORS["second"], markersize=4)
+    names.append(f"{word} to theory")
+    ax.set_yticks(range(len(names)), names)
+    ax.set(ylim=(-0.6, len(names) - 0.4), xlabel="energy distance (scaled)")
+    ax.set_xlim(left=0)
 
 
 def _band(result: xr.Dataset) -> str:
@@ -213,7 +217,8 @@ def _check_orbits(result: xr.Dataset) -> None:
         )
 
 
-def comparison_diagram(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, size: float = 1.6) -> Axes:
+@figure()
+def comparison_diagram(ax: Axes, result: xr.Dataset, *, y: str | None = None, size: float = 1.6) -> None:
     """Draw a comparison of a diagram: theory as a pale cloud, measured points in black, flips as marks at the top.
 
     Parameters
@@ -230,19 +235,17 @@ def comparison_diagram(result: xr.Dataset, ax: Axes | None = None, *, y: str | N
     check_kind(result, "diagram")
     parameter = str(result["theory_section"].dims[0])
     (name,) = first_states(result, y)
-    with style.axes(ax) as drawn:
-        points = result["theory_section"].sel(state=name).transpose(..., parameter)
-        at = np.broadcast_to(result[parameter].values, points.shape)
-        style.cloud(drawn, (at, points.values), 0.9, THEORY, "theory")
-        looks = {"color": THEORY, "alpha": 0.12, "zorder": 0, "label": "reach for drawn parameters"}
-        shade_reach(drawn, result.sel(state=name), result[parameter].values, **looks)
-        read = result[f"measured_{parameter}"], result["measured_section"].sel(state=name)
-        style.cloud(drawn, read, size, MEASURED, measured_label(result))
-        _flips(drawn, result)
-        drawn.margins(x=0)
-        style.even_dots(drawn.legend(**ABOVE, ncols=2, columnspacing=1.0))
-        name_plane(drawn, result, parameter, name)
-    return drawn
+    points = result["theory_section"].sel(state=name).transpose(..., parameter)
+    at = np.broadcast_to(result[parameter].values, points.shape)
+    style.cloud(ax, (at, points.values), 0.9, THEORY, "theory")
+    looks: dict[str, Any] = {"color": THEORY, "alpha": 0.12, "zorder": 0, "label": "reach for drawn parameters"}
+    shade_reach(ax, result.sel(state=name), result[parameter].values, **looks)
+    read = result[f"measured_{parameter}"], result["measured_section"].sel(state=name)
+    style.cloud(ax, read, size, MEASURED, measured_label(result))
+    _flips(ax, result)
+    ax.margins(x=0)
+    style.even_dots(ax.legend(**ABOVE, ncols=2, columnspacing=1.0))
+    name_plane(ax, result, parameter, name)
 
 
 def _flips(ax: Axes, result: xr.Dataset) -> None:
@@ -251,30 +254,24 @@ def _flips(ax: Axes, result: xr.Dataset) -> None:
     A parameter that moves while it is recorded delays a flip; an arrow leads from the flip as read to the one with the
     delay taken out, whose bar is its uncertainty.
     """
-    top = ax.get_xaxis_transform()
-    count = result.sizes.get("flip", 0)
-    found = {
-        kind: result[kind].values if kind in result else np.full(count, np.nan)
-        for kind in ("theory_flip", "measured_flip_read", "measured_flip", "measured_flip_error")
-    }
-    word = measured_label(result)
+    top, word = ax.get_xaxis_transform(), measured_label(result)
+    none = np.full(result.sizes.get("flip", 0), np.nan)
+    keys = ("theory_flip", "measured_flip_read", "measured_flip", "measured_flip_error")
+    found = (result[key].values if key in result else none for key in keys)
     tick: dict[str, Any] = {"transform": top, "zorder": 6, "solid_capstyle": "butt"}
-    for expected, read, still, error in zip(*found.values(), strict=True):
+    for expected, read, still, error in zip(*found, strict=True):
         for place, color, width, words in ((expected, THEORY, 2.0, "theory"), (read, MEASURED, 1.2, word)):
             if np.isfinite(place):
                 label = style.once(ax, f"flip, {words}")
                 ax.plot([place] * 2, [0.93, 1.0], color=color, linewidth=width, label=label, **tick)
-        if np.isfinite(read) and np.isfinite(still) and read != still:
-            ax.annotate(
-                "", (still, 0.965), (read, 0.965), xycoords=top, textcoords=top, zorder=5,
-                arrowprops={"arrowstyle": "->", "color": MEASURED, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 3},
-            )  # fmt: skip
         if np.isfinite(still) and read != still:
-            ax.errorbar(
-                [still], [0.965], xerr=[error] if np.isfinite(error) else None, fmt="D", color=MEASURED, markersize=3.5,
-                markerfacecolor="white", markeredgewidth=0.8, elinewidth=0.8, capsize=1.5, transform=top, zorder=6,
-                label=style.once(ax, f"flip, {word}, delay taken out"),
-            )  # fmt: skip
+            if np.isfinite(read):
+                arrow = {"arrowstyle": "->", "color": MEASURED, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 3}
+                ax.annotate("", (still, 0.965), (read, 0.965), xycoords=top, zorder=5, arrowprops=arrow)
+            label = style.once(ax, f"flip, {word}, delay taken out")
+            looks: dict[str, Any] = {"size": 3.5, "markeredgewidth": 0.8, "elinewidth": 0.8, "capsize": 1.5}
+            looks |= {"face": "white", "mark": "D", "transform": top, "zorder": 6}
+            style.points(ax, [still], [0.965], xerr=[error], label=label, **looks)
 
 
 #: Height in points of a jump's number above its marks: a rising and a falling one may lie at one place.
@@ -282,7 +279,8 @@ _LIFT = {"up": 5, "down": 14}
 _LOOKS = {"up": ("first", "^", "-", "increasing"), "down": ("second", "v", "--", "decreasing")}
 
 
-def comparison_response(result: xr.Dataset, ax: Axes | None = None, *, digits: int = 3) -> Axes:
+@figure()
+def comparison_response(ax: Axes, result: xr.Dataset, *, digits: int = 3) -> None:
     """Draw a comparison of a response.
 
     Parameters
@@ -297,28 +295,21 @@ def comparison_response(result: xr.Dataset, ax: Axes | None = None, *, digits: i
     check_kind(result, "response")
     parameter = str(result["theory_amplitude"].dims[0])
     (state,) = first_states(result, None)
-    word = measured_label(result)
-    with style.axes(ax) as drawn:
-        values = result[parameter].values
-        runs = result["measured_direction"].values.astype(str)
-        for i, direction in enumerate(result["direction"].values.astype(str)):
-            color, marker, line, name = _LOOKS[direction]
-            color = style.COLORS[color]
-            shade_reach(drawn, result.isel(direction=i), values, color=color, alpha=0.2)
-            drawn.plot(values, result["theory_amplitude"].values[:, i], line, color=color, label=f"theory, {name}")
-            mine = runs == direction
-            error = result["measured_amplitude_error"].values[mine]
-            at, heights = result[f"measured_{parameter}"].values[mine], result["measured_amplitude"].values[mine]
-            drawn.errorbar(
-                at, heights, yerr=error if np.isfinite(error).any() else None, fmt=marker, color=color, markersize=3,
-                markerfacecolor="white", markeredgewidth=0.7, elinewidth=0.6, label=f"{word}, {name}",
-            )  # fmt: skip
-        _jumps(drawn, result, digits)
-        drawn.set_ylim(bottom=0)
-        drawn.margins(x=0.02)
-        drawn.legend(**ABOVE, ncols=2, handlelength=1.6, columnspacing=1.2)
-        name_plane(drawn, result, parameter, state, "amplitude of ")
-    return drawn
+    values, runs, word = result[parameter].values, result["measured_direction"].values, measured_label(result)
+    for i, direction in enumerate(result["direction"].values.astype(str)):
+        shade, marker, line, name = _LOOKS[direction]
+        color = style.COLORS[shade]
+        shade_reach(ax, result.isel(direction=i), values, color=color, alpha=0.2)
+        ax.plot(values, result["theory_amplitude"].values[:, i], line, color=color, label=f"theory, {name}")
+        keys = (f"measured_{parameter}", "measured_amplitude", "measured_amplitude_error")
+        at, heights, error = (result[key].values[runs == direction] for key in keys)
+        looks: dict[str, Any] = {"color": color, "face": "white", "mark": marker, "label": f"{word}, {name}"}
+        style.points(ax, at, heights, yerr=error, **looks)
+    _jumps(ax, result, digits)
+    ax.set_ylim(bottom=0)
+    ax.margins(x=0.02)
+    ax.legend(**ABOVE, ncols=2, handlelength=1.6, columnspacing=1.2)
+    name_plane(ax, result, parameter, state, "amplitude of ")
 
 
 def _jumps(ax: Axes, result: xr.Dataset, digits: int) -> None:
@@ -339,11 +330,8 @@ def _jumps(ax: Axes, result: xr.Dataset, digits: int) -> None:
                 ax.plot([place], [0.03], "D", color=color, markerfacecolor=face, **looks)
         if np.isfinite(seen) and np.isfinite(expected):
             number = f"{expected - seen:+.{digits}f}".replace("-", "\N{MINUS SIGN}")
-            ax.annotate(
-                number, ((seen + expected) / 2, 0.03), (0, _LIFT[direction]), xycoords=foot,
-                textcoords="offset points", ha="center", fontsize=style.small(ax), color=color, zorder=6,
-                path_effects=style.halo(),
-            )  # fmt: skip
+            between, lift = ((seen + expected) / 2, 0.03), (0, _LIFT[direction])
+            style.label(ax, number, between, lift, xycoords=foot, ha="center", color=color)
             differences = True
     if differences:
         unit = name_and_unit(result, str(result["theory_amplitude"].dims[0]))[1]

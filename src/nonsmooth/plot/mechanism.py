@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,18 +12,24 @@ from nonsmooth.plot.parts import GROUND, Link, Scheme
 from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
 
     from nonsmooth.system.system import System
 
-__all__ = ["FLOOR", "Sketch", "mechanism", "put"]
+__all__ = ["Part", "Sketch", "mechanism", "put", "sketch_of_run"]
 
-_WIDTH, _ZONE, FLOOR = 1.1, 1.75, 0.2  # of a mass, between two of them, below them
+#: ``("line", x, y, color, width, fill)``, filled where a colour is given, or ``("text", x, y, words, color, size, ha,
+#: va)``.
+Part = tuple[Any, ...]
+
+_WIDTH, _ZONE, _FLOOR = 1.1, 1.75, 0.2  # of a mass, between two of them, below them
 _LANE = 0.44  # height that one link takes
 _GAP = 0.32  # of a contact in a sketch that is not to scale
-_ORDER = ("spring", "preload", "damper", "backlash", "slider", "stop", "elastic")  # from above
-_DARK, _GREY, _FILL = style.COLORS["section"], style.COLORS["muted"], "#DCE6EE"
+_ORDER = ("spring", "preload", "damper", "backlash", "friction", "stop", "elastic")  # from above
+_DARK, _GREY, _PAPER = style.COLORS["section"], style.COLORS["muted"], "#FFFFFF"
 _STOP, _RUB, _FORCE = (style.COLORS[name] for name in ("second", "fourth", "first"))
+_PALE = f"{_RUB}8C"  # what rubs
 
 
 def mechanism(system: System, ax: Axes | None = None, *, labels: bool = True) -> Axes:
@@ -70,16 +76,30 @@ def mechanism(system: System, ax: Axes | None = None, *, labels: bool = True) ->
     return drawn
 
 
-class Sketch:
-    """A scheme laid out on the paper, in units of its own; it can be drawn with its masses displaced."""
+def sketch_of_run(system: System, run: xr.Dataset) -> tuple[Sketch, Callable[[int], list[Part]]] | None:
+    """The sketch of a system, and a function that gives its parts at each instant of a run; None where the system has
+    no masses on a line."""
+    from nonsmooth.plot.scheme import scheme_of
 
-    def __init__(self, scheme: Scheme) -> None:
-        self.scheme = scheme
+    try:
+        sketch = Sketch(scheme_of(system), moving=True)
+    except ValueError:
+        return None
+    q = np.stack([run["u"].sel(state=name).values for name in sketch.scheme.coordinates], axis=1)
+    scale, q, time = sketch.scale_for(q), np.nan_to_num(q), run["time"].values
+    return sketch, lambda k: sketch.parts(scale * q[k], scale, float(time[k]))
+
+
+class Sketch:
+    """A scheme laid out on the paper, in units of its own; one that is ``moving`` shows no forces and coordinates."""
+
+    def __init__(self, scheme: Scheme, moving: bool = False) -> None:
+        self.scheme, self.moving = scheme, moving
         n = len(scheme.masses)
         self.zones: list[list[Link]] = [[] for _ in range(n + 1)]
         self.above: list[Link] = []
         self.below: dict[int, Link] = {}
-        for link in sorted(scheme.links, key=lambda one: _ORDER.index(_kind(one))):
+        for link in sorted(scheme.links, key=lambda one: _ORDER.index(one.kind)):
             if link.kind == "friction" and link.left == GROUND:
                 self.below[link.right] = link
             elif link.left == GROUND and link.kind in ("spring", "damper", "backlash", "preload"):
@@ -91,16 +111,15 @@ class Sketch:
                 self.zones[link.right].append(link)
             else:
                 self.above.append(link)
-        most = max(len(zone) for zone in self.zones)
-        self.tall = max(1.0, _LANE * most + 0.1)
+        self.tall = max(1.0, _LANE * max(map(len, self.zones)) + 0.1)
         self.left = 0.0 if self.zones[0] else _ZONE - 0.5
         self.faces = [_ZONE + i * (_WIDTH + _ZONE) for i in range(n)]  # left faces at rest
         self.right = self.faces[-1] + _WIDTH + (_ZONE if self.zones[-1] else 0.5)
-        self.top = FLOOR + self.tall + (0.62 if scheme.forces else 0.36) + 0.5 * len(self.above)
+        roof = 0.62 if scheme.forces else 0.36
+        self.top = _FLOOR + self.tall + (0.15 if moving and not self.above else roof + 0.5 * len(self.above))
         self.bottom = -0.3 - (0.22 if any(link.words for link in self.below.values()) else 0.0)
         self.bottom -= (0.3 if scheme.base else 0.0) + 0.24 * len(scheme.others)
         self.width, self.height = self.right - self.left + 0.4, self.top - self.bottom + 0.1
-        self.time = 0.0
 
     def frame(self, ax: Axes, room: float = 0.0) -> None:
         """Limits of the axes, which show nothing but the sketch; ``room`` more on both sides."""
@@ -111,47 +130,45 @@ class Sketch:
 
     def scale_for(self, q: Any) -> float:
         """Length on the paper of one unit of a coordinate, for positions (instants, masses): no zone is crossed."""
-        parted = np.diff(np.pad(q, ((0, 0), (1, 1))), axis=1)
+        parted = np.diff(np.pad(np.nan_to_num(q), ((0, 0), (1, 1))), axis=1)
         largest = float(np.abs(parted).max(initial=0.0))
         gaps = [abs(one.gap) for one in self.scheme.links if np.isfinite(one.gap) and 0 < abs(one.gap) < 3 * largest]
         return float(min(0.5 / largest, 0.7 / max(gaps, default=largest))) * _ZONE if largest > 0 else 1.0
 
     def parts(
         self, moved: Sequence[float] | None = None, scale: float | None = None, time: float = 0.0, labels: bool = True
-    ) -> list[tuple[Any, ...]]:
+    ) -> list[Part]:
         """Its parts with the masses ``moved`` by so much on the paper at an instant; ``scale``: length on the paper of
         one unit of a coordinate, to which gaps are drawn then."""
-        pen, self.time = Pen(labels), time
-        pen.moving = moved is not None
-        shift = np.zeros(len(self.faces)) if moved is None else np.asarray(moved, dtype=float)
+        pen, self.time, self.scale = Pen(labels), time, scale
+        self.now = [
+            face + by
+            for face, by in zip(self.faces, np.zeros(len(self.faces)) if moved is None else moved, strict=True)
+        ]
         self._ground(pen)
-        for i, face in enumerate(self.faces):
-            self._mass(pen, i, face + shift[i])
+        for i, face in enumerate(self.now):
+            self._mass(pen, i, face)
         for z, zone in enumerate(self.zones):
             for k, link in enumerate(zone):
-                y = FLOOR + self.tall * (1 - (k + 0.5) / len(zone))
-                self._link(pen, z, link, y, shift, scale)
+                self._link(pen, z, link, self._lane(zone, k))
         for k, link in enumerate(self.above):
-            y = FLOOR + self.tall + (0.8 if self.scheme.forces else 0.46) + 0.45 * k
-            first, last = (self.faces[i] + shift[i] + 0.25 * _WIDTH for i in (link.left, link.right))
+            y = _FLOOR + self.tall + (0.8 if self.scheme.forces else 0.46) + 0.45 * k
+            first, last = (self.now[i] + 0.25 * _WIDTH for i in (link.left, link.right))
             for x in (first, last):
-                pen.path(0, x, FLOOR + self.tall, x, y)
-            self._between(pen, link, first, last, y, _WIDTH + _ZONE, scale)
-        for k, words in enumerate(self.scheme.others):
-            pen.text(
-                self.left,
-                self.bottom + 0.24 * (len(self.scheme.others) - 1 - k),
-                words,
-                ha="left",
-                va="bottom",
-                plain=True,
-            )
+                pen.path(0, x, _FLOOR + self.tall, x, y)
+            self._between(pen, link, first, last, y, _WIDTH + _ZONE)
+        for k, words in enumerate(reversed(self.scheme.others)):
+            pen.text(self.left, self.bottom + 0.24 * k, words, ha="left", va="bottom", plain=True)
         return pen.made
+
+    def _lane(self, zone: list[Link], k: int) -> float:
+        """The height of the k-th link of a zone."""
+        return _FLOOR + self.tall * (1 - (k + 0.5) / len(zone))
 
     # What stands still
 
     def _ground(self, pen: Pen) -> None:
-        high = FLOOR + self.tall + 0.1
+        high = _FLOOR + self.tall + 0.1
         belts = [self.faces[i] for i, link in self.below.items() if link.words]
         edges = [self.left, *[x for face in belts for x in (face - 0.3, face + _WIDTH + 0.3)], self.right]
         for a, b in zip(edges[::2], edges[1::2], strict=True):
@@ -165,35 +182,33 @@ class Sketch:
             y = self.bottom + 0.24 * len(self.scheme.others) + 0.22
             pen.arrow(self.left + 0.1, self.left + 0.9, y, both=True)
             pen.text(self.left + 1.0, y, self.scheme.base, ha="left")
-        for z, zone in enumerate(self.zones):
+        for z, zone in enumerate(self.zones[1:-1], 1):
             grounded = [k for k, link in enumerate(zone) if GROUND in (link.left, link.right)]
-            if 0 < z < len(self.zones) - 1 and grounded:
+            if grounded:
                 x = self._anchor(z)
-                pen.path(0, x, 0, x, FLOOR + self.tall * (1 - (grounded[0] + 0.5) / len(zone)) + 0.14, width=2.2)
+                pen.path(0, x, 0, x, self._lane(zone, grounded[0]) + 0.14, width=2.2)
 
     def _anchor(self, z: int) -> float:
         """The place of the ground in a zone: a wall, or a post with room beside it."""
-        if z == 0:
-            return self.left
-        if z == len(self.faces):
-            return self.right
+        if z in (0, len(self.faces)):
+            return self.right if z else self.left
         held = {link.left == GROUND for link in self.zones[z] if GROUND in (link.left, link.right)}
         return self.faces[z] - (0.5 if len(held) > 1 else 0.68 if True in held else 0.32) * _ZONE
 
     def _mass(self, pen: Pen, i: int, x: float) -> None:
-        pen.box(x, FLOOR, _WIDTH, self.tall, _FILL)
-        middle, top = x + 0.5 * _WIDTH, FLOOR + self.tall
-        pen.text(middle, FLOOR + 0.5 * self.tall, self.scheme.masses[i], size=1.25)
+        pen.box(x, _FLOOR, _WIDTH, self.tall, "#DCE6EE")
+        middle, top = x + 0.5 * _WIDTH, _FLOOR + self.tall
+        pen.text(middle, _FLOOR + 0.5 * self.tall, self.scheme.masses[i], size=1.25)
         rubs = self.below.get(i)
         if rubs is None:
             for at in (0.25, 0.75):
-                pen.circle(x + at * _WIDTH, 0.5 * FLOOR, 0.5 * FLOOR)
+                pen.circle(x + at * _WIDTH, 0.5 * _FLOOR, 0.5 * _FLOOR)
         else:
-            pen.box(x + 0.15 * _WIDTH, 0.0, 0.7 * _WIDTH, FLOOR, _RUB, alpha=0.55)
-            pen.text(middle, 0.5 * FLOOR, rubs.label, size=0.9)
+            pen.box(x + 0.15 * _WIDTH, 0.0, 0.7 * _WIDTH, _FLOOR, _PALE)
+            pen.text(middle, 0.5 * _FLOOR, rubs.label, size=0.9)
             if rubs.words:
                 pen.belt(self.faces[i] - 0.2, self.faces[i] + _WIDTH + 0.2, rubs.words)
-        if not pen.moving:
+        if not self.moving:
             pen.path(top, middle, 0.06, middle, 0.26, color=_GREY)
             pen.arrow(middle, middle + 0.38, top + 0.16, color=_GREY)
             pen.text(middle + 0.43, top + 0.16, latex_name(self.scheme.coordinates[i]), ha="left")
@@ -203,24 +218,21 @@ class Sketch:
 
     # What joins
 
-    def _link(self, pen: Pen, z: int, link: Link, y: float, shift: Any, scale: float | None) -> None:
+    def _link(self, pen: Pen, z: int, link: Link, y: float) -> None:
         """A link in a zone, between two faces or a face and the ground."""
-        near = self.faces[z - 1] + _WIDTH + shift[z - 1] if z else self.left
-        far = self.faces[z] + shift[z] if z < len(self.faces) else self.right
-        n = len(self.faces)
+        near = self.now[z - 1] + _WIDTH if z else self.left
+        far = self.now[z] if z < len(self.now) else self.right
         if GROUND not in (link.left, link.right):
-            self._between(pen, link, near, far, y, _ZONE, scale)
+            self._between(pen, link, near, far, y, _ZONE)
         elif link.kind in ("stop", "elastic"):
             on_right = link.right == GROUND  # of the mass
             face, rest = (near, self.faces[z - 1] + _WIDTH) if on_right else (far, self.faces[z])
-            self._pad(pen, link, face, rest, self._anchor(z), y, _ZONE, scale)
+            self._pad(pen, link, face, rest, self._anchor(z), y, _ZONE)
         else:
-            left, right = (near, self._anchor(z)) if z == n else (self._anchor(z), far)
-            self._between(pen, link, left, right, y, _ZONE, scale)
+            ends = (near, self._anchor(z)) if z == len(self.now) else (self._anchor(z), far)
+            self._between(pen, link, *ends, y, _ZONE)
 
-    def _between(
-        self, pen: Pen, link: Link, left: float, right: float, y: float, rest: float, scale: float | None
-    ) -> None:
+    def _between(self, pen: Pen, link: Link, left: float, right: float, y: float, rest: float) -> None:
         words = link.label
         match link.kind:
             case "spring" | "preload":
@@ -230,57 +242,64 @@ class Sketch:
             case "friction":
                 pen.slider(left, right, y, words)
             case "backlash":
-                half = 0.16 if scale is None else min(0.6 * rest, scale * link.half)
+                half = 0.16 if self.scale is None else min(0.6 * rest, self.scale * link.half)
                 pen.play(left, right, y, half, rest, words, link.words and rf"\pm {link.words}")
-            case "stop" | "elastic" if link.pulls:
-                gap = self._room(link, rest, scale)
-                pen.catch(left, right, y, rest, gap, link.words or words)
-            case "stop" | "elastic":
-                self._pad(pen, link, left, right - rest, right, y, rest, scale)
+            case _ if link.pulls:
+                pen.catch(left, right, y, rest, self._room(link, rest), link.words or words)
+            case _:
+                self._pad(pen, link, left, right - rest, right, y, rest)
 
-    def _pad(
-        self, pen: Pen, link: Link, face: float, at: float, ground: float, y: float, rest: float, scale: float | None
-    ) -> None:  # fmt: skip
+    def _pad(self, pen: Pen, link: Link, face: float, at: float, ground: float, y: float, rest: float) -> None:
         sign = 1.0 if ground > at else -1.0
-        pad = at + sign * self._room(link, rest, scale)
-        pen.pad(face, sign * max(sign * pad, sign * face) if link.kind == "elastic" else pad, ground, y, link)
+        pad = at + sign * self._room(link, rest)
+        pad = sign * max(sign * pad, sign * face) if link.kind == "elastic" else pad
+        pen.pad(face, pad, ground, y, link, always=not self.moving)
 
-    def _room(self, link: Link, rest: float, scale: float | None) -> float:
+    def _room(self, link: Link, rest: float) -> float:
         gap = link.gap if link.gap_at is None else float(link.gap_at(self.time))
-        if scale is not None and np.isfinite(gap):
-            return float(np.clip(scale * gap, -0.7 * rest, 0.8 * rest))
+        if self.scale is not None and np.isfinite(gap):
+            return float(np.clip(self.scale * gap, -0.7 * rest, 0.8 * rest))
         return 0.0 if gap <= 0 else _GAP
 
 
-def _kind(link: Link) -> str:
-    return "slider" if link.kind == "friction" else link.kind
-
-
 class Pen:
-    """Parts of a sketch as data, made of lines, boxes, circles, arrows and words: :func:`put` draws them."""
+    """Parts of a sketch as data, made of lines and words: :func:`put` draws them."""
 
     def __init__(self, labels: bool = True) -> None:
-        self.labels, self.moving, self.made = labels, False, list[tuple[Any, ...]]()
+        self.labels, self.made = labels, list[Part]()
 
-    def path(self, y: float, *places: float, color: str = _DARK, width: float = 0.9) -> None:
-        """A line through places, each by its abscissa and its height above y."""
-        self.made.append(("line", places[::2], [y + high for high in places[1::2]], color, width))
+    def path(self, y: float, *places: float, color: str = _DARK, width: float = 0.9, fill: str = "") -> None:
+        """A line through places, each by its abscissa and its height above y; a filled shape where it has a colour."""
+        self.made.append(("line", places[::2], [y + high for high in places[1::2]], color, width, fill))
 
     def text(
-        self, x: float, y: float, words: str, color: str = _DARK, size: float = 1.0, ha: str = "center",
-        va: str = "center", plain: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        x: float,
+        y: float,
+        words: str,
+        color: str = _DARK,
+        size: float = 1.0,
+        ha: str = "center",
+        va: str = "center",
+        plain: bool = False,
+    ) -> None:
         if self.labels and words:
             self.made.append(("text", x, y, words if plain else f"${words}$", color, size, ha, va))
 
-    def box(self, x: float, y: float, width: float, height: float, fill: str, alpha: float = 1.0) -> None:
-        self.made.append(("box", x, y, width, height, fill, alpha))
+    def box(self, x: float, y: float, width: float, height: float, fill: str) -> None:
+        self.path(y, x, 0, x + width, 0, x + width, height, x, height, x, 0, fill=fill)
 
     def circle(self, x: float, y: float, radius: float) -> None:
-        self.made.append(("circle", x, y, radius))
+        turn = np.linspace(0, 2 * np.pi, 21)
+        self.path(y, *np.stack([x + radius * np.cos(turn), radius * np.sin(turn)], axis=1).ravel(), fill=_PAPER)
 
     def arrow(self, a: float, b: float, y: float, color: str = _DARK, both: bool = False, heavy: bool = False) -> None:
-        self.made.append(("arrow", a, b, y, color, both, heavy))
+        width, size = (1.3, 0.12) if heavy else (0.8, 0.09)
+        way, high = size if b > a else -size, 0.4 * size
+        ends = [(b, b - way), (a, a + way)][: 1 + both]
+        self.path(y, ends[1][1] if both else a, 0, b - way, 0, color=color, width=width)
+        for tip, back in ends:
+            self.path(y, tip, 0, back, high, back, -high, tip, 0, color=color, width=0.5, fill=color)
 
     def hatch(self, a: float, b: float, at: float, upright: int = 0) -> None:
         """Strokes behind a line of the ground: below it, or to the left (-1) or right (1) of an upright one."""
@@ -288,7 +307,7 @@ class Pen:
         gone = np.full(len(places), np.nan)
         one = np.stack([places, places - 0.1, gone], axis=1).ravel()
         other = np.tile([at, at + (0.1 * upright or -0.1), np.nan], len(places))
-        self.made.append(("line", *((other, one) if upright else (one, other)), _GREY, 0.6))
+        self.made.append(("line", *((other, one) if upright else (one, other)), _GREY, 0.6, ""))
 
     def belt(self, a: float, b: float, words: str) -> None:
         for x in (a, b):
@@ -327,7 +346,7 @@ class Pen:
         middle = 0.5 * (a + b)
         end = middle + 0.36
         self.path(y, a, 0, middle - 0.16, 0)
-        self.box(middle - 0.16, y - 0.07, 0.32, 0.14, _RUB, alpha=0.55)
+        self.box(middle - 0.16, y - 0.07, 0.32, 0.14, _PALE)
         self.path(y, middle - 0.3, -0.1, end, -0.1, end, 0.1, middle - 0.3, 0.1, width=1.4)
         self.path(y, end, 0, b, 0)
         self.text(middle, y + 0.13, words, va="bottom")
@@ -354,7 +373,7 @@ class Pen:
         if gap > 0.1:
             self.text(0.5 * (hook + pin), y - 0.13, words, va="top")
 
-    def pad(self, face: float, pad: float, ground: float, y: float, link: Link) -> None:
+    def pad(self, face: float, pad: float, ground: float, y: float, link: Link, always: bool) -> None:
         """A stop by its pad, on a rod, or on a spring (and a damper) where it is elastic; with its gap."""
         sign = 1.0 if ground > pad else -1.0
         back = pad + 0.07 * sign
@@ -372,28 +391,22 @@ class Pen:
             for x in (face, pad):
                 self.path(y, x, -0.23, x, -0.13, color=_GREY, width=0.5)
             self.arrow(face, pad, y - 0.19, color=_GREY, both=True)
-        if room > 0.12 or not self.moving:
+        if room > 0.12 or always:
             self.text(0.5 * (face + pad), y - 0.23, link.words, va="top", size=0.95)
 
 
-def put(ax: Axes, parts: Iterable[tuple[Any, ...]]) -> list[Any]:
+def put(ax: Axes, parts: Iterable[Part]) -> list[Any]:
     """Draw parts of a sketch on axes; the artists are returned."""
-    from matplotlib.patches import Circle, Rectangle
-
     made: list[Any] = []
-    edge: dict[str, Any] = {"edgecolor": _DARK, "linewidth": 0.9}
-    for part in parts:
-        match part:
-            case "line", x, y, color, width:
-                made += ax.plot(x, y, "-", color=color, linewidth=width, solid_capstyle="butt", clip_on=False)
-            case "text", x, y, words, color, size, ha, va:
-                made.append(ax.text(x, y, words, color=color, fontsize=size * style.small(ax), ha=ha, va=va))
-            case "box", x, y, width, height, fill, alpha:
-                made.append(ax.add_patch(Rectangle((x, y), width, height, facecolor=fill, alpha=alpha, **edge)))
-            case "circle", x, y, radius:
-                made.append(ax.add_patch(Circle((x, y), radius, facecolor="white", **edge)))
-            case "arrow", a, b, y, color, both, heavy:
-                looks = {"arrowstyle": "<|-|>" if both else "-|>", "color": color, "shrinkA": 0, "shrinkB": 0,
-                         "linewidth": 1.3 if heavy else 0.8, "mutation_scale": 8 if heavy else 6}  # fmt: skip
-                made.append(ax.annotate("", (b, y), (a, y), arrowprops=looks, annotation_clip=False))
+    for kind, x, y, *looks in parts:
+        if kind == "text":
+            words, color, size, ha, va = looks
+            made.append(ax.text(x, y, words, color=color, fontsize=size * style.small(ax), ha=ha, va=va))
+            continue
+        color, width, fill = looks
+        common: dict[str, Any] = {"linewidth": width, "clip_on": False, "zorder": 2}
+        if fill:
+            made += ax.fill(x, y, facecolor=fill, edgecolor=color, **common)
+        else:
+            made += ax.plot(x, y, "-", color=color, solid_capstyle="butt", **common)
     return made

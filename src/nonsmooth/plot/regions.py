@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.plot import style
+from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import name_axes, symbol_of
 
 if TYPE_CHECKING:
@@ -29,16 +30,17 @@ _LINES = ("second", "third", "fourth")
 _GRID = 401
 
 
+@figure(ratio=0.85)
 def regions(
+    ax: Axes,
     system: System,
-    ax: Axes | None = None,
     *,
     xlim: tuple[float, float],
     ylim: tuple[float, float],
     x: str | None = None,
     y: str | None = None,
     t: float = 0.0,
-) -> Axes:
+) -> None:
     """Draw the regions of a system's first mode (G-), of the mode it changes to (G+), and the borders between them.
 
     Parameters
@@ -62,14 +64,9 @@ def regions(
     names = _states(system, x, y)
     first, second = np.meshgrid(np.linspace(*xlim, _GRID), np.linspace(*ylim, _GRID))
     margins = _margins(system, names, first, second, t)
-    with style.axes(ax, ratio=0.85) as drawn:
-        if system.is_smoothed:
-            _draw_bands(drawn, first, second, margins)
-        else:
-            _draw_surfaces(drawn, first, second, margins)
-        drawn.set(xlim=xlim, ylim=ylim)
-        name_axes(drawn, *((symbol_of(name), system.states[name]) for name in names))
-    return drawn
+    (_draw_bands if system.is_smoothed else _draw_surfaces)(ax, first, second, margins)
+    ax.set(xlim=xlim, ylim=ylim)
+    name_axes(ax, *((symbol_of(name), system.states[name]) for name in names))
 
 
 def _states(system: System, *given: str | None) -> list[str]:

@@ -25,9 +25,26 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
 
 __all__ = [
-    "ABOVE", "COLORS", "COLUMN", "PAGE", "apart", "axes", "clear_legend", "cloud", "even_dots", "halo", "journal",
-    "make_room", "mark", "once", "save_figure", "slides", "small",
-]  # fmt: skip
+    "ABOVE",
+    "COLORS",
+    "COLUMN",
+    "PAGE",
+    "apart",
+    "axes",
+    "clear_legend",
+    "cloud",
+    "even_dots",
+    "halo",
+    "journal",
+    "label",
+    "make_room",
+    "mark",
+    "once",
+    "points",
+    "save_figure",
+    "slides",
+    "small",
+]
 
 #: Widths of one column (84 mm) and of the page (174 mm), in inches.
 COLUMN = 84 / 25.4
@@ -147,7 +164,11 @@ def axes(ax: Axes | None, *, width: float = COLUMN, ratio: float = 0.72) -> Iter
         size = (width, width * ratio) if name == "journal" else (wide * width / COLUMN, high * width / COLUMN)
         figure = plt.figure(figsize=size)
         _made[figure] = name
-        yield figure.add_subplot()
+        try:
+            yield figure.add_subplot()
+        except BaseException:  # what could not be drawn leaves no empty figure
+            plt.close(figure)
+            raise
 
 
 @contextmanager
@@ -191,6 +212,38 @@ def mark(ax: Axes, points: Iterable[Any], marker: str, words: str, size: float =
     """Draw white marks at points (x, y), with a dark edge, named in the legend once."""
     looks = {"markerfacecolor": "white", "markeredgecolor": COLORS["section"], "markeredgewidth": 0.8, **looks}
     ax.plot(*map(np.ravel, points), marker, linestyle="none", markersize=size, label=once(ax, words), **looks)
+
+
+def points(
+    ax: Axes,
+    x: Any,
+    y: Any,
+    *,
+    color: str = COLORS["section"],
+    face: str | None = None,
+    size: float = 3.0,
+    mark: str = "o",
+    **looks: Any,
+) -> None:
+    """Draw measured points with error bars, ``xerr`` or ``yerr``; none where no error is known."""
+    for bar in ("xerr", "yerr"):
+        if not np.isfinite(np.asarray(looks.get(bar, np.nan), dtype=float)).any():
+            looks.pop(bar, None)
+    ax.errorbar(
+        x,
+        y,
+        fmt=mark,
+        color=color,
+        markerfacecolor=color if face is None else face,
+        markersize=size,
+        **{"markeredgewidth": 0.7, "elinewidth": 0.6, "zorder": 4, **looks},
+    )
+
+
+def label(ax: Axes, words: str, place: tuple[float, float], offset: tuple[float, float], **looks: Any) -> Any:
+    """Write small words beside a place, so many points away, that show over whatever lies below."""
+    looks = {"fontsize": small(ax), "zorder": 6, "path_effects": halo(), **looks}
+    return ax.annotate(words, place, offset, textcoords="offset points", **looks)
 
 
 def make_room(ax: Axes, share: float) -> None:

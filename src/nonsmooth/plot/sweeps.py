@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.plot import style
 from nonsmooth.plot.branches import draw_branch
+from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import (
     column,
     first_states,
@@ -18,7 +19,7 @@ from nonsmooth.plot.labels import (
     only_states,
     variable_along,
 )
-from nonsmooth.plot.planes import cell_edges, held
+from nonsmooth.plot.planes import edges_of, held
 from nonsmooth.tables.quantities import quantities_of
 from nonsmooth.tables.quantities import quantity as quantity_of
 
@@ -26,24 +27,22 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = [
-    "bifurcation", "bifurcation_diagram", "density", "frequency_response", "one_branch", "smoothing_report",
-    "sorted_out",
-]  # fmt: skip
+__all__ = ["bifurcation", "bifurcation_diagram", "density", "frequency_response", "one_branch", "smoothing_report"]
 
 _LINES = ("section", "third", "fourth")
 _COLORS = {"up": "first", "down": "second", "none": "section"}
 _SEAM = 2.0  # a rising point over a falling one, which lies on it: both show
 
 
+@figure()
 def bifurcation(
+    ax: Axes,
     result: xr.Dataset,
-    *over: xr.Dataset | Axes | None,
-    ax: Axes | None = None,
+    *over: xr.Dataset,
     y: str | None = None,
     size: float = 0.8,
     color: str | None = None,
-) -> Axes:
+) -> None:
     """Draw the section points of a ``sweep`` over its parameter, up and down in two colours, and branches over them.
 
     Parameters
@@ -73,33 +72,27 @@ def bifurcation(
     variable_along(result, "section", "sweep")
     (name,) = first_states(result, y)
     parameter = str(result["maximum"].dims[0])
-    ax, branches = sorted_out(over, ax, parameter)
+    _share_an_axis(over, parameter)
     of_state = name in result["state"].values
     points = column(result, "section", name) if of_state else quantity_of(result, name).expand_dims("iterate")
     size = size if of_state else 3.0 * size
     directions = [str(word) for word in np.atleast_1d(result["direction"].values)]
-    with style.axes(ax) as drawn:
-        for i, direction in enumerate(directions):
-            mine = points.isel(direction=i) if "direction" in points.dims else points
-            cloud = mine.transpose(..., parameter).values
-            values = np.broadcast_to(result[parameter].values, cloud.shape)
-            under = direction == "up" and "down" in directions
-            style.cloud(
-                drawn,
-                (values, cloud),
-                size * (_SEAM if under else 1.0),
-                color or style.COLORS["pale" if under else _COLORS[direction]],
-                direction if len(directions) > 1 else None,
-            )
-        for k, one in enumerate(branches):
-            draw_branch(drawn, one, y=name, color=style.COLORS[_LINES[k % len(_LINES)]], behind=True)
-        # The whole sweep shows, its ends too where every point diverged.
-        drawn.dataLim.update_from_data_x(result[parameter].values, ignore=False)
-        drawn.margins(x=0)
-        _name(drawn, result, parameter, name, points)
-        if len(directions) > 1 or branches:
-            style.even_dots(style.clear_legend(drawn))
-    return drawn
+    for i, direction in enumerate(directions):
+        mine = points.isel(direction=i) if "direction" in points.dims else points
+        cloud = mine.transpose(..., parameter).values
+        values = np.broadcast_to(result[parameter].values, cloud.shape)
+        under = direction == "up" and "down" in directions
+        shade = color or style.COLORS["pale" if under else _COLORS[direction]]
+        words = direction if len(directions) > 1 else None
+        style.cloud(ax, (values, cloud), size * (_SEAM if under else 1.0), shade, words)
+    for k, one in enumerate(over):
+        draw_branch(ax, one, y=name, color=style.COLORS[_LINES[k % len(_LINES)]], behind=True)
+    # The whole sweep shows, its ends too where every point diverged.
+    ax.dataLim.update_from_data_x(result[parameter].values, ignore=False)
+    ax.margins(x=0)
+    _name(ax, result, parameter, name, points)
+    if len(directions) > 1 or over:
+        style.even_dots(style.clear_legend(ax))
 
 
 def _name(ax: Axes, result: xr.Dataset, parameter: str, name: str, values: xr.DataArray, before: str = "") -> None:
@@ -110,34 +103,17 @@ def _name(ax: Axes, result: xr.Dataset, parameter: str, name: str, values: xr.Da
     return name_axes(ax, name_and_unit(result, parameter), (own, str(values.attrs.get("units", "1"))))
 
 
-def sorted_out(
-    over: tuple[xr.Dataset | Axes | None, ...], ax: Axes | None, parameter: str
-) -> tuple[Axes | None, list[xr.Dataset]]:
-    """Axes given in place of a branch, and the branches, which must be over the same parameter."""
-    import xarray as xr
-
-    branches: list[xr.Dataset] = []
+def _share_an_axis(over: tuple[xr.Dataset, ...], parameter: str) -> None:
+    """Check that branches are over the parameter of the diagram."""
     for one in over:
-        if one is None:
-            continue
-        if not isinstance(one, xr.Dataset):
-            ax = one
-            continue
-        of = one.attrs.get("parameter")
-        if of != parameter:
+        if (of := one.attrs.get("parameter")) != parameter:
             raise ValueError(f"the diagram is over {parameter!r}, this branch over {of!r}: they share no axis")
-        branches.append(one)
-    return ax, branches
 
 
+@figure("bifurcation_diagram", "swept_section")
 def bifurcation_diagram(
-    result: xr.Dataset,
-    ax: Axes | None = None,
-    *,
-    y: str | None = None,
-    special: bool = True,
-    size: float = 0.8,
-) -> Axes:
+    ax: Axes, result: xr.Dataset, *, y: str | None = None, special: bool = True, size: float = 0.8
+) -> None:
     """Draw all section points of every branch, stable parts solid and unstable ones dashed, over those of the sweeps.
 
     Parameters
@@ -153,20 +129,17 @@ def bifurcation_diagram(
     size
         Diameter of a point of the sweeps in typographic points.
     """
-    variable_along(result, "swept_section", "bifurcation_diagram")
     (name,) = first_states(result, y)
     parameter = str(result.attrs["parameter"])
     swept = result["swept_section"].sel(state=name).transpose("direction", "sample", "iterate").values
     values = np.broadcast_to(result["swept_value"].values[None, :, None], swept.shape)
-    with style.axes(ax) as drawn:
-        style.cloud(drawn, (values, swept), size, style.COLORS["pale"], "sweeps")
-        for k in range(result.sizes["branch_id"]):
-            draw_branch(drawn, one_branch(result, k), y=name, special=special)
-        drawn.dataLim.update_from_data_x(result["swept_value"].values, ignore=False)
-        drawn.margins(x=0)
-        name_plane(drawn, result, parameter, name)
-        style.even_dots(style.clear_legend(drawn))
-    return drawn
+    style.cloud(ax, (values, swept), size, style.COLORS["pale"], "sweeps")
+    for k in range(result.sizes["branch_id"]):
+        draw_branch(ax, one_branch(result, k), y=name, special=special)
+    ax.dataLim.update_from_data_x(result["swept_value"].values, ignore=False)
+    ax.margins(x=0)
+    name_plane(ax, result, parameter, name)
+    style.even_dots(style.clear_legend(ax))
 
 
 def one_branch(result: xr.Dataset, k: int) -> xr.Dataset:
@@ -186,16 +159,17 @@ _LOOKS: dict[str, dict[str, Any]] = {
 _WORDS = {"up": "increasing", "down": "decreasing", "none": "each from its start"}
 
 
+@figure("frequency_response", "amplitude")
 def frequency_response(
+    ax: Axes,
     result: xr.Dataset,
-    *over: xr.Dataset | Axes | None,
-    ax: Axes | None = None,
+    *over: xr.Dataset,
     y: str | None = None,
     quantity: str = "amplitude",
     jumps: bool = True,
     digits: int = 4,
     region: str | xr.DataArray | None = None,
-) -> Axes:
+) -> None:
     """Draw a ``frequency_response`` result.
 
     Parameters
@@ -219,7 +193,6 @@ def frequency_response(
         A condition, or what :func:`nonsmooth.region` gave: the values of the parameter at which it holds, in every
         direction and from every start, are shaded.
     """
-    variable_along(result, "amplitude", "frequency_response")
     if quantity not in ("amplitude", "maximum", "minimum"):
         raise ValueError(f"quantity is {quantity!r}; allowed: 'amplitude', 'maximum', 'minimum'")
     (name,) = first_states(result, y)
@@ -229,39 +202,36 @@ def frequency_response(
     alone = f"{name}_{quantity}" not in known
     heights = quantity_of(result, name if alone else f"{name}_{quantity}", known)
     inside = held(result, region)
-    ax, branches = sorted_out(over, ax, parameter)
+    _share_an_axis(over, parameter)
     marks: list[Any] = []
-    with style.axes(ax) as drawn:
-        for i, direction in enumerate(np.atleast_1d(result["direction"].values).astype(str)):
-            one = heights.isel(direction=i) if "direction" in heights.dims else heights
-            curves = one.transpose(parameter, ...).values.reshape(len(values), -1)
-            for k, curve in enumerate(curves.T):
-                found = _intervals(values, curve, _jumps(result, name, direction, k))
-                at = [i for _, i in found]
-                broken = np.insert(values, at, np.nan), np.insert(curve, at, np.nan)
-                drawn.plot(*broken, label=_WORDS[direction] if k == 0 else None, **_LOOKS[direction])
-                if jumps:
-                    for place, i in found:
-                        marks.append(_mark(drawn, curve, i, values[0] <= values[-1], place, direction, digits))
-        for behind in branches:
-            draw_branch(drawn, behind, y=name, quantity=quantity, color=style.COLORS["section"], width=0.7, behind=True)
-        drawn.margins(x=0)
-        if inside is not None:
-            _shade(drawn, inside, parameter)
-        _name(drawn, result, parameter, name, heights, "" if alone else f"{quantity} of ")
-        style.clear_legend(drawn)
-        style.apart(drawn, marks)
-    return drawn
+    for i, direction in enumerate(np.atleast_1d(result["direction"].values).astype(str)):
+        one = heights.isel(direction=i) if "direction" in heights.dims else heights
+        curves = one.transpose(parameter, ...).values.reshape(len(values), -1)
+        for k, curve in enumerate(curves.T):
+            found = _intervals(values, curve, _jumps(result, name, direction, k))
+            at = [i for _, i in found]
+            broken = np.insert(values, at, np.nan), np.insert(curve, at, np.nan)
+            ax.plot(*broken, label=_WORDS[direction] if k == 0 else None, **_LOOKS[direction])
+            for place, i in found if jumps else ():
+                marks.append(_mark(ax, curve, i, values[0] <= values[-1], place, direction, digits))
+    for behind in over:
+        draw_branch(ax, behind, y=name, quantity=quantity, color=style.COLORS["section"], width=0.7, behind=True)
+    ax.margins(x=0)
+    if inside is not None:
+        _shade(ax, inside, parameter)
+    _name(ax, result, parameter, name, heights, "" if alone else f"{quantity} of ")
+    style.clear_legend(ax)
+    style.apart(ax, marks)
 
 
 def _shade(ax: Axes, inside: xr.DataArray, parameter: str) -> None:
     """Shade the cells of an axis in which a condition holds."""
     whole = inside.all([dim for dim in inside.dims if dim != parameter]).sortby(parameter)
-    edges = cell_edges(whole[parameter].values)
+    edges = edges_of(whole[parameter].values)
     words = str(inside.attrs.get("long_name", "region"))
+    looks: dict[str, Any] = {"color": style.COLORS["third"], "alpha": 0.15, "linewidth": 0, "zorder": 0}
     for i in np.flatnonzero(whole.values):
-        ax.axvspan(edges[i], edges[i + 1], color=style.COLORS["third"], alpha=0.15, linewidth=0, zorder=0,
-                   label=style.once(ax, words))  # fmt: skip
+        ax.axvspan(edges[i], edges[i + 1], label=style.once(ax, words), **looks)
     ax.set_xlim(*whole[parameter].values[[0, -1]])
 
 
@@ -306,14 +276,12 @@ def _mark(
     side = 2 if direction == "up" else -2
     small = abs(after - before) < 0.2 * np.ptp(curve[np.isfinite(curve)])  # no room beside the arrow: below it
     where, offset = (min(before, after), (side, -3)) if small else ((before + after) / 2, (side, 0))
-    return ax.annotate(
-        f"{place:.{digits}g}", (place, where), offset, textcoords="offset points", color=color, rotation=90,
-        fontsize=style.small(ax), va="top" if small else "center", ha="left" if side > 0 else "right", zorder=6,
-        path_effects=style.halo(),
-    )  # fmt: skip
+    sides = {"va": "top" if small else "center", "ha": "left" if side > 0 else "right"}
+    return style.label(ax, f"{place:.{digits}g}", (place, where), offset, color=color, rotation=90, **sides)
 
 
-def density(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, cmap: str = "magma_r") -> Axes:
+@figure("sweep(..., density=True)", "density")
+def density(ax: Axes, result: xr.Dataset, *, y: str | None = None, cmap: str = "magma_r") -> None:
     """Draw the histograms of a ``sweep(..., density=True)`` over its parameter, in a logarithmic scale of colour.
 
     Parameters
@@ -336,29 +304,22 @@ def density(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None,
     -----
     The colour is the share of a parameter value's points in one bin, in per cent. A point that failed has none.
     """
-    variable_along(result, "density", "sweep(..., density=True)")
+    from matplotlib.colors import LogNorm
+
     (name,) = only_states(result, y)
     parameter = str(result["density"].dims[0])
     one = result.sortby(parameter).sel(state=name)
-    counts = one["density"].sum([dim for dim in ("direction", "start") if dim in one["density"].dims])
+    counts, beyond = (one[key].sum({"direction", "start"} & {*one[key].dims}) for key in ("density", "outside"))
     table = counts.transpose("bin", parameter).values.astype(float)
-    total = table.sum(axis=0)
-    beyond = one["outside"].sum([dim for dim in ("direction", "start") if dim in one["outside"].dims]).values
-    total = total + beyond
     share = np.full(table.shape, np.nan)
-    np.divide(100.0 * table, total, out=share, where=table > 0)
-    from matplotlib.colors import LogNorm
-
-    with style.axes(ax) as drawn:
-        there = share[np.isfinite(share)]
-        lowest, highest = (float(there.min()), float(there.max())) if len(there) else (1.0, 100.0)
-        mesh = drawn.pcolormesh(
-            cell_edges(one[parameter].values), one["bin_edge"].values, share, rasterized=True, cmap=cmap,
-            norm=LogNorm(lowest, max(highest, 1.01 * lowest)),
-        )  # fmt: skip
-        drawn.figure.colorbar(mesh, ax=drawn, label="share of the points (%)")
-        name_plane(drawn, result, parameter, name)
-    return drawn
+    np.divide(100.0 * table, table.sum(axis=0) + beyond.values, out=share, where=table > 0)
+    there = share[np.isfinite(share)]
+    lowest, highest = (float(there.min()), float(there.max())) if len(there) else (1.0, 100.0)
+    edges = edges_of(one[parameter].values), one["bin_edge"].values
+    colors: dict[str, Any] = {"cmap": cmap, "norm": LogNorm(lowest, max(highest, 1.01 * lowest))}
+    mesh = ax.pcolormesh(*edges, share, rasterized=True, **colors)
+    ax.figure.colorbar(mesh, ax=ax, label="share of the points (%)")
+    name_plane(ax, result, parameter, name)
 
 
 _QUANTITIES = {
@@ -371,7 +332,8 @@ _MARKS = {"linear": ("first", "o"), "tanh": ("second", "s"), "arctan": ("third",
 _LOST = 0.04  # height of the mark where there is no such orbit, in the axes
 
 
-def smoothing_report(result: xr.Dataset, ax: Axes | None = None, *, y: str = "state") -> Axes:
+@figure("smoothing_report", "state_difference")
+def smoothing_report(ax: Axes, result: xr.Dataset, *, y: str = "state") -> None:
     """Draw the result of ``smoothing_report``: one line for each band, with its order at the smallest widths.
 
     Parameters
@@ -390,32 +352,27 @@ def smoothing_report(result: xr.Dataset, ax: Axes | None = None, *, y: str = "st
     ValueError
         A result of another verb, or another quantity.
     """
-    variable_along(result, "state_difference", "smoothing_report")
     if y not in _QUANTITIES:
         raise ValueError(f"y = {y!r} is one of {', '.join(_QUANTITIES)}")
-    with style.axes(ax) as drawn:
-        eta = result["eta"].values
-        lost: set[float] = set()
-        for band in result["band"].values:
-            one = result.sel(band=band)
-            color, mark = _MARKS[str(band)]
-            values = one[f"{y}_difference"].values
-            shown = np.isfinite(values) & (values > 0)
-            orders = one[f"{y}_order"].values
-            known = orders[np.isfinite(orders)]
-            name = str(band) + (f", order {known[0]:.2f}" if len(known) else "")
-            color = style.COLORS[color]
-            drawn.plot(eta[shown], values[shown], "-", color=color, linewidth=0.8)
-            drawn.plot([], [], mark, color=color, markersize=3.5, label=name)
-            changed = one["stable"].values != bool(one["reference_stable"])
-            for which, fill in ((shown & ~changed, color), (shown & changed, "none")):
-                drawn.plot(eta[which], values[which], mark, color=color, markerfacecolor=fill, markersize=3.5)
-            lost |= set(eta[one["status"].values != 0].tolist())
-        if lost:
-            drawn.plot(
-                sorted(lost), [_LOST] * len(lost), "x", color=style.COLORS["section"], markersize=4,
-                transform=drawn.get_xaxis_transform(), label="no such orbit",
-            )  # fmt: skip
-        drawn.set(xscale="log", yscale="log", xlabel=r"half width of the bands, $\eta$", ylabel=_QUANTITIES[y])
-        drawn.legend()
-    return drawn
+    eta = result["eta"].values
+    lost: set[float] = set()
+    for band in result["band"].values:
+        one = result.sel(band=band)
+        shade, mark = _MARKS[str(band)]
+        color, values = style.COLORS[shade], one[f"{y}_difference"].values
+        shown = np.isfinite(values) & (values > 0)
+        orders = one[f"{y}_order"].values
+        known = orders[np.isfinite(orders)]
+        ax.plot(eta[shown], values[shown], "-", color=color, linewidth=0.8)
+        ax.plot(
+            [], [], mark, color=color, markersize=3.5, label=band + (f", order {known[0]:.2f}" if len(known) else "")
+        )
+        changed = one["stable"].values != bool(one["reference_stable"])
+        for which, fill in ((shown & ~changed, color), (shown & changed, "none")):
+            ax.plot(eta[which], values[which], mark, color=color, markerfacecolor=fill, markersize=3.5)
+        lost |= set(eta[one["status"].values != 0].tolist())
+    if lost:
+        looks: dict[str, Any] = {"color": style.COLORS["section"], "markersize": 4, "label": "no such orbit"}
+        ax.plot(sorted(lost), [_LOST] * len(lost), "x", transform=ax.get_xaxis_transform(), **looks)
+    ax.set(xscale="log", yscale="log", xlabel=r"half width of the bands, $\eta$", ylabel=_QUANTITIES[y])
+    ax.legend()

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.plot import style
+from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import (
     column,
     first_states,
@@ -24,9 +25,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
-    "amplitude_spectrum", "orbit", "phase_portrait", "pieces_by_mode", "section", "shade_zone", "time_history",
+    "amplitude_spectrum",
+    "orbit",
+    "phase_portrait",
+    "pieces_by_mode",
+    "section",
+    "shade_zone",
+    "time_history",
     "with_gaps",
-]  # fmt: skip
+]
 
 
 def with_gaps(result: xr.Dataset, *curves: NDArray[np.float64]) -> list[NDArray[np.float64]]:
@@ -42,27 +49,22 @@ def pieces_by_mode(mode: NDArray[np.integer], *curves: NDArray[np.float64]) -> l
     return [[np.where(mode == k, curve, np.nan) for curve in curves] for k in range(int(mode.max(initial=0)) + 1)]
 
 
-def time_history(result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, shade: bool | str = True) -> Axes:
+@figure("simulate", "u")
+def time_history(ax: Axes, result: xr.Dataset, *, y: str | None = None, shade: bool | str = True) -> None:
     """Draw ``y`` (a state, by default the first, or an output) of a ``simulate`` result over time.
 
     The curve is cut where a reset makes the state jump. ``shade`` marks the time spent in any mode but the first; of a
     system with several elements the time in which a contact is closed (without contacts: in which something sticks).
     The name of an element, ``"stop"``: the time in which it does something else than in the first mode.
     """
-    variable_along(result, "u", "simulate")
     (name,) = first_states(result, y)
-    with style.axes(ax) as drawn:
-        time = result["time"].values
-        drawn.plot(*with_gaps(result, time, column(result, "u", name).values), color=style.COLORS["first"])
-        if shade:
-            away = _away(result, shade)
-            drawn.fill_between(
-                time, 0, 1, where=away, transform=drawn.get_xaxis_transform(),
-                color=style.COLORS["zone"], alpha=0.25, linewidth=0,
-            )  # fmt: skip
-        drawn.margins(x=0)
-        name_plane(drawn, result, "time", name)
-    return drawn
+    time = result["time"].values
+    ax.plot(*with_gaps(result, time, column(result, "u", name).values), color=style.COLORS["first"])
+    if shade:
+        looks: dict[str, Any] = {"color": style.COLORS["zone"], "alpha": 0.25, "linewidth": 0}
+        ax.fill_between(time, 0, 1, where=_away(result, shade), transform=ax.get_xaxis_transform(), **looks)
+    ax.margins(x=0)
+    name_plane(ax, result, "time", name)
 
 
 _CLOSED, _STUCK = {"rest", "contact", "above", "below"}, {"stick", "held"}  # phases of elements
@@ -95,15 +97,16 @@ ZONE = "contact zone"  # in legends
 _MODE_COLORS = ("first", "second", "third", "fourth")
 
 
+@figure("simulate", "u", ratio=0.85)
 def phase_portrait(
+    ax: Axes,
     result: xr.Dataset,
-    ax: Axes | None = None,
     *,
     x: str | None = None,
     y: str | None = None,
     section: xr.Dataset | None = None,
     zone: float | str | None = None,
-) -> Axes:
+) -> None:
     """Draw a ``simulate`` result in the plane of two states, each mode in its own colour.
 
     Parameters
@@ -120,29 +123,22 @@ def phase_portrait(
         The contact zone x > zone, shaded: a number, or the name of the parameter that holds it (``"g"``).
         Without it the zone shows by the colour of the orbit alone.
     """
-    variable_along(result, "u", "simulate")
     names = first_states(result, x, y)
-    with style.axes(ax, ratio=0.85) as drawn:
-        mode = result["mode"].values.astype(float)
-        curves = [column(result, "u", name).values for name in names]
-        cut_mode, *cut = with_gaps(result, mode, *curves)
-        modes = words_of_flags(result["mode"])
-        pieces = pieces_by_mode(np.nan_to_num(cut_mode, nan=-1).astype(int), *cut)
-        for k, (xs, ys) in enumerate(pieces):
-            if np.isfinite(xs).any():
-                color = style.COLORS[_MODE_COLORS[k % len(_MODE_COLORS)]]
-                drawn.plot(xs, ys, color=color, label=modes[k].replace("_", " "), zorder=2 + 0.1 * k)
-        if section is not None:
-            variable_along(section, "section", "poincare or sweep")
-            points = [column(section, "section", name).values.ravel() for name in names]
-            drawn.plot(
-                *points, "o", markersize=2.6, color=style.COLORS["section"], zorder=4, label="section points",
-                rasterized=points[0].size > 500,
-            )  # fmt: skip
-        if zone is not None:
-            shade_zone(drawn, float(result[zone]) if isinstance(zone, str) else zone)
-        name_plane(drawn, result, *names)
-    return drawn
+    mode = result["mode"].values.astype(float)
+    cut_mode, *cut = with_gaps(result, mode, *(column(result, "u", name).values for name in names))
+    modes = words_of_flags(result["mode"])
+    for k, (xs, ys) in enumerate(pieces_by_mode(np.nan_to_num(cut_mode, nan=-1).astype(int), *cut)):
+        if np.isfinite(xs).any():
+            color = style.COLORS[_MODE_COLORS[k % len(_MODE_COLORS)]]
+            ax.plot(xs, ys, color=color, label=modes[k].replace("_", " "), zorder=2 + 0.1 * k)
+    if section is not None:
+        variable_along(section, "section", "poincare or sweep")
+        points = [column(section, "section", name).values.ravel() for name in names]
+        looks: dict[str, Any] = {"markersize": 2.6, "color": style.COLORS["section"], "zorder": 4}
+        ax.plot(*points, "o", label="section points", rasterized=points[0].size > 500, **looks)
+    if zone is not None:
+        shade_zone(ax, float(result[zone]) if isinstance(zone, str) else zone)
+    name_plane(ax, result, *names)
 
 
 def shade_zone(ax: Axes, edge: float) -> None:
@@ -154,29 +150,28 @@ def shade_zone(ax: Axes, edge: float) -> None:
     ax.set_xlim(low, high)
 
 
+@figure("poincare or sweep", "section", ratio=0.85)
 def section(
+    ax: Axes,
     result: xr.Dataset,
-    ax: Axes | None = None,
     *,
     x: str | None = None,
     y: str | None = None,
     size: float = 0.8,
     color: str | None = None,
-) -> Axes:
+) -> None:
     """Draw the section points of a ``poincare`` result (or of a ``sweep``, all its points together).
 
     ``size`` is the diameter of a point in typographic points. Clouds are pixels in a vector figure.
     """
-    variable_along(result, "section", "poincare or sweep")
     names = first_states(result, x, y)
-    with style.axes(ax, ratio=0.85) as drawn:
-        points = (column(result, "section", name).values for name in names)
-        style.cloud(drawn, points, size, color or style.COLORS["section"])
-        name_plane(drawn, result, *names)
-    return drawn
+    points = (column(result, "section", name).values for name in names)
+    style.cloud(ax, points, size, color or style.COLORS["section"])
+    name_plane(ax, result, *names)
 
 
-def orbit(result: Any, ax: Axes | None = None, *, x: str | None = None, y: str | None = None) -> Axes:
+@figure(ratio=0.85)
+def orbit(ax: Axes, result: Any, *, x: str | None = None, y: str | None = None) -> None:
     """Draw an orbit once round, each mode in its own colour.
 
     Open circles are the states just before and after each transition, black dots the section points, and a cross is the
@@ -197,60 +192,53 @@ def orbit(result: Any, ax: Axes | None = None, *, x: str | None = None, y: str |
         result = Orbit.from_dataset(result)
     run = result.trajectory()
     names = first_states(run, x, y)
-    with style.axes(ax, ratio=0.85) as drawn:
-        phase_portrait(run, drawn, x=names[0], y=names[1])
-        mark: dict[str, Any] = {"size": 3.4, "zorder": 5, "markeredgewidth": 0.7}
-        if run.sizes["crossing"]:
-            sides = (np.concatenate([run[key].sel(state=name) for key in ("u_before", "u_after")]) for name in names)
-            style.mark(drawn, sides, "o", "crossing", **mark)
-        # Phase 0 of each forcing period; of an autonomous orbit the one state it is held by.
-        returns = max(result.period_number, 1)
-        time = run["time"].values
-        at = [int(np.abs(time - k * result.period / returns).argmin()) for k in range(returns)]
-        points = (run["u"].sel(state=name).values[at] for name in names)
-        style.mark(drawn, points, "o", "section", **mark, markerfacecolor=style.COLORS["section"])
-        clearance = run["touch_clearance"].values
-        if np.isfinite(clearance).any():
-            near = int(np.nanargmin(clearance))
-            words = f"least clearance {clearance[near]:.2g}"
-            place = [run["touch_u"].sel(state=name).values[near] for name in names]
-            cross: dict[str, Any] = {"color": style.COLORS["fourth"], "markersize": 5, "markeredgewidth": 1.1}
-            drawn.plot(*place, "x", zorder=6, label=words, **cross)
-        style.clear_legend(drawn)
-    return drawn
+    phase_portrait(run, ax, x=names[0], y=names[1])
+    mark: dict[str, Any] = {"size": 3.4, "zorder": 5, "markeredgewidth": 0.7}
+    if run.sizes["crossing"]:
+        sides = (np.concatenate([run[key].sel(state=name) for key in ("u_before", "u_after")]) for name in names)
+        style.mark(ax, sides, "o", "crossing", **mark)
+    # Phase 0 of each forcing period; of an autonomous orbit the one state it is held by.
+    returns = max(result.period_number, 1)
+    time = run["time"].values
+    at = [int(np.abs(time - k * result.period / returns).argmin()) for k in range(returns)]
+    points = (run["u"].sel(state=name).values[at] for name in names)
+    style.mark(ax, points, "o", "section", **mark, markerfacecolor=style.COLORS["section"])
+    clearance = run["touch_clearance"].values
+    if np.isfinite(clearance).any():
+        near = int(np.nanargmin(clearance))
+        words = f"least clearance {clearance[near]:.2g}"
+        place = [run["touch_u"].sel(state=name).values[near] for name in names]
+        cross: dict[str, Any] = {"color": style.COLORS["fourth"], "markersize": 5, "markeredgewidth": 1.1}
+        ax.plot(*place, "x", zorder=6, label=words, **cross)
+    style.clear_legend(ax)
 
 
 FLOOR = 1e-7  # of the largest line: below it rounding and the tolerance rule
 
 
-def amplitude_spectrum(
-    result: xr.Dataset, ax: Axes | None = None, *, y: str | None = None, highest: float = 20.0
-) -> Axes:
+@figure("amplitude_spectrum", "amplitude")
+def amplitude_spectrum(ax: Axes, result: xr.Dataset, *, y: str | None = None, highest: float = 20.0) -> None:
     """Draw an ``amplitude_spectrum`` of the state ``y`` (by default the first) over multiples of the base frequency.
 
     ``highest``: the largest multiple drawn. Lines below 1e-7 of the largest are left out, and so is the mean.
     """
-    variable_along(result, "amplitude", "amplitude_spectrum")
     (name,) = first_states(result, y)
     order, values = result["order"].values, column(result, "amplitude", name).values
     some = (order > 1e-9) & (order <= highest)
     order, values = order[some], values[some]
     floor = FLOOR * (float(values.max(initial=0.0)) or 1.0)
     some = values > floor
-    with style.axes(ax) as drawn:
-        drawn.set_yscale("log")
-        bottom = max(floor, 0.3 * float(values[some].min(initial=np.inf))) if some.any() else floor
-        symbol, unit = name_and_unit(result, name)
-        if int(result["period_number"]):
-            drawn.vlines(order[some], bottom, values[some], color=style.COLORS["first"], linewidth=1.0)
-            drawn.plot(order[some], values[some], "o", color=style.COLORS["first"], markersize=3.0)
-        else:
-            drawn.plot(order, np.maximum(values, bottom), color=style.COLORS["first"], linewidth=0.8)
-        drawn.set_ylim(bottom=bottom)
-        drawn.set_xlim(0.0, 1.02 * float(order[some].max(initial=1.0)))
-        base = float(result["base_frequency"])
-        per = result["base_frequency"].attrs["units"]
-        of = "frequency per iterate" if per == "per iterate" else f"frequency / {base:.4g} {per}"
-        name_axes(drawn, None, (f"amplitude of {symbol}", unit))
-        drawn.set_xlabel(of)
-    return drawn
+    bottom = max(floor, 0.3 * float(values[some].min(initial=np.inf))) if some.any() else floor
+    color = style.COLORS["first"]
+    ax.set_yscale("log")
+    if int(result["period_number"]):
+        ax.vlines(order[some], bottom, values[some], color=color, linewidth=1.0)
+        ax.plot(order[some], values[some], "o", color=color, markersize=3.0)
+    else:
+        ax.plot(order, np.maximum(values, bottom), color=color, linewidth=0.8)
+    ax.set_ylim(bottom=bottom)
+    ax.set_xlim(0.0, 1.02 * float(order[some].max(initial=1.0)))
+    per, (symbol, unit) = result["base_frequency"].attrs["units"], name_and_unit(result, name)
+    name_axes(ax, None, (f"amplitude of {symbol}", unit))
+    base = f"frequency / {float(result['base_frequency']):.4g} {per}"
+    ax.set_xlabel("frequency per iterate" if per == "per iterate" else base)

@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.recordings.limits import MAX_COLUMNS
-from nonsmooth.recordings.reading import Reading, Source, Trace
+from nonsmooth.recordings.reading import MAX_COLUMNS, Reading, Remarks, Source, Trace
 from nonsmooth.recordings.recording import Recording, mixed_units
-from nonsmooth.recordings.remarks import Remarks
 from nonsmooth.recordings.sampling import examine, missing_runs
 
 if TYPE_CHECKING:

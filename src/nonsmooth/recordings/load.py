@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import os
 import re
 import stat
 import warnings
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.assemble import assemble
-from nonsmooth.recordings.limits import MAX_FILE_BYTES, inflation_limit
-from nonsmooth.recordings.reading import Column, Options, Reading, Source, Trace, names_of
+from nonsmooth.recordings.reading import (
+    MAX_FILE_BYTES,
+    Column,
+    Options,
+    Reading,
+    Source,
+    TableOptions,
+    Trace,
+    inflation_limit,
+    names_of,
+)
 from nonsmooth.recordings.recording import Recording, RecordingWarning
 
 __all__ = ["FORMATS", "content_of", "load_recording", "parse_recording"]
@@ -65,14 +73,7 @@ def load_recording(
     axis: str = "time",
     rate: float | None = None,
     units: Mapping[str, str] | None = None,
-    delimiter: str | None = None,
-    decimal: str | None = None,
-    thousands: str | None = None,
-    header: int | None = None,
-    units_row: int | None = None,
-    skip: int | str | Sequence[str] = 0,
-    na: str | Sequence[str] = (),
-    wraps: Mapping[str, float] | None = None,
+    **table: Unpack[TableOptions],
 ) -> Recording:
     """Read what an instrument recorded: runs, channels, units, sample rates, and where each came from.
 
@@ -135,13 +136,9 @@ def load_recording(
     >>> recording.channel("Position", run="Run #1")                                 # doctest: +SKIP
     >>> ns.load_recording("log.csv", columns={"time": "t", "x": ("pos", "mm")})     # doctest: +SKIP
     """
-    options = _checked(format, columns, axis, rate, units, delimiter, decimal)
-    options = replace(
-        options, thousands=_mark(thousands, options.decimal), header=_line(header, "header"),
-        units_row=_line(units_row, "units_row"), skip=_line(skip, "skip") if isinstance(skip, int) else 0,
-        leave=() if isinstance(skip, int) else _texts(skip, "skip"), na=_texts(na, "na"),
-        wraps=_periods(wraps or {}),
-    )  # fmt: skip
+    if format is not None and format not in FORMATS:
+        raise ValueError(f"format must be one of {', '.join(FORMATS)}, got {format!r}")
+    options = Options.of({"columns": columns, "axis": axis, "rate": rate, "units": units, **table})
     file = Path(path)
     recording = parse_recording(content_of(file), file.name, options, format=format)
     for remark in recording.warnings[:_SPOKEN]:
@@ -179,64 +176,6 @@ def _unpacked(data: bytes, source: Source) -> bytes:
     if len(content) > limit:
         raise source.error("", f"unpacks to more than {limit} bytes, more than its size warrants: unpack it yourself")
     return content
-
-
-def _checked(
-    format: str | None,
-    columns: Mapping[str, Column] | None,
-    axis: str,
-    rate: float | None,
-    units: Mapping[str, str] | None,
-    delimiter: str | None,
-    decimal: str | None,
-) -> Options:
-    if format is not None and format not in FORMATS:
-        raise ValueError(f"format must be one of {', '.join(FORMATS)}, got {format!r}")
-    if columns is not None and (not isinstance(columns, Mapping) or not columns):
-        raise TypeError("columns must be a mapping of our names to the file's, as {'time': 't', 'x': ('pos', 'mm')}")
-    for ours, theirs in (columns or {}).items():
-        given = theirs[0] if isinstance(theirs, tuple) and len(theirs) == 2 else theirs
-        if isinstance(given, bool) or not isinstance(given, str | int) or not isinstance(ours, str):
-            raise TypeError(f"columns[{ours!r}] must be a header, a place from 0, or (one of these, unit): {theirs!r}")
-    if not isinstance(axis, str) or not axis.isidentifier() or axis == "run":
-        raise ValueError(f"axis must be a name such as 'time' or 'frequency', got {axis!r}")
-    if rate is not None and not (isinstance(rate, int | float) and math.isfinite(rate) and rate > 0):
-        raise ValueError(f"rate must be a positive number of samples per second, got {rate!r}")
-    if rate is not None and (axis != "time" or axis in (columns or {})):
-        raise ValueError("rate makes a time axis where the file has none; give it without columns['time'] and axis")
-    if delimiter is not None and (not isinstance(delimiter, str) or len(delimiter) != 1 or delimiter in '"\r\n'):
-        raise ValueError(f"delimiter must be one character such as ',', ';' or a tab, got {delimiter!r}")
-    if decimal not in (None, ".", ","):
-        raise ValueError(f"decimal must be '.' or ',', got {decimal!r}")
-    if decimal == "," and delimiter == ",":
-        raise ValueError("delimiter and decimal cannot both be ','")
-    return Options(columns, axis, None if rate is None else float(rate), dict(units or {}), delimiter, decimal)
-
-
-def _mark(thousands: str | None, decimal: str | None) -> str | None:
-    if thousands is not None and (thousands not in (".", ",", " ", "'", "\u00a0", "\u202f") or thousands == decimal):
-        raise ValueError(f"thousands must be one of . , ' or a space, and not the decimal mark, got {thousands!r}")
-    return thousands
-
-
-def _line(given: Any, name: str) -> int:
-    if given is not None and (isinstance(given, bool) or not isinstance(given, int) or given < (name != "skip")):
-        raise ValueError(f"{name} must be the number of a line, counted from 1, got {given!r}")
-    return given or 0
-
-
-def _texts(given: str | Sequence[str], name: str) -> tuple[str, ...]:
-    texts = (given,) if isinstance(given, str) else tuple(given)
-    if not all(isinstance(text, str) and text.strip() for text in texts):
-        raise TypeError(f"{name} must be a text or several, {name}='#N/A', got {given!r}")
-    return texts
-
-
-def _periods(wraps: Mapping[str, float]) -> dict[str, float]:
-    for name, period in wraps.items():
-        if isinstance(period, bool) or not isinstance(period, int | float) or not 0 < period < math.inf:
-            raise ValueError(f"wraps[{name!r}] must be the count at which it begins anew, 65536 e.g., got {period!r}")
-    return {name: float(period) for name, period in wraps.items()}
 
 
 def content_of(file: Path) -> bytes:

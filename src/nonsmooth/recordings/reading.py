@@ -1,26 +1,87 @@
-"""Result of every reader: traces (one channel of one run), remarks, and the file they came from.
+"""Matter of every reader: its options, and its result: traces, remarks, and the file they came from.
 
 A reader is a function ``read(data: bytes, source: Source, options: Options) -> Reading``. It takes the whole file as
-bytes, touches no disk, raises only ``DataFileError``, and leaves rates, grouping and labels to ``assemble``.
+bytes, touches no disk, raises only ``DataFileError``, and leaves rates, grouping and labels to ``assemble``. Recordings
+come from elsewhere: what a file claims is checked against its size.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from importlib import import_module
+from types import ModuleType
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import DataFileError
-from nonsmooth.recordings.remarks import Remarks
+from nonsmooth.errors import DataFileError, not_installed
+from nonsmooth.system.names import check_keys
 
 __all__ = [
-    "TIME_SCALES", "TIME_WORDS", "Column", "Options", "Reading", "Source", "Trace", "is_axis_name", "names_of",
-    "scaled_time",
+    "MAX_COLUMNS", "MAX_DEPTH", "MAX_FILE_BYTES", "TIME_SCALES", "TIME_WORDS", "Column", "Group", "Options",
+    "Reading", "Remarks", "Source", "TableOptions", "Trace", "inflation_limit", "is_axis_name", "names_of",
+    "needed", "scaled_time",
 ]  # fmt: skip
+
+MAX_FILE_BYTES = 1 << 30  # read whole into memory, so that the hash is that of what was read
+MAX_COLUMNS = 4096  # over all runs of one file; each becomes a labelled array
+MAX_DEPTH = 32  # of nested containers
+
+_FLOOR = 16 << 20  # small files may hold long constant signals, which compress without bound
+_RATIO = 100
+
+
+def inflation_limit(n_bytes: int) -> int:
+    """The most bytes that the compressed parts of a file of ``n_bytes`` may become, all together."""
+    return max(_FLOOR, _RATIO * n_bytes)
+
+
+_NAMED = 4  # channels named in one remark
+_ALIKE = 3  # more runs than this of which the same is to be said, but for numbers, share one sentence
+
+
+class Remarks:
+    """Sentences on a file, a run, or a channel of a run."""
+
+    def __init__(self) -> None:
+        self._channels: dict[tuple[str, str], list[str]] = {}
+
+    def say(self, sentence: str) -> None:
+        """Something about the file as a whole."""
+        self._channels.setdefault(("", sentence), [])
+
+    def of(self, run: str, channel: str, sentence: str) -> None:
+        """Something about a channel of a run ("" where it concerns all runs)."""
+        self._channels.setdefault((run, sentence), []).append(channel)
+
+    def sentences(self) -> tuple[str, ...]:
+        """All of them; channels of one run of which the same is to be said stand together, and so do many runs."""
+        alike: dict[tuple[str, ...], list[tuple[str, list[str], str]]] = {}
+        for (run, text), channels in self._channels.items():
+            kind = (re.sub(r"\d+", "#", text), *channels) if run else (run, text)
+            alike.setdefault(kind, []).append((run, channels, text))
+        said: list[str] = []
+        for group in alike.values():
+            if len(group) <= _ALIKE:
+                said += [_sentence(*one) for one in group]
+            else:
+                said.append(f"{_sentence(*group[0])} (and likewise {len(group) - 1} more runs, to {group[-1][0]!r})")
+        return tuple(said)
+
+
+def _sentence(run: str, channels: list[str], text: str) -> str:
+    channels = list(dict.fromkeys(channels))
+    named = ", ".join(map(repr, channels[:_NAMED]))
+    more = f" and {len(channels) - _NAMED} more" if len(channels) > _NAMED else ""
+    which = f"channel{'s' if len(channels) > 1 else ''} {named}{more}" if channels else ""
+    place = ", ".join(part for part in (f"run {run!r}" if run else "", which) if part)
+    return f"{place}: {text}" if place else text
+
 
 #: What instruments call the time column, lower case, in the languages their programs speak.
 TIME_WORDS = frozenset(
@@ -53,9 +114,22 @@ class Source:
         return DataFileError(": ".join(part for part in (self.name, place, message) if part))
 
 
+class TableOptions(TypedDict, total=False):
+    """Options of ``load_recording`` for tables and counters; see there."""
+
+    delimiter: str | None
+    decimal: str | None
+    thousands: str | None
+    header: int | None
+    units_row: int | None
+    skip: int | str | Sequence[str]
+    na: str | Sequence[str]
+    wraps: Mapping[str, float] | None
+
+
 @dataclass(frozen=True)
 class Options:
-    """The arguments of ``load_recording`` that concern readers."""
+    """The options of ``load_recording`` that concern readers; lines are 0 and texts () where none are given."""
 
     columns: Mapping[str, Column] | None = None
     axis: str = "time"
@@ -66,10 +140,64 @@ class Options:
     thousands: str | None = None
     header: int = 0
     units_row: int = 0
-    skip: int = 0
-    leave: tuple[str, ...] = ()
+    skip: int | tuple[str, ...] = 0
     na: tuple[str, ...] = ()
     wraps: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> Options:
+        """The options of a call, checked.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An option that is not known, or a value that it cannot have.
+        """
+        check_keys(given, [one.name for one in fields(cls)], "load_recording", "an option")
+        read = {name: value for name, value in given.items() if value is not None}
+        for name in {"header", "units_row", "skip"} & set(read):
+            line = read[name]
+            if isinstance(line, bool) or not isinstance(line, int if name != "skip" else int | Iterable) or (
+                isinstance(line, int) and line < (name != "skip")
+            ):
+                raise ValueError(f"{name} must be the number of a line, counted from 1, got {line!r}")
+        for name in {"skip", "na"} & set(read):
+            if not isinstance(texts := read[name], int):
+                read[name] = (texts,) if isinstance(texts, str) else tuple(texts)
+                if not all(isinstance(text, str) and text.strip() for text in read[name]):
+                    raise TypeError(f"{name} must be a text or several, {name}='#N/A', got {texts!r}")
+        options = cls(**read)
+        options.check()
+        return options
+
+    def check(self) -> None:
+        """Refuse values that do not fit."""
+        columns, axis, rate, decimal, marks = self.columns or {}, self.axis, self.rate, self.decimal, self.thousands
+        if self.columns is not None and (not isinstance(columns, Mapping) or not columns):
+            raise TypeError("columns must map our names to the file's, as {'time': 't', 'x': ('pos', 'mm')}")
+        for ours, theirs in columns.items():
+            given = theirs[0] if isinstance(theirs, tuple) and len(theirs) == 2 else theirs
+            if isinstance(given, bool) or not isinstance(given, str | int) or not isinstance(ours, str):
+                raise TypeError(
+                    f"columns[{ours!r}] must be a header, a place from 0, or (one of these, unit): {theirs!r}"
+                )
+        if not isinstance(axis, str) or not axis.isidentifier() or axis == "run":
+            raise ValueError(f"axis must be a name such as 'time' or 'frequency', got {axis!r}")
+        if rate is not None and not (isinstance(rate, int | float) and math.isfinite(rate) and rate > 0):
+            raise ValueError(f"rate must be a positive number of samples per second, got {rate!r}")
+        if rate is not None and (axis != "time" or axis in columns):
+            raise ValueError("rate makes a time axis where the file has none; give it without columns['time'] and axis")
+        if (cut := self.delimiter) is not None and (not isinstance(cut, str) or len(cut) != 1 or cut in '"\r\n'):
+            raise ValueError(f"delimiter must be one character such as ',', ';' or a tab, got {cut!r}")
+        if decimal not in (None, ".", ","):
+            raise ValueError(f"decimal must be '.' or ',', got {decimal!r}")
+        if decimal == "," == cut:
+            raise ValueError("delimiter and decimal cannot both be ','")
+        if marks is not None and (marks not in (".", ",", " ", "'", "\u00a0", "\u202f") or marks == decimal):
+            raise ValueError(f"thousands must be one of . , ' or a space, and not the decimal mark, got {marks!r}")
+        for name, period in self.wraps.items():
+            if isinstance(period, bool) or not isinstance(period, int | float) or not 0 < period < math.inf:
+                raise ValueError(f"wraps[{name!r}] must be the count at which it begins anew, as 65536, got {period!r}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,3 +256,24 @@ def names_of(candidates: Sequence[str], most: int = 12) -> str:
     """A list for a message, cut where it would be long."""
     shown = ", ".join(repr(name if len(name) <= 60 else name[:57] + "...") for name in candidates[:most])
     return shown + (f", and {len(candidates) - most} more" if len(candidates) > most else "")
+
+
+def needed(module: str, package: str, source: Source, extra: str = "experiment") -> ModuleType:
+    """Import ``module``; where it is missing, a DataFileError that says how to get it."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise source.error("", f"reading it needs {not_installed(package, extra)}") from error
+
+
+class Group(dict[str, Any]):
+    """Arrays by name: their units and attributes, the rate at which they were sampled, the run they belong to."""
+
+    def __init__(
+        self, members: Mapping[str, Any] | None = None, units: Mapping[str, str] | None = None,
+        rate: float | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(members or {})
+        self.units, self.rate, self.run = dict(units or {}), rate, ""
+        self.attrs: dict[str, dict[str, str]] = {}
+        self.notes: dict[str, str] = {}

@@ -16,24 +16,11 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.results.labels import Labels
-from nonsmooth.results.schema import (
-    Column,
-    columns,
-    dataset,
-    floats,
-    parameter_coords,
-    quantity_attributes,
-    start_coords,
-    state_coords,
-    table,
-    varied,
-)
-from nonsmooth.results.statuses import status_attributes
+from nonsmooth.results.schema import columns, dataset, floats, quantity_attributes, table, varied
 
 __all__ = ["attractor_variables", "basin_fractions", "basins", "chart"]
 
 SHOWN = 4000  # section points kept of one attractor
-LABEL = "attractor (-1: not converged, -2: diverged)"
 
 #: Of a chart behind its plane; without "start" where there was one.
 _CHART = table(
@@ -49,17 +36,23 @@ _CHART = table(
     ("computed", "", "own", "1 where the point was computed, 0 where its label was inferred"),
     ("status", "start", "status", ""),
 )
-_ATTRACTOR = (
-    Column("period_number", "period_number", (), "place", "period number (0: no cycle)"),
-    Column("name", "name", (), "text", "what the attractor is"),
-    Column("confirmed", "confirmed", (), "yes", "1 where Newton's method has found the cycle"),
-    Column("chaotic", "chaotic", (), "yes", "1 where the largest exponent is above zero beyond its error"),
-    Column("lyapunov", "exponent", (), "rate", "largest Lyapunov exponent"),
-    Column("lyapunov_error", "exponent_error", (), "rate", "standard error of the largest Lyapunov exponent"),
-    Column("multiplier", "multiplier", (), "", "largest modulus of the cycle's multipliers"),
-    Column("maximum", "maximum", ("state",), "", "largest value on the attractor"),
-    Column("minimum", "minimum", ("state",), "", "smallest value on the attractor"),
+_ATTRACTOR = table(
+    ("period_number", "", "place", "period number (0: no cycle)"),
+    ("name", "", "text", "what the attractor is"),
+    ("confirmed", "", "yes", "1 where Newton's method has found the cycle"),
+    ("chaotic", "", "yes", "1 where the largest exponent is above zero beyond its error"),
+    ("lyapunov", "", "rate", "largest Lyapunov exponent", "exponent"),
+    ("lyapunov_error", "", "rate", "standard error of the largest Lyapunov exponent", "exponent_error"),
+    ("multiplier", "", "", "largest modulus of the cycle's multipliers"),
+    ("maximum", "state", "", "largest value on the attractor"),
+    ("minimum", "state", "", "smallest value on the attractor"),
 )
+_POINTS = table(
+    ("section", "attractor state", "", "a section point"),
+    ("section_points", "section_point state", "", "section points"),
+    ("point_attractor", "section_point", "place", "attractor to which the point belongs"),
+)
+_LABEL = table(("label", "", "id", "attractor (-1: not converged, -2: diverged)"), ("status", "", "status", ""))
 #: Of the share of each attractor, of basins as a whole, and over a parameter.
 _SHARES = table(
     ("fraction", "", "own", "share of the starts"),
@@ -80,23 +73,25 @@ _SHARES = table(
 
 
 def chart(
-    labels: Labels, attrs: Mapping[str, str], grid: Mapping[str, ArrayLike], arrays: Mapping[str, Any], *,
-    starts: ArrayLike, one_start: bool, loads: Mapping[str, tuple[str, str]] | None = None,
-) -> xr.Dataset:  # fmt: skip
+    labels: Labels,
+    attrs: Mapping[str, str],
+    grid: Mapping[str, ArrayLike],
+    arrays: Mapping[str, Any],
+    *,
+    starts: ArrayLike,
+    one_start: bool,
+    loads: Mapping[str, tuple[str, str]] | None = None,
+) -> xr.Dataset:
     """The result of ``chart``: everything known per point of the plane of two parameters; ``loads`` are the long names
     and units of those among the arrays."""
-    plane = tuple(grid)
-    known = [*_CHART, *(Column(name, name, ("start",), "own", words) for name, (words, _) in (loads or {}).items())]
+    known = [*_CHART, *table(*((name, "start", "own", words) for name, (words, _) in (loads or {}).items()))]
     if one_start:
         known = [one._replace(dims=tuple(dim for dim in one.dims if dim != "start")) for one in known]
-    variables = columns(labels, known, arrays, *plane)
+    variables = columns(labels, known, arrays, *grid)
     for name, (_, unit) in (loads or {}).items():
         variables[name][2]["units"] = unit
-    coords: dict[str, Any] = parameter_coords(labels, without=plane)
-    for name, values in grid.items():
-        coords |= varied(labels, name, values)
-    coords |= state_coords(labels)
-    result = dataset(variables, coords | start_coords(starts), attrs)
+    plane = {name: one for key, values in grid.items() for name, one in varied(labels, key, values).items()}
+    result = dataset(labels, attrs, variables, starts, **plane)
     return result.squeeze("start") if one_start else result
 
 
@@ -114,40 +109,27 @@ def basins(
     status: ArrayLike,
 ) -> xr.Dataset:
     """The result of ``basins``. ``attractors`` have the fields of ``attractors.basins_attractors.Attractor``."""
-    plane = tuple(grid)
-    variables: dict[str, Any] = {"label": (plane, np.asarray(label, np.int32), {"long_name": LABEL})}
-    variables["status"] = (plane, np.asarray(status, np.int8), status_attributes())
+    variables = columns(labels, _LABEL, {"label": label, "status": status}, *grid)
     variables |= attractor_variables(labels, attractors)
     variables |= columns(labels, _SHARES, per_attractor, "attractor") | columns(labels, _SHARES, measures)
     variables |= columns(labels, _SHARES, {"uncertain": uncertain[1]}, "distance")
-    coords: dict[str, Any] = parameter_coords(labels) | state_coords(labels)
-    for name, values in grid.items():
-        coords[name] = (name, floats(values), quantity_attributes(name, labels.states[name]))
-    for name, value in fixed.items():
-        coords[name] = ((), float(value), quantity_attributes(name, labels.states[name]))
-    coords["distance"] = ("distance", uncertain[0], {"long_name": "distance in grid steps"})
-    coords["attractor"] = ("attractor", np.arange(len(attractors)), {"long_name": "attractor"})
-    return dataset(variables, coords, attrs)
+    named = {name: quantity_attributes(name, quantity) for name, quantity in labels.states.items()}
+    along: dict[str, Any] = {name: (name, floats(values), named[name]) for name, values in grid.items()}
+    along |= {name: ((), float(value), named[name]) for name, value in fixed.items()}
+    along |= {"distance": uncertain[0], "attractor": np.arange(len(attractors))}
+    return dataset(labels, attrs, variables, **along)
 
 
 def attractor_variables(labels: Labels, attractors: Sequence[Any]) -> dict[str, Any]:
     """Properties of each attractor; their section points one after the other over ``section_point``."""
     n = len(labels.states)
     points = [item.points[:SHOWN] for item in attractors]
-    names = [column.field for column in _ATTRACTOR]
-    fields: dict[str, Any] = {name: [getattr(item, name) for item in attractors] for name in names}
+    fields: dict[str, Any] = {one.field: [getattr(item, one.field) for item in attractors] for one in _ATTRACTOR}
     fields |= {name: np.array(fields[name], float).reshape(-1, n) for name in ("maximum", "minimum")}
-    owner = np.repeat(np.arange(len(points)), [len(item) for item in points]).astype(np.int64)
-    return columns(labels, _ATTRACTOR, fields, "attractor") | {
-        "section": (
-            ("attractor", "state"), np.array([item[0] for item in points], float).reshape(-1, n),
-            {"long_name": "a section point"},
-        ),
-        "section_points": (
-            ("section_point", "state"), np.concatenate([np.zeros((0, n)), *points]), {"long_name": "section points"},
-        ),
-        "point_attractor": ("section_point", owner, {"long_name": "attractor to which the point belongs"}),
-    }  # fmt: skip
+    owner = np.repeat(np.arange(len(points)), [len(item) for item in points])
+    first = np.array([item[0] for item in points], float).reshape(-1, n)
+    every = {"section": first, "section_points": np.concatenate([np.zeros((0, n)), *points]), "point_attractor": owner}
+    return columns(labels, _ATTRACTOR, fields, "attractor") | columns(labels, _POINTS, every)
 
 
 def basin_fractions(
@@ -157,7 +139,5 @@ def basin_fractions(
     variables: dict[str, Any] = {}
     for name, array in arrays.items():
         variables |= columns(labels, _SHARES, {name: array}, *(parameter, "attractor", "state")[: np.ndim(array)])
-    coords: dict[str, Any] = parameter_coords(labels, without=parameter) | state_coords(labels)
-    coords |= varied(labels, parameter, values)
-    coords["attractor"] = ("attractor", np.arange(np.shape(arrays["fraction"])[1]), {"long_name": "attractor"})
-    return dataset(variables, coords, attrs)
+    attractors = np.arange(np.shape(arrays["fraction"])[1])
+    return dataset(labels, attrs, variables, **varied(labels, parameter, values), attractor=attractors)

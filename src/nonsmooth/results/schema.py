@@ -38,34 +38,60 @@ from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.statuses import EQUILIBRIA, flag_attributes, status_attributes
 
 __all__ = [
-    "Column", "attributes", "columns", "dataset", "floats", "parameter_coords", "quantity_attributes", "response",
-    "section_points", "start_coords", "state_coords", "strings", "sweep", "table", "trajectory", "typed",
-    "varied", "with_impacts",
-]  # fmt: skip
+    "Column",
+    "attributes",
+    "chosen",
+    "columns",
+    "dataset",
+    "floats",
+    "parameter_coords",
+    "quantity_attributes",
+    "response",
+    "section_points",
+    "state_coords",
+    "strings",
+    "sweep",
+    "table",
+    "trajectory",
+    "typed",
+    "varied",
+    "with_impacts",
+    "with_unit",
+]
 
 
 class Column(NamedTuple):
-    """A variable of a result: its name, the field of what holds it, its dims beside those of the result, the rule for
-    its numbers and their unit, and its long name."""
+    """A variable of a result: its name, its dims beside those of the result, the rule for its numbers and their unit,
+    its long name, and the field of what holds it."""
 
     name: str
-    field: str
     dims: tuple[str, ...]
     rule: str
     words: str
+    field: str
 
 
 #: Types of the numbers by rule; None: as they come. "time" and "rate" have units, integers of a name a table of words.
 _TYPES: dict[str, Any] = {
-    "": float, "time": float, "rate": float, "complex": complex, "flag": bool, "text": str, "place": np.int64,
-    "id": np.int32, "mode": np.int16, "transition": np.int16, "indicator": np.int16, "status": np.int8,
-    "equilibrium": np.int8, "yes": np.int8, "own": None,
-}  # fmt: skip
+    **dict.fromkeys(("", "time", "rate"), float),
+    **dict.fromkeys(("mode", "transition", "indicator"), np.int16),
+    **dict.fromkeys(("status", "equilibrium", "yes"), np.int8),
+    "complex": complex,
+    "flag": bool,
+    "text": str,
+    "place": np.int64,
+    "id": np.int32,
+    "own": None,
+}
 
 
-def table(*rows: tuple[str, str, str, str]) -> tuple[Column, ...]:
-    """Columns of (name, dims, rule, words), whose fields have their names."""
-    return tuple(Column(name, name, tuple(dims.split()), rule, words) for name, dims, rule, words in rows)
+def table(*rows: tuple[str, ...], before: str = "") -> tuple[Column, ...]:
+    """Columns of (name, dims, rule, words, field): the field is the name where it is not given, without the word
+    ``before`` with which all names begin."""
+    return tuple(
+        Column(before + name, tuple(dims.split()), rule, words, field[0] if field else name)
+        for name, dims, rule, words, *field in rows
+    )
 
 
 def typed(column: Column, values: Any) -> NDArray[Any]:
@@ -104,8 +130,55 @@ def columns(labels: Labels, known: Sequence[Column], arrays: Mapping[str, Any], 
     }
 
 
-def dataset(variables: Mapping[str, Any], coords: Mapping[str, Any], attrs: Mapping[str, Any]) -> xr.Dataset:
-    """A result, its record without what the coordinates hold."""
+def chosen(dim: str, words: Sequence[str], known: Sequence[str], long_name: str) -> tuple[str, NDArray[np.int8], Any]:
+    """A variable of words, each one of those ``known``, as integers with their table."""
+    codes = np.array([known.index(word) for word in words], dtype=np.int8)
+    return dim, codes, {"long_name": long_name, **flag_attributes(known)}
+
+
+def with_unit(dims: Any, values: ArrayLike, words: str, unit: str) -> tuple[Any, NDArray[np.float64], dict[str, str]]:
+    """A variable whose long name and unit are known with it, such as a load of an element."""
+    return dims, floats(values), {"long_name": words, "units": unit}
+
+
+#: Coordinates that several results have.
+_ALONG = table(
+    ("attractor", "attractor", "own", "attractor"),
+    ("band", "band", "text", "shape of the bands"),
+    ("direction", "direction", "text", "direction of the sweep"),
+    ("distance", "distance", "own", "distance in grid steps"),
+    ("end", "end", "text", "end"),
+    ("eta", "eta", "", "half width of the bands"),
+    ("exponent", "exponent", "own", "number of the exponent"),
+    ("indicator", "indicator", "text", "indicator"),
+    ("segment", "time", "place", "number of crossings before this sample"),
+    ("start", "start", "own", "index of the start"),
+    ("start_state", "start state", "", "state at the start"),
+)
+
+
+def dataset(
+    labels: Labels,
+    attrs: Mapping[str, Any],
+    variables: Mapping[str, Any],
+    starts: ArrayLike | None = None,
+    /,
+    **along: Any,
+) -> xr.Dataset:
+    """A result, its record without what the coordinates hold.
+
+    Its coordinates are those ``along`` its dims, as values of the common table or whole, the ``starts`` (S, n), the
+    states where something is over them, and the parameters that are not varied.
+    """
+    if starts is not None:
+        states = np.atleast_2d(floats(starts))
+        along |= {"start": np.arange(len(states)), "start_state": states}
+    whole = {name: one for name, one in along.items() if isinstance(one, tuple) and one and isinstance(one[-1], dict)}
+    coords = whole | columns(labels, _ALONG, {name: one for name, one in along.items() if name not in whole})
+    dims = {dim for one in (*variables.values(), *coords.values()) for dim in np.atleast_1d(one[0])}
+    if "state" in dims and "state" not in coords:
+        coords |= state_coords(labels)
+    coords |= parameter_coords(labels, without=[*variables, *coords, *dims])
     return with_short_record(xr.Dataset(variables, coords, dict(attrs)))
 
 
@@ -152,24 +225,24 @@ _JUMPS = {
 
 
 def trajectory(
-    labels: Labels, attrs: Mapping[str, str], *, time: ArrayLike, segment: ArrayLike, outputs: ArrayLike | None = None,
-    memory: ArrayLike | None = None, status: int = 0, **arrays: Any,
-) -> xr.Dataset:  # fmt: skip
+    labels: Labels,
+    attrs: Mapping[str, str],
+    *,
+    time: ArrayLike,
+    segment: ArrayLike,
+    outputs: ArrayLike | None = None,
+    memory: ArrayLike | None = None,
+    status: int = 0,
+    **arrays: Any,
+) -> xr.Dataset:
     """The result of ``simulate``: samples over ``time``, crossings and touches as flat lists."""
-    d = labels
-    variables = columns(d, _TRAJECTORY, {**arrays, "status": status})
-    for names, found in ((d.outputs, outputs), (d.memory, memory)):
+    variables = columns(labels, _TRAJECTORY, {**arrays, "status": status})
+    for names, found in ((labels.outputs, outputs), (labels.memory, memory)):
         if found is not None:
             for (name, quantity), column in zip(names.items(), floats(found).T, strict=True):
                 variables[name] = ("time", column, quantity_attributes(name, quantity))
-    along = {"long_name": "time", "units": d.time_unit, **({"symbol": "n"} if d.is_map else {})}
-    coords: dict[str, Any] = {
-        "time": ("time", floats(time), along),
-        "segment": ("time", np.asarray(segment, np.int64), {"long_name": "number of crossings before this sample"}),
-        **state_coords(d),
-        **parameter_coords(d),
-    }
-    return dataset(variables, coords, attrs)
+    along = {"long_name": "time", "units": labels.time_unit, **({"symbol": "n"} if labels.is_map else {})}
+    return dataset(labels, attrs, variables, time=("time", floats(time), along), segment=segment)
 
 
 def with_impacts(
@@ -178,11 +251,8 @@ def with_impacts(
     """The result of ``simulate`` with quantities of impacts over ``crossing``: long names and units; ``columns`` (C, S)
     each, those of an element one after the other."""
     table = np.stack(columns, axis=2).reshape(run.sizes["crossing"], len(quantities))
-    added = {
-        name: ("crossing", column, {"long_name": words, "units": unit})
-        for (name, (words, unit)), column in zip(quantities.items(), table.T, strict=True)
-    }
-    return run.assign(added)
+    told = zip(quantities.items(), table.T, strict=True)
+    return run.assign({name: with_unit("crossing", values, *named) for (name, named), values in told})
 
 
 def sweep(
@@ -190,7 +260,7 @@ def sweep(
     attrs: Mapping[str, str],
     parameter: str,
     values: ArrayLike,
-    arrays: Mapping[str, ArrayLike],
+    arrays: Mapping[str, Any],
     *,
     directions: Sequence[str],
     starts: ArrayLike,
@@ -203,34 +273,26 @@ def sweep(
     ``directions`` holds "up", "down" or "none"; ``starts`` (S, n) the first states; ``loads`` arrays (D, S, P) with
     their long names and units. See the module's text.
     """
-    d = labels
     leading = ("direction", "start", parameter)
     stems = {"output_maximum": "maximum", "output_minimum": "minimum"}
     known = [*(column.name for column in _SWEEP), *stems]
     if unknown := set(arrays) - set(known):
         raise ValueError(f"no such array in a sweep: {sorted(unknown)}; known: {sorted(known)}")
-    variables = columns(d, _SWEEP, arrays, *leading)
-    for i, (output, quantity) in enumerate(d.outputs.items()):
+    variables = columns(labels, _SWEEP, arrays, *leading)
+    for i, (output, quantity) in enumerate(labels.outputs.items()):
         for name, stem in stems.items():
             if name in arrays:
-                told = {"long_name": f"{stem} of {output}", "units": quantity.unit}
-                variables[f"{output}_{stem}"] = (leading, np.asarray(arrays[name])[..., i], told)
-    for name, (array, words, unit) in (loads or {}).items():  # a maximum of an output is there already
-        variables.setdefault(name, (leading, floats(array), {"long_name": words, "units": unit}))
-    coords: dict[str, Any] = {
-        **varied(d, parameter, values),
-        "direction": ("direction", strings(directions), {"long_name": "direction of the sweep"}),
-        **start_coords(starts),
-        **state_coords(d),
-        **parameter_coords(d, without=parameter),
-    }
+                told = f"{stem} of {output}", quantity.unit
+                variables[f"{output}_{stem}"] = with_unit(leading, arrays[name][..., i], *told)
+    for name, load in (loads or {}).items():  # a maximum of an output is there already
+        variables.setdefault(name, with_unit(leading, *load))
+    along: dict[str, Any] = {**varied(labels, parameter, values), "direction": directions}
     if edges is not None:
         variables["bin_edge"] = (("state", "edge"), floats(edges), {"long_name": "edges of the bins, per state"})
     if "clearance" in arrays:
-        coords["indicator"] = ("indicator", strings(d.indicators), {"long_name": "indicator"})
-    result = dataset(variables, coords, attrs)
-    order = (parameter, "direction", "start", ...)
-    return result.transpose(*order).squeeze(list(squeeze))
+        along["indicator"] = labels.indicators
+    result = dataset(labels, attrs, variables, starts, **along)
+    return result.transpose(parameter, "direction", "start", ...).squeeze(list(squeeze))
 
 
 def response(swept: xr.Dataset, *, amplitude: ArrayLike, jumps: Mapping[str, ArrayLike]) -> xr.Dataset:
@@ -243,9 +305,8 @@ def response(swept: xr.Dataset, *, amplitude: ArrayLike, jumps: Mapping[str, Arr
     maximum = swept["maximum"]
     parameter = str(maximum.dims[0])
     full = ("direction", "start", parameter, "state")
-    amplitudes = floats(amplitude)
     dropped = tuple(i for i, dim in enumerate(full) if dim not in maximum.dims)
-    labelled = xr.DataArray(amplitudes.squeeze(dropped), dims=[dim for dim in full if dim in maximum.dims])
+    labelled = xr.DataArray(floats(amplitude).squeeze(dropped), dims=[dim for dim in full if dim in maximum.dims])
     variables: dict[str, Any] = {
         "amplitude": labelled.transpose(*maximum.dims).assign_attrs(long_name="half the peak-to-peak value")
     }
@@ -261,9 +322,7 @@ def section_points(
     labels: Labels, attrs: Mapping[str, str], *, starts: ArrayLike, squeeze: Sequence[str] = (), **arrays: Any
 ) -> xr.Dataset:
     """The result of ``poincare``: the points in which trajectories meet the section, one trajectory per start."""
-    coords = {**start_coords(starts), **state_coords(labels), **parameter_coords(labels)}
-    variables = columns(labels, _POINTS, arrays)
-    return dataset(variables, coords, attrs).squeeze(list(squeeze))
+    return dataset(labels, attrs, columns(labels, _POINTS, arrays), starts).squeeze(list(squeeze))
 
 
 @lru_cache(maxsize=64)
@@ -297,14 +356,6 @@ def parameter_coords(d: Labels, without: str | Sequence[str] = ()) -> dict[str, 
 def varied(d: Labels, name: str, values: ArrayLike, dim: str | None = None) -> dict[str, Any]:
     """The coordinate of a parameter that is varied, over the dim of its own name or another one."""
     return {name: (dim or name, floats(values), quantity_attributes(name, d.parameters[name]))}
-
-
-def start_coords(starts: ArrayLike) -> dict[str, Any]:
-    states = np.atleast_2d(floats(starts))
-    return {
-        "start": ("start", np.arange(len(states)), {"long_name": "index of the start"}),
-        "start_state": (("start", "state"), states, {"long_name": "state at the start"}),
-    }
 
 
 def quantity_attributes(name: str, quantity: Quantity) -> dict[str, str]:

@@ -11,8 +11,7 @@ from scipy.optimize import linear_sum_assignment
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.results.labels import Labels
-from nonsmooth.results.schema import columns, dataset, floats, parameter_coords, state_coords, strings, table
-from nonsmooth.results.statuses import status_attributes
+from nonsmooth.results.schema import Column, columns, dataset, table
 
 __all__ = ["report"]
 
@@ -27,64 +26,63 @@ _ORBIT = table(
     ("exponents", "exponent", "", "Lyapunov exponents"),
 )
 _NONE = {"complex": complex(np.nan, np.nan), "flag": False}  # what stands where there is no orbit; else NaN
-_COUNTS = {
-    "n_attractors": "number of attractors that the starts reach",
-    "missing": "attractors of the event-driven system without a counterpart",
-    "spurious": "attractors without a counterpart in the event-driven system",
-}
-_DIFFERENCES = {
-    "state": "largest difference of the states, in units of their scales",
-    "multiplier": "largest difference of the multipliers",
-    "exponent": "largest difference of the exponents that are finite without a band",
-    "period": "relative difference of the periods",
-}
+_COUNTS = table(
+    ("n_attractors", "", "place", "number of attractors that the starts reach"),
+    ("missing", "", "place", "attractors of the event-driven system without a counterpart"),
+    ("spurious", "", "place", "attractors without a counterpart in the event-driven system"),
+)
+_ENDED = table(("status", "", "status", ""), ("note", "", "text", "why there is no such orbit"))
+_DIFFERENCES = table(
+    ("state_difference", "", "", "largest difference of the states, in units of their scales"),
+    ("multiplier_difference", "", "", "largest difference of the multipliers"),
+    ("exponent_difference", "", "", "largest difference of the exponents that are finite without a band"),
+    ("period_difference", "", "", "relative difference of the periods"),
+)
 
 
 def report(
-    labels: Labels, attrs: Mapping[str, str], bands: Sequence[str], etas: FloatArray, reference: Mapping[str, Any],
-    rows: Mapping[tuple[int, int], Mapping[str, Any]], *, scale: FloatArray, forced: bool,
-) -> xr.Dataset:  # fmt: skip
+    labels: Labels,
+    attrs: Mapping[str, str],
+    bands: Sequence[str],
+    etas: FloatArray,
+    reference: Mapping[str, Any],
+    rows: Mapping[tuple[int, int], Mapping[str, Any]],
+    *,
+    scale: FloatArray,
+    forced: bool,
+) -> xr.Dataset:
     """The result of ``smoothing_report``: ``rows`` by (band, eta), with the names of the variables."""
-    n, shape = len(labels.states), (len(bands), len(etas))
+    shape, n = (len(bands), len(etas)), len(labels.states)
     variables: dict[str, Any] = {}
+
+    def put(column: Column, values: Any, own: Any = None) -> None:
+        """A variable over the bands, and that of the event-driven orbit."""
+        variables.update(columns(labels, [column], {column.name: values}, "band", "eta"))
+        if own is not None:
+            name, words = f"reference_{column.name}", f"{column.words}, event-driven"
+            variables.update(columns(labels, [column._replace(name=name, words=words)], {column.name: own}))
+
     for column in _ORBIT:
-        name, empty = column.name, _NONE.get(column.rule, np.nan)
+        empty = _NONE.get(column.rule, np.nan)
         size = [n] * len(column.dims)
         values, own = np.full((*shape, *size), empty), np.full(size, empty)
         for place, row in rows.items():
-            values[place] = row.get(name, empty)
-        own[...] = reference.get(name, empty)
-        sharp = column._replace(name=f"reference_{name}", words=f"{column.words}, event-driven")
-        variables |= columns(labels, [column], {name: values}, "band", "eta") | columns(labels, [sharp], {name: own})
-    for key, far in _differences(variables, scale, forced).items():
-        variables[f"{key}_difference"] = (("band", "eta"), far, {"long_name": _DIFFERENCES[key]})
-        words = {"long_name": f"order of {key}_difference in eta, against the next smaller one"}
-        variables[f"{key}_order"] = (("band", "eta"), _orders(etas, far), words)
-    if "n_attractors" in reference:
-        for name, long_name in _COUNTS.items():
-            counts = np.array([[rows[i, j][name] for j in range(shape[1])] for i in range(shape[0])], np.int64)
-            variables[name] = (("band", "eta"), counts, {"long_name": long_name})
-        variables["reference_n_attractors"] = (
-            (),
-            np.int64(reference["n_attractors"]),
-            {"long_name": f"{_COUNTS['n_attractors']}, event-driven"},
-        )
-    status = [[rows[i, j]["status"] for j in range(shape[1])] for i in range(shape[0])]
-    notes = [rows[i, j]["note"] for i in range(shape[0]) for j in range(shape[1])]
-    variables["status"] = (("band", "eta"), np.array(status, np.int8), status_attributes())
-    variables["note"] = (("band", "eta"), strings(notes).reshape(shape), {"long_name": "why there is no such orbit"})
-    coords: dict[str, Any] = {
-        "band": ("band", strings(bands), {"long_name": "shape of the bands"}),
-        "eta": ("eta", floats(etas), {"long_name": "half width of the bands"}),
-        "exponent": ("exponent", np.arange(1, n + 1), {"long_name": "number of the exponent"}),
-        **state_coords(labels),
-        **parameter_coords(labels, without=["band", *variables]),
-    }
-    return dataset(variables, coords, attrs)
+            values[place] = row.get(column.name, empty)
+        own[...] = reference.get(column.name, empty)
+        put(column, values, own)
+    for column, far in zip(_DIFFERENCES, _differences(variables, scale, forced), strict=True):
+        put(column, far)
+        words = f"order of {column.name} in eta, against the next smaller one"
+        name = column.name.replace("difference", "order")
+        put(Column(name, (), "", words, name), _orders(etas, far))
+    for column in (*(_COUNTS if "n_attractors" in reference else ()), *_ENDED):
+        counted = [[rows[i, j][column.name] for j in range(shape[1])] for i in range(shape[0])]
+        put(column, counted, reference["n_attractors"] if column.name == "n_attractors" else None)
+    return dataset(labels, attrs, variables, band=bands, eta=etas, exponent=np.arange(1, n + 1))
 
 
-def _differences(variables: Mapping[str, Any], scale: FloatArray, forced: bool) -> dict[str, FloatArray]:
-    """Distances to the event-driven orbit, (band, eta)."""
+def _differences(variables: Mapping[str, Any], scale: FloatArray, forced: bool) -> list[FloatArray]:
+    """Distances to the event-driven orbit, (band, eta), as in the table."""
 
     def both(name: str) -> tuple[Any, Any]:
         return variables[name][1], variables[f"reference_{name}"][1]
@@ -98,12 +96,7 @@ def _differences(variables: Mapping[str, Any], scale: FloatArray, forced: bool) 
     else:
         exponent = np.full(state.shape, np.nan)
     period, known = both("period")
-    return {
-        "state": state,
-        "multiplier": _of_multipliers(*both("floquet_multipliers")),
-        "exponent": exponent,
-        "period": np.abs(period / known - 1),
-    }
+    return [state, _of_multipliers(*both("floquet_multipliers")), exponent, np.abs(period / known - 1)]
 
 
 def _of_multipliers(values: Any, reference: Any) -> FloatArray:

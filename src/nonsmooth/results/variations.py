@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.results.labels import Labels
-from nonsmooth.results.schema import columns, dataset, parameter_coords, table, varied
+from nonsmooth.results.schema import columns, dataset, table, varied
 
 __all__ = ["derivatives_of_run", "spectrum"]
 
@@ -47,14 +47,14 @@ def derivatives_of_run(
     """The result of ``sensitivity``; the memory's names follow those of the states."""
     names = np.array([*labels.states, *labels.memory], dtype=str)
     defect = 0.0 if log_det == trace else log_det - trace  # both may be minus infinity
-    variables = columns(labels, _SENSITIVITY, {**arrays, "log_det": log_det, "trace_defect": defect})
-    coords: dict[str, Any] = {
-        "state": ("state", names, {"long_name": "state, then memory"}),
-        "initial_state": ("initial_state", names, {"long_name": "state at the start, then memory"}),
-        "parameter": ("parameter", np.array(list(parameters), dtype=str)),
-        **parameter_coords(labels, without=[*variables, "parameter", "initial_state"]),
-    }
-    return dataset(variables, coords, attrs)
+    return dataset(
+        labels,
+        attrs,
+        columns(labels, _SENSITIVITY, {**arrays, "log_det": log_det, "trace_defect": defect}),
+        state=("state", names, {"long_name": "state, then memory"}),
+        initial_state=("initial_state", names, {"long_name": "state at the start, then memory"}),
+        parameter=("parameter", np.array(list(parameters), dtype=str), {}),
+    )
 
 
 def spectrum(
@@ -62,12 +62,6 @@ def spectrum(
 ) -> xr.Dataset:
     """The result of ``lyapunov``. All arrays have the points as leading dim, also where there is one."""
     variables = columns(labels, _SPECTRUM, arrays, parameter or "point")
-    number = np.arange(1, np.shape(arrays["running"])[-1] + 1)
-    coords: dict[str, Any] = {
-        "exponent": ("exponent", number, {"long_name": "number of the exponent"}),
-        **parameter_coords(labels, without=[*variables, "batch", parameter or ""]),
-    }
-    if parameter is None:
-        return dataset(variables, coords, attrs).isel(point=0)
-    coords |= varied(labels, parameter, () if values is None else values)
-    return dataset(variables, coords, attrs)
+    over = {} if parameter is None else varied(labels, parameter, () if values is None else values)
+    made = dataset(labels, attrs, variables, **over, exponent=np.arange(1, np.shape(arrays["running"])[-1] + 1))
+    return made.isel(point=0) if parameter is None else made

@@ -32,7 +32,7 @@ def test_a_rule_has_an_uncertainty_of_its_own() -> None:
 def test_along_a_diagram_the_error_of_a_rule_stays() -> None:
     """g follows rho; a drawn system is off its rule by the same error at every point of the diagram."""
     from nonsmooth.identification.compare.diagram import _marched
-    from nonsmooth.identification.compare.model import Model
+    from nonsmooth.identification.compare.draws import Model
 
     rule = read_settings({"g": (lambda p: p["rho"] / 10, 1e-3)}, MODEL)
     base = nominal(MODEL, None, rule).with_parameters(omega=9.0, rho=0.1)

@@ -4,9 +4,10 @@ import numpy as np
 import xarray as xr
 from scipy.integrate import solve_ivp
 
+from nonsmooth import ParameterSet
+from nonsmooth.identification import Estimate
 from nonsmooth.studies.savi2007.identification.evidence import Run
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit
-from nonsmooth.studies.savi2007.identification.shooting import ShootingFit
 
 COUNT = 0.0789 / 1440
 #: Of `driven`: natural frequency, c/m, F_C/m, k_s/m, c_s/m, gap and place of rest.
@@ -33,9 +34,9 @@ def run(procedure, time, x=None, *, force=None, turns=None, name="Run #1", **set
 
 def decay_of(omega_0, b, f, zero=0.0, error=1e-6):
     """The free oscillator as a free decay would have told it, without a fit behind it."""
-    starts, used = np.zeros((0, 2)), np.zeros(0, dtype=bool)
-    nothing = ShootingFit(np.zeros(4), np.eye(4), starts, [], [], COUNT / np.sqrt(12), 5e-5, 1.0, 1.0, 0, used)
-    return DecayFit(np.array([omega_0, b, f, zero]), error**2 * np.eye(4), (), (), nothing)
+    noise = Estimate(COUNT / np.sqrt(12), 0.0, "m")
+    fit = ParameterSet({}, np.zeros((1, 1)), extra={"x.noise": noise})
+    return DecayFit(np.array([omega_0, b, f, zero]), error**2 * np.eye(4), (0,), ((0, 2),), fit)
 
 
 def swinging(omega, amplitude, lag, mean, *, crank, duration=12.0, mark=0.0, rng=None, name="Run #1", second=0.0):

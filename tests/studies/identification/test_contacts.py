@@ -20,11 +20,9 @@ from tests.studies.identification.made import (
     run,
 )  # fmt: skip
 
-from nonsmooth.identification.arrow import Unsettled
 from nonsmooth.recordings.session import Quantity
 from nonsmooth.studies.savi2007.identification.contact_findings import contact_finding, one_contact
-from nonsmooth.studies.savi2007.identification.multiple_shooting import _grazes, _Joint, shoot_contacts
-from nonsmooth.studies.savi2007.identification.pieces import Piece
+from nonsmooth.studies.savi2007.identification.multiple_shooting import shoot_contacts
 from nonsmooth.studies.savi2007.identification.referral import counted_gap
 
 
@@ -36,9 +34,7 @@ def three_runs():
 @pytest.fixture(scope="module")
 def fitted():
     decay = decay_of(W, B, F, PLACE)
-    return shoot_contacts(
-        three_runs(), decay, resolution=COUNT, kappa=1.1 * KAPPA, gamma=0.5 * GAMMA, pieces_per_run=12
-    )
+    return shoot_contacts(three_runs(), decay, resolution=COUNT, kappa=1.1 * KAPPA, gamma=0.5 * GAMMA)
 
 
 def test_contact_parameters_and_gap_lie_within_their_uncertainty(fitted):
@@ -59,19 +55,16 @@ def test_the_gates_mark_may_be_anywhere(mark):
     period = 2 * np.pi / 8.0
     turned = run("contact", runs[0].time, runs[0].positions, turns=runs[0].turns[:-1] + period * mark / (2 * np.pi),
                  crank_length=0.030, gap=GAP)  # fmt: skip
-    found = shoot_contacts(
-        [turned], decay_of(W, B, F, PLACE), resolution=COUNT, kappa=KAPPA, gamma=GAMMA, pieces_per_run=12, mark=mark
-    )
+    found = shoot_contacts([turned], decay_of(W, B, F, PLACE), resolution=COUNT, kappa=KAPPA, gamma=GAMMA, mark=mark)
     error = np.sqrt(np.diag(found.covariance))
-    drive = found.values[7:9]
-    np.testing.assert_allclose(drive, 0.030 * np.array([np.cos(mark), -np.sin(mark)]), atol=4 * error[7:9].max() + 2e-5)
-    assert abs(found.values[3] - KAPPA) < 3.5 * error[3] and found.fit.used.all() and found.fit.reduced < 2
+    assert abs(found.values[7] - 0.030) < 4 * error[7] and abs(found.values[8] - mark) < 4 * error[8] + 1e-3
+    assert abs(found.values[3] - KAPPA) < 3.5 * error[3] and not found.left and found.excess < 1.4
 
 
 def test_one_contact_tells_less_than_all_together(fitted):
     m = 0.84
     many = contact_finding(fitted, Quantity(m), resolution=COUNT)
-    single = one_contact(fitted, m, resolution=COUNT, kappa_error=1e-3 * KAPPA)
+    single = one_contact(fitted, decay_of(W, B, F, PLACE), m, resolution=COUNT, kappa_error=1e-3 * KAPPA)
     assert many.estimate.logarithmic and single.estimate.factor > many.estimate.factor > 1
     # by the root of their number and more
     ratio = np.log(single.estimate.factor) / np.log(many.estimate.factor)
@@ -85,47 +78,12 @@ def test_one_contact_tells_less_than_all_together(fitted):
     assert np.nanmax(np.abs(shown["residual"].values)) < 3 * COUNT
 
 
-def test_a_piece_in_which_friction_all_but_holds_the_car_has_a_corner():
-    # x = -A cos(w t) passes +-0.5 mm/s within 2 v / (A w^2) = 5 ms; x = -A cos^3 lingers where it turns in the middle
-    time = np.arange(0, 1.4, 0.01)
-    piece = Piece(time, time, time, np.arange(11), lambda p: (p, p, p), np.zeros(2))
-    angle = 4.5 * time
-    swift = 0.01 * np.column_stack([-np.cos(angle), 4.5 * np.sin(angle)])
-    slow = 0.01 * np.column_stack([-(np.cos(angle) ** 3), 3 * 4.5 * np.cos(angle) ** 2 * np.sin(angle)])
-    assert not _grazes(piece, swift, 1.0, 2e-5, 0.015) and _grazes(piece, slow, 1.0, 2e-5, 0.015)
-    assert not _grazes(piece, slow, 1.0, 2e-5, np.inf)
-    assert _grazes(piece, swift, 0.01 + 1e-5, 2e-5, np.inf)  # turns 10 um short of the gap
-
-
 def test_the_fit_is_the_same_from_another_first_guess(fitted):
     decay = decay_of(W, B, F, PLACE)
-    other = shoot_contacts(
-        three_runs(), decay, resolution=COUNT, kappa=0.9 * KAPPA, gamma=1.6 * GAMMA, pieces_per_run=12
-    )
+    other = shoot_contacts(three_runs(), decay, resolution=COUNT, kappa=0.9 * KAPPA, gamma=1.6 * GAMMA)
     error = np.sqrt(np.diag(fitted.covariance))
-    assert np.all(np.abs(other.values - fitted.values) < 0.1 * error)
-
-
-def test_a_piece_whose_start_a_corner_holds_is_left_out(fitted, monkeypatch):
-    """No step leads on where one piece stands 1.8 uncertainties short: the others are fitted without it."""
-    held, free = fitted.pieces[4], _Joint.fit
-
-    def fit(self, start, rough=False):
-        here = np.array([(piece.label, piece.origin) == (held.label, held.origin) for piece in self.pieces])
-        if rough or not here.any():
-            return free(self, start, rough)
-        starts = np.array([piece.start for piece in self.pieces])
-        raise Unsettled("no step", np.r_[0.04, np.where(here, 1.8, 0.0)], np.zeros(len(start)), start, starts)
-
-    monkeypatch.setattr(_Joint, "fit", fit)
-    found = shoot_contacts(
-        three_runs(), decay_of(W, B, F, PLACE), resolution=COUNT, kappa=1.1 * KAPPA, gamma=0.5 * GAMMA,
-        pieces_per_run=12,
-    )  # fmt: skip
-    assert len(found.pieces) == len(fitted.pieces) - 1 and found.grazing == fitted.grazing + 1 and not found.short
-    error = np.sqrt(np.diag(found.covariance))
-    for i in range(3):
-        assert abs(found.values[found.place(i, 0)] - GAP) < 3.5 * error[found.place(i, 0)]
+    # windows are cut where the first guess has no contact: elsewhere
+    assert np.all(np.abs(other.values - fitted.values) < 0.4 * error)
 
 
 def test_a_motor_that_wanders_is_in_the_uncertainty():
@@ -134,26 +92,14 @@ def test_a_motor_that_wanders_is_in_the_uncertainty():
         return lambda t: omega * t + omega * size / rate * np.sin(rate * t + omega)
 
     runs = [driven(omega, crank, phase=wandering(omega)) for omega, crank in ((11.15, 0.039), (8.0, 0.030))]
-    found = shoot_contacts(
-        runs, decay_of(W, B, F, PLACE), resolution=COUNT, kappa=1.1 * KAPPA, gamma=0.5 * GAMMA, pieces_per_run=12
-    )
-    error, by_scatter = (np.sqrt(np.diag(matrix)) for matrix in (found.covariance, found.fit.covariance))
+    found = shoot_contacts(runs, decay_of(W, B, F, PLACE), resolution=COUNT, kappa=1.1 * KAPPA, gamma=0.5 * GAMMA)
+    error = np.sqrt(np.diag(found.covariance))
     assert abs(found.values[3] - KAPPA) < 3 * error[3] and abs(found.values[4] - GAMMA) < 3 * error[4]
     for i in range(2):
         gap = found.place(i, 0)
         assert abs(found.values[gap] - GAP) < 3 * error[gap]
     # how far a line over two turns is off adds to what the residuals show
-    moved = found.covariance - found.fit.covariance
-    assert np.linalg.matrix_rank(moved, tol=1e-12 * np.trace(moved)) == 1
-    assert np.max(np.diag(moved) / by_scatter**2) > 0.05
-
-
-def test_pieces_that_graze_are_left_out():
-    time, gap = np.linspace(0.0, 1.0, 101), GAP
-    motion = np.column_stack([gap + 1e-5 - 0.01 * (time - 0.503) ** 2, -0.02 * (time - 0.503)])
-    piece = Piece(time, motion[:, 0], time, np.arange(11), None, motion[0])
-    assert _grazes(piece, motion, gap, 2e-5) and not _grazes(piece, motion, gap, 0.5e-5)
-    assert not _grazes(piece, motion, gap - 1e-3, 2e-5)
+    assert np.max(np.abs(found.by_turns) / error) > 0.2
 
 
 def told(values, errors, readings):

@@ -7,13 +7,12 @@ import numpy as np
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
-from nonsmooth.continuation.problems.rounds import Rounds
 from nonsmooth.continuation.problems.shooting import Shooting
-from nonsmooth.continuation.problems.signature import Signature, Visit
-from nonsmooth.flow.equilibria import ModeField
+from nonsmooth.continuation.problems.signature import Round, Signature, Visit
+from nonsmooth.flow.mode_fields import mode_field
 from nonsmooth.system.system import System
 
-__all__ = ["cycle_about_a_centre", "first_cycle"]
+__all__ = ["first_cycle"]
 
 ANGLES = 720
 LARGEST = 1e6  # of the states' scales
@@ -21,80 +20,66 @@ SMALL = 1e-2  # amplitude of the first cycle, in units of the states' scales
 
 
 def first_cycle(
-    system: System, name: str, value: float, mode: int, u: FloatArray, width: float
-) -> tuple[Orbits, OrbitPoint] | None:
-    r"""A small cycle :math:`u + \epsilon \, \mathrm{Re}(q e^{i \omega t})`, corrected to an orbit."""
-    eigen = _rotation(system, name, value, mode, u, width)
-    if eigen is None:
-        return None
-    rested, own, omega = eigen
-    scale = np.concatenate([system.scale_vector(), np.ones(len(system.memory))])
-    # Begun where its real part is largest, so that the section lies across the flow.
-    own = own * np.exp(-1j * np.angle(np.sum(own**2 / scale**2)) / 2)
-    shooting = Shooting(system, Signature((Visit(mode),)), 0, (name,))
-    period = 2 * np.pi / omega
-    curve = Orbits(shooting, scale, period, (width,))
-    for amplitude in (SMALL, 0.3 * SMALL, 3 * SMALL):
-        z = rested + amplitude * own.real
-        shooting.anchor(z, shooting.values, scale)
-        Y = shooting.join(np.empty(0), z[None, :], period, [value]) / curve.scale
-        border = np.zeros(curve.n)
-        border[: shooting.n] = own.real / scale
-        border /= np.linalg.norm(border)
-        point = curve.near(Y, border, most=20)
-        if point is not None and np.nanmax(point.path.maximum - point.path.minimum) > 0:
-            return curve, point
-    return None
+    kind: str, system: System, name: str, value: float, mode: int, u: FloatArray, width: float
+) -> OrbitPoint | None:
+    r"""The first of the cycles that emanate from a Hopf point, or from a focus-centre.
 
-
-def cycle_about_a_centre(
-    system: System, name: str, value: float, mode: int, u: FloatArray, width: float
-) -> tuple[Orbits, OrbitPoint] | None:
-    r"""A cycle a little larger than the closed orbit of a linear mode that touches the mode's boundary.
-
-    At a focus-centre every :math:`u + A \, \mathrm{Re}(q e^{i \theta})` within the mode is closed; the cycle leaves the
-    largest of them, which touches. Its size is kept and the parameter solved for.
+    Of a Hopf point a small one, :math:`u + \epsilon \, \mathrm{Re}(q e^{i \omega t})`. At a focus-centre every
+    :math:`u + A \, \mathrm{Re}(q e^{i \theta})` within the linear mode is closed; the cycle leaves the largest of them,
+    which touches, and the first is a little larger. Its size is kept and the parameter solved for.
     """
     eigen = _rotation(system, name, value, mode, u, width)
     if eigen is None:
         return None
     rested, own, omega = eigen
-    n, values = len(system.states), system.parameter_vector()
-    values[list(system.values).index(name)] = value
-    field = ModeField(system.traced, mode, ())
+    values, period, signature = system.parameter_vector(), 2 * np.pi / omega, Signature((Visit(mode),))
+    size = np.concatenate([system.scale_vector(), np.ones(len(system.memory))])
+    # Begun where its real part is largest, so that the section lies across the flow.
+    turn, amplitude = complex(np.exp(-1j * np.angle(np.sum(own**2 / size**2)) / 2)), SMALL
+    if kind == "focus_centre":
+        touching = _touching(system, mode, rested, own, values)
+        if touching is None:
+            return None
+        turn, amplitude = touching
+        size[: len(u)] = np.abs(amplitude * own).real.max()
+    curve = Orbits(Shooting(system, signature, 0, (name,)), size, period, (width,))
+    for factor in (1.0, 0.3, 3.0) if kind == "hopf" else (1.03, 1.1, 1.01, 1.3):
+        z = rested + factor * amplitude * (own * turn).real
+        once = Round(0, period, signature, np.empty(0), z[None, :])
+        if kind == "focus_centre":
+            read = curve.rounds.free(values, z, mode, 0.0, period)
+            if read is None or not len(read.times):
+                continue
+            once = read
+        fresh, X = curve.around(once, [value])
+        border = np.zeros(fresh.n)
+        border[: len(size)] = (X[: len(size)] - rested) / size
+        point = fresh.near(X / fresh.scale, border / np.linalg.norm(border), most=20)
+        if point is not None and not point.virtual and np.nanmax(point.path.maximum - point.path.minimum) > 0:
+            return point
+    return None
+
+
+def _touching(
+    system: System, mode: int, rested: FloatArray, own: ComplexArray, values: FloatArray
+) -> tuple[complex, float] | None:
+    """A phase well within the mode, and the amplitude with which a closed orbit touches its boundary; None: none."""
+    from scipy.optimize import brentq
+
+    n, field = len(system.states), mode_field(system.traced, mode)
     turns = np.exp(2j * np.pi * np.arange(ANGLES) / ANGLES)
 
     def margins(amplitude: float) -> FloatArray:
         states = (rested + amplitude * (own * turns[:, None]).real)[:, :n]
         return np.array([field.margins(field.indicators(one, values, rested[n:])[0]).max() for one in states])
 
-    small, large = 0.0, 1.0
+    large = 1.0
     while margins(large).max() < 0.0:
-        small, large = large, 2.0 * large
+        large *= 2.0
         if large > LARGEST:
             return None  # nothing bounds the mode: no cycle
-    for _ in range(40):
-        middle = 0.5 * (small + large)
-        small, large = (small, middle) if margins(middle).max() >= 0.0 else (middle, large)
-    scale = np.concatenate([np.abs(large * own).real.max() * np.ones(n), np.ones(len(system.memory))])
-    period = 2 * np.pi / omega
-    curve = Orbits(Shooting(system, Signature((Visit(mode),)), 0, (name,)), scale, period, (width,))
-    rounds = Rounds(curve.shooting)
-    inside = turns[int(margins(large).argmin())]
-    for beyond in (0.03, 0.1, 0.01, 0.3):
-        z = rested + (1.0 + beyond) * large * (own * inside).real
-        guess = rounds.free(values, z, mode, 0.0, period)
-        if guess is None or not len(guess.times):
-            continue
-        fresh, X = curve.with_signature(guess.signature, guess.times, guess.states, guess.period, [value])
-        Y = X / fresh.scale
-        border = np.zeros(fresh.n)
-        border[: curve.shooting.n] = (X[: curve.shooting.n] - rested) / scale
-        border /= np.linalg.norm(border)
-        point = fresh.near(Y, border, most=20)
-        if point is not None and not point.virtual:
-            return fresh, point
-    return None
+    large = brentq(lambda amplitude: margins(amplitude).max(), 0.0, large, xtol=1e-12)
+    return complex(turns[int(margins(large).argmin())]), large
 
 
 def _rotation(

@@ -1,4 +1,4 @@
-"""Branches as they are asked for: the range, the marches both ways, and the result made of them."""
+"""Branches as they are asked for: their first curves, the range, the marches both ways, and the result of them."""
 
 from __future__ import annotations
 
@@ -8,26 +8,30 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.arguments import allowed_range, limits
+from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.branches.reading import layout_attributes
 from nonsmooth.continuation.branches.records import BranchRecord, PointRecord, SpecialRecord, record_of
-from nonsmooth.continuation.events.leaving import AlongOrbits
+from nonsmooth.continuation.events.of_orbits import AlongOrbits
 from nonsmooth.continuation.march.event import BESIDE, Step
 from nonsmooth.continuation.march.march import Limits, March, Policy, march
-from nonsmooth.continuation.problems.curve import Curve, Place
-from nonsmooth.continuation.problems.signature import Signature
+from nonsmooth.continuation.problems.curve import Place, Point
+from nonsmooth.continuation.problems.orbits import Orbits, size_of
+from nonsmooth.continuation.problems.shooting import Shooting
+from nonsmooth.continuation.problems.signature import Round, Signature
 from nonsmooth.errors import Interrupted
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Asked", "Following", "Start", "both_ways", "dataset"]
+__all__ = ["Asked", "Following", "Start", "both_ways", "curve_of", "dataset", "resumed_at"]
 
 ZERO = 1e-6  # of the numbers beside it: the first point is a special one
 
-#: A curve and a point of it, to march on from along its tangent; or a march that has ended.
-Start = tuple[Curve[Any], Any] | March
+#: A point to march on from along its tangent, or a march that has ended.
+Start = Point | March
 
 
 def both_ways(policy: Policy, limits: Limits, back: Start, middle: Sequence[Any], ahead: Start) -> BranchRecord:
@@ -41,10 +45,10 @@ def both_ways(policy: Policy, limits: Limits, back: Start, middle: Sequence[Any]
         elif found and found[0].ending in ("closed", "interrupted"):
             found.append(March(ending=found[0].ending))
         else:
-            found.append(march(*start, limits, policy))
+            found.append(march(start, limits, policy))
     marched, before = found
-    if isinstance(ahead, tuple) and isinstance(back, tuple) and ahead[0] is back[0]:
-        middle[0].marks.extend(SpecialRecord(kind) for kind in _at_the_start(policy, *ahead, before, marched))
+    if isinstance(ahead, Point) and isinstance(back, Point) and ahead.curve is back.curve:
+        middle[0].marks.extend(SpecialRecord(kind) for kind in _at_the_start(policy, ahead, before, marched))
     for row in before.rows:
         row.point = row.point.turned()
     points = [*(record_of(row) for row in before.rows[::-1]), *middle, *(record_of(row) for row in marched.rows)]
@@ -52,16 +56,17 @@ def both_ways(policy: Policy, limits: Limits, back: Start, middle: Sequence[Any]
     return BranchRecord(points, [before.ending, marched.ending], said)
 
 
-def _at_the_start(policy: Policy, curve: Curve[Any], first: Any, back: March, ahead: March) -> list[str]:
+def _at_the_start(policy: Policy, first: Any, back: March, ahead: March) -> list[str]:
     """Special points at the first point itself: rounding decides whether a march from there sees them."""
-    if not (back.rows and ahead.rows) or not all(march.rows[0].curve is curve for march in (back, ahead)):
+    both = back, ahead
+    if not all(march.rows and march.rows[0].point.curve is first.curve for march in both):
         return []
     before, after = back.rows[0].point.turned(), ahead.rows[0].point  # the march back has its tangents the other way
-    seen = {row.kind for march in (back, ahead) for row in march.special
-            if row.curve is curve and np.abs(row.point.Y - first.Y).max() < BESIDE}  # fmt: skip
-    step, found = Step(curve, before, after, ([], []), ([], [])), []
+    seen = {row.kind for march in both for row in march.special
+            if row.point.curve is first.curve and np.abs(row.point.Y - first.Y).max() < BESIDE}  # fmt: skip
+    step, found = Step(before, after, ([], []), ([], [])), []
     for kind in policy.kinds:
-        here, was, now = (kind.number(curve, point) for point in (first, before, after))
+        here, was, now = (kind.number(point) for point in (first, before, after))
         happened = kind.happened(step, was, now) and abs(here) <= ZERO * max(abs(was), abs(now))
         if happened and kind.certain and (named := kind.named(step, first)) and named[0] not in seen:
             found.append(named[0])
@@ -187,3 +192,25 @@ def orbits_dataset(
     values = {branch.name: [point.value for point in points]}
     tables = ORBIT, SPECIAL_ORBIT
     return dataset(branch.system, "continue_orbit", values, tables, record, policy, options, more, attrs)
+
+
+def curve_of(orbit: Orbit, name: str, width: float) -> tuple[Orbits, FloatArray]:
+    """The curve through an orbit, and its unknowns."""
+    system = orbit.system
+    states = np.vstack([np.concatenate([orbit.u, orbit.memory]), orbit.crossing_states])
+    once = Round(orbit.period_number, orbit.period, orbit.signature, orbit.crossing_times, states)
+    shooting, X = Shooting.of(system, once, (name,), [system.values[name]])
+    return _through(shooting, X, orbit, width)
+
+
+def resumed_at(
+    system: System, period_number: int, point: PointRecord, name: str, width: float
+) -> tuple[Orbits, FloatArray]:
+    """The curve through a recorded point."""
+    return _through(Shooting(system, point.signature, period_number, (name,)), point.X, point, width)
+
+
+def _through(shooting: Shooting, X: FloatArray, orbit: Any, width: float) -> tuple[Orbits, FloatArray]:
+    size = size_of(orbit.maximum, orbit.minimum, shooting.system)
+    shooting.prepare(X, size)
+    return Orbits(shooting, size, orbit.period, (width,)), X

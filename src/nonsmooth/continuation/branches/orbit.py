@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.continuation.branches.reading import layout_attributes, layouts_of, recorded, undamaged
+from nonsmooth.continuation.branches.reading import fields_of, layout_attributes, layouts_of, recorded, undamaged
 from nonsmooth.continuation.problems.multipliers import stability, stable_by
 from nonsmooth.continuation.problems.path import Path
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
@@ -89,20 +89,18 @@ class Orbit:
     minimum: FloatArray
     clearance: dict[str, float]
     virtual: bool = False
-    reference: tuple[FloatArray, FloatArray] | None = field(default=None)
     options: Mapping[str, Any] = field(default_factory=dict)
     loads: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def crossings_per_period(self) -> float:
         """Transitions per forcing period (autonomous: once round)."""
-        return len(self.signature.crossings) / max(self.period_number, 1)
+        return self.signature.rates(self.system.transitions, self.period_number)[0]
 
     @property
     def contacts_per_period(self) -> float:
         """Entries into contact per forcing period (autonomous: once round)."""
-        jumps = self.system.transitions
-        return sum(jumps[v.transition].contact for v in self.signature.crossings) / max(self.period_number, 1)
+        return self.signature.rates(self.system.transitions, self.period_number)[1]
 
     def trajectory(self, samples: int | None = None) -> xr.Dataset:
         """The orbit once round, as a result of ``simulate``; begun behind the transitions that lie on the section."""
@@ -219,13 +217,8 @@ class Orbit:
         if source["verb"] != "find_orbit":
             verb = source["verb"]
             raise ValueError(f"this Dataset was made by {verb!r}; Orbit.from_dataset reads those of find_orbit")
-        scalar: dict[str, Any] = {"flag": bool, "time": float, "text": str, "place": int}
         with undamaged("orbit"):
-            (signature,) = layouts_of(dataset, system)
-            values: dict[str, Any] = {column.field: dataset[column.name].values for column in FOUND}
-            for column in FOUND:
-                if not column.dims:
-                    values[column.field] = scalar[column.rule](values[column.field])
+            (signature,), (values,) = layouts_of(dataset, system), fields_of(dataset, FOUND)
             shape = len(signature.crossings), len(system.states) + len(system.memory)
             values["crossing_states"] = values["crossing_states"].reshape(shape)
             names = map(str, dataset["indicator"].values)
@@ -236,22 +229,13 @@ class Orbit:
 
 
 def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArray, virtual: bool) -> Orbit:
-    """The record of a solved orbit."""
-    X = solved.X
-    system = shooting.system.with_parameters(
-        dict(zip(shooting.system.values, map(float, solved.values), strict=True))
-    ) if shooting.n_active else shooting.system  # fmt: skip
-    times, states = shooting.split(X)
-    n_u = len(system.states)
-    M = solved.monodromy
-    multipliers = solved.multipliers
+    """The record of a solved orbit, at the parameters of its system."""
+    system, once = shooting.system, shooting.once(solved.X)
+    u, memory = np.split(once.states[0], [len(system.states)])
     return Orbit(
-        system=system, u=states[0, :n_u].copy(), mode=system.modes[shooting.at_section],
-        memory=states[0, n_u:].copy(), period=float(solved.times[-1]), period_number=shooting.period_number,
-        signature=shooting.signature, crossing_times=times.copy(), crossing_states=states[1:].copy(),
-        monodromy_matrix=M, floquet_multipliers=multipliers,
-        stable=stable_by(multipliers, shooting.forced),
-        maximum=path.maximum.copy(), minimum=path.minimum.copy(),
+        system=system, u=u, mode=system.modes[shooting.at_section], memory=memory, period=once.period,
+        period_number=shooting.period_number, signature=shooting.signature, crossing_times=once.times,
+        crossing_states=once.states[1:], monodromy_matrix=solved.monodromy, floquet_multipliers=solved.multipliers,
+        stable=stable_by(solved.multipliers, shooting.forced), maximum=path.maximum.copy(), minimum=path.minimum.copy(),
         clearance=dict(zip(system.indicators, map(float, clearance), strict=True)), virtual=virtual,
-        reference=shooting.reference,
     )  # fmt: skip

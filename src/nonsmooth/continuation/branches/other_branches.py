@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.branches.begin import resumed_at
-from nonsmooth.continuation.branches.born import cycle_about_a_centre, first_cycle
-from nonsmooth.continuation.branches.following import Asked, Start
-from nonsmooth.continuation.branches.reading import hopf_row, mark_of, one_row, special_row
+from nonsmooth.continuation.branches.born import first_cycle
+from nonsmooth.continuation.branches.following import Asked, Start, resumed_at
+from nonsmooth.continuation.branches.reading import hopf_row, marks_of, one_row, special_row
 from nonsmooth.continuation.branches.records import record_of
 from nonsmooth.continuation.march.march import March, Row
-from nonsmooth.continuation.problems.curve import tangents
+from nonsmooth.continuation.problems.curve import Point, tangents
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.shooting import Shooting
+from nonsmooth.continuation.problems.signature import Round
 from nonsmooth.errors import SolveError
 
 if TYPE_CHECKING:
@@ -38,24 +38,23 @@ def switched(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
             "(with virtual=True a grazing or corner row goes straight on)"
         )
     curve, X = resumed_at(system, period_number, point, own, branch.width)
-    ways = emanating(curve, X, point.tangent / curve.scale, kind)
-    begun: list[tuple[Orbits, OrbitPoint]] = []
-    for fresh, Y, direction in ways:
+    fresh, Y, ways = emanating(curve, X, point.tangent / curve.scale, kind)
+    begun: list[OrbitPoint] = []
+    for direction in ways:
         for away in AWAY:
             first = fresh.near(Y + away * direction, direction)
             if first is not None and not first.virtual:
-                begun.append((fresh, first))
+                begun.append(first)
                 break
     if not begun:
         raise SolveError(f"no other branch was found at this {kind}", status="no_convergence")
-    fresh, Y, direction = ways[0]
-    here = fresh.described(Y, direction, 0.0, 0, fresh.evaluate(Y))
+    here = fresh.described(Point(fresh, Y, ways[0], 0.0, 0, fresh.evaluate(Y)))
     assert here is not None
-    middle = [record_of(Row(fresh, here, kind=kind)), record_of(Row(*begun[0]))]
+    middle = [record_of(Row(here, kind=kind)), record_of(Row(begun[0]))]
     back: Start = March(ending="branching", said=f"The branch begins at the {kind}.")
     if len(begun) > 1:
         back = begun[1]
-        middle.insert(0, record_of(Row(begun[1][0], begun[1][1].turned())))
+        middle.insert(0, record_of(Row(begun[1].turned())))
     number = fresh.shooting.period_number
     return branch.result(number, back, middle, begun[0], closed=fresh.landmark(here), origin=kind)
 
@@ -70,9 +69,9 @@ def straight_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset
     first = curve.near(X / curve.scale, border / np.linalg.norm(border))
     if first is None:
         raise SolveError(f"Newton's method did not converge at this {kind}", status="no_convergence")
-    middle = record_of(Row(curve, first))
-    middle.marks.append(mark_of(one_row(start, "continue_orbit"), system))
-    return branch.result(period_number, (curve, first.turned()), [middle], (curve, first), origin=kind)
+    middle = record_of(Row(first))
+    middle.marks.extend(marks_of(one_row(start, "continue_orbit"), system))
+    return branch.result(period_number, first.turned(), [middle], first, origin=kind)
 
 
 def born(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
@@ -84,15 +83,14 @@ def born(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
     system, own, value, mode, u, before = hopf_row(start)
     _check_parameter(name, own)
     branch = asked.follow(system, own, before, value)
-    begun = (first_cycle if kind == "hopf" else cycle_about_a_centre)(system, own, value, mode, u, branch.width)
-    if begun is None:
+    first = first_cycle(kind, system, own, value, mode, u, branch.width)
+    if first is None:
         raise SolveError(f"no cycle was found at this {kind}", status="no_convergence")
-    curve, first = begun
     # The first cycle of a Hopf point is small; about a centre the one that touches the boundary is followed back to.
     back: Start = March(ending="branching", said="The branch begins at the Hopf point.")
     if kind == "focus_centre":
-        back = curve, first.turned()
-    return branch.result(0, back, [record_of(Row(curve, first))], (curve, first), origin=kind)
+        back = first.turned()
+    return branch.result(0, back, [record_of(Row(first))], first, origin=kind)
 
 
 def _check_parameter(name: str | None, own: str) -> None:
@@ -102,36 +100,30 @@ def _check_parameter(name: str | None, own: str) -> None:
 
 def doubled(shooting: Shooting, X: FloatArray) -> tuple[Shooting, FloatArray]:
     """The same orbit gone round twice."""
-    n = shooting.period_number
-    times, states = shooting.split(X)
-    period = shooting.period(X)
-    signature = shooting.signature.repeated(2, n)
-    twice = Shooting(shooting.system, signature, 2 * n, shooting.active)
+    n, once = shooting.period_number, shooting.once(X)
+    times = np.concatenate([once.times, once.times + once.period])
     # The second round begins at the section within the last visit, which is not a crossing.
-    t2 = np.concatenate([times, times + period])
-    z2 = np.concatenate([states, states[1:]])
-    X2 = twice.join(t2, z2, 2 * period, X[shooting.size :])
-    twice.divided, twice.alone = 2 * shooting.divided, 2 * shooting.alone
-    if shooting.reference is not None:
-        twice.reference = shooting.reference
-    return twice, X2
+    states = np.concatenate([once.states, once.states[1:]])
+    twice = Round(2 * n, 2 * once.period, once.signature.repeated(2, n), times, states)
+    fresh, X2 = Shooting.of(shooting.system, twice, shooting.active, X[shooting.size :])
+    fresh.divided, fresh.alone, fresh.reference = 2 * shooting.divided, 2 * shooting.alone, shooting.reference
+    return fresh, X2
 
 
 def emanating(
     curve: Orbits, X: FloatArray, along: FloatArray, kind: str
-) -> list[tuple[Orbits, FloatArray, FloatArray]]:
-    """Curve, common point and direction of each new half branch at a special point.
+) -> tuple[Orbits, FloatArray, list[FloatArray]]:
+    """Curve and common point of the other branch at a special point, and the direction of each half of it.
 
     A flip has one (the orbit begun a round later is the same orbit), a crossing of branches two.
     """
     if kind == "flip":
-        twice, X2 = doubled(curve.shooting, X)
-        fresh = Orbits(twice, curve.size, 2 * curve.period, curve.widths)
-        both = tangents(fresh, X2 / fresh.scale)
-        # The parameter turns on the branch of twice the period.
-        return [] if both is None else [(fresh, X2 / fresh.scale, min(both, key=lambda v: abs(v[-1])))]
+        twice, X = doubled(curve.shooting, X)
+        curve = Orbits(twice, curve.size, 2 * curve.period, curve.widths)
     both = tangents(curve, X / curve.scale)
     if both is None:
-        return []
+        return curve, X, []
+    if kind == "flip":  # the parameter turns on the branch of twice the period
+        return curve, X / curve.scale, [min(both, key=lambda v: abs(v[-1]))]
     other = min(both, key=lambda v: abs(v @ along))
-    return [(curve, X / curve.scale, other), (curve, X / curve.scale, -other)]
+    return curve, X / curve.scale, [other, -other]

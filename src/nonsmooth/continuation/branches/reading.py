@@ -7,7 +7,7 @@ are checked against the system, and the unknowns against the signatures.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
@@ -17,16 +17,18 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.records import BranchRecord, PointRecord, SpecialRecord
-from nonsmooth.continuation.events.leaving import ENDINGS
+from nonsmooth.continuation.events.of_orbits import ENDINGS
 from nonsmooth.continuation.problems.signature import AT_ONCE, SECTION, Signature, Visit
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from nonsmooth.results.branches import Column
+
 __all__ = [
-    "hopf_row", "layout_attributes", "layouts_of", "mark_of", "one_row", "read_branch", "recorded", "special_row",
-    "undamaged",
+    "fields_of", "hopf_row", "layout_attributes", "layouts_of", "marks_of", "one_row", "read_branch", "recorded",
+    "special_row", "undamaged",
 ]  # fmt: skip
 
 
@@ -73,6 +75,20 @@ def one_row(start: xr.Dataset, verb: str) -> xr.Dataset:
     return start.isel(special=0)
 
 
+def fields_of(dataset: xr.Dataset, table: Sequence[Column], dim: str = "") -> Iterator[dict[str, Any]]:
+    """What the variables of a table hold, one record after the other along a dim; of one row that is all."""
+    from nonsmooth.results.branches import STEMS
+    from nonsmooth.results.schema import typed
+
+    every = []
+    for column in table:
+        variable = dataset[column.name if column.name in dataset else STEMS[column.name]]
+        every.append(typed(column, variable.values if dim in variable.dims else variable.values[None]))
+    for values in zip(*every, strict=True):
+        yield {column.field: value if column.dims else value.item()
+               for column, value in zip(table, values, strict=True)}  # fmt: skip
+
+
 def read_branch(dataset: xr.Dataset) -> tuple[System, BranchRecord]:
     """The system and the record of a branch.
 
@@ -84,14 +100,8 @@ def read_branch(dataset: xr.Dataset) -> tuple[System, BranchRecord]:
     source, system = recorded(dataset, "branch")
     with undamaged("branch"):
         name, period_number = str(dataset.attrs["parameter"]), int(dataset["period_number"])
-        layouts = layouts_of(dataset, system)
-        columns = _columns(dataset, name)
-        points = [
-            _point(system, layouts, period_number, name, {key: column[i] for key, column in columns.items()})
-            for i in range(dataset.sizes["point"])
-        ]
-        for i in range(dataset.sizes["special"]):
-            mark = mark_of(dataset.isel(special=i), system)
+        points = _points(dataset, system, name, period_number)
+        for mark in marks_of(dataset, system):
             points[_place(mark.point, len(points), "point")].marks.append(mark)
         words = list(ENDINGS)
         endings = [words[_place(int(code), len(words), "ending")] for code in dataset["ended"].values]
@@ -118,7 +128,7 @@ def special_row(start: Any, verb: str) -> tuple[System, str, str, PointRecord, i
     source, system = recorded(start, "special point")
     with undamaged("special point"):
         own, period_number = str(start.attrs["parameter"]), int(start["period_number"])
-        point = _point(system, layouts_of(start, system), period_number, own, _columns(start, own))
+        (point,) = _points(start, system, own, period_number)
         return system, str(start["kind"].values), own, point, period_number, source["options"]["range"]
 
 
@@ -172,51 +182,34 @@ def layouts_of(dataset: xr.Dataset, system: System) -> list[Signature]:
     return found
 
 
-def _columns(dataset: xr.Dataset, name: str) -> dict[str, Any]:
-    """Arrays of the parameter and of what is known of an orbit."""
+def _points(dataset: xr.Dataset, system: System, name: str, period_number: int) -> list[PointRecord]:
+    """The points of a branch, or the one of a row; each has as many unknowns as its signature."""
     from nonsmooth.results.branches import ORBIT
 
-    found = {key: dataset[key].values for key in (name, *(column.name for column in ORBIT))}
-    at_section = {i: visits[0][0] for i, visits in enumerate(json.loads(dataset.attrs["layouts"]))}
-    for layout, mode in zip(np.ravel(found["layout"]), np.ravel(found["mode"]), strict=True):
-        if at_section.get(int(layout), mode) != mode:
-            raise ValueError(f"mode {mode} is not that of its signature")
+    layouts, written = layouts_of(dataset, system), json.loads(dataset.attrs["layouts"])
+    values, n = np.atleast_1d(dataset[name].values), len(system.states) + len(system.memory)
+    found = []
+    for value, fields in zip(values, fields_of(dataset, ORBIT, "point"), strict=True):
+        layout = _place(fields["layout"], len(layouts), "signature")
+        signature = layouts[layout]
+        if fields["mode"] != written[layout][0][0]:
+            raise ValueError(f"mode {fields['mode']} is not that of its signature")
+        known, size = ~np.isnan(fields["X"]), n + len(signature.crossings) * (n + 1) + (1 if period_number else 2)
+        if not known[:size].all() or known[size:].any() or not np.isfinite(fields["tangent"][:size]).all():
+            raise ValueError(f"a point has not the {size} unknowns of its signature")
+        fields |= {"X": fields["X"][:size], "tangent": fields["tangent"][:size], "mode": signature.visits[0].mode}
+        found.append(PointRecord(float(value), signature, **fields))
     return found
 
 
-def _point(
-    system: System, layouts: list[Signature], period_number: int, name: str, row: Mapping[str, Any]
-) -> PointRecord:
-    """One point of a branch, whose unknowns are as many as its signature has."""
-    from nonsmooth.results.branches import ORBIT
+def marks_of(dataset: xr.Dataset, system: System) -> Iterator[SpecialRecord]:
+    """The special points of a branch, or that of a row of it or of `special_points`."""
+    from nonsmooth.results.branches import SPECIAL_ORBIT
 
-    found = {column.field: row[column.name] for column in ORBIT}
-    signature = layouts[_place(int(found["layout"]), len(layouts), "signature")]
-    known = ~np.isnan(found["X"])
-    n = len(system.states) + len(system.memory)
-    size = n + len(signature.crossings) * (n + 1) + (1 if period_number else 2)
-    if not known[:size].all() or known[size:].any() or not np.isfinite(found["tangent"][:size]).all():
-        raise ValueError(f"a point has not the {size} unknowns of its signature")
-    found["X"], found["tangent"] = found["X"][:size], found["tangent"][:size]
-    found["mode"] = signature.visits[0].mode
-    for column in ORBIT:
-        if column.rule in ("flag", "time"):
-            found[column.field] = (bool if column.rule == "flag" else float)(found[column.field])
-    return PointRecord(float(row[name]), signature, **found)
-
-
-def mark_of(row: xr.Dataset, system: System) -> SpecialRecord:
-    """The special point of a row of a branch, or of `special_points`."""
-    from nonsmooth.results.branches import SPECIAL_ORBIT, STEMS
-
-    types: dict[str, Any] = {"text": str, "flag": bool, "place": int}
-    found: dict[str, Any] = {}
-    for column in SPECIAL_ORBIT:
-        value = row[column.name if column.name in row else STEMS[column.name]].values
-        found[column.field] = types[column.rule](value) if column.rule in types else value
-    if found["indicator"] not in ("", *system.indicators):
-        raise ValueError(f"no indicator {found['indicator']!r}")
-    return SpecialRecord(**found)
+    for fields in fields_of(dataset, SPECIAL_ORBIT, "special"):
+        if fields["indicator"] not in ("", *system.indicators):
+            raise ValueError(f"no indicator {fields['indicator']!r}")
+        yield SpecialRecord(**fields)
 
 
 def _place(i: int, n: int, what: str) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.march.march import Row
-from nonsmooth.continuation.problems.equilibrium import Equilibria
+from nonsmooth.continuation.problems.equilibrium import Rest
 from nonsmooth.continuation.problems.multipliers import stable_by
 from nonsmooth.continuation.problems.signature import Signature
 
@@ -90,11 +90,12 @@ class BranchRecord:
 
 def record_of(row: Row) -> Any:
     """The record of a solved point of a branch."""
-    curve, point = row.curve, row.point
-    if isinstance(curve, Equilibria):
+    point = row.point
+    if isinstance(point, Rest):
         record: Any = RestRecord(
-            point.value, point.u, point.lower, point.upper, point.eigenvalues, curve.stable(point), curve.mode
-        )
+            point.value, point.u, point.lower, point.upper, point.eigenvalues, point.curve.stable(point),
+            point.curve.mode,
+        )  # fmt: skip
     else:
         record = _of_orbit(row)
     if row.kind:
@@ -103,24 +104,23 @@ def record_of(row: Row) -> Any:
 
 
 def _of_orbit(row: Row) -> PointRecord:
-    curve, point = row.curve, row.point
+    point, curve = row.point, row.point.curve
     shooting, path = curve.shooting, point.path
-    jumps, turns = shooting.system.traced.transitions, max(shooting.period_number, 1)
-    crossings, n_u = shooting.signature.crossings, len(shooting.system.states)
     # Exactly at a graze the multipliers are those of the side without contact.
     multipliers = point.multipliers if row.graze is None else row.graze.multipliers_free
+    crossings, contacts = shooting.signature.rates(shooting.system.traced.transitions, shooting.period_number)
     return PointRecord(
-        point.value, shooting.signature, point.X, point.tangent * curve.scale, shooting.at_section, point.X[:n_u],
-        path.maximum, path.minimum, float(point.solved.times[-1]), multipliers,
+        point.value, shooting.signature, point.X, point.tangent * curve.scale, shooting.at_section,
+        point.X[: len(path.maximum)], path.maximum, path.minimum, float(point.solved.times[-1]), multipliers,
         stable_by(multipliers, shooting.forced), curve.walk.clearance(path, len(shooting.system.indicators)),
-        len(crossings) / turns, sum(jumps[v.transition].contact for v in crossings) / turns, row.virtual,
+        crossings, contacts, row.virtual,
     )  # fmt: skip
 
 
 def _mark(row: Row) -> SpecialRecord:
     mark = SpecialRecord(row.kind, sliding=row.sliding)
     if row.indicator >= 0:
-        mark.indicator = list(row.curve.shooting.system.indicators)[row.indicator]
+        mark.indicator = list(row.point.shooting.system.indicators)[row.indicator]
     if isinstance(row.graze, str):  # of equilibria
         mark.grazing = row.graze
     elif row.graze is not None:

@@ -8,14 +8,12 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.continuation.events.change import Change, by_others, gained, inserted, is_tolerance, rest_after, without
-from nonsmooth.continuation.march.event import BESIDE, Event, Met, Step
+from nonsmooth.continuation.march.event import Event, Step
 from nonsmooth.continuation.problems.signature import AT_ONCE
 
-__all__ = ["BOUNDARIES", "Boundary", "Unseen", "passed_by"]
+__all__ = ["BOUNDARIES", "Boundary", "Crossed", "Unseen"]
 
 ENDS = 1e-4  # of the period: a maximum as near to a crossing belongs to it
-JUMP = 1e-3  # of the numbers at both ends: one larger than this at its root has jumped there
-LARGEST = 1e3
 NO_SPEED = 1e-3  # of the steepest crossing: slower than this is a touch
 UNSEEN = 1e-10  # along the branch: as near as an event is located that only simulations show
 
@@ -37,23 +35,23 @@ class Boundary(Event):
     def __init__(self, place: int = -1) -> None:
         self.place = place
 
-    def number(self, curve: Any, point: Any) -> float:
+    def number(self, point: Any) -> float:
         """The margin."""
-        return float(curve.margins(point)[self.place])
+        return float(point.curve.margins(point)[self.place])
 
     def happened(self, step: Step, was: float, now: float) -> bool:
         """Return whether the boundary is passed on the step, or lies at the beginning of the march.
 
         A branch that goes straight on stops at a section that a crossing passes, and nowhere else."""
-        if step.virtual and not self.at_section(step.curve, step.b):
+        if step.virtual and not self.at_section(step.b):
             return False
         return now < 0.0 and (was >= 0.0 or (step.first and not step.virtual))
 
-    def at_section(self, curve: Any, point: Any) -> bool:
+    def at_section(self, point: Any) -> bool:
         """Return whether a crossing passes the section of a forced orbit here, and nothing else happens."""
         return False
 
-    def contacts(self, curve: Any, point: Any) -> list[Change]:
+    def contacts(self, point: Any) -> list[Change]:
         """Contacts that may begin or end here; none where it is about something else."""
         return []
 
@@ -62,7 +60,7 @@ class Boundary(Event):
         return True
 
     @abstractmethod
-    def surface(self, curve: Any, point: Any, beyond: Any = None) -> int:
+    def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator of the surface that is reached (-1: of none).
 
         ``beyond`` is the curve on which the branch goes on."""
@@ -72,43 +70,42 @@ class Crossed(Boundary):
     """A margin of a crossing, or of a visit that begins or ends with one: its row nearest to zero tells the surface."""
 
     @abstractmethod
-    def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:
-        """Visit, transition, state, and the row that fires: where the surface is that is reached."""
+    def visit(self, point: Any) -> int:
+        """The visit whose crossing it is."""
 
-    def surface(self, curve: Any, point: Any, beyond: Any = None) -> int:
+    def crossing(self, point: Any, visit: int) -> tuple[int, Any, int]:
+        """Transition, state, and the row that fires (-1: whichever): those at the end of the visit."""
+        return point.shooting.signature.visits[visit].transition, point.solved.segments.z[visit], -1
+
+    def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator of the row that is nearest to zero (-1: of none)."""
-        visit, k, z, fires = self.crossing(curve, point)
-        times, _ = curve.shooting.split(point.X)
-        t = float(times[min(visit, len(times) - 1)])
-        rows = curve.shooting.system.traced.transitions[k].rows
-        near = [(abs(curve.shooting.flow.jump(point.solved.values, k, t, z, r).h), row.indicator)
-                for r, row in enumerate(rows) if r != fires]  # fmt: skip
+        visit, shooting = self.visit(point), point.shooting
+        k, z, fires = self.crossing(point, visit)
+        t = float(point.solved.times[min(visit + 1, shooting.m)])
+        near = [(abs(shooting.flow.jump(point.solved.values, k, t, z, r).h), row.indicator)
+                for r, row in enumerate(shooting.system.traced.transitions[k].rows) if r != fires]  # fmt: skip
         return min(near)[1] if near else -1
 
 
 class Short(Crossed):
     """A visit shrinks to nothing."""
 
-    def at_section(self, curve: Any, point: Any) -> bool:
+    def at_section(self, point: Any) -> bool:
         """Return whether the visit begins or ends at the section of a forced orbit."""
-        return curve.shooting.forced and int(point.path.tau.argmin()) in (0, curve.shooting.m)
+        return point.shooting.forced and self.visit(point) in (0, point.shooting.m)
 
-    def contacts(self, curve: Any, point: Any) -> list[Change]:
+    def contacts(self, point: Any) -> list[Change]:
         """The orbit without a visit between two visits of one mode, where it shrinks without speed."""
-        visits, path = curve.shooting.signature.visits, point.path
-        i = int(path.tau.argmin())
+        visits, slopes, i = point.shooting.signature.visits, point.path.slope, self.visit(point)
         if i in (0, len(visits) - 1) or visits[i - 1].mode != visits[i + 1].mode or visits[i - 1].row < 0:
             return []
-        slope = path.slope[curve.walk.conditional.tolist().index(i - 1)]
-        steepest = float(np.abs(path.slope).max())
-        if not (slope < NO_SPEED * max(steepest, 1e-300) or len(path.slope) < 3):
-            return []
-        return [without(curve, point, i - 1, 2)]
+        slope = slopes[point.curve.walk.conditional.tolist().index(i - 1)]
+        slow = slope < NO_SPEED * max(float(np.abs(slopes).max()), 1e-300) or len(slopes) < 3
+        return [without(point, i - 1, 2)] if slow else []
 
-    def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:
-        """The end of the visit."""
-        visit = int(point.path.tau.argmin())
-        return visit, curve.shooting.signature.visits[visit].transition, point.solved.segments.z[visit], -1
+    def visit(self, point: Any) -> int:
+        """The visit itself."""
+        return int(point.path.tau.argmin())
 
 
 class Slow(Crossed):
@@ -116,37 +113,36 @@ class Slow(Crossed):
 
     name = "grazing"
 
-    def contacts(self, curve: Any, point: Any) -> list[Change]:
+    def contacts(self, point: Any) -> list[Change]:
         """The orbit without an impact of no speed."""
-        visits = curve.shooting.signature.visits
-        i = self.crossing(curve, point)[0]
-        count = 1
+        visits, i, count = point.shooting.signature.visits, self.visit(point), 1
         while visits[i + count].row == AT_ONCE:  # an impact made of several transitions
             count += 1
-        return [without(curve, point, i, count)] if visits[i + count].mode == visits[i].mode else []
+        return [without(point, i, count)] if visits[i + count].mode == visits[i].mode else []
 
-    def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:
-        """The slowest crossing."""
-        visit = int(curve.walk.conditional[int(point.path.slope.argmin())])
-        return visit, curve.shooting.signature.visits[visit].transition, point.solved.segments.z[visit], -1
+    def visit(self, point: Any) -> int:
+        """The visit before the slowest crossing."""
+        return int(point.curve.walk.conditional[int(point.path.slope.argmin())])
 
 
 class Own(Crossed):
     """Two rows of the condition that fires vanish together."""
 
-    def contacts(self, curve: Any, point: Any) -> list[Change]:
+    def contacts(self, point: Any) -> list[Change]:
         """At a tolerance: the same impact by the other transition, and the orbit without it or the last before rest."""
-        i, surface = self.crossing(curve, point)[0], self.surface(curve, point)
-        if not is_tolerance(curve, surface):
+        i, surface = self.visit(point), self.surface(point)
+        if not is_tolerance(point, surface):
             return []
-        found, count = by_others(curve, point, i, surface), rest_after(curve, point, i)
-        return found if count == 0 else [*found, without(curve, point, i, count or 1)]
+        found, count = by_others(point, i, surface), rest_after(point, i)
+        return found if count == 0 else [*found, without(point, i, count or 1)]
 
-    def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:
-        """The crossing with the least other row."""
-        visit = int(curve.walk.conditional[int(point.path.own.argmin())])
-        fires = curve.shooting.signature.visits[visit]
-        return visit, fires.transition, point.solved.segments.z[visit], fires.row
+    def visit(self, point: Any) -> int:
+        """The visit before the crossing with the least other row."""
+        return int(point.curve.walk.conditional[int(point.path.own.argmin())])
+
+    def crossing(self, point: Any, visit: int) -> tuple[int, Any, int]:
+        """The row that fires is known."""
+        return (*super().crossing(point, visit)[:2], point.shooting.signature.visits[visit].row)
 
 
 class Touch(Boundary):
@@ -154,29 +150,31 @@ class Touch(Boundary):
 
     name = "grazing"
 
-    def contacts(self, curve: Any, point: Any) -> list[Change]:
+    def contacts(self, point: Any) -> list[Change]:
         """The orbit with the transition, and if it leads to another mode with each of the ways back."""
-        return inserted(curve, point)
+        return inserted(point)
 
     def counts(self, point: Any) -> bool:
         """Return whether the touch lies within its visit; at its end it is the other side of an impact of no speed."""
-        visit, k = point.path.touched
-        times = point.solved.times
+        (visit, k), times = point.path.touched, point.solved.times
         ends = np.abs(times[visit : visit + 2] - point.path.place[visit, k])
         return float(ends.min()) >= ENDS * float(times[-1])
 
-    def surface(self, curve: Any, point: Any, beyond: Any = None) -> int:
+    def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator that is touched."""
-        return int(curve.walk.net.rows[point.path.which[point.path.touched], 0])
+        return int(point.curve.walk.net.rows[point.path.which[point.path.touched], 0])
 
 
 class Others(Crossed):
     """The condition of another transition holds too at the end of a visit."""
 
-    def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:
-        """The end of the visit, and the other transition."""
-        visit = int(point.path.others.argmax())
-        return visit, int(point.path.other[visit]), point.solved.segments.z[visit], -1
+    def visit(self, point: Any) -> int:
+        """The visit at whose end it does."""
+        return int(point.path.others.argmax())
+
+    def crossing(self, point: Any, visit: int) -> tuple[int, Any, int]:
+        """The other transition."""
+        return int(point.path.other[visit]), point.solved.segments.z[visit], -1
 
 
 class Landed(Crossed):
@@ -188,10 +186,13 @@ class Landed(Crossed):
         """Return whether a reset led there, and not the section, which passes behind a boundary."""
         return int(point.path.landed.argmax()) != 0
 
-    def crossing(self, curve: Any, point: Any) -> tuple[int, int, Any, int]:
-        """The beginning of the visit, and the transition that is reached."""
-        visit = int(point.path.landed.argmax())
-        return visit, int(point.path.landing[visit]), curve.shooting.split(point.X)[1][visit], -1
+    def visit(self, point: Any) -> int:
+        """The visit that begins there."""
+        return int(point.path.landed.argmax())
+
+    def crossing(self, point: Any, visit: int) -> tuple[int, Any, int]:
+        """The transition that is reached, where the visit begins."""
+        return int(point.path.landing[visit]), point.shooting.split(point.X)[1][visit], -1
 
 
 class Unseen(Boundary):
@@ -204,40 +205,22 @@ class Unseen(Boundary):
 
         Margins are looked at in parts of a step: of two extremes within a part none shows. A simulation isolates them.
         """
-        curve, low, high, there = step.curve, 0.0, step.end, step.b
+        low, high, there = 0.0, step.end, step.b
         while high - low > UNSEEN:
             middle = 0.5 * (low + high)
-            point = curve.between(step.a, step.b, middle)
+            point = step.curve.between(step.a, step.b, middle)
             if point is None:
                 return None
-            if curve.shows(point):
+            if step.curve.shows(point):
                 low = middle
             else:
                 high, there = middle, point
         return high, there
 
-    def surface(self, curve: Any, point: Any, beyond: Any = None) -> int:
+    def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator of the first transition that the signature beyond has more often."""
-        return gained(curve, beyond)
+        return gained(point, beyond)
 
 
 #: In the order of ``Path.margins``: what explains the others first.
 BOUNDARIES = (Short(0), Slow(1), Own(2), Touch(3), Others(4), Landed(5))
-
-
-def passed_by(step: Step) -> list[Met]:
-    """Boundaries that a branch passes with its signature, either way; of those met together the best explained.
-
-    Left out are those where the march begins, and what turns the section."""
-    found: list[Met] = []
-    begun = BESIDE if step.first else 0.0
-    for kind, was, now in zip(BOUNDARIES, *step.margins, strict=True):
-        there = kind.located(step) if was * now < 0.0 else None
-        if there is None or there[0] > step.stop:
-            continue
-        jumped = abs(kind.number(step.curve, there[1])) > JUMP * min(max(abs(was), abs(now)), LARGEST)
-        if jumped or not kind.counts(there[1]) or any(abs(there[0] - met.s) <= BESIDE for met in found):
-            continue
-        if there[0] > begun and not (step.cause == "change" and abs(there[0] - step.stop) <= BESIDE):
-            found.append(Met(kind, *there, kind.name))
-    return found

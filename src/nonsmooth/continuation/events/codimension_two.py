@@ -17,14 +17,14 @@ grazing             grazing_fold det(I - M), grazing_flip det(I + M), for M- and
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
 from nonsmooth.continuation.events.boundaries import BOUNDARIES
 from nonsmooth.continuation.events.change import inserted
 from nonsmooth.continuation.events.grazing import both_sides
-from nonsmooth.continuation.march.event import Event, Met, Step, locate
+from nonsmooth.continuation.march.event import Event, Met, Name, Step, locate
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.locus import Locus
 from nonsmooth.continuation.problems.multipliers import pairs, product_of_pairs, without_own
@@ -33,65 +33,48 @@ from nonsmooth.continuation.problems.orbits import OrbitPoint
 
 __all__ = ["KINDS", "AlongCurve"]
 
-#: The kinds that have curves, each with the point of codimension two at which its curve meets a graze.
-KINDS = {
-    "fold": "grazing_fold", "flip": "grazing_flip", "neimark_sacker": "grazing_neimark_sacker",
-    "grazing": "double_grazing",
-}  # fmt: skip
 PAIR = 1e-6  # imaginary part of a complex pair
 NOISE = 1e-6  # a coefficient that stays below this balance vanishes all along (an area-preserving map)
-POLE = 1e-3  # of the numbers at both ends: one that is larger at its root has gone through infinity
 DOUBLE = 1e-5  # two multipliers nearer to -1 than this: rounding decides on the coefficient, which has a pole there
 #: Points at which a Neimark-Sacker curve ends: beyond, the two multipliers are real.
 ENDED = ("resonance_1_1", "resonance_1_2")
-Number = Callable[[Locus, OrbitPoint], float]
 
 
 class CodimensionTwo(Event):
-    """A second number vanishes on a curve of special points."""
+    """A second number vanishes on a curve of special points: a function of the point and given numbers."""
 
     certain = False
 
-    def __init__(self, name: str, number: Number) -> None:
-        self.name, self._number = name, number
+    def __init__(self, name: str, function: Callable[..., float], *given: float) -> None:
+        self.name, self._function, self._given = name, function, given
 
-    def number(self, curve: Any, point: Any) -> float:
+    def number(self, point: Any) -> float:
         """The number."""
-        return self._number(curve, point)
-
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
-        """Its name; None where the number went through infinity."""
-        was, now = (self.number(step.curve, end) for end in (step.a, step.b))
-        if abs(self.number(step.curve, point)) > POLE * max(abs(was), abs(now)):
-            return None
-        return self.name, None
+        return self._function(point, *self._given)
 
 
 class OfPair(CodimensionTwo):
     """A number of the pair on the unit circle of a Neimark-Sacker curve; at 1 and -1 the curve ends."""
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """Its name; None where the pair is real."""
         if self.name in ENDED:
             return self.name, "resonance"
-        return super().named(step, point) if np.abs(point.multipliers.imag).max() >= PAIR else None
+        return (self.name, None) if np.abs(point.multipliers.imag).max() >= PAIR else None
 
 
 class Coefficient(CodimensionTwo):
     """The coefficient of a normal form vanishes."""
 
-    def __init__(self, name: str) -> None:
-        super().__init__(name, lambda curve, point: _coefficient(curve, point)[0])
-
     def happened(self, step: Step, was: float, now: float) -> bool:
         """Return whether its sign changes, and it is not zero all along."""
-        balance = (abs(_coefficient(step.curve, end)[1]) for end in (step.a, step.b))
+        balance = (abs(_coefficient(end, 1)) for end in (step.a, step.b))
         return was * now < 0.0 and max(balance) >= NOISE
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """Its name; None at a 1:2 resonance."""
         resonant = int((np.abs(point.multipliers + 1.0) < DOUBLE).sum()) > 1
-        return None if resonant else super().named(step, point)
+        return None if resonant else (self.name, None)
 
 
 class Cusp(Event):
@@ -100,7 +83,7 @@ class Cusp(Event):
     name = "cusp"
     certain = False
 
-    def number(self, curve: Any, point: Any) -> float:
+    def number(self, point: Any) -> float:
         """Nothing to watch at one point: two directions are compared."""
         return np.nan
 
@@ -108,7 +91,7 @@ class Cusp(Event):
         """Return whether the direction of the parameters turns on the step."""
         return float(step.a.tangent[-2:] @ step.b.tangent[-2:]) < 0.0
 
-    def confirmed(self, curve: Any, point: Any, was: float, now: float) -> bool:
+    def confirmed(self, point: Any, was: float, now: float) -> bool:
         """Return True: it has no number of its own."""
         return True
 
@@ -134,109 +117,60 @@ class AlongCurve(Policy):
     }
 
     def __init__(self, kind: str, forced: bool) -> None:
-        self.kinds, self._graze = _kinds_on(kind, forced), KINDS[kind]
+        self._graze, every, of_forced = KINDS[kind]
+        self.kinds = (*every, *of_forced) if forced else every
 
-    def behind(self, found: March, curve: Locus, met: list[Met]) -> None:
+    def behind(self, found: March, met: list[Met]) -> None:
         """Record the point at which the curve meets a graze or a corner; it ends there."""
         found.ending = met[0].name
-        found.mark(self._graze if met[0].name == "grazing" else met[0].name, curve, met[0].point)
+        found.mark(self._graze if met[0].name == "grazing" else met[0].name, met[0].point)
 
 
-def _kinds_on(kind: str, forced: bool) -> tuple[Event, ...]:
-    """The points of codimension two that curves of one kind are searched for."""
-    own = 0 if forced else 1  # derivatives of p that vanish at 1 anyway
-    if kind == "fold":
-        return (
-            CodimensionTwo("fold_flip", _polynomial(-1.0, 0)),
-            CodimensionTwo("resonance_1_1", _polynomial(1.0, own + 1)),
-            CodimensionTwo("fold_neimark_sacker", _others(1.0)),
-            Cusp(),
-        )
-    if kind == "flip":
-        found: tuple[Event, ...] = (
-            CodimensionTwo("fold_flip", _polynomial(1.0, own)),
-            CodimensionTwo("resonance_1_2", _polynomial(-1.0, 1)),
-            CodimensionTwo("flip_neimark_sacker", _others(-1.0)),
-        )
-        return (*found, Coefficient("generalised_flip")) if forced else found
-    if kind == "neimark_sacker":
-        found = (
-            *(OfPair(name, _sum_and(x)) for name, x in (("resonance_1_1", -2.0), ("resonance_1_2", 2.0),
-                                                        ("resonance_1_3", 1.0), ("resonance_1_4", 0.0))),
-            OfPair("fold_neimark_sacker", _rest(-1.0)), OfPair("flip_neimark_sacker", _rest(1.0)),
-        )  # fmt: skip
-        return (*found, Coefficient("chenciner")) if forced else found
-    found = (
-        CodimensionTwo("grazing_fold", _polynomial(1.0, own)),
-        CodimensionTwo("grazing_flip", lambda _, place: float(np.linalg.det(place.M + np.eye(len(place.M))))),
-    )
-    contact = (CodimensionTwo(name, _with_contact(x)) for name, x in (("grazing_fold", -1.0), ("grazing_flip", 1.0)))
-    return (*found, *contact) if forced else found
-
-
-def _coefficient(locus: Locus, place: OrbitPoint) -> tuple[float, float]:
-    """The normal form's coefficient and its balance, on a curve of flips or of Neimark-Sacker points; NaN: none."""
+def _coefficient(place: OrbitPoint, which: int = 0) -> float:
+    """The normal form's coefficient (1: its balance), on a curve of flips or of Neimark-Sacker points; NaN: none."""
     try:
-        if locus.kind == "flip":
-            return flip_coefficient(locus.shooting, place.solved, locus.scale)
-        mu = complex(place.multipliers[_pair(locus, place)[0]])
+        if cast(Locus, place.curve).kind == "flip":
+            return flip_coefficient(place.shooting, place.solved, place.curve.scale)[which]
+        mu = complex(place.multipliers[_pair(place)[0]])
         if abs(mu.imag) > PAIR:
-            return torus_coefficient(locus.shooting, place.solved, locus.scale, mu)
+            return torus_coefficient(place.shooting, place.solved, place.curve.scale, mu)[which]
     except np.linalg.LinAlgError:  # at a resonance or another multiplier 1 there is none
         pass
-    return np.nan, np.nan
+    return np.nan
 
 
-def _polynomial(x: float, order: int) -> Number:
+def _polynomial(place: OrbitPoint, x: float, order: int) -> float:
     """The characteristic polynomial of M or a derivative at x; NaN where too few multipliers are left for it."""
-
-    def number(locus: Locus, place: OrbitPoint) -> float:
-        least = 2 if locus.shooting.forced else 3
-        if order > (0 if locus.shooting.forced or x != 1.0 else 1) and len(place.M) < least:
-            return np.nan
-        p = np.poly(place.M)
-        return float(np.polyval(np.polyder(p, order), x)) if order else float(np.polyval(p, x))
-
-    return number
+    own = 0 if place.shooting.forced else 1  # derivatives that vanish at 1 anyway
+    if order > 0 and len(place.M) < 2 + own:
+        return np.nan
+    return float(np.polyval(np.polyder(np.poly(place.M), order + (own if x == 1.0 else 0)), x))
 
 
-def _others(own: float) -> Number:
+def _others(place: OrbitPoint, own: float) -> float:
     """prod (mu_i mu_j - 1) of the multipliers without the critical one; NaN without a complex pair."""
-
-    def number(locus: Locus, place: OrbitPoint) -> float:
-        mu = np.delete(place.multipliers, np.abs(place.multipliers - own).argmin())
-        mu = without_own(mu, locus.shooting.forced)
-        return product_of_pairs(mu) if (np.abs(mu.imag) > PAIR).any() else np.nan
-
-    return number
+    mu = np.delete(place.multipliers, np.abs(place.multipliers - own).argmin())
+    mu = without_own(mu, place.shooting.forced)
+    return product_of_pairs(mu) if (np.abs(mu.imag) > PAIR).any() else np.nan
 
 
-def _sum_and(x: float) -> Number:
+def _sum_and(place: OrbitPoint, x: float) -> float:
     """The sum of the pair on the unit circle, and x."""
-
-    def number(locus: Locus, place: OrbitPoint) -> float:
-        i, j = _pair(locus, place)
-        return float((place.multipliers[i] + place.multipliers[j]).real) + x
-
-    return number
+    return float(place.multipliers[list(_pair(place))].sum().real) + x
 
 
-def _rest(sign: float) -> Number:
+def _rest(place: OrbitPoint, sign: float) -> float:
     """prod (1 +- mu) of the multipliers without the pair; NaN where there are none."""
-
-    def number(locus: Locus, place: OrbitPoint) -> float:
-        rest = without_own(np.delete(place.multipliers, _pair(locus, place)), locus.shooting.forced)
-        return float(np.prod(1.0 + sign * rest).real) if len(rest) else np.nan
-
-    return number
+    rest = without_own(np.delete(place.multipliers, _pair(place)), place.shooting.forced)
+    return float(np.prod(1.0 + sign * rest).real) if len(rest) else np.nan
 
 
-def _pair(locus: Locus, place: OrbitPoint) -> tuple[int, int]:
+def _pair(place: OrbitPoint) -> tuple[int, int]:
     """The two multipliers whose product is 1."""
     mu = place.multipliers
     i, j = pairs(len(mu))
     far = np.abs(mu[i] * mu[j] - 1.0)
-    if not locus.shooting.forced:  # the own multiplier 1 is none of them, unless it has become double
+    if not place.shooting.forced:  # the own multiplier 1 is none of them, unless it has become double
         own = int(np.abs(mu - 1.0).argmin())
         if len(mu) > 2:
             far[(i == own) | (j == own)] = np.inf
@@ -244,18 +178,36 @@ def _pair(locus: Locus, place: OrbitPoint) -> tuple[int, int]:
     return (int(i[at]), int(j[at])) if mu[i[at]].imag >= 0.0 else (int(j[at]), int(i[at]))
 
 
-def _with_contact(sign: float) -> Number:
+def _with_contact(place: OrbitPoint, sign: float) -> float:
     """det(I +- M+); where M+ is unbounded (a rigid impact), its leading coefficient."""
+    for change in inserted(place):
+        M, far, near = both_sides(place, change)
+        if not (np.isfinite(far).all() and np.isfinite(near).all()):
+            continue
+        one = np.eye(len(M))
+        if np.abs(near).max() < 1.5 * np.abs(far).max():
+            return float(np.linalg.det(one + sign * (2 * near - far)))
+        return float(np.linalg.det(one + sign * near) - np.linalg.det(one + sign * far)) / np.abs(far).max()
+    return np.nan
 
-    def number(locus: Locus, place: OrbitPoint) -> float:
-        for change in inserted(locus, place):
-            M, far, near = both_sides(locus.shooting, place.solved, change)
-            if not (np.isfinite(far).all() and np.isfinite(near).all()):
-                continue
-            one = np.eye(len(M))
-            if np.abs(near).max() < 1.5 * np.abs(far).max():
-                return float(np.linalg.det(one + sign * (2 * near - far)))
-            return float(np.linalg.det(one + sign * near) - np.linalg.det(one + sign * far)) / np.abs(far).max()
-        return np.nan
 
-    return number
+#: The kinds that have curves, each with the point at which its curve meets a graze, the points of codimension two that
+#: it is searched for, and those of forced orbits besides.
+KINDS: dict[str, tuple[str, tuple[Event, ...], tuple[Event, ...]]] = {
+    "fold": ("grazing_fold", (
+        CodimensionTwo("fold_flip", _polynomial, -1.0, 0), CodimensionTwo("resonance_1_1", _polynomial, 1.0, 1),
+        CodimensionTwo("fold_neimark_sacker", _others, 1.0), Cusp(),
+    ), ()),
+    "flip": ("grazing_flip", (
+        CodimensionTwo("fold_flip", _polynomial, 1.0, 0), CodimensionTwo("resonance_1_2", _polynomial, -1.0, 1),
+        CodimensionTwo("flip_neimark_sacker", _others, -1.0),
+    ), (Coefficient("generalised_flip", _coefficient),)),
+    "neimark_sacker": ("grazing_neimark_sacker", (
+        OfPair("resonance_1_1", _sum_and, -2.0), OfPair("resonance_1_2", _sum_and, 2.0),
+        OfPair("resonance_1_3", _sum_and, 1.0), OfPair("resonance_1_4", _sum_and, 0.0),
+        OfPair("fold_neimark_sacker", _rest, -1.0), OfPair("flip_neimark_sacker", _rest, 1.0),
+    ), (Coefficient("chenciner", _coefficient),)),
+    "grazing": ("double_grazing", (
+        CodimensionTwo("grazing_fold", _polynomial, 1.0, 0), CodimensionTwo("grazing_flip", _polynomial, -1.0, 0),
+    ), (CodimensionTwo("grazing_fold", _with_contact, -1.0), CodimensionTwo("grazing_flip", _with_contact, 1.0))),
+}  # fmt: skip

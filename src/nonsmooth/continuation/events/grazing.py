@@ -13,17 +13,17 @@ decide.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.events.change import Change
 from nonsmooth.continuation.problems.multipliers import multipliers_of
-from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
-from nonsmooth.continuation.problems.shooting import Shooting, Solved
-from nonsmooth.continuation.problems.signature import AT_ONCE, Visit
-from nonsmooth.flow.saltation import chained
+from nonsmooth.continuation.problems.orbits import OrbitPoint
+from nonsmooth.continuation.problems.shooting import Shooting
+from nonsmooth.continuation.problems.signature import AT_ONCE, Round
+from nonsmooth.continuation.problems.visits import led
 from nonsmooth.flow.variational import VariationalFlow
 
 __all__ = ["Graze", "both_sides", "graze"]
@@ -44,16 +44,15 @@ class Graze:
     doubled: bool  # an orbit of twice the period is born here
 
 
-def graze(curve: Orbits, point: OrbitPoint, first: OrbitPoint, change: Change) -> Graze | None:
-    """Judge the graze at ``point``, where ``curve`` ends; ``first`` is the first point behind it."""
-    shooting = curve.shooting
-    M, M_far, M_near = both_sides(shooting, point.solved, change)
+def graze(point: OrbitPoint, first: OrbitPoint, change: Change) -> Graze | None:
+    """Judge the graze at ``point``, where its curve ends; ``first`` is the first point behind it."""
+    M, M_far, M_near = both_sides(point, change)
     if not (np.isfinite(M).all() and np.isfinite(M_far).all() and np.isfinite(M_near).all()):
         return None
     bounded = bool(np.abs(M_near).max() < 1.5 * np.abs(M_far).max())
     M_plus = 2 * M_near - M_far if bounded else M_near
     one = np.eye(len(M))
-    if shooting.forced:
+    if point.shooting.forced:
         same = bool(np.linalg.det(one - M) * np.linalg.det(one - M_plus) > 0)
     else:  # a multiplier 1 by nature makes det(I - M) vanish: the parameter's own turn tells the side
         same = float(point.tangent[-1]) * float(first.X[-1] - point.X[-1]) > 0.0
@@ -64,79 +63,38 @@ def graze(curve: Orbits, point: OrbitPoint, first: OrbitPoint, change: Change) -
     )  # fmt: skip
 
 
-def both_sides(shooting: Shooting, solved: Solved, change: Change) -> tuple[FloatArray, FloatArray, FloatArray]:
+def both_sides(point: OrbitPoint, change: Change) -> list[FloatArray]:
     """M-, and M+ looked at from ``ASIDE`` and from half of it (their limit, where there is one)."""
-    if change.gained:
-        visits, (times, states) = shooting.signature.visits, shooting.split(solved.X)
-    else:
-        visits, times, states = change.signature.visits, change.times, change.states
-    product = _Product(shooting.flow, solved.values, visits, times, states, float(solved.times[-1]), change)
-    matrices = product(0.0), product(ASIDE), product(0.5 * ASIDE)
-    for matrix in matrices:
-        matrix[shooting.free], matrix[:, shooting.free] = 0.0, 0.0
-    return matrices
+    old, flow = point.shooting, point.shooting.flow
+    found = []
+    for once in (change.free, *(_beside(flow, point.solved.values, change, x) for x in (ASIDE, 0.5 * ASIDE))):
+        shooting, X = Shooting.of(old.system, once, old.active, point.X[old.size :])
+        shooting.anchor(X[: old.n], point.solved.values, point.curve.size)
+        found.append(shooting.evaluate(X).monodromy)
+    return found
 
 
-@dataclass
-class _Product:
-    """The monodromy matrix of the orbit at the graze, without its contact or with it."""
+def _beside(flow: VariationalFlow, values: FloatArray, change: Change, aside: float) -> Round:
+    """The round with the contact entered so far (periods) before the touch, and left at it or as long after it.
 
-    flow: VariationalFlow
-    values: FloatArray
-    visits: tuple[Visit, ...]
-    times: FloatArray
-    states: FloatArray
-    end: float
-    change: Change
-
-    def __call__(self, aside: float) -> FloatArray:
-        """With ``aside`` > 0 the contact's saltation matrices are put in, looked at so far from the touch (periods)."""
-        M = np.eye(self.flow.n)
-        begin, taken = 0.0, None
-        for i, visit in enumerate(self.visits):
-            end = self.end if i == len(self.times) else float(self.times[i])
-            if i == self.change.place and aside > 0.0:
-                step, z = self._through(visit.mode, begin, end, self.states[i], aside * self.end)
-            else:
-                step, z = self._leg(visit.mode, begin, end, self.states[i])
-            M = step @ M
-            if i < len(self.times):
-                jump = self.flow.jump(self.values, visit.transition, end, z, visit.row)
-                taken = chained([taken, jump]) if taken is not None and visit.row == AT_ONCE else jump
-                if self.visits[i + 1].row != AT_ONCE:
-                    M = taken.saltation @ M
-            begin = end
-        return np.asarray(M)
-
-    def _leg(self, mode: int, begin: float, end: float, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        segments = self.flow.segments(self.values, [mode], [begin], [end - begin], z[None, :])
-        return segments.Phi[0], segments.z[0]
-
-    def _through(
-        self, mode: int, begin: float, end: float, z: FloatArray, aside: float
-    ) -> tuple[FloatArray, FloatArray]:
-        """The visit that the contact interrupts: entered a little before the touch, left as long after it.
-
-        An impact is looked at before the touch, where the indicator still rises; the motion goes on from the touch."""
-        touch, inserted = self.change.touch, self.change.inserted
-        first, z = self._leg(mode, begin, touch - aside, z)
-        taken = [inserted[0].transition]
-        for visit in inserted[1:]:
-            if visit.row == AT_ONCE:
-                taken.append(visit.transition)
-        entry = self.flow.jump(self.values, taken, touch - aside, z, inserted[0].row)
-        if len(taken) == len(inserted):
-            there, z = self._leg(mode, touch - aside, touch, z)
-            rest, z = self._leg(mode, touch, end, z)
-            # Phi of the last stretch before the touch belongs behind the impact, to the order of ``aside``.
-            return rest @ there @ entry.saltation @ first, z
-        # The way back is looked at where the touch is, unless that is a touch for it too (no damper).
-        inside, at_touch = self._leg(inserted[1].mode, touch - aside, touch, entry.z_after)
-        leave = self.flow.jump(self.values, inserted[1].transition, touch, at_touch, inserted[1].row)
-        leaves = touch
-        if abs(leave.rate) < abs(entry.rate):
-            inside, z = self._leg(inserted[1].mode, touch - aside, touch + aside, entry.z_after)
-            leaves = touch + aside
-            leave = self.flow.jump(self.values, inserted[1].transition, leaves, z, inserted[1].row)
-        rest, z = self._leg(mode, leaves, end, leave.z_after)
-        return rest @ leave.saltation @ inside @ entry.saltation @ first, z
+    An impact is looked at before the touch, where the indicator still rises; the motion goes on from the touch."""
+    once, i, aside = change.contact, change.place, aside * change.contact.period
+    visits, times, states = once.signature.visits[i : i + change.count], once.times.copy(), once.states.copy()
+    touch, begin = float(times[i]), float(times[i - 1]) if i else 0.0
+    times[i : i + len(visits)] = enters = touch - aside
+    before = after = led(flow, values, visits[0].mode, begin, enters - begin, states[i])
+    rate = flow.jump(values, visits[0].transition, enters, before, visits[0].row).rate
+    for visit in visits:
+        i += 1
+        if visit is not visits[0] and visit.row != AT_ONCE:  # the way back
+            # It is looked at where the touch is, unless that is a touch for it too (no damper).
+            for leaves in (touch, touch + aside):
+                z = led(flow, values, visit.mode, enters, leaves - enters, after)
+                leave = flow.jump(values, visit.transition, leaves, z, visit.row)
+                if abs(leave.rate) >= abs(rate):
+                    break
+            times[i - 1], states[i] = leaves, leave.z_after
+            return replace(once, times=times, states=states)
+        states[i] = after = flow.jump(values, visit.transition, enters, after, visit.row).z_after
+    states[i] = before
+    return replace(once, times=times, states=states)

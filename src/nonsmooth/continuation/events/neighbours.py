@@ -15,11 +15,10 @@ from itertools import pairwise
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.events.change import Change, common_orbit
-from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
-from nonsmooth.continuation.problems.rounds import Rounds
-from nonsmooth.continuation.problems.shooting import Solved
-from nonsmooth.continuation.searches.settled import Guess, touching
+from nonsmooth.continuation.events.change import Change, Common, common_orbit
+from nonsmooth.continuation.problems.orbits import OrbitPoint
+from nonsmooth.continuation.problems.signature import Round
+from nonsmooth.continuation.searches.settled import touching
 
 __all__ = ["beside"]
 
@@ -37,97 +36,80 @@ BACK = 1e-3  # of its distance: an orbit nearer than this to the branch that has
 AGAIN = 3  # times that Newton's method is begun with one signature
 
 
-def beside(
-    curve: Orbits, point: OrbitPoint, contacts: Sequence[tuple[Change, OrbitPoint]] = ()
-) -> tuple[Orbits, OrbitPoint] | None:
+def beside(point: OrbitPoint, contacts: Sequence[tuple[Change, OrbitPoint]] = ()) -> OrbitPoint | None:
     """The orbit with which a branch goes on at ``point``, where its signature ends, on a curve of its own.
 
     ``contacts`` are those that may begin or end there. Its tangent leads away from there. None where there is none, or
     no simulated round shows it."""
-    common = [end for change, there in contacts if (end := common_orbit(curve, there, change)) is not None]
-    forward, here = float(np.sign(point.tangent[-1])) or 1.0, float(point.X[-1])
+    common = [end for change, there in contacts if (end := common_orbit(there, change)) is not None]
+    forward = float(np.sign(point.tangent[-1])) or 1.0
     nearest: dict[float, list[float]] = {forward: [], -forward: []}  # of those found, at each distance
     for aside in ASIDE:
         for side, before in nearest.items():
             least = np.inf
-            for other, found in _found(curve, point, common, side, aside):
-                apart = _apart(curve, point, found)
-                if (_arrives(curve, point, other, found, here) or _shrink([*before, apart])) and not _leads_back(
-                    curve, point, found
-                ):
-                    facing = side * float(found.tangent[-1]) >= 0.0
-                    return other, found if facing else found.turned()
+            for found in _found(point, common, side, aside):
+                apart = _apart(point, found)
+                if (_arrives(point, found) or _shrink([*before, apart])) and not _leads_back(point, found):
+                    return found if side * float(found.tangent[-1]) >= 0.0 else found.turned()
                 least = min(least, apart)
             before.append(least)
     return None
 
 
-def _found(
-    curve: Orbits, point: OrbitPoint, common: list[tuple[Orbits, Solved, FloatArray]], side: float, aside: float
-) -> Iterator[tuple[Orbits, OrbitPoint]]:
+def _found(point: OrbitPoint, common: list[Common], side: float, aside: float) -> Iterator[OrbitPoint]:
     """Orbits at one distance on one side of the parameter that simulated rounds show, on curves of their own."""
-    shooting = curve.shooting
+    shooting, curve = point.shooting, point.curve
     values = point.solved.values.copy()
-    values[shooting.places] = there = np.array([float(point.X[-1]) + side * aside * curve.width])
-    rounds = curve.rounds
+    values[shooting.places] = there = np.array([point.value + side * aside * curve.width])
     tried = Counter({shooting.signature.cycle: AGAIN})
-    for guess in _guesses(curve, point, common, rounds, values, side, aside):
+    for guess in _guesses(point, common, values, side * aside):
         for _ in range(ROUNDS):
             if guess is None or tried[guess.signature.cycle] >= AGAIN:
                 break
             tried[guess.signature.cycle] += 1
-            other, X = curve.with_signature(guess.signature, guess.times, guess.states, guess.period, there)
+            other, X = curve.around(guess, there)
             found = other.at_parameter(X / other.scale, float(there[0]))
-            if found is None or not _apart(curve, point, found) < NEAR:
+            if found is None or not _apart(point, found) < NEAR:
                 break
-            if not found.virtual and rounds.shows(other.shooting, found.X, values):
-                yield other, found
+            if not found.virtual and curve.rounds.shows(other.shooting, found.X, values):
+                yield found
                 break
-            guess = rounds.read(other.shooting, found.X, values)  # no orbit of the system: what its round shows is next
+            # No orbit of the system: what its round shows is next.
+            guess = curve.rounds.read(other.shooting, found.X, values)
 
 
-def _guesses(
-    curve: Orbits, point: OrbitPoint, common: list[tuple[Orbits, Solved, FloatArray]], rounds: Rounds,
-    values: FloatArray, side: float, aside: float,
-) -> Iterator[Guess | None]:  # fmt: skip
+def _guesses(point: OrbitPoint, common: list[Common], values: FloatArray, ahead: float) -> Iterator[Round | None]:
     """Rounds along the branch, from the end of the signature itself, and about it; that end without its touches.
 
     First the common orbits of contacts, along their tangents: beyond an impact without speed a round shows none nearby.
     """
     for other, there, tangent in common:
         if abs(float(tangent[-1])) > STEEP:
-            yield _as_guess(other, there, there.X + side * aside / float(tangent[-1]) * tangent * other.scale)
-    shooting, slope = curve.shooting, float(point.tangent[-1])
+            yield other.shooting.once(there.X + ahead / float(tangent[-1]) * tangent * other.scale)
+    shooting, curve, slope = point.shooting, point.curve, float(point.tangent[-1])
+    rounds = curve.rounds
     if abs(slope) > STEEP:
-        yield rounds.read(shooting, point.X + side * aside / slope * point.tangent * curve.scale, values)
+        yield rounds.read(shooting, point.X + ahead / slope * point.tangent * curve.scale, values)
     yield rounds.read(shooting, point.X, values)
-    yield from touching(_as_guess(curve, point.solved, point.X), shooting.system)
+    yield from touching(shooting.once(point.X), shooting.system)
     random = np.random.default_rng(0)
     for i in range(PERTURBED):
-        change = aside ** POWERS[i % 3] * random.uniform(-1.0, 1.0, shooting.n) * curve.size
+        change = abs(ahead) ** POWERS[i % 3] * random.uniform(-1.0, 1.0, shooting.n) * curve.size
         yield rounds.read(shooting, point.X, values, change)
 
 
-def _as_guess(curve: Orbits, near: Solved, X: FloatArray) -> Guess:
-    """Unknowns near a solved orbit of a curve as an interval of motion."""
-    shooting = curve.shooting
-    period = float(near.times[-1]) if shooting.forced else float(X[shooting.size - 1])
-    return Guess(shooting.period_number, period, shooting.signature, *shooting.split(X))
-
-
-def _apart(curve: Orbits, a: OrbitPoint, b: OrbitPoint) -> float:
+def _apart(a: OrbitPoint, b: OrbitPoint) -> float:
     """Largest difference of extremes, in units of the states' sizes, and of the periods."""
-    size = curve.size[: len(a.path.maximum)]
+    size = a.curve.size[: len(a.path.maximum)]
     extremes = np.concatenate([(a.path.maximum - b.path.maximum) / size, (a.path.minimum - b.path.minimum) / size])
-    period = abs(float(a.solved.times[-1] - b.solved.times[-1])) / curve.period
+    period = abs(float(a.solved.times[-1] - b.solved.times[-1])) / a.curve.period
     return max(float(np.nanmax(np.abs(extremes), initial=0.0)), period)
 
 
-def _arrives(curve: Orbits, point: OrbitPoint, other: Orbits, found: OrbitPoint, here: float) -> bool:
+def _arrives(point: OrbitPoint, found: OrbitPoint) -> bool:
     """Return whether the orbits found come to ``point`` as the parameter comes back to it."""
-    value = here + NEARER * (float(found.X[-1]) - here)
-    nearer = other.at_parameter(found.Y, value)
-    return nearer is not None and _apart(curve, point, nearer) <= SHRINKS * _apart(curve, point, found) + 1e-9
+    nearer = found.curve.at_parameter(found.Y, point.value + NEARER * (found.value - point.value))
+    return nearer is not None and _apart(point, nearer) <= SHRINKS * _apart(point, found) + 1e-9
 
 
 def _shrink(distances: list[float]) -> bool:
@@ -138,10 +120,9 @@ def _shrink(distances: list[float]) -> bool:
     return len(last) == CHAIN and all(a <= LINEAR * b for a, b in pairwise(last))
 
 
-def _leads_back(curve: Orbits, point: OrbitPoint, found: OrbitPoint) -> bool:
+def _leads_back(point: OrbitPoint, found: OrbitPoint) -> bool:
     """Return whether an orbit lies on the branch that has come to ``point``, whatever its signature says."""
-    value = float(found.X[-1])
-    if (value - float(point.X[-1])) * float(point.tangent[-1]) > 0.0:
+    if (found.value - point.value) * float(point.tangent[-1]) > 0.0:
         return False
-    own = curve.at_parameter(point.Y, value)
-    return own is not None and _apart(curve, own, found) < BACK * _apart(curve, point, found)
+    own = point.curve.at_parameter(point.Y, found.value)
+    return own is not None and _apart(own, found) < BACK * _apart(point, found)

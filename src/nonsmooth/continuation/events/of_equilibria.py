@@ -6,9 +6,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step
+from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Name, Step
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
-from nonsmooth.continuation.problems.equilibrium import FREE, Equilibria, Rest, equilibria_near, goes_on
+from nonsmooth.continuation.problems.equilibrium import FREE, Rest, equilibria_near, goes_on
 from nonsmooth.continuation.problems.multipliers import pairs
 
 __all__ = ["AlongEquilibria", "beyond"]
@@ -23,14 +23,14 @@ class Hopf(Event):
 
     name = "hopf"
 
-    def number(self, curve: Any, point: Any) -> float:
+    def number(self, point: Any) -> float:
         """The product of all sums of two eigenvalues."""
         if len(point.eigenvalues) < 2:
             return 1.0
         i, j = pairs(len(point.eigenvalues))
         return float(np.prod(point.eigenvalues[i] + point.eigenvalues[j]).real)
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """None where the sum of two real eigenvalues vanishes."""
         nearest = point.eigenvalues[np.argmin(np.abs(point.eigenvalues.real))]
         if abs(nearest.imag) <= 1e-9:
@@ -43,9 +43,9 @@ class Edge(Event):
 
     name = "boundary_equilibrium"
 
-    def number(self, curve: Any, point: Any) -> float:
+    def number(self, point: Any) -> float:
         """The least distance to a transition."""
-        return float(curve.margins(point)[0])
+        return float(point.curve.margins(point)[0])
 
     def happened(self, step: Step, was: float, now: float) -> bool:
         """Return whether the equilibrium leaves its mode on the step."""
@@ -84,32 +84,32 @@ class AlongEquilibria(Policy):
                 far, point = s, there or point
         return Met(self.boundaries[0], far, point, self.boundaries[0].name)
 
-    def behind(self, found: March, curve: Equilibria, met: list[Met]) -> tuple[Equilibria, Rest] | None:
+    def behind(self, found: March, met: list[Met]) -> Rest | None:
         """Record the boundary, and whether the branch goes on behind it or turns back; the equilibrium there, or None.
 
         Persistence: on the other side of the boundary lies an equilibrium of the mode beyond. Non-smooth fold: it lies
         on the same side, and both meet and vanish."""
         rest = met[0].point
-        after = beyond(curve, rest)
+        after = beyond(rest)
         if after is None:
             found.ending = "boundary"
-        corner = rest.margins[len(curve.system.transitions) :].max(initial=-np.inf) > -0.5 * FREE
+        corner = rest.margins[len(rest.curve.system.transitions) :].max(initial=-np.inf) > -0.5 * FREE
         if after is None or not corner:  # else another point of the set is its extreme from here on
-            ahead = after is not None and float(rest.tangent[-1]) * float(after[1].tangent[-1]) > 0.0
+            ahead = after is not None and float(rest.tangent[-1]) * float(after.tangent[-1]) > 0.0
             graze = "" if after is None else "persistence" if ahead else "non_smooth_fold"
-            found.mark(met[0].name, curve, rest, graze=graze)
+            found.mark(met[0].name, rest, graze=graze)
         return after
 
 
-def beyond(curve: Equilibria, rest: Rest) -> tuple[Equilibria, Rest] | None:
+def beyond(rest: Rest) -> Rest | None:
     """The equilibrium, or the set of them, behind a boundary, where the two meet; None where there is none."""
-    system, parameter, width = curve.system, curve.parameter, curve.width
-    scale, facing = system.scale_vector(), float(np.copysign(1.0, rest.tangent[-1]))
+    curve = rest.curve
+    scale, facing = curve.system.scale_vector(), float(np.copysign(1.0, rest.tangent[-1]))
     for ahead in (facing, -facing):
-        value = rest.value + BEYOND * width * ahead
-        for other, first in equilibria_near(system, parameter, width, rest.u, value):
-            if other.word() == curve.word():
+        value = rest.value + BEYOND * curve.width * ahead
+        for first in equilibria_near(curve.system, curve.parameter, curve.width, rest.u, value):
+            if first.curve.word() == curve.word():
                 continue  # back lies the branch that has come here
             if goes_on(rest, first, NEAR * scale) and (first.margins < 0.0).all():
-                return other, first.facing(ahead)
+                return first.facing(ahead)
     return None

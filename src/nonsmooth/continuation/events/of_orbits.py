@@ -1,4 +1,6 @@
-r"""Special points of branches of orbits that do not end a signature.
+r"""Special points of branches of orbits, and the end of a signature: its record, and the orbit with which it goes on.
+
+Special points that do not end a signature:
 
 fold
     the parameter turns: the tangent's last component vanishes;
@@ -12,39 +14,89 @@ neimark_sacker
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from nonsmooth.continuation.march.event import Crossing, Event, Fold, Step
+from nonsmooth.continuation.events.boundaries import BOUNDARIES, Boundary, Crossed, Unseen
+from nonsmooth.continuation.events.change import Change, common_point, is_tolerance, past_the_section, rest_after
+from nonsmooth.continuation.events.grazing import graze
+from nonsmooth.continuation.events.neighbours import beside
+from nonsmooth.continuation.events.sliding import sliding_bifurcation
+from nonsmooth.continuation.march.event import BESIDE, LARGEST, Crossing, Event, Fold, Met, Name, Step, first_met
+from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
+from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
+from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.primitive import is_doubled
+from nonsmooth.continuation.problems.shooting import Shooting
+from nonsmooth.errors import SystemDefinitionError
 
-__all__ = ["KINDS", "SMALL", "Flip", "FoldOfOrbits", "NeimarkSacker"]
+__all__ = ["ENDINGS", "AlongOrbits"]
 
 POLE = 1e-2  # of a multiplier from 1 or -1: farther off it is no fold, no flip, but a contact of no length
 NOTHING = 2e-2  # of the first orbit's size: a fold there is the cycle's birth
 SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish in a Hopf bifurcation
+FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
+WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
+AHEAD = 1e-6  # of the range
+WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
+#: How a branch can end, with the sentence for each.
+ENDINGS = {
+    "range": "The branch reached the edge of the range.",
+    "branching": "The branch begins where it leaves another one.",
+    "closed": "The branch came back to where it began.",
+    "points": "The largest number of points was reached; continue the branch with continue_orbit(branch).",
+    "equilibrium": (
+        "The cycle shrinks to an equilibrium, a Hopf bifurcation: continue_equilibrium finds it to the last digit."
+    ),
+    "focus_centre": (
+        "The cycle ends in a focus-centre bifurcation: it only touches the boundary of a mode that is linear, and at "
+        "this value all smaller orbits of that mode are closed."
+    ),
+    "no_convergence": (
+        "Newton's method did not converge, however small the step; the orbit may end in an event that is not known "
+        "here (a chatter, an infinite period)."
+    ),
+    "grazing": (
+        "The orbit touches a boundary and no orbit near it goes on: beyond this point the motion leaves for another "
+        "attractor."
+    ),
+    "corner": "The orbit meets the corner of two boundaries, and no orbit near it goes on.",
+    "physical": "Beyond this value the equations do not allow the parameter: the range was cut there.",
+    "circle": "The virtual branch came back to an earlier point of its own and goes round from here on.",
+    "landing": (
+        "A reset leads just onto a boundary: beyond this point it leads behind it, where another transition follows at "
+        "the same instant."
+    ),
+    "interrupted": INTERRUPTED + "; continue the branch with continue_orbit(branch).",
+    "homoclinic": (
+        "The period grows beyond all bounds while states and parameter stand: the cycle ends in a homoclinic (or "
+        "heteroclinic) orbit, a connection of equilibria beside which it waits ever longer."
+    ),
+}
 
 
 class FoldOfOrbits(Fold):
     """Two orbits meet; a branch of cycles that emanates from a Hopf point turns there too."""
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """A Hopf point, which ends the branch, where the cycle is small."""
-        if step.curve.shooting.forced and np.abs(point.multipliers - 1.0).min() > POLE:
+        if point.shooting.forced and np.abs(point.multipliers - 1.0).min() > POLE:
             return None  # a contact of no length turns the parameter too, without a multiplier 1
-        return ("hopf", "equilibrium") if step.curve.swing(point) < NOTHING else ("fold", None)
+        return ("hopf", "equilibrium") if point.curve.swing(point) < NOTHING else ("fold", None)
 
 
 class CrossingOfOrbits(Crossing):
     """Another branch of orbits crosses."""
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """The flip of the orbit of half the period, which ends the branch, or a crossing by its name."""
-        if step.curve.shooting.forced and np.abs(point.multipliers - 1.0).min() > POLE:
+        if point.shooting.forced and np.abs(point.multipliers - 1.0).min() > POLE:
             return None  # a contact of no length turns the determinant's sign too
-        if is_doubled(step.curve, point):
+        if is_doubled(point):
             return "flip", "branching"
         return super().named(step, point)
 
@@ -54,14 +106,14 @@ class Flip(Event):
 
     name = "flip"
 
-    def number(self, curve: Any, point: Any) -> float:
+    def number(self, point: Any) -> float:
         """det(M + I)."""
         M = point.M
         if M.shape == (2, 2):
             return float(1.0 + M[0, 0] + M[1, 1] + (M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]))
         return float(np.linalg.det(M + np.eye(len(M))))
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """None where no multiplier is near -1."""
         return None if np.abs(point.multipliers + 1.0).min() > POLE else (self.name, None)
 
@@ -71,15 +123,174 @@ class NeimarkSacker(Event):
 
     name = "neimark_sacker"
 
-    def number(self, curve: Any, point: Any) -> float:
+    def number(self, point: Any) -> float:
         """The product of (mu_i mu_j - 1) over all pairs."""
-        return product_of_pairs(without_own(point.multipliers, curve.shooting.forced))
+        return product_of_pairs(without_own(point.multipliers, point.shooting.forced))
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """None where two real multipliers have the product 1."""
         mu = point.multipliers
         near = mu[np.abs(np.abs(mu) - 1.0) < 1e-3]
         return (self.name, None) if (np.abs(near.imag) > 1e-6).any() else None
 
 
-KINDS = (FoldOfOrbits(), CrossingOfOrbits(), Flip(), NeimarkSacker())
+class AlongOrbits(Policy):
+    """Special points of periodic orbits, and the boundaries of their signatures."""
+
+    kinds = (FoldOfOrbits(), CrossingOfOrbits(), Flip(), NeimarkSacker())
+    boundaries = BOUNDARIES
+    endings = ENDINGS
+
+    def __init__(self) -> None:
+        self._unwatched: Shooting | None = None  # of a curve whose points simulated rounds do not confirm
+
+    def unseen(self, step: Step) -> Met | None:
+        """The first place on a step where only a simulated round tells that the signature ends."""
+        shooting = step.b.shooting
+        if step.virtual or shooting is self._unwatched or step.curve.shows(step.b):
+            return None
+        met = Unseen().met(step)
+        if met is None or beside(met.point) is not None:
+            return met
+        warnings.warn(
+            f"a simulation of the orbit at {shooting.active[-1]} = {met.point.value!r} takes other transitions than "
+            "the branch: its points from here on are not confirmed",
+            RuntimeWarning, stacklevel=2,
+        )  # fmt: skip
+        self._unwatched = shooting
+        return None
+
+    def passed_by(self, step: Step) -> list[Met]:
+        """Boundaries that a virtual branch passes, either way; of those met together the best explained.
+
+        Left out are those where the march begins, and what turns the section."""
+        found: list[Met] = []
+        begun = BESIDE if step.first else 0.0
+        for kind, was, now in zip(BOUNDARIES, *step.margins, strict=True):
+            met = kind.met(step) if was * now < 0.0 else None
+            if met is None or met.s > step.stop:
+                continue
+            ends = np.clip((was, now), -LARGEST, LARGEST)
+            counts = kind.confirmed(met.point, *ends) and kind.counts(met.point)
+            if not counts or any(abs(met.s - one.s) <= BESIDE for one in found):
+                continue
+            if met.s > begun and not (step.cause == "change" and abs(met.s - step.stop) <= BESIDE):
+                found.append(met)
+        return found
+
+    def record(self, found: March, step: Step, met: Met) -> None:
+        """List a special point, or a boundary that a branch passes with its signature."""
+        if isinstance(met.kind, Boundary):
+            mark(found, [met], beside(met.point, contacts_of([met])))
+        else:
+            super().record(found, step, met)
+
+    def behind(self, found: March, met: list[Met]) -> OrbitPoint | None:
+        """Record a change of signature and begin anew behind it; None where the branch ends."""
+        first = met[0]
+        if len(met) == 1 and first.kind.at_section(first.point):
+            after = past_the_section(first.point)
+            if after is not None and (after.path.margins[1:] >= 0.0).all():
+                return after  # else another boundary is met with the section
+        beyond = beside(first.point, contacts_of(met))
+        if beyond is not None and _completes(met, beyond):
+            return beyond
+        name = mark(found, met, beyond)
+        if beyond is None and _is_centre(first):
+            found.ending = found.special[-1].kind = "focus_centre"
+        elif beyond is None:
+            found.ending = first.kind.ending or name
+        elif is_doubled(beyond) and not is_doubled(first.point):
+            # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
+            found.ending = "branching"
+            return None
+        return beyond
+
+    def over(self, point: OrbitPoint) -> str | None:
+        """Return ``equilibrium`` where an autonomous orbit has all but shrunk to one, ``homoclinic`` where it only
+        grows longer: states and parameter stand, beside an equilibrium it waits for ever."""
+        shooting, along = point.shooting, np.abs(point.tangent)
+        if point.curve.swing(point) < SMALL:
+            return "equilibrium"
+        stands = along[-1] < WAITS**2 and along[: shooting.n].max() < WAITS
+        return "homoclinic" if not shooting.forced and stands and point.tangent[shooting.size - 1] > 0.0 else None
+
+    def why(self, point: OrbitPoint) -> str:
+        """Return ``physical`` where the equations do not allow the parameter ahead."""
+        ahead = point.value + AHEAD * point.curve.width * float(np.sign(point.tangent[-1]))
+        try:
+            point.shooting.system.with_parameters({point.shooting.active[-1]: ahead})
+        except (SystemDefinitionError, ValueError):
+            return "physical"
+        return "no_convergence"
+
+
+def _completes(met: list[Met], beyond: OrbitPoint) -> bool:
+    """Return whether only the speed below which impacts are completed as rest is reached.
+
+    An impact that vanishes far from rest passes that speed too, and is a graze."""
+    passed = [one for one in met if is_tolerance(one.point, one.kind.surface(one.point, beyond))]
+    if not passed:
+        return False
+    kind, point = passed[0].kind, passed[0].point
+    same = beyond.shooting.m == point.shooting.m or not isinstance(kind, Crossed)
+    return same or rest_after(point, kind.visit(point)) is not None
+
+
+def _is_centre(met: Met) -> bool:
+    """Return whether an autonomous orbit has shrunk to a closed one of a linear mode."""
+    point = met.point
+    if point.shooting.forced:
+        return False
+    system, name, width = point.shooting.system, point.shooting.active[0], point.curve.width
+    free = [change.new.signature for change in met.kind.contacts(point) if not change.gained]
+    return any(not one.crossings and Equilibria(system, one.visits[0].mode, name, width).linear for one in free)
+
+
+def contacts_of(met: list[Met]) -> list[tuple[Change, OrbitPoint]]:
+    """The contacts that may begin or end with what is met, each with the orbit there."""
+    return [(change, one.point) for one in met for change in one.kind.contacts(one.point)]
+
+
+def mark(found: March, met: list[Met], beyond: OrbitPoint | None) -> str:
+    """Record the end of a signature, by the contact that begins or ends there where one does; its name."""
+    kind, point = met[0].kind, met[0].point
+    sliding = "" if beyond is None else sliding_bifurcation(point, beyond)
+    if beyond is not None:
+        cycle = beyond.shooting.signature.cycle
+        for change, there in contacts_of(met):
+            if change.new.signature.cycle == cycle:
+                # The orbit without the contact, whichever side the branch came from.
+                free = there if change.gained else common_point(there, change) or beyond
+                judged = graze(there, beyond, change)
+                found.mark("grazing", free, indicator=change.indicator, graze=judged, sliding=sliding)
+                return "grazing"
+        end = _from_behind(point, beyond)
+        if end is not None and _is_better(met[0], end.point):
+            kind, point = end.kind, end.point
+    own = kind.contacts(point)
+    name = "grazing" if own else kind.name
+    indicator = own[0].indicator if own else kind.surface(point, beyond)
+    found.mark(name, point, indicator=indicator, sliding=sliding)
+    return name
+
+
+def _from_behind(point: OrbitPoint, first: OrbitPoint) -> Met | None:
+    """The end of the new signature seen from its first orbit: the place at which the old one ends."""
+    fresh, back = first.curve, first.turned()
+    away, steep = abs(float(first.X[-1] - point.X[-1])) / fresh.width, abs(float(first.tangent[-1]))
+    new = fresh.step(back, 2.0 * away / steep) if steep * FARTHEST > away else None
+    if new is None:
+        return None
+    met = first_met(Step(back, new, ([], []), (fresh.margins(back), fresh.margins(new)), True), BOUNDARIES)
+    return replace(met[0], point=met[0].point.turned()) if met else None
+
+
+def _is_better(met: Met, there: OrbitPoint) -> bool:
+    """Return whether the end of the new signature, ``there``, is a better place of a corner than that of the old one.
+
+    A visit that ends as it begins, at a double zero, is located badly."""
+    if met.kind.place < 0:  # no margin tells where it is: within the interval that simulations leave
+        return abs(float(there.X[-1] - met.point.X[-1])) < WITHIN * there.curve.width
+    new, old = (np.linalg.cond(point.solved.jacobian * point.curve.weights) for point in (there, met.point))
+    return bool(new < old)

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+from nonsmooth.continuation.problems.orbits import OrbitPoint
 
 __all__ = ["sliding_bifurcation"]
 
@@ -38,26 +38,24 @@ class _Stay(NamedTuple):
     z: FloatArray = np.empty(0)
 
 
-def sliding_bifurcation(curve: Orbits, point: OrbitPoint, fresh: Orbits, first: OrbitPoint) -> str:
+def sliding_bifurcation(point: OrbitPoint, first: OrbitPoint) -> str:
     """The name of the sliding bifurcation between an orbit and the ``first`` one beyond it, on a curve of its own.
 
     Empty where another event changes the signature, or events of different names at one instant."""
-    sides = [(curve, point, _round(curve, point)), (fresh, first, _round(fresh, first))]
-    (_, _, short), (curve, point, long) = sorted(sides, key=lambda side: len(side[2]))
-    end = [stay.mode for stay in short]
-    names = set()
+    (_, short), (point, long) = sorted(((one, _round(one)) for one in (point, first)), key=lambda side: len(side[1]))
+    end, names = [stay.mode for stay in short], set()
     while len(long) > len(end):
         i = min(range(len(long)), key=lambda i: long[i].length)
-        names.add(_name(curve, point.solved.values, long[i - 1], long[i], long[(i + 1) % len(long)]))
+        names.add(_name(point, long[i - 1], long[i], long[(i + 1) % len(long)]))
         long = _without(long, i)
     modes = [stay.mode for stay in long]
     same = any(modes[i:] + modes[:i] == end for i in range(len(modes)))
     return names.pop() if same and len(names) == 1 else ""
 
 
-def _round(curve: Orbits, point: OrbitPoint) -> list[_Stay]:
+def _round(point: OrbitPoint) -> list[_Stay]:
     """The visits once round; the first and the last one are one."""
-    visits, times, before = curve.shooting.signature.visits, point.solved.times, point.solved.segments.z
+    visits, times, before = point.shooting.signature.visits, point.solved.times, point.solved.segments.z
     lengths = np.diff(times)
     if len(visits) == 1:
         return [_Stay(visits[0].mode, float(lengths[0]))]
@@ -74,12 +72,12 @@ def _without(stays: list[_Stay], i: int) -> list[_Stay]:
     return rest
 
 
-def _name(curve: Orbits, values: FloatArray, before: _Stay, gone: _Stay, after: _Stay) -> str:
+def _name(point: OrbitPoint, before: _Stay, gone: _Stay, after: _Stay) -> str:
     """The name by the visit that is gone and those beside it, which slide along the surface at its begin or its end."""
     for ends in (before, gone):
-        if ends.row < 0 or _moves(curve, values, before) or _moves(curve, values, gone):
+        if ends.row < 0 or _moves(point, before) or _moves(point, gone):
             continue
-        slides = [_slides(curve, values, ends, stay.mode) for stay in (before, gone, after)]
+        slides = [_slides(point, ends, stay.mode) for stay in (before, gone, after)]
         if slides == [False, True, False]:
             return "grazing_sliding" if before.mode == after.mode else "crossing_sliding"
         if slides == [False, False, True]:
@@ -89,20 +87,20 @@ def _name(curve: Orbits, values: FloatArray, before: _Stay, gone: _Stay, after: 
     return ""
 
 
-def _moves(curve: Orbits, values: FloatArray, ends: _Stay) -> bool:
+def _moves(point: OrbitPoint, ends: _Stay) -> bool:
     """Return whether the transition that ends a visit moves states that lie on its surface, as an impact does."""
-    jump = curve.shooting.flow.jump(values, ends.transition, ends.t, ends.z, ends.row)
+    jump = point.shooting.flow.jump(point.solved.values, ends.transition, ends.t, ends.z, ends.row)
     change, h_z = jump.R_z - np.eye(jump.n), jump.h_z
     along = change - np.outer(change @ h_z, h_z) / max(float(h_z @ h_z), 1e-300)
     return bool(np.abs(along).max() > NOTHING)
 
 
-def _slides(curve: Orbits, values: FloatArray, ends: _Stay, mode: int) -> bool:
+def _slides(point: OrbitPoint, ends: _Stay, mode: int) -> bool:
     """Return whether motion in a mode stays on the surface at which another visit ends.
 
     Its rate vanishes there, whatever the state: the rate's gradient is a multiple of the surface's."""
-    indicator = curve.shooting.system.traced.transitions[ends.transition].rows[ends.row].indicator
-    at = curve.shooting.flow.indicator(values, indicator, mode, ends.t, ends.z)
+    indicator = point.shooting.system.traced.transitions[ends.transition].rows[ends.row].indicator
+    at = point.shooting.flow.indicator(point.solved.values, indicator, mode, ends.t, ends.z)
     h, rate = np.append(at.h_z, at.h_t), np.append(at.L_z, at.L_t)
     along = rate - h * float(rate @ h) / max(float(h @ h), 1e-300)
     return bool(h.any() and np.abs(along).max() <= NOTHING * max(float(np.abs(rate).max()), 1.0))

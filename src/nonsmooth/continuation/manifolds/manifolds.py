@@ -25,13 +25,14 @@ B. Krauskopf, H. Osinga, J. Computational Physics 146 (1998) 404-419.
 from __future__ import annotations
 
 from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit
-from nonsmooth.continuation.manifolds.arcs import BEGIN, Arc, grow
+from nonsmooth.continuation.manifolds.arcs import BEGIN, Arc
 from nonsmooth.continuation.manifolds.section_map import SectionMap
 from nonsmooth.continuation.problems.multipliers import EDGE
 from nonsmooth.continuation.problems.orbits import size_of
@@ -142,7 +143,7 @@ def manifolds(
                 if j:
                     q = once.forward(q[None, :])[0]
                     q = u + (q - u) * (first / np.linalg.norm(q - u))
-                arcs.append((one, side, j, mu, grow(step, view, u, q, reach, near, turn, most)))
+                arcs.append((one, side, j, mu, Arc(step, view, reach, near, turn, most).grow(u, q)))
     options = {"length": reach, "kind": kind, "distance": near, "angle": turn, "delta": first, "points": most,
                "section": f"Stroboscopic(phase={phase!r})"}  # fmt: skip
     return _dataset(orbit, size, view(np.array(cycle)), arcs, options)
@@ -197,26 +198,15 @@ def _dataset(
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
 
-    n = len(size)
-    labels = labels_of(orbit.system)
-    sections, lengths, iterates, pieces, numbers = [], [], [], [], []
-    for number, (_, _, j, _, arc) in enumerate(arcs):
-        x = np.concatenate([np.empty((0, n)), *arc.points])
-        piece = np.concatenate([np.empty(0, np.int64), *arc.piece])
-        d = np.linalg.norm(np.diff(x, axis=0), axis=1)
-        d[np.diff(piece) > 0] = 0.0
-        begin = float(np.linalg.norm(x[0] - cycle[j])) if len(x) else 0.0
-        sections.append(x * size)
-        lengths.append(begin + np.concatenate([[0.0], np.cumsum(d)])[: len(x)])
-        iterates.append(np.concatenate([np.empty(0, np.int64), *arc.iterate]))
-        pieces.append(piece)
-        numbers.append(np.full(len(x), number, dtype=np.int64))
+    labels, none = labels_of(orbit.system), np.empty(0)
+    of_arcs = [[(np.empty((0, len(size))), none, none.astype(int), none.astype(int)), *arc.parts] for *_, arc in arcs]
+    x, lengths, iterates, pieces = (np.concatenate(one) for one in zip(*chain(*of_arcs), strict=True))
+    numbers = np.repeat(np.arange(len(arcs)), [sum(len(part[0]) for part in parts) for parts in of_arcs])
     attrs = provenance(labels, "manifolds", options, method="images of a fundamental segment")
     return build(
         labels, attrs,
-        {"section": np.concatenate(sections), "arc_length": np.concatenate(lengths),
-         "iterate": np.concatenate(iterates), "piece": np.concatenate(pieces), "arc": np.concatenate(numbers)},
-        kinds=[one for one, *_ in arcs], sides=[side for _, side, *_ in arcs],
-        orbit_points=[j for _, _, j, _, _ in arcs], multipliers=[mu for _, _, _, mu, _ in arcs],
-        orbit_section=cycle * size, scale=size, endings=ENDS, ended=[arc.ending for *_, arc in arcs],
+        {"section": x * size, "arc_length": lengths, "iterate": iterates, "piece": pieces, "arc": numbers,
+         "side": [side for _, side, *_ in arcs], "orbit_point": [j for _, _, j, _, _ in arcs],
+         "multiplier": [mu for _, _, _, mu, _ in arcs], "orbit_section": cycle * size, "size": size},
+        kinds=[one for one, *_ in arcs], endings=ENDS, ended=[arc.ending for *_, arc in arcs],
     )  # fmt: skip

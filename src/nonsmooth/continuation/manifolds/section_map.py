@@ -91,54 +91,38 @@ class SectionMap:
         return found
 
     def _newton(self, w: FloatArray, guess: FloatArray) -> FloatArray:
-        """Damped Newton, many points at once, with one-sided differences for the derivative."""
-        m, n = w.shape
-        x, done = guess.copy(), np.zeros(m, dtype=bool)
-        r = self.forward(x) - w
-        size = np.asarray(np.abs(r).max(axis=1, initial=0.0), dtype=np.float64)
+        """Damped Newton, many points at once, with one-sided differences for the derivative; NaN where it fails."""
+        x, r = guess.copy(), self.forward(guess) - w
+        size = np.abs(r).max(axis=1, initial=0.0)
+        found: NDArray[np.bool_] = np.zeros(len(w), dtype=bool)
         for _ in range(ITERATIONS):
-            done |= size <= SOLVED * 0.01
-            live = np.flatnonzero(~done & np.isfinite(size))
+            found |= size <= SOLVED * 0.01
+            live = np.flatnonzero(~found & np.isfinite(size))
             if not len(live):
                 break
-            J = np.empty((len(live), n, n))
-            for j in range(n):
-                moved = x[live].copy()
-                moved[:, j] += STEP
-                J[:, :, j] = (self.forward(moved) - (r[live] + w[live])) / STEP
-            sound = np.asarray(np.isfinite(J).all(axis=(1, 2)), dtype=bool)
+            ahead = [self.forward(x[live] + STEP * one) for one in np.eye(w.shape[1])]
+            J = (np.stack(ahead, axis=2) - (r + w)[live, :, None]) / STEP
+            sound: NDArray[np.bool_] = np.asarray(np.isfinite(J).all(axis=(1, 2)))
             sound[sound] = np.abs(np.linalg.det(J[sound])) > 1e-14
             size[live[~sound]] = np.inf
-            live, J = live[sound], J[sound]
-            if not len(live):
-                break
-            step = np.asarray(-np.linalg.solve(J, r[live][:, :, None])[:, :, 0], dtype=np.float64)
-            length = np.asarray(np.abs(step).max(axis=1), dtype=np.float64)
+            live = live[sound]
+            step = -np.linalg.solve(J[sound], r[live][:, :, None])[:, :, 0]
+            length = np.abs(step).max(axis=1)
             step *= np.minimum(1.0, REACH / np.maximum(length, 1e-300))[:, None]
-            self._advance(live, x, r, size, done, step, length, w)
-        x[~done] = np.nan
+            left = np.arange(len(live))
+            for part in 0.5 ** np.arange(8):  # halved until they bring the images nearer
+                at = live[left]
+                trial = x[at] + part * step[left]
+                there = self.forward(trial) - w[at]
+                new = np.abs(there).max(axis=1, initial=0.0)
+                nearer = new < size[at]
+                x[at[nearer]], r[at[nearer]], size[at[nearer]] = trial[nearer], there[nearer], new[nearer]
+                found[at[nearer & (length[left] <= SOLVED)]] = True  # a step of rounding's length ends a point
+                left = left[~nearer]
+                if not len(left):
+                    break
+            at = live[left]  # no nearer: found where that is as near as rounding allows
+            found[at[(size[at] <= 1e-10) & (length[left] <= 1e-8)]] = True
+            size[at[~found[at]]] = np.inf
+        x[~found] = np.nan
         return x
-
-    def _advance(
-        self, live: NDArray[np.int64], x: FloatArray, r: FloatArray, size: FloatArray, done: NDArray[np.bool_],
-        step: FloatArray, length: FloatArray, w: FloatArray,
-    ) -> None:  # fmt: skip
-        """Take the steps, halved until they bring the images nearer; a step of rounding's length ends a point."""
-        part, waiting = 1.0, np.ones(len(live), dtype=bool)
-        for _ in range(8):
-            some = live[waiting]
-            trial = x[some] + part * step[waiting]
-            there = self.forward(trial) - w[some]
-            new = np.abs(there).max(axis=1)
-            nearer = new < size[some]
-            x[some[nearer]], r[some[nearer]], size[some[nearer]] = trial[nearer], there[nearer], new[nearer]
-            done[some[nearer & (length[waiting] <= SOLVED)]] = True
-            places = np.flatnonzero(waiting)
-            waiting[places[nearer]] = False
-            if not waiting.any():
-                return
-            part *= 0.5
-        stuck = live[waiting]
-        # No nearer, and already as near as rounding allows: found.
-        done[stuck[(size[stuck] <= 1e-10) & (length[waiting] <= 1e-8)]] = True
-        size[stuck[~done[stuck]]] = np.inf

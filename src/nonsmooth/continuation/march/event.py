@@ -10,7 +10,6 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ import numpy as np
 from nonsmooth.continuation.problems.curve import Point, branch_point, tangents
 from nonsmooth.continuation.problems.solve import determinant
 
-__all__ = ["BESIDE", "Crossing", "Event", "Fold", "Met", "Step", "first_met", "locate", "special_on"]
+__all__ = ["BESIDE", "LARGEST", "Crossing", "Event", "Fold", "Met", "Name", "Step", "first_met", "locate", "special_on"]
 
 BEGUN = 1e-6
 ROUNDING = 1e-13  # of the numbers at both ends: smaller than this is zero, however short the step
@@ -30,6 +29,10 @@ ABOUT = 1e-2  # along the branch: steps are short beside a crossing of branches,
 TURNS = 1e-5  # of the other tangent's component in the parameter: smaller than this is zero
 SURE = 1e-3  # of the numbers at both ends: one larger than this at its root has jumped there
 SAME = 1e-9  # of the numbers at both ends: smaller than this at the place of another event is the same event
+
+
+#: The name by which an event is listed, with the ending where the branch ends there; None where it is none of its kind.
+Name = tuple[str, str | None] | None
 
 
 @dataclass
@@ -49,7 +52,6 @@ class Met:
 class Step:
     """A step along a curve, from a to b; ``numbers`` of its kinds, ``margins`` of its boundaries, each at both ends."""
 
-    curve: Any
     a: Any
     b: Any
     numbers: tuple[list[float], list[float]]
@@ -63,6 +65,11 @@ class Step:
     def __post_init__(self) -> None:
         self.end = float(self.a.tangent @ (self.b.Y - self.a.Y))
         self.stop, self.last = self.end, self.b
+
+    @property
+    def curve(self) -> Any:
+        """The curve."""
+        return self.a.curve
 
     def ends(self, cause: str, s: float, point: Any) -> None:
         """The branch stops at a point at distance s."""
@@ -84,7 +91,7 @@ class Event(ABC):
     certain = True
 
     @abstractmethod
-    def number(self, curve: Any, point: Any) -> float:
+    def number(self, point: Any) -> float:
         """The number that vanishes at the event."""
 
     def happened(self, step: Step, was: float, now: float) -> bool:
@@ -93,20 +100,20 @@ class Event(ABC):
 
     def located(self, step: Step) -> tuple[float, Any] | None:
         """Distance from the beginning of the step, and the point there; None where it is not found."""
-        return locate(step, partial(self.number, step.curve))
+        return locate(step, self.number)
 
     def met(self, step: Step) -> Met | None:
         """The event on a step, by its own name."""
         there = self.located(step)
         return None if there is None else Met(self, *there, self.name)
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """Its name, and the ending where the branch ends there; None where the number vanished for another reason."""
         return self.name, None
 
-    def confirmed(self, curve: Any, point: Any, was: float, now: float) -> bool:
+    def confirmed(self, point: Any, was: float, now: float) -> bool:
         """Return whether the number does vanish at the corrected point: noise changes its sign elsewhere too."""
-        return abs(self.number(curve, point)) <= SURE * max(abs(was), abs(now))
+        return abs(self.number(point)) <= SURE * max(abs(was), abs(now))
 
 
 class Fold(Event):
@@ -114,7 +121,7 @@ class Fold(Event):
 
     name = "fold"
 
-    def number(self, curve: Any, point: Any) -> float:
+    def number(self, point: Any) -> float:
         """The last component of the tangent."""
         return float(point.tangent[-1])
 
@@ -125,11 +132,11 @@ class Crossing(Event):
     name = "branch_point"
     certain = False
 
-    def number(self, curve: Any, point: Any) -> float:
+    def number(self, point: Any) -> float:
         """The sign of the bordered determinant."""
         return float(point.orientation)
 
-    def named(self, step: Step, point: Any) -> tuple[str, str | None] | None:
+    def named(self, step: Step, point: Any) -> Name:
         """A pitchfork where the parameter turns on one of the two branches, and a transcritical where it does not."""
         both = tangents(step.curve, point.Y)
         if both is None:
@@ -137,7 +144,7 @@ class Crossing(Event):
         least, most = sorted(np.abs(both[:, -1]))
         return ("pitchfork" if least < TURNS * most else "transcritical"), None
 
-    def confirmed(self, curve: Any, point: Any, was: float, now: float) -> bool:
+    def confirmed(self, point: Any, was: float, now: float) -> bool:
         """Return True: its place solves equations of its own."""
         return True
 
@@ -158,7 +165,7 @@ class Crossing(Event):
         if Y is None or np.abs(Y - point.Y).max() > max(float(np.abs(b.Y - a.Y).max()), ABOUT):
             return there
         # Any direction in the plane of both branches is null here, and the border is singular: keep that of the branch.
-        exact = curve.described(Y, point.tangent, point.orientation, point.iterations, curve.evaluate(Y))
+        exact = curve.described(Point(curve, Y, point.tangent, point.orientation, point.iterations, curve.evaluate(Y)))
         return there if exact is None else (float(a.tangent @ (Y - a.Y)), exact)
 
 
@@ -207,7 +214,7 @@ def first_met(step: Step, boundaries: Sequence[Event]) -> list[Met] | None:
         if not kind.happened(step, was, now):
             continue
         passed = True
-        known = [(kind.number(step.curve, met.point), met) for met in located]
+        known = [(kind.number(met.point), met) for met in located]
         # Both are infinite where a visit has turned negative: it is not followed.
         largest = max((abs(x) for x in (was, now) if np.isfinite(x)), default=0.0)
         same = [Met(kind, met.s, met.point, kind.name) for value, met in known
@@ -234,7 +241,7 @@ def special_on(step: Step, kinds: Sequence[Event]) -> list[Met]:
         return []
     curve, a, b, (before, after) = step.curve, step.a, step.b, step.numbers
     if stop < step.end and (last := curve.between(a, b, stop)):  # beyond its stop the same equations may turn back
-        b, after = last, [kind.number(curve, last) for kind in kinds]
+        b, after = last, [kind.number(last) for kind in kinds]
         step = replace(step, b=b, numbers=(before, after))
     for kind, was, now in zip(kinds, before, after, strict=True):
         if not kind.happened(step, was, now):
@@ -249,7 +256,7 @@ def special_on(step: Step, kinds: Sequence[Event]) -> list[Met]:
                 )  # fmt: skip
         elif (
             there[0] <= stop
-            and kind.confirmed(curve, there[1], was, now)
+            and kind.confirmed(there[1], was, now)
             and (named := kind.named(step, there[1])) is not None
         ):
             found.append(Met(kind, *there, *named))

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from nonsmooth.continuation.march.event import Event, Met, Step, first_met, special_on
-from nonsmooth.continuation.problems.curve import Curve, Place, Point, passing
+from nonsmooth.continuation.problems.curve import Place, Point, passing
 
 __all__ = ["INTERRUPTED", "Limits", "March", "Policy", "march"]
 
@@ -35,9 +35,8 @@ class Limits:
 
 @dataclass
 class Row:
-    """A point of a branch with the curve it lies on, and what belongs to its kind where it is a special one."""
+    """A point of a branch, and what belongs to its kind where it is a special one."""
 
-    curve: Any
     point: Any
     virtual: bool = False  # beyond a boundary that its path should obey
     kind: str = ""  # of a special point
@@ -59,13 +58,13 @@ class March:
         """The rows that are special points."""
         return [row for row in self.rows if row.kind]
 
-    def add(self, curve: Curve[Any], point: Point) -> None:
+    def add(self, point: Point) -> None:
         """Append a point."""
-        self.rows.append(Row(curve, point, point.virtual))
+        self.rows.append(Row(point, point.virtual))
 
-    def mark(self, kind: str, curve: Curve[Any], point: Point, virtual: bool = False, **more: Any) -> None:
+    def mark(self, kind: str, point: Point, virtual: bool = False, **more: Any) -> None:
         """Append a special point; on a boundary itself no path is virtual."""
-        self.rows.append(Row(curve, point, virtual, kind, **more))
+        self.rows.append(Row(point, virtual, kind, **more))
 
 
 class Policy(ABC):
@@ -90,11 +89,11 @@ class Policy(ABC):
 
     def record(self, found: March, step: Step, met: Met) -> None:
         """List an event that a branch passes."""
-        found.mark(met.name, step.curve, met.point, step.virtual and met.point.virtual)
+        found.mark(met.name, met.point, step.virtual and met.point.virtual)
 
     @abstractmethod
-    def behind(self, found: March, curve: Any, met: list[Met]) -> tuple[Any, Any] | None:
-        """Record the boundaries ``met`` at one place; the curve and the point behind, or None."""
+    def behind(self, found: March, met: list[Met]) -> Any:
+        """Record the boundaries ``met`` at one place; the point behind, on a curve of its own, or None."""
 
     def unseen(self, step: Step) -> Met | None:
         """The first place on a step that margins do not tell lies beyond a boundary."""
@@ -104,20 +103,20 @@ class Policy(ABC):
         """Boundaries that a branch passes on a step with the equations that it has."""
         return []
 
-    def over(self, curve: Any, point: Any) -> str | None:
+    def over(self, point: Any) -> str | None:
         """The ending of a branch whose last point this is; None where it goes on."""
         return None
 
-    def why(self, curve: Any, point: Any) -> str:
+    def why(self, point: Any) -> str:
         """The ending of a branch on which no point follows this one."""
         return "no_convergence"
 
 
-def march(curve: Curve[Any], point: Any, limits: Limits, policy: Policy) -> March:
+def march(point: Any, limits: Limits, policy: Policy) -> March:
     """Follow a branch from a point along its tangent until it ends; the first row is the point after it."""
     found = March()
     try:
-        _Marching(found, limits, policy).follow(curve, point)
+        _Marching(found, limits, policy).follow(point)
     except KeyboardInterrupt:  # `both_ways` raises it again, with what was found
         found.ending = "interrupted"
     return found
@@ -132,10 +131,10 @@ class _Marching:
         self.circle: Place | None = None  # a point that is met again if the branch goes round (Brent's method)
         self.again = 8
 
-    def follow(self, curve: Curve[Any], point: Any) -> None:
+    def follow(self, point: Any) -> None:
         """March on, point by point."""
         found = self.found
-        self._begin(*(curve.renewed(point) or (curve, point)))
+        self._begin(point.curve.renewed(point) or point)
         while len(found.rows) < self.limits.points:
             new = self._next()
             step = None if new is None else self._within(new)
@@ -147,7 +146,7 @@ class _Marching:
             if step is None or met is None:
                 limit = self._limit()
                 if not limit:
-                    found.ending = self.policy.why(self.curve, self.point)
+                    found.ending = self.policy.why(self.point)
                 if not limit or not self._change(limit):
                     return
                 continue
@@ -159,7 +158,7 @@ class _Marching:
             if self._special(step):
                 return
             if step.cause in ("range", "closed"):
-                found.add(self.curve, step.last)
+                found.add(step.last)
                 found.ending = step.cause
                 return
             if step.cause == "change":
@@ -170,33 +169,33 @@ class _Marching:
 
     def _change(self, met: list[Met]) -> bool:
         """Go on behind the boundaries ``met``; False where the branch ends there."""
-        after = self.policy.behind(self.found, self.curve, met)
+        after = self.policy.behind(self.found, met)
         if after is None:
             return False
-        self._begin(*after)
+        self._begin(after)
         self.ds = 0.1 * self.limits.largest
-        self.found.add(*after)
+        self.found.add(after)
         return True
 
     def _limit(self) -> list[Met]:
         """The boundaries to which the branch has come in the limit: its equations have no derivatives there."""
         point, near = self.point, np.full(len(self.policy.boundaries), np.inf)  # as chords of the margins end
         for row in self.found.rows:
-            if row.curve is self.curve:
+            if row.point.curve is self.curve:
                 fallen = np.nan_to_num(self.curve.margins(row.point)) - np.nan_to_num(self.margins)
                 s = np.where(fallen > 0.0, float(np.abs(point.Y - row.point.Y).max()), np.inf)
                 near = np.fmin(near, np.abs(self.margins) * s / np.abs(fallen))
         return [Met(kind, 0.0, point, kind.name) for kind, s in zip(self.policy.boundaries, near, strict=True)
                 if s < AT_LIMIT]  # fmt: skip
 
-    def _begin(self, curve: Curve[Any], point: Any) -> None:
+    def _begin(self, point: Any) -> None:
         """Go on from a point of a curve."""
-        self.curve, self.before, self.point = curve, None, point
+        self.curve, self.before, self.point = point.curve, None, point
         self.numbers, self.margins = self._watched(self.point)
 
     def _watched(self, point: Any) -> tuple[list[float], Any]:
         """The numbers of all kinds of events at a point, and its margins to the boundaries."""
-        return [kind.number(self.curve, point) for kind in self.policy.kinds], self.curve.margins(point)
+        return [kind.number(point) for kind in self.policy.kinds], self.curve.margins(point)
 
     def _next(self) -> Any:
         """The next point, at a distance at which it is like the last one; None where there is none."""
@@ -230,7 +229,7 @@ class _Marching:
                 reached, s = last, there
         numbers, margins = self._watched(reached)
         return Step(
-            self.curve, self.point, reached, (self.numbers, numbers), (self.margins, margins), not self.found.rows,
+            self.point, reached, (self.numbers, numbers), (self.margins, margins), not self.found.rows,
             self.limits.virtual, "" if reached is new else "range",
         )  # fmt: skip
 
@@ -273,8 +272,8 @@ class _Marching:
     def _ended(self, step: Step) -> bool:
         """Take the step; True where the branch ends with it."""
         found, curve, new = self.found, self.curve, step.b
-        found.add(curve, new)
-        ending = self.policy.over(curve, new)
+        found.add(new)
+        ending = self.policy.over(new)
         if ending is None and new.virtual and came_back(self.circle, step) is not None:
             ending = "circle"
         if ending is not None:
@@ -284,7 +283,7 @@ class _Marching:
             self.circle, self.again = curve.landmark(new), len(found.rows)
         self.ds = min(self.ds * self.easy, self.limits.largest)
         if renewed := curve.renewed(new):
-            self._begin(*renewed)
+            self._begin(renewed)
         else:
             self.before, self.point = self.point, new
             self.numbers, self.margins = step.numbers[1], step.margins[1]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar, cast
 
 import numpy as np
 
@@ -34,6 +34,7 @@ Place = tuple[Any, FloatArray, FloatArray]
 class Point:
     """A solved point of a curve."""
 
+    curve: Any
     Y: FloatArray  # X / scale
     tangent: FloatArray  # unit length, in scaled unknowns
     orientation: float  # sign of the bordered determinant
@@ -106,11 +107,9 @@ class Curve(ABC, Generic[P]):
     def moved(self, solved: Any, Y: FloatArray) -> Any:
         """The equations after a last step so small that their derivatives stay."""
 
-    @abstractmethod
-    def described(
-        self, Y: FloatArray, tangent: FloatArray, orientation: float, iterations: int, solved: Any
-    ) -> P | None:
+    def described(self, point: Point) -> P | None:
         """A solved point with all that is known of it; None where that cannot be computed."""
+        return cast(P, point)
 
     def word(self) -> Any:
         """Return what tells curves of one branch apart."""
@@ -140,8 +139,8 @@ class Curve(ABC, Generic[P]):
         """Difference of what is known of two neighbours, from 0 to 1."""
         return 0.0
 
-    def renewed(self, point: P) -> tuple[Curve[P], P] | None:
-        """The curve and the last point in other units, or with a phase condition put through it; None as they are."""
+    def renewed(self, point: P) -> P | None:
+        """The last point on a curve in other units, or with a phase condition put through it; None as it is."""
         return None
 
     # --- along the curve
@@ -216,7 +215,7 @@ class Curve(ABC, Generic[P]):
     def point(self, solved: Any, Y: FloatArray, border: FloatArray, iterations: int = 0) -> P | None:
         """A solved point with its tangent along ``border``."""
         found = self.tangent(solved, border)
-        return None if found is None else self.described(Y, *found, iterations, solved)
+        return None if found is None else self.described(Point(self, Y, *found, iterations, solved))
 
     def near(self, Y: FloatArray, border: FloatArray, *, most: int | None = None) -> P | None:
         """The point across ``border`` through Y, with its tangent along it."""
@@ -268,7 +267,7 @@ class Curve(ABC, Generic[P]):
         if point is None or float(point.tangent @ a.tangent) < 0.5:
             # At a crossing of branches any direction in their plane is null: keep that of the branch.
             towards = (1 - x) * a.tangent + x * b.tangent
-            return self.described(found[1], towards / np.linalg.norm(towards), 0.0, found[2], found[0])
+            return self.described(Point(self, found[1], towards / np.linalg.norm(towards), 0.0, found[2], found[0]))
         return point
 
     def at_parameter(self, Y: FloatArray, value: float, which: int = -1) -> P | None:
@@ -283,6 +282,13 @@ class Curve(ABC, Generic[P]):
         solved, Y, iterations = found
         null = self.null_vectors(solved)
         return self.point(solved, Y, null[-1], iterations) if len(null) else None
+
+    def nearest(self, Y: FloatArray, value: float) -> P | None:
+        """The point at a value of the parameter; where that cannot be held, at a fold, the one across the branch."""
+        point = self.at_parameter(Y, value)
+        if point is None and len(null := self.null_vectors(self.evaluate(Y))):
+            return self.near(Y, null[-1], most=20)
+        return point
 
     def at_edge(self, a: P, b: P, edge: float, which: int) -> P | None:
         """The point at the edge of a parameter's range, between two points."""

@@ -10,8 +10,9 @@ import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.curve import Curve, Point
-from nonsmooth.flow.equilibria import ModeField, sorted_eigenvalues
+from nonsmooth.flow.equilibria import sorted_eigenvalues
 from nonsmooth.flow.equilibrium_sets import EquilibriumSet, equilibrium_sets, modes_of_sets
+from nonsmooth.flow.mode_fields import mode_field
 from nonsmooth.flow.polytopes import Extreme
 from nonsmooth.system.system import System
 
@@ -38,6 +39,7 @@ class _Field:
 class Rest(Point):
     """An equilibrium on a branch."""
 
+    curve: Equilibria
     solved: _Field
     u: FloatArray
     jacobian: FloatArray  # (n, n)
@@ -67,7 +69,7 @@ class Equilibria(Curve[Rest]):
         self.system, self.mode, self.parameter, self.width = system, mode, parameter, width
         self.place = list(system.values).index(parameter)
         self.values, self.memory = system.parameter_vector(), system.memory_vector()
-        self.field = ModeField(system.traced, mode, (self.place,))
+        self.field = mode_field(system.traced, mode, (self.place,))
         self.own = self.field.own
         self.scale = np.append(system.scale_vector()[self.own], width)
 
@@ -100,16 +102,20 @@ class Equilibria(Curve[Rest]):
         """The vector field after a last step."""
         return self.evaluate(Y)
 
-    def described(
-        self, Y: FloatArray, tangent: FloatArray, orientation: float, iterations: int, solved: _Field
-    ) -> Rest | None:
+    def described(self, point: Point) -> Rest | None:
         """The equilibrium with its eigenvalues and margins."""
-        jacobian = solved.J[:, :-1] / self.scale[:-1]
-        u, values = self._at(solved.X)
+        u, values = self._at(point.X)
         h, h_u = self.field.indicators(u, values, self.memory)
         margins = self.field.margins(h, EDGE * (np.abs(h_u) @ (self.system.scale_vector() + np.abs(u))))
+        return self._measured(point, u, point.solved.J[:, :-1] / self.scale[:-1], margins, u, u)
+
+    def _measured(
+        self, point: Point, u: FloatArray, jacobian: FloatArray, margins: FloatArray, lower: FloatArray,
+        upper: FloatArray,
+    ) -> Rest:  # fmt: skip
         eigenvalues = sorted_eigenvalues(jacobian)
-        return Rest(Y, tangent, orientation, iterations, solved, u, jacobian, eigenvalues, margins, u, u)
+        return Rest(**vars(point), u=u, jacobian=jacobian, eigenvalues=eigenvalues, margins=margins, lower=lower,
+                    upper=upper)  # fmt: skip
 
     def stable(self, rest: Rest) -> bool:
         """Return whether all eigenvalues have negative real parts."""
@@ -148,7 +154,7 @@ class _Corner:
         self.curve, self.u, self.side, self.keys = curve, extreme.u, extreme.side, [i for i, _ in extreme.keys]
         place, traced = curve.place, curve.system.traced
         same = extreme.mode == curve.mode
-        self.field = curve.field if same else ModeField(traced, extreme.mode, (place,))
+        self.field = curve.field if same else mode_field(traced, extreme.mode, (place,))
         self.own, self.scale = self.field.own, curve.system.scale_vector()[self.field.own]
         self.unit = np.eye(len(curve.values))[place] * STEP * curve.width
         # conditions that are met there by construction
@@ -164,9 +170,9 @@ class _Corner:
         if not len(self.across):
             left, sizes, _ = np.linalg.svd(J[:, :-1])
             self.across = left[:, : int((sizes > FREE * max(float(sizes[0]), FREE)).sum())].T
-        h, h_u = curve.field.indicators(u, values, curve.memory)
+        h, h_u = self.field.indicators(u, values, curve.memory)
         # indicators are differentiated in the states only
-        there = [curve.field.indicators(u, values + one, curve.memory)[0] for one in (self.unit, -self.unit)]
+        there = [self.field.indicators(u, values + one, curve.memory)[0] for one in (self.unit, -self.unit)]
         slopes = np.column_stack([h_u[:, self.own] * self.scale, (there[0] - there[1]) / (2.0 * STEP)])[keys]
         J, f = np.vstack([self.across @ J, slopes]), np.append(self.across @ f, h[keys])
         if (missing := len(self.own) - len(f)) > 0:
@@ -193,7 +199,7 @@ class _Corner:
 
     def margins(self, u: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
         """Margins of the conditions that are not met by construction; and how nearly another corner is as extreme."""
-        h, h_u = self.curve.field.indicators(u, values, self.curve.memory)
+        h, h_u = self.field.indicators(u, values, self.curve.memory)
         edge = EDGE * (np.abs(h_u) @ (self.curve.system.scale_vector() + np.abs(u)))
         margins = np.where(self.met, -np.inf, self.field.margins(h, edge))
         if not self.keys:
@@ -220,11 +226,9 @@ class SetOfEquilibria(Equilibria):
         X = Y * self.scale
         return _Field(X, *self.corners[0].equations(*self._at(X)))
 
-    def described(
-        self, Y: FloatArray, tangent: FloatArray, orientation: float, iterations: int, solved: _Field
-    ) -> Rest | None:
+    def described(self, point: Point) -> Rest | None:
         """The middle of the set with its extent; None where an extreme point is not found."""
-        first, values = self._at(solved.X)
+        first, values = self._at(point.X)
         ends = [first]
         for corner in self.corners[1:]:
             if (end := corner.solved(values)) is None:
@@ -236,8 +240,7 @@ class SetOfEquilibria(Equilibria):
         upper = np.where(np.isinf(self.found.upper), np.inf, np.max(ends, axis=0))
         middle = np.mean(ends, axis=0)
         jacobian = self.field.evaluate(middle, values, self.memory)[1]
-        eigenvalues = sorted_eigenvalues(jacobian)
-        return Rest(Y, tangent, orientation, iterations, solved, middle, jacobian, eigenvalues, margins, lower, upper)
+        return self._measured(point, middle, jacobian, margins, lower, upper)
 
     def word(self) -> Any:
         """The conditions at the extreme points, and their modes."""
@@ -251,7 +254,7 @@ class SetOfEquilibria(Equilibria):
 
 def equilibria_near(
     system: System, parameter: str, width: float, u: FloatArray, value: float, modes: Sequence[int] | None = None
-) -> Iterator[tuple[Equilibria, Rest]]:
+) -> Iterator[Rest]:
     """Equilibria and sets of them at a value of the parameter, the nearest to a state first."""
     values = system.parameter_vector()
     values[list(system.values).index(parameter)] = value
@@ -265,7 +268,7 @@ def equilibria_near(
             curve.watched = tuple({*watched, *one.modes})
         rest = curve.at(curve.corners[0].u if isinstance(curve, SetOfEquilibria) else one.point, value)
         if rest is not None:
-            yield curve, rest
+            yield rest
 
 
 def goes_on(rest: Rest, other: Rest, size: FloatArray) -> bool:

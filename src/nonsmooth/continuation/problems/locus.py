@@ -69,6 +69,8 @@ class Locus(Orbits):
                 return np.nan
             if self.touched is None:
                 self.touched = path.touched
+            if path.which[self.touched] >= 0 and np.isneginf(path.inner[self.touched]):
+                return 0.0  # a maximum so near to zero that it has no sign
             return float(path.inner[self.touched]) / self._unit
         M = solved.monodromy
         if self.kind == "flip":
@@ -112,23 +114,13 @@ class Locus(Orbits):
         """The locus at a special point: the shortest correction, and a tangent of either sense."""
         Y = X / self.scale
         self.calibrate(Y)
-        for _ in range(3 * self.most):
-            self._gradient = None
-            solved = self.evaluate(Y)
-            matrix, right = self.bordered(solved, np.zeros(self.n))[:-1], self.residual(solved)
-            if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
-                return None
-            step = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
-            Y = np.asarray(Y - step, dtype=float)
-            if np.abs(step).max() < CLOSE:
-                break
-        else:
+        found = self.correct(Y, np.zeros(self.n), 0.0, tolerance=CLOSE, most=3 * self.most, singular=True)
+        if found is None:
             return None
-        solved = self.evaluate(Y)
-        null = self.null_vectors(solved, 1e-9)
-        return self.point(solved, Y, null[-1]) if len(null) == 1 else None
+        null = self.null_vectors(found[0], 1e-9)
+        return self.point(found[0], found[1], null[-1]) if len(null) == 1 else None
 
-    def renewed(self, point: OrbitPoint) -> tuple[Orbits, OrbitPoint] | None:
+    def renewed(self, point: OrbitPoint) -> OrbitPoint | None:
         """The phase condition put through the last point; the units stay, psi was calibrated in them."""
         return None if self.shooting.reference is None else super().renewed(point)
 

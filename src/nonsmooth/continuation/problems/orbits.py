@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.continuation.problems.anchor import plane_across
 from nonsmooth.continuation.problems.curve import Curve, Point
 from nonsmooth.continuation.problems.path import Path, Walk
 from nonsmooth.continuation.problems.rounds import Rounds
-from nonsmooth.continuation.problems.shooting import Shooting, Solved
-from nonsmooth.continuation.problems.signature import Signature
+from nonsmooth.continuation.problems.shooting import Shooting, Solved, plane_across
+from nonsmooth.continuation.problems.signature import Round, Signature
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
@@ -47,10 +46,16 @@ def _still(traced: Traced) -> NDArray[np.bool_]:
 class OrbitPoint(Point):
     """A solved orbit."""
 
+    curve: Orbits
     solved: Solved
     M: FloatArray
     multipliers: ComplexArray
     path: Path
+
+    @property
+    def shooting(self) -> Shooting:
+        """The equations of its curve."""
+        return self.curve.shooting
 
     @property
     def virtual(self) -> bool:
@@ -94,15 +99,11 @@ class Orbits(Curve[OrbitPoint]):
         """Simulated rounds of its orbits."""
         return Rounds(self.shooting)
 
-    def with_signature(
-        self, signature: Signature, times: FloatArray, states: FloatArray, period: float, parameters: Any
-    ) -> tuple[Orbits, FloatArray]:
-        """The curve of another signature in the same units, and the unknowns there from instants and states."""
-        old = self.shooting
-        fresh = Shooting(old.system, signature, old.period_number, old.active)
-        X = fresh.join(times, states, period, parameters)
-        fresh.prepare(X, self.size)
-        return self._like(fresh, self.size), X
+    def around(self, once: Round, parameters: Any) -> tuple[Orbits, FloatArray]:
+        """The curve of another signature in the same units, and the unknowns of once round there."""
+        shooting, X = Shooting.of(self.shooting.system, once, self.shooting.active, parameters)
+        shooting.prepare(X, self.size)
+        return self._like(shooting, self.size), X
 
     def _like(self, shooting: Shooting, size: FloatArray) -> Orbits:
         """The curve of other equations of the same branch, or in other units."""
@@ -126,15 +127,13 @@ class Orbits(Curve[OrbitPoint]):
         """The equations after a last step so small that their derivatives stay."""
         return self.shooting.moved(solved, Y * self.scale)
 
-    def described(
-        self, Y: FloatArray, tangent: FloatArray, orientation: float, iterations: int, solved: Solved
-    ) -> OrbitPoint | None:
+    def described(self, point: Point) -> OrbitPoint | None:
         """The orbit with its multipliers and its path."""
-        M = solved.monodromy
-        path = self.walk.along(solved, self.shooting.split(solved.X)[1])
+        M = point.solved.monodromy
+        path = self.walk.along(point.solved, self.shooting.split(point.X)[1])
         if path is None or not np.isfinite(M).all():
             return None
-        return OrbitPoint(Y, tangent, orientation, iterations, solved, M, solved.multipliers_of(M), path)
+        return OrbitPoint(**vars(point), M=M, multipliers=point.solved.multipliers_of(M), path=path)
 
     def word(self) -> Signature:
         """The signature."""
@@ -171,8 +170,8 @@ class Orbits(Curve[OrbitPoint]):
         swing = (point.path.maximum - point.path.minimum) / self.first_size[: len(point.path.maximum)]
         return float(np.nanmax(swing))
 
-    def renewed(self, point: OrbitPoint) -> tuple[Orbits, OrbitPoint] | None:
-        """The curve in units of an orbit that has grown; or the phase condition of one without transitions put through
+    def renewed(self, point: OrbitPoint) -> OrbitPoint | None:
+        """The point in units of an orbit that has grown; or the phase condition of one without transitions put through
         it."""
         shooting, z = self.shooting, point.X[: self.shooting.n]
         if shooting.reference is None:
@@ -181,10 +180,11 @@ class Orbits(Curve[OrbitPoint]):
                 return None
             fresh = self._like(shooting, np.maximum(size, self.size))
             tangent = point.tangent * self.scale / fresh.scale
-            return fresh, replace(point, Y=point.X / fresh.scale, tangent=tangent / np.linalg.norm(tangent))
+            tangent /= np.linalg.norm(tangent)
+            return replace(point, curve=fresh, Y=point.X / fresh.scale, tangent=tangent)
         shooting.reference = plane_across(z, point.solved.segments.f_begin[0], self.size)
         row = point.solved.jacobian[-1]
         row[:] = 0.0
         row[: shooting.n] = shooting.reference[1]
         found = self.tangent(point.solved, point.tangent)
-        return self, (point if found is None else replace(point, tangent=found[0], orientation=found[1]))
+        return point if found is None else replace(point, tangent=found[0], orientation=found[1])

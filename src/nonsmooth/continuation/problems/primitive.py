@@ -12,7 +12,8 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
-from nonsmooth.continuation.problems.signature import Signature
+from nonsmooth.continuation.problems.signature import Round, Signature
+from nonsmooth.continuation.problems.visits import led
 
 __all__ = ["is_doubled", "primitive"]
 
@@ -29,33 +30,30 @@ def primitive(shooting: Shooting, solved: Solved, size: FloatArray) -> tuple[Sho
     p, m = shooting.period_number, shooting.m
     for rounds in range(p or m or LONGEST, 1, -1):
         once = _once_round(shooting, solved, size, rounds, SAME)
-        if once is None:
-            continue
-        short = Shooting(shooting.system, once, p // rounds, shooting.active)
-        short.reference = shooting.reference
-        times, states = shooting.split(solved.X)
-        values = shooting.parameters(solved.X)[shooting.places]
-        return short, short.join(times[: short.m], states[: short.m + 1], solved.times[-1] / rounds, values)
+        if once is not None:
+            values = shooting.parameters(solved.X)[shooting.places]
+            short, X = Shooting.of(shooting.system, once, shooting.active, values)
+            short.reference = shooting.reference
+            return short, X
     return None
 
 
-def is_doubled(curve: Any, point: Any) -> bool:
+def is_doubled(point: Any) -> bool:
     """Return whether an orbit is a shorter one gone round twice, as where a doubled branch meets its flip."""
-    return _once_round(curve.shooting, point.solved, curve.size, 2, DOUBLED) is not None
+    return _once_round(point.shooting, point.solved, point.curve.size, 2, DOUBLED) is not None
 
 
-def _once_round(
-    shooting: Shooting, solved: Solved, size: FloatArray, rounds: int, near: float
-) -> Signature | None:
-    """The signature of once round where a solved orbit closes after a part of its period."""
+def _once_round(shooting: Shooting, solved: Solved, size: FloatArray, rounds: int, near: float) -> Round | None:
+    """Once round where a solved orbit closes after a part of its period."""
     p, m, visits = shooting.period_number, shooting.m, shooting.signature.visits
     if p % rounds or m % rounds:
         return None
     few = m // rounds
-    once = Signature((*visits[:few], visits[-1]))
-    if once.repeated(rounds, p // rounds) != shooting.signature:
+    signature = Signature((*visits[:few], visits[-1]))
+    if signature.repeated(rounds, p // rounds) != shooting.signature:
         return None
-    z, begin = shooting.split(solved.X)[1], float(solved.times[few])
-    into = float(solved.times[-1]) / rounds - begin
-    there = shooting.flow.segments(solved.values, [visits[few].mode], [begin], [into], z[few][None, :]).z[0]
+    times, z = shooting.split(solved.X)
+    period, begin = float(solved.times[-1]) / rounds, float(solved.times[few])
+    there = led(shooting.flow, solved.values, visits[few].mode, begin, period - begin, z[few])
+    once = Round(p // rounds, period, signature, times[:few], z[: few + 1])
     return once if np.abs((there - z[0]) / size).max() < near else None

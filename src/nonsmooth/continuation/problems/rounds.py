@@ -5,17 +5,14 @@ The simulation isolates every crossing, so a round that shows an orbit's own sig
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.problems.anchor import anchored
-from nonsmooth.continuation.problems.signature import Signature, Visit
-from nonsmooth.continuation.problems.visits import visits_of
-from nonsmooth.continuation.searches.settled import Guess
+from nonsmooth.continuation.problems.signature import Round, Signature, Visit
+from nonsmooth.continuation.problems.visits import anchored, led, round_of, visits_of
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.kernels.hybrid import codes
@@ -44,7 +41,7 @@ class Rounds:
 
     def read(
         self, shooting: Shooting, X: FloatArray, values: FloatArray, change: FloatArray | float = 0.0
-    ) -> Guess | None:
+    ) -> Round | None:
         """The round at ``values`` from the middle of the longest visit of an orbit, its state changed by ``change``.
 
         None where it fails, or does not come back to the mode where it began."""
@@ -92,8 +89,7 @@ class Rounds:
         i = int(np.diff(ends).argmax()) if forced else 0  # without forcing the section lies within a visit
         begin = float(ends[i])
         into = 0.5 * float(ends[i + 1] - begin) if forced else 0.0
-        z = self.flow.segments(values, shooting.modes[i : i + 1], [begin], [into], states[i][None, :]).z[0]
-        return i, begin + into, z, period
+        return i, begin + into, led(self.flow, values, shooting.modes[i], begin, into, states[i]), period
 
     def _run(
         self, values: FloatArray, z: FloatArray, mode: int, begin: float, until: float, at: Any,
@@ -108,40 +104,27 @@ class Rounds:
         log = engine.record(engine.prepare(values[None, :]), state, until, np.asarray(at, dtype=float))
         return log if log.status in (codes.OK, codes.NOT_GUARANTEED) else None
 
-    def _forced(self, values: FloatArray, z: FloatArray, mode: int, begin: float, period: float) -> Guess | None:
+    def _forced(self, values: FloatArray, z: FloatArray, mode: int, begin: float, period: float) -> Round | None:
         log = self._run(values, z, mode, begin, begin + period, [period])
-        if log is None:
+        once = None if log is None else round_of(self.flow, values, log, z, mode, period, self.period_number)
+        if log is None or once is None:
             return None
-        visits, after = visits_of(self.flow, values, log, z[len(self.system.states) :])
-        instants = log.crossing_time
-        last = self.system.traced.transitions[visits[-1].transition].target if visits else mode
-        if last != mode:
-            return None
-        first = self._behind(visits, instants, period)
-        order = [*range(first, len(visits)), *range(first)]
-        turned = np.concatenate([instants[first:] - period, instants[:first]])
-        moved = [visits[j] for j in order]
-        at_section = visits[first].mode if first < len(visits) else last
-        for i in range(len(visits) - first):  # begun before the section, over in the next round
-            if moved[i].row == -1:
-                moved[i] = replace(moved[i], turn=moved[i].turn - self.period_number)
-        turned = np.maximum(turned, 0.0)
-        if first < len(visits) and turned[0] < ROUNDING * period:  # a transition at the section itself
-            section = np.nan_to_num(log.u_before[first])
-            memory = after[first - 1][len(section) :] if first else z[len(section) :]
-        else:
-            section, memory = np.nan_to_num(log.sample_u[0]), log.sample_memory[0]
-        states = np.vstack([np.concatenate([section, memory])[None, :], after[order]])
-        return Guess(self.period_number, period, Signature((*moved, Visit(at_section))), turned, states)
+        first = self._behind(once)
+        section, memory = np.nan_to_num(log.sample_u[0]), log.sample_memory[0]
+        if first < len(once.times) and once.times[first] - period < ROUNDING * period:  # a transition at the section
+            section, memory = np.nan_to_num(log.u_before[first]), once.states[first, len(section) :]
+        found = once.begun(first, period, np.concatenate([section, memory]))
+        found.times = np.maximum(found.times, 0.0)
+        return found
 
-    def _behind(self, visits: list[Visit], instants: FloatArray, period: float) -> int:
+    def _behind(self, once: Round) -> int:
         """The first visit that ends at the section or behind it: a phase of 0 is at the section, whatever rounding."""
-        for j, visit in enumerate(visits):
-            if visit.turn >= self.period_number if visit.row == -1 else instants[j] >= period:
+        for j, visit in enumerate(once.signature.crossings):
+            if visit.turn >= self.period_number if visit.row == -1 else once.times[j] >= once.period:
                 return j
-        return len(visits)
+        return len(once.times)
 
-    def free(self, values: FloatArray, z: FloatArray, mode: int, begin: float, period: float) -> Guess | None:
+    def free(self, values: FloatArray, z: FloatArray, mode: int, begin: float, period: float) -> Round | None:
         """A round without forcing, from a state, that takes about ``period``."""
         log = self._run(values, z, mode, 0.0, (1.5 + LATE) * period, [])
         if log is None:
@@ -149,7 +132,7 @@ class Rounds:
         visits, after = visits_of(self.flow, values, log, z[len(self.system.states) :])
         instants = log.crossing_time
         if not visits:
-            return Guess(0, period, Signature((Visit(mode),)), np.empty(0), z[None, :])
+            return Round(0, period, Signature((Visit(mode),)), np.empty(0), z[None, :])
         again = [
             j for j in range(1, len(visits))
             if visits[j] == visits[0] and abs(instants[j] - instants[0] - period) < LATE * period
@@ -157,8 +140,6 @@ class Rounds:
         if not again:
             return None
         j = min(again, key=lambda j: float(np.abs(after[j] - after[0]).max()))
+        signature, states = Signature((*visits[:j], Visit(mode))), np.vstack([z, after[:j]])
         period = float(instants[j] - instants[0])
-        signature = Signature((*visits[:j], Visit(mode)))
-        states = np.vstack([z[None, :], after[:j]])
-        found = anchored(self.flow, values, signature, instants[:j], states, period)
-        return Guess(0, period, *found)
+        return anchored(self.flow, values, Round(0, period, signature, instants[:j], states))

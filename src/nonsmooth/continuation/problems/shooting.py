@@ -23,15 +23,14 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.continuation.problems.anchor import plane_across
 from nonsmooth.continuation.problems.multipliers import multipliers_of
-from nonsmooth.continuation.problems.signature import AT_ONCE, Signature
+from nonsmooth.continuation.problems.signature import AT_ONCE, Round, Signature
 from nonsmooth.continuation.problems.surfaces import coincide, mean_along, one_surface
 from nonsmooth.flow.saltation import chained
 from nonsmooth.flow.variational import Jump, Segments, VariationalFlow
 from nonsmooth.system.system import System
 
-__all__ = ["Shooting", "Solved"]
+__all__ = ["Shooting", "Solved", "plane_across"]
 
 ROUNDING = 1e-16  # of the period
 SHORT = (0.0, 1e-6, 1e-2)  # of the period, by order: of a shorter visit the mean is taken in place of the quotient
@@ -124,6 +123,18 @@ class Shooting:
         self.reference: tuple[FloatArray, FloatArray] | None = None  # autonomous, no crossings: (z_ref, f_ref)
         self.alone = [False] * m  # crossings whose other rows vanish together with the one that fires
         self.divided = [0] * m  # the power of the visit's length by which the equations of exits are divided
+
+    @classmethod
+    def of(
+        cls, system: System, once: Round, active: tuple[str, ...] = (), values: Any = ()
+    ) -> tuple[Shooting, FloatArray]:
+        """The equations of once round, and its unknowns; ``values`` are those of the active parameters."""
+        shooting = cls(system, once.signature, once.period_number, active)
+        return shooting, shooting.join(once.times, once.states, once.period, values)
+
+    def once(self, X: FloatArray) -> Round:
+        """Once round the orbit with these unknowns."""
+        return Round(self.period_number, self.period(X), self.signature, *self.split(X))
 
     def _constants(self) -> list[int]:
         """Components of z that no visit moves and no transition sets."""
@@ -367,3 +378,9 @@ class Shooting:
     def at_section(self) -> int:
         """The mode at the section."""
         return self.signature.visits[0].mode
+
+
+def plane_across(z: FloatArray, field: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(z_ref, f_ref) of the plane f_ref . (u - z_ref) = 0 through z across the flow, in states divided by ``size``."""
+    weighted = field / size**2
+    return z.copy(), weighted / max(float(np.abs(weighted * size).max()), 1e-300)

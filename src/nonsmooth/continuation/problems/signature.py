@@ -1,4 +1,4 @@
-"""The signature of a periodic orbit: the modes it visits and the transitions that end the visits.
+"""The signature of a periodic orbit, the modes it visits and the transitions that end the visits; and once round it.
 
 The first visit begins, and the last one ends, at the section: phase 0 of the forcing, or for an autonomous system a
 point within a visit. Two orbits that are read from different points of the same cycle have the same ``cycle``.
@@ -7,13 +7,17 @@ point within a visit. Two orbits that are read from different points of the same
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from nonsmooth.arrays import FloatArray
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["AT_ONCE", "SECTION", "Signature", "Visit"]
+__all__ = ["AT_ONCE", "SECTION", "Round", "Signature", "Visit"]
 
 SECTION = -1
 AT_ONCE = -2  # a row: the condition holds already where the transition before has led
@@ -72,13 +76,10 @@ class Signature:
         ]
         return Signature((*visits, self.visits[-1]))
 
-    def with_inserted(self, place: int, inserted: Sequence[Visit]) -> Signature:
-        """With further visits that interrupt visit ``place``."""
-        return Signature((*self.visits[:place], *inserted, *self.visits[place:]))
-
-    def without(self, first: int, count: int) -> Signature:
-        """Without ``count`` visits from ``first`` on: what remains is one visit where they stood."""
-        return Signature((*self.visits[:first], *self.visits[first + count :]))
+    def rates(self, transitions: Sequence[Any], turns: int) -> tuple[float, float]:
+        """Transitions, and entries into contact, per turn (0: once round)."""
+        taken = [transitions[v.transition] for v in self.crossings]
+        return len(taken) / max(turns, 1), sum(jump.contact for jump in taken) / max(turns, 1)
 
     def text(self, traced: Traced) -> str:
         """In words: ``free (penetration) contact (separation) free``."""
@@ -97,3 +98,42 @@ class Signature:
                 row = jump.rows[visit.row]
                 parts.append(f"({traced.indicator_names[row.indicator]} {'>' if row.sign > 0 else '<'} 0)")
         return " ".join(parts)
+
+
+@dataclass
+class Round:
+    """Once round an orbit, or an interval of motion that nearly closes: all that its unknowns are made of."""
+
+    period_number: int  # 0: autonomous
+    period: float
+    signature: Signature
+    times: FloatArray  # of its crossings
+    states: FloatArray  # (m + 1, n_z): at the section and after the crossings
+
+    def with_inserted(self, place: int, visits: Sequence[Visit], t: float, after: Sequence[FloatArray]) -> Self:
+        """With further visits that interrupt visit ``place`` at t, and the states after them."""
+        old, times, states = self.signature.visits, self.times, self.states
+        return replace(
+            self, signature=Signature((*old[:place], *visits, *old[place:])),
+            times=np.concatenate([times[:place], np.full(len(visits), t), times[place:]]),
+            states=np.concatenate([states[: place + 1], after, states[place + 1 :]]),
+        )  # fmt: skip
+
+    def without(self, first: int, count: int) -> Self:
+        """Without ``count`` visits from ``first`` on: what remains is one visit where they stood."""
+        visits, gone = self.signature.visits, np.arange(first, first + count)
+        return replace(
+            self, signature=Signature((*visits[:first], *visits[first + count :])), times=np.delete(self.times, gone),
+            states=np.delete(self.states, gone + 1, axis=0),
+        )  # fmt: skip
+
+    def begun(self, i: int, begin: float, z: FloatArray) -> Self:
+        """The same round from visit i on: its section lies at the time ``begin``, in the state z."""
+        visits, times, turns = self.signature.visits, self.times, self.period_number
+        moved = [v if v.row != -1 else replace(v, turn=v.turn + turns * ((j < i) - (begin > 0.0)))
+                 for j, v in enumerate(visits[:-1])]  # fmt: skip
+        return replace(
+            self, signature=Signature((*moved[i:], *moved[:i], Visit(visits[i].mode))),
+            times=np.concatenate([times[i:] - begin, times[:i] + (self.period - begin)]),
+            states=np.concatenate([z[None, :], self.states[i + 1 :], self.states[1 : i + 1]]),
+        )  # fmt: skip

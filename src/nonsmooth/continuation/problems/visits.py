@@ -1,4 +1,4 @@
-"""The transitions of a simulation's log, read as visits of a signature."""
+"""A simulation's log read as visits of a signature, and as once round an orbit."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.problems.signature import AT_ONCE, Visit
+from nonsmooth.continuation.problems.signature import AT_ONCE, Round, Signature, Visit
 
 if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import Log
     from nonsmooth.flow.variational import Jump, VariationalFlow
 
-__all__ = ["visits_of"]
+__all__ = ["anchored", "led", "round_of", "visits_of"]
 
 ROUNDING = 1e-13  # of an indicator's size
 BEHIND = 1e-9  # of an indicator's size: nearer to a boundary than this is on it
@@ -58,3 +58,29 @@ def _fired_row(flow: VariationalFlow, values: FloatArray, k: int, t: float, z: F
 def _size(flow: VariationalFlow, jump: Jump, z: FloatArray) -> float:
     """The size of the indicator of a transition."""
     return float(np.abs(jump.h_z) @ flow.scale) + abs(float(jump.h_z @ z))
+
+
+def round_of(
+    flow: VariationalFlow, values: FloatArray, log: Log, z: FloatArray, mode: int, period: float, period_number: int = 0
+) -> Round | None:
+    """A log that begins at the section, in the state z of a mode, as once round; None where it ends in another mode."""
+    visits, after = visits_of(flow, values, log, z[flow.n_u :])
+    if visits and flow.traced.transitions[visits[-1].transition].target != mode:
+        return None
+    signature = Signature((*visits, Visit(mode)))
+    return Round(period_number, period, signature, log.crossing_time, np.vstack([z, after]))
+
+
+def anchored(flow: VariationalFlow, values: FloatArray, once: Round) -> Round:
+    """The same autonomous orbit read from the middle of its longest visit."""
+    times = once.times
+    lengths = np.append(np.diff(times), times[0] + once.period - times[-1])  # of the visit after crossing i
+    i = int(lengths.argmax())
+    half = 0.5 * float(lengths[i])
+    mode = once.signature.visits[(i + 1) % len(times)].mode
+    return once.begun(i + 1, float(times[i]) + half, led(flow, values, mode, 0.0, half, once.states[i + 1]))
+
+
+def led(flow: VariationalFlow, values: FloatArray, mode: int, begin: float, length: float, z: FloatArray) -> FloatArray:
+    """The state to which motion in a mode leads."""
+    return flow.segments(values, [mode], [begin], [length], z[None, :]).z[0]

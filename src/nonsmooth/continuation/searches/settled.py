@@ -1,17 +1,25 @@
-"""From a simulation to a first guess: let the motion settle, find its period, read off its signature."""
+"""From a simulation to a first guess: let the motion settle, find its period, read off its signature.
+
+Of autonomous systems by recurrence on a section that is found on the way. Where transitions happen they are the
+section: a cycle is a sequence of transitions that repeats, with the states after them. Else the section is the level
+half way up the state that swings most, passed upwards.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.problems.signature import Signature, Visit
-from nonsmooth.continuation.problems.visits import visits_of
-from nonsmooth.flow.engines.engine import Section, State
+from nonsmooth.continuation.problems.signature import Round, Signature, Visit
+from nonsmooth.continuation.problems.visits import anchored, round_of, visits_of
+from nonsmooth.errors import SolveError
+from nonsmooth.flow.engines.engine import IntArray, Log, Section, State
+from nonsmooth.flow.equilibria import AT_REST, ROUNDING, equilibrium_at
+from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 
@@ -20,23 +28,27 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engines.loop import Engine
     from nonsmooth.system.system import System
 
-__all__ = ["CLOSED", "NEAR", "Guess", "forced_guesses", "settle_forced", "touching"]
+__all__ = ["CLOSED", "NEAR", "Guess", "autonomous_guesses", "forced_guesses", "settle_forced", "touching"]
 
 CHOICE = 6  # candidates tried: period numbers, or returning points for a given one
 CLOSED = 1e-8  # a return nearer than this has closed: the shortest such period comes first
 TOUCH = 1e-6  # of the period, of the motion's size: a contact as short, an impact as weak as this may be a touch
 NEAR = 0.2  # of the motion's size: a return farther off than this is no candidate
+SAMPLES = 4001
+FEW, MANY = 8, 200  # rounds in a stretch of motion that is long, and short, enough to look at
+LONGEST = 1e6
+REST = 1e-7  # of its scale: a motion smaller than this has come to rest
+AT_ONCE = 1e-12  # of a unit of time: what happens within it happens at the start
+TENDS = "the motion tends to an equilibrium:"
+ELSEWHERE = (
+    "Give start=, a state away from it, or follow the equilibrium with continue_equilibrium to where a cycle emanates"
+)
 
 
 @dataclass
-class Guess:
-    """An interval of motion that nearly closes, read as an orbit; ``gap`` tells how far off it closes (scaled)."""
+class Guess(Round):
+    """An interval of motion that nearly closes; ``gap`` tells how far off it closes (scaled)."""
 
-    period_number: int  # 0: autonomous
-    period: float
-    signature: Signature
-    times: FloatArray  # of its crossings
-    states: FloatArray  # (m + 1, n_z): at the section and after the crossings
     gap: float = 0.0
     size: FloatArray = field(default_factory=lambda: np.empty(0))  # (n_u,) half the range of each state
     gaps: FloatArray = field(default_factory=lambda: np.empty(0))  # after 1, 2 ... forcing periods
@@ -131,45 +143,154 @@ def _read_round(system: System, settled: Settled, p: int, i: int, gaps: FloatArr
     if log.status not in (codes.OK, codes.NOT_GUARANTEED):
         return None
     flow, values = VariationalFlow.of(system), system.parameter_vector()
-    visits, states = visits_of(flow, values, log, start[len(state.u) :])
-    if visits and system.traced.transitions[visits[-1].transition].target != mode:
+    once = round_of(flow, values, log, start, mode, p * period, p)
+    if once is None:
         return None
-    signature = Signature((*visits, Visit(mode)))
     kicks = np.abs(np.nan_to_num(log.u_after - log.u_before) / settled.size).max(axis=1, initial=0.0)
-    if len(states):  # the memory returns too, or the round is a longer one
-        begun, ended = start[len(state.u) :], states[-1, len(state.u) :]
-        apart = np.abs(ended - begun) / np.maximum(np.maximum(np.abs(begun), np.abs(ended)), 1e-12)
-        gaps[-1] = max(gaps[-1], float(apart.max(initial=0.0)))
-    return Guess(
-        p, p * period, signature, log.crossing_time, np.vstack([start, states]), float(gaps[-1]), settled.size, gaps,
-        kicks,
-    )  # fmt: skip
+    begun, ended = once.states[[0, -1], len(state.u) :]  # the memory returns too, or the round is a longer one
+    apart = np.abs(ended - begun) / np.maximum(np.maximum(np.abs(begun), np.abs(ended)), 1e-12)
+    gaps[-1] = max(gaps[-1], float(apart.max(initial=0.0)))
+    return Guess(**vars(once), gap=float(gaps[-1]), size=settled.size, gaps=gaps, kicks=kicks)
 
 
-def touching(guess: Guess, system: System) -> list[Guess]:
+R = TypeVar("R", bound=Round)
+
+
+def touching(guess: R, system: System, kicks: FloatArray | None = None) -> list[R]:
     """The same motion without contacts that are no more than a touch: an orbit at its grazing point, or none such."""
-    signature, times, states = guess.signature, guess.times, guess.states
-    kicks = np.full(len(times), np.inf) if guess.kicks is None else guess.kicks
-    jumps = system.transitions
-    i = 0
-    while i < len(times):
-        visits = signature.visits
-        here = jumps[visits[i].transition]
-        if here.at is not None:  # it happens whether it changes the state or not
+    found, i, jumps = guess, 0, system.transitions
+    kicks = np.full(len(guess.times), np.inf) if kicks is None else kicks
+    while i < len(found.times):
+        visits, times = found.signature.visits, found.times
+        here, count = jumps[visits[i].transition], 0
+        if here.at is not None:
+            pass  # it happens whether it changes the state or not
+        elif here.reset is not None and here.source == here.target and kicks[i] < TOUCH:
+            count = 1
+        elif i + 1 < len(times) and times[i + 1] - times[i] < TOUCH * guess.period:
+            count = 2 if visits[i].mode == visits[i + 2].mode and visits[i + 1].row >= 0 else 0
+        if count:
+            found, kicks = found.without(i, count), np.delete(kicks, np.arange(i, i + count))
+        else:
             i += 1
+    return [] if found is guess else [found]
+
+
+@dataclass
+class _Stretch:
+    """A stretch of motion, and what its second half tells: passages of the level half way up, and half the ranges."""
+
+    log: Log
+    times: FloatArray  # of the passages upwards, interpolated
+    points: FloatArray  # the states there
+    modes: IntArray
+    rests: bool  # as good as still
+    size: FloatArray
+
+
+def autonomous_guesses(
+    system: System, engine: Engine, state: State, transient: int, most: int, given: int | None, search: Search
+) -> list[Guess]:
+    """Candidates for once round, the shortest first."""
+    tables = engine.prepare(system.parameter_vector()[None, :])
+
+    def run(duration: float) -> _Stretch:
+        begin = float(state.clock[0])
+        instants = begin + np.linspace(0.0, duration, SAMPLES)
+        log = search.record(engine, tables, state, begin + duration, instants)
+        if log.status not in (codes.OK, codes.NOT_GUARANTEED):
+            raise solve_error(log.status, begun=(system, state.u))
+        return _seen(log, instants, system)
+
+    first = state.copy()  # in the mode to which transitions that already hold lead
+    engine.record(tables, first, float(first.clock[0]) + AT_ONCE, np.empty(0))
+    _refuse_equilibrium(system, first, "the start", ROUNDING)
+    duration = 64.0
+    while True:
+        stretch = run(duration)
+        rounds = len(stretch.times)
+        if stretch.rests:
+            _refuse_equilibrium(system, state, TENDS, AT_REST, stable=True)
+        if rounds < FEW and duration < LONGEST:
+            duration *= 4.0
+        elif rounds > MANY:
+            duration *= FEW / rounds * 4.0
+        else:
+            break
+    if rounds < 2:  # a motion that drifts passes once
+        _refuse_equilibrium(system, state, TENDS, AT_REST)
+        raise SolveError(
+            f"the motion does not come back: over {duration:.3g} units of time the state that moves most passed the "
+            "middle of its range at most once. There is no cycle here; give another start",
+            status="not_periodic",
+        )
+    one = duration / rounds
+    if transient:
+        search.doing = f"letting {transient} rounds of some {one:.3g} units of time pass"
+        run(transient * one)
+    stretch = run(max((2 * (given or min(most, 8)) + 3), FEW) * one)
+    if stretch.rests:
+        _refuse_equilibrium(system, state, TENDS, AT_REST)
+        raise SolveError(f"{TENDS} there is no cycle here. {ELSEWHERE}", status="equilibrium")
+    found = _by_transitions(system, stretch, most, given) if len(stretch.log.crossing_time) > 1 else []
+    return found or _by_level(stretch, most, given)
+
+
+def _seen(log: Log, instants: FloatArray, system: System) -> _Stretch:
+    """The passages of the level half way up the state that swings most."""
+    u, scale = np.nan_to_num(log.sample_u), system.scale_vector()
+    begin = len(u) // 2
+    low, high = u[begin:].min(axis=0), u[begin:].max(axis=0)
+    half = 0.5 * (high - low)
+    j = int((half / scale).argmax())
+    x, rests = u[:, j] - 0.5 * (low[j] + high[j]), bool((half <= REST * scale).all())
+    at = begin + np.flatnonzero((x[begin:-1] < 0.0) & (x[begin + 1 :] >= 0.0) & (not rests))
+    part = x[at] / (x[at] - x[at + 1])
+    points = (1 - part)[:, None] * u[at] + part[:, None] * u[at + 1]
+    times = instants[at] + part * (instants[1] - instants[0])
+    return _Stretch(log, times, points, log.sample_mode[at], rests, np.maximum(half, 1e-3 * scale))
+
+
+def _refuse_equilibrium(system: System, state: State, what: str, near: float, stable: bool = False) -> None:
+    """SolveError where the state is an equilibrium (``stable``: a stable one), with its name."""
+    at = equilibrium_at(system, state.u, int(state.counters[0]), memory=state.memory, near=near)
+    if at is not None and (at.kind == "stable" or not stable):
+        raise SolveError(
+            f"{what} {at.words(list(system.states))}. No cycle passes there. {ELSEWHERE}", status="equilibrium"
+        )
+
+
+def _by_transitions(system: System, stretch: _Stretch, most: int, given: int | None) -> list[Guess]:
+    """Sequences of transitions that repeat."""
+    flow, values, log = VariationalFlow.of(system), system.parameter_vector(), stretch.log
+    k, after = log.crossing_transition, np.nan_to_num(log.u_after)
+    last, guesses = len(k) - 1, []
+    for length in range(1, min(last, 40 * most) + 1):
+        begun = last - length
+        gap = float(np.abs((after[last] - after[begun]) / stretch.size).max())
+        if k[begun] != k[last] or gap > NEAR:
             continue
-        if here.reset is not None and here.source == here.target and kicks[i] < TOUCH:
-            kicks = np.delete(kicks, i)
-            signature = signature.without(i, 1)
-            times, states = np.delete(times, i), np.delete(states, i + 1, axis=0)
-            continue
-        short = i + 1 < len(times) and times[i + 1] - times[i] < TOUCH * guess.period
-        if short and visits[i].mode == visits[i + 2].mode and visits[i + 1].row >= 0:
-            signature = signature.without(i, 2)
-            kicks = np.delete(kicks, [i, i + 1])
-            times, states = np.delete(times, [i, i + 1]), np.delete(states, [i + 1, i + 2], axis=0)
-            continue
-        i += 1
-    if len(times) == len(guess.times):
-        return []
-    return [replace(guess, signature=signature, times=times, states=states)]
+        begin, end = float(log.crossing_time[begun]), float(log.crossing_time[last])
+        visits, states = visits_of(flow, values, log, log.memory_after[begun], begun + 1)
+        signature = Signature((*visits, Visit(system.traced.transitions[k[last]].target)))
+        times, states = log.crossing_time[begun + 1 :] - begin, np.vstack([states[-1:], states])
+        once = anchored(flow, values, Round(0, end - begin, signature, times, states))
+        guesses.append(Guess(**vars(once), gap=gap, size=stretch.size))
+        if len(guesses) >= (given or most):
+            break
+    return guesses[given - 1 : given] if given else guesses
+
+
+def _by_level(stretch: _Stretch, most: int, given: int | None) -> list[Guess]:
+    """Returns to the level half way up."""
+    times, points, guesses = stretch.times, stretch.points, []
+    for p in [given] if given else range(1, most + 1):
+        if p >= len(points) or p > most:
+            break
+        gap = float(np.abs((points[-1] - points[-1 - p]) / stretch.size).max())
+        if gap <= NEAR:
+            z = np.concatenate([points[-1], stretch.log.sample_memory[-1]])[None, :]
+            signature = Signature((Visit(int(stretch.modes[-1])),))
+            guesses.append(Guess(0, float(times[-1] - times[-1 - p]), signature, np.empty(0), z, max(gap, 1e-3),
+                                 stretch.size))  # fmt: skip
+    return guesses

@@ -9,9 +9,8 @@ import numpy as np
 
 from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.identification.blas import one_blas_thread
-from nonsmooth.identification.compare.draws import nominal, read_settings
+from nonsmooth.identification.compare.draws import Model, nominal, read_settings
 from nonsmooth.identification.compare.measured import recorded_motion
-from nonsmooth.identification.compare.model import Model
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:

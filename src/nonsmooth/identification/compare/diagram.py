@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.flips import Flip, delayed_flips
-from nonsmooth.identification.compare.model import Model
 from nonsmooth.identification.compare.periods import flips, measured_period, period_numbers
 from nonsmooth.identification.compare.predict import Motions
 

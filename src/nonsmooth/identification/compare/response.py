@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from nonsmooth.arrays import FloatArray
 from nonsmooth.diagrams.response import jumps_in
 from nonsmooth.diagrams.sweep import sweep
+from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.jumps import Jump, Jumps, jumps_in_steps, match_jumps
-from nonsmooth.identification.compare.model import Model
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -65,7 +65,7 @@ def fit(
     is minimized over the parameters p, the start z_0 of every window, and what is unknown of the sensors (gain g,
     offset o, delay d). The derivatives of the motion are exact, through every transition, as those of
     :func:`nonsmooth.sensitivity`. The windows grow from a part of a period to the whole record, as far as the motion
-    can be followed.
+    can be followed; from a first guess that is near, the longest are taken at once.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def problem_of(
 ) -> Windows:  # fmt: skip
     """The problem, without windows; the noise is the records' own irregularity."""
     check_system(system, "fit", inputs=True)
-    from nonsmooth.identification.fit.first_modes import read_modes
+    from nonsmooth.identification.fit.first_level import read_modes
     from nonsmooth.identification.fit.motion import Marcher
     from nonsmooth.identification.fit.records import irregularity, read_records
     from nonsmooth.identification.fit.unknowns import read_unknowns
@@ -262,6 +262,7 @@ def best_of(
                 if best is None or found.good or found.rank < best.rank:
                     best = found
                 if found.good:
+                    advance(left[0])
                     return best
             advance(left[0])
     if best is None:

@@ -16,8 +16,8 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import Unsettled, settle
-from nonsmooth.identification.fit.first_level import settle_first
-from nonsmooth.identification.fit.first_modes import BETTER, other_beginnings, rechosen
+from nonsmooth.identification.fit.first_level import BETTER, other_beginnings, rechosen, settle_first
+from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
 from nonsmooth.identification.fit.rough import LEAST, level
 from nonsmooth.identification.fit.windows import Window, Windows
@@ -30,6 +30,7 @@ _CHAOS = 1e3  # growth of a start's change within a window, from which neighbour
 _REGULAR = 10.0  # that growth, below which a motion is regular enough to be followed over twice the time
 _WORSE = 1.5  # chi^2 per degree of freedom against that of the level before: a longer window does not fit
 _GOOD, _WHITE = 1.3, 5.0  # residuals over irregularity, and readings that share an error, of a fit that needs no other
+_NEAR = 0.6  # residuals of a guess over the readings' own size, up to which the longest windows are fitted from it
 SHORT = 0.05  # standard uncertainties from the minimum, beyond which a fit is said not to have come to its end
 _ROUNDS = 12  # of noise from residuals and residuals from noise
 
@@ -122,6 +123,10 @@ def grow(
     SolveError
         If not even the first windows can be fitted.
     """
+    near = _at_once(problem, theta, start, free, longest)
+    if near is not None:
+        told()
+        return near
     now, theta, starts, state = settle_first(problem, theta, length, start, free)
     told()
     wide, poor, stuck = length, _reduced(now, state) > POOR, False
@@ -138,6 +143,26 @@ def grow(
     rounds = 2 if poor else _ROUNDS
     final = _begun(_final(now, theta, starts, problem.noise, rounds), problem.noise, rounds)
     return replace(final, stuck=stuck)
+
+
+def _at_once(problem: Windows, theta: FloatArray, start: FloatArray | None, free: bool, longest: float) -> Grown | None:
+    """The fit over the longest windows, from a guess so near that it needs no shorter ones; None where it is not."""
+    now = problem.of(first_windows(problem, theta, longest, start, free))
+    if not now.pieces:
+        return None
+    state = now.residuals(theta, now.starts)
+    for c in range(len(problem.sensors)):
+        size = np.nanstd(np.concatenate([record.values[:, c] for record in problem.records]))
+        if not np.sqrt(np.mean(np.concatenate(parts(now, state, c)) ** 2)) < _NEAR * size:
+            return None
+    try:
+        found = level(now, theta, now.starts)
+        if _reduced(now, found[2]) > 2.0 * _GOOD**2:
+            return None
+        final = _begun(_final(now, *found[:2], problem.noise, _ROUNDS), problem.noise, _ROUNDS)
+    except SolveError:
+        return None
+    return final if final.good and _spreads(now, *found[1:]) < _CHAOS else None
 
 
 def _longer_windows(

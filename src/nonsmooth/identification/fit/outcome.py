@@ -11,7 +11,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.identification.fit.first_modes import BETTER
+from nonsmooth.identification.fit.first_level import BETTER
 from nonsmooth.identification.fit.growth import SHORT, Grown
 from nonsmooth.identification.fit.noise import OUTLYING, robust_size
 from nonsmooth.identification.fit.profile import profiled

@@ -11,8 +11,7 @@ import zlib
 from collections.abc import Iterator
 
 from nonsmooth.errors import DataFileError
-from nonsmooth.recordings.limits import inflation_limit
-from nonsmooth.recordings.reading import Source
+from nonsmooth.recordings.reading import Source, inflation_limit
 
 __all__ = ["Archive"]
 

@@ -15,12 +15,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.recordings.limits import MAX_COLUMNS, MAX_DEPTH
 from nonsmooth.recordings.readers.fields import Field, Table, label, traces_of
-from nonsmooth.recordings.readers.group import Group
 from nonsmooth.recordings.readers.loaders import LOADERS
-from nonsmooth.recordings.reading import Options, Reading, Source, is_axis_name, names_of
-from nonsmooth.recordings.remarks import Remarks
+from nonsmooth.recordings.reading import (
+    MAX_COLUMNS,
+    MAX_DEPTH,
+    Group,
+    Options,
+    Reading,
+    Remarks,
+    Source,
+    is_axis_name,
+    names_of,
+)
 
 __all__ = ["read"]
 

@@ -11,11 +11,9 @@ from __future__ import annotations
 import re
 
 from nonsmooth.errors import DataFileError
-from nonsmooth.recordings.limits import MAX_COLUMNS
 from nonsmooth.recordings.readers.fields import Field, Table, split_unit, traces_of
 from nonsmooth.recordings.readers.text_table import Cells, Numerals, checked_header, decoded, read_cells, rows
-from nonsmooth.recordings.reading import TIME_WORDS, Options, Reading, Source, Trace, names_of
-from nonsmooth.recordings.remarks import Remarks
+from nonsmooth.recordings.reading import MAX_COLUMNS, TIME_WORDS, Options, Reading, Remarks, Source, Trace, names_of
 
 __all__ = ["SYNTHETIC", "looks_like_capstone", "read"]
 

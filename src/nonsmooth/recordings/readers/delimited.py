@@ -64,16 +64,17 @@ def read_lines(
 def _kept(stream: Iterable[str], options: Options, top: list[str], comments: list[str]) -> Iterator[str]:
     """The lines of the table; others are blank, so that lines keep their numbers."""
     begun = False
+    skip, leave = (options.skip, ()) if isinstance(options.skip, int) else (0, options.skip)
     for line, text in enumerate(stream, 1):
         top += [text] if line <= _SEARCHED or not begun else []
         begin = text.lstrip()
-        above = line <= options.skip or line < options.header
+        above = line <= skip or line < options.header
         begun = begun or not (above or begin == "" or begin.startswith(_COMMENT))
-        if not begun and line > options.skip and begin.startswith(_COMMENT):
+        if not begun and line > skip and begin.startswith(_COMMENT):
             comments.append(text.strip())
-        left = not begun or (line != options.header and bool(options.leave) and begin.startswith(options.leave))
+        left = not begun or (line != options.header and bool(leave) and begin.startswith(leave))
         yield "\n" if left else text
-        if begun and not options.leave and line >= _SEARCHED:
+        if begun and not leave and line >= _SEARCHED:
             yield from stream
 
 

@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.errors import DataFileError
-from nonsmooth.recordings.limits import MAX_COLUMNS, MAX_DEPTH, inflation_limit
-from nonsmooth.recordings.readers.group import Group
-from nonsmooth.recordings.reading import Source
-from nonsmooth.recordings.remarks import Remarks
+from nonsmooth.recordings.reading import MAX_COLUMNS, MAX_DEPTH, Group, Remarks, Source, inflation_limit
 
 __all__ = ["load_hdf5"]
 

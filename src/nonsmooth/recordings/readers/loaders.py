@@ -16,12 +16,8 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.errors import DataFileError
-from nonsmooth.recordings.limits import MAX_COLUMNS, inflation_limit
-from nonsmooth.recordings.needed import needed
 from nonsmooth.recordings.readers.archive import Archive
-from nonsmooth.recordings.readers.group import Group
-from nonsmooth.recordings.reading import Source
-from nonsmooth.recordings.remarks import Remarks
+from nonsmooth.recordings.reading import MAX_COLUMNS, Group, Remarks, Source, inflation_limit, needed
 
 __all__ = ["LOADERS"]
 

@@ -17,11 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.recordings.limits import MAX_COLUMNS
 from nonsmooth.recordings.readers.fields import places
 from nonsmooth.recordings.readers.text_table import Cells, Numerals, decoded, number, read_cells
-from nonsmooth.recordings.reading import Options, Reading, Source, Trace
-from nonsmooth.recordings.remarks import Remarks
+from nonsmooth.recordings.reading import MAX_COLUMNS, Options, Reading, Remarks, Source, Trace
 
 __all__ = ["read"]
 

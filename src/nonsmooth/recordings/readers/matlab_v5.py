@@ -1,7 +1,8 @@
-"""MATLAB files of versions 5 to 7: checked element by element and unpacked within limits, then read by SciPy.
+"""MATLAB files of versions 5 to 7: unpacked within limits, the shapes they claim checked, then read by SciPy.
 
-SciPy's reader believes the lengths and shapes that a file claims. Here each is compared with the bytes that are there
-before it sees them. Variables of classes that hold no plain data (sparse, objects, functions) are left out.
+SciPy's reader makes room for as many cells and structs as a file claims. Here each number of elements is compared with
+the bytes that are there before it sees them. Variables of classes that hold no plain data (sparse, objects, functions)
+are left out.
 """
 
 from __future__ import annotations
@@ -11,29 +12,18 @@ import math
 import struct
 import zlib
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from nonsmooth.recordings.limits import MAX_DEPTH, inflation_limit
-from nonsmooth.recordings.reading import Source
-from nonsmooth.recordings.remarks import Remarks
+from nonsmooth.recordings.reading import MAX_DEPTH, Remarks, Source, inflation_limit
 
 __all__ = ["load_v5"]
 
 _HEADER = 128
-_MATRIX, _COMPRESSED = 14, 15
-_SIZES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}  # bytes of a number, by its type
-_TEXT = frozenset([1, 2, 3, 4, 16, 17, 18])
-_CELL, _STRUCT, _CHAR = 1, 2, 4
-_NUMBERS = range(6, 16)
-
-
-class _Element(NamedTuple):
-    kind: int
-    begin: int
-    end: int
-    following: int
+_INT8, _INT32, _MATRIX, _COMPRESSED = 1, 5, 14, 15
+_NUMERIC, _TEXT = {1, 2, 3, 4, 5, 6, 7, 9, 12, 13}, {1, 2, 3, 4, 16, 17, 18}
+_CELL, _STRUCT, _CHAR, _NUMBERS = 1, 2, 4, range(6, 16)  # classes
 
 
 class _LeftOut(Exception):
@@ -50,9 +40,16 @@ def load_v5(data: bytes, source: Source, remarks: Remarks) -> dict[str, Any]:
     # The offset of a part that only objects use is cleared with them.
     plain = bytearray(data[:116] + b"\0" * 8 + data[124:_HEADER])
     left = inflation_limit(len(data))
-    for body, place in _variables(data, order, left, source):
+    for kind, body, position in _elements(memoryview(data), order, "variable at ", source, _HEADER):
+        place = f"variable at byte {position}"
+        if kind == _COMPRESSED:
+            unpacked = _unpacked(body, left, place, source)
+            left -= len(unpacked)
+            kind, body, _ = next(_elements(memoryview(unpacked), order, f"{place}, ", source), (0, body, 0))
+        if kind != _MATRIX:
+            raise source.error(place, f"is of type {kind}, expected a matrix (14) or a packed one (15)")
         try:
-            name = _Checker(body, order, place, source).check()
+            name = _name(body, order, place, source)
         except _LeftOut as why:
             remarks.say(f"{place}: holds {why}; left out")
             continue
@@ -66,135 +63,73 @@ def load_v5(data: bytes, source: Source, remarks: Remarks) -> dict[str, Any]:
     return {name: _plain(value) for name, value in found.items() if not name.startswith("__")}
 
 
-def _variables(data: bytes, order: str, left: int, source: Source) -> Iterator[tuple[bytes, str]]:
-    """The body of each top-level matrix, unpacked."""
-    limit, position = left, _HEADER
-    while position < len(data):
-        place = f"variable at byte {position}"
-        if len(data) - position < 8:
-            raise source.error(place, "its tag is cut short")
-        kind, size = struct.unpack_from(order + "II", data, position)
-        begin, position = position + 8, position + 8 + size
-        if position > len(data):
-            raise source.error(place, f"is {size} bytes long, only {len(data) - begin} follow: the file is cut short")
-        body = data[begin:position]
-        if kind == _COMPRESSED:
-            try:
-                unpacker = zlib.decompressobj()
-                body = unpacker.decompress(body, left + 1)
-                whole = unpacker.eof
-            except zlib.error as error:
-                raise source.error(place, f"cannot be unpacked, it is damaged ({error})") from None
-            left -= len(body)
-            if left < 0:
-                raise source.error(place, f"unpacks to more than {limit} bytes, more than the file's size warrants")
-            if not whole or len(body) < 8:
-                raise source.error(place, "cannot be unpacked, it is cut short")
-            kind, size = struct.unpack_from(order + "II", body)
-            if len(body) < 8 + size:
-                raise source.error(place, f"holds {len(body) - 8} bytes, its tag says {size}")
-            body = body[8 : 8 + size]
-        if kind != _MATRIX:
-            raise source.error(place, f"is of type {kind}, expected a matrix (14) or a packed one (15)")
-        yield body, place
+def _unpacked(packed: memoryview, limit: int, place: str, source: Source) -> bytes:
+    """The bytes of a packed variable, at most ``limit``."""
+    unpacker = zlib.decompressobj()
+    try:
+        found = unpacker.decompress(packed, limit + 1)
+    except zlib.error as error:
+        raise source.error(place, f"cannot be unpacked, it is damaged ({error})") from None
+    if len(found) > limit:
+        raise source.error(place, f"unpacks to more than {limit} bytes, more than the file's size warrants")
+    if not unpacker.eof:
+        raise source.error(place, "cannot be unpacked, it is cut short")
+    return found
 
 
-class _Checker:
-    """Compares what one variable claims with the bytes it has."""
+def _elements(
+    body: memoryview, order: str, place: str, source: Source, position: int = 0
+) -> Iterator[tuple[int, memoryview, int]]:
+    """Type, content and place of each data element."""
+    while position < len(body):
+        if len(body) - position < 8:
+            raise source.error(f"{place}byte {position}", "an element is cut short")
+        kind, size = struct.unpack_from(order + "II", body, position)
+        begin, following = position + 8, position + 8 + size
+        if kind >> 16:  # a small element: up to four bytes inside its own tag
+            kind, size, begin, following = kind & 0xFFFF, kind >> 16, position + 4, position + 8
+        elif kind != _COMPRESSED:
+            following += -size % 8
+        if begin + size > min(max(following, begin), len(body)):
+            left = min(following, len(body)) - begin
+            message = f"is {size} bytes long, only {left} follow: the file is cut short"
+            raise source.error(f"{place}byte {position}", message)
+        yield kind, body[begin : begin + size], position
+        position = following
 
-    def __init__(self, body: bytes, order: str, place: str, source: Source) -> None:
-        self._body, self._order, self._place, self._source = body, order, place, source
 
-    def check(self) -> str:
-        """The variable's name; DataFileError if a claim does not fit, _LeftOut if it holds no plain data."""
-        return self._matrix(0, len(self._body), 0)
+def _name(body: memoryview, order: str, place: str, source: Source, depth: int = 0) -> bytes:
+    """The name of a matrix, whose number of elements, and of those of its members, fits the bytes it has."""
+    if depth > MAX_DEPTH:
+        raise source.error(place, f"is nested deeper than {MAX_DEPTH}")
+    parts = _elements(body, order, f"{place}, ", source)
+    (_, flags, _), (kind, shape, _), (_, name, _) = (next(parts, (0, body[:0], 0)) for _ in range(3))
+    dims = struct.unpack(f"{order}{len(shape) // 4}i", shape[: len(shape) // 4 * 4])
+    if len(flags) != 8 or kind != _INT32 or not 2 <= len(dims) <= 32 or min(dims) < 0:
+        raise source.error(place, f"expected the flags and the dimensions of a matrix, got {dims[:4]}")
+    (word, _), n, rest = struct.unpack(order + "II", flags), math.prod(dims), [*parts]
+    class_, held = word & 0xFF, [kind for kind, *_ in rest]
+    if class_ not in (_CELL, _STRUCT, _CHAR, *_NUMBERS):
+        raise _LeftOut(f"a MATLAB array of class {class_} (sparse, object or function)")
+    if class_ == _STRUCT:
+        named = held[:2] == [_INT32, _INT8] and len(rest[0][1]) == 4
+        width = max(struct.unpack(order + "i", rest[0][1])[0], 1) if named else 1
+        fits = named and _are_matrices(held[2:], n * (len(rest[1][1]) // width))
+    elif class_ == _CELL:
+        fits = _are_matrices(held, n)
+    else:
+        parts_of, count = (_TEXT, 1) if class_ == _CHAR else (_NUMERIC, 2 if word & 0x0800 else 1)
+        fits = n <= len(body) and len(held) == count and set(held) <= parts_of
+    if not fits:
+        raise source.error(place, f"says it has {n} elements, which are not what its {len(body)} bytes hold")
+    for kind, member, _ in rest:
+        if kind == _MATRIX and len(member):
+            _name(member, order, place, source, depth + 1)
+    return bytes(name).split(b"\0")[0]
 
-    def _error(self, position: int, message: str) -> Exception:
-        return self._source.error(f"{self._place}, byte {position} of it", message)
 
-    def _next(self, position: int, end: int) -> _Element:
-        if end - position < 8:
-            raise self._error(position, "an element is missing or cut short")
-        first, size = struct.unpack_from(self._order + "II", self._body, position)
-        if first >> 16:
-            # A small element: up to four bytes inside its own tag.
-            kind, size = first & 0xFFFF, first >> 16
-            if size > 4:
-                raise self._error(position, f"a small element says it has {size} bytes, at most 4 fit")
-            return _Element(kind, position + 4, position + 4 + size, position + 8)
-        begin = position + 8
-        if size > end - begin:
-            raise self._error(position, f"an element says it has {size} bytes, {end - begin} are left")
-        return _Element(first, begin, begin + size, min(begin + -(-size // 8) * 8, end))
-
-    def _ints(self, element: _Element) -> tuple[int, ...]:
-        n = (element.end - element.begin) // 4
-        return struct.unpack_from(f"{self._order}{n}i", self._body, element.begin)
-
-    def _matrix(self, begin: int, end: int, depth: int) -> str:
-        if depth > MAX_DEPTH:
-            raise self._error(begin, f"is nested deeper than {MAX_DEPTH}")
-        flags = self._next(begin, end)
-        if flags.kind != 6 or flags.end - flags.begin != 8:
-            raise self._error(begin, "expected the flags of a matrix")
-        (word,) = struct.unpack_from(self._order + "I", self._body, flags.begin)
-        kind, is_complex = word & 0xFF, bool(word & 0x0800)
-        if kind not in (_CELL, _STRUCT, _CHAR, *_NUMBERS):
-            raise _LeftOut(f"a MATLAB array of class {kind} (sparse, object or function)")
-        shape = self._next(flags.following, end)
-        dims = self._ints(shape)
-        if shape.kind != 5 or not 2 <= len(dims) <= 32 or min(dims) < 0:
-            raise self._error(flags.following, f"expected the dimensions of a matrix, got {dims[:4]}")
-        n = math.prod(dims)
-        name = self._next(shape.following, end)
-        if name.kind not in (1, 2, 16):
-            raise self._error(shape.following, "expected the name of a matrix")
-        text = self._body[name.begin : name.end].split(b"\0")[0]
-        position = name.following
-        if kind in _NUMBERS:
-            for _ in range(1 + is_complex):
-                position = self._numbers(position, end, n)
-        elif kind == _CHAR:
-            letters = self._next(position, end)
-            if letters.kind not in _TEXT or n > letters.end - letters.begin:
-                raise self._error(position, f"expected {n} letters, there are {letters.end - letters.begin} bytes")
-        elif kind == _CELL:
-            self._members(position, end, n, depth)
-        else:
-            self._struct(position, end, n, depth)
-        return text.decode("ascii", errors="replace")
-
-    def _numbers(self, position: int, end: int, n: int) -> int:
-        numbers = self._next(position, end)
-        size = _SIZES.get(numbers.kind)
-        if size is None or numbers.end - numbers.begin != n * size:
-            raise self._error(
-                position, f"expected {n} numbers, there are {numbers.end - numbers.begin} bytes of type {numbers.kind}"
-            )
-        return numbers.following
-
-    def _struct(self, position: int, end: int, n: int, depth: int) -> None:
-        width = self._next(position, end)
-        (length,) = self._ints(width)[:1] or (0,)
-        names = self._next(width.following, end)
-        size = names.end - names.begin
-        if width.kind != 5 or names.kind not in (1, 2) or not 0 < length <= 256 or size % length:
-            raise self._error(position, "expected the names of a struct's fields")
-        fields = [self._body[k : k + length].split(b"\0")[0] for k in range(names.begin, names.end, length)]
-        if len(set(fields)) < len(fields) or b"" in fields:
-            raise self._error(position, "the names of a struct's fields are empty or stand there twice")
-        self._members(names.following, end, n * len(fields), depth)
-
-    def _members(self, position: int, end: int, n: int, depth: int) -> None:
-        if n > (end - position) // 8:
-            raise self._error(position, f"expected {n} elements, {end - position} bytes are left")
-        for _ in range(n):
-            member = self._next(position, end)
-            if member.kind != _MATRIX:
-                raise self._error(position, f"an element is of type {member.kind}, expected a matrix (14)")
-            if member.end > member.begin:
-                self._matrix(member.begin, member.end, depth + 1)
-            position = member.following
+def _are_matrices(kinds: list[int], count: int) -> bool:
+    return len(kinds) == count and set(kinds) <= {_MATRIX}
 
 
 def _plain(value: Any) -> Any:

@@ -9,21 +9,16 @@ import contextlib
 import io
 import logging
 import math
+import struct
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from nonsmooth.errors import DataFileError
-from nonsmooth.recordings.limits import MAX_COLUMNS
-from nonsmooth.recordings.needed import needed
-from nonsmooth.recordings.readers.group import Group
-from nonsmooth.recordings.readers.tdms_layout import check_layout
-from nonsmooth.recordings.reading import Source, is_axis_name
-from nonsmooth.recordings.remarks import Remarks
+from nonsmooth.recordings.reading import MAX_COLUMNS, Group, Remarks, Source, is_axis_name, needed
 
-__all__ = ["load_tdms"]
-
+__all__ = ["check_layout", "load_tdms"]
 
 def load_tdms(data: bytes, source: Source, remarks: Remarks) -> tuple[dict[str, Any], dict[str, Any]]:
     """The groups of a file by clock, and its properties."""
@@ -101,3 +96,33 @@ def _number(text: str | None) -> float | None:
 
 def _plain(properties: Any) -> dict[str, str]:
     return {str(key): str(value)[:1000] for key, value in list(properties.items())[:256]}
+
+
+_LEAD_IN = 28
+_UNFINISHED = 0xFFFF_FFFF_FFFF_FFFF  # the writer was stopped before it could say where the segment ends
+_MAX_SEGMENTS = 100_000
+
+
+def check_layout(data: bytes, source: Source) -> None:
+    """DataFileError with the segment whose lead-in is damaged or points outside the file."""
+    position = 0
+    for segment in range(1, _MAX_SEGMENTS + 1):
+        place = f"segment {segment}, byte {position}"
+        if len(data) - position < _LEAD_IN:
+            raise source.error(place, f"its lead-in of {_LEAD_IN} bytes is cut short")
+        tag, contents, _, end, raw = struct.unpack_from("<4sIIQQ", data, position)
+        if tag != b"TDSm":
+            raise source.error(place, f"begins with {tag!r}, expected b'TDSm'")
+        if contents & (1 << 6):
+            raise source.error(place, "is written in big-endian order, which is not read; save it again on a PC")
+        left = len(data) - position - _LEAD_IN
+        if end == _UNFINISHED:
+            end = left
+        if end > left or raw > end:
+            raise source.error(
+                place, f"says it is {end} bytes long with data from {raw} on, but {left} bytes follow: it is cut short"
+            )
+        position += _LEAD_IN + end
+        if position == len(data):
+            return
+    raise source.error("", f"holds more than {_MAX_SEGMENTS} segments")

@@ -17,9 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.recordings.limits import MAX_COLUMNS
-from nonsmooth.recordings.reading import Source
-from nonsmooth.recordings.remarks import Remarks
+from nonsmooth.recordings.reading import MAX_COLUMNS, Remarks, Source
 
 __all__ = ["Cells", "Numerals", "Row", "checked_header", "decoded", "number", "read_cells", "rows"]
 

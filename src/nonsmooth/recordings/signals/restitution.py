@@ -7,10 +7,11 @@ acceleration of gravity, and where the record does not, something touches it.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import even_rate, signal, whose
@@ -18,7 +19,7 @@ from nonsmooth.recordings.signals.checks import even_rate, signal, whose
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["flights", "restitution"]
+__all__ = ["flights", "impacts_of", "restitution", "single_contacts"]
 
 
 def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int = 4) -> xr.Dataset:
@@ -114,45 +115,60 @@ def restitution(
     ValueError
         If values are missing.
     """
-    import xarray as xr
-
     t, z = signal(time, height, least=12, purpose="restitution")
-    longest = 4.5 * float(np.median(np.diff(t))) if longest is None else longest
-    first, last = flights["first"].values, flights["last"].values
-    rows = []
-    for k in range(len(first) - 1):
-        i, j = int(last[k]), int(first[k + 1])
-        before = slice(max(int(first[k]), i - window + 1), i + 1)
-        after = slice(j, min(int(last[k + 1]), j + window - 1) + 1)
-        if t[j] - t[i] > longest or after.stop - after.start < 4 or before.stop - before.start < 4:
+    found, sides = [], []
+    for k, before, after in single_contacts(t, flights, window, longest):
+        if min(len(t[before]), len(t[after])) < 4:
             continue
+        i, j = before.stop - 1, after.start
         left, right = _Side(t[before], z[before], t[i]), _Side(t[after], z[after], t[i])
         when = _meeting(left.p - right.p, float(t[j] - t[i]))
-        (z0, v0), (_, v1) = left.at(when), right.at(when)
-        rows.append((t[i] + when, z0, v0, v1, t[j] - t[i], k, left, right, when))
-    freedom = sum(side.freedom for row in rows for side in row[6:8])
-    noise = math.sqrt(sum(side.squares for row in rows for side in row[6:8]) / freedom) if freedom else math.nan
-    table = np.array([row[:6] for row in rows], np.float64).reshape(-1, 6)
-    errors = np.array([[side.slope_error(row[8], noise) for side in row[6:8]] for row in rows]).reshape(-1, 2)
-    before_v, after_v = table[:, 2], table[:, 3]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        e = np.where(before_v < -3.0 * errors[:, 0], -after_v / before_v, np.nan)
-        e_error = np.hypot(errors[:, 1], e * errors[:, 0]) / np.abs(before_v)
-    return xr.Dataset(
+        found.append((k, t[i] + when, t[j] - t[i], left.p @ _powers(when), when))
+        sides.append((left, right))
+    freedom = sum(side.freedom for pair in sides for side in pair)
+    noise = math.sqrt(sum(side.squares for pair in sides for side in pair) / freedom) if freedom else math.nan
+    rows = [
         {
-            "impact_time": ("impact", table[:, 0], {"long_name": "time of the impact", "units": "s"}),
-            "impact_height": ("impact", table[:, 1], {"long_name": "height at the impact"}),
-            "v_before": ("impact", before_v, {"long_name": "velocity before the impact"}),
-            "v_before_error": ("impact", errors[:, 0]),
-            "v_after": ("impact", after_v, {"long_name": "velocity after the impact"}),
-            "v_after_error": ("impact", errors[:, 1]),
-            "restitution": ("impact", e, {"long_name": "restitution"}),
-            "restitution_error": ("impact", e_error),
-            "duration": ("impact", table[:, 4], {"long_name": "from the last free sample to the next", "units": "s"}),
-            "flight": ("impact", table[:, 5].astype(np.int64)),
-        },
-        attrs={"noise": noise},
-    )
+            "flight": k, "impact_time": at, "duration": duration, "impact_height": height,
+            "v_before": left.slope(when, noise), "v_after": right.slope(when, noise),
+        } for (k, at, duration, height, when), (left, right) in zip(found, sides, strict=True)
+    ]  # fmt: skip
+    return impacts_of(rows, {"impact_height": (float, "height at the impact")}).assign_attrs(noise=noise)
+
+
+def single_contacts(
+    t: FloatArray, flights: xr.Dataset, window: int, longest: float | None
+) -> Iterator[tuple[int, slice, slice]]:
+    """Each flight that a short contact ends: its number, its last samples and the first of the flight behind it."""
+    longest = 4.5 * float(np.median(np.diff(t))) if longest is None else longest
+    first, last = flights["first"].values.tolist(), flights["last"].values.tolist()
+    for k, (i, j) in enumerate(zip(last[:-1], first[1:], strict=True)):
+        if t[j] - t[i] <= longest:
+            yield k, slice(max(first[k], i - window + 1), i + 1), slice(j, min(last[k + 1], j + window - 1) + 1)
+
+
+def impacts_of(rows: Sequence[Mapping[str, Any]], more: Mapping[str, tuple[type, str]]) -> xr.Dataset:
+    """Impacts with their restitution, of rows whose velocities are (value, error); ``more``: other columns."""
+    import xarray as xr
+
+    def column(name: str, kind: type, place: int | None = None) -> NDArray[Any]:
+        return np.array([row[name] if place is None else row[name][place] for row in rows], kind)
+
+    data: dict[str, Any] = {}
+    times = {"impact_time": "time of the impact", "duration": "from the last free sample to the next"}
+    for name, long_name in times.items():
+        data[name] = ("impact", column(name, float), {"long_name": long_name, "units": "s"})
+    (v0, e0), (v1, e1) = ([column(name, float, place) for place in (0, 1)] for name in ("v_before", "v_after"))
+    for word, v, error in (("before", v0, e0), ("after", v1, e1)):
+        data[f"v_{word}"] = ("impact", v, {"long_name": f"velocity {word} the impact"})
+        data[f"v_{word}_error"] = ("impact", error)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        e = np.where(v0 < -3.0 * e0, -v1 / v0, np.nan)
+        e_error = np.hypot(e1, e * e0) / np.abs(v0)
+    data |= {"restitution": ("impact", e, {"long_name": "restitution"}), "restitution_error": ("impact", e_error)}
+    data["flight"] = ("impact", column("flight", int), {"long_name": "flight before"})
+    data |= {name: ("impact", column(name, kind), {"long_name": text}) for name, (kind, text) in more.items()}
+    return xr.Dataset(data)
 
 
 def _densest(values: FloatArray) -> tuple[float, float]:
@@ -193,12 +209,14 @@ class _Side:
         self.squares, self.freedom = float(left @ left), len(t) - 3
         self.C = np.linalg.inv(A.T @ A)
 
-    def at(self, s: float) -> tuple[float, float]:
-        return float(self.p @ [1.0, s, s * s]), float(self.p @ [0.0, 1.0, 2.0 * s])
-
-    def slope_error(self, s: float, noise: float) -> float:
+    def slope(self, s: float, noise: float) -> tuple[float, float]:
+        """The velocity and its error."""
         along = np.array([0.0, 1.0, 2.0 * s])
-        return noise * math.sqrt(float(along @ self.C @ along))
+        return float(self.p @ along), noise * math.sqrt(float(along @ self.C @ along))
+
+
+def _powers(s: float) -> FloatArray:
+    return np.array([1.0, s, s * s])
 
 
 def _meeting(d: FloatArray, length: float) -> float:

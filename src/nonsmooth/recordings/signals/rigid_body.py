@@ -16,11 +16,19 @@ from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import whose
+from nonsmooth.recordings.signals.restitution import impacts_of, single_contacts
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["corner_heights", "corner_restitution", "cube"]
+
+
+_COLUMNS = {
+    "corner": (int, "row of the corner"), "half_sample": (float, "change of the restitution by half a sample"),
+    "height": (float, "height of the corner"), "touching": (int, "corners at the ground"),
+    "single": (bool, "one corner alone touches, and comes down"),
+}  # fmt: skip
 
 
 def cube(half_width: float = 1.0) -> FloatArray:
@@ -97,8 +105,6 @@ def corner_restitution(
     ValueError
         If shapes do not agree or values are missing.
     """
-    import xarray as xr
-
     t = np.asarray(time, np.float64)
     place, points = np.asarray(position, np.float64), np.asarray(corners, np.float64)
     if place.shape != (len(t), 3) or np.shape(orientation) != (len(t), 4) or points.ndim != 2 or points.shape[1] != 3:
@@ -109,58 +115,29 @@ def corner_restitution(
     if not (np.isfinite(t).all() and np.isfinite(place).all() and np.isfinite(np.asarray(orientation)).all()):
         raise ValueError(f"{whose(position)}: values are missing; take the intervals of the record that are whole")
     turns, fall = _turns(orientation), float(flights["acceleration"])
-    sample = float(np.median(np.diff(t)))
-    longest = 4.5 * sample if longest is None else longest
-    first, last = flights["first"].values, flights["last"].values
+    half_sample = 0.5 * float(np.median(np.diff(t)))
     reach = near * float(np.max(np.linalg.norm(points, axis=1)))
-    rows, left_out = [], 0
-    for k in range(len(first) - 1):
-        i, j = int(last[k]), int(first[k + 1])
-        if t[j] - t[i] > longest:
-            left_out += 1
-            continue
-        before = _Flight(t, place, turns, slice(max(int(first[k]), i - window + 1), i + 1), fall)
-        after = _Flight(t, place, turns, slice(j, min(int(last[k + 1]), j + window - 1) + 1), fall)
-        corner = int(np.argmin(before.heights(0.5 * (t[i] + t[j]), points)))
-        grid = np.linspace(t[i], t[j], 41)
+    rows = []
+    for k, *sides in single_contacts(t, flights, window, longest):
+        before, after = (_Flight(t, place, turns, side, fall) for side in sides)
+        begin, end = t[sides[0].stop - 1], t[sides[1].start]
+        corner = int(np.argmin(before.heights(0.5 * (begin + end), points)))
+        grid = np.linspace(begin, end, 41)
         apart = np.array([before.heights(s, points)[corner] - after.heights(s, points)[corner] for s in grid])
         when = _nearest_zero(grid, apart)
-        heights = before.heights(when, points)
-        v0, e0 = before.velocity(when, points[corner])
-        v1, e1 = after.velocity(when, points[corner])
-        late, early = (
-            -after.velocity(when + s, points[corner])[0] / before.velocity(when + s, points[corner])[0]
-            for s in (0.5 * sample, -0.5 * sample)
-        )
+        heights, point = before.heights(when, points), points[corner]
+        moved = (when + half_sample, when - half_sample)
+        late, early = (-after.velocity(s, point)[0] / before.velocity(s, point)[0] for s in moved)
+        v0, e0 = before.velocity(when, point)
         touching = int(np.count_nonzero(heights < heights[corner] + reach))
         same = corner == int(np.argmin(after.heights(when, points)))
-        single = touching == 1 and same and v0 < -3.0 * e0
-        half = 0.5 * abs(late - early)
-        rows.append((when, corner, v0, e0, v1, e1, heights[corner], touching, t[j] - t[i], single, k, half))
-    table = np.array(rows, np.float64).reshape(-1, 12)
-    _, _, v0, e0, v1, e1 = table[:, :6].T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        e = np.where(v0 < -3.0 * e0, -v1 / v0, np.nan)
-        e_error = np.hypot(e1, e * e0) / np.abs(v0)
-    return xr.Dataset(
-        {
-            "impact_time": ("impact", table[:, 0], {"long_name": "time of the impact", "units": "s"}),
-            "corner": ("impact", table[:, 1].astype(np.int64)),
-            "v_before": ("impact", v0, {"long_name": "vertical velocity of the corner before"}),
-            "v_before_error": ("impact", e0),
-            "v_after": ("impact", v1, {"long_name": "vertical velocity of the corner after"}),
-            "v_after_error": ("impact", e1),
-            "restitution": ("impact", e, {"long_name": "restitution"}),
-            "restitution_error": ("impact", e_error),
-            "half_sample": ("impact", table[:, 11], {"long_name": "change of the restitution by half a sample"}),
-            "height": ("impact", table[:, 6], {"long_name": "height of the corner"}),
-            "touching": ("impact", table[:, 7].astype(np.int64), {"long_name": "corners at the ground"}),
-            "duration": ("impact", table[:, 8], {"long_name": "from the last free sample to the next", "units": "s"}),
-            "single": ("impact", table[:, 9].astype(np.bool_)),
-            "flight": ("impact", table[:, 10].astype(np.int64), {"long_name": "flight before"}),
-        },
-        attrs={"left_out": left_out},
-    )
+        rows.append({
+            "flight": k, "impact_time": when, "duration": end - begin, "v_before": (v0, e0),
+            "v_after": after.velocity(when, point), "corner": corner, "half_sample": 0.5 * abs(late - early),
+            "height": heights[corner], "touching": touching, "single": touching == 1 and same and v0 < -3.0 * e0,
+        })  # fmt: skip
+    left_out = max(flights.sizes["flight"] - 1, 0) - len(rows)
+    return impacts_of(rows, _COLUMNS).assign_attrs(left_out=left_out)
 
 
 def _nearest_zero(t: FloatArray, y: FloatArray) -> float:

@@ -97,7 +97,7 @@ class Traced:
     outputs: tuple[tuple[Expr, ...], ...]
     period: Expr | None
     along: tuple[frozenset[int], ...] = ()
-    patterns: Patterns | None = field(default=None, compare=False, repr=False)  # modes are made when they are visited
+    patterns: Patterns | None = field(default=None, repr=False)  # modes are made when they are visited
     decider: Decider | None = field(default=None, compare=False, repr=False)  # what elements decide together
 
     @property

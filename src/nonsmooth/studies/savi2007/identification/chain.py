@@ -212,9 +212,8 @@ class _Chain:
         sentences = [disagreement(adjusted), *impossible(adjusted)]
         if contacts is not None and contacts.poor:
             sentences.append(
-                f"contact: the motion is not that of the model: root of chi^2 per degree of freedom "
-                f"{contacts.fit.reduced**0.5:.3g}, {np.count_nonzero(~contacts.fit.used)} of {len(contacts.pieces)} "
-                "pieces left out. Look at the crank's length, the photogate and the gap of these runs"
+                f"contact: the motion is not that of the model: residuals {contacts.excess:.3g} times the sensor's "
+                "noise. Look at the crank's length, the photogate and the gap of these runs"
             )
         for sentence in sentences:
             if sentence:
@@ -385,6 +384,8 @@ class _Chain:
         except SolveError as reason:
             self.say(f"contact: not used, so that the gap is not known: {reason}")
             return None, None
+        for sentence in found.left:
+            self.say(sentence)
         self.observe(("kappa", "gamma"), found.values[3:5], found.covariance[3:5, 3:5], "multiple shooting")
         own = Quantity(m, float(np.sqrt(rough.covariance[rough.names.index("m"), rough.names.index("m")])))
         self.findings.append(contact_finding(found, own, resolution=resolution))
@@ -393,5 +394,5 @@ class _Chain:
         # of the ratio k_s/m: both come from masses and forces that are known apart
         error = rough["k_s"] / m * float(np.sqrt(np.array([1, -1]) @ relative @ [1, -1]))
         return found, self.beside(
-            "c_s from one contact", lambda: one_contact(found, m, resolution=resolution, kappa_error=error)
+            "c_s from one contact", lambda: one_contact(found, decay, m, resolution=resolution, kappa_error=error)
         )

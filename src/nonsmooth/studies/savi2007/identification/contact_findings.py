@@ -7,18 +7,17 @@ many contacts fitted together have a smaller one, by the root of their number an
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nonsmooth import SolveError
 from nonsmooth.identification import Estimate, Finding
-from nonsmooth.identification.profiles import Profile, profile_of
 from nonsmooth.identification.uncertainty import coverage_factor
 from nonsmooth.recordings import Quantity
-from nonsmooth.studies.savi2007.identification.multiple_shooting import ContactFit
-from nonsmooth.studies.savi2007.identification.shooting import ShootingFit, shoot
+from nonsmooth.recordings.signals.phase import drive_phase
+from nonsmooth.studies.savi2007.identification.free_decay import DecayFit
+from nonsmooth.studies.savi2007.identification.multiple_shooting import ContactFit, fit_contact, known_before
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,8 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["contact_finding", "one_contact"]
 
 _KAPPA, _GAMMA = 3, 4  # indices of k_s/m and c_s/m among the parameters
-_POINTS = 24
-_TRIED = 15  # pieces of which the median one is shown
+_TRIED = 5  # windows of which the median one is shown
 
 
 def contact_finding(found: ContactFit, mass: Quantity, *, resolution: float) -> Finding:
@@ -51,44 +49,36 @@ def contact_finding(found: ContactFit, mass: Quantity, *, resolution: float) -> 
         f"gap, {run.name}": Estimate(float(found.values[found.place(i, 0)]), float(error[found.place(i, 0)]), "m")
         for i, run in enumerate(found.runs)
     }
-    left = int(np.count_nonzero(~found.fit.used))
     value = float(found.values[_GAMMA])
     stiff = Estimate(float(found.values[_KAPPA]), float(error[_KAPPA])).times(mass.value, mass.uncertainty, "N/m")
     notes = [
-        f"root of chi^2 per degree of freedom {np.sqrt(found.fit.reduced):.2f}; the clock jitters by "
-        f"{1e6 * found.fit.jitter:.0f} µs",
+        f"residuals {found.excess:.2f} times the sensor's noise",
         "one contact is 8 samples at 100 Hz: what is known of c_s comes from many fitted together",
+        *found.left,
     ]
-    if found.short:
-        notes.append(
-            f"the fit stands {found.short:.2g} standard uncertainties short of its minimum, where friction or a graze "
-            "gives the sum of squares a corner; what is left of the way is in the uncertainties"
-        )
-    if found.grazing:
-        notes.append(
-            f"{found.grazing} pieces in which the car grazes the support, or friction all but holds it, are left out"
-        )
-    if left:
-        notes.append(f"{left} of {len(found.pieces)} pieces are left out: they fit far worse than the others")
+    notes += [f"{run.name}: {note}" for run, one in zip(found.runs, found.fits, strict=True)
+              for note in (*one.notes, *one.anomalies) if note.startswith(("left out", "the fit stands"))]  # fmt: skip
     return Finding(
         "c_s_contact",
         Estimate(value, float(error[_GAMMA]), logarithmic=value > 0).times(mass.value, mass.uncertainty, "N s/m"),
-        f"multiple shooting over {found.n_contacts} pieces split at contacts", found.fit.samples,
+        f"multiple shooting over {found.n_contacts} contacts", found.samples,
         tuple(run.name for run in found.runs), tuple(notes),
         {"k_s": stiff, **gaps},
         data=_data(found, resolution), plot="multiple_shooting",
     )  # fmt: skip
 
 
-def one_contact(found: ContactFit, mass: float, *, resolution: float, kappa_error: float) -> Finding:
-    r"""The profile of c_s over a single piece with contact: what one contact tells on its own.
+def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: float, kappa_error: float) -> Finding:
+    r"""The profile of c_s over a window with a single contact: what one contact tells on its own.
 
     Known besides is what does not come from contacts: the free oscillator, k_s/m, and the drive as set. Gap, place and
-    the drive's details are this piece's own to find, as they were for all pieces together.
+    the drive's details are this window's own to find, as they were for all together.
 
     Parameters
     ----------
     found : ContactFit
+    decay : DecayFit
+        The free oscillator.
     mass : float
         Mass (kg).
     resolution : float
@@ -99,97 +89,57 @@ def one_contact(found: ContactFit, mass: float, *, resolution: float, kappa_erro
     Returns
     -------
     Finding
-        ``c_s_one_contact``, from the piece that is the median one in how well it tells c_s.
+        ``c_s_one_contact``, from the window that is the median one, of some, in how well it tells c_s.
     """
-    used = [i for i in range(len(found.pieces)) if found.fit.used[i]]
-    alone = {i: _Alone(found, i, resolution, kappa_error) for i in used[:: max(len(used) // _TRIED, 1)]}
-    widths = {i: one.width() for i, one in alone.items()}
-    order = sorted((i for i in widths if np.isfinite(widths[i])), key=lambda i: widths[i])
-    if not order:
-        raise ValueError("no piece with contact can be fitted on its own")
-    chosen = order[len(order) // 2]
-    one, width, gamma = alone[chosen], widths[chosen], float(found.values[_GAMMA])
-    low_end = max(gamma - 3.5 * width, 0.02 * gamma)
-    values = np.append(np.linspace(low_end, gamma, _POINTS // 2, endpoint=False),
-                       np.linspace(gamma, gamma + 3.5 * width, _POINTS - _POINTS // 2))  # fmt: skip
-    cost = np.array([one.cost(float(value)) for value in values])
-    kept = np.isfinite(cost)
-    values, cost = values[kept], (cost[kept] - np.min(cost[kept])) / max(found.fit.reduced, 1.0)
-    top = int(np.argmin(cost))
-    profile = profile_of(values * mass, cost, mass * float(values[top]))
-    best, low, high = profile.best, profile.low, profile.high
-    bounded = bool(np.isfinite(low) and np.isfinite(high))
+    kappa, gamma, windows = float(found.values[_KAPPA]), float(found.values[_GAMMA]), found.single()
+    alone = []
+    for i, first, last in windows[:: max(len(windows) // _TRIED, 1)]:
+        run, drive = found.runs[i], drive_phase(found.runs[i].passages)
+        known = known_before(
+            run, decay, float(found.values[found.place(i, 3)]),
+            kappa=Estimate(kappa, kappa_error), gamma=Estimate(gamma, 10 * gamma),
+        )  # fmt: skip
+        try:
+            one = fit_contact(
+                run, drive, not drive.wander()[1], known, known, resolution, (first, last), profile=["gamma"]
+            )
+        except SolveError:
+            continue
+        if np.isfinite(one.uncertainty["gamma"]):
+            alone.append((float(one.uncertainty["gamma"]), run, one))
+    if not alone:
+        raise ValueError("no contact can be fitted on its own")
+    width, run, one = sorted(alone, key=lambda row: row[0])[len(alone) // 2]
+    data = next(finding.data for finding in one.findings if finding.name == "gamma, profile")
+    assert data is not None
+    best, low, high = (mass * float(data[name]) for name in ("best", "low", "high"))
+    bounded = bool(0 < low and np.isfinite(high))
     error = best * float(np.log(high / low)) / (2 * coverage_factor()) if bounded else mass * width
+    shown = data.assign({name: data[name] * mass for name in ("best", "low", "high")})
+    shown = shown.assign_coords(value=("value", mass * data["value"].values, {"units": "N s/m"}))
     return Finding(
-        "c_s_one_contact", Estimate(best, error, "N s/m", logarithmic=True),
-        "profile likelihood of one piece with contact, its gap, place and drive found with it",
-        len(found.pieces[chosen].x), (found.pieces[chosen].label,),
+        "c_s_one_contact", Estimate(best, error, "N s/m", logarithmic=bounded),
+        "profile likelihood of one contact, its gap, place and drive found with it",
+        int(one.residuals.sizes["sample"]), (run.name,),
         (
             (f"95 % limits {low:.3g} to {high:.3g} N s/m" if bounded else "the profile does not bound it on both sides")
-            + f"; the piece is the median one of {len(order)}",
+            + f"; the window is the median one of {len(alone)}",
         ),
-        data=_profile(profile, found), plot="profile",
+        data=shown.assign_attrs(parameter="c_s", units="N s/m", synthetic="yes" if run.synthetic else "no"),
+        plot="profile",
     )  # fmt: skip
 
 
-class _Alone:
-    """One piece with the eleven parameters that act on it, and what is known of them besides contacts."""
-
-    def __init__(self, found: ContactFit, i: int, resolution: float, kappa_error: float) -> None:
-        piece = found.pieces[i]
-        self.piece = replace(piece, which=np.arange(len(piece.which)), start=found.fit.starts[i])
-        self.rows = piece.which
-        self.values, self.resolution, self.jitter = found.values[self.rows], resolution, found.fit.jitter
-        self.known = found.known[self.rows].copy()
-        self.known[_KAPPA] = self.values[_KAPPA]
-        self.precision = found.precision[np.ix_(self.rows, self.rows)].copy()
-        self.precision[_KAPPA, _KAPPA] += kappa_error**-2.0
-        self.steps = np.array([1e-6, 1e-6, 1e-7, 1e-6 * self.values[_KAPPA], 1e-4, 3e-8, 3e-8, *[1e-7] * 4])
-
-    def fit(self, gamma: float, hold: float) -> ShootingFit:
-        """The other parameters at this c_s/m, which is held with the precision ``hold``."""
-        values, known, precision = self.values.copy(), self.known.copy(), self.precision.copy()
-        values[_GAMMA] = known[_GAMMA] = gamma
-        precision[_GAMMA, _GAMMA] = hold
-        return shoot(
-            [self.piece], values, self.steps, resolution=self.resolution, known=known, precision=precision,
-            jitter=self.jitter,
-        )  # fmt: skip
-
-    def width(self) -> float:
-        """Standard error of c_s/m, free but for a factor of ten; inf where this piece cannot be fitted alone."""
-        gamma = float(self.values[_GAMMA])
-        try:
-            return float(np.sqrt(self.fit(gamma, (10 * gamma) ** -2.0).covariance[_GAMMA, _GAMMA]))
-        except SolveError:
-            return float("inf")
-
-    def cost(self, gamma: float) -> float:
-        """chi^2 of readings and of what is known, the rest fitted; NaN where that fails."""
-        try:
-            found = self.fit(gamma, (1e-4 * gamma) ** -2.0)
-        except SolveError:
-            return float("nan")
-        weight = 1.0 / (self.resolution**2 / 12 + (self.jitter * found.fitted[0][:, 1]) ** 2)
-        off = found.values - self.known
-        off[_GAMMA] = 0.0
-        return float(np.sum(found.residuals[0] ** 2 * weight) + off @ self.precision @ off)
-
-
 def _data(found: ContactFit, resolution: float) -> xr.Dataset:
-    """The run with the most pieces, sample by sample."""
+    """The longest run, sample by sample."""
     import xarray as xr
 
-    names = [piece.label for piece in found.pieces]
-    which = max(range(len(found.runs)), key=lambda i: names.count(found.runs[i].name))
-    run = found.runs[which]
+    which = max(range(len(found.runs)), key=lambda i: found.fits[i].residuals.sizes["sample"])
+    run, fitted_of = found.runs[which], found.fits[which].residuals
     time, x = run.time, run.positions
     fitted, segment = np.full(len(x), np.nan), np.full(len(x), -1)
-    for i, piece in enumerate(found.pieces):
-        if piece.label == run.name and found.fit.used[i]:
-            begin = int(np.argmin(np.abs(time - piece.origin)))
-            fitted[begin : begin + len(piece.x)] = found.fit.fitted[i][:, 0]
-            segment[begin : begin + len(piece.x)] = i
+    at = np.searchsorted(time, fitted_of["time"].values)
+    fitted[at], segment[at] = fitted_of["fitted"].values, fitted_of["window"].values
     gap = float(found.values[found.place(which, 0)])
     return xr.Dataset(
         {
@@ -201,20 +151,4 @@ def _data(found: ContactFit, resolution: float) -> xr.Dataset:
             "gap_error": ((), float(np.sqrt(found.covariance[found.place(which, 0), found.place(which, 0)]))),
         },
         {"time": time}, {"synthetic": "yes" if run.synthetic else "no", "run": run.name},
-    )  # fmt: skip
-
-
-def _profile(profile: Profile, found: ContactFit) -> xr.Dataset:
-    import xarray as xr
-
-    return xr.Dataset(
-        {
-            "cost": ("value", profile.cost), "best": ((), profile.best), "low": ((), profile.low),
-            "high": ((), profile.high),
-        },
-        {"value": ("value", profile.values, {"units": "N s/m"})},
-        {
-            "parameter": "c_s", "units": "N s/m",
-            "synthetic": "yes" if any(run.synthetic for run in found.runs) else "no",
-        },
     )  # fmt: skip

@@ -21,8 +21,8 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.evidence import Run
-from nonsmooth.studies.savi2007.identification.free_decay import DecayFit, free_decay
-from nonsmooth.studies.savi2007.identification.support_damping import log_decrement
+from nonsmooth.studies.savi2007.identification.free_decay import DecayFit
+from nonsmooth.studies.savi2007.identification.support_damping import decay_rate, log_decrement
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,7 +41,7 @@ def envelope(time: FloatArray, first: float, omega_0: float, b: float, f: float)
 
 
 def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: Quantity, *, resolution: float) -> Finding:
-    r"""Viscous damping and dry friction from the shape of free decays, with a viscous-only fit beside it.
+    r"""Viscous damping and dry friction from the shape of free decays, with the decrement of the same decays beside it.
 
     Parameters
     ----------
@@ -57,21 +57,23 @@ def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: Quantity, *, resol
     Returns
     -------
     Finding
-        c (N s/m). ``others``: ``friction`` (N), ``c_viscous_only`` of the same decays without friction in the law;
-        ``covariance`` is that of c and friction.
+        c (N s/m). ``others``: ``friction`` (N), ``c_viscous_only`` by the logarithmic decrement of the same
+        decays; ``covariance`` is that of c and friction.
     """
-    viscous = free_decay(
-        [(runs[i].time, runs[i].positions) for i in decay.runs], resolution=resolution, friction=False,
-        doubt_law=False, check=False, jitter=decay.fit.jitter,
-    )  # fmt: skip
+    peaks = [_peaks(runs[i], span, decay, resolution) for i, span in zip(decay.runs, decay.spans, strict=True)]
+    viscous = np.array([decay_rate(*row) for row in peaks if len(row[0]) > 2]).reshape(-1, 3)
+    weight = 1.0 / viscous[:, 2]
+    rate = -2 * float(np.average(viscous[:, 0], weights=weight))
+    rate_error = 2 * float(np.sqrt(1 / np.sum(weight)))
     c, friction = mass.value * float(decay.values[1]), mass.value * float(decay.values[2])
-    plain = mass.value * float(viscous.values[1])
+    plain = mass.value * rate
     own = mass.value**2 * decay.covariance[1:3, 1:3]
     covariance = own + mass.uncertainty**2 * np.outer(decay.values[1:3], decay.values[1:3])
     c_error, friction_error = (float(e) for e in np.sqrt(np.diag(covariance)))
     related = float(own[0, 1] / np.sqrt(own[0, 0] * own[1, 1])) if own[1, 1] else 0.0
     notes = [
-        f"without friction in the law the same decays give {plain:.4g} N s/m, {100 * (plain / c - 1):+.1f} %",
+        f"by their logarithmic decrement, without friction, the same decays give {plain:.4g} N s/m, "
+        f"{100 * (plain / c - 1):+.1f} %",
         f"c and the dry friction are told apart by the shape; correlation {related:+.2f}",
         *decay.notes,
     ]
@@ -80,23 +82,20 @@ def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: Quantity, *, resol
         decay.samples, tuple(runs[i].name for i in decay.runs), tuple(notes),
         {
             "friction": Estimate(friction, friction_error, "N"),
-            "c_viscous_only": Estimate(float(viscous.values[1]), viscous.error("b")).times(
-                mass.value, mass.uncertainty, "N s/m"
-            ),
+            "c_viscous_only": Estimate(rate, rate_error).times(mass.value, mass.uncertainty, "N s/m"),
         },
-        covariance, _data(runs, decay, viscous, (c, c_error, friction, friction_error), resolution), "free_decay",
+        covariance, _data(runs, decay, peaks, (c, c_error, friction, friction_error)), "free_decay",
     )  # fmt: skip
 
 
-def _turn(decay: DecayFit, which: int) -> tuple[float, float]:
-    """Time of the first turning point after the first fitted sample (s), and its height, to second order."""
-    x, v = decay.fit.fitted[which][0] - [decay.values[3], 0.0]
-    late = v / (decay.values[0] ** 2 * x)
-    return float(late), float(abs(x) * (1 + (decay.values[0] * late) ** 2 / 2))
+def _peaks(run: Run, span: tuple[int, int], decay: DecayFit, resolution: float) -> tuple[FloatArray, ...]:
+    """Turning points of the part that is used; the first lies within a sample of where the fit begins."""
+    early = slice(max(span[0] - 3, 0), span[1])
+    return log_decrement(run.time[early], run.positions[early], float(decay.values[3]), resolution=resolution)
 
 
 def _data(
-    runs: Sequence[Run], decay: DecayFit, viscous: DecayFit, numbers: tuple[float, ...], resolution: float
+    runs: Sequence[Run], decay: DecayFit, peaks: Sequence[tuple[FloatArray, ...]], numbers: tuple[float, ...]
 ) -> xr.Dataset:
     import xarray as xr
 
@@ -105,16 +104,17 @@ def _data(
     which = int(np.argmax(widths))
     run, (begin, end) = runs[decay.runs[which]], decay.spans[which]
     time, x = run.time[begin:end], run.positions[begin:end]
-    # the first turning point lies within a sample of where the fit begins
-    early = slice(max(begin - 3, 0), end)
-    at, height, error = log_decrement(run.time[early], run.positions[early], rest, resolution=resolution)
-    begun, first = _turn(decay, which)
-    at = at - (time[0] + begun)
+    at, height, error = peaks[which]
+    # the first turning point after the first fitted sample, and its height, to second order
+    first, v = decay.begins(which)
+    late = v / (natural**2 * first)
+    slope, intercept, _ = decay_rate(*peaks[which])
+    begun = time[0] + late
+    at = at - begun
     fine = np.linspace(0.0, float(at[-1]), 200)
-    fitted = decay.fit.fitted[which][:, 0] - rest
-    both = envelope(fine, first, natural, b, f)
-    shift, alone = _turn(viscous, which)
-    plain = envelope(fine + begun - shift, alone, natural, float(viscous.values[1]), 0.0)
+    plain = np.exp(intercept + slope * (begun + fine))
+    fitted = decay.fitted(which) - rest
+    both = envelope(fine, float(abs(first) * (1 + (natural * late) ** 2 / 2)), natural, b, f)
     return xr.Dataset(
         {
             "peak_time": ("peak", at, {"units": "s"}), "peak_height": ("peak", height, {"units": "m"}),

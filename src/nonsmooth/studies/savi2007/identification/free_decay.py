@@ -10,9 +10,9 @@ so that it takes the same length :math:`4 f/\omega_0^2` off the swing in every c
 same fraction, and it does not shift the frequency: :math:`\omega_d = \sqrt{\omega_0^2 - b^2/4}` with or without it. A
 single decay therefore tells the two apart by its shape, several of different heights all the better.
 
-The fit is in the time domain over all runs together, from each first turning point to where the car has become slow:
-there the friction law is in doubt (a car that creeps, a belt that gives), and the fit should not hang on it. How far
-the estimate moves when half of that speed is let in is added to the uncertainty: it is that of the law.
+The fit is :func:`nonsmooth.fit`'s, over all runs together, from each first turning point to where the car has become
+slow: there the friction law is in doubt (a car that creeps, a belt that gives), and the fit should not hang on it. How
+far the estimate moves when half of that speed is let in is added to the uncertainty: it is that of the law.
 
 References: J.P. Den Hartog, Trans. ASME 53 (1931) 107; B.F. Feeny and J.W. Liang, J. Sound Vib. 195 (1996) 149.
 """
@@ -21,16 +21,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from nonsmooth import SolveError
+from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
 from nonsmooth.arrays import FloatArray
 from nonsmooth.studies.savi2007.identification.consistency import Consistent, consistent
-from nonsmooth.studies.savi2007.identification.pieces import Piece, start_state
-from nonsmooth.studies.savi2007.identification.shooting import ShootingFit, shoot
 
 __all__ = ["DecayFit", "free_decay", "swing"]
 
@@ -38,32 +37,47 @@ __all__ = ["DecayFit", "free_decay", "swing"]
 #: Speed (m/s) of the slowest half swing that is used.
 SLOWEST = 0.03
 _NAMES = ("omega_0", "b", "f", "x_e")
-_UNFITTING = 4.0  # chi^2 of a run's residuals, in that of the median run, from which the law does not fit it
+_UNFITTING = 2.0  # residuals of a run over those of the median run, from which the law does not fit it
 
 
 @dataclass(frozen=True, eq=False)
 class DecayFit:
     r"""Outcome of `free_decay`: :math:`\omega_0`, b = c/m, f = F_C/m, and the place of rest x_e in the sensor's count.
 
-    ``values`` and ``covariance`` are in the order ``omega_0, b, f, x_e``; ``fit`` holds residuals and weights.
+    ``values`` and ``covariance`` are in the order ``omega_0, b, f, x_e``; ``fit`` is what :func:`nonsmooth.fit` found.
     """
 
     values: FloatArray
     covariance: FloatArray
     runs: tuple[int, ...]
     spans: tuple[tuple[int, int], ...]
-    fit: ShootingFit
+    fit: ParameterSet
     notes: tuple[str, ...] = ()
 
     @property
     def samples(self) -> int:
         """Samples that entered."""
-        return self.fit.samples
+        return int(self.fit.residuals.sizes["sample"])
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of a reading (m)."""
+        return self.fit.extra["x.noise"].value
 
     def error(self, name: str) -> float:
         """Standard uncertainty of one of the four."""
         i = _NAMES.index(name)
         return float(np.sqrt(self.covariance[i, i]))
+
+    def fitted(self, which: int) -> FloatArray:
+        """Fitted positions of one of the runs (m), in the sensor's count."""
+        data = self.fit.residuals
+        return np.asarray(data["fitted"].values[data["run"].values == which], dtype=np.float64)
+
+    def begins(self, which: int) -> tuple[float, float]:
+        """Position from rest (m) and velocity (m/s) of one of the runs at its first sample."""
+        of = f", {which}" if len(self.runs) > 1 else ""
+        return self.fit.extra[f"x(0){of}"].value, self.fit.extra[f"v_x(0){of}"].value
 
 
 def swing(time: FloatArray, x: FloatArray, *, resolution: float, slowest: float = SLOWEST) -> tuple[int, int]:
@@ -111,10 +125,7 @@ def free_decay(
     resolution: float,
     slowest: float = SLOWEST,
     friction: bool = True,
-    jitter: float | None = None,
-    doubt_law: bool = True,
     names: Sequence[str] | None = None,
-    check: bool = True,
 ) -> DecayFit:
     r"""Fit :math:`\omega_0`, c/m and F_C/m to free decays.
 
@@ -128,18 +139,13 @@ def free_decay(
         Speed (m/s) of the slowest half swing that is used.
     friction : bool
         False: viscous damping only.
-    jitter : float, optional
-        Standard deviation of the sampling instants (s), where known.
-    doubt_law : bool
-        Add to the covariance how far the estimate moves with half of ``slowest``.
     names : sequence of str, optional
         Names of the records for the notes on those that cannot be used.
-    check : bool
-        Leave out records that disagree with the majority, with a note on each.
 
     Returns
     -------
     DecayFit
+        Without the records that disagree with the majority, with a note on each.
 
     Raises
     ------
@@ -151,20 +157,19 @@ def free_decay(
     records, notes = _records(runs, resolution, slowest, names)
     if not records:
         raise ValueError("no free decay can be used; " + "; ".join(notes))
-    apart: Consistent | None = None
-    if check and len(records) > 1:
-        chosen, apart, said = _agreeing(records, runs, resolution, slowest, friction, jitter)
+    used, agreed, start = _used(friction), None, np.zeros(4)
+    if len(records) > 1:
+        chosen, agreed, said = _agreeing(records, runs, resolution, slowest, friction)
         records, notes = [records[i] for i in chosen], notes + said
-    values, covariance, fit = _fit(records, friction, resolution, jitter)
-    if apart is not None:
-        used = _used(friction)
-        values[used], covariance[np.ix_(used, used)] = apart.mean, apart.covariance + apart.scatter
-    elif doubt_law:
-        slower = _records([runs[r.number] for r in records], resolution, slowest / 2, None)[0]
-        moved = _fit(slower, friction, resolution, jitter)[0] - values
-        covariance += np.outer(moved, moved)
+    if agreed is not None:
+        start[used] = agreed.mean
+    values, covariance, found = _fit(records, friction, resolution, _guess(records) if agreed is None else start)
+    if agreed is not None and not agreed.agree:
+        values[used], covariance[np.ix_(used, used)] = agreed.mean, agreed.covariance + agreed.scatter
+    else:
+        covariance += _doubt(records, runs, resolution, slowest, friction, values)
     return DecayFit(
-        values, covariance, tuple(r.number for r in records), tuple(r.span for r in records), fit, tuple(notes)
+        values, covariance, tuple(r.number for r in records), tuple(r.span for r in records), found, tuple(notes)
     )
 
 
@@ -200,50 +205,68 @@ def _used(friction: bool) -> list[int]:
     return [0, 1, 2, 3] if friction else [0, 1, 3]
 
 
+@cache
+def _oscillator(friction: bool) -> System:
+    """The free oscillator about its rest, everything over its mass."""
+    dry = {"dry": elements.Coulomb(at="x", friction="f")} if friction else {}
+    known = {"omega_0": (4.5, "rad/s"), "b": (1.0, "1/s")} | ({"f": (0.005, "N/kg")} if friction else {})
+    return mechanical(
+        1.0, "b", lambda p: [[p.omega_0**2]], parameters=known, coordinates={"x": "m"}, elements=dry, name="free decay"
+    )
+
+
 def _fit(
-    records: Sequence[_Record], friction: bool, resolution: float, jitter: float | None
-) -> tuple[FloatArray, FloatArray, ShootingFit]:
+    records: Sequence[_Record], friction: bool, resolution: float, first: FloatArray
+) -> tuple[FloatArray, FloatArray, ParameterSet]:
     """The four values, their covariance and the fit; zeros for a friction that is not fitted."""
     used = _used(friction)
-    which = np.arange(len(used))
-    pieces = [
-        Piece(
-            r.time, r.x, np.zeros_like(r.time), which, _build(friction), start_state(r.time, r.x), label=str(r.number)
-        )
-        for r in records
-    ]
-    steps = np.array([1e-4, 1e-4, 1e-5, 1e-6])[used]
-    fit = shoot(pieces, _guess(pieces)[used], steps, resolution=resolution, jitter=jitter)
+    names = [_NAMES[i] for i in used[:-1]]
+    system = _oscillator(friction).with_parameters(dict(zip(names, first[used[:-1]].tolist(), strict=True)))
+    found = fit(
+        system, [{"x": (r.time, r.x)} for r in records], [*names, "x.offset"],
+        measured={"x": Sensor(resolution=resolution, offset=float(first[3]))},
+        mode="dry_stick" if friction else None, tries=1, progress=False,
+    )  # fmt: skip
     values, covariance = np.zeros(4), np.zeros((4, 4))
-    values[used] = fit.values
-    covariance[np.ix_(used, used)] = fit.covariance
-    return values, covariance, fit
+    names.append("x.offset")
+    values[used] = [found.estimate(name).value for name in names]
+    covariance[np.ix_(used, used)] = found.full_covariance.sel(parameter=names, other=names)
+    if not np.isfinite(covariance).all():
+        raise SolveError(f"the decays do not determine {', '.join(names)}")
+    return values, covariance, found
+
+
+def _doubt(
+    records: Sequence[_Record], runs: Sequence[tuple[Any, Any]], resolution: float, slowest: float, friction: bool,
+    values: FloatArray,
+) -> FloatArray:  # fmt: skip
+    """Covariance of the law: how far the values move when half of the speed is let in."""
+    slower = _records([runs[r.number] for r in records], resolution, slowest / 2, None)[0]
+    moved = _fit(slower, friction, resolution, values)[0] - values
+    return np.outer(moved, moved)
 
 
 def _agreeing(
-    records: Sequence[_Record], runs: Sequence[tuple[Any, Any]], resolution: float, slowest: float, friction: bool,
-    jitter: float | None,
-) -> tuple[list[int], Consistent | None, list[str]]:  # fmt: skip
-    """Records that agree, their weighted mean where no majority agrees, and a sentence on each that is left out.
+    records: Sequence[_Record], runs: Sequence[tuple[Any, Any]], resolution: float, slowest: float, friction: bool
+) -> tuple[list[int], Consistent | None, list[str]]:
+    """Records that are used, what they agree on where there are several, and a sentence on each that is left out.
 
     Each is fitted alone. One that the law does not fit (a string that slipped on the wheel, a hand that touched) leaves
     more than the others; one that it fits may still tell other values.
     """
-    alone: list[tuple[FloatArray, FloatArray, ShootingFit] | None] = []
-    for r in records:
+    alone: dict[int, tuple[FloatArray, FloatArray]] = {}
+    left: dict[int, float] = {}
+    first = _guess(records)
+    for i, r in enumerate(records):
         try:
-            values, covariance, fit = _fit([r], friction, resolution, jitter)
-            slower = _records([runs[r.number]], resolution, slowest / 2, None)[0]
-            moved = _fit(slower, friction, resolution, jitter)[0] - values
-            alone.append((values, covariance + np.outer(moved, moved), fit))
+            values, covariance, found = _fit([r], friction, resolution, first)
+            alone[i] = values, covariance + _doubt([r], runs, resolution, slowest, friction, values)
         except SolveError:
-            alone.append(None)
+            continue
+        left[i] = found.extra["x.noise"].value
     said = []
-    fits = {i: one[2] for i, one in enumerate(alone) if one is not None}
-    fitted = list(fits)
-    left = _unfitting(list(fits.values()), resolution)
-    typical = float(np.median(np.sqrt(left))) if len(left) else 1.0
-    good = [i for i, excess in zip(fitted, left, strict=True) if excess <= _UNFITTING * typical**2]
+    typical = float(np.median(list(left.values()))) if left else 1.0
+    good = [i for i, noise in left.items() if noise <= _UNFITTING * typical]
     if 2 * len(good) <= len(records):
         return list(range(len(records))), None, [
             f"{len(records) - len(good)} of {len(records)} decays are not those of the law, and no majority is: "
@@ -252,58 +275,36 @@ def _agreeing(
     for i, r in enumerate(records):
         if i not in good:
             by = (
-                "no decay fits it" if i not in fitted else
-                f"it is {np.sqrt(left[fitted.index(i)]) / typical:.1f} times as far from a decay as the others are "
+                "no decay fits it" if i not in left else
+                f"it is {left[i] / typical:.1f} times as far from a decay as the others are "
                 "(root of chi^2)"
             )  # fmt: skip
             said.append(f"{r.name}: left out: {by}; see whether the string slipped on the wheel")
     if len(good) < 2:
         return good, None, said
     used = _used(friction)
-    told = [(one[0][used], one[1][np.ix_(used, used)]) for one in (alone[i] for i in good) if one is not None]
-    found = consistent([values for values, _ in told], [covariance for _, covariance in told])
-    for i, keep, (values, covariance) in zip(good, found.used, told, strict=True):
+    told = [(alone[i][0][used], alone[i][1][np.ix_(used, used)]) for i in good]
+    agreed = consistent([values for values, _ in told], [covariance for _, covariance in told])
+    for i, keep, (values, covariance) in zip(good, agreed.used, told, strict=True):
         if not keep:
-            off = found.off(values, covariance)
+            off = agreed.off(values, covariance)
             k = int(np.argmax(np.abs(off)))
             said.append(
                 f"{records[i].name}: left out: its {_NAMES[used[k]]} is {off[k]:+.1f} combined uncertainties from that "
-                f"of the {np.count_nonzero(found.used)} runs that agree; see whether the string slipped on the wheel"
+                f"of the {np.count_nonzero(agreed.used)} runs that agree; see whether the string slipped on the wheel"
             )
-    if not found.agree:
+    if not agreed.agree:
         said.append(
-            f"the {len(good)} decays disagree (Birge ratio {found.birge:.1f}) and no majority agrees: all are used, "
+            f"the {len(good)} decays disagree (Birge ratio {agreed.birge:.1f}) and no majority agrees: all are used, "
             "with the scatter between them as uncertainty; see whether the string slips on the wheel"
         )
-    return [i for i, keep in zip(good, found.used, strict=True) if keep], None if found.agree else found, said
+    return [i for i, keep in zip(good, agreed.used, strict=True) if keep], agreed, said
 
 
-def _unfitting(fits: Sequence[ShootingFit], resolution: float) -> FloatArray:
-    """Mean square of each run's residuals over what a count and the clock's typical jitter let expect."""
-    jitter = float(np.median([fit.jitter for fit in fits])) if fits else 0.0
-    return np.array([
-        float(np.mean(r**2 / (resolution**2 / 12 + (jitter * f[:, 1]) ** 2)))
-        for fit in fits for r, f in zip(fit.residuals, fit.fitted, strict=True)
-    ])  # fmt: skip
-
-
-_NO_DRIVE, _NO_CONTACT = np.zeros(4), np.array([0.0, 0.0, np.inf])
-
-
-def _build(friction: bool) -> Any:
-    def with_friction(p: FloatArray) -> tuple[Any, Any, Any]:
-        return p, _NO_DRIVE, _NO_CONTACT
-
-    def viscous(p: FloatArray) -> tuple[Any, Any, Any]:
-        return np.array([p[0], p[1], 0.0, p[2]]), _NO_DRIVE, _NO_CONTACT
-
-    return with_friction if friction else viscous
-
-
-def _guess(pieces: Sequence[Piece]) -> FloatArray:
+def _guess(records: Sequence[_Record]) -> FloatArray:
     """From turning points: half a period between them; each swing is q times the one before."""
     periods, ratios, rests = [], [], []
-    for p in pieces:
+    for p in records:
         rest = float(np.mean(p.x[-20:])) if len(p.x) > 40 else 0.0
         away = p.x - rest
         turned = np.flatnonzero(np.sign(away[1:]) != np.sign(away[:-1]))

@@ -99,11 +99,11 @@ def natural_frequency(runs: Sequence[Run], decay: DecayFit) -> Finding:
     frequency = np.fft.rfftfreq(GRID, 1 / rate)
     grid_step = rate / GRID
     top = 1 + int(np.argmax(magnitude[1:]))
-    peak, spread = spectral_peak(time, x, float(frequency[top]), grid_step, decay.fit.noise)
+    peak, spread = spectral_peak(time, x, float(frequency[top]), grid_step, decay.noise)
     value, error, b = float(decay.values[0]), decay.error("omega_0"), float(decay.values[1])
     begin, end = decay.spans[largest]
     fitted = np.full(len(x), np.nan)
-    fitted[begin:end] = decay.fit.fitted[largest][:, 0] - decay.values[3]
+    fitted[begin:end] = decay.fitted(largest) - decay.values[3]
     grid = 2 * np.pi * grid_step
     at_peak, peak_error = 2 * np.pi * peak, 2 * np.pi * spread
     undamped = float(np.sqrt(at_peak**2 + b**2 / 2))

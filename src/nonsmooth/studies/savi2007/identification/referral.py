@@ -119,7 +119,7 @@ class Referred:
         others = {"gap_at_rest": self.at_rest, "mean_shift": self.shift, "rest_position": self.rest}
         return Finding(
             "g", self.gap, "multiple shooting over records with contact, referred to the mean position",
-            contacts.fit.samples, tuple(run.name for run in contacts.runs), tuple(notes), others, self.covariance,
+            contacts.samples, tuple(run.name for run in contacts.runs), tuple(notes), others, self.covariance,
         )  # fmt: skip
 
 

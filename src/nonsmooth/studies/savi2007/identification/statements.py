@@ -82,11 +82,10 @@ def identifiability(adjusted: Adjusted, contacts: ContactFit | None, single: Fin
     if contacts is not None:
         relative = float(np.sqrt(contacts.covariance[4, 4]) / abs(contacts.values[4]))
         said["c_s"] += (
-            f"; {contacts.n_contacts} pieces with contact together know it within a factor "
-            f"{np.exp(1.96 * relative):.4g}"
+            f"; {contacts.n_contacts} contacts together know it within a factor {np.exp(1.96 * relative):.4g}"
         )
         if single is not None:
-            said["c_s"] += f", one alone {single.estimate.factor:.3g} (95 %)"
+            said["c_s"] += f", one alone: {single.estimate}"
     return {name: said[name] for name in said if name in adjusted.names or (name == "g" and contacts is not None)}
 
 

@@ -20,7 +20,7 @@ from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.evidence import Run
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit, free_decay
 
-__all__ = ["log_decrement", "support_damping"]
+__all__ = ["decay_rate", "log_decrement", "support_damping"]
 
 
 def log_decrement(time: FloatArray, x: FloatArray, rest: float, *, resolution: float) -> tuple[FloatArray, ...]:
@@ -44,6 +44,12 @@ def log_decrement(time: FloatArray, x: FloatArray, rest: float, *, resolution: f
     found = np.array(rows).reshape(-1, 2)
     # a parabola through five samples has 0.7 of one sample's error at its top
     return found[:, 0], found[:, 1], np.full(len(found), 0.7 * resolution / np.sqrt(12))
+
+
+def decay_rate(t: FloatArray, height: FloatArray, error: FloatArray) -> tuple[float, float, float]:
+    """Slope (1/s) and intercept of the line through the logarithms of the heights, and the slope's variance."""
+    line, covariance = np.polyfit(t, np.log(height), 1, w=height / error, cov=True)
+    return float(line[0]), float(line[1]), float(covariance[0, 0])
 
 
 def support_damping(
@@ -76,19 +82,19 @@ def support_damping(
         if len(t) < 4:
             notes.append(f"run {runs[i].name!r}: no logarithmic decrement, {len(t)} turning points above ten counts")
             continue
-        line, covariance = np.polyfit(t, np.log(height), 1, w=height / error, cov=True)
-        slopes.append(float(line[0]))
-        weights.append(1 / float(covariance[0, 0]))
+        slope, intercept, variance = decay_rate(t, height, error)
+        slopes.append(slope)
+        weights.append(1 / variance)
         if data is None:
-            ratio = -slopes[0] / decay.values[0]
+            ratio = -slope / decay.values[0]
             data = xr.Dataset(
                 {
                     "x": ("time", runs[i].positions - decay.values[3], {"units": "m"}),
                     "peak_time": ("peak", t, {"units": "s"}), "peak_height": ("peak", height, {"units": "m"}),
                     "log_height": ("peak", np.log(height)), "log_height_error": ("peak", error / height),
-                    "used": ("peak", np.ones(len(t), dtype=np.int8)), "slope": ((), float(line[0]), {"units": "1/s"}),
-                    "intercept": ((), float(line[1])), "damping_ratio": ((), ratio),
-                    "damping_ratio_error": ((), float(np.sqrt(covariance[0, 0])) / decay.values[0]),
+                    "used": ("peak", np.ones(len(t), dtype=np.int8)), "slope": ((), slope, {"units": "1/s"}),
+                    "intercept": ((), intercept), "damping_ratio": ((), ratio),
+                    "damping_ratio_error": ((), float(np.sqrt(variance)) / decay.values[0]),
                 },
                 {"time": runs[i].time}, {"synthetic": "yes" if runs[i].synthetic else "no"},
             )  # fmt: skip

@@ -82,8 +82,9 @@ class Element(ABC):
                 f"{label}: give {self.kinematics}= (a function of t, u, p) and on= (what a unit force adds to which "
                 f"state's derivative), or at= (a coordinate) in ns.mechanical"
             )
-        if self.at is not None and self.on is not None:
-            raise SystemDefinitionError(f"{label}: at= (a coordinate of ns.mechanical) and on= exclude each other")
+        for name, given in (("on", self.on), (self.kinematics, own)):
+            if self.at is not None and given is not None:
+                raise SystemDefinitionError(f"{label}: at= (of ns.mechanical) and {name}= exclude each other")
         if self.on is not None and not isinstance(self.on, Mapping):
             raise SystemDefinitionError(
                 f'{label}: on= maps states to numbers or functions, {{"v": 1.0}}; not {shortened(self.on)}'

@@ -1,0 +1,197 @@
+"""The vector field of one mode as functions of numbers, from expressions or from rows of numbers."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import product
+from math import prod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.arrays import FloatArray
+from nonsmooth.system.derived.patterns import STEP
+
+if TYPE_CHECKING:
+    from nonsmooth.system.derived.assembly import Pattern
+    from nonsmooth.system.derived.patterns import Patterns
+    from nonsmooth.system.derived.rows import Rows
+    from nonsmooth.system.symbolic.traced import Traced
+
+__all__ = ["MOST", "ModeField", "arguments", "every_mode", "held_places", "mode_field"]
+
+MOST = 4096  # modes that are made so that all of them can be looked at
+
+
+class ModeField(ABC):
+    """The vector field of one mode and the indicators, with their derivatives, as functions of numbers.
+
+    ``own`` are the mode's states, others stay zero; ``places`` the parameters in which derivatives are wanted."""
+
+    linear: bool  # in the states
+    affine: bool  # and so are the indicators
+
+    def __init__(self, traced: Traced, mode: int, places: Sequence[int] = ()) -> None:
+        self.traced, self.mode, self.places = traced, mode, tuple(places)
+        self.own = [i for i in range(len(traced.u)) if not traced.lacking[mode][i]]
+
+    @abstractmethod
+    def evaluate(
+        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """f (n,), its Jacobian (n, n) and its derivatives in the parameters (n, n_places), of the mode's own states; at
+        several times each with a leading dim."""
+
+    @abstractmethod
+    def indicators(
+        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
+    ) -> tuple[FloatArray, FloatArray]:
+        """Indicators (n_indicators,) and their gradients (n_indicators, n_u); at several times with a leading dim."""
+
+    def margins(self, h: FloatArray, edge: FloatArray | float = 0.0) -> FloatArray:
+        """Margins by which conditions of transitions hold (n_transitions,), -inf for those that are not of the mode.
+
+        Rows nearer to zero than ``edge`` hold where another one of their condition does: a speed and an acceleration
+        vanish at every equilibrium, and what lies behind a stop is none."""
+        h = np.where(np.abs(h) <= edge, 0.0, h)
+        found = np.full(len(self.traced.transitions), -np.inf)
+        for k, jump in enumerate(self.traced.transitions):
+            if jump.source == self.mode and jump.rows and jump.fires:
+                rows = [row.sign * float(h[row.indicator]) for row in jump.rows]
+                found[k] = min((x for x in rows if x), default=0.0)
+        return found
+
+
+class _Formulas(ModeField):
+    """From expressions."""
+
+    def __init__(self, traced: Traced, mode: int, places: Sequence[int] = ()) -> None:
+        import sympy as sp
+
+        super().__init__(traced, mode, places)
+        u = [traced.u[i] for i in self.own]
+        f = [sp.sympify(traced.fields[mode][i]) for i in self.own]
+        jacobian = [e.diff(s) for e in f for s in u]
+        derived = [*jacobian, *(e.diff(traced.p[k]) for e in f for k in places)]
+        self._field = sp.lambdify(arguments(traced), [*f, *derived], modules="numpy")
+        self._indicators, slopes = _indicators(traced)
+        moving = {*traced.u}
+        self.linear = not any(e.free_symbols & moving for e in jacobian)
+        self.affine = self.linear and not any(e.free_symbols & moving for e in slopes)
+
+    def evaluate(
+        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        found, n = _numbers(self._field, t, u, values, memory), len(self.own)
+        f, J, slopes = np.split(found, [n, n + n * n], axis=-1)
+        return f, J.reshape(*f.shape, n), slopes.reshape(*f.shape, len(self.places))
+
+    def indicators(
+        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
+    ) -> tuple[FloatArray, FloatArray]:
+        found, n = _numbers(self._indicators, t, u, values, memory), len(self.traced.indicators)
+        return found[..., :n], found[..., n:].reshape(*found.shape[:-1], n, len(self.traced.u))
+
+
+class _Numbers(ModeField):
+    """From rows of numbers, of a mode that is made when it is visited."""
+
+    linear = affine = True
+
+    def __init__(self, traced: Traced, mode: int, places: Sequence[int] = ()) -> None:
+        super().__init__(traced, mode, places)
+        assert traced.patterns is not None
+        self.patterns, self.pattern = traced.patterns, traced.patterns.visited[mode]
+
+    def evaluate(
+        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        field, w = self._field(values), self._augmented(u, values, t)
+        slopes = [w @ self._field(values, place).imag.T / STEP for place in self.places]
+        J = np.broadcast_to(field[:, : len(u)], (*np.shape(t), len(u), len(u)))
+        return w @ field.T, J, np.stack(slopes, axis=-1) if slopes else np.zeros((*np.shape(t), len(u), 0))
+
+    def indicators(
+        self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
+    ) -> tuple[FloatArray, FloatArray]:
+        rows = np.nan_to_num(_conditions(self.patterns, self.pattern, values.tobytes()))  # NaN: not asked for
+        slopes = np.broadcast_to(rows[:, : len(u)], (*np.shape(t), len(rows), len(u)))
+        return self._augmented(u, values, t) @ rows.T, slopes
+
+    def _field(self, values: FloatArray, place: int | None = None) -> FloatArray:
+        return _rows(self.patterns, values.tobytes(), place).flow(self.patterns.mode, self.pattern)[0]
+
+    def _augmented(self, u: FloatArray, values: FloatArray, t: Any) -> FloatArray:
+        rows, times = _rows(self.patterns, values.tobytes()), np.atleast_1d(t)
+        w = rows.augmented_all(np.tile(u, (len(times), 1)), times)
+        return w if np.ndim(t) else w[0]
+
+
+@lru_cache(maxsize=256)
+def mode_field(traced: Traced, mode: int, places: tuple[int, ...] = ()) -> ModeField:
+    """The functions of a mode, made once."""
+    return (_Formulas if traced.patterns is None else _Numbers)(traced, mode, places)
+
+
+def every_mode(traced: Traced, values: FloatArray) -> range | None:
+    """The numbers of all modes, where those that are made when they are visited are made for it; None where they are
+    more than ``MOST``."""
+    if (patterns := traced.patterns) is None:
+        return range(len(traced.mode_names))
+    make, counts = patterns.make, [len(part.element.phases) for part in patterns.make.parts]
+    if prod(counts) > MOST:
+        return None
+    rows = _rows(patterns, values.tobytes())
+    for pattern in sorted({*product(*map(range, counts))} - patterns.led):
+        if make.may_hold(make.held(pattern), patterns.mode):
+            patterns.look_at(rows, pattern)
+            rows.forget()
+    return range(len(patterns.visited))
+
+
+def held_places(traced: Traced, mode: int, values: FloatArray) -> tuple[Rows, list[FloatArray]] | None:
+    """The places and rates that the held elements of a mode keep at zero, as rows; None where elements decide alone."""
+    patterns = traced.patterns or (traced.decider.rows if traced.decider is not None else None)
+    if patterns is None:
+        return None
+    pattern = patterns.visited[mode] if traced.decider is None else traced.decider.modes[mode][1]
+    rows = _rows(patterns, values.tobytes())
+    held = rows.held(pattern)
+    return rows, [np.array([rows.parts[k].where.values, rows.rate(k, patterns.mode).values]) for k in held]
+
+
+@lru_cache(maxsize=16)
+def _rows(patterns: Patterns, values: bytes, place: int | None = None) -> Rows:
+    """The calculus of a system's elements at values of the parameters."""
+    return patterns.rows_at(np.frombuffer(values), place)
+
+
+@lru_cache(maxsize=1024)
+def _conditions(patterns: Patterns, pattern: Pattern, values: bytes) -> FloatArray:
+    return patterns.ways_out(_rows(patterns, values), pattern)[0]
+
+
+def _numbers(function: Any, t: Any, u: FloatArray, values: FloatArray, memory: FloatArray) -> FloatArray:
+    """The numbers that a function gives at a time (m,), or at several (T, m)."""
+    with np.errstate(all="ignore"):
+        found = function(t, u, values, memory)
+    if np.ndim(t) == 0:
+        return np.array(found, dtype=float)
+    return np.array([np.broadcast_to(one, np.shape(t)) for one in found], dtype=float).reshape(len(found), np.size(t)).T
+
+
+def arguments(traced: Traced) -> list[Any]:
+    """The arguments of a function that is made of a system's expressions."""
+    return [traced.t, list(traced.u), list(traced.p), list(traced.m)]
+
+
+@lru_cache(maxsize=8)
+def _indicators(traced: Traced) -> tuple[Any, list[Any]]:
+    """The indicators of a system with their slopes as a function of numbers, and the slopes as expressions."""
+    import sympy as sp
+
+    h = [sp.sympify(e) for e in traced.indicators]
+    slopes = [e.diff(s) for e in h for s in traced.u]
+    return sp.lambdify(arguments(traced), [*h, *slopes], modules="numpy"), slopes
