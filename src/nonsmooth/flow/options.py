@@ -106,7 +106,7 @@ class Campaign(Settling, total=False):
 
 LONGEST = 16  # period number looked for where none is given and as many points are kept
 #: Options that say who computes, not what: results do not depend on them.
-_UNRECORDED = ("threads", "progress", "store", "client", "any_cpu")
+_UNRECORDED = ("threads", "progress", "budget", "store", "client", "any_cpu")
 
 
 def workers_of(options: Work) -> int | None:
@@ -163,6 +163,6 @@ def as_called(arguments: Mapping[str, Any]) -> dict[str, Any]:
         record["start"] = plain_start(arguments["system"], record["start"])
     if "section" in record and (record["section"] is not None or arguments["system"].period() is not None):
         record["section"] = section_plan(arguments["system"], record["section"])[0]
-    if "max_period" in record:
+    if "keep" in record and "max_period" in record:
         record["max_period"] = longest_period(record["keep"], record["max_period"])
     return {name: value for name, value in record.items() if name not in _UNRECORDED}
