@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -19,7 +19,10 @@ from nonsmooth.system.codegen.jet import jet_code
 from nonsmooth.system.symbolic.printing import Printer, assignments
 from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["MOST_MODELS", "SIGNATURES", "CompiledModel", "compile_model", "model_source"]
+__all__ = [
+    "MOST_MODELS", "SIGNATURES", "CompiledModel", "compile_model", "constants_of", "function_of", "model_source",
+    "scalar_code", "unpacked",
+]  # fmt: skip
 
 MOST_MODELS = 32  # whose code is kept though nobody uses it: a third of a MB each
 # mode, [order,] t, u, q and what is written; q holds the parameters, then the memory.
@@ -106,7 +109,7 @@ def model_source(traced: Traced) -> str:
     for mode, fields in enumerate(traced.fields):
         rows = [Integer(0) if traced.keeps_at_zero(mode, i) else h for i, h in enumerate(_asked(traced, mode))]
         rows += [output[mode] for output in traced.outputs]
-        jets.append(jet_code(traced.t, traced.u, _constants(traced), fields, rows))
+        jets.append(jet_code(traced.t, traced.u, constants_of(traced), fields, rows))
     bodies = {name: [lines for lines, _ in parts] for name, parts in writers.items()}
     bodies["jet"] = [jet.lines for jet in jets]
     functions = {f for parts in writers.values() for _, used in parts for f in used}
@@ -122,11 +125,12 @@ def model_source(traced: Traced) -> str:
         f"N_SCRATCH = {max([1, *(jet.n_scratch for jet in jets)])}",
         f"SMOOTH_OUTPUTS = {smooth!r}",
     ]
-    n_constants = len(traced.p) + len(traced.m)
-    constants = [f"q{i} = q[{i}]" for i in range(n_constants)]
     copies = [f"for i in range({len(traced.u)}):", "    u_new[i] = u[i]"]
-    copies += [f"for i in range({n_constants}):", "    q_new[i] = q[i]"]
-    parts += [_function(name, bodies[name], constants, copies if name == "jump" else []) for name in SIGNATURES]
+    copies += [f"for i in range({len(traced.p) + len(traced.m)}):", "    q_new[i] = q[i]"]
+    parts += [
+        function_of(name, f'"{SIGNATURES[name]}"', _ARGUMENTS[name], bodies[name], copies if name == "jump" else [])
+        for name in SIGNATURES
+    ]
     return "\n".join(part for part in parts if part) + "\n"
 
 
@@ -141,24 +145,35 @@ def _inlined(lines: list[str]) -> list[str]:
     return [re.sub(r"\b(cos|sin)\(", lambda found: f"{_INLINED[found[1]]}(", line) for line in lines]
 
 
-def _function(name: str, branches: list[list[str]], constants: list[str], always: list[str]) -> str:
-    selector = _ARGUMENTS[name].split(",")[0]
-    words = set(re.findall(r"\w+", "\n".join(line for branch in branches for line in branch)))
-    lines = [*(line for line in constants if line.split(" ")[0] in words), *always]
+def function_of(
+    name: str, options: str, arguments: str, branches: list[list[str]], always: Sequence[str] = ()
+) -> str:
+    """The text of a function that does one of some branches, by its first argument, after what is ``always`` done.
+
+    ``options`` are those of ``callback``."""
+    selector, lines = arguments.split(",")[0], list(always)
     for i, branch in enumerate(branches):
         lines.append(f"{'el' if i else ''}if {selector} == {i}:")
         lines += [f"    {line}" for line in branch or ["pass"]]
+    lines = [*unpacked(line for branch in branches for line in branch), *lines]
     body = "".join(f"    {line}\n" for line in lines or ["pass"])
-    return f'\n\n@callback("{SIGNATURES[name]}")\ndef {name}({_ARGUMENTS[name]}):\n{body}'.rstrip("\n")
+    return f"\n\n@callback({options})\ndef {name}({arguments}):\n{body}".rstrip("\n")
 
 
-def _constants(traced: Traced) -> dict[Basic, str]:
+def unpacked(lines: Iterable[str]) -> list[str]:
+    """Lines that give the parameters and the memory used in ``lines`` their names."""
+    used = {int(number) for number in re.findall(r"\bq(\d+)\b", "\n".join(lines))}
+    return [f"q{i} = q[{i}]" for i in sorted(used)]
+
+
+def constants_of(traced: Traced) -> dict[Basic, str]:
+    """What parameters and memory are called in generated code."""
     return {symbol: f"q{i}" for i, symbol in enumerate([*traced.p, *traced.m])}
 
 
-def _scalar_code(traced: Traced, targets: Sequence[tuple[str, Expr]]) -> tuple[list[str], set[str]]:
+def scalar_code(traced: Traced, targets: Sequence[tuple[str, Expr]]) -> tuple[list[str], set[str]]:
     """Straight code for some expressions at one point, and the functions of ``math`` that it uses."""
-    names = {**_constants(traced), traced.t: "t", **{symbol: f"x{i}" for i, symbol in enumerate(traced.u)}}
+    names = {**constants_of(traced), traced.t: "t", **{symbol: f"x{i}" for i, symbol in enumerate(traced.u)}}
     printer = Printer(names)
     used = set().union(*(e.free_symbols for _, e in targets)) if targets else set()
     lines = [f"x{i} = u[{i}]" for i, symbol in enumerate(traced.u) if symbol in used]
@@ -167,12 +182,12 @@ def _scalar_code(traced: Traced, targets: Sequence[tuple[str, Expr]]) -> tuple[l
 
 
 def _field(traced: Traced, mode: int) -> tuple[list[str], set[str]]:
-    return _scalar_code(traced, [(f"du[{i}]", e) for i, e in enumerate(traced.fields[mode])])
+    return scalar_code(traced, [(f"du[{i}]", e) for i, e in enumerate(traced.fields[mode])])
 
 
 def _values(traced: Traced, mode: int) -> tuple[list[str], set[str]]:
     rows = [*_asked(traced, mode), *(output[mode] for output in traced.outputs)]
-    return _scalar_code(traced, [(f"out[{i}]", e) for i, e in enumerate(rows)])
+    return scalar_code(traced, [(f"out[{i}]", e) for i, e in enumerate(rows)])
 
 
 def _jump(traced: Traced, index: int) -> tuple[list[str], set[str]]:
@@ -181,4 +196,4 @@ def _jump(traced: Traced, index: int) -> tuple[list[str], set[str]]:
     reset = traced.u if transition.reset is None else transition.reset
     targets = [(f"u_new[{i}]", e) for i, e in enumerate(reset) if e != traced.u[i]]
     targets += [(f"q_new[{len(traced.p) + i}]", e) for i, e in transition.writes]
-    return _scalar_code(traced, targets)
+    return scalar_code(traced, targets)

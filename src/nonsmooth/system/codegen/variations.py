@@ -9,7 +9,6 @@ they are needed one at a time.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,9 +18,9 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from nonsmooth.system.codegen.generate import MOST_MODELS, SIGNATURES
+from nonsmooth.system.codegen import generate
+from nonsmooth.system.codegen.generate import MOST_MODELS, SIGNATURES, constants_of, scalar_code
 from nonsmooth.system.codegen.jet import jet_code
-from nonsmooth.system.symbolic.printing import Printer, assignments
 from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 __all__ = ["VariationalModel", "touch_function", "variational_model"]
@@ -75,28 +74,21 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
         for jac in jacobians
     ]
     jets = [
-        jet_code(traced.t, traced.u, _constants(traced), field, [jac[i][j] for i, j in entries])
+        jet_code(traced.t, traced.u, constants_of(traced), field, [jac[i][j] for i, j in entries])
         for field, jac in zip(traced.fields, jacobians, strict=True)
     ]
-    fields = [_code(traced, [(f"du[{i}]", e) for i, e in enumerate(field)]) for field in traced.fields]
-    switches = [_code(traced, _switch(traced, jump, wanted)) for jump in traced.transitions]
+    fields = [scalar_code(traced, [(f"du[{i}]", e) for i, e in enumerate(field)]) for field in traced.fields]
+    switches = [scalar_code(traced, _switch(traced, jump, wanted)) for jump in traced.transitions]
     functions = set().union(*(jet.functions for jet in jets), *(used for _, used in [*fields, *switches]))
     parts = [
         "from nonsmooth.kernels.compile.cache import callback",
         "from nonsmooth.kernels.compile.lanes import load, plus, store, times",
         f"from math import {', '.join(sorted(functions))}" if functions else "",
-        _function(
-            "jet",
-            _JET,
-            "mode, order, t, u, q, C, W, D",
-            traced,
-            [
-                [*jet.lines, *_small_changes(entries, kind, n, len(wanted))]
-                for jet, kind in zip(jets, kinds, strict=True)
-            ],
-        ),
-        _function("field", SIGNATURES["field"], "mode, t, u, q, du", traced, [lines for lines, _ in fields]),
-        _function("switch", _SWITCH, "transition, t, u, q, out", traced, [lines for lines, _ in switches]),
+        _function("jet", _JET, "mode, order, t, u, q, C, W, D", [
+            [*jet.lines, *_small_changes(entries, kind, n, len(wanted))] for jet, kind in zip(jets, kinds, strict=True)
+        ]),
+        _function("field", SIGNATURES["field"], "mode, t, u, q, du", [lines for lines, _ in fields]),
+        _function("switch", _SWITCH, "transition, t, u, q, out", [lines for lines, _ in switches]),
     ]
     module = load_module("\n".join(part for part in parts if part) + "\n", "variations", lasting=False)
     return VariationalModel(
@@ -105,6 +97,11 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
         np.array(kinds, dtype=np.int64).reshape(len(kinds), len(entries)),
         max([1, *(jet.n_scratch for jet in jets)]),
     )  # fmt: skip
+
+
+def _function(name: str, signature: str, arguments: str, branches: list[list[str]]) -> str:
+    only_kernels = "no_cpython_wrapper=True, no_cfunc_wrapper=True"  # call it
+    return generate.function_of(name, f'"{signature}", {only_kernels}', arguments, branches)
 
 
 def _small_changes(entries: list[tuple[int, int]], kinds: list[int], n: int, columns: int) -> list[str]:
@@ -173,8 +170,8 @@ def touch_function(traced: Traced, active: tuple[int, ...], indicator: int, mode
     h = traced.indicators[indicator]
     slope = along(h)
     values = [e for one in (h, slope, along(slope)) for e in (one, *(one.diff(s) for s in variables))]
-    lines, used = _code(traced, [(f"r{i}", e) for i, e in enumerate(values)])
-    constants = _unpacked(traced, lines)
+    lines, used = scalar_code(traced, [(f"r{i}", e) for i, e in enumerate(values)])
+    constants = generate.unpacked(lines)
     result = ", ".join(f"r{i}" for i in range(len(values)))
     body = "".join(f"    {line}\n" for line in [*constants, *lines, f"return ({result})"])
     header = f"from math import {', '.join(sorted(used))}\n" if used else ""
@@ -182,34 +179,3 @@ def touch_function(traced: Traced, active: tuple[int, ...], indicator: int, mode
     exec(compile(f"{header}def touch(t, u, q):\n{body}", f"<touch {indicator} in mode {mode}>", "exec"), namespace)
     found: Callable[..., Any] = namespace["touch"]
     return found
-
-
-def _constants(traced: Traced) -> dict[sp.Basic, str]:
-    return {symbol: f"q{i}" for i, symbol in enumerate([*traced.p, *traced.m])}
-
-
-def _code(traced: Traced, targets: list[tuple[str, sp.Expr]]) -> tuple[list[str], set[str]]:
-    """Straight code for expressions at one point, and the functions of ``math`` that it uses."""
-    names = {**_constants(traced), traced.t: "t", **{symbol: f"x{i}" for i, symbol in enumerate(traced.u)}}
-    printer = Printer(names)
-    used: set[sp.Basic] = set().union(*(e.free_symbols for _, e in targets)) if targets else set()
-    lines = [f"x{i} = u[{i}]" for i, symbol in enumerate(traced.u) if symbol in used]
-    lines += assignments(targets, printer, "g")
-    return lines, printer.used
-
-
-def _unpacked(traced: Traced, lines: list[str]) -> list[str]:
-    """Lines that give the parameters and the memory used in ``lines`` their names."""
-    words = set(re.findall(r"\w+", "\n".join(lines)))
-    return [f"q{i} = q[{i}]" for i in range(len(traced.p) + len(traced.m)) if f"q{i}" in words]
-
-
-def _function(name: str, signature: str, arguments: str, traced: Traced, branches: list[list[str]]) -> str:
-    selector = arguments.split(",")[0]
-    lines = _unpacked(traced, [line for branch in branches for line in branch])
-    for i, branch in enumerate(branches):
-        lines.append(f"{'el' if i else ''}if {selector} == {i}:")
-        lines += [f"    {line}" for line in branch or ["pass"]]
-    body = "".join(f"    {line}\n" for line in lines or ["pass"])
-    decorator = f'@callback("{signature}", no_cpython_wrapper=True, no_cfunc_wrapper=True)'  # only kernels call it
-    return f"\n\n{decorator}\ndef {name}({arguments}):\n{body}".rstrip("\n")
