@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import inspect
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -19,7 +18,7 @@ from nonsmooth.system.arguments import Limit, declared
 SOURCE = Path(ns.__file__).parent
 #: Verbs whose arguments are read by themselves: they take any names, or what is no option.
 OTHERS = {"animate", "explore", "identify", "load", "load_recording", "save", "system_of", "where"}
-WORDS = ("must be", "allowed:", "takes an ns.System", "give its two ends")
+WORDS = ("must be", "allowed:", "takes an ns.System", "give its two ends", "real number", "finite")
 
 
 def doors() -> dict[str, Any]:
@@ -61,9 +60,8 @@ def wrong(kind: Any) -> list[Any]:
 
 @cache
 def cases() -> list[tuple[str, str, Any]]:
-    return [
-        (verb, name, value) for verb, door in DOORS.items() for name, kind in door.kinds.items() for value in wrong(kind)
-    ]
+    kinds = [(verb, name, kind) for verb, door in DOORS.items() for name, kind in door.kinds.items()]
+    return [(verb, name, value) for verb, name, kind in kinds for value in wrong(kind)]
 
 
 def refused(verb: str, **given: Any) -> Exception:
@@ -81,7 +79,7 @@ def test_what_a_declaration_does_not_allow_is_refused_in_a_sentence(verb: str) -
     assert tried or not any(wrong(kind) for kind in DOORS[verb].kinds.values())
     for name, value in tried:
         said = str(refused(verb, **{name: value}))
-        assert name in said and any(word in said for word in (*WORDS, "real number", "finite")), (name, value, said)
+        assert name in said.lower() and any(word in said for word in WORDS), (name, value, said)
 
 
 @pytest.mark.parametrize("verb", DOORS)
@@ -132,8 +130,8 @@ def test_no_verb_has_more_than_twelve_arguments_of_its_own_or_120_lines() -> Non
     for verb, door in DOORS.items():
         function: Callable[..., Any] = inspect.unwrap(door.function)
         own = [name for name in door.items if name not in shared and name != "self"]
-        node = ast.parse(inspect.getsource(function).lstrip()).body[0] if not isinstance(getattr(ns, verb), type) else None
-        lines = 0 if node is None else (node.end_lineno or 0) - node.body[0].end_lineno  # type: ignore[attr-defined]
+        text = "" if isinstance(getattr(ns, verb), type) else inspect.getsource(function)
+        lines = len(text.splitlines()) - len((function.__doc__ or "").splitlines())
         if len(own) > 12 or lines > 120:
             many[verb] = len(own), lines
     assert not many

@@ -134,11 +134,9 @@ def control_based_continuation(
     course = course_of(names, parameter, range, frequency, amplitude, direction)
     guard = Guard(rig, *holding.positions)
     branch = _Branch(Holder(guard, holding, holding.mass_of(rig)), course, names)
-    options = {**asdict(course), "step": step, "points": points, "holding": asdict(holding)}
-    record = {
-        "version": package_version(), "verb": "control_based_continuation", "rig": type(rig).__name__,
-        "options": options_as_data(options),
-    }  # fmt: skip
+    options = options_as_data({**asdict(course), "step": step, "points": points, "holding": asdict(holding)})
+    record: dict[str, Any] = {"version": package_version(), "verb": "control_based_continuation"}
+    record |= {"rig": type(rig).__name__, "options": options}
     try:
         branch.begin()
         with bar(points, "control-based continuation", progress) as advance:

@@ -279,7 +279,7 @@ _PARAMETERS = re.compile(r"^Parameters\n-+\n(?:(?!\n+\w[\w ]*\n-{3,}).)*", re.MU
 
 def declared(function: Verb) -> dict[str, Any]:
     """What each argument of a verb, or of a class, may be."""
-    door = getattr(function, "door", None)
+    door = getattr(getattr(function, "__init__") if isinstance(function, type) else function, "door", None)  # noqa: B009
     return get_type_hints(function, include_extras=True) if door is None else dict(door.kinds)
 
 
@@ -300,7 +300,7 @@ def entries(doc: str | None) -> dict[tuple[str, ...], tuple[str, list[str]]]:
 def _evaluated(annotation: Any, function: Verb) -> Any:
     """What an annotation means; Any where it names what is imported for type checkers alone."""
     try:
-        return eval(annotation, function.__globals__) if isinstance(annotation, str) else annotation
+        return eval(annotation, inspect.unwrap(function).__globals__) if isinstance(annotation, str) else annotation
     except NameError:
         return Any
 
