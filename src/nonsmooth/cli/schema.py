@@ -140,7 +140,7 @@ def _option(option: Option) -> dict[str, Any]:
 
 
 def _of_kind(kind: Any) -> dict[str, Any]:
-    """What a verb declares of an argument; anything where it declares nothing."""
+    """The values that a verb declares of an argument; any where it declares nothing."""
     from nonsmooth.system.arguments import Limit
 
     parts = get_args(kind)

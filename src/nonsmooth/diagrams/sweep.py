@@ -199,7 +199,7 @@ class _Sweep:
 
     @cached_property
     def slots(self) -> dict[tuple[int, int], Slot]:
-        """What is kept of each direction and start."""
+        """Points, verdicts and loads of each direction and start."""
         both = product(range(len(self.directions)), range(len(self.starts)))
         return {key: Slot(self.settler, self.points, self.edges, self.measured) for key in both}
 

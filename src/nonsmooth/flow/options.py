@@ -23,7 +23,7 @@ Varied = Annotated[str, 'the parameter is given by its name in quotes, as "rho",
 
 
 class Solver(TypedDict, total=False):
-    """How a trajectory is computed.
+    """The way a trajectory is computed.
 
     Parameters
     ----------

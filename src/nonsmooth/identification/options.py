@@ -12,7 +12,7 @@ __all__ = ["Fitting", "Known", "Prediction", "Recorded"]
 
 
 class Known(TypedDict, total=False):
-    """What is known before a recording is seen.
+    """Knowledge from before a recording.
 
     Parameters
     ----------
@@ -58,11 +58,11 @@ class Recorded(TypedDict, total=False):
 
 
 class Fitting(Known, Recorded, total=False):
-    """What a fit is told beside the model and the readings."""
+    """All that a fit is told beside the model and the readings."""
 
 
 class Prediction(Solver, total=False):
-    """How the theory is computed and laid over a measurement.
+    """The way the theory is computed and laid over a measurement.
 
     Parameters
     ----------

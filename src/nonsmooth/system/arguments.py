@@ -202,7 +202,7 @@ class _Door:
         self.needed = [name for name, item in self.items.items() if item.default is _NEEDED]
 
     def read(self, given: tuple[Any, ...], named: Mapping[str, Any]) -> dict[str, Any]:
-        """What the verb is called with."""
+        """The arguments as read, with defaults of what is shared."""
         values = dict(zip(self.positional, given, strict=False))
         twice = values.keys() & named
         values |= named
@@ -216,7 +216,7 @@ class _Door:
 
     @cached_property
     def kinds(self) -> dict[str, Any]:
-        """What each argument may be, as its annotation says."""
+        """The type of each argument, as its annotation says."""
         shared = get_type_hints(self.group, include_extras=True) if self.group else {}
         if self.behind:
             shared = {name: self.behind.kinds[name] for name in self.shared}
@@ -278,7 +278,7 @@ _PARAMETERS = re.compile(r"^Parameters\n-+\n(?:(?!\n+\w[\w ]*\n-{3,}).)*", re.MU
 
 
 def declared(function: Verb) -> dict[str, Any]:
-    """What each argument of a verb, or of a class, may be."""
+    """The values that each argument of a verb, or of a class, may have, as declared."""
     door = getattr(getattr(function, "__init__") if isinstance(function, type) else function, "door", None)  # noqa: B009
     return get_type_hints(function, include_extras=True) if door is None else dict(door.kinds)
 
@@ -298,7 +298,7 @@ def entries(doc: str | None) -> dict[tuple[str, ...], tuple[str, list[str]]]:
 
 
 def _evaluated(annotation: Any, function: Verb) -> Any:
-    """What an annotation means; Any where it names what is imported for type checkers alone."""
+    """The type that an annotation means; Any where it names what is imported for type checkers alone."""
     try:
         return eval(annotation, inspect.unwrap(function).__globals__) if isinstance(annotation, str) else annotation
     except NameError:
@@ -423,7 +423,7 @@ def _instance(value: Any, name: str, kind: type, what: Any) -> Any:
 
 
 def _words(what: Any) -> str:
-    """What an annotation allows, in words."""
+    """Name in words what an annotation allows."""
     kind = get_origin(what) or what
     if kind is Annotated:
         return _words(get_args(what)[0])
