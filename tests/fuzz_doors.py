@@ -1,7 +1,7 @@
 """Random arguments for every verb: each refusal is a sentence of ours, and nothing runs long without progress.
 
-Usage: python tests/fuzz_doors.py [calls for each verb] [seed]; prints a line for each verb, and every call that ended in
-an error raised by a library, or took more than 20 s of processor time.
+Usage: python tests/fuzz_doors.py [calls for each verb] [seed]; prints a line for each verb, and every call that ended
+in an error raised by a library, or took more than 20 s of processor time.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ SOURCE = str(Path(ns.__file__).parent)
 LONGEST = 20.0  # seconds
 #: Values that people and programs hand over by mistake, and some that are allowed.
 ODD: list[Any] = [
-    None, True, False, 0, 1, 2, 3, -1, 2.5, 3.0, 1e-320, 1e300, -0.0, math.nan, math.inf, 10**30, 3j, "", "a", "up", "no",
-    "x", "rho", "omega", "auto", "taylor", "cuda", [], [1.0], [0.1, 0.2], [[0.0, 0.1]], (0.1, 0.3), (0.3, 0.1), {},
-    {"x": 0.01}, {"x": (0.0, 0.01), "v": (0.0, 0.1)}, {"rho": "up"}, {"y": 1}, np.zeros(2), np.array(3.0), np.array([]),
-    np.array(["a"]), np.float64(0.2), np.int64(4), np.bool_(True), object(), len, ns, ns.Stroboscopic(0.5),
-    ns.Poincare("penetration"), b"x", range(3), {1, 2}, 1.0 + 0.0j, "1e-3",
+    None, True, False, 0, 1, 2, 3, -1, 2.5, 3.0, 1e-320, 1e300, -0.0, math.nan, math.inf, 10**30, 3j, "", "a", "up",
+    "no", "x", "rho", "omega", "auto", "taylor", "cuda", [], [1.0], [0.1, 0.2], [[0.0, 0.1]], (0.1, 0.3), (0.3,
+    0.1), {}, {"x": 0.01}, {"x": (0.0, 0.01), "v": (0.0, 0.1)}, {"rho": "up"}, {"y": 1}, np.zeros(2), np.array(3.0),
+    np.array([]), np.array(["a"]), np.float64(0.2), np.int64(4), np.bool_(True), object(), len, ns,
+    ns.Stroboscopic(0.5), ns.Poincare("penetration"), b"x", range(3), {1, 2}, 1.0 + 0.0j, "1e-3",
 ]  # fmt: skip
 
 
@@ -119,7 +119,8 @@ def main() -> None:
         call, count, slowest = getattr(ns, verb), Counter[str](), 0.0
         names = list(inspect.signature(call).parameters)
         for _ in range(many):
-            changed = {str(name): ODD[rng.integers(len(ODD))] for name in rng.choice(names, 1 + int(rng.random() < 0.3))}
+            some = rng.choice(names, 1 + int(rng.random() < 0.3))
+            changed = {str(name): ODD[rng.integers(len(ODD))] for name in some}
             changed |= {f"{names[rng.integers(len(names))]}s": 1} if rng.random() < 0.05 else {}
             asked, began = {**base, **changed}, time.process_time()
             signal.setitimer(signal.ITIMER_PROF, LONGEST)

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.system.arguments import Limit, declared
+from nonsmooth.system.arguments import declared
+from nonsmooth.system.kinds import Limit
 
 SOURCE = Path(ns.__file__).parent
 #: Verbs whose arguments are read by themselves: they take any names, or what is no option.

@@ -21,7 +21,8 @@ from nonsmooth.flow.options import Campaign, Varied, as_called, kept_of
 from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import random_starts, start_states
 from nonsmooth.results.memory import room_for
-from nonsmooth.system.arguments import at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import at_least
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -141,7 +141,7 @@ def _option(option: Option) -> dict[str, Any]:
 
 def _of_kind(kind: Any) -> dict[str, Any]:
     """The values that a verb declares of an argument; any where it declares nothing."""
-    from nonsmooth.system.arguments import Limit
+    from nonsmooth.system.kinds import Limit
 
     parts = get_args(kind)
     if get_origin(kind) is Annotated:

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.arguments import within
+from nonsmooth.system.kinds import within
 from nonsmooth.system.system import System
 
 __all__ = ["LargestStep", "allowed_range", "limits"]

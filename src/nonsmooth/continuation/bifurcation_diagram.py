@@ -19,7 +19,8 @@ from nonsmooth.continuation.special import special_points
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.options import Varied, as_called
 from nonsmooth.results.progress import Progress
-from nonsmooth.system.arguments import Range, above, at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, above, at_least
 
 if TYPE_CHECKING:
     import xarray as xr

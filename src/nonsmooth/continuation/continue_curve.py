@@ -17,7 +17,8 @@ from nonsmooth.continuation.problems.locus import Locus
 from nonsmooth.continuation.problems.orbits import size_of
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.errors import SolveError, shortened
-from nonsmooth.system.arguments import Range, at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, at_least
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:

@@ -16,7 +16,8 @@ from nonsmooth.errors import SolveError
 from nonsmooth.flow.mode_fields import MOST, every_mode
 from nonsmooth.flow.options import Varied
 from nonsmooth.flow.starts import first_state
-from nonsmooth.system.arguments import Range, at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, at_least
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:

@@ -14,7 +14,8 @@ from nonsmooth.continuation.branches.reading import read_branch
 from nonsmooth.continuation.branches.records import record_of
 from nonsmooth.continuation.march.march import March, Row
 from nonsmooth.errors import SolveError
-from nonsmooth.system.arguments import Range, at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, at_least
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -33,7 +33,8 @@ from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
-from nonsmooth.system.arguments import above, at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import above, at_least
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.searches.search import Search

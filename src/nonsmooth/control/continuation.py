@@ -21,7 +21,8 @@ from nonsmooth.errors import Interrupted, SolveError, shortened
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as bar
 from nonsmooth.results.provenance import options_as_data, package_version
-from nonsmooth.system.arguments import Range, above, at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, above, at_least
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from nonsmooth.system.arguments import Range, above, at_least, checked, real_number
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, above, at_least, real_number
 
 __all__ = ["Holding"]
 

@@ -9,7 +9,8 @@ import numpy as np
 from nonsmooth.control.actuated import FORCE, actuated
 from nonsmooth.flow.arguments import real_number
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.system.arguments import above, at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import above, at_least
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:

@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import float_array, real_number
+from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.engines.engine import FloatArray
-from nonsmooth.system.arguments import Range, at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -187,11 +188,8 @@ def _range(radius: FloatArray, slope: FloatArray, pairs: FloatArray, extent: flo
     return float(radius[steadiest[0]]), float(radius[steadiest[1]])
 
 
-def _given(limits: Any, radius: FloatArray) -> tuple[float, float]:
-    try:
-        low, high = (real_number(value, "an end of the range") for value in limits)
-    except (TypeError, ValueError):
-        raise ValueError(f"range = {shortened(limits)}: give its two ends, (low, high)") from None
+def _given(limits: tuple[float, float], radius: FloatArray) -> tuple[float, float]:
+    low, high = limits
     if not radius[0] <= low < high <= radius[-1] * (1 + 1e-9):
-        raise ValueError(f"range = {shortened(limits)} must rise and lie within {radius[0]:.3g} ... {radius[-1]:.3g}")
+        raise ValueError(f"range = {shortened(limits)} must lie within {radius[0]:.3g} ... {radius[-1]:.3g}")
     return low, high

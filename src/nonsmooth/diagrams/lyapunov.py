@@ -40,7 +40,8 @@ from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 from nonsmooth.results.statuses import EQUILIBRIA
-from nonsmooth.system.arguments import at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import at_least
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -24,7 +24,8 @@ from nonsmooth.flow.options import Settling, Varied, as_called, workers_of
 from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.results.memory import room_for
-from nonsmooth.system.arguments import at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,7 +50,7 @@ def sweep(
     judge: bool = True,
     extremes: bool = True,
     loads: bool = False,
-    density: Annotated[bool | Mapping[str, Any], 'write density=True, or {"x": (lowest, highest)}'] = False,
+    density: Annotated[bool | Mapping[str, Range], 'write density=True, or {"x": (lowest, highest)}'] = False,
     bins: Annotated[int, at_least(1)] = 400,
     **options: Unpack[Settling],
 ) -> xr.Dataset:

@@ -22,7 +22,8 @@ import numpy as np
 from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.results.memory import room_for
-from nonsmooth.system.arguments import at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import at_least
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypedDict
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import plain_start
 from nonsmooth.results.progress import Progress
-from nonsmooth.system.arguments import Default, above, at_least, within
+from nonsmooth.system.kinds import Default, above, at_least, within
 
 __all__ = [
     "Campaign", "Length", "Settling", "Solver", "Varied", "Work", "as_called", "kept_of", "longest_period", "solver_of",

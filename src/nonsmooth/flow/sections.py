@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from nonsmooth.errors import shortened
 from nonsmooth.flow.engines.engine import Section
-from nonsmooth.system.arguments import above, at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import above, at_least
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

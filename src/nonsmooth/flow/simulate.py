@@ -20,7 +20,8 @@ from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state, is_one_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
-from nonsmooth.system.arguments import above, at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import above, at_least
 
 if TYPE_CHECKING:
     import xarray as xr

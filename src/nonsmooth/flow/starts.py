@@ -11,7 +11,8 @@ from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import float_array, real_number
 from nonsmooth.flow.engines.engine import FloatArray, State
 from nonsmooth.results.memory import room_for
-from nonsmooth.system.arguments import at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import at_least
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:

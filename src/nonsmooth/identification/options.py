@@ -6,7 +6,7 @@ from typing import Annotated, Any, TypedDict
 
 from nonsmooth.flow.options import Solver
 from nonsmooth.results.progress import Progress
-from nonsmooth.system.arguments import Default, at_least
+from nonsmooth.system.kinds import Default, at_least
 
 __all__ = ["Fitting", "Known", "Prediction", "Recorded"]
 

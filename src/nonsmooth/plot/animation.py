@@ -17,7 +17,8 @@ from nonsmooth.plot import style
 from nonsmooth.plot.labels import column, first_states, name_plane, variable_along
 from nonsmooth.plot.mechanism import put, sketch_of_run
 from nonsmooth.plot.trajectories import with_gaps
-from nonsmooth.system.arguments import above, at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import above, at_least
 from nonsmooth.system.origin import system_of
 from nonsmooth.tables.sampled import sampled
 

@@ -18,8 +18,9 @@ from nonsmooth.flow.sections import Poincare, Stroboscopic
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 from nonsmooth.smoothing.attractors import Box, Found, attractors_of, matched
-from nonsmooth.system.arguments import at_least, checked
+from nonsmooth.system.arguments import checked
 from nonsmooth.system.derived.smoothing import BANDS
+from nonsmooth.system.kinds import at_least
 from nonsmooth.system.parameter import finite_number
 
 if TYPE_CHECKING:

@@ -37,7 +37,8 @@ from nonsmooth.continuation.manifolds.section_map import SectionMap
 from nonsmooth.continuation.problems.multipliers import EDGE
 from nonsmooth.continuation.problems.orbits import size_of
 from nonsmooth.flow.sections import Stroboscopic
-from nonsmooth.system.arguments import above, at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import above, at_least
 
 if TYPE_CHECKING:
     import xarray as xr

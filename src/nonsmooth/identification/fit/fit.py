@@ -14,7 +14,8 @@ from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.options import Fitting
 from nonsmooth.results.progress import Progress, progress
-from nonsmooth.system.arguments import above, at_least, check_system, checked
+from nonsmooth.system.arguments import check_system, checked
+from nonsmooth.system.kinds import above, at_least
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:

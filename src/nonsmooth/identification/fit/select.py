@@ -14,7 +14,8 @@ from nonsmooth.errors import SolveError
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.options import Recorded
 from nonsmooth.results.progress import progress as watched
-from nonsmooth.system.arguments import at_least, check_system, checked
+from nonsmooth.system.arguments import check_system, checked
+from nonsmooth.system.kinds import at_least
 
 if TYPE_CHECKING:
     import xarray as xr
