@@ -67,9 +67,10 @@ def cases() -> list[tuple[str, str, Any]]:
 
 def refused(verb: str, **given: Any) -> Exception:
     """The error of a call with an argument, and with placeholders for all that it needs behind it."""
-    needed = {name: ns.models.discontinuous_support for name in DOORS[verb].needed if name not in given}
+    items = DOORS[verb].items.values()
+    needed = [one.name for one in items if one.default is one.empty and one.name not in ("self", *given)]
     with pytest.raises((TypeError, ValueError)) as caught:
-        getattr(ns, verb)(**given, **{name: one for name, one in needed.items() if name != "self"})
+        getattr(ns, verb)(**given, **dict.fromkeys(needed, object()))
     return caught.value
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypedDict
+from typing import Annotated, Any, Literal, TypedDict, cast
 
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import plain_start
@@ -128,10 +128,7 @@ def workers_of(options: Work) -> int | None:
 
 def solver_of(options: Solver) -> Solver:
     """The part that says how a trajectory is computed."""
-    return {
-        "method": options["method"], "rtol": options["rtol"], "atol": options["atol"], "order": options["order"],
-        "locate": options["locate"],
-    }  # fmt: skip
+    return cast(Solver, {name: value for name, value in options.items() if name in Solver.__annotations__})
 
 
 def longest_period(keep: int, max_period: int | None) -> int:
@@ -148,10 +145,8 @@ def longest_period(keep: int, max_period: int | None) -> int:
 
 def kept_of(options: Campaign) -> dict[str, Any]:
     """The part that says where chunks are computed and kept: what :func:`nonsmooth.campaign.run.run` takes."""
-    return {
-        "threads": workers_of(options), "progress": options["progress"], "store": options["store"],
-        "client": options["client"], "any_cpu": options["any_cpu"],
-    }  # fmt: skip
+    own = ("progress", "store", "client", "any_cpu")
+    return {"threads": workers_of(options)} | {name: value for name, value in options.items() if name in own}
 
 
 def as_called(arguments: Mapping[str, Any]) -> dict[str, Any]:

@@ -76,8 +76,8 @@ def checked(function: Any = None, *, of: Verb | None = None, read: bool = True, 
 
         @wraps(function)
         def called(*given: Any, **named: Any) -> Any:
-            n = len(door.nameless)
-            return function(*given[:n], **door.read(given[n:], named))
+            bound = door.bound(given, named)
+            return function(*bound.args, **bound.kwargs)
 
         called.__doc__ = door.documentation()
         called.__signature__, called.door = door.signature, door  # type: ignore[attr-defined]
@@ -95,32 +95,30 @@ class _Door:
     def __init__(self, function: Verb, of: Verb | None, defaults: Mapping[str, Any]) -> None:
         own = inspect.signature(function)
         self.function, self.verb = function, function.__qualname__.removesuffix(".__init__")
-        self.nameless = [name for name, item in own.parameters.items() if item.kind is item.POSITIONAL_ONLY]
-        self.items = {name: item for name, item in own.parameters.items() if name not in self.nameless}
+        self.items = dict(own.parameters)
         rest = next((item for item in self.items.values() if item.kind is item.VAR_KEYWORD), None)
-        self.items.pop(rest.name if rest else "", None)
         self.group = None if rest is None else _group(rest.annotation, function)
         self.behind: _Door | None = getattr(of, "door", None)
         others = inspect.signature(of).parameters.values() if of else _parameters(self.group, defaults)
-        others = [item.replace(kind=item.KEYWORD_ONLY) for item in others if item.name not in self.items]
-        self.items |= {item.name: item for item in others}
-        self.takes_any = rest is not None and not others
-        first, last = [own.parameters[name] for name in self.nameless], [rest] if rest and self.takes_any else []
-        self.signature = own.replace(parameters=[*first, *self.items.values(), *last])
-        self.shared = {item.name: item.default for item in others}
-        self.positional = [name for name, item in self.items.items() if item.kind is not item.KEYWORD_ONLY]
-        self.needed = [name for name, item in self.items.items() if item.default is _NEEDED]
+        self.shared = {item.name: item.default for item in others if item.name not in self.items}
+        if rest is not None and self.shared:
+            del self.items[rest.name]
+            added = {item.name: item.replace(kind=item.KEYWORD_ONLY) for item in others}
+            self.items |= {name: item for name, item in added.items() if name in self.shared}
+        self.signature = own.replace(parameters=[*self.items.values()])
 
-    def read(self, given: tuple[Any, ...], named: Mapping[str, Any]) -> dict[str, Any]:
+    def bound(self, given: tuple[Any, ...], named: Mapping[str, Any]) -> inspect.BoundArguments:
         """The arguments as read, with defaults of what is shared."""
-        values = dict(zip(self.positional, given, strict=False))
-        twice = values.keys() & named
-        values |= named
-        unknown_ = not self.takes_any and not values.keys() <= self.items.keys()
-        if twice or unknown_ or len(given) > len(self.positional) or not values.keys() >= set(self.needed):
-            raise TypeError(self.misfit(given, named, values))
-        readers = self.readers
-        return self.shared | {name: readers.get(name, _as_given)(value, name) for name, value in values.items()}
+        try:
+            bound = self.signature.bind(*given, **named)
+        except TypeError as error:
+            raise TypeError(self.misfit(given, named, str(error))) from None
+        values, readers = bound.arguments, self.readers
+        for name in [*(name for name in values if name not in named), *named]:  # in the order in which they were given
+            if name in readers:
+                values[name] = readers[name](values[name], name)
+        bound.arguments = self.shared | values
+        return bound
 
     @cached_property
     def kinds(self) -> dict[str, Any]:
@@ -139,30 +137,29 @@ class _Door:
             found["system"] = lambda value, _: check_system(value, self.verb, "inputs" in self.items)
         return found
 
-    def misfit(self, given: tuple[Any, ...], named: Mapping[str, Any], values: Mapping[str, Any]) -> str:
+    def misfit(self, given: tuple[Any, ...], named: Mapping[str, Any], error: str) -> str:
         """The sentence for a call that does not fit the signature."""
-        own = [name for name in (*self.nameless, *self.positional) if name != "self"]
-        options = [name for name in self.items if name not in self.positional]
-        usage = f"{self.verb}({', '.join([*own, *(f'{name}=' for name in options or ['name'])])})"
-        if len(given) > len(self.positional):
-            count = f"{len(own) or 'no'} argument{'s' * (len(own) != 1)}"
-            number = len(given) + len(own) - len(self.positional)
-            over = shortened(given[len(self.positional)])
-            return f"{self.verb} takes {count} by position, not {number}: give {over} by its name; {usage}"
-        if missing := [name for name in self.needed if name not in values]:
+        items = {name: item for name, item in self.items.items() if name != "self"}
+        given = given[len(self.items) - len(items) :]
+        options = [name for name, item in items.items() if item.kind is item.KEYWORD_ONLY]
+        first = [name for name, item in items.items() if item.kind is not item.VAR_KEYWORD and name not in options]
+        usage = f"{self.verb}({', '.join([*first, *(f'{name}=' for name in options or ['name'])])})"
+        if len(given) > len(first):
+            count = f"{len(first) or 'no'} argument{'s' * (len(first) != 1)}"
+            over = shortened(given[len(first)])
+            return f"{self.verb} takes {count} by position, not {len(given)}: give {over} by its name; {usage}"
+        there = {*first[: len(given)], *named}
+        if missing := [name for name, item in items.items() if item.default is _NEEDED and name not in there]:
             return f"{self.verb} needs {' and '.join(missing)}: {usage}"
-        for name in named:
-            if name not in self.items and not self.takes_any:
-                system = values.get("system")
-                if name in getattr(system, "parameters", ()):
-                    return (
-                        f"`{name}` is a parameter of {getattr(system, 'name', '')!r}, not an option of {self.verb}: "
-                        f"set it with system.with_parameters({name}=...)"
-                    )
-                known = [one for one in self.items if one not in ("self", "system")]
-                return unknown(name, "an option", self.verb, known)
-        twice = next(name for name in named if name in self.positional[: len(given)])
-        return f"{self.verb}: {twice} is given twice, by position and by its name; {usage}"
+        system = named.get("system", given[0] if given else None)
+        for name in named.keys() - items.keys():
+            if name in getattr(system, "parameters", ()):
+                return (
+                    f"`{name}` is a parameter of {getattr(system, 'name', '')!r}, not an option of {self.verb}: "
+                    f"set it with system.with_parameters({name}=...)"
+                )
+            return unknown(name, "an option", self.verb, [one for one in items if one != "system"])
+        return f"{self.verb}: {error}; {usage}"
 
     def documentation(self) -> str | None:
         """The docstring, with what is shared written into its list of parameters."""
@@ -180,10 +177,6 @@ class _Door:
         if not added or parameters is None:
             return text or None
         return "\n".join([text[: parameters.end()].rstrip(), *added]) + text[parameters.end() :]
-
-
-def _as_given(value: Any, _: str) -> Any:
-    return value
 
 
 _PARAMETERS = re.compile(r"^Parameters\n-+\n(?:(?!\n+\w[\w ]*\n-{3,}).)*", re.MULTILINE | re.DOTALL)
