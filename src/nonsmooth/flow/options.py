@@ -11,13 +11,14 @@ from nonsmooth.results.progress import Progress
 from nonsmooth.system.kinds import Default, above, at_least, within
 
 __all__ = [
-    "Campaign", "Length", "Settling", "Solver", "Varied", "Work", "as_called", "kept_of", "longest_period", "solver_of",
-    "workers_of",
+    "LONGEST_RUN", "Campaign", "Length", "Settling", "Solver", "Varied", "Work", "as_called", "kept_of",
+    "longest_period", "solver_of", "workers_of",
 ]  # fmt: skip
 
 
+LONGEST_RUN = 1e12  # periods, or units of time: what is longer does not end
 #: Of a run, in periods or in time.
-Length = Annotated[float, above(0), "it is the length of a run"]
+Length = Annotated[float, above(0, LONGEST_RUN), "it is the length of a run"]
 #: The parameter that a verb varies.
 Varied = Annotated[str, 'the parameter is given by its name in quotes, as "rho", before its values']
 

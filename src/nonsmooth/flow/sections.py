@@ -73,6 +73,9 @@ class Poincare:
     t_max: Annotated[float, above(0)] | None = None
 
 
+_EACH_PERIOD = Stroboscopic()
+
+
 def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare, Section]:
     """The section meant (``Stroboscopic(0)`` where None and the system has a period), and its integers.
 
@@ -88,7 +91,7 @@ def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare,
                 f"{system.name!r} has no forcing period, so there is no stroboscopic section; "
                 f'pass section=ns.Poincare("indicator"), one of: {", ".join(system.indicators) or "(it has none)"}'
             )
-        section = Stroboscopic()
+        section = _EACH_PERIOD
     if isinstance(section, Stroboscopic):
         if period is None:
             raise ValueError(f"{system.name!r} has no forcing period: use ns.Poincare(...) in place of {section}")

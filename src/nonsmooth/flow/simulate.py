@@ -15,7 +15,7 @@ from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
 from nonsmooth.flow.failure import refuse_beyond_stops, solve_error, wrong_way
 from nonsmooth.flow.inputs import driven
 from nonsmooth.flow.loads import meter_of
-from nonsmooth.flow.options import Length, Solver, as_called, solver_of
+from nonsmooth.flow.options import LONGEST_RUN, Length, Solver, as_called, solver_of
 from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state, is_one_start
 from nonsmooth.kernels.hybrid import codes
@@ -42,7 +42,7 @@ def simulate(
     duration: Length | None = None,
     start: Any = None,
     mode: str | None = None,
-    transient: Annotated[float, at_least(0)] = 0,
+    transient: Annotated[float, at_least(0, LONGEST_RUN)] = 0,
     samples: Any = None,
     step: Annotated[float, above(0)] | None = None,
     ramps: Mapping[str, Any] | None = None,

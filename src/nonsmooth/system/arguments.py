@@ -71,13 +71,16 @@ def checked(function: Any = None, *, of: Verb | None = None, read: bool = True, 
 
     def decorated(function: F) -> F:
         door = _Door(function, of, defaults)
-        if not read:
-            door.readers = {}
 
         @wraps(function)
         def called(*given: Any, **named: Any) -> Any:
-            bound = door.bound(given, named)
-            return function(*bound.args, **bound.kwargs)
+            if read:
+                return function(**door.read(given, named))
+            door.fit(given, named)
+            return function(*given, **named)
+
+        if not read:
+            door.readers = {}
 
         called.__doc__ = door.documentation()
         called.__signature__, called.door = door.signature, door  # type: ignore[attr-defined]
@@ -106,19 +109,25 @@ class _Door:
             added = {item.name: item.replace(kind=item.KEYWORD_ONLY) for item in others}
             self.items |= {name: item for name, item in added.items() if name in self.shared}
         self.signature = own.replace(parameters=[*self.items.values()])
+        self.needed = {name for name, item in self.items.items() if item.default is _NEEDED}
+        self.first = [name for name, item in self.items.items() if item.kind is item.POSITIONAL_OR_KEYWORD]
 
-    def bound(self, given: tuple[Any, ...], named: Mapping[str, Any]) -> inspect.BoundArguments:
-        """The arguments as read, with defaults of what is shared."""
+    def fit(self, given: tuple[Any, ...], named: Mapping[str, Any]) -> None:
+        """TypeError for a call that does not fit the signature."""
         try:
-            bound = self.signature.bind(*given, **named)
+            self.signature.bind(*given, **named)
         except TypeError as error:
             raise TypeError(self.misfit(given, named, str(error))) from None
-        values, readers = bound.arguments, self.readers
-        for name in [*(name for name in values if name not in named), *named]:  # in the order in which they were given
-            if name in readers:
-                values[name] = readers[name](values[name], name)
-        bound.arguments = self.shared | values
-        return bound
+
+    def read(self, given: tuple[Any, ...], named: dict[str, Any]) -> dict[str, Any]:
+        """The arguments as read, in the order in which they were given, behind defaults of what is shared."""
+        values = dict(zip(self.first, given, strict=False)) | named
+        whole = len(values) == len(given) + len(named)
+        if not (whole and self.needed <= values.keys() <= self.items.keys()):
+            self.fit(given, named)
+        readers = self.readers
+        read = {name: readers[name](value, name) if name in readers else value for name, value in values.items()}
+        return self.shared | read
 
     @cached_property
     def kinds(self) -> dict[str, Any]:

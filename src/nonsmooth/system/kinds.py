@@ -61,14 +61,16 @@ class Limit:
 Range = Annotated[tuple[float, float], "rising"]
 
 
-def at_least(low: float) -> Limit:
+def at_least(low: float, most: float = math.inf) -> Limit:
     """No less than ``low``."""
-    return Limit(f"at least {low:g}" if low else "zero or more", low)
+    words = f"at least {low:g}" if low else "zero or more"
+    return Limit(words if most == math.inf else f"{words}, at most {most:g}", low, most)
 
 
-def above(low: float) -> Limit:
+def above(low: float, most: float = math.inf) -> Limit:
     """More than ``low``."""
-    return Limit(f"above {low:g}" if low else "positive", low, without_low=True)
+    words = f"above {low:g}" if low else "positive"
+    return Limit(words if most == math.inf else f"{words}, at most {most:g}", low, most, without_low=True)
 
 
 def within(low: float, high: float) -> Limit:
