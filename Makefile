@@ -14,7 +14,7 @@ export PYTHONDONTWRITEBYTECODE :=
 PYTEST_ARGS ?= -n auto --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-full test slow installed test-times mutants mutants-sample fuzz altered coverage \
+.PHONY: help reproduce reproduce-full test slow installed wheels test-times mutants mutants-sample fuzz altered coverage \
 	coverage-awkward coverage-fit check contacts equilibria branches bench gpu gpu-compiler docs screenshots clean distclean \
 	versions
 
@@ -35,6 +35,9 @@ slow: $(VENV)/.compiled-test $(VENV)/.installed-cluster  ## run the long campaig
 
 installed: $(VENV)/.compiled-test  ## build sdist and wheel; the README's ten lines by the wheel, in an empty environment
 	$(BIN)/python tests/installed.py
+
+wheels: $(VENV)/.compiled-test  ## dist/: a wheel with compiled kernels for Linux, and a plain one; both tried in empty environments
+	$(BIN)/python tests/installed.py --wheels dist
 
 test-times: $(VENV)/.compiled-test  ## processor time of each file of tests: compiling, importing, children, browser, rest
 	$(BIN)/python -m pytest -p tests.costs -n 0 -q

@@ -2,7 +2,8 @@
 
 Nothing depends on it. Where it fails, or `HATCH_BUILD_NO_HOOKS=true` leaves it out, the wheel has the sources alone and
 kernels are compiled when they are first called. `NONSMOOTH_LEVELS` names the levels of the architecture to be made (by
-default that of this processor).
+default that of this processor), `NONSMOOTH_PLATFORM` the platform in the wheel's name (by default that of this machine:
+the kernels are no libraries, and know nothing of the system that they were made on).
 """
 
 import os
@@ -43,7 +44,11 @@ class CompileAhead(BuildHookInterface):  # type: ignore[misc]
         elif version != "editable" and any(Path(self.folder.name).iterdir()):
             build_data["force_include"][self.folder.name] = "nonsmooth/kernels/ahead"
             build_data["pure_python"] = False
-            build_data["infer_tag"] = True
+            if platform := os.environ.get("NONSMOOTH_PLATFORM"):
+                python = f"cp{sys.version_info.major}{sys.version_info.minor}"
+                build_data["tag"] = f"{python}-{python}-{platform}"
+            else:
+                build_data["infer_tag"] = True
 
 
 def run_apart(code: str, arguments: list[str], environment: dict[str, str]) -> tuple[int, str]:

@@ -84,7 +84,7 @@ class Page:
         return dict(json.loads(self.tab.evaluate('Bokeh.documents[0].get_model_by_name("ui").value')))
 
     def value(self, name: str) -> float:
-        return float(next(one["value"] for one in self.ui()["parameters"] if one["name"] == name))
+        return float(self.ui()["state"][f"p.{name}"])
 
     def write(self, field: str, text: str) -> None:
         self.tab.fill(f'[id="{field}"]', text)

@@ -57,12 +57,10 @@ def test_elements_between_masses_and_several_kinds_together() -> None:
 
 @pytest.mark.parametrize(
     ("change", "said"),
-    [({"masses": []}, "needs a mass"), ({"masses": [ONE] * 5}, "at most 4"),
-     ({"masses": [{**ONE, "m": "0"}]}, "mass 1, mass = 0"),
+    [({"masses": [{**ONE, "m": "0"}]}, "mass 1, mass = 0"),
      ({"masses": [{**ONE, "k": "__import__('os')"}]}, "is no number"),
-     ({"elements": [{"kind": "eval", "at": 1}]}, "is no kind"),
      ({"elements": [{"kind": "stop", "at": 3}]}, "no mass 3"),
-     ({"elements": [{"kind": "stop", "at": 1, "other": 1}]}, "with itself"), ({"elements": "stop"}, "whole"),
+     ({"elements": [{"kind": "stop", "at": 1, "other": 1}]}, "with itself"),
      ({"elements": [{"kind": "stop", "at": 1, "restitution": 2}]}, "at most 1"), ({"omega": -1}, "forcing frequency")],
 )  # fmt: skip
 def test_what_does_not_fit_is_refused_with_its_row(change: dict[str, Any], said: str) -> None:
@@ -74,12 +72,12 @@ def test_a_system_of_the_form_is_written_and_explored(page: Any) -> None:
     page.until_done()
     page.tab.select_option("#model", "")
     page.until('document.getElementById("building-python").textContent.includes("ns.elements.Stop")')
-    page.tab.fill('#building-elements [data-key="restitution"]', "2")
-    page.tab.press('#building-elements [data-key="restitution"]', "Tab")
+    page.tab.fill('#building-elements [data-set="build.elements.0.restitution"]', "2")
+    page.tab.press('#building-elements [data-set="build.elements.0.restitution"]', "Tab")
     page.until('document.getElementById("wrong-building").textContent.includes("at most 1")')
     assert page.tab.is_disabled("#building-explore")
-    page.tab.fill('#building-elements [data-key="restitution"]', "0.6")
-    page.tab.press('#building-elements [data-key="restitution"]', "Tab")
+    page.tab.fill('#building-elements [data-set="build.elements.0.restitution"]', "0.6")
+    page.tab.press('#building-elements [data-set="build.elements.0.restitution"]', "Tab")
     page.until('document.getElementById("building-python").textContent.includes("(0.6,")')
     page.picture("building")
     made: dict[str, Any] = {}

@@ -42,8 +42,8 @@ def test_figure_11_a_dragged_slider_and_a_click_on_a_column_of_period_4(page: An
     })()""")
     value = columns[len(columns) // 2]
     page.tab.mouse.click(*page.place("diagram", value, 0.02))
-    page.until(f'Math.abs(JSON.parse(Bokeh.documents[0].get_model_by_name("ui").value).parameters'
-               f'.find(one => one.name === "rho").value - {value}) < 1e-3')  # fmt: skip
+    ui = 'JSON.parse(Bokeh.documents[0].get_model_by_name("ui").value)'
+    page.until(f'Math.abs({ui}.state["p.rho"] - {value}) < 1e-3')
     page.until_done()
     told = page.readout()
     print(f"period-4 column at rho = {value:.4f} N: {told}")

@@ -17,7 +17,7 @@ from tests.explorer.conftest import FEW, wait_until
 import nonsmooth as ns
 from nonsmooth.explorer.measured import read, strand_distance
 from nonsmooth.explorer.recorded import LARGEST, frequency_of, matched, response_points, samples_of
-from nonsmooth.identification.compare.fold import fold
+from nonsmooth.identification.compare.orbits import fold
 from nonsmooth.recordings import Recording, write_cap, write_capstone_csv
 
 TRUTH = {"k": 8.0, "c": 0.8, "g": -0.004}

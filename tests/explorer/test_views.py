@@ -84,7 +84,7 @@ def test_the_spectrum_of_a_motion_without_contact_is_one_line_of_the_linear_ampl
     page.write("v-p.g", "1")
     page.tab.click("#tab-spectrum")
     page.until_done()
-    p = {one["name"]: one["value"] for one in page.ui()["parameters"]}
+    p = {one["name"]: page.value(one["name"]) for one in page.ui()["parameters"]}
     known = p["rho"] / p["m"] / np.hypot(2 * p["k"] / p["m"] - p["omega"] ** 2, p["c"] * p["omega"] / p["m"])
     lines = data(page, "lines")
     assert list(lines["x"]) == [1.0]
@@ -112,7 +112,7 @@ def test_the_response_without_contact_is_the_linear_resonance_curve(page: Any) -
     page.write("response.high", "7")
     page.tab.select_option("#shown", "x")
     page.until_done()
-    p = {one["name"]: one["value"] for one in page.ui()["parameters"]}
+    p = {one["name"]: page.value(one["name"]) for one in page.ui()["parameters"]}
     for word in ("up", "down"):
         drawn = data(page, f"response {word}")
         omega = drawn["x"]

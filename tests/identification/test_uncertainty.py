@@ -5,10 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from nonsmooth.identification.arrow import State, Unsettled, sandwich, settle
 from nonsmooth.identification.finding import Estimate
-from nonsmooth.identification.pieces import State
-from nonsmooth.identification.profiles import profile_of
-from nonsmooth.identification.sandwich import sandwich
+from nonsmooth.identification.fit.profile import profile_of
 from nonsmooth.identification.uncertainty import (
     correlated,
     correlation_times,
@@ -67,12 +66,31 @@ def test_parameters_known_mainly_together_keep_the_uncertainty_of_white_residual
         r = y - table @ np.linalg.lstsq(table, y, rcond=None)[0]
         state = State([r], [r], [table], [np.zeros((n, 1))])
         problem = SimpleNamespace(
-            pieces=[piece], derivatives=lambda theta, starts, now=state: now, weights=lambda state, spread: [np.ones(n)]
-        )
-        found = sandwich(problem, np.zeros(2), np.zeros((1, 1)), 0.0, np.ones(1, dtype=bool), np.zeros((2, 2)))
+            pieces=[piece], derivatives=lambda theta, starts, now=state: now, weights=lambda state: [np.ones(n)],
+            unknowns=SimpleNamespace(precision=np.zeros((2, 2))),
+        )  # fmt: skip
+        found = sandwich(problem, np.zeros(2), np.zeros((1, 1)))
         white = np.linalg.inv(table.T @ table) * (r @ r) / (n - 2)
         ratios.append(np.sqrt(np.diag(found.covariance) / np.diag(white)))
     assert np.min(ratios) > 0.999999 and np.mean(ratios) < 1.05 and np.max(ratios) < 1.3
+
+
+def test_a_fit_whose_minimum_no_step_reaches_is_refused():
+    """Derivatives of the wrong sign: the minimum at 1 seems a hundred standard uncertainties away, the other way."""
+    piece = SimpleNamespace(which=np.arange(1), n_free=0)
+
+    def state(theta, starts):
+        return State([], [np.full(4, theta[0] - 1.0)], [np.ones((4, 1))], [np.zeros((4, 1))])
+
+    unknowns = SimpleNamespace(
+        low=np.array([-np.inf]), high=np.array([np.inf]), centre=np.zeros(1), precision=np.zeros((1, 1))
+    )
+    problem = SimpleNamespace(
+        pieces=[piece], unknowns=unknowns, residuals=state, derivatives=state, weights=lambda state: [np.full(4, 50.0)]
+    )
+    with pytest.raises(Unsettled, match="no step lowers the sum of squares") as refused:
+        settle(problem, np.zeros(1), np.zeros((1, 1)))
+    assert refused.value.distance[0] == pytest.approx(100.0)  # of 0.01, from four readings known to 0.02
 
 
 def test_profile_of_a_parabola_gives_the_normal_interval():

@@ -314,14 +314,15 @@ def test_a_mdf_group_of_another_rate_is_a_sensor_of_the_same_run(tmp_path: Path)
     [
         ({"thousands": "x"}, "thousands must be one of"),
         ({"thousands": ",", "decimal": ","}, "not the decimal mark"),
-        ({"header": 0}, "header must be the number of a line"),
-        ({"units_row": True}, "units_row must be the number of a line"),
-        ({"skip": -1}, "skip must be the number of a line"),
+        ({"header": 0}, "header, the number of a line, = 0 must be a whole number, at least 1"),
+        ({"units_row": True}, "units_row, the number of a line, must be a real number"),
+        ({"skip": -1}, "skip, the number of a line, = -1 must be a whole number"),
         ({"wraps": {"x": 0}}, "at which it begins anew"),
+        ({"skips": 2}, "`skips` is not an option"),
     ],
 )
 def test_options_are_refused_before_anything_is_read(options: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises((ValueError, TypeError), match=message):
         ns.load_recording("absent.csv", **options)
 
 

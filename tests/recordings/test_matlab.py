@@ -171,5 +171,5 @@ def test_version_73_claims_and_links() -> None:
     recording = parse_recording(hdf5(linked), "x.mat")
     assert any("/secret: is a link; left out" in w for w in recording.warnings)
     good = hdf5(linked)
-    with pytest.raises(DataFileError, match="cannot be read as HDF5"):
+    with pytest.raises(DataFileError, match="cannot be read as a MATLAB file, it is damaged or cut short"):
         parse_recording(good[: len(good) // 2], "bad.mat")

@@ -16,8 +16,8 @@ from nonsmooth.plot import COLORS
 from nonsmooth.studies.savi2007 import Reproduction
 from nonsmooth.studies.savi2007.figures.diagrams import other_motions
 from nonsmooth.studies.savi2007.figures.figure import Figure
+from nonsmooth.studies.savi2007.figures.gap import transient_points
 from nonsmooth.studies.savi2007.printed import FIGURE_14, NUMBERS
-from nonsmooth.studies.savi2007.rig_figures.gap import transient_points
 from nonsmooth.studies.savi2007.study import figures_of_the_study
 
 FIGURES: dict[str, Figure] = {figure.name: figure for figure in figures_of_the_study()}

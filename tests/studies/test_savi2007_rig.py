@@ -14,11 +14,11 @@ from nonsmooth.studies.savi2007.claims import rig as claims_rig
 from nonsmooth.studies.savi2007.claims import rig_response as claims_rig_response
 from nonsmooth.studies.savi2007.claims.rows import Cell, Row, printed_cell
 from nonsmooth.studies.savi2007.claims.verdicts import Verdict
+from nonsmooth.studies.savi2007.figures.motions import chosen, measured_periods_at, said
 from nonsmooth.studies.savi2007.findings import Number, found_in, kept, the_finding
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.measure import Interval, measured_jumps, measured_periods
 from nonsmooth.studies.savi2007.printed import FIGURE_14, NUMBERS, TABLE_1
-from nonsmooth.studies.savi2007.rig_figures.motions import chosen, measured_periods_at, said
 
 STEP = 0.05
 

@@ -126,7 +126,7 @@ def _dataset(
     from nonsmooth.results.provenance import provenance
 
     numbers, n_starts, n = asked["values"], labels.shape[1], len(system.states)
-    count = np.stack([(labels == k).sum(axis=1) for k in range(n_attractors)], axis=1).reshape(len(numbers), -1)
+    count = (labels[:, None] == np.arange(n_attractors)[:, None]).sum(axis=2)
     fraction, error = share_errors(count, n_starts)
     period = np.full(count.shape, -1, dtype=np.int64)
     exponent, spread = np.full(count.shape, np.nan), np.full(count.shape, np.nan)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -34,51 +34,38 @@ ON_BRANCH = 0.02  # of a branch's size: a point of the sweep nearer to it than t
 
 
 @dataclass
-class _Found:
-    """Branches in the order in which they were found, and the branch that each one leaves (-1: found in a sweep)."""
+class _Branch:
+    """A branch, the one that it leaves (-1: found in a sweep), and how many switches lead to it."""
 
-    name: str
-    width: float
-    branches: list[xr.Dataset] = field(default_factory=list)
-    parents: list[int] = field(default_factory=list)
-    levels: list[int] = field(default_factory=list)
-    lines: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)  # values, section points (point, p, state)
+    data: xr.Dataset
+    parent: int
+    level: int
+    values: FloatArray  # of the parameter
+    returns: FloatArray  # (point, period number, state) all section points
 
-    def add(self, branch: xr.Dataset, parent: int, level: int) -> None:
-        self.branches.append(branch)
-        self.parents.append(parent)
-        self.levels.append(level)
-        self.lines.append((branch[self.name].values, returns_of(branch)))
+    def holds(self, value: float, u: FloatArray) -> bool:
+        """Return whether a point of a sweep lies on it."""
+        high, low = self.data["maximum"].values, self.data["minimum"].values
+        size = np.maximum(np.nanmax(high, 0) - np.nanmin(low, 0), 1e-12)
+        a, b = self.values[:-1], self.values[1:]
+        at = np.flatnonzero(((a - value) * (b - value) <= 0.0) & (a != b))
+        x = ((value - a[at]) / (b[at] - a[at]))[:, None, None]
+        there = (1.0 - x) * self.returns[at] + x * self.returns[at + 1]
+        return bool((np.abs((there - u) / size).max(axis=2) < ON_BRANCH).any())
 
-    def holds(self, value: float, period: int, u: FloatArray) -> bool:
-        """Return whether a point of a sweep lies on a branch."""
-        for branch, (values, points) in zip(self.branches, self.lines, strict=True):
-            if int(branch["period_number"]) != period:
-                continue
-            size = np.maximum(np.nanmax(branch["maximum"].values, 0) - np.nanmin(branch["minimum"].values, 0), 1e-12)
-            a, b = values[:-1], values[1:]
-            for i in np.flatnonzero(((a - value) * (b - value) <= 0.0) & (a != b)):
-                x = (value - a[i]) / (b[i] - a[i])
-                there = (1.0 - x) * points[i] + x * points[i + 1]
-                if (np.abs((there - u) / size).max(axis=1) < ON_BRANCH).any():
-                    return True
-        return False
+    def begins_at(self, row: xr.Dataset, near: float) -> bool:
+        """Return whether it is the other branch through a special point."""
+        doubles, data = str(row["kind"].values) == "flip", self.data
+        if int(data["period_number"]) != (2 if doubles else 1) * int(row["period_number"]):
+            return False
+        value = row[data.attrs["parameter"]].values
+        same = (data["special_kind"] == row["kind"]) & (np.abs(data["special_value"] - value) < near)
+        ends = data["special_point"].isin([0, data.sizes["point"] - 1]) if doubles else True  # a doubled one ends there
+        return bool((same & ends).any())
 
-    def left(self, branch: int, row: xr.Dataset) -> bool:
-        """Return whether the other branch through a special point of a branch is known."""
-        kind, value, period = str(row["kind"].values), float(row[self.name]), int(row["period_number"])
-        for i, other in enumerate(self.branches):
-            number = int(other["period_number"])
-            if i == branch or number != (2 * period if kind == "flip" else period):
-                continue
-            same = (other["special_kind"].values == kind) & (
-                np.abs(other["special_value"].values - value) < SAME * self.width
-            )
-            if kind == "flip":  # a doubled branch ends there
-                same &= np.isin(other["special_point"].values, [0, other.sizes["point"] - 1])
-            if same.any():
-                return True
-        return False
+
+def _branch(data: xr.Dataset, parent: int, level: int) -> _Branch:
+    return _Branch(data, parent, level, data[data.attrs["parameter"]].values, returns_of(data))
 
 
 @checked
@@ -150,31 +137,31 @@ def bifurcation_diagram(
         )
     low, high = limits(system, parameter, range, None)
     swept = _swept(system, parameter, np.linspace(low, high, n), start, transient, max_period)
-    found, complete = _Found(parameter, high - low), True
+    found, complete = list[_Branch](), True
     more: dict[str, Any] = {"step": step, "points": points}
     with search_within(budget, "bifurcation_diagram", progress) as search:
         for value, period, u in _periodic(swept, parameter):
-            if found.holds(value, period, u):
+            if any(int(one.data["period_number"]) == period and one.holds(value, u) for one in found):
                 continue
-            if not complete or _spent(search):
+            if not complete or search.over():
                 complete = False
                 break
             try:
                 here = system.with_parameters({parameter: value})
                 orbit = find_orbit(here, start=u, transient=0, period_number=period, progress=False)
-                found.add(continue_orbit(orbit, parameter, (low, high), **more), -1, 0)
+                found.append(_branch(continue_orbit(orbit, parameter, (low, high), **more), -1, 0))
             except SolveError:
                 continue
-            complete = _switched(found, len(found.branches) - 1, depth, max_period, search, more)
-    if not found.branches and not complete:
+            complete = _switched(found, depth, max_period, search, more, SAME * (high - low))
+    if not found and not complete:
         raise SolveError(f"the budget of {budget:g} s was spent before a branch was found", status="budget")
-    if not found.branches:
+    if not found:
         raise SolveError(
             f"no periodic orbit was found over {parameter} = {low!r} ... {high!r}: the sweeps show none up to period "
             f"{max_period}, or Newton's method converged to none of them. Give another start, range or transient",
             status="not_periodic",
         )
-    return _dataset(system, found, swept, asked, complete)
+    return _dataset(system, parameter, found, swept, asked, complete)
 
 
 def _swept(system: System, name: str, values: FloatArray, start: Any, transient: int, most: int) -> xr.Dataset:
@@ -203,36 +190,28 @@ def _periodic(swept: xr.Dataset, name: str) -> list[tuple[float, int, FloatArray
     return [(value, number, u) for _, number, value, u in found]
 
 
-def _spent(search: Search) -> bool:
-    """Return whether the budget is spent."""
-    try:
-        search.look()
-    except SolveError:
-        return True
-    return False
-
-
-def _switched(found: _Found, at: int, depth: int, most: int, search: Search, more: dict[str, Any]) -> bool:
-    """Follow the branches that leave those from ``at`` on; False where the budget ends it."""
-    while at < len(found.branches):
-        branch = found.branches[at]
-        table = special_points(branch)
-        for i in range(table.sizes["special"] if found.levels[at] < depth else 0):
+def _switched(
+    found: list[_Branch], depth: int, most: int, search: Search, more: dict[str, Any], near: float
+) -> bool:
+    """Follow the branches that leave the last one, and those that leave these; False where the budget ends it."""
+    todo = [len(found) - 1]
+    for at in todo:
+        branch = found[at]
+        table, last = special_points(branch.data), branch.data.sizes["point"] - 1
+        for i in range(table.sizes["special"] if branch.level < depth else 0):
             row = table.isel(special=i)
-            place = int(row["point"])
-            if str(row["kind"].values) not in SWITCHES or (place in (0, branch.sizes["point"] - 1)):
+            kind, number = str(row["kind"].values), int(row["period_number"])
+            if kind not in SWITCHES or int(row["point"]) in (0, last) or (kind == "flip" and 2 * number > most):
                 continue
-            doubles = str(row["kind"].values) == "flip"
-            if found.left(at, row) or (doubles and 2 * int(row["period_number"]) > most):
+            if any(other is not branch and other.begins_at(row, near) for other in found):
                 continue
-            if _spent(search):
+            if search.over():
                 return False
             try:
-                other = continue_orbit(row, **more)
+                found.append(_branch(continue_orbit(row, **more), at, branch.level + 1))
             except SolveError:
                 continue
-            found.add(other, at, found.levels[at] + 1)
-        at += 1
+            todo.append(len(found) - 1)
     return True
 
 
@@ -260,11 +239,14 @@ def returns_of(branch: xr.Dataset) -> FloatArray:
     return found
 
 
-def _dataset(system: System, found: _Found, swept: xr.Dataset, options: dict[str, Any], complete: bool) -> xr.Dataset:
+def _dataset(
+    system: System, name: str, found: list[_Branch], swept: xr.Dataset, options: dict[str, Any], complete: bool
+) -> xr.Dataset:
     from nonsmooth.results.branches import diagram
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
 
-    labels, returns = labels_of(system), [points for _, points in found.lines]
+    labels = labels_of(system)
     attrs = dict(provenance(labels, "bifurcation_diagram", options, method="multiple shooting"))
-    return diagram(labels, attrs, found.name, found.branches, returns, found.parents, swept, complete)
+    branches, returns, parents = zip(*((one.data, one.returns, one.parent) for one in found), strict=True)
+    return diagram(labels, attrs, name, branches, returns, parents, swept, complete)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from nonsmooth.continuation.arguments import LargestStep
-from nonsmooth.continuation.branches.following import Asked, Start, curve_of, resumed_at
+from nonsmooth.continuation.branches.following import Asked, Start, curve_of
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.branches.other_branches import born, straight_on, switched
 from nonsmooth.continuation.branches.reading import read_branch
@@ -128,8 +128,6 @@ def _go_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
         if not open_end and not (asked.virtual and ending in ("grazing", "corner")):
             ends.append(March(ending=ending, said=said))
             continue
-        curve, X = resumed_at(system, record.period_number, point, branch.name, branch.width)
-        border = point.tangent / curve.scale * (1.0 if side else -1.0)
-        begin = curve.near(X / curve.scale, border / np.linalg.norm(border))
+        begin = branch.resumed(record.period_number, point, 1.0 if side else -1.0)
         ends.append(begin or March(ending="no_convergence"))
     return branch.result(record.period_number, ends[0], record.points, ends[1])

@@ -9,8 +9,9 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit, orbit_of
+from nonsmooth.continuation.problems.curve import Point
 from nonsmooth.continuation.problems.multipliers import multipliers_of, nearest_to_one, stability
-from nonsmooth.continuation.problems.path import Walk
+from nonsmooth.continuation.problems.orbits import Orbits
 from nonsmooth.continuation.problems.primitive import primitive
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
 from nonsmooth.continuation.problems.solve import solve
@@ -107,7 +108,7 @@ def find_orbit(
         raise ValueError(f"{system.name!r} depends on time without a period: it has no periodic orbits")
     wanted = bool(checked_loads(system, loads, "find_orbit"))
     state = first_state(system, start)
-    with search_within(budget, "find_orbit", progress) as search:
+    with search_within(budget, "find_orbit", progress, looks=True) as search:
         guesses = _guesses(system, state, period_number, transient, max_period, search)
         orbit = _polished(system, guesses, period_number is not None, transient == 0, search)
     warn_if_slow(system, orbit.maximum, orbit.minimum)
@@ -130,13 +131,13 @@ def _guesses(
     else:
         keep = 2 * max(max_period, period_number or 1) + 2
         begun = state.copy()
-        settled = settle_forced(system, engine, state, transient, keep, search)
+        settled = settle_forced(system, engine, state, transient, keep)
         if settled.status not in GOOD and not transient and period_number is not None:
             # The motion leaves an unstable orbit and fails later: its first rounds are enough.
-            settled = settle_forced(system, engine, begun, 0, period_number + 1, search)
+            settled = settle_forced(system, engine, begun, 0, period_number + 1)
         if settled.status not in GOOD:
             raise solve_error(settled.status, begun=(system, begun.u))
-        guesses = forced_guesses(system, settled, period_number, max_period)
+        guesses = forced_guesses(system, engine, settled, period_number, max_period)
     if not guesses:
         unit = "rounds" if system.period() is None else "iterates" if system.is_map else "forcing periods"
         raise SolveError(
@@ -159,7 +160,8 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
         search.doing = f"looking for a {name} orbit by Newton's method"
         shooting.anchor(X[: shooting.n], shooting.values, size)
         left = shooting.evaluate(X).residual[: shooting.n]  # what the guess lacks to close
-        solved, tried = _newton(shooting, X, _scale(shooting, size, guess.period), search)
+        curve = Orbits(shooting, size, guess.period, ())
+        solved, tried = _newton(curve, X, search)
         shorter = None if solved is None else primitive(shooting, solved, size)
         gap = guess.gap
         if shorter is not None and given:
@@ -169,7 +171,8 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
             continue
         if shorter is not None:
             shooting, X = shorter
-            solved, tried = _newton(shooting, X, _scale(shooting, size, guess.period), search)
+            curve = Orbits(shooting, size, guess.period, ())
+            solved, tried = _newton(curve, X, search)
             name = _name(shooting.period_number)
             if shooting.forced:
                 gap = float(guess.gaps[shooting.period_number - 1])
@@ -177,15 +180,12 @@ def _polished(system: System, guesses: list[Guess], given: bool, unstable: bool,
         if solved is None:
             reasons.append(_why(shooting, tried, name))
             continue
-        walk = Walk(shooting)
-        path = walk.along(solved, shooting.split(solved.X)[1])
-        if path is None:
+        point = curve.described(Point(curve, solved.X / curve.scale, np.empty(0), 0.0, 0, solved))
+        if point is None:
             reasons.append(("no_convergence", f"the {name} orbit found could not be followed"))
             continue
-        clearance = walk.clearance(path, len(system.indicators))
-        noise = NOISE * float(guess.size.max())
-        virtual = bool((path.margins < -noise).any())
-        orbit = orbit_of(shooting, solved, path, clearance, virtual)
+        virtual = bool((point.path.margins < -NOISE * float(guess.size.max())).any())
+        orbit = orbit_of(point, virtual)
         if virtual:
             reasons.append(("virtual", f"the {name} orbit found passes through a boundary it should obey"))
         elif given or unstable or (orbit.stable and _is_near(orbit, guess, gap, left)):
@@ -226,11 +226,6 @@ def _name(period_number: int) -> str:
     return f"period-{period_number}" if period_number else "closed"
 
 
-def _scale(shooting: Shooting, size: FloatArray, period: float) -> FloatArray:
-    m = shooting.m
-    return shooting.join(np.full(m, period), np.tile(size, (m + 1, 1)), period)
-
-
 def _is_near(orbit: Orbit, guess: Guess, gap: float, left: FloatArray) -> bool:
     """Return whether an orbit is the one that a motion settles on: as near as its gap says.
 
@@ -245,18 +240,17 @@ def _is_near(orbit: Orbit, guess: Guess, gap: float, left: FloatArray) -> bool:
     return moved <= SLOW * float(np.abs(away[: len(guess.size)] / guess.size).max())
 
 
-def _newton(shooting: Shooting, X: FloatArray, scale: FloatArray, search: Search) -> tuple[Solved | None, Solved]:
+def _newton(curve: Orbits, X: FloatArray, search: Search) -> tuple[Solved | None, Solved]:
     """Solve at fixed parameters; None where it does not converge, and the last iterate."""
-    X = X.copy()
-    size = shooting.size
-    last = np.inf
+    shooting, X, last = curve.shooting, X.copy(), np.inf
+    scale = curve.scale / np.sqrt(shooting.m + 1)  # each visit's states by their own size
     for i in range(MOST):
         search.look()
         solved = shooting.evaluate(X)
         if not np.isfinite(solved.residual).all():
             return None, solved
         try:
-            step = solve(solved.jacobian[:, :size] * scale[:size], -solved.residual)
+            step = solve(solved.jacobian * scale, -solved.residual)
         except np.linalg.LinAlgError:
             return None, solved
         length = float(np.abs(step).max())
@@ -266,6 +260,6 @@ def _newton(shooting: Shooting, X: FloatArray, scale: FloatArray, search: Search
             return solved, solved
         if length > 0.5:
             step *= 0.5 / length
-        X[:size] += scale[:size] * step
+        X += scale * step
         last = length
     return None, solved

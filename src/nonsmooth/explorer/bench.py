@@ -51,10 +51,13 @@ class Bench:
     def actions(self) -> dict[str, Callable[[str, Any], object]]:
         """Messages of the page that concern a recording."""
         return {
-            "drop": self._drop, "recording": self._change, "fit": self._fit, "tick": self._tick,
-            "cancel": lambda *_: self._stop(), "unread": self._unread, "remove": self._remove,
+            "drop": self._drop,
+            "fit": self._fit,
+            "cancel": lambda *_: self._stop(),
+            "unread": self._unread,
+            "remove": self._remove,
             "take drive": self._take_drive,
-        }  # fmt: skip
+        }
 
     # --- what a person does
 
@@ -76,17 +79,17 @@ class Bench:
             raise ValueError(_too_large(file, size))
         raise ValueError(f"{file} cannot be read: is it a folder, or was it moved?")
 
-    def _change(self, name: str, value: Any) -> None:
+    def set(self, name: str, value: Any) -> None:
+        """Take the value of a field: ``fit.PARAMETER``, or one of the setup after ``recording.``."""
         if self.recorded is None or self.setup is None:
             raise ValueError("there is no recording yet; drop a file into the page")
-        field = name.removeprefix("recording.")
-        self.setup = self.setup.changed(field, value, self.recorded, self.page.system)
-
-    def _tick(self, name: str, value: Any) -> None:
-        parameter = name.removeprefix("fit.")
-        if parameter not in self.page.system.parameters:
-            raise ValueError(f"{parameter[:40]!r} is no parameter of this model")
-        (self._unticked.discard if value else self._unticked.add)(parameter)
+        group, _, field = name.partition(".")
+        if group == "recording":
+            self.setup = self.setup.changed(field, value, self.recorded, self.page.system)
+        elif field not in self.page.system.parameters:
+            raise ValueError(f"{field[:40]!r} is no parameter of this model")
+        else:
+            (self._unticked.discard if value else self._unticked.add)(field)
 
     def _fit(self, name: str, value: Any) -> None:
         samples, state = self.samples(), self.page.state
@@ -230,40 +233,48 @@ class Bench:
         """The panel as it is now."""
         self.page.tell("recording", self._content())
 
+    def fields(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Values of the fields of the panel, and the choices of those that have some."""
+        if self.recorded is None or self.setup is None:
+            return {}, {}
+        setup, channels = self.setup, self.recorded.runs[self.setup.run]
+        words = {name: f"{name} ({one.unit})" if one.unit else name for name, one in channels.items()}
+        choices = {"recording.run": dict(zip(self.recorded.runs, self.recorded.runs, strict=True))}
+        choices |= {f"recording.channel.{state}": {"": "not recorded", **words} for state in setup.states}
+        choices["recording.turns"] = {"": "not recorded", **words}
+        values = {f"recording.{name}": getattr(setup, name) for name in ("run", "turns", "begin", "end")}
+        for state, one in setup.states.items():
+            values |= {f"recording.{what}.{state}": value for what, value in vars(one).items()}
+        return values | {f"fit.{name}": name not in self._unticked for name in self.page.system.parameters}, choices
+
     def _content(self) -> dict[str, Any]:
         busy = {"doing": self.doing, "fraction": round(self._fraction, 3), "most": LARGEST}
         if self.recorded is None or self.setup is None:
             return {**busy, "file": ""}
-        system, symbols = self.page.system, symbols_of(self.page.system)
-        channels, setup = self.recorded.runs[self.setup.run], self.setup
+        recorded, setup, system, symbols = self.recorded, self.setup, self.page.system, symbols_of(self.page.system)
         laid = self.laid or {"distance": None, "why": "", "curve": {}}
-        remarks = [*unlike(self.recorded, setup, system), *([laid["why"]] if laid["why"] else [])]
-        if self.recorded.axis != "time":
+        remarks = [*unlike(recorded, setup, system), *([laid["why"]] if laid["why"] else [])]
+        if recorded.axis != "time":
             remarks.append("a table over frequency: it lies over the frequency response")
-        if laid["distance"] is not None:
-            far = laid["distance"]
+        if (far := laid["distance"]) is not None:
             remarks.append(
                 f"{far['periods']} forcing periods compared; "
                 f"the record's phase leads the model's by {round(far['shift'], 3) + 0.0:.3f} of a period"
             )
-        drive = laid.get("drive")
+        drive, html = laid.get("drive"), {name: html_of(symbol) for name, symbol in symbols.items()}
         return {
-            **busy, "file": self.recorded.file + (" (synthetic)" if self.recorded.synthetic else ""),
-            "run": setup.run, "runs": list(self.recorded.runs), "turns": setup.turns,
-            "channels": [[name, f"{name} ({one.unit})" if one.unit else name] for name, one in channels.items()],
-            "begin": setup.begin, "end": setup.end, "unit": "s" if self.recorded.axis == "time" else "Hz",
-            "rows": [
-                {"name": name, "html": html_of(symbols[name]), "unit": unit, "channel": setup.channels.get(name, ""),
-                 "factor": setup.factors.get(name, 1.0), "shift": setup.shifts.get(name, 0.0)}
-                for name, unit in system.states.items()
-            ],
-            "ticks": [
-                {"name": name, "html": html_of(symbols[name]), "on": name not in self._unticked}
-                for name in system.parameters
-            ],
+            **busy,
+            "file": recorded.file + (" (synthetic)" if recorded.synthetic else ""),
+            "runs": len(recorded.runs),
+            "unit": "s" if recorded.axis == "time" else "Hz",
+            "rows": [{"name": name, "html": html[name], "unit": unit} for name, unit in system.states.items()],
+            "shown": [*setup.channels],
+            "ticks": [{"name": name, "html": html[name]} for name in system.parameters],
             "drive": "" if drive is None else f"forcing period {number(drive, 's', 5)} recorded",
-            "found": self._told, "remarks": remarks, "more": list(self.recorded.remarks[:8]),
-        }  # fmt: skip
+            "found": self._told,
+            "remarks": remarks,
+            "more": list(recorded.remarks[:8]),
+        }
 
 
 def _too_large(file: str, size: int) -> str:

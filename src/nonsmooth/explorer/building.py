@@ -6,7 +6,8 @@ the Python is made here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -20,9 +21,10 @@ if TYPE_CHECKING:
     from nonsmooth.explorer.session import Session
     from nonsmooth.system.system import System
 
-__all__ = ["KINDS", "LINK", "MOST", "Plan", "Workshop", "read_plan"]
+__all__ = ["KINDS", "LINK", "Plan", "Workshop", "read_plan"]
 
-MOST = 4  # masses, and elements
+_MOST = 4  # masses, and elements
+_KEPT = 50  # models that a page may have made
 
 
 @dataclass(frozen=True)
@@ -54,45 +56,38 @@ LINK: Mapping[str, Quantity] = {
     "c": Quantity("damping", "N s/m", 0.1, "c", least=0.0),
     "F": Quantity("force", "N", 0.0, "F"),
 }
-_POSITION = Quantity("position", "m", 0.5, "d")
-_STIFFNESS = Quantity("stiffness", "N/m", 20.0, "s", least=0.0)
+_OMEGA = Quantity("forcing frequency", "rad/s", 1.0, "omega", least=1e-9)
+_POSITION = {"position": Quantity("position", "m", 0.5, "d")}
+_STIFFNESS = {"stiffness": Quantity("stiffness", "N/m", 20.0, "s", least=0.0)}
+_RESTITUTION = {"restitution": Quantity("restitution", "1", 0.7, "e", least=0.0, most=1.0)}
+_DAMPING = {"damping": Quantity("damping", "N s/m", 0.1, "b", least=0.0)}
+_FRICTION = {"friction": Quantity("friction force", "N", 0.2, "f", least=0.0)}
+_BELT = {"belt": Quantity("speed of the ground", "m/s", 0.0, "w")}
+_PLAY = {"half_width": Quantity("half width", "m", 0.2, "h", least=0.0)}
+_PRELOAD = {"preload": Quantity("preload", "N", 0.2, "P")}
 KINDS: Mapping[str, Kind] = {
-    "stop": Kind("rigid stop", "Stop", {
-        "position": _POSITION, "restitution": Quantity("restitution", "1", 0.7, "e", least=0.0, most=1.0),
-    }, sided=True),
-    "elastic": Kind("elastic stop", "ElasticStop", {
-        "position": _POSITION, "stiffness": _STIFFNESS, "damping": Quantity("damping", "N s/m", 0.1, "b", least=0.0),
-    }, sided=True),
-    "friction": Kind("dry friction", "Coulomb", {
-        "friction": Quantity("friction force", "N", 0.2, "f", least=0.0),
-        "belt": Quantity("speed of the ground", "m/s", 0.0, "w"),
-    }),
-    "backlash": Kind("backlash", "Backlash", {
-        "half_width": Quantity("half width", "m", 0.2, "h", least=0.0), "stiffness": _STIFFNESS,
-    }),
-    "preloaded": Kind("preloaded spring", "PreloadedSpring", {
-        "preload": Quantity("preload", "N", 0.2, "P"), "stiffness": _STIFFNESS,
-    }),
-}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Placed:
-    """An element of the form: its kind, the masses between which it is (the second 0: the ground), its side."""
-
-    kind: str
-    at: int
-    other: int
-    side: int
-    numbers: Mapping[str, float]
+    "stop": Kind("rigid stop", "Stop", _POSITION | _RESTITUTION, sided=True),
+    "elastic": Kind("elastic stop", "ElasticStop", _POSITION | _STIFFNESS | _DAMPING, sided=True),
+    "friction": Kind("dry friction", "Coulomb", _FRICTION | _BELT),
+    "backlash": Kind("backlash", "Backlash", _PLAY | _STIFFNESS),
+    "preloaded": Kind("preloaded spring", "PreloadedSpring", _PRELOAD | _STIFFNESS),
+}
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A chain of masses, each joined to the one before it (the first to the ground) by a spring and a damper."""
+    """A chain of masses, each joined to the one before it (the first to the ground) by a spring and a damper.
+
+    Attributes
+    ----------
+    links : tuple of mapping
+        Numbers of each mass.
+    elements : tuple of (kind, arguments, numbers)
+        Arguments as data: ``at`` and ``side``; parameters have their names from the numbers.
+    """
 
     links: tuple[Mapping[str, float], ...]
-    elements: tuple[Placed, ...]
+    elements: tuple[tuple[str, Mapping[str, Any], Mapping[str, float]], ...]
     omega: float
 
     @property
@@ -104,17 +99,35 @@ class Plan:
             for key, quantity in LINK.items()
             if key != "F" or link["F"]
         }
-        if self.forced:
+        if self._forced:
             found["omega"] = (self.omega, "rad/s")
-        for i, placed in enumerate(self.elements, 1):
-            for key, quantity in KINDS[placed.kind].arguments.items():
-                found[f"{quantity.letter}_{i}"] = (placed.numbers[key], quantity.unit)
+        for i, (kind, _, numbers) in enumerate(self.elements, 1):
+            for key, quantity in KINDS[kind].arguments.items():
+                found[f"{quantity.letter}_{i}"] = (numbers[key], quantity.unit)
         return found
 
     @property
-    def forced(self) -> list[int]:
+    def _forced(self) -> list[int]:
         """Numbers of the masses that a force drives."""
         return [i for i, link in enumerate(self.links, 1) if link["F"]]
+
+    @property
+    def _calls(self) -> dict[str, tuple[str, dict[str, Any]]]:
+        """Class and arguments of every element, by its name."""
+        return {
+            f"{kind}{i}": (
+                KINDS[kind].element,
+                {**given, **{key: f"{quantity.letter}_{i}" for key, quantity in KINDS[kind].arguments.items()}},
+            )
+            for i, (kind, given, _) in enumerate(self.elements, 1)
+        }
+
+    @property
+    def name(self) -> str:
+        """A name of the system."""
+        parts = dict.fromkeys(KINDS[kind].label for kind, *_ in self.elements)
+        masses = "one mass" if len(self.links) == 1 else f"{len(self.links)} masses"
+        return masses + (f" with {', '.join(parts)}" if parts else "")
 
     def system(self) -> System:
         """The system, made by :func:`nonsmooth.mechanical`."""
@@ -123,96 +136,64 @@ class Plan:
         def force(i: int) -> Callable[..., Any]:
             return lambda t, p: getattr(p, f"F{i}") * np.cos(p.omega * t)
 
-        elements = {}
-        for i, placed in enumerate(self.elements, 1):
-            kind = KINDS[placed.kind]
-            given: dict[str, Any] = {key: f"{quantity.letter}_{i}" for key, quantity in kind.arguments.items()}
-            if kind.sided:
-                given["side"] = placed.side
-            at = {f"x{placed.at}": 1, f"x{placed.other}": -1} if placed.other else f"x{placed.at}"
-            elements[f"{placed.kind}{i}"] = getattr(ns.elements, kind.element)(at=at, **given)
         return ns.mechanical(
-            lambda p: _matrix(p, "m", n), lambda p: _matrix(p, "c", n), lambda p: _matrix(p, "k", n),
-            parameters=self.parameters, coordinates={f"x{i}": "m" for i in range(1, n + 1)},
-            forcing={f"x{i}": force(i) for i in self.forced}, elements=elements or None, name=self.name,
-        )  # fmt: skip
-
-    @property
-    def name(self) -> str:
-        """A name of the system."""
-        parts = [KINDS[placed.kind].label for placed in self.elements]
-        masses = "one mass" if len(self.links) == 1 else f"{len(self.links)} masses"
-        return masses + (f" with {', '.join(dict.fromkeys(parts))}" if parts else "")
+            *(lambda p, letter=letter: _matrix(p, letter, n) for letter in "mck"),
+            parameters=self.parameters,
+            coordinates={f"x{i}": "m" for i in range(1, n + 1)},
+            forcing={f"x{i}": force(i) for i in self._forced},
+            elements={key: getattr(ns.elements, kind)(**given) for key, (kind, given) in self._calls.items()} or None,
+            name=self.name,
+        )
 
     def python(self) -> str:
         """The Python that makes the same system."""
         n = len(self.links)
-        rows = range(1, n + 1)
+        calls = {
+            key: f"ns.elements.{kind}({', '.join(f'{name}={json.dumps(value)}' for name, value in given.items())})"
+            for key, (kind, given) in self._calls.items()
+        }
+        blocks = {
+            "parameters": {name: f'({value!r}, "{unit}")' for name, (value, unit) in self.parameters.items()},
+            "coordinates": {f"x{i}": '"m"' for i in range(1, n + 1)},
+            "forcing": {f"x{i}": f"lambda t, p: p.F{i} * np.cos(p.omega * t)" for i in self._forced},
+            "elements": calls,
+        }
         lines = [f'"""{self.name[0].upper()}{self.name[1:]}."""', ""]
         lines += ["import numpy as np", "", "import nonsmooth as ns", "", "system = ns.mechanical("]
         lines += [f"    lambda p: {_matrix(_Names(), letter, n)}," for letter in "mck"]
-        lines += ["    parameters={"]
-        lines += [f'        "{name}": ({value!r}, "{unit}"),' for name, (value, unit) in self.parameters.items()]
-        coordinates = ", ".join(f'"x{i}": "m"' for i in rows)
-        lines += ["    },", f"    coordinates={{{coordinates}}},"]
-        if self.forced:
-            lines += ["    forcing={"]
-            lines += [f'        "x{i}": lambda t, p: p.F{i} * np.cos(p.omega * t),' for i in self.forced]
-            lines += ["    },"]
-        if self.elements:
-            lines += ["    elements={", *map(self._element, range(1, len(self.elements) + 1)), "    },"]
+        for block, entries in blocks.items():
+            if entries:
+                rows = (f'        "{name}": {text},' for name, text in entries.items())
+                lines += [f"    {block}={{", *rows, "    },"]
         return "\n".join([*lines, f'    name="{self.name}",', ")"]) + "\n"
 
-    def _element(self, i: int) -> str:
-        placed = self.elements[i - 1]
-        kind = KINDS[placed.kind]
-        at = f'{{"x{placed.at}": 1, "x{placed.other}": -1}}' if placed.other else f'"x{placed.at}"'
-        given = [f"at={at}", *(f'{key}="{quantity.letter}_{i}"' for key, quantity in kind.arguments.items())]
-        if kind.sided:
-            given.append(f"side={placed.side}")
-        return f'        "{placed.kind}{i}": ns.elements.{kind.element}({", ".join(given)}),'
 
-
-def read_plan(form: Any) -> Plan:
-    """The plan of a form as a browser sends it: ``masses``, ``elements`` and ``omega``.
+def read_plan(form: Mapping[str, Any]) -> Plan:
+    """The plan of a form: texts of ``masses``, ``elements`` and ``omega``.
 
     Raises
     ------
     ValueError
-        Whatever is no number within its limits and no word of :data:`KINDS`; the message names the row.
+        Whatever is no number within its limits; the message names the row.
     """
-    if not isinstance(form, Mapping):
-        raise ValueError("the form did not arrive whole; try again")
-    masses, parts = (_rows(form.get(key), key) for key in ("masses", "elements"))
-    if not masses:
-        raise ValueError("a system needs a mass")
-    links = tuple(
-        {key: _number(row.get(key), quantity, f"mass {i}") for key, quantity in LINK.items()}
-        for i, row in enumerate(masses, 1)
-    )
+    links = tuple(_numbers(LINK, row, f"mass {i}") for i, row in enumerate(form["masses"], 1))
     elements = []
-    for i, row in enumerate(parts, 1):
-        kind = str(row.get("kind"))
-        if kind not in KINDS:
-            raise ValueError(f"element {i}: {kind[:40]!r} is no kind; there are: {', '.join(KINDS)}")
-        at, other = (_mass(row.get(key, 0), len(links), low, f"element {i}") for key, low in (("at", 1), ("other", 0)))
+    for i, row in enumerate(form["elements"], 1):
+        where, kind = f"element {i}", KINDS[row["kind"]]
+        at, other = (int(_number(row.get(key, 0), Quantity(key, "", 0, ""), where)) for key in ("at", "other"))
+        if not (0 < at <= len(links) and 0 <= other <= len(links)):
+            raise ValueError(f"{where}: there is no mass {max(at, other)}")
         if at == other:
-            raise ValueError(f"element {i} joins mass {at} with itself; choose the ground or another mass")
-        numbers = {
-            key: _number(row.get(key, quantity.value), quantity, f"element {i}")
-            for key, quantity in KINDS[kind].arguments.items()
-        }
-        elements.append(Placed(kind, at, other, -1 if row.get("side") == "below" else 1, numbers))
-    omega = _number(form.get("omega"), Quantity("forcing frequency", "rad/s", 1.0, "omega", least=1e-9), "the force")
-    return Plan(links, tuple(elements), omega)
+            raise ValueError(f"{where} joins mass {at} with itself; choose the ground or another mass")
+        given: dict[str, Any] = {"at": {f"x{at}": 1, f"x{other}": -1} if other else f"x{at}"}
+        if kind.sided:
+            given["side"] = -1 if row.get("side") == "below" else 1
+        elements.append((row["kind"], given, _numbers(kind.arguments, row, where)))
+    return Plan(links, tuple(elements), _number(form["omega"], _OMEGA, "the force"))
 
 
-def _rows(value: Any, what: str) -> Sequence[Mapping[str, Any]]:
-    if not isinstance(value, list) or not all(isinstance(row, Mapping) for row in value):
-        raise ValueError(f"{what}: the form did not arrive whole; try again")
-    if len(value) > MOST:
-        raise ValueError(f"{what}: {len(value)} of them; the form makes at most {MOST}, Python any number")
-    return value
+def _numbers(quantities: Mapping[str, Quantity], row: Mapping[str, Any], where: str) -> dict[str, float]:
+    return {key: _number(row.get(key, one.value), one, where) for key, one in quantities.items()}
 
 
 def _number(value: Any, quantity: Quantity, where: str) -> float:
@@ -221,13 +202,6 @@ def _number(value: Any, quantity: Quantity, where: str) -> float:
         limits = f"at least {quantity.least:g}" + (f" and at most {quantity.most:g}" if quantity.most < np.inf else "")
         raise ValueError(f"{where}, {quantity.label} = {number:g}: give {limits}")
     return number
-
-
-def _mass(value: Any, most: int, least: int, where: str) -> int:
-    number = number_of(value, where)
-    if number != int(number) or not least <= number <= most:
-        raise ValueError(f"{where}: there is no mass {number:g}")
-    return int(number)
 
 
 def _matrix(p: Any, letter: str, n: int) -> list[list[Any]]:
@@ -253,30 +227,68 @@ class _Names:
         return Symbol(f"p.{name}")
 
 
-_KEPT = 50  # models that a page may have made
-
-
 class Workshop:
-    """Models that were made in a page, as "built 1", "built 2" and so on."""
+    """Models that were made in a page, as "built 1", "built 2" and so on, and what stands in the form of the next."""
 
     def __init__(self, page: Session) -> None:
         self.page = page
         self._made: dict[str, str] = {}  # the name of a model, by its Python
         self._python, self._shown = "", 0
+        self._form: dict[str, Any] = {"masses": [], "elements": [], "omega": "1"}
+        self._add("mass", None)
+        self._add("stop", None)
+        self._form["masses"][0]["F"] = "0.5"
 
     @property
     def actions(self) -> dict[str, Callable[[str, Any], object]]:
         """Messages of the page that concern the form."""
-        return {"form": self._write, "build": self._build}
+        show = lambda *_: self._write()  # noqa: E731
+        return {"build": self._build, "build form": show, "build add": self._add, "build remove": self._remove}
 
-    def _write(self, name: str, value: Any) -> None:
-        """Show the Python of the form; none where something in it does not fit."""
+    def set(self, name: str, value: Any) -> None:
+        """Take the text of a field, ``build.omega`` or ``build.masses.0.k``."""
+        row, key = self._form, name.removeprefix("build.")
+        if key != "omega":
+            kind, at, key = key.split(".")
+            row = self._form[kind][int(at)]
+        if key not in row or key == "kind":
+            raise ValueError(f"{name[:40]!r} is no field of the form")
+        row[key] = str(value)[:60]
+        self._write()
+
+    def _add(self, name: str, value: Any) -> None:
+        quantities, row = LINK, dict[str, str]()
+        if name != "mass":
+            quantities = KINDS[name].arguments
+            row = {"kind": name, "at": "1", "other": "0"} | ({"side": "above"} if KINDS[name].sided else {})
+        rows = self._form["elements" if row else "masses"]
+        if len(rows) >= _MOST:
+            raise ValueError(f"the form makes at most {_MOST} masses and as many elements, Python any number")
+        rows.append(row | {key: f"{quantity.value:g}" for key, quantity in quantities.items()})
+        self._write()
+
+    def _remove(self, name: str, value: Any) -> None:
+        kind, _, at = name.partition(".")
+        if name == "masses.0" and len(self._form["masses"]) == 1:
+            raise ValueError("a system needs a mass")
+        del self._form[kind][int(at)]
+        for row in self._form["elements"]:  # those at a mass that is gone come to the first, or to the ground
+            gone = {key for key in ("at", "other") if int(row[key]) > len(self._form["masses"])}
+            row |= {key: one for key, one in (("at", "1"), ("other", "0")) if key in gone}
+        self._write()
+
+    def _write(self) -> None:
+        """Show the Python of the form, or what does not fit in it."""
         self._python = ""
-        self._python = read_plan(value).python()
+        self.page.notes.pop("building", None)
+        try:
+            self._python = read_plan(self._form).python()
+        except ValueError as error:
+            self.page.notes["building"] = str(error)
 
     def _build(self, name: str, value: Any) -> None:
         """Make the system, and show it."""
-        plan = read_plan(value)
+        plan = read_plan(self._form)
         python = plan.python()
         if python not in self._made:
             if len(self._made) >= _KEPT:
@@ -290,18 +302,35 @@ class Workshop:
         self.page.show_model(self._made[python])
         self._shown += 1
 
+    def _fields(self) -> dict[str, list[list[tuple[str, str, str, str]]]]:
+        """Of each row its fields: name, text, words before it and unit; a choice has no words."""
+        return {
+            kind: [
+                [
+                    (f"build.{kind}.{i}.{key}", text, one.label if one else "", one.unit if one else "")
+                    for key, text in row.items()
+                    if key != "kind"
+                    for one in [(KINDS[row["kind"]].arguments if "kind" in row else LINK).get(key)]
+                ]
+                for i, row in enumerate(self._form[kind])
+            ]
+            for kind in ("masses", "elements")
+        }
+
+    def fields(self) -> tuple[dict[str, str], dict[str, dict[str, str]]]:
+        """Texts of all fields, and the choices of those that have some."""
+        texts = {name: text for rows in self._fields().values() for row in rows for name, text, *_ in row}
+        masses = {str(i): f"mass {i}" for i in range(1, len(self._form["masses"]) + 1)}
+        words = {"at": masses, "other": {"0": "the ground", **masses}}
+        words["side"] = {"above": "above it", "below": "below it"}
+        choices = {name: words[key] for name in texts if (key := name.rpartition(".")[2]) in words}
+        return {**texts, "build.omega": self._form["omega"]}, choices
+
     def tell(self) -> None:
         """The form as it is now."""
-
-        def quantity(one: Any) -> dict[str, Any]:
-            return {"label": one.label, "unit": one.unit, "value": one.value}
-
-        self.page.tell("building", {
-            "python": self._python, "built": self._shown, "most": MOST,
-            "link": {key: quantity(one) for key, one in LINK.items()},
-            "kinds": {
-                key: {"label": kind.label, "sided": kind.sided,
-                      "arguments": {name: quantity(one) for name, one in kind.arguments.items()}}
-                for key, kind in KINDS.items()
-            },
-        })  # fmt: skip
+        rows = {
+            kind: [[(name, *words) for name, _, *words in row] for row in some] for kind, some in self._fields().items()
+        }
+        labels = [KINDS[row["kind"]].label for row in self._form["elements"]]
+        told = {"python": self._python, "built": self._shown, "most": _MOST, "labels": labels, **rows}
+        self.page.tell("building", told)

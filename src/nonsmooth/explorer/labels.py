@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
+
+from sympy.printing.pretty.pretty_symbology import greek_unicode, sub
 
 from nonsmooth.plot.units import PREFIXES, power_for
 from nonsmooth.system.parameter import latex_name
@@ -13,14 +14,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 __all__ = ["PREFIXES", "axis_label", "html_of", "number", "plain_of", "power_of", "symbols_of"]
-
-_GREEK: Mapping[str, str] = {
-    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "epsilon": "ε", "zeta": "ζ", "eta": "η", "theta": "θ",
-    "kappa": "κ", "lambda": "λ", "mu": "μ", "nu": "ν", "xi": "ξ", "pi": "π", "rho": "ρ", "sigma": "σ", "tau": "τ",
-    "phi": "φ", "varphi": "φ", "chi": "χ", "psi": "ψ", "omega": "ω", "Gamma": "Γ", "Delta": "Δ", "Theta": "Θ",
-    "Lambda": "Λ", "Xi": "Ξ", "Pi": "Π", "Sigma": "Σ", "Phi": "Φ", "Psi": "Ψ", "Omega": "Ω",
-}  # fmt: skip
-_BELOW = dict(zip("0123456789aehijklmnoprstuvx", "₀₁₂₃₄₅₆₇₈₉ₐₑₕᵢⱼₖₗₘₙₒₚᵣₛₜᵤᵥₓ", strict=True))
 
 
 def symbols_of(system: System) -> dict[str, str]:
@@ -35,7 +28,7 @@ def plain_of(latex: str) -> str:
     stem, below = _parts(latex)
     if not below:
         return stem
-    small = "".join(_BELOW.get(letter, "") for letter in below)
+    small = "".join(sub.get(letter, "") for letter in below)
     return stem + (small if len(small) == len(below) else f"_{below}")
 
 
@@ -47,7 +40,7 @@ def html_of(latex: str) -> str:
 
 def _parts(latex: str) -> tuple[str, str]:
     text = re.sub(r"\\mathrm\{([^{}]*)\}", r"\1", latex)
-    text = re.sub(r"\\([A-Za-z]+)", lambda found: _GREEK.get(found[1], found[1]), text).replace("\\", "")
+    text = re.sub(r"\\(?:var)?([A-Za-z]+)", lambda found: greek_unicode.get(found[1], found[1]), text).replace("\\", "")
     stem, _, below = text.partition("_")
     return stem.strip("{}"), below.strip("{}").replace("{", "").replace("}", "")
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import nonsmooth as ns
 from nonsmooth.errors import SolveError
 from nonsmooth.explorer.recorded import Channel, Recorded, Samples
-from nonsmooth.identification.compare.fold import fold
+from nonsmooth.identification.compare.orbits import fold
 from nonsmooth.identification.fit.first_windows import rates
 from nonsmooth.recordings.load import parse_recording
 from nonsmooth.recordings.reading import Options

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.explorer.catalogue import GIVEN, first_state
-from nonsmooth.explorer.state import CHOICES, to_query, within
+from nonsmooth.explorer.state import changed, to_query, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,33 +44,29 @@ def opened_result(result: xr.Dataset) -> tuple[System | None, str]:
 
 
 def _opened(system: System, options: Mapping[str, Any], output: Mapping[str, str]) -> tuple[System | None, str]:
-    name = _name_of(system)
+    name, states = _name_of(system), list(system.states)
     state = first_state(name, system)
-    states = list(system.states)
     for parameter, values in _ranges(options):
         ends = [float(end) for end in (np.min(values), np.max(values))] if np.size(values) > 1 else []
         if parameter in state.values and ends and ends[0] < ends[1]:
             state = state.but("over", parameter).but("low", ends[0]).but("high", ends[1])
             break
-    for field in ("transient", "keep"):
-        if isinstance(options.get(field), int):
-            state = state.but(field, within(field, options[field]))
-    if isinstance(direction := options.get("direction"), str) and direction in CHOICES["direction"]:
-        state = state.but("direction", direction)
-    if options.get("method") == "rkf45":
-        state = state.but("method", "rkf45")
-    section = options.get("section")
-    phase = section.get("phase") if isinstance(section, Mapping) else getattr(section, "phase", None)
-    if isinstance(phase, int | float):
-        state = state.but("phase", float(phase) % 1.0)
-    start: Any = options.get("start")
-    if isinstance(start, Mapping) and set(start) <= set(states):
-        start = [start.get(one, 0.0) for one in states]
-    if start is not None and np.shape(start) == (len(states),) and np.isfinite(np.asarray(start, dtype=float)).all():
-        state = state.but("start", tuple(float(one) for one in start))
-    for field, chosen in output.items():
-        if field in ("x", "y") and chosen in states:
-            state = state.but(field, chosen) if {"x", "y"} <= output.keys() else state.but("shown", chosen)
+    section, start = options.get("section"), options.get("start")
+    if isinstance(start, Mapping):
+        start = [start.get(one, 0.0) for one in states] if set(start) <= set(states) else None
+    found: dict[str, Any] = {
+        field: within(field, options[field]) for field in ("transient", "keep") if isinstance(options.get(field), int)
+    }
+    found |= {field: options.get(field) for field in ("direction", "method")}
+    found |= {
+        "start": start,
+        "phase": section.get("phase") if isinstance(section, Mapping) else getattr(section, "phase", None),
+    }
+    plane = {"x", "y"} <= output.keys()
+    found |= {field if plane else "shown": chosen for field, chosen in output.items() if field in ("x", "y")}
+    for field, value in found.items():
+        with suppress(ValueError, TypeError):  # what no page shows stays as it is
+            state = changed(state, field, value, states)
     return (None if name != GIVEN else system), to_query(state)
 
 

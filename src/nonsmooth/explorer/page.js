@@ -2,13 +2,18 @@
 (() => {
   const $ = id => document.getElementById(id);
   const all = which => [...document.querySelectorAll(which)];
-  const node = (tag, given, ...within) => { const one = Object.assign(document.createElement(tag), given); one.append(...within); return one; };
-  const on = (target, kind, hear) => target.addEventListener(kind, hear);
+  const node = (tag, {set, ...given}, ...within) => {
+    const one = Object.assign(document.createElement(tag), given);
+    if (set) one.dataset.set = set;
+    one.append(...within);
+    return one;
+  };
+  const on = (target, kind, hear) => target.addEventListener(kind, hear, target === document);
   const root = document.documentElement;
-  let send = () => {}, count = 0, held = null, built = "", playing = 0, last = null;
+  let send = () => {}, count = 0, held = "", built = "", playing = 0, last = null;
 
   const act = (what, name, value) => { root.dataset.sent = ++count; send(JSON.stringify({do: what, name, value, n: count})); };
-  const short = value => Number(Number(value).toPrecision(7)).toString();
+  const short = value => typeof value === "number" ? Number(value.toPrecision(7)).toString() : value;
 
   function fill(select, entries, chosen) {
     const key = JSON.stringify(entries);
@@ -18,56 +23,61 @@
     }
     select.value = chosen;
   }
-  /* A field is sent when its text is complete; until then the server's values leave it alone. */
-  function field(input, commit) {
-    const done = () => { if (input.dataset.open) { delete input.dataset.open; commit(input.value); } };
-    on(input, "input", () => { input.dataset.open = "yes"; });
-    on(input, "change", done);
-    on(input, "keydown", event => { if (event.key === "Enter") done(); });
-  }
-  /* A choice or a field hands its value over, and takes that of the server. */
-  const bind = (one, commit) => one.tagName === "SELECT" ? on(one, "change", () => commit(one.value)) : field(one, commit);
-  const show = (one, choices, value) => choices ? fill(one, choices, value) : put(one, short(value));
-  /* A slider is followed while it moves, and leaves the server's values alone until it is let go. */
-  function slide(range, follow) {
-    on(range, "input", () => { held = range; follow(Number(range.value)); });
-    on(range, "change", () => { held = null; act("end"); });
-  }
+  /* A control bears the name of the field that it sets, and shows the value that the server has of it. A field is sent
+     when its text is complete, until then the server's values leave it alone; a slider is followed while it moves. */
+  const named = name => all(`[data-set="${name}"]`);
   const put = (input, value) => { if (!input.dataset.open && input.value !== String(value)) input.value = value; };
+  const commit = (name, value) => { act("set", name, value); act("end"); };
+  on(document, "input", ({target: one}) => {
+    const name = one.dataset.set;
+    if (!name) return;
+    if (one.type === "range") {
+      held = name;
+      for (const other of named(name)) put(other, short(Number(one.value)));
+      act("set", name, Number(one.value));
+    } else if (one.tagName === "INPUT") one.dataset.open = "yes";
+  });
+  on(document, "change", ({target: one}) => {
+    const name = one.dataset.set;
+    if (!name) return;
+    if (one.type === "range") { held = ""; act("end"); }
+    else if (one.type === "checkbox") commit(name, one.checked);
+    else if (one.tagName === "SELECT" || one.dataset.open) { delete one.dataset.open; commit(name, one.value); }
+  });
+  on(document, "keydown", ({key, target: one}) => {
+    if (key === "Enter" && one.dataset.open) one.dispatchEvent(new Event("change"));
+  });
+  function show() {
+    for (const one of last ? all("[data-set]") : []) {
+      const name = one.dataset.set, value = last.state[name];
+      if (value === undefined || name === held) continue;
+      if (one.tagName === "SELECT") fill(one, last.choices[name], value);
+      else if (one.type === "checkbox") one.checked = value;
+      else put(one, short(value));
+    }
+  }
 
   function row(name, {html, unit}, ...slider) {
-    const text = node("input", {id: "v-" + name, inputMode: "decimal", ariaLabel: name + (unit ? " in " + unit : "")});
+    const text = node("input", {id: "v-" + name, set: name, inputMode: "decimal", ariaLabel: name + (unit ? " in " + unit : "")});
     const head = node("div", {className: "name"}, node("b", {innerHTML: html}), node("span", {className: "unit", textContent: unit}), text);
     return node("div", {className: "parameter"}, head, ...slider, node("div", {className: "wrong", id: "wrong-" + name}));
   }
 
   function parameters(ui) {
-    const key = JSON.stringify(ui.parameters.map(one => one.name).concat(ui.states.map(one => one.name), ui.state.model));
+    const key = JSON.stringify([ui.parameters.map(one => one.name), ui.states, ui.state.model]);
     if (key !== built) {
       built = key;
       $("parameters").replaceChildren(...ui.parameters.map(one => {
-        const name = "p." + one.name, range = node("input", {type: "range", id: "s-" + name, ariaLabel: name + ", slider"});
-        const box = row(name, one, range), text = box.querySelector("input");
-        field(text, value => { act("set", name, value); act("end"); });
-        slide(range, value => { text.value = short(value); act("set", name, value); });
-        return box;
+        const name = "p." + one.name;
+        return row(name, one, node("input", {type: "range", id: "s-" + name, set: name, ariaLabel: name + ", slider"}));
       }));
-      $("starts").replaceChildren(...ui.states.map(one => {
-        const box = row("start." + one.name, one);
-        field(box.querySelector("input"), () =>
-          act("set", "start", [...$("starts").querySelectorAll("input")].map(one => one.value)));
-        return box;
-      }));
+      $("starts").replaceChildren(...ui.states.map(one => row("start." + one.name, one)));
     }
-    for (const one of ui.parameters) {
-      const text = $("v-p." + one.name), range = $("s-p." + one.name);
-      range.closest(".parameter").classList.toggle("over", one.name === ui.state.over);
-      if (held === range) continue;
-      range.min = one.low; range.max = one.high; range.step = (one.high - one.low) / 1000;
-      range.value = one.value;
-      put(text, short(one.value));
+    for (const {name, low, high} of ui.parameters) {
+      const range = $("s-p." + name);
+      range.closest(".parameter").classList.toggle("over", name === ui.state.over);
+      if (held !== "p." + name) Object.assign(range, {min: low, max: high, step: (high - low) / 1000});
     }
-    ui.states.forEach(one => put($("v-start." + one.name), short(one.value)));
   }
 
   /* The tab that is chosen in each panel, with its controls and its figure. */
@@ -89,10 +99,8 @@
     fill($("model"), [...Object.entries(ui.models), ["", "build one …"]], ui.state.model);
     fill($("preset"), [["", "choose …"], ...ui.presets.map(one => [one, one])], "");
     $("preset-label").hidden = !ui.presets.length;
-    for (const one of all("[data-set]")) {
-      show(one, ui.choices[one.dataset.set], ui.state[one.dataset.set]);
-    }
-    if (held !== $("phase-slider")) $("phase-slider").value = ui.state.phase;
+    parameters(ui);
+    show();
     $("phase-box").hidden = !ui.forced;
     $("eta-label").hidden = ui.state.method !== "smoothed";
     [$("undo").disabled, $("redo").disabled] = ui.can.map(can => !can);
@@ -102,7 +110,6 @@
     $("tabs").hidden = ui.tabs < 2;
     $("tabs").textContent = `${ui.tabs} tabs`;
     tabs(ui);
-    parameters(ui);
     root.classList.toggle("dark", ui.dark);
     root.classList.toggle("large", ui.large);
     window.history.replaceState(null, "", "?" + ui.query);
@@ -153,19 +160,16 @@
     const channel = doc && doc.get_model_by_name("act");
     if (!channel) return setTimeout(connect, 30);
     send = text => { channel.value = text; };
-    const parts = (window.parts || []).map(part => part({$, node, on, act, bind, show, file, progress}));
+    const parts = (window.parts || []).map(part => part({$, node, on, act, show, file, progress}));
     for (const [name, hear] of Object.entries(Object.assign({ui: render, readout, busy, notes, file}, ...parts))) {
       const model = doc.get_model_by_name(name);
       const told = () => { if (model.value) hear(JSON.parse(model.value)); };
       model.properties.value.change.connect(told);
       told();
     }
-    for (const one of all("[data-set]")) {
-      bind(one, value => { act("set", one.dataset.set, value); act("end"); });
-    }
     for (const list of all("[data-panel]")) {
       on(list, "click", event => {
-        if (event.target.dataset.view) { act("set", list.dataset.panel, event.target.dataset.view); act("end"); }
+        if (event.target.dataset.view) commit(list.dataset.panel, event.target.dataset.view);
       });
       on(list, "keydown", event => {
         const step = {ArrowRight: 1, ArrowLeft: -1}[event.key], all = [...list.children];
@@ -181,7 +185,6 @@
       document.dispatchEvent(new Event("build"));
     });
     on($("preset"), "change", () => { if ($("preset").value) act("preset", "", $("preset").value); });
-    slide($("phase-slider"), value => act("set", "phase", value));
     on($("play"), "click", () => {
       if (playing) { clearInterval(playing); playing = 0; act("end"); } else
         playing = setInterval(() => act("set", "phase", Math.round((last.state.phase + 0.01) * 1e6 % 1e6) / 1e6), 80);

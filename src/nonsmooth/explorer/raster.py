@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 __all__ = ["Layer", "drawn"]
 
@@ -28,13 +29,7 @@ def drawn(layers: list[Layer], low: float, high: float, height: int) -> NDArray[
         counts = np.bincount(
             rows[there].astype(np.int64).clip(0) * columns + column, minlength=height * columns
         ).reshape(height, columns)
-        thick = counts.copy()
-        for k in range(1, size):
-            shift = (k + 1) // 2 * (1 if k % 2 else -1)
-            if shift > 0:
-                np.maximum(thick[shift:], counts[:-shift], out=thick[shift:])
-            else:
-                np.maximum(thick[:shift], counts[-shift:], out=thick[:shift])
+        thick = maximum_filter1d(counts, size, axis=0, mode="constant")
         red, green, blue = (int(color[i : i + 2], 16) for i in (1, 3, 5))
         shade = _ALPHA[np.minimum(thick, 3)] << 24 | np.uint32(blue << 16 | green << 8 | red)
         image = np.where(thick > 0, shade, image)

@@ -17,9 +17,18 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 __all__ = [
-    "LARGEST", "Channel", "Recorded", "Samples", "Setup", "forcing_period", "frequency_of", "matched",
-    "response_points", "samples_of", "unlike",
-]  # fmt: skip
+    "LARGEST",
+    "Channel",
+    "Recorded",
+    "Samples",
+    "Setup",
+    "forcing_period",
+    "frequency_of",
+    "matched",
+    "response_points",
+    "samples_of",
+    "unlike",
+]
 
 FloatArray = NDArray[np.float64]
 LARGEST = 64 << 20  # bytes of a file that the page takes
@@ -55,16 +64,23 @@ class Recorded:
 
 
 @dataclass(frozen=True)
+class Shown:
+    """The channel that shows a state, "" where none does: state = factor * reading + shift."""
+
+    channel: str = ""
+    factor: float = 1.0
+    shift: float = 0.0
+
+
+@dataclass(frozen=True)
 class Setup:
     """The reading of a recording as the motion of a model.
 
     Attributes
     ----------
     run : str
-    channels : mapping
-        State to channel; a state that no channel shows is missing.
-    factors, shifts : mapping
-        State = factor * reading + shift.
+    states : mapping
+        How each state is shown.
     turns : str
         Channel with one row for each turn of the drive; "" where there is none.
     begin, end : float
@@ -72,12 +88,15 @@ class Setup:
     """
 
     run: str
-    channels: Mapping[str, str]
-    factors: Mapping[str, float]
-    shifts: Mapping[str, float]
+    states: Mapping[str, Shown]
     turns: str
     begin: float
     end: float
+
+    @property
+    def channels(self) -> dict[str, str]:
+        """State to channel, of those that are shown."""
+        return {state: one.channel for state, one in self.states.items() if one.channel}
 
     def changed(self, name: str, value: Any, recorded: Recorded, system: System) -> Setup:
         """The same with another value of a field: ``run``, ``turns``, ``begin``, ``end``, ``channel.STATE``, ....
@@ -91,29 +110,26 @@ class Setup:
             return matched(recorded, system, _known(value, recorded.runs, "run"))
         channels = recorded.runs[self.run]
         if name in ("begin", "end"):
-            second = number_of(value, name)
-            made = replace(self, begin=second) if name == "begin" else replace(self, end=second)
+            ends: dict[str, Any] = {name: number_of(value, name)}
+            made = replace(self, **ends)
             if not made.begin < made.end:
                 raise ValueError(f"the piece from {made.begin:g} to {made.end:g} s is empty")
             return made
         if name == "turns":
             return replace(self, turns=_known(value, ["", *channels], "channel"))
         what, _, state = name.partition(".")
-        if what not in ("channel", "factor", "shift") or state not in system.states:
+        if what not in ("channel", "factor", "shift") or state not in self.states:
             raise ValueError(f"{name[:40]!r} is nothing that a recording has")
-        if what == "shift":
-            return replace(self, shifts={**self.shifts, state: number_of(value, name)})
-        if what == "factor":
-            factor = number_of(value, name)
-            if factor == 0:
+        new: dict[str, Any]
+        if what == "channel":
+            new = {what: _known(value, ["", *channels], "channel")}
+            if value:
+                new["factor"] = _factor(channels[value].unit, system.states[state]) or 1.0
+        else:
+            new = {what: number_of(value, name)}
+            if new == {"factor": 0}:
                 raise ValueError(f"{name} = 0 makes every reading equal; give how much of the state one unit shows")
-            return replace(self, factors={**self.factors, state: factor})
-        chosen = _known(value, ["", *channels], "channel")
-        rest = {one: channel for one, channel in self.channels.items() if one != state}
-        if not chosen:
-            return replace(self, channels=rest)
-        factor = _factor(channels[chosen].unit, system.states[state]) or 1.0
-        return replace(self, channels={**rest, state: chosen}, factors={**self.factors, state: factor})
+        return replace(self, states={**self.states, state: replace(self.states[state], **new)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,10 +183,12 @@ def matched(recorded: Recorded, system: System, run: str = "") -> Setup:
     if not found and free:
         likely = [name for name in free if recorded.axis != "time" and "amplitude" in name.casefold()]
         found[next(iter(system.states))] = (likely or free)[0]
-    factors = {state: _factor(channels[name].unit, system.states[state]) or 1.0 for state, name in found.items()}
+    shown = dict.fromkeys(system.states, Shown()) | {
+        state: Shown(name, _factor(channels[name].unit, system.states[state]) or 1.0) for state, name in found.items()
+    }
     times = [channels[name].time for name in found.values()]
     begin, end = (min(t[0] for t in times), max(t[-1] for t in times)) if times else (0.0, 1.0)
-    return Setup(run, found, factors, {}, turns, float(begin), float(end))
+    return Setup(run, shown, turns, float(begin), float(end))
 
 
 def samples_of(recorded: Recorded, setup: Setup, most: int = _MOST) -> Samples | None:
@@ -186,7 +204,7 @@ def samples_of(recorded: Recorded, setup: Setup, most: int = _MOST) -> Samples |
         column = np.full(len(time), np.nan)
         own, inside = clocks[state], np.isin(clocks[state], time)
         values = channels[name].values[inside]
-        column[np.searchsorted(time, own[inside])] = setup.factors.get(state, 1.0) * values + setup.shifts.get(state, 0)
+        column[np.searchsorted(time, own[inside])] = setup.states[state].factor * values + setup.states[state].shift
         columns[state] = column
     return Samples(time, columns, channels[setup.turns].time if setup.turns else np.empty(0))
 
@@ -201,11 +219,10 @@ def response_points(
     does not set the forcing period, or the state was not recorded, there are none.
     """
     nothing = np.empty(0), np.empty(0)
-    name = setup.channels.get(state)
+    name, factor = setup.states[state].channel, abs(setup.states[state].factor)
     now = forcing_period(system, values)
-    if name is None or now is None:
+    if not name or now is None:
         return nothing
-    factor = abs(setup.factors.get(state, 1.0))
     points: list[tuple[float, float]] = []
     for run, channels in recorded.runs.items():
         if name not in channels:
@@ -256,7 +273,7 @@ def unlike(recorded: Recorded, setup: Setup, system: System) -> list[str]:
     return [
         f"{name} is in {channels[name].unit or 'no unit'}, {state} in {system.states[state]}: give the factor"
         for state, name in setup.channels.items()
-        if setup.factors.get(state, 1.0) == 1.0
+        if setup.states[state].factor == 1.0
         and system.states[state] not in ("", "1")
         and not _factor(channels[name].unit, system.states[state])
     ]

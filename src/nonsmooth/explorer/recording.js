@@ -1,5 +1,5 @@
 /* The panel of a recording: a file is read in the page as bytes and handed over; what they mean, the server's readers say. */
-(window.parts = window.parts || []).push(({$, node, on, act, bind, show, progress}) => {
+(window.parts = window.parts || []).push(({$, node, on, act, show, progress}) => {
   let most = 0, built = "", file = "";
 
   function take(file) {
@@ -24,31 +24,20 @@
   });
   for (const [id, what] of [["fit", "fit"], ["cancel", "cancel"], ["remove", "remove"], ["drive", "take drive"]])
     on($("recording-" + id), "click", () => act(what, "recording"));
-  const own = ["run", "turns", "begin", "end"], parts = ["channel", "factor", "shift"];
-  for (const name of own) bind($("recording-" + name), value => act("recording", "recording." + name, value));
 
-  function rows(told, channels) {
-    const key = JSON.stringify(told.rows.map(one => one.name).concat(told.ticks.map(one => one.name)));
-    if (key !== built) {
-      built = key;
-      $("recording-rows").replaceChildren(...told.rows.map(one => {
-        const [channel, factor, shift] = parts.map(what => node(
-          what === "channel" ? "select" : "input", {id: what + "-" + one.name, inputMode: "decimal", ariaLabel: what + " of " + one.name}));
-        [channel, factor, shift].forEach((part, k) => bind(part, value => act("recording", "recording." + parts[k] + "." + one.name, value)));
-        const scale = node("div", {className: "scale"}, "× ", factor, " + ", shift, node("span", {className: "unit", textContent: " " + one.unit}));
-        return node("div", {className: "measured"}, node("div", {}, node("b", {innerHTML: one.html}), " = ", channel), scale);
-      }));
-      $("recording-ticks").replaceChildren(...told.ticks.map(one => {
-        const box = node("input", {type: "checkbox", id: "fit-" + one.name});
-        on(box, "change", () => act("tick", "fit." + one.name, box.checked));
-        return node("label", {}, box, node("b", {innerHTML: one.html}));
-      }));
-    }
-    for (const one of told.rows) {
-      for (const what of parts) show($(what + "-" + one.name), what === "channel" && channels, one[what]);
-      $("channel-" + one.name).closest(".measured").querySelector(".scale").hidden = !one.channel;
-    }
-    for (const one of told.ticks) $("fit-" + one.name).checked = one.on;
+  function rows(told) {
+    const key = JSON.stringify([told.rows, told.ticks]);
+    if (key === built) return;
+    built = key;
+    $("recording-rows").replaceChildren(...told.rows.map(({name, html, unit}) => {
+      const [channel, factor, shift] = ["channel", "factor", "shift"].map(what => node(what === "channel" ? "select" : "input",
+        {id: what + "-" + name, set: `recording.${what}.${name}`, inputMode: "decimal", ariaLabel: what + " of " + name}));
+      const scale = node("div", {className: "scale"}, "× ", factor, " + ", shift, node("span", {className: "unit", textContent: " " + unit}));
+      return node("div", {className: "measured"}, node("div", {}, node("b", {innerHTML: html}), " = ", channel), scale);
+    }));
+    $("recording-ticks").replaceChildren(...told.ticks.map(({name, html}) =>
+      node("label", {}, node("input", {type: "checkbox", id: "fit-" + name, set: "fit." + name}), node("b", {innerHTML: html}))));
+    show();
   }
 
   function recording(told) {
@@ -61,11 +50,10 @@
     if (file !== told.file) { file = told.file; $("recording-name").closest("div").scrollIntoView({block: "nearest"}); }
     $("recording-name").textContent = told.file;
     $("recording-name").title = told.more.join("\n");
-    const channels = [["", "not recorded"], ...told.channels], choices = {run: told.runs.map(one => [one, one]), turns: channels};
-    for (const name of own) show($("recording-" + name), choices[name], told[name]);
-    $("recording-run").closest("label").hidden = told.runs.length < 2;
+    $("recording-run").closest("label").hidden = told.runs < 2;
     $("recording-unit").textContent = told.unit;
-    rows(told, channels);
+    rows(told);
+    for (const {name} of told.rows) $("factor-" + name).closest(".scale").hidden = !told.shown.includes(name);
     $("recording-fit").disabled = Boolean(told.doing);
     $("recording-drive-box").hidden = !told.drive;
     $("recording-drive-text").textContent = told.drive;

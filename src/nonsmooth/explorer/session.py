@@ -194,7 +194,7 @@ class Session:
             self.notes.pop("page", None)
             self.notes.pop(name, None)
             known[action](name, value)
-        except (ValueError, TypeError, KeyError) as error:
+        except (ValueError, TypeError, LookupError) as error:
             place = str(message.get("name") or "page") if isinstance(message, dict) else "page"
             self.notes[place] = str(error)
             self._refused[place] = self.state, str(error)
@@ -202,7 +202,11 @@ class Session:
         self.refresh()
 
     def _set(self, name: str, value: Any) -> None:
-        self.past.put(self._arranged(name, changed(self.state, name, value, list(self.system.states))), name)
+        owners: dict[str, Any] = {"recording": self.bench, "fit": self.bench, "build": self.workshop}
+        if owner := owners.get(name.partition(".")[0]):
+            owner.set(name, value)
+        else:
+            self.past.put(self._arranged(name, changed(self.state, name, value, list(self.system.states))), name)
 
     def _arranged(self, name: str, state: State) -> State:
         """Another parameter of the diagram takes a range of its own; a range keeps its order."""

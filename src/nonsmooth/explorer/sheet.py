@@ -95,36 +95,40 @@ class Sheet:
             view.place()
 
     def controls(self, models: Iterable[str]) -> dict[str, Any]:
-        """Content of the page's controls: models, parameters with their sliders, choices, legends."""
+        """Content of the page's controls: models, parameters with the ends of their sliders, values and choices of all
+        fields, legends."""
         system, state = self.page.system, self.page.state
-        fields = {name: one for name, one in SETTINGS.items() if one.label}
+        settings = {name: one for name, one in SETTINGS.items() if one.label}
         symbols, rows = symbols_of(system), []
         plain = {name: plain_of(symbol) for name, symbol in symbols.items()}
-        choices = {
+        values = {key: value for key, value in vars(state).items() if key not in ("values", "settings", "start")}
+        values |= {f"p.{name}": value for name, value in state.values.items()}
+        values |= {f"start.{name}": value for name, value in zip(system.states, state.start, strict=True)}
+        values |= {name: setting(name, system, state) for name in settings}
+        choices: dict[str, Mapping[str, str]] = {
             **CHOICES,
             "over": {name: plain[name] for name in system.parameters},
             **{axis: {name: plain[name] for name in system.states} for axis in ("x", "y", "shown")},
-            **{name: one.choices(system, state) for name, one in fields.items() if one.choices is not None},
+            **{name: one.choices(system, state) for name, one in settings.items() if one.choices is not None},
         }
+        for owner in (self.bench, self.page.workshop):
+            more, words = owner.fields()
+            values |= more
+            choices |= words
         for name, parameter in system.parameters.items():
-            value = state.values[name]
-            also = (value, state.low, state.high) if name == state.over else (value,)
+            also = (state.values[name], *((state.low, state.high) if name == state.over else ()))
             low, high = slider_range(float(system.values[name]), also)
-            rows.append({
-                "name": name, "html": html_of(symbols[name]), "unit": parameter.unit, "value": value, "low": low,
-                "high": high,
-            })  # fmt: skip
+            rows.append(
+                {"name": name, "html": html_of(symbols[name]), "unit": parameter.unit, "low": low, "high": high}
+            )
+        states = [{"name": name, "html": html_of(symbols[name]), "unit": unit} for name, unit in system.states.items()]
         return {
             "models": {name: "your system" if name == GIVEN else name.replace("_", " ") for name in models},
             "presets": list(presets_of(state)),
             "parameters": rows,
-            "states": [
-                {"name": name, "html": html_of(symbols[name]), "unit": unit, "value": value}
-                for (name, unit), value in zip(system.states.items(), state.start, strict=True)
-            ],
+            "states": states,
             "choices": {name: list(words.items()) for name, words in choices.items()},
-            "state": {key: value for key, value in vars(state).items() if key not in ("values", "settings")}
-            | {name: setting(name, system, state) for name in fields},
+            "state": values,
             "query": to_query(state),
             "forced": system.period() is not None,
             "legends": {name: view.legend() for name, view in self.views.items()},

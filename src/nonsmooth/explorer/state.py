@@ -142,6 +142,9 @@ def changed(state: State, name: str, value: Any, states: Sequence[str]) -> State
         if value not in (allowed := [*words[name]]):
             raise ValueError(f"{name} = {str(value)[:40]!r}; allowed: {', '.join(allowed)}")
         return state.but(name, str(value))
+    if name.startswith("start."):
+        at = [f"start.{one}" for one in states].index(name)
+        return changed(state, "start", [*state.start[:at], value, *state.start[at + 1 :]], states)
     if name == "start":
         parts = value.split() if isinstance(value, str) else list(value)
         if len(parts) != len(states):

@@ -5,24 +5,64 @@ r"""The arrow-shaped normal equations of multiple shooting: starts eliminated pi
     \Big(P + \sum_s G_s^T G_s - G_s^T S_s (S_s^T S_s)^{-1} S_s^T G_s\Big) \delta\theta = \ldots
 
 with G, S the residuals' derivatives in the parameters and in a piece's start, and P the precision of what is known.
+Pieces of motion have free starts of their own. The covariance is by the scatter of the scores, which correlate in time
+within a piece.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.pieces import Fittable, State
+from nonsmooth.identification.uncertainty import newey_west, not_below
 
-__all__ = ["Unsettled", "inverted", "reduced", "settle"]
+__all__ = ["Fittable", "Sandwich", "State", "Unsettled", "inverted", "reduced", "sandwich", "settle"]
 
+_LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction counts as determined
 _SETTLED = 1e-3  # of a standard uncertainty
 _RIDGE = 1e-13  # of a start's column: what keeps a start that is known or not seen from being divided by
 _LITTLE = 1e-4  # of the sum of squares: what a rough fit leaves to be gained
 _ACCURACY = 0.05  # of a standard uncertainty: how near the minimum is told where the derivatives' accuracy ends
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Residuals and derivatives of all pieces at one point, not weighted."""
+
+    fitted: list[FloatArray]
+    residuals: list[FloatArray]
+    in_parameters: list[FloatArray]
+    in_start: list[FloatArray]
+
+    def chi2(self, weights: list[FloatArray], used: Any = None) -> float:
+        """Sum of the weighted residuals' squares, of all pieces or of those that are used."""
+        rows = zip(self.residuals, weights, strict=True)
+        return sum(float(np.sum((r * w) ** 2)) for i, (r, w) in enumerate(rows) if used is None or used[i])
+
+
+class Fittable(Protocol):
+    """Problem that the iteration and the covariance take: pieces, each with its start, and their residuals."""
+
+    @property
+    def pieces(self) -> Any:
+        """Each with ``which``, ``n_free``, ``by_instant`` and ``correlation``."""
+
+    @property
+    def unknowns(self) -> Any:
+        """With the bounds ``low`` and ``high``, and the ``precision`` of what is known about ``centre``."""
+
+    def residuals(self, theta: FloatArray, starts: FloatArray) -> State:
+        """Residuals of all pieces."""
+
+    def derivatives(self, theta: FloatArray, starts: FloatArray) -> State:
+        """The same with derivatives in the parameters of each piece and in its start."""
+
+    def weights(self, state: State) -> list[FloatArray]:
+        """One over each residual's standard deviation."""
 
 
 class Unsettled(SolveError):
@@ -40,7 +80,7 @@ class Unsettled(SolveError):
 
 
 def reduced(
-    problem: Fittable, state: State, weights: list[FloatArray], used: Any, p: int, damping: float = 0.0
+    problem: Fittable, state: State, weights: list[FloatArray], p: int, used: Any = None, damping: float = 0.0
 ) -> tuple[Any, ...]:
     """Normal equations without the starts, and what gives the starts' steps back; ``damping`` is that of the starts.
 
@@ -62,62 +102,56 @@ def reduced(
         factor = np.asarray(np.linalg.qr(table, mode="r"))
         inverse = np.linalg.inv(factor[:n, :n]) / size[:, None]
         back.append((inverse, factor[:n, n : n + m], factor[:n, n + m]))
-        if used[i]:
+        if used is None or used[i]:
             left, rest = factor[n:, n : n + m], factor[n:, n + m]
             normal[np.ix_(piece.which, piece.which)] += left.T @ left
             right[piece.which] += left.T @ rest
     return normal, right, back
 
 
-def inverted(matrix: FloatArray, least: float = 0.0) -> tuple[FloatArray, FloatArray]:
+def inverted(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Inverse of a normal matrix in units of its own diagonal, and directions (columns) that it does not determine.
 
-    Eigenvalues below ``least`` make such a direction; it is left out of the inverse. With 0 there is none.
+    Small eigenvalues make such a direction; it is left out of the inverse.
     """
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     shrunk = matrix / np.outer(scale, scale)
-    if least <= 0.0:
-        return np.linalg.inv(shrunk) / np.outer(scale, scale), np.zeros((len(scale), 0))
     shrunk[np.diag(matrix) <= 0.0] = 0.0  # what nothing depends on is a direction of its own
     values, vectors = np.linalg.eigh(shrunk)
-    known = values > least
+    known = values > _LEAST
     inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
     return inverse, vectors[:, ~known]
 
 
 def settle(
-    problem: Fittable, theta: FloatArray, starts: FloatArray, spread: float, used: Any, centre: FloatArray,
-    prior: FloatArray, iterations: int, rough: bool = False, bounds: tuple[FloatArray, FloatArray] | None = None,
-    least: float = 0.0,
-) -> tuple[FloatArray, FloatArray, State, int]:  # fmt: skip
-    """Levenberg and Marquardt's iteration: parameters, starts, the state there, and how many steps it took.
+    problem: Fittable, theta: FloatArray, starts: FloatArray, used: Any = None, known: FloatArray | None = None,
+    rough: bool = False,
+) -> tuple[FloatArray, FloatArray, State]:  # fmt: skip
+    """Levenberg and Marquardt's iteration: parameters, starts, and the state there.
 
     With ``rough`` it ends where it makes little way, or has taken all its iterations: a start for another fit.
-    ``bounds`` are the least and the largest parameters; directions of which `inverted` says that they are not
-    determined, at ``least``, are left as they are.
+    ``known`` is a precision in place of that of the priors. Directions of the parameters that `inverted` says are not
+    determined are left as they are.
 
     Raises
     ------
     SolveError
-        If it does not settle (`Unsettled`), within the iterations or at all, or (where ``least`` is 0) a direction of
-        the parameters is not determined.
+        If it does not settle (`Unsettled`), within the iterations or at all.
     """
-    damping = 1e-4
-    p = len(theta)
-    low, high = bounds or (np.full(p, -np.inf), np.full(p, np.inf))
+    u, p, damping, iterations = problem.unknowns, len(theta), 1e-4, 30 if rough else 50
+    prior = u.precision if known is None else known
     state = problem.derivatives(theta, starts)
-    weights = problem.weights(state, spread)
+    weights = problem.weights(state)
 
     def cost(now: State, at: FloatArray) -> float:
-        data = sum(float(np.sum((r * w) ** 2)) for r, w, u in zip(now.residuals, weights, used, strict=True) if u)
-        return data + float((at - centre) @ prior @ (at - centre))
+        return now.chi2(weights, used) + float((at - u.centre) @ prior @ (at - u.centre))
 
     best = cost(state, theta)
-    for count in range(1, iterations + 1):
+    for _ in range(iterations):
         while True:
-            normal, right, back = reduced(problem, state, weights, used, p, damping)
+            normal, right, back = reduced(problem, state, weights, p, used, damping)
             full = normal + prior
-            pull = right - prior @ (theta - centre)
+            pull = right - prior @ (theta - u.centre)
             scale = np.sqrt(np.maximum(np.diag(full), 1e-300))
             shrunk = full / np.outer(scale, scale)
             if not np.isfinite(shrunk).all():
@@ -125,29 +159,25 @@ def settle(
                     f"the motion of this fit over {len(problem.pieces)} pieces grows without bound: its records "
                     "are not of the motion that they are taken for"
                 )
-            if least <= 0.0 and np.linalg.cond(shrunk) > 1e13:
-                raise SolveError("the records do not determine all parameters of this fit; give one its value")
-            free = _free(theta, pull, low, high)
+            free = _free(problem, theta, pull)
             step = np.zeros(p)
             damped = shrunk[np.ix_(free, free)] + damping * np.eye(len(free))
             step[free] = np.linalg.solve(damped, pull[free] / scale[free]) / scale[free]
-            if least > 0.0:
-                _, loose = inverted(full[np.ix_(free, free)], least)
-                step[free] -= (loose @ (loose.T @ (step[free] * scale[free]))) / scale[free]
-            step = np.clip(theta + step, low, high) - theta
+            _, loose = inverted(full[np.ix_(free, free)])
+            step[free] -= (loose @ (loose.T @ (step[free] * scale[free]))) / scale[free]
+            step = np.clip(theta + step, u.low, u.high) - theta
             moved = starts.copy()
             for i, (inverse, cross, part) in enumerate(back):
                 moved[i] += inverse @ (part - cross @ step[problem.pieces[i].which])
-            trial = problem.residuals(theta + step, moved)
-            found = cost(trial, theta + step)
+            found = cost(problem.residuals(theta + step, moved), theta + step)
             if np.isfinite(found) and found <= best * (1 + 1e-12):
                 break
             damping *= 8
             # no smaller sum of squares: the derivatives' own accuracy is reached, or nothing fits
-            if damping > (1e4 if least > 0.0 and rough else 1e8):
-                distance, rest = _distance(problem, state, weights, used, theta, centre, prior, low, high, least)
+            if damping > (1e4 if rough else 1e8):
+                distance, rest = _distance(problem, state, weights, used, theta, prior)
                 if (far := float(np.max(distance))) < _ACCURACY or rough:
-                    return theta, starts, state, count
+                    return theta, starts, state
                 raise Unsettled(
                     f"the fit over {len(problem.pieces)} pieces did not settle: no step lowers the sum of squares, "
                     f"though its minimum should be {far:.2g} standard uncertainties away; look at the records for "
@@ -156,13 +186,13 @@ def settle(
         theta, starts, gain, best = theta + step, moved, best - found, found
         state = problem.derivatives(theta, starts)
         # by the undamped step: a damped one is short wherever it is taken
-        distance, rest = _distance(problem, state, weights, used, theta, centre, prior, low, high, least)
+        distance, rest = _distance(problem, state, weights, used, theta, prior)
         far = float(np.max(distance))
         if far < _SETTLED or (far < _ACCURACY and gain < 1e-7 * best) or (rough and gain < _LITTLE * best):
-            return theta, starts, state, count
+            return theta, starts, state
         damping = max(damping / 10, 1e-9)
     if rough:
-        return theta, starts, state, iterations
+        return theta, starts, state
     raise Unsettled(
         f"the fit over {len(problem.pieces)} pieces did not settle in {iterations} iterations",
         distance, rest, theta, starts,
@@ -170,24 +200,60 @@ def settle(
 
 
 def _distance(
-    problem: Fittable, state: State, weights: list[FloatArray], used: Any, theta: FloatArray, centre: FloatArray,
-    prior: FloatArray, low: FloatArray, high: FloatArray, least: float,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    problem: Fittable, state: State, weights: list[FloatArray], used: Any, theta: FloatArray, prior: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Undamped steps in standard uncertainties: the largest of the parameters, then of each start; the parameters'."""
-    normal, right, back = reduced(problem, state, weights, used, len(theta))
-    pull = right - prior @ (theta - centre)
-    free = _free(theta, pull, low, high)
+    normal, right, back = reduced(problem, state, weights, len(theta), used)
+    pull = right - prior @ (theta - problem.unknowns.centre)
+    free = _free(problem, theta, pull)
     covariance = np.zeros_like(normal)
-    covariance[np.ix_(free, free)] = inverted((normal + prior)[np.ix_(free, free)], least)[0]
+    covariance[np.ix_(free, free)] = inverted((normal + prior)[np.ix_(free, free)])[0]
     step = covariance @ pull
     far = [float(np.max(np.abs(step) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))))]
-    for piece, (inverse, cross, part), use in zip(problem.pieces, back, used, strict=True):
+    for i, (piece, (inverse, cross, part)) in enumerate(zip(problem.pieces, back, strict=True)):
         error = np.linalg.norm(inverse, axis=1)
         own = np.abs(inverse @ (part - cross @ step[piece.which])) / np.maximum(error, 1e-150)
-        far.append(float(np.max(own)) if use else 0.0)
+        far.append(float(np.max(own)) if used is None or used[i] else 0.0)
     return np.array(far), np.asarray(step)
 
 
-def _free(theta: FloatArray, pull: FloatArray, low: FloatArray, high: FloatArray) -> Any:
+def _free(problem: Fittable, theta: FloatArray, pull: FloatArray) -> Any:
     """Places of the parameters that are not held at a bound, against which the data push them."""
-    return np.flatnonzero(~(((theta <= low) & (pull < 0)) | ((theta >= high) & (pull > 0))))
+    u = problem.unknowns
+    return np.flatnonzero(~(((theta <= u.low) & (pull < 0)) | ((theta >= u.high) & (pull > 0))))
+
+
+class Sandwich(NamedTuple):
+    """State at the best fit, covariance (p, p), chi^2 per degree of freedom, samples that share an error.
+
+    ``normal`` and ``back`` are those of `reduced` there.
+    """
+
+    state: State
+    covariance: FloatArray
+    reduced: float
+    correlation: float
+    normal: FloatArray
+    back: list[Any]
+
+
+def sandwich(problem: Fittable, theta: FloatArray, starts: FloatArray) -> Sandwich:
+    """Covariance of the parameters at the best fit, never smaller along any than that of white residuals."""
+    p, prior = len(theta), problem.unknowns.precision
+    state = problem.derivatives(theta, starts)
+    weights = problem.weights(state)
+    normal, _, back = reduced(problem, state, weights, p)
+    meat, tau, rows = np.zeros((p, p)), [], 0
+    for i, (piece, (inner, cross, _)) in enumerate(zip(problem.pieces, back, strict=True)):
+        g, s = state.in_parameters[i] * weights[i][:, None], state.in_start[i] * weights[i][:, None]
+        r = state.residuals[i] * weights[i]
+        tau.append(piece.correlation(r))
+        scores = piece.by_instant((g - s @ (inner @ cross)) * r[:, None])
+        meat[np.ix_(piece.which, piece.which)] += newey_west(scores, tau[-1])
+        rows += len(r)
+    freedom = max(rows - sum(piece.n_free for piece in problem.pieces) - p, 1)
+    size = state.chi2(weights) / freedom
+    inverse, _ = inverted(normal + prior)
+    part = rows / freedom
+    covariance = not_below(inverse @ (meat * part + prior) @ inverse, inverse @ (normal * size + prior) @ inverse)
+    return Sandwich(state, covariance, size, float(np.median(tau)), normal, back)

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.identification.compare.draws import drawn_variables
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from nonsmooth.system.system import System
 
 __all__ = ["Gathered", "matched"]
 
@@ -19,6 +22,7 @@ __all__ = ["Gathered", "matched"]
 LISTS = {"jump": ("jump_value", ("jump_variable", "jump_direction")), "special": (None, ("special_kind", "kind"))}
 FINER = 8  # points to a step of a drawn branch, on a cubic
 MOST = 10**8  # numbers kept over all draws
+FAILURES = 3  # reasons that are repeated
 
 
 class Gathered:
@@ -36,22 +40,36 @@ class Gathered:
         self.along = [] if "branch" in centre else [name for name in along if name not in left]  # one branch alone
         self.lists = [dim for dim in LISTS if dim in centre.dims and (dim != "special" or self.branch)]
         self.rows: list[dict[str, Any]] = []
+        self.failures: list[str] = []
         self.sheets = _Sheets(centre, self.branch, self.along) if self.along else None
 
-    def add(self, result: xr.Dataset | None) -> None:
-        """Keep what a draw gave; None where it failed."""
-        row: dict[str, Any] = {}
-        if result is not None:
-            for name in self.plain:
-                if name in result and result[name].shape == self.centre[name].shape:
-                    row[name] = result[name].values
-            if self.sheets is not None:
-                row |= self.sheets.brought(result)
-            for dim in self.lists:
-                row[dim] = matched(self.centre, result, dim)
-            if len(self.rows) * sum(np.size(values) for values in row.values()) > MOST:
-                raise ValueError("the draws hold more than 1e8 numbers: take fewer draws, or a smaller result")
+    def add(self, result: xr.Dataset) -> None:
+        """Keep what a draw gave."""
+        same = [name for name in self.plain if name in result and result[name].shape == self.centre[name].shape]
+        row: dict[str, Any] = {name: result[name].values for name in same}
+        if self.sheets is not None:
+            row |= self.sheets.brought(result)
+        row |= {dim: matched(self.centre, result, dim) for dim in self.lists}
+        if len(self.rows) * sum(np.size(values) for values in row.values()) > MOST:
+            raise ValueError("the draws hold more than 1e8 numbers: take fewer draws, or a smaller result")
         self.rows.append(row)
+
+    def fail(self, reason: str) -> None:
+        """Count a draw for which the verb failed."""
+        self.failures.append(reason)
+        self.rows.append({})
+
+    def banded(
+        self, edges: list[float], more: dict[str, Any], drawn: Mapping[str, FloatArray], system: System, seed: int
+    ) -> xr.Dataset:
+        """The result at the parameters found with its bands, of the draws until now, and the draws."""
+        n, reasons = len(self.rows), "; ".join(dict.fromkeys(self.failures[:FAILURES]))
+        variables = self.variables(edges) | more
+        variables |= drawn_variables({name: values[:n] for name, values in drawn.items()}, system)
+        words = {"long_name": "draws for which the verb failed", "comment": reasons}
+        result = self.centre.assign({**variables, "failed": ((), len(self.failures), words)})
+        result = result.assign_coords(quantile=("quantile", edges))
+        return result.assign_attrs(propagated=f"{n} draws from seed {seed}")
 
     def variables(self, edges: list[float]) -> dict[str, Any]:
         """Quantiles, shares and probabilities."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification.uncertainty import normal_draws
 from nonsmooth.results.representation import cut, html_table, text_table
 
 if TYPE_CHECKING:
@@ -62,20 +64,18 @@ class ParameterSet(Mapping[str, float]):
         anomalies: Sequence[str] = (),
         synthetic: bool = False,
     ) -> None:
-        put = object.__setattr__
-        put(self, "estimates", MappingProxyType(dict(estimates)))
-        put(self, "extra", MappingProxyType(dict(extra or {})))
-        put(self, "findings", tuple(findings))
-        put(self, "identifiability", MappingProxyType(dict(identifiability or {})))
-        put(self, "notes", tuple(notes))
-        put(self, "anomalies", tuple(anomalies))
-        put(self, "synthetic", bool(synthetic))
-        matrix = np.array(covariance, dtype=np.float64)
-        n = len(self.estimates) + len(self.extra)
+        matrix, n = np.array(covariance, dtype=np.float64), len(estimates) + len(extra or {})
         if matrix.shape != (n, n):
             raise ValueError(f"covariance must be ({n}, {n}): parameters, then extra; got {matrix.shape}")
         matrix.flags.writeable = False
-        put(self, "_covariance", matrix)
+        mappings = {"estimates": estimates, "extra": extra, "identifiability": identifiability}
+        held = {
+            **{name: MappingProxyType(dict(given or {})) for name, given in mappings.items()},
+            "findings": tuple(findings), "notes": tuple(notes), "anomalies": tuple(anomalies),
+            "synthetic": bool(synthetic), "_covariance": matrix,
+        }  # fmt: skip
+        for name, value in held.items():
+            object.__setattr__(self, name, value)
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"a ParameterSet does not change (tried to set {name!r})")
@@ -114,9 +114,8 @@ class ParameterSet(Mapping[str, float]):
         ValueError
             If it was not made by a fit in this session: residuals are not kept in files.
         """
-        for finding in self.findings:
-            if finding.name == "fit" and finding.data is not None:
-                return finding.data
+        if (data := self._data_of("fit")) is not None:
+            return data
         raise ValueError("this set holds no residuals: they are those of a fit, ns.fit(...), made in this session")
 
     @property
@@ -128,10 +127,12 @@ class ParameterSet(Mapping[str, float]):
         ValueError
             If there are none: they are asked for, and not kept in files.
         """
-        for finding in self.findings:
-            if finding.name == "posterior" and finding.data is not None:
-                return finding.data["value"]
+        if (data := self._data_of("posterior")) is not None:
+            return data["value"]
         raise ValueError("this set holds no posterior: ask for one, ns.fit(..., posterior=2000), in this session")
+
+    def _data_of(self, name: str) -> xr.Dataset | None:
+        return next((one.data for one in self.findings if one.name == name and one.data is not None), None)
 
     @staticmethod
     def _labelled(names: list[str], matrix: FloatArray) -> xr.DataArray:
@@ -176,17 +177,12 @@ class ParameterSet(Mapping[str, float]):
         They are rows of the posterior where the set has one.
         """
         names = list(self.estimates)
-        if any(finding.name == "posterior" and finding.data is not None for finding in self.findings):
+        if self._data_of("posterior") is not None:
             table = self.posterior.sel(parameter=names).values
-            table = table[np.random.default_rng(seed).integers(len(table), size=n)]
-            return {name: table[:, i].copy() for i, name in enumerate(names)}
-        centre = np.array([self[name] for name in names])
-        matrix = np.array(self._covariance[: len(names), : len(names)])
-        logarithmic = np.array([self.estimates[name].logarithmic and self[name] > 0 for name in names])
-        scale = np.where(logarithmic, centre, 1.0)  # d ln x = dx / x
-        rng = np.random.default_rng(seed)
-        steps = rng.multivariate_normal(np.zeros(len(names)), matrix / np.outer(scale, scale), size=n, method="eigh")
-        values = np.where(logarithmic, centre * np.exp(np.where(logarithmic, steps, 0.0)), centre + steps)
+            values = table[np.random.default_rng(seed).integers(len(table), size=n)]
+        else:
+            logarithmic = [self.estimates[name].logarithmic and self[name] > 0 for name in names]
+            values = normal_draws([*self.values()], self.covariance.values, n, seed, logarithmic)
         return {name: values[:, i].copy() for i, name in enumerate(names)}
 
     def to_dataset(self) -> xr.Dataset:
@@ -195,25 +191,22 @@ class ParameterSet(Mapping[str, float]):
 
         from nonsmooth.results.provenance import attribute, package_version, with_short_record
 
-        names = [*self.estimates, *self.extra]
-        rows = [*self.estimates.values(), *self.extra.values()]
+        rows = {**self.estimates, **self.extra}
+        columns = ("value", "uncertainty", "half_width", "logarithmic")
+        data = {name: ("parameter", [getattr(row, name) for row in rows.values()]) for name in columns}
         record = {
             "version": package_version(), "verb": "identify", "synthetic": self.synthetic, "notes": list(self.notes),
             "anomalies": list(self.anomalies),
             "n_parameters": len(self.estimates), "identifiability": dict(self.identifiability),
-            "units": [row.unit for row in rows], "findings": [_as_record(finding) for finding in self.findings],
+            "units": [row.unit for row in rows.values()],
+            "findings": [_as_record(finding) for finding in self.findings],
         }  # fmt: skip
-        return with_short_record(xr.Dataset(
-            {
-                "value": ("parameter", [row.value for row in rows]),
-                "uncertainty": ("parameter", [row.uncertainty for row in rows]),
-                "half_width": ("parameter", [row.half_width for row in rows]),
-                "logarithmic": ("parameter", np.array([int(row.logarithmic) for row in rows], dtype=np.int8)),
-                "covariance": (("parameter", "other"), self._covariance.copy()),
-            },
-            {"parameter": names, "other": names},
+        found = xr.Dataset(
+            {**data, "covariance": (("parameter", "other"), self._covariance.copy())},
+            {"parameter": [*rows], "other": [*rows]},
             attribute(record) | {"synthetic": "yes" if self.synthetic else "no"},
-        ))  # fmt: skip
+        )
+        return with_short_record(found.assign(logarithmic=found["logarithmic"].astype(np.int8)))
 
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> ParameterSet:
@@ -229,13 +222,11 @@ class ParameterSet(Mapping[str, float]):
         record = read_provenance(dataset) if ATTRIBUTE in dataset.attrs else {}
         if record.get("verb") != "identify":
             raise ValueError("this Dataset was not made by ParameterSet.to_dataset")
-        columns = [dataset[name].values for name in ("value", "uncertainty", "half_width", "logarithmic")]
+        columns = [dataset[name].values.tolist() for name in ("value", "uncertainty", "half_width", "logarithmic")]
         rows = {
-            str(name): Estimate(float(v), float(u), unit, float(h), bool(g))
-            for name, v, u, h, g, unit in zip(
-                dataset["parameter"].values, *columns, record["units"], strict=True
-            )
-        }  # fmt: skip
+            str(name): Estimate(v, u, unit, h, bool(g))
+            for name, v, u, h, g, unit in zip(dataset["parameter"].values, *columns, record["units"], strict=True)
+        }
         names, n = list(rows), record["n_parameters"]
         return cls(
             {name: rows[name] for name in names[:n]}, dataset["covariance"].values,
@@ -312,13 +303,10 @@ class ParameterSet(Mapping[str, float]):
 
 
 def _as_record(finding: Finding) -> dict[str, Any]:
-    def numbers(estimate: Estimate) -> list[Any]:
-        return [estimate.value, estimate.uncertainty, estimate.unit, estimate.half_width, estimate.logarithmic]
-
     return {
-        "name": finding.name, "estimate": numbers(finding.estimate), "method": finding.method,
+        "name": finding.name, "estimate": list(astuple(finding.estimate)), "method": finding.method,
         "samples_used": finding.samples_used, "runs": list(finding.runs), "notes": list(finding.notes),
-        "others": {name: numbers(other) for name, other in finding.others.items()}, "plot": finding.plot,
+        "others": {name: list(astuple(other)) for name, other in finding.others.items()}, "plot": finding.plot,
     }  # fmt: skip
 
 

@@ -16,8 +16,8 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 
 __all__ = [
-    "correlated", "correlation_times", "coverage_factor", "factor_interval", "interval", "newey_west", "not_below",
-    "uniform",
+    "correlated", "correlation_times", "coverage_factor", "factor_interval", "interval", "newey_west", "normal_draws",
+    "not_below", "uniform",
 ]  # fmt: skip
 
 
@@ -111,6 +111,16 @@ def correlation_times(residuals: Any, *, longest: int | None = None) -> float:
     below = np.flatnonzero(rho[1 : last + 1] <= 0)
     end = int(below[0]) + 1 if len(below) else last + 1
     return max(1.0, float(1.0 + 2.0 * rho[1:end].sum()))
+
+
+def normal_draws(mean: Any, covariance: FloatArray, n: int, seed: int, logarithmic: Any = False) -> FloatArray:
+    """``n`` rows drawn from a normal law; of a quantity that is ``logarithmic`` the logarithm is normal."""
+    mean, sizes = np.asarray(mean, dtype=float), np.sqrt(np.diag(covariance))
+    scale = np.where(sizes > 0, sizes, 1.0)  # parameters differ by 10^5 in size: draw in units of their own errors
+    rng = np.random.default_rng(seed)
+    unit = rng.multivariate_normal(np.zeros(len(mean)), covariance / np.outer(scale, scale), n, method="eigh")
+    relative = np.where(logarithmic, scale / np.where(logarithmic, mean, 1.0), 0.0)  # d ln x = dx / x
+    return np.where(logarithmic, mean * np.exp(unit * relative), mean + unit * scale)
 
 
 def newey_west(scores: FloatArray, times: float) -> FloatArray:

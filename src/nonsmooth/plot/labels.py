@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +13,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
-    "column", "first_states", "in_words", "name_and_unit", "name_axes", "name_plane", "only_states", "symbol_of",
-    "variable_along", "with_unit", "words_of_flags",
-]  # fmt: skip
+    "column",
+    "first_states",
+    "name_and_unit",
+    "name_axes",
+    "name_plane",
+    "only_states",
+    "symbol_of",
+    "variable_along",
+    "with_unit",
+]
 
 
 def name_and_unit(result: xr.Dataset, name: str) -> tuple[str, str]:
@@ -115,14 +122,3 @@ def only_states(result: xr.Dataset, *names: str | None) -> list[str]:
         if name not in states:
             raise ValueError(f"{name!r} is not a state of this result; states: {states}")
     return found
-
-
-def words_of_flags(array: xr.DataArray) -> list[str]:
-    """The words of a variable's ``flag_meanings``: the modes' names, the transitions' labels."""
-    return str(array.attrs["flag_meanings"]).split()
-
-
-def in_words(array: xr.DataArray) -> Any:
-    """The values of a variable as the words of its ``flag_meanings``; "?" for a number that has none."""
-    words = dict(zip(np.atleast_1d(array.attrs["flag_values"]).tolist(), words_of_flags(array), strict=True))
-    return np.vectorize(lambda code: words.get(int(code), "?"), otypes=[object])(array.values)

@@ -8,8 +8,9 @@ import numpy as np
 
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.figure import figure
-from nonsmooth.plot.labels import in_words, name_and_unit, name_axes, name_plane, only_states
+from nonsmooth.plot.labels import name_and_unit, name_axes, name_plane, only_states
 from nonsmooth.results.labels import kind_of
+from nonsmooth.results.statuses import in_words
 from nonsmooth.tables.quantities import quantities_of, quantity
 
 if TYPE_CHECKING:

@@ -50,9 +50,10 @@ class _Reader:
         self.speeds = [j for _, j in pairs]
         self.still = {one: 0 for one in self.u if one not in driven}
         self.values = dict(zip(self.p, (system.values[name] for name in t.parameter_names), strict=True))
-        self.symbols = {one: system.parameters[name].symbol or latex_name(name)
-                        for one, name in zip(self.p, t.parameter_names, strict=True)} | {self.t: "t"}  # fmt: skip
-        self.symbols |= {one: latex_name(name) for one, name in zip(self.u, names, strict=True) if one in driven}
+        self.latex = {name: one.symbol or latex_name(name) for name, one in system.parameters.items()}
+        named = dict(zip(self.p, map(self.latex.get, t.parameter_names), strict=True))
+        inputs = {one: latex_name(name) for one, name in zip(self.u, names, strict=True) if one in driven}
+        self.symbols = {**named, **inputs, self.t: "t"}
 
     def _smooth(self, t: Any) -> tuple[Any, ...]:
         """The vector field without contacts: of a system whose surfaces slide what both sides have in common."""
@@ -66,8 +67,9 @@ class _Reader:
 
     def read(self) -> Scheme:
         size = len(self.q)
-        stiffness, damping = ([[-sp.diff(a, x).subs(self.still) for x in some] for a in self.acceleration]
-                              for some in (self.q, self.v))  # fmt: skip
+        stiffness, damping = (
+            [[-sp.diff(a, x).subs(self.still) for x in some] for a in self.acceleration] for some in (self.q, self.v)
+        )
         masses = self._masses(stiffness, damping)
         scheme = Scheme(list(self.names), [self.text(m) if m is not None else "" for m in masses])
         for kind, table in (("spring", stiffness), ("damper", damping)):
@@ -128,9 +130,8 @@ class _Reader:
                     found[i] = sp.simplify(table[i][i] / damping[i][i])
                 elif loaded != 0 and "base" not in powers:
                     found[i] = sp.simplify(sp.diff(push, v) / loaded)
-            apart = [self.is_zero(table[i][j] - found[i] * damping[i][j])
-                     for i in range(size) for j in range(size) if found[i] is not None]  # fmt: skip
-            if not all(apart) or 0 in found:
+            pairs = [(i, j) for i in range(size) for j in range(size) if found[i] is not None]
+            if 0 in found or not all(self.is_zero(table[i][j] - found[i] * damping[i][j]) for i, j in pairs):
                 raise self._off("its mass matrix is not diagonal")
         for load in self.loads.elements if self.loads is not None else ():
             if load.kind == "Rubbing":
@@ -163,9 +164,10 @@ class _Reader:
         if "base" in powers:
             scheme.base = r"\ddot y"
         for i, v in enumerate(self.v):
-            force = sp.diff(powers["forcing"], v) if "forcing" in powers else sp.expand(
-                self.acceleration[i].subs(self.still) * (1 if masses[i] is None else masses[i])
-            )  # fmt: skip
+            if "forcing" in powers:
+                force = sp.diff(powers["forcing"], v)
+            else:
+                force = sp.expand(self.acceleration[i].subs(self.still) * (masses[i] or 1))
             if force != 0 and not force.has(sp.zoo, sp.nan):
                 scheme.forces[i] = self.text(force) or "F(t)"
 
@@ -185,20 +187,17 @@ class _Reader:
         law = {key: self._law(node) for key, node in given.items()}
         match load.kind:
             case "Stop" | "ElasticStop":
-                parts = ("e", law.get("restitution", "")) if load.kind == "Stop" else ("k", law.get("stiffness", ""))
-                label = f"{parts[0]} = {parts[1]}" if parts[1][:1].isdigit() and load.kind == "Stop" else parts[1]
-                scheme.links.append(self._contact(
-                    "stop" if load.kind == "Stop" else "elastic", weights, rest, label, "damping" in given
-                ))  # fmt: skip
+                kind, key = ("stop", "restitution") if load.kind == "Stop" else ("elastic", "stiffness")
+                label = law.get(key, "")
+                label = f"e = {label}" if kind == "stop" and label[:1].isdigit() else label
+                scheme.links.append(self._contact(kind, weights, rest, label, "damping" in given))
             case "Coulomb":
                 words = "" if self.is_zero(rest) else self.text(-rest)
                 scheme.links.append(Link("friction", left, right, law.get("friction", ""), words=words))
             case "Backlash":
-                half = given.get("half_width")
-                scheme.links.append(Link(
-                    "backlash", left, right, law.get("stiffness", ""), words=law.get("half_width", ""),
-                    half=self._value(half),
-                ))  # fmt: skip
+                half, words = self._value(given.get("half_width")), law.get("half_width", "")
+                label = law.get("stiffness", "")
+                scheme.links.append(Link("backlash", left, right, label, words=words, half=half))
             case "PreloadedSpring":
                 label = r",\ ".join(filter(None, (law.get("preload"), law.get("stiffness"))))
                 scheme.links.append(Link("preload", left, right, label))
@@ -231,13 +230,11 @@ class _Reader:
     def _law(self, node: ast.expr) -> str:
         """An argument of an element as LaTeX."""
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            known = self.system.parameters.get(node.value)
-            return known.symbol if known is not None and known.symbol else latex_name(node.value)
+            return self.latex.get(node.value) or latex_name(node.value)
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
             return f"{node.value:.4g}"
         words = ast.unparse(node)
-        known_as = {name: one.symbol or latex_name(name) for name, one in self.system.parameters.items()}
-        if words.startswith("p.") and (symbol := known_as.get(words.removeprefix("p."))):
+        if words.startswith("p.") and (symbol := self.latex.get(words.removeprefix("p."))):
             return symbol
         return "f(v)" if "v" in {n.id for n in ast.walk(node) if isinstance(n, ast.Name)} else ""
 
@@ -268,7 +265,7 @@ class _Reader:
                     scheme.links.append(self._contact("stop", *place, f"e = {label}" if e.is_number else label, False))
                     continue
                 force = sp.expand(t.fields[jump.target][self.speeds[i]] - t.fields[jump.source][self.speeds[i]])
-                stiff = -sp.diff(force, self.q[i]) * (1 if masses[i] is None else masses[i])
+                stiff = -sp.diff(force, self.q[i]) * (masses[i] or 1)
                 label = self.text(sp.simplify(stiff))
                 scheme.links.append(self._contact("elastic", *place, label, force.has(*self.v)))
         for surface in self.system.surfaces:

@@ -42,6 +42,7 @@ __all__ = [
     "once",
     "points",
     "save_figure",
+    "shade",
     "slides",
     "small",
 ]
@@ -244,6 +245,12 @@ def label(ax: Axes, words: str, place: tuple[float, float], offset: tuple[float,
     """Write small words beside a place, so many points away, that show over whatever lies below."""
     looks = {"fontsize": small(ax), "zorder": 6, "path_effects": halo(), **looks}
     return ax.annotate(words, place, offset, textcoords="offset points", **looks)
+
+
+def shade(ax: Axes, x: Any, where: Any, **looks: Any) -> None:
+    """Shade the parts of the abscissa in which something holds, over the whole height."""
+    looks = {"color": COLORS["zone"], "alpha": 0.25, "linewidth": 0, **looks}
+    ax.fill_between(x, 0, 1, where=where, transform=ax.get_xaxis_transform(), **looks)
 
 
 def make_room(ax: Axes, share: float) -> None:

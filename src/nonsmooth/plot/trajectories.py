@@ -10,15 +10,8 @@ from numpy.typing import NDArray
 
 from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
-from nonsmooth.plot.labels import (
-    column,
-    first_states,
-    name_and_unit,
-    name_axes,
-    name_plane,
-    variable_along,
-    words_of_flags,
-)
+from nonsmooth.plot.labels import column, first_states, name_and_unit, name_axes, name_plane, variable_along
+from nonsmooth.results.statuses import words_of_flags
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,8 +54,7 @@ def time_history(ax: Axes, result: xr.Dataset, *, y: str | None = None, shade: b
     time = result["time"].values
     ax.plot(*with_gaps(result, time, column(result, "u", name).values), color=style.COLORS["first"])
     if shade:
-        looks: dict[str, Any] = {"color": style.COLORS["zone"], "alpha": 0.25, "linewidth": 0}
-        ax.fill_between(time, 0, 1, where=_away(result, shade), transform=ax.get_xaxis_transform(), **looks)
+        style.shade(ax, time, _away(result, shade))
     ax.margins(x=0)
     name_plane(ax, result, "time", name)
 

@@ -7,25 +7,25 @@ come from elsewhere: what a file claims is checked against its size.
 
 from __future__ import annotations
 
-import math
+import io
 import re
-from collections.abc import Iterable, Mapping, Sequence
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from importlib import import_module
 from types import ModuleType
 from typing import Any, TypedDict
 
-import numpy as np
-from numpy.typing import NDArray
-
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.errors import DataFileError, not_installed
+from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.system.names import check_keys
 
 __all__ = [
-    "MAX_COLUMNS", "MAX_DEPTH", "MAX_FILE_BYTES", "TIME_SCALES", "TIME_WORDS", "Column", "Group", "Options",
-    "Reading", "Remarks", "Source", "TableOptions", "Trace", "inflation_limit", "is_axis_name", "names_of",
-    "needed", "scaled_time",
+    "MAX_COLUMNS", "MAX_DEPTH", "MAX_FILE_BYTES", "TIME_SCALES", "TIME_WORDS", "Archive", "Column", "Group",
+    "Options", "Reading", "Remarks", "Source", "TableOptions", "Trace", "inflation_limit", "is_axis_name",
+    "names_of", "needed", "scaled_time",
 ]  # fmt: skip
 
 MAX_FILE_BYTES = 1 << 30  # read whole into memory, so that the hash is that of what was read
@@ -156,11 +156,8 @@ class Options:
         check_keys(given, [one.name for one in fields(cls)], "load_recording", "an option")
         read = {name: value for name, value in given.items() if value is not None}
         for name in {"header", "units_row", "skip"} & set(read):
-            line = read[name]
-            if isinstance(line, bool) or not isinstance(line, int if name != "skip" else int | Iterable) or (
-                isinstance(line, int) and line < (name != "skip")
-            ):
-                raise ValueError(f"{name} must be the number of a line, counted from 1, got {line!r}")
+            if name != "skip" or isinstance(read[name], int):
+                read[name] = whole_number(read[name], f"{name}, the number of a line,", int(name != "skip"))
         for name in {"skip", "na"} & set(read):
             if not isinstance(texts := read[name], int):
                 read[name] = (texts,) if isinstance(texts, str) else tuple(texts)
@@ -183,7 +180,7 @@ class Options:
                 )
         if not isinstance(axis, str) or not axis.isidentifier() or axis == "run":
             raise ValueError(f"axis must be a name such as 'time' or 'frequency', got {axis!r}")
-        if rate is not None and not (isinstance(rate, int | float) and math.isfinite(rate) and rate > 0):
+        if rate is not None and not real_number(rate, "rate") > 0:
             raise ValueError(f"rate must be a positive number of samples per second, got {rate!r}")
         if rate is not None and (axis != "time" or axis in columns):
             raise ValueError("rate makes a time axis where the file has none; give it without columns['time'] and axis")
@@ -196,7 +193,7 @@ class Options:
         if marks is not None and (marks not in (".", ",", " ", "'", "\u00a0", "\u202f") or marks == decimal):
             raise ValueError(f"thousands must be one of . , ' or a space, and not the decimal mark, got {marks!r}")
         for name, period in self.wraps.items():
-            if isinstance(period, bool) or not isinstance(period, int | float) or not 0 < period < math.inf:
+            if not real_number(period, f"wraps[{name!r}]") > 0:
                 raise ValueError(f"wraps[{name!r}] must be the count at which it begins anew, as 65536, got {period!r}")
 
 
@@ -214,7 +211,7 @@ class Trace:
     values: FloatArray
     origin: str
     axis_unit: str = "s"
-    lines: NDArray[np.int64] | None = None
+    lines: IntArray | None = None
     attrs: Mapping[str, str] = field(default_factory=dict)
 
     def place(self, index: int) -> str:
@@ -277,3 +274,58 @@ class Group(dict[str, Any]):
         self.units, self.rate, self.run = dict(units or {}), rate, ""
         self.attrs: dict[str, dict[str, str]] = {}
         self.notes: dict[str, str] = {}
+
+
+_PIECE = 1 << 16
+_MAX_MEMBERS = 20_000
+
+
+class Archive:
+    """A ZIP file in memory. All pieces ever taken out of it, together, stay below ``inflation_limit``.
+
+    What its directory says of sizes is not believed: bytes are counted as they come out.
+    """
+
+    def __init__(self, data: bytes, source: Source) -> None:
+        self._source = source
+        self._left = self._limit = inflation_limit(len(data))
+        try:
+            self._zip = zipfile.ZipFile(io.BytesIO(data))
+            infos = self._zip.infolist()
+        # A damaged directory surfaces as almost any exception of zipfile.
+        except Exception as error:
+            raise source.error("", f"is not a whole ZIP archive ({error})") from error
+        if len(infos) > _MAX_MEMBERS:
+            raise source.error("", f"holds {len(infos)} members; at most {_MAX_MEMBERS} are read")
+        self._infos = {info.filename.replace("\\", "/"): info for info in infos}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The members, with forward slashes."""
+        return tuple(self._infos)
+
+    def pieces(self, name: str) -> Iterator[bytes]:
+        """The bytes of a member, piece by piece."""
+        info = self._infos.get(name)
+        if info is None:
+            raise self._source.error(name, "is not in the archive, though main.xml names it")
+        if info.flag_bits & 1:
+            raise self._source.error(name, "is encrypted; save the experiment without a password")
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise self._source.error(name, f"is packed by method {info.compress_type}; expected stored or deflated")
+        try:
+            with self._zip.open(info) as opened:
+                while piece := opened.read(_PIECE):
+                    self._left -= len(piece)
+                    if self._left < 0:
+                        raise self._source.error(
+                            name,
+                            f"unpacks to more than {self._limit} bytes, more than a file of {self._source.size} bytes "
+                            "warrants; it may be made to exhaust memory",
+                        )
+                    yield piece
+        except DataFileError:
+            raise
+        # zipfile raises NotImplementedError for a compression or a version of the format that it does not know.
+        except (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, NotImplementedError) as error:
+            raise self._source.error(name, f"cannot be unpacked, it is damaged or cut short ({error})") from error

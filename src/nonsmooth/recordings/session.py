@@ -17,6 +17,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from nonsmooth.errors import DataFileError
+from nonsmooth.flow.arguments import real_number
 from nonsmooth.recordings.load import content_of, load_recording
 from nonsmooth.recordings.reading import Options
 from nonsmooth.recordings.recording import Recording, RecordingWarning
@@ -94,7 +95,7 @@ def apparatus_of(given: Any, where: str) -> Mapping[str, Quantity]:
         check_keys(stated, ("value", "uncertainty"), f"{where}, {name}", "a key")
         if "value" not in stated:
             raise ValueError(f"{where}, {name}: needs `value`")
-        numbers = [_number(stated.get(key, 0.0), f"{where}, {name}: {key}") for key in ("value", "uncertainty")]
+        numbers = [real_number(stated.get(key, 0.0), f"{where}, {name}: {key}") for key in ("value", "uncertainty")]
         quantity = Quantity(*numbers)
         if quantity.value <= 0 or quantity.uncertainty < 0:
             raise ValueError(f"{where}, {name} = {value!r}: must be positive, an uncertainty zero or more")
@@ -143,20 +144,12 @@ def _run(given: Any, procedure: str, where: str) -> tuple[str, Mapping[str, Any]
     for key, value in table.items():
         kind = SETTINGS[key][0]
         if kind is float:
-            table[key] = _number(value, f"{where}: {key}")
+            table[key] = real_number(value, f"{where}: {key}")
         elif not isinstance(value, kind) or isinstance(value, bool):
             raise TypeError(f"{where}: {key} = {value!r} must be of type {kind.__name__}")
     if table.get("direction", "up") not in ("up", "down"):
         raise ValueError(f"{where}: direction = {table['direction']!r} must be 'up' or 'down'")
     return name, MappingProxyType(table)
-
-
-def _number(value: Any, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TypeError(f"{what} = {value!r} must be a number")
-    if value - value != 0:
-        raise ValueError(f"{what} = {value!r} must be finite")
-    return float(value)
 
 
 def table_of(value: Any, where: str) -> Mapping[str, Any]:

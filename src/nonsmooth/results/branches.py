@@ -147,7 +147,7 @@ def line(
     for name, values in parameters.items():
         coords |= varied(labels, name, values, "point")
     if "clearance" in variables:
-        coords["indicator"] = labels.indicators
+        coords["indicator"] = [*labels.indicators]
     return dataset(labels, attrs, {**variables, **more}, None, **coords)
 
 

@@ -173,7 +173,7 @@ def dataset(
     if starts is not None:
         states = np.atleast_2d(floats(starts))
         along |= {"start": np.arange(len(states)), "start_state": states}
-    whole = {name: one for name, one in along.items() if isinstance(one, tuple) and one and isinstance(one[-1], dict)}
+    whole = {name: one for name, one in along.items() if isinstance(one, tuple)}
     coords = whole | columns(labels, _ALONG, {name: one for name, one in along.items() if name not in whole})
     dims = {dim for one in (*variables.values(), *coords.values()) for dim in np.atleast_1d(one[0])}
     if "state" in dims and "state" not in coords:
@@ -286,11 +286,11 @@ def sweep(
                 variables[f"{output}_{stem}"] = with_unit(leading, arrays[name][..., i], *told)
     for name, load in (loads or {}).items():  # a maximum of an output is there already
         variables.setdefault(name, with_unit(leading, *load))
-    along: dict[str, Any] = {**varied(labels, parameter, values), "direction": directions}
+    along: dict[str, Any] = {**varied(labels, parameter, values), "direction": [*directions]}
     if edges is not None:
         variables["bin_edge"] = (("state", "edge"), floats(edges), {"long_name": "edges of the bins, per state"})
     if "clearance" in arrays:
-        along["indicator"] = labels.indicators
+        along["indicator"] = [*labels.indicators]
     result = dataset(labels, attrs, variables, starts, **along)
     return result.transpose(parameter, "direction", "start", ...).squeeze(list(squeeze))
 

@@ -78,7 +78,7 @@ def report(
     for column in (*(_COUNTS if "n_attractors" in reference else ()), *_ENDED):
         counted = [[rows[i, j][column.name] for j in range(shape[1])] for i in range(shape[0])]
         put(column, counted, reference["n_attractors"] if column.name == "n_attractors" else None)
-    return dataset(labels, attrs, variables, band=bands, eta=etas, exponent=np.arange(1, n + 1))
+    return dataset(labels, attrs, variables, band=[*bands], eta=etas, exponent=np.arange(1, n + 1))
 
 
 def _differences(variables: Mapping[str, Any], scale: FloatArray, forced: bool) -> list[FloatArray]:

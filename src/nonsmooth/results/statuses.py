@@ -4,13 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.kernels.hybrid import codes
 
-__all__ = ["EQUILIBRIA", "STATUSES", "Status", "by_code", "by_name", "flag_attributes", "status_attributes"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "EQUILIBRIA",
+    "STATUSES",
+    "Status",
+    "by_code",
+    "by_name",
+    "flag_attributes",
+    "in_words",
+    "status_attributes",
+    "words_of_flags",
+]
 
 
 @dataclass(frozen=True)
@@ -111,6 +124,18 @@ def flag_attributes(words: Sequence[str], values: Sequence[int] | None = None, d
     numbers = range(len(words)) if values is None else values
     meanings = " ".join("_".join(word.split()) for word in words)
     return {"flag_values": np.array(list(numbers), dtype=dtype), "flag_meanings": meanings}
+
+
+def words_of_flags(array: xr.DataArray) -> list[str]:
+    """The words of a variable's ``flag_meanings``: the modes' names, the transitions' labels."""
+    return str(array.attrs["flag_meanings"]).split()
+
+
+def in_words(array: xr.DataArray) -> Any:
+    """The values of a variable as the words of its ``flag_meanings``; "?" for a number that has none."""
+    words = dict(zip(np.atleast_1d(array.attrs["flag_values"]).tolist(), words_of_flags(array), strict=True))
+    found = [words.get(int(code), "?") for code in array.values.ravel()]
+    return np.array(found, dtype=object).reshape(array.shape)
 
 
 def status_attributes() -> dict[str, Any]:

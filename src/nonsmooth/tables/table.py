@@ -12,6 +12,7 @@ import numpy as np
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
+from nonsmooth.results.statuses import in_words
 from nonsmooth.system.arguments import checked
 from nonsmooth.tables.quantities import coordinates_of, dataset_of, quantities_of, quantity, rows_of
 from nonsmooth.tables.sampled import once, sampled
@@ -119,31 +120,16 @@ def _columns(
     """Flat columns over all rows, headers as keys."""
     import xarray as xr
 
-    shape = xr.DataArray(np.zeros([data.sizes[dim] for dim in rows]), dims=rows)
-    columns = {dim: np.arange(data.sizes[dim]) for dim in rows if dim not in found and len(rows) > 1}
-    flat = {
-        name: np.broadcast_to(
-            values.reshape([-1 if d == dim else 1 for d in rows]), shape.shape
-        ).ravel() for dim, values in columns.items() for name in [dim]
-    }  # fmt: skip
-    for name, array in found.items():
-        plain = xr.DataArray(_worded(array), dims=array.dims)
+    numbered = [dim for dim in rows if dim not in found and len(rows) > 1]
+    every = {dim: xr.DataArray(np.arange(data.sizes[dim]), dims=dim) for dim in numbered} | found
+    flat: dict[str, np.ndarray] = {}
+    for name, array in every.items():
+        plain = xr.DataArray(in_words(array) if "flag_values" in array.attrs else array.values, dims=array.dims)
         missing = [dim for dim in rows if dim not in plain.dims]
         full = plain.expand_dims({dim: data.sizes[dim] for dim in missing}).transpose(*rows)
         unit = str(array.attrs.get("units", "1"))
         flat[f"{name} ({unit})" if units and unit not in ("", "1") else name] = np.asarray(full.values).ravel()
     return flat
-
-
-def _worded(array: xr.DataArray) -> np.ndarray:
-    """The values, those of a table of words as words."""
-    if "flag_values" not in array.attrs:
-        return np.asarray(array.values)
-    words = str(array.attrs["flag_meanings"]).split()
-    known = dict(zip(np.atleast_1d(array.attrs["flag_values"]).tolist(), words, strict=True))
-    return np.vectorize(lambda code: known.get(int(code), "?"), otypes=[object])(array.values) if array.size else (
-        np.empty(array.shape, dtype=object)
-    )  # fmt: skip
 
 
 def _record(data: xr.Dataset) -> dict[str, Any]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nonsmooth.identification.compare.flips import delayed_flips
-from nonsmooth.identification.compare.periods import period_numbers
+from nonsmooth.identification.compare.periods import delayed_flips, period_numbers
 
 NOISE = np.array([1e-3])
 
@@ -42,7 +41,7 @@ def test_the_delay_is_taken_out(first: float, last: float, word: str, flip: floa
 
 def test_the_amplitude_equation_itself_is_solved() -> None:
     """Its steady amplitude for parameters that stand still, and its exponential decay beyond the flip."""
-    from nonsmooth.identification.compare.flips import _amplitude
+    from nonsmooth.identification.compare.periods import _amplitude
 
     still = _amplitude(np.full(400, 0.2), np.full(400, 0.05), 0.0)  # w' = -0.2 w + 0.05: w = 1/4, A = 2
     assert still[0] == 1.0 and still[-1] == pytest.approx(2.0, rel=1e-12)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nonsmooth.identification.compare.fold import fold, mean_orbit
-from nonsmooth.identification.compare.orbits import common_length, orbit_distance
+from nonsmooth.identification.compare.orbits import common_length, fold, mean_orbit, orbit_distance
 
 
 def harmonic(phase: np.ndarray, lead: float = 0.0, size: float = 1.0) -> np.ndarray:

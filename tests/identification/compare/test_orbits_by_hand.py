@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nonsmooth.identification.compare.fold import fold, mean_orbit
-from nonsmooth.identification.compare.orbits import common_length, orbit_distance
+from nonsmooth.identification.compare.orbits import common_length, fold, mean_orbit, orbit_distance
 from nonsmooth.identification.compare.periods import flips, measured_period
 
 ANGLE = 2 * np.pi * np.arange(64) / 64

@@ -17,7 +17,7 @@ from nonsmooth.continuation.events.of_orbits import AlongOrbits
 from nonsmooth.continuation.march.event import BESIDE, Step
 from nonsmooth.continuation.march.march import Limits, March, Policy, march
 from nonsmooth.continuation.problems.curve import Place, Point
-from nonsmooth.continuation.problems.orbits import Orbits, size_of
+from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits, size_of
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.continuation.problems.signature import Round, Signature
 from nonsmooth.errors import Interrupted
@@ -137,6 +137,12 @@ class Following:
         """The width of the range."""
         return self.range[1] - self.range[0]
 
+    def resumed(self, period_number: int, point: PointRecord, way: float = 1.0) -> OrbitPoint | None:
+        """The orbit of a recorded point on a curve of its own, facing along the branch (1) or back (-1)."""
+        curve, X = resumed_at(self.system, period_number, point, self.name, self.width)
+        border = way * point.tangent / curve.scale
+        return curve.near(X / curve.scale, border / np.linalg.norm(border))
+
     def result(
         self, period_number: int, back: Start, middle: Sequence[PointRecord], ahead: Start,
         closed: Place | None = None, origin: str | None = None,
@@ -168,30 +174,29 @@ def orbits_dataset(
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.statuses import flag_attributes, status_attributes
 
-    points, asked = record.points, branch.asked
-    layouts: dict[Signature, int] = {}
-    cycles: dict[Any, int] = {}
-    texts: list[str] = []
+    points, asked, system = record.points, branch.asked, branch.system
+    layouts = {one: i for i, one in enumerate(dict.fromkeys(point.signature for point in points))}
+    cycles: dict[Any, Signature] = {}
+    for one in layouts:
+        cycles.setdefault(one.cycle, one)
+    numbers = {one: list(cycles).index(one.cycle) for one in layouts}
     for point in points:
-        point.layout = layouts.setdefault(point.signature, len(layouts))
-        if point.signature.cycle not in cycles:
-            texts.append(point.signature.text(branch.system.traced))
-        point.cycle = cycles.setdefault(point.signature.cycle, len(cycles))
+        point.layout, point.cycle = layouts[point.signature], numbers[point.signature]
     options = {
         "parameter": branch.name, "range": branch.range, "step": asked.step, "points": asked.points,
         "virtual": asked.virtual, **origin,
     }  # fmt: skip
-    meanings = {"long_name": "signature", **flag_attributes(texts, dtype=np.int32)}
-    turn = labels_of(branch.system).turn
+    texts = [one.text(system.traced) for one in cycles.values()]
     more = {
-        "signature": ("point", np.array([point.cycle for point in points], np.int32), meanings),
-        "period_number": ((), np.int64(period_number), {"long_name": f"{turn}s (0: autonomous)"}),
+        "signature": ("point", np.array([point.cycle for point in points], np.int32),
+                      {"long_name": "signature", **flag_attributes(texts, dtype=np.int32)}),
+        "period_number": ((), np.int64(period_number), {"long_name": f"{labels_of(system).turn}s (0: autonomous)"}),
         "status": ("point", np.zeros(len(points), np.int8), status_attributes()),
-    }
-    attrs = {"parameter": branch.name, **layout_attributes(layouts, branch.system)}
+    }  # fmt: skip
+    attrs = {"parameter": branch.name, **layout_attributes(layouts, system)}
     values = {branch.name: [point.value for point in points]}
     tables = ORBIT, SPECIAL_ORBIT
-    return dataset(branch.system, "continue_orbit", values, tables, record, policy, options, more, attrs)
+    return dataset(system, "continue_orbit", values, tables, record, policy, options, more, attrs)
 
 
 def curve_of(orbit: Orbit, name: str, width: float) -> tuple[Orbits, FloatArray]:

@@ -11,8 +11,7 @@ import numpy as np
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.branches.reading import fields_of, layout_attributes, layouts_of, recorded, undamaged
 from nonsmooth.continuation.problems.multipliers import stability, stable_by
-from nonsmooth.continuation.problems.path import Path
-from nonsmooth.continuation.problems.shooting import Shooting, Solved
+from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.signature import Signature
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import State
@@ -106,10 +105,10 @@ class Orbit:
         """The orbit once round, as a result of ``simulate``; begun behind the transitions that lie on the section."""
         from nonsmooth.flow.simulate import simulate
 
-        u, memory, mode = self._begin()
+        state = self._begin()
         return simulate(
-            self.system, duration=self.period, start=self._start(u, memory), mode=mode, samples=samples or 1025,
-            rtol=RTOL,
+            self.system, duration=self.period, start=self._start(state), mode=self.system.modes[state.counters[0]],
+            samples=samples or 1025, rtol=RTOL,
         )  # fmt: skip
 
     def with_loads(self) -> Orbit:
@@ -125,35 +124,33 @@ class Orbit:
         checked_loads(self.system, True, "with_loads")
         meter = meter_of(self.system)
         assert meter is not None
-        u, memory, mode = self._begin()
-        state = State(u.copy(), memory.copy())
-        state.counters[0] = self.system.modes.index(mode)
+        state = self._begin()
         engine, values = engine_for(self.system, rtol=RTOL), self.system.parameter_vector()
         loads = meter.over(engine, values, state, self.period, max(self.period_number, 1))
         if loads is None:
             raise SolveError("the orbit cannot be followed once round, so its loads are not known: it is unstable")
         return replace(self, loads=loads)
 
-    def _begin(self) -> tuple[FloatArray, FloatArray, str]:
+    def _begin(self) -> State:
         """State, memory and mode behind the transitions that lie on the section: a start cannot lead into a stop."""
-        u, memory, mode = self.u, self.memory, self.mode
-        n, visits = len(self.u), self.signature.visits
+        z, mode = np.append(self.u, self.memory), self.system.modes.index(self.mode)
         for i in np.flatnonzero(self.crossing_times <= AT_SECTION * self.period):
-            u, memory = np.split(self.crossing_states[i], [n])
-            mode = self.system.modes[visits[i + 1].mode]
-        return u, memory, mode
+            z, mode = self.crossing_states[i], self.signature.visits[i + 1].mode
+        state = State(z[: len(self.u)].copy(), z[len(self.u) :].copy())
+        state.counters[0] = mode
+        return state
 
-    def _start(self, u: FloatArray, memory: FloatArray) -> Any:
+    def _start(self, state: State) -> Any:
         """A state as a start; with the memory, where the system has one."""
-        if not len(memory):
-            return u
+        if not len(state.memory):
+            return state.u
         import xarray as xr
 
         variables: dict[str, Any] = {
-            "u": (("time", "state"), u[None, :]),
+            "u": (("time", "state"), state.u[None, :]),
             "mode": ("time", np.zeros(1, dtype=int), {"flag_meanings": "-"}),  # given by name beside it
         }
-        variables |= {name: ("time", [value]) for name, value in zip(self.system.memory, memory, strict=True)}
+        variables |= {name: ("time", [value]) for name, value in zip(self.system.memory, state.memory, strict=True)}
         return xr.Dataset(variables, {"state": list(self.system.states)})
 
     def __repr__(self) -> str:
@@ -228,14 +225,16 @@ class Orbit:
             return cls(system=system, signature=signature, options=source["options"], loads=loads, **values)
 
 
-def orbit_of(shooting: Shooting, solved: Solved, path: Path, clearance: FloatArray, virtual: bool) -> Orbit:
+def orbit_of(point: OrbitPoint, virtual: bool) -> Orbit:
     """The record of a solved orbit, at the parameters of its system."""
-    system, once = shooting.system, shooting.once(solved.X)
+    shooting, path, once = point.shooting, point.path, point.shooting.once(point.X)
+    system, mu = shooting.system, point.multipliers
     u, memory = np.split(once.states[0], [len(system.states)])
+    clearance = point.curve.walk.clearance(path, len(system.indicators))
     return Orbit(
         system=system, u=u, mode=system.modes[shooting.at_section], memory=memory, period=once.period,
         period_number=shooting.period_number, signature=shooting.signature, crossing_times=once.times,
-        crossing_states=once.states[1:], monodromy_matrix=solved.monodromy, floquet_multipliers=solved.multipliers,
-        stable=stable_by(solved.multipliers, shooting.forced), maximum=path.maximum.copy(), minimum=path.minimum.copy(),
+        crossing_states=once.states[1:], monodromy_matrix=point.M, floquet_multipliers=mu,
+        stable=stable_by(mu, shooting.forced), maximum=path.maximum.copy(), minimum=path.minimum.copy(),
         clearance=dict(zip(system.indicators, map(float, clearance), strict=True)), virtual=virtual,
     )  # fmt: skip

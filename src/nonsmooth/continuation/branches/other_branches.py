@@ -11,7 +11,7 @@ from nonsmooth.continuation.branches.born import first_cycle
 from nonsmooth.continuation.branches.following import Asked, Start, resumed_at
 from nonsmooth.continuation.branches.reading import hopf_row, marks_of, one_row, special_row
 from nonsmooth.continuation.branches.records import record_of
-from nonsmooth.continuation.march.march import March, Row
+from nonsmooth.continuation.march.march import March, Row, SpecialRecord
 from nonsmooth.continuation.problems.curve import Point, tangents
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.shooting import Shooting
@@ -50,7 +50,7 @@ def switched(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
         raise SolveError(f"no other branch was found at this {kind}", status="no_convergence")
     here = fresh.described(Point(fresh, Y, ways[0], 0.0, 0, fresh.evaluate(Y)))
     assert here is not None
-    middle = [record_of(Row(here, kind=kind)), record_of(Row(begun[0]))]
+    middle = [record_of(Row(here, mark=SpecialRecord(kind))), record_of(Row(begun[0]))]
     back: Start = March(ending="branching", said=f"The branch begins at the {kind}.")
     if len(begun) > 1:
         back = begun[1]
@@ -64,9 +64,7 @@ def straight_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset
     system, kind, own, point, period_number, before = special_row(start, "continue_orbit")
     _check_parameter(name, own)
     branch = asked.follow(system, own, before, point.value)
-    curve, X = resumed_at(system, period_number, point, own, branch.width)
-    border = point.tangent / curve.scale
-    first = curve.near(X / curve.scale, border / np.linalg.norm(border))
+    first = branch.resumed(period_number, point)
     if first is None:
         raise SolveError(f"Newton's method did not converge at this {kind}", status="no_convergence")
     middle = record_of(Row(first))
@@ -80,10 +78,10 @@ def born(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
     kind = str(start["kind"].values)
     if kind not in ("hopf", "focus_centre"):
         raise ValueError(f"no cycle emanates from a {kind}: that happens at a hopf point or a focus_centre")
-    system, own, value, mode, u, before = hopf_row(start)
+    system, own, rest, before = hopf_row(start)
     _check_parameter(name, own)
-    branch = asked.follow(system, own, before, value)
-    first = first_cycle(kind, system, own, value, mode, u, branch.width)
+    branch = asked.follow(system, own, before, rest.value)
+    first = first_cycle(kind, system, own, rest, branch.width)
     if first is None:
         raise SolveError(f"no cycle was found at this {kind}", status="no_convergence")
     # The first cycle of a Hopf point is small; about a centre the one that touches the boundary is followed back to.

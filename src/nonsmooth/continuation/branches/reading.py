@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.branches.records import BranchRecord, PointRecord, SpecialRecord
+from nonsmooth.continuation.branches.records import BranchRecord, PointRecord, RestRecord, SpecialRecord
 from nonsmooth.continuation.events.of_orbits import ENDINGS
 from nonsmooth.continuation.problems.signature import AT_ONCE, SECTION, Signature, Visit
 from nonsmooth.system.system import System
@@ -76,7 +75,7 @@ def one_row(start: xr.Dataset, verb: str) -> xr.Dataset:
 
 
 def fields_of(dataset: xr.Dataset, table: Sequence[Column], dim: str = "") -> Iterator[dict[str, Any]]:
-    """What the variables of a table hold, one record after the other along a dim; of one row that is all."""
+    """Fields of the records in a result, by the table of its variables, one after the other along a dim."""
     from nonsmooth.results.branches import STEMS
     from nonsmooth.results.schema import typed
 
@@ -132,17 +131,18 @@ def special_row(start: Any, verb: str) -> tuple[System, str, str, PointRecord, i
         return system, str(start["kind"].values), own, point, period_number, source["options"]["range"]
 
 
-def hopf_row(start: xr.Dataset) -> tuple[System, str, float, int, FloatArray, tuple[float, float]]:
-    """System, parameter, its value, mode, equilibrium and range of one Hopf point of ``continue_equilibrium``."""
+def hopf_row(start: xr.Dataset) -> tuple[System, str, RestRecord, Any]:
+    """System at one Hopf point of ``continue_equilibrium``, the parameter, the equilibrium there, and the range."""
+    from nonsmooth.results.branches import EQUILIBRIUM
+
     source, system = recorded(start, "special point")
     with undamaged("special point"):
-        name = str(start.attrs["parameter"])
-        value, mode = float(start[name]), _place(int(start["mode"]), len(system.modes), "mode")
-        u = np.asarray(start["u"].values, dtype=float)
-        low, high = (float(end) for end in source["options"]["range"])
-        if u.shape != (len(system.states),) or not np.isfinite(u).all():
-            raise ValueError(f"its equilibrium is {u}")
-    return system.with_parameters({name: value}), name, value, mode, u, (low, high)
+        name, (fields,) = str(start.attrs["parameter"]), fields_of(start, EQUILIBRIUM)
+        rest = RestRecord(float(start[name]), **fields)
+        _place(rest.mode, len(system.modes), "mode")
+        if rest.u.shape != (len(system.states),) or not np.isfinite(rest.u).all():
+            raise ValueError(f"its equilibrium is {rest.u}")
+        return system.with_parameters({name: rest.value}), name, rest, source["options"]["range"]
 
 
 def layout_attributes(signatures: Iterable[Signature], system: System) -> dict[str, str]:

@@ -10,27 +10,12 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.continuation.march.march import Row
+from nonsmooth.continuation.march.march import Row, SpecialRecord
 from nonsmooth.continuation.problems.equilibrium import Rest
 from nonsmooth.continuation.problems.multipliers import stable_by
 from nonsmooth.continuation.problems.signature import Signature
 
 __all__ = ["BranchRecord", "PointRecord", "RestRecord", "SpecialRecord", "record_of"]
-
-
-@dataclass
-class SpecialRecord:
-    """A special point: its kind, its data, and its place ``point`` in the branch."""
-
-    kind: str
-    indicator: str = ""
-    grazing: str = ""
-    sliding: str = ""
-    bounded: bool = True
-    doubled: bool = False
-    contact: ComplexArray = field(default_factory=lambda: np.empty(0, dtype=complex))  # in the limit
-    determinants: FloatArray = field(default_factory=lambda: np.empty(0))
-    point: int = -1
 
 
 @dataclass
@@ -98,34 +83,18 @@ def record_of(row: Row) -> Any:
         )  # fmt: skip
     else:
         record = _of_orbit(row)
-    if row.kind:
-        record.marks.append(_mark(row))
+    if row.mark:
+        record.marks.append(row.mark)
     return record
 
 
 def _of_orbit(row: Row) -> PointRecord:
     point, curve = row.point, row.point.curve
     shooting, path = curve.shooting, point.path
-    # Exactly at a graze the multipliers are those of the side without contact.
-    multipliers = point.multipliers if row.graze is None else row.graze.multipliers_free
     crossings, contacts = shooting.signature.rates(shooting.system.traced.transitions, shooting.period_number)
     return PointRecord(
         point.value, shooting.signature, point.X, point.tangent * curve.scale, shooting.at_section,
-        point.X[: len(path.maximum)], path.maximum, path.minimum, float(point.solved.times[-1]), multipliers,
-        stable_by(multipliers, shooting.forced), curve.walk.clearance(path, len(shooting.system.indicators)),
+        point.X[: len(path.maximum)], path.maximum, path.minimum, point.period, point.multipliers,
+        stable_by(point.multipliers, shooting.forced), curve.walk.clearance(path, len(shooting.system.indicators)),
         crossings, contacts, row.virtual,
     )  # fmt: skip
-
-
-def _mark(row: Row) -> SpecialRecord:
-    mark = SpecialRecord(row.kind, sliding=row.sliding)
-    if row.indicator >= 0:
-        mark.indicator = list(row.point.shooting.system.indicators)[row.indicator]
-    if isinstance(row.graze, str):  # of equilibria
-        mark.grazing = row.graze
-    elif row.graze is not None:
-        g, one = row.graze, np.eye(len(row.graze.M_free))
-        mark.grazing, mark.bounded, mark.doubled, mark.contact = g.kind, g.bounded, g.doubled, g.multipliers_contact
-        both = (g.M_free, g.M_contact)
-        mark.determinants = np.array([np.linalg.det(one + sign * M) for sign in (-1.0, 1.0) for M in both])
-    return mark

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.continuation.events.change import Change, by_others, gained, inserted, is_tolerance, rest_after, without
-from nonsmooth.continuation.march.event import Event, Step
+from nonsmooth.continuation.march.event import Event, Step, first_beyond
 from nonsmooth.continuation.problems.signature import AT_ONCE
 
 __all__ = ["BOUNDARIES", "Boundary", "Crossed", "Unseen"]
@@ -75,14 +75,14 @@ class Crossed(Boundary):
 
     def crossing(self, point: Any, visit: int) -> tuple[int, Any, int]:
         """Transition, state, and the row that fires (-1: whichever): those at the end of the visit."""
-        return point.shooting.signature.visits[visit].transition, point.solved.segments.z[visit], -1
+        return point.signature.visits[visit].transition, point.solved.segments.z[visit], -1
 
     def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator of the row that is nearest to zero (-1: of none)."""
         visit, shooting = self.visit(point), point.shooting
         k, z, fires = self.crossing(point, visit)
         t = float(point.solved.times[min(visit + 1, shooting.m)])
-        near = [(abs(shooting.flow.jump(point.solved.values, k, t, z, r).h), row.indicator)
+        near = [(abs(shooting.flow.jump(point.values, k, t, z, r).h), row.indicator)
                 for r, row in enumerate(shooting.system.traced.transitions[k].rows) if r != fires]  # fmt: skip
         return min(near)[1] if near else -1
 
@@ -96,7 +96,7 @@ class Short(Crossed):
 
     def contacts(self, point: Any) -> list[Change]:
         """The orbit without a visit between two visits of one mode, where it shrinks without speed."""
-        visits, slopes, i = point.shooting.signature.visits, point.path.slope, self.visit(point)
+        visits, slopes, i = point.signature.visits, point.path.slope, self.visit(point)
         if i in (0, len(visits) - 1) or visits[i - 1].mode != visits[i + 1].mode or visits[i - 1].row < 0:
             return []
         slope = slopes[point.curve.walk.conditional.tolist().index(i - 1)]
@@ -115,7 +115,7 @@ class Slow(Crossed):
 
     def contacts(self, point: Any) -> list[Change]:
         """The orbit without an impact of no speed."""
-        visits, i, count = point.shooting.signature.visits, self.visit(point), 1
+        visits, i, count = point.signature.visits, self.visit(point), 1
         while visits[i + count].row == AT_ONCE:  # an impact made of several transitions
             count += 1
         return [without(point, i, count)] if visits[i + count].mode == visits[i].mode else []
@@ -142,7 +142,7 @@ class Own(Crossed):
 
     def crossing(self, point: Any, visit: int) -> tuple[int, Any, int]:
         """The row that fires is known."""
-        return (*super().crossing(point, visit)[:2], point.shooting.signature.visits[visit].row)
+        return (*super().crossing(point, visit)[:2], point.signature.visits[visit].row)
 
 
 class Touch(Boundary):
@@ -205,17 +205,7 @@ class Unseen(Boundary):
 
         Margins are looked at in parts of a step: of two extremes within a part none shows. A simulation isolates them.
         """
-        low, high, there = 0.0, step.end, step.b
-        while high - low > UNSEEN:
-            middle = 0.5 * (low + high)
-            point = step.curve.between(step.a, step.b, middle)
-            if point is None:
-                return None
-            if step.curve.shows(point):
-                low = middle
-            else:
-                high, there = middle, point
-        return high, there
+        return first_beyond(step, step.curve.shows, UNSEEN)
 
     def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator of the first transition that the signature beyond has more often."""

@@ -20,7 +20,7 @@ from nonsmooth.continuation.problems.visits import anchored, led
 from nonsmooth.system.symbolic.traced import ASKED, FOUND, Traced
 
 __all__ = [
-    "Change", "Common", "by_others", "common_orbit", "common_point", "gained", "inserted", "is_tolerance",
+    "Change", "Common", "by_others", "common_orbit", "gained", "inserted", "is_tolerance",
     "past_the_section", "rest_after", "without",
 ]  # fmt: skip
 
@@ -36,6 +36,7 @@ Common = tuple[Orbits, Solved, FloatArray]
 class Change:
     """A contact that begins or ends: the common orbit once round, with it and without it."""
 
+    point: OrbitPoint
     contact: Round
     free: Round
     place: int  # the visit of the free round in which the contact stands
@@ -51,8 +52,8 @@ class Change:
 
 def inserted(point: OrbitPoint) -> list[Change]:
     """The orbit with the transition that it touches, and if that leads to another mode with each of the ways back."""
-    path, flow, values, traced = point.path, point.shooting.flow, point.solved.values, point.shooting.system.traced
-    free = point.shooting.once(point.X)
+    path, flow, values, traced = point.path, point.shooting.flow, point.values, point.shooting.system.traced
+    free = point.once
     place, k = path.touched
     row = int(path.which[place, k] - point.curve.walk.net.row_start[k])
     t, begin = float(path.place[place, k]), float(point.solved.times[place])
@@ -60,7 +61,7 @@ def inserted(point: OrbitPoint) -> list[Change]:
     indicator = traced.transitions[k].rows[row].indicator
 
     def change(new: list[Visit], after: list[FloatArray]) -> Change:
-        return Change(free.with_inserted(place, new, t, after), free, place, len(new), indicator, True)
+        return Change(point, free.with_inserted(place, new, t, after), free, place, len(new), indicator, True)
 
     found = []
     for taken in _answers(traced, k):
@@ -91,15 +92,15 @@ def _answers(traced: Traced, k: int) -> list[int]:
 
 def without(point: OrbitPoint, place: int, count: int) -> Change:
     """The orbit without ``count`` visits that have no length, from ``place`` on."""
-    contact = point.shooting.once(point.X)
+    contact = point.once
     visit = contact.signature.visits[place]
     indicator = point.shooting.system.traced.transitions[visit.transition].rows[visit.row].indicator
-    return Change(contact, contact.without(place, count), place, count, indicator, False)
+    return Change(point, contact, contact.without(place, count), place, count, indicator, False)
 
 
 def rest_after(point: OrbitPoint, place: int) -> int | None:
     """The number of impacts from visit ``place`` on that rest follows at once; None where it does not."""
-    visits, times = point.shooting.signature.visits, point.solved.times
+    visits, times = point.signature.visits, point.solved.times
     i = place
     while visits[i].row >= 0 and visits[i + 1].mode == visits[place].mode:
         i += 1
@@ -109,7 +110,7 @@ def rest_after(point: OrbitPoint, place: int) -> int | None:
 
 def by_others(point: OrbitPoint, place: int, indicator: int) -> list[Change]:
     """The same orbit where one of its transitions is another one that needs an indicator with the other sign."""
-    jumps, free = point.shooting.system.traced.transitions, point.shooting.once(point.X)
+    jumps, free = point.shooting.system.traced.transitions, point.once
     visits = free.signature.visits
     visit = visits[place]
     own = jumps[visit.transition]
@@ -121,15 +122,15 @@ def by_others(point: OrbitPoint, place: int, indicator: int) -> list[Change]:
         if turned and (other.source, other.target) == (own.source, own.target) and fired in other.rows:
             new = replace(visit, transition=k, row=other.rows.index(fired))
             signature = Signature((*visits[:place], new, *visits[place + 1 :]))
-            found.append(Change(replace(free, signature=signature), free, place, 1, indicator, True))
+            found.append(Change(point, replace(free, signature=signature), free, place, 1, indicator, True))
     return found
 
 
-def common_orbit(point: OrbitPoint, change: Change) -> Common | None:
+def common_orbit(change: Change) -> Common | None:
     """The common orbit in the new signature."""
-    once = change.new
+    once, point = change.new, change.point
     if not point.shooting.forced and len(once.times):
-        once = anchored(point.shooting.flow, point.solved.values, once)
+        once = anchored(point.shooting.flow, point.values, once)
     fresh, X = point.curve.around(once, point.X[-1:])
     solved = fresh.shooting.evaluate(X)
     if not np.isfinite(solved.jacobian).all():
@@ -138,21 +139,12 @@ def common_orbit(point: OrbitPoint, change: Change) -> Common | None:
     return (fresh, solved, null[-1]) if len(null) else None
 
 
-def common_point(point: OrbitPoint, change: Change) -> OrbitPoint | None:
-    """The common orbit as a point of the new signature."""
-    found = common_orbit(point, change)
-    if found is None:
-        return None
-    fresh, solved, tangent = found
-    return fresh.point(solved, solved.X / fresh.scale, tangent)
-
-
 def past_the_section(point: OrbitPoint) -> OrbitPoint | None:
     """The same orbit where a crossing has passed the section: the last of the round in place of the first, or so.
 
     It faces in the same direction: that of the parameter, or of the state at the section near a fold."""
-    shooting, values = point.shooting, point.solved.values
-    once = shooting.once(point.X)
+    shooting, values = point.shooting, point.values
+    once = point.once
     visits, times, end = once.signature.visits, once.times, once.period
     if int(point.path.tau.argmin()) == 0:
         z = led(shooting.flow, values, visits[1].mode, times[0], -times[0], once.states[1])
@@ -174,7 +166,7 @@ def past_the_section(point: OrbitPoint) -> OrbitPoint | None:
 def gained(point: OrbitPoint, fresh: OrbitPoint) -> int:
     """The indicator of the first transition that another signature has more often (-1: none)."""
     more = Counter((v.transition, v.row) for v in fresh.shooting.signature.crossings)
-    more.subtract((v.transition, v.row) for v in point.shooting.signature.crossings)
+    more.subtract((v.transition, v.row) for v in point.signature.crossings)
     transitions = point.shooting.system.traced.transitions
     rows = [transitions[k].rows[row].indicator for (k, row), n in more.items() if n > 0 and row >= 0]
     return rows[0] if rows else -1

@@ -17,6 +17,7 @@ grazing             grazing_fold det(I - M), grazing_flip det(I + M), for M- and
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -27,7 +28,7 @@ from nonsmooth.continuation.events.grazing import both_sides
 from nonsmooth.continuation.march.event import Event, Met, Name, Step, locate
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.locus import Locus
-from nonsmooth.continuation.problems.multipliers import pairs, product_of_pairs, without_own
+from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
 from nonsmooth.continuation.problems.normal_form import flip_coefficient, torus_coefficient
 from nonsmooth.continuation.problems.orbits import OrbitPoint
 
@@ -167,21 +168,17 @@ def _rest(place: OrbitPoint, sign: float) -> float:
 
 def _pair(place: OrbitPoint) -> tuple[int, int]:
     """The two multipliers whose product is 1."""
-    mu = place.multipliers
-    i, j = pairs(len(mu))
-    far = np.abs(mu[i] * mu[j] - 1.0)
-    if not place.shooting.forced:  # the own multiplier 1 is none of them, unless it has become double
-        own = int(np.abs(mu - 1.0).argmin())
-        if len(mu) > 2:
-            far[(i == own) | (j == own)] = np.inf
-    at = int(far.argmin())
-    return (int(i[at]), int(j[at])) if mu[i[at]].imag >= 0.0 else (int(j[at]), int(i[at]))
+    mu, choice = place.multipliers, list(range(len(place.multipliers)))
+    if not place.shooting.forced and len(mu) > 2:  # the own 1 is none of them, unless it has become double
+        choice.remove(int(np.abs(mu - 1.0).argmin()))
+    i, j = min(combinations(choice, 2), key=lambda pair: abs(mu[pair[0]] * mu[pair[1]] - 1.0))
+    return (i, j) if mu[i].imag >= 0.0 else (j, i)
 
 
 def _with_contact(place: OrbitPoint, sign: float) -> float:
     """det(I +- M+); where M+ is unbounded (a rigid impact), its leading coefficient."""
     for change in inserted(place):
-        M, far, near = both_sides(place, change)
+        M, far, near = both_sides(change)
         if not (np.isfinite(far).all() and np.isfinite(near).all()):
             continue
         one = np.eye(len(M))

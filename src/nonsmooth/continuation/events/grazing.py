@@ -13,74 +13,60 @@ decide.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from nonsmooth.arrays import ComplexArray, FloatArray
+from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.events.change import Change
 from nonsmooth.continuation.problems.multipliers import multipliers_of
 from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.continuation.problems.signature import AT_ONCE, Round
 from nonsmooth.continuation.problems.visits import led
-from nonsmooth.flow.variational import VariationalFlow
 
-__all__ = ["Graze", "both_sides", "graze"]
+__all__ = ["both_sides", "graze"]
 
 ASIDE = 1e-6  # of the period: the touch is looked at from this far before and behind
 
 
-@dataclass
-class Graze:
-    """Outcome of a graze; ``kind`` is ``"persistence"`` or ``"non_smooth_fold"``."""
+def graze(first: OrbitPoint, change: Change) -> dict[str, Any]:
+    """Judge a graze, beyond which ``first`` is the first point: fields of a ``SpecialRecord``; none: M+ is unknown.
 
-    kind: str
-    bounded: bool
-    M_free: FloatArray  # M-
-    M_contact: FloatArray  # M+ (unbounded: just beyond the graze)
-    multipliers_free: ComplexArray
-    multipliers_contact: ComplexArray
-    doubled: bool  # an orbit of twice the period is born here
-
-
-def graze(point: OrbitPoint, first: OrbitPoint, change: Change) -> Graze | None:
-    """Judge the graze at ``point``, where its curve ends; ``first`` is the first point behind it."""
-    M, M_far, M_near = both_sides(point, change)
+    M+ is that just beyond the graze where it is unbounded."""
+    M, M_far, M_near = both_sides(change)
     if not (np.isfinite(M).all() and np.isfinite(M_far).all() and np.isfinite(M_near).all()):
-        return None
+        return {}
     bounded = bool(np.abs(M_near).max() < 1.5 * np.abs(M_far).max())
-    M_plus = 2 * M_near - M_far if bounded else M_near
-    one = np.eye(len(M))
-    if point.shooting.forced:
-        same = bool(np.linalg.det(one - M) * np.linalg.det(one - M_plus) > 0)
-    else:  # a multiplier 1 by nature makes det(I - M) vanish: the parameter's own turn tells the side
-        same = float(point.tangent[-1]) * float(first.X[-1] - point.X[-1]) > 0.0
-    doubled = bool(np.linalg.det(one + M) * np.linalg.det(one + M_plus) < 0)
-    return Graze(
-        "persistence" if same else "non_smooth_fold", bounded, M, M_plus,
-        multipliers_of(M), multipliers_of(M_plus), doubled,
-    )  # fmt: skip
+    M_plus, one = 2 * M_near - M_far if bounded else M_near, np.eye(len(M))
+    determinants = np.array([np.linalg.det(one + sign * side) for sign in (-1.0, 1.0) for side in (M, M_plus)])
+    same, point = determinants[0] * determinants[1] > 0.0, change.point
+    if not point.shooting.forced:  # its own multiplier 1 makes det(I - M) vanish: the parameter's turn tells the side
+        same = point.rise * (first.value - point.value) > 0.0
+    return {
+        "grazing": "persistence" if same else "non_smooth_fold", "bounded": bounded, "determinants": determinants,
+        "contact": multipliers_of(M_plus), "doubled": bool(determinants[2] * determinants[3] < 0.0),
+    }  # fmt: skip
 
 
-def both_sides(point: OrbitPoint, change: Change) -> list[FloatArray]:
+def both_sides(change: Change) -> list[FloatArray]:
     """M-, and M+ looked at from ``ASIDE`` and from half of it (their limit, where there is one)."""
-    old, flow = point.shooting, point.shooting.flow
-    found = []
-    for once in (change.free, *(_beside(flow, point.solved.values, change, x) for x in (ASIDE, 0.5 * ASIDE))):
+    point, old, found = change.point, change.point.shooting, []
+    for once in (change.free, _beside(change, ASIDE), _beside(change, 0.5 * ASIDE)):
         shooting, X = Shooting.of(old.system, once, old.active, point.X[old.size :])
-        shooting.anchor(X[: old.n], point.solved.values, point.curve.size)
+        shooting.anchor(X[: old.n], point.values, point.curve.size)
         found.append(shooting.evaluate(X).monodromy)
     return found
 
 
-def _beside(flow: VariationalFlow, values: FloatArray, change: Change, aside: float) -> Round:
+def _beside(change: Change, aside: float) -> Round:
     """The round with the contact entered so far (periods) before the touch, and left at it or as long after it.
 
     An impact is looked at before the touch, where the indicator still rises; the motion goes on from the touch."""
-    once, i, aside = change.contact, change.place, aside * change.contact.period
+    once, i, flow, values = change.contact, change.place, change.point.shooting.flow, change.point.values
     visits, times, states = once.signature.visits[i : i + change.count], once.times.copy(), once.states.copy()
-    touch, begin = float(times[i]), float(times[i - 1]) if i else 0.0
+    touch, begin, aside = float(times[i]), float(times[i - 1]) if i else 0.0, aside * once.period
     times[i : i + len(visits)] = enters = touch - aside
     before = after = led(flow, values, visits[0].mode, begin, enters - begin, states[i])
     rate = flow.jump(values, visits[0].transition, enters, before, visits[0].row).rate

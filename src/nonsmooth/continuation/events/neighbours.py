@@ -36,12 +36,12 @@ BACK = 1e-3  # of its distance: an orbit nearer than this to the branch that has
 AGAIN = 3  # times that Newton's method is begun with one signature
 
 
-def beside(point: OrbitPoint, contacts: Sequence[tuple[Change, OrbitPoint]] = ()) -> OrbitPoint | None:
+def beside(point: OrbitPoint, contacts: Sequence[Change] = ()) -> OrbitPoint | None:
     """The orbit with which a branch goes on at ``point``, where its signature ends, on a curve of its own.
 
     ``contacts`` are those that may begin or end there. Its tangent leads away from there. None where there is none, or
     no simulated round shows it."""
-    common = [end for change, there in contacts if (end := common_orbit(there, change)) is not None]
+    common = [end for change in contacts if (end := common_orbit(change)) is not None]
     forward = float(np.sign(point.tangent[-1])) or 1.0
     nearest: dict[float, list[float]] = {forward: [], -forward: []}  # of those found, at each distance
     for aside in ASIDE:
@@ -50,7 +50,7 @@ def beside(point: OrbitPoint, contacts: Sequence[tuple[Change, OrbitPoint]] = ()
             for found in _found(point, common, side, aside):
                 apart = _apart(point, found)
                 if (_arrives(point, found) or _shrink([*before, apart])) and not _leads_back(point, found):
-                    return found if side * float(found.tangent[-1]) >= 0.0 else found.turned()
+                    return found if side * found.rise >= 0.0 else found.turned()
                 least = min(least, apart)
             before.append(least)
     return None
@@ -59,7 +59,7 @@ def beside(point: OrbitPoint, contacts: Sequence[tuple[Change, OrbitPoint]] = ()
 def _found(point: OrbitPoint, common: list[Common], side: float, aside: float) -> Iterator[OrbitPoint]:
     """Orbits at one distance on one side of the parameter that simulated rounds show, on curves of their own."""
     shooting, curve = point.shooting, point.curve
-    values = point.solved.values.copy()
+    values = point.values.copy()
     values[shooting.places] = there = np.array([point.value + side * aside * curve.width])
     tried = Counter({shooting.signature.cycle: AGAIN})
     for guess in _guesses(point, common, values, side * aside):
@@ -86,12 +86,12 @@ def _guesses(point: OrbitPoint, common: list[Common], values: FloatArray, ahead:
     for other, there, tangent in common:
         if abs(float(tangent[-1])) > STEEP:
             yield other.shooting.once(there.X + ahead / float(tangent[-1]) * tangent * other.scale)
-    shooting, curve, slope = point.shooting, point.curve, float(point.tangent[-1])
+    shooting, curve, slope = point.shooting, point.curve, point.rise
     rounds = curve.rounds
     if abs(slope) > STEEP:
         yield rounds.read(shooting, point.X + ahead / slope * point.tangent * curve.scale, values)
     yield rounds.read(shooting, point.X, values)
-    yield from touching(shooting.once(point.X), shooting.system)
+    yield from touching(point.once, shooting.system)
     random = np.random.default_rng(0)
     for i in range(PERTURBED):
         change = abs(ahead) ** POWERS[i % 3] * random.uniform(-1.0, 1.0, shooting.n) * curve.size
@@ -122,7 +122,7 @@ def _shrink(distances: list[float]) -> bool:
 
 def _leads_back(point: OrbitPoint, found: OrbitPoint) -> bool:
     """Return whether an orbit lies on the branch that has come to ``point``, whatever its signature says."""
-    if (found.value - point.value) * float(point.tangent[-1]) > 0.0:
+    if (found.value - point.value) * point.rise > 0.0:
         return False
     own = point.curve.at_parameter(point.Y, found.value)
     return own is not None and _apart(own, found) < BACK * _apart(point, found)

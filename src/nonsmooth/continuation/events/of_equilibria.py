@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+from math import prod
 from typing import Any, ClassVar
 
 import numpy as np
 
-from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Name, Step
+from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Name, Step, first_beyond
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.equilibrium import FREE, Rest, equilibria_near, goes_on
-from nonsmooth.continuation.problems.multipliers import pairs
 
 __all__ = ["AlongEquilibria", "beyond"]
 
@@ -25,10 +26,7 @@ class Hopf(Event):
 
     def number(self, point: Any) -> float:
         """The product of all sums of two eigenvalues."""
-        if len(point.eigenvalues) < 2:
-            return 1.0
-        i, j = pairs(len(point.eigenvalues))
-        return float(np.prod(point.eigenvalues[i] + point.eigenvalues[j]).real)
+        return complex(prod(a + b for a, b in combinations(point.eigenvalues.tolist(), 2))).real
 
     def named(self, step: Step, point: Any) -> Name:
         """None where the sum of two real eigenvalues vanishes."""
@@ -71,18 +69,10 @@ class AlongEquilibria(Policy):
 
     def unseen(self, step: Step) -> Met | None:
         """The place on a step where another set of equilibria runs into this one."""
-        curve, near, far = step.curve, 0.0, step.end
-        if curve.alone(step.b):
+        if step.curve.alone(step.b):
             return None
-        point = step.b
-        while far - near > LOCATED * step.end:
-            s = 0.5 * (near + far)
-            there = curve.between(step.a, step.b, s)
-            if there is not None and curve.alone(there):
-                near = s
-            else:
-                far, point = s, there or point
-        return Met(self.boundaries[0], far, point, self.boundaries[0].name)
+        there = first_beyond(step, step.curve.alone, LOCATED * step.end)
+        return Met(self.boundaries[0], *there, self.boundaries[0].name)
 
     def behind(self, found: March, met: list[Met]) -> Rest | None:
         """Record the boundary, and whether the branch goes on behind it or turns back; the equilibrium there, or None.
@@ -95,9 +85,9 @@ class AlongEquilibria(Policy):
             found.ending = "boundary"
         corner = rest.margins[len(rest.curve.system.transitions) :].max(initial=-np.inf) > -0.5 * FREE
         if after is None or not corner:  # else another point of the set is its extreme from here on
-            ahead = after is not None and float(rest.tangent[-1]) * float(after.tangent[-1]) > 0.0
+            ahead = after is not None and rest.rise * after.rise > 0.0
             graze = "" if after is None else "persistence" if ahead else "non_smooth_fold"
-            found.mark(met[0].name, rest, graze=graze)
+            found.mark(met[0].name, rest, grazing=graze)
         return after
 
 

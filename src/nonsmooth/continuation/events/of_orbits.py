@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.continuation.events.boundaries import BOUNDARIES, Boundary, Crossed, Unseen
-from nonsmooth.continuation.events.change import Change, common_point, is_tolerance, past_the_section, rest_after
+from nonsmooth.continuation.events.change import Change, common_orbit, is_tolerance, past_the_section, rest_after
 from nonsmooth.continuation.events.grazing import graze
 from nonsmooth.continuation.events.neighbours import beside
 from nonsmooth.continuation.events.sliding import sliding_bifurcation
@@ -195,11 +195,10 @@ class AlongOrbits(Policy):
         beyond = beside(first.point, contacts_of(met))
         if beyond is not None and _completes(met, beyond):
             return beyond
-        name = mark(found, met, beyond)
-        if beyond is None and _is_centre(first):
-            found.ending = found.special[-1].kind = "focus_centre"
-        elif beyond is None:
-            found.ending = first.kind.ending or name
+        centre = beyond is None and _is_centre(first)
+        name = mark(found, met, beyond, "focus_centre" if centre else "")
+        if beyond is None:
+            found.ending = name if centre else first.kind.ending or name
         elif is_doubled(beyond) and not is_doubled(first.point):
             # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
             found.ending = "branching"
@@ -247,38 +246,40 @@ def _is_centre(met: Met) -> bool:
     return any(not one.crossings and Equilibria(system, one.visits[0].mode, name, width).linear for one in free)
 
 
-def contacts_of(met: list[Met]) -> list[tuple[Change, OrbitPoint]]:
-    """The contacts that may begin or end with what is met, each with the orbit there."""
-    return [(change, one.point) for one in met for change in one.kind.contacts(one.point)]
+def contacts_of(met: list[Met]) -> list[Change]:
+    """The contacts that may begin or end with what is met."""
+    return [change for one in met for change in one.kind.contacts(one.point)]
 
 
-def mark(found: March, met: list[Met], beyond: OrbitPoint | None) -> str:
-    """Record the end of a signature, by the contact that begins or ends there where one does; its name."""
+def mark(found: March, met: list[Met], beyond: OrbitPoint | None, name: str = "") -> str:
+    """Record the end of a signature, by the contact that begins or ends there where no name is given; its name."""
     kind, point = met[0].kind, met[0].point
-    sliding = "" if beyond is None else sliding_bifurcation(point, beyond)
+    names, sliding = list(point.shooting.system.indicators), ""
     if beyond is not None:
-        cycle = beyond.shooting.signature.cycle
-        for change, there in contacts_of(met):
-            if change.new.signature.cycle == cycle:
-                # The orbit without the contact, whichever side the branch came from.
-                free = there if change.gained else common_point(there, change) or beyond
-                judged = graze(there, beyond, change)
-                found.mark("grazing", free, indicator=change.indicator, graze=judged, sliding=sliding)
+        sliding = sliding_bifurcation(point, beyond)
+        for change in contacts_of(met):
+            if change.new.signature.cycle == beyond.signature.cycle:
+                free = change.point  # the orbit without the contact, whichever side the branch came from
+                if not change.gained:
+                    fresh, solved, tangent = common_orbit(change) or (beyond.curve, beyond.solved, beyond.tangent)
+                    free = fresh.point(solved, solved.X / fresh.scale, tangent) or beyond
+                judged = graze(beyond, change)
+                found.mark("grazing", free, indicator=names[change.indicator], sliding=sliding, **judged)
                 return "grazing"
         end = _from_behind(point, beyond)
         if end is not None and _is_better(met[0], end.point):
             kind, point = end.kind, end.point
     own = kind.contacts(point)
-    name = "grazing" if own else kind.name
+    name = name or ("grazing" if own else kind.name)
     indicator = own[0].indicator if own else kind.surface(point, beyond)
-    found.mark(name, point, indicator=indicator, sliding=sliding)
+    found.mark(name, point, indicator=names[indicator] if indicator >= 0 else "", sliding=sliding)
     return name
 
 
 def _from_behind(point: OrbitPoint, first: OrbitPoint) -> Met | None:
     """The end of the new signature seen from its first orbit: the place at which the old one ends."""
     fresh, back = first.curve, first.turned()
-    away, steep = abs(float(first.X[-1] - point.X[-1])) / fresh.width, abs(float(first.tangent[-1]))
+    away, steep = abs(first.value - point.value) / fresh.width, abs(first.rise)
     new = fresh.step(back, 2.0 * away / steep) if steep * FARTHEST > away else None
     if new is None:
         return None
@@ -291,6 +292,6 @@ def _is_better(met: Met, there: OrbitPoint) -> bool:
 
     A visit that ends as it begins, at a double zero, is located badly."""
     if met.kind.place < 0:  # no margin tells where it is: within the interval that simulations leave
-        return abs(float(there.X[-1] - met.point.X[-1])) < WITHIN * there.curve.width
+        return abs(there.value - met.point.value) < WITHIN * there.curve.width
     new, old = (np.linalg.cond(point.solved.jacobian * point.curve.weights) for point in (there, met.point))
     return bool(new < old)

@@ -55,7 +55,7 @@ def sliding_bifurcation(point: OrbitPoint, first: OrbitPoint) -> str:
 
 def _round(point: OrbitPoint) -> list[_Stay]:
     """The visits once round; the first and the last one are one."""
-    visits, times, before = point.shooting.signature.visits, point.solved.times, point.solved.segments.z
+    visits, times, before = point.signature.visits, point.solved.times, point.solved.segments.z
     lengths = np.diff(times)
     if len(visits) == 1:
         return [_Stay(visits[0].mode, float(lengths[0]))]
@@ -89,7 +89,7 @@ def _name(point: OrbitPoint, before: _Stay, gone: _Stay, after: _Stay) -> str:
 
 def _moves(point: OrbitPoint, ends: _Stay) -> bool:
     """Return whether the transition that ends a visit moves states that lie on its surface, as an impact does."""
-    jump = point.shooting.flow.jump(point.solved.values, ends.transition, ends.t, ends.z, ends.row)
+    jump = point.shooting.flow.jump(point.values, ends.transition, ends.t, ends.z, ends.row)
     change, h_z = jump.R_z - np.eye(jump.n), jump.h_z
     along = change - np.outer(change @ h_z, h_z) / max(float(h_z @ h_z), 1e-300)
     return bool(np.abs(along).max() > NOTHING)
@@ -100,7 +100,7 @@ def _slides(point: OrbitPoint, ends: _Stay, mode: int) -> bool:
 
     Its rate vanishes there, whatever the state: the rate's gradient is a multiple of the surface's."""
     indicator = point.shooting.system.traced.transitions[ends.transition].rows[ends.row].indicator
-    at = point.shooting.flow.indicator(point.solved.values, indicator, mode, ends.t, ends.z)
+    at = point.shooting.flow.indicator(point.values, indicator, mode, ends.t, ends.z)
     h, rate = np.append(at.h_z, at.h_t), np.append(at.L_z, at.L_t)
     along = rate - h * float(rate @ h) / max(float(h @ h), 1e-300)
     return bool(h.any() and np.abs(along).max() <= NOTHING * max(float(np.abs(rate).max()), 1.0))

@@ -56,38 +56,31 @@ class SectionMap:
         return self._images(x, self.plan, self.periods)
 
     def _images(self, x: FloatArray, plan: Section, returns: int) -> FloatArray:
-        images = np.full_like(x, np.nan)
-        starts = np.ascontiguousarray(x * self.size)
-        for a in range(0, len(x), CHUNK):
-            part = starts[a : a + CHUNK]
-            safe = np.isfinite(part).all(axis=1)
-            if not safe.any():
-                continue
-            given = np.ascontiguousarray(part[safe])
-            out = self.engine.kept(len(given), 1)
+        images, safe = np.full_like(x, np.nan), np.flatnonzero(np.isfinite(x).all(axis=1))
+        for a in range(0, len(safe), CHUNK):
+            at = safe[a : a + CHUNK]
+            given, out = np.ascontiguousarray(x[at] * self.size), self.engine.kept(len(at), 1)
             state = State(given[0].copy(), self.system.memory_vector())
-            self.engine.chain(self.tables, 0, len(given), state, given, plan, returns - 1, 1, out)
+            self.engine.chain(self.tables, 0, len(at), state, given, plan, returns - 1, 1, out)
             good = np.isin(out.status, (codes.OK, codes.NOT_GUARANTEED))
-            images[a + np.flatnonzero(safe)[good]] = out.section[good, 0] / self.size
+            images[at[good]] = out.section[good, 0] / self.size
         return images
 
     def backward(self, w: FloatArray, near: FloatArray) -> FloatArray:
         """Preimages (m, n) of w (m, n), each near its guess; those not found are tried from found neighbours."""
         found = self._newton(w, near)
         for _ in range(SWEEPS):
-            known = np.flatnonzero(np.isfinite(found).all(axis=1))
-            todo = np.flatnonzero(~np.isfinite(found).all(axis=1))
+            missing = ~np.isfinite(found).all(axis=1)
+            known, todo = np.flatnonzero(~missing), np.flatnonzero(missing)
             if not len(todo) or not len(known):
                 break
             nearest = known[np.abs(todo[:, None] - known[None, :]).argmin(axis=1)]
             # One step on at either side of what is known: guesses from farther off are seldom good.
-            close = todo[np.abs(todo - nearest) <= 4]
-            if not len(close):
-                break
-            better = self._newton(w[close], found[nearest[np.isin(todo, close)]])
+            near = np.abs(todo - nearest) <= 4
+            better = self._newton(w[todo[near]], found[nearest[near]])
             if not np.isfinite(better).all(axis=1).any():
                 break
-            found[close] = better
+            found[todo[near]] = better
         return found
 
     def _newton(self, w: FloatArray, guess: FloatArray) -> FloatArray:

@@ -17,7 +17,10 @@ import numpy as np
 from nonsmooth.continuation.problems.curve import Point, branch_point, tangents
 from nonsmooth.continuation.problems.solve import determinant
 
-__all__ = ["BESIDE", "LARGEST", "Crossing", "Event", "Fold", "Met", "Name", "Step", "first_met", "locate", "special_on"]
+__all__ = [
+    "BESIDE", "LARGEST", "Crossing", "Event", "Fold", "Met", "Name", "Step", "first_beyond", "first_met", "locate",
+    "special_on",
+]  # fmt: skip
 
 BEGUN = 1e-6
 ROUNDING = 1e-13  # of the numbers at both ends: smaller than this is zero, however short the step
@@ -63,7 +66,7 @@ class Step:
     last: Any = field(init=False)  # at this point
 
     def __post_init__(self) -> None:
-        self.end = float(self.a.tangent @ (self.b.Y - self.a.Y))
+        self.end = self.a.along(self.b.Y)
         self.stop, self.last = self.end, self.b
 
     @property
@@ -123,7 +126,7 @@ class Fold(Event):
 
     def number(self, point: Any) -> float:
         """The last component of the tangent."""
-        return float(point.tangent[-1])
+        return point.rise
 
 
 class Crossing(Event):
@@ -166,7 +169,7 @@ class Crossing(Event):
             return there
         # Any direction in the plane of both branches is null here, and the border is singular: keep that of the branch.
         exact = curve.described(Point(curve, Y, point.tangent, point.orientation, point.iterations, curve.evaluate(Y)))
-        return there if exact is None else (float(a.tangent @ (Y - a.Y)), exact)
+        return there if exact is None else (a.along(Y), exact)
 
 
 def locate(step: Step, number: Callable[[Any], float]) -> tuple[float, Any] | None:
@@ -202,6 +205,19 @@ def locate(step: Step, number: Callable[[Any], float]) -> tuple[float, Any] | No
     return s, known[s]
 
 
+def first_beyond(step: Step, holds: Callable[[Any], bool], near: float) -> tuple[float, Any]:
+    """The first place on a step at which something ``holds`` no more, as at its end, by halving; the point there."""
+    low, high, there = 0.0, step.end, step.b
+    while high - low > near:
+        middle = 0.5 * (low + high)
+        point = step.curve.between(step.a, step.b, middle)
+        if point is not None and holds(point):
+            low = middle
+        else:
+            high, there = middle, point or there
+    return high, there
+
+
 def first_met(step: Step, boundaries: Sequence[Event]) -> list[Met] | None:
     """The first boundary on a step: all that is met there, what explains it best first.
 
@@ -222,9 +238,9 @@ def first_met(step: Step, boundaries: Sequence[Event]) -> list[Met] | None:
         if same or any(value > 0.0 for value, _ in known):  # met at the same place, or farther on
             located += same[:1]
             continue
-        there: tuple[float, Any] | None = kind.located(step)
-        if there is not None and there[0] <= step.stop * (1 + 1e-12):
-            located.append(Met(kind, *there, kind.name))
+        met = kind.met(step)
+        if met is not None and met.s <= step.stop * (1 + 1e-12):
+            located.append(met)
     if not located:
         return None if passed and not step.cause else []
     first = min(met.s for met in located)

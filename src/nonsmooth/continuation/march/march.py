@@ -9,10 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.march.event import Event, Met, Step, first_met, special_on
 from nonsmooth.continuation.problems.curve import Place, Point, passing
 
-__all__ = ["INTERRUPTED", "Limits", "March", "Policy", "march"]
+__all__ = ["INTERRUPTED", "Limits", "March", "Policy", "Row", "SpecialRecord", "march"]
 
 INTERRUPTED = "Interrupted: what was found until then stands"
 FIRST = 1e-3  # step
@@ -34,15 +35,32 @@ class Limits:
 
 
 @dataclass
+class SpecialRecord:
+    """A special point: its kind, its data, and its place ``point`` in the branch; at a graze both sides of it."""
+
+    kind: str
+    indicator: str = ""
+    grazing: str = ""
+    sliding: str = ""
+    bounded: bool = True
+    doubled: bool = False
+    contact: ComplexArray = field(default_factory=lambda: np.empty(0, dtype=complex))  # in the limit
+    determinants: FloatArray = field(default_factory=lambda: np.empty(0))
+    point: int = -1
+
+
+@dataclass
 class Row:
-    """A point of a branch, and what belongs to its kind where it is a special one."""
+    """A point of a branch, and what it is as a special one."""
 
     point: Any
     virtual: bool = False  # beyond a boundary that its path should obey
-    kind: str = ""  # of a special point
-    indicator: int = -1
-    sliding: str = ""
-    graze: Any = None  # an events.grazing.Graze
+    mark: SpecialRecord | None = None
+
+    @property
+    def kind(self) -> str:
+        """The kind of a special point, else nothing."""
+        return self.mark.kind if self.mark else ""
 
 
 @dataclass
@@ -56,7 +74,7 @@ class March:
     @property
     def special(self) -> list[Row]:
         """The rows that are special points."""
-        return [row for row in self.rows if row.kind]
+        return [row for row in self.rows if row.mark]
 
     def add(self, point: Point) -> None:
         """Append a point."""
@@ -64,7 +82,7 @@ class March:
 
     def mark(self, kind: str, point: Point, virtual: bool = False, **more: Any) -> None:
         """Append a special point; on a boundary itself no path is virtual."""
-        self.rows.append(Row(point, virtual, kind, **more))
+        self.rows.append(Row(point, virtual, SpecialRecord(kind, **more)))
 
 
 class Policy(ABC):
@@ -217,15 +235,11 @@ class _Marching:
     def _within(self, new: Any) -> Step | None:
         """The step to the new point, or to the edge of the range before it; None where that is not found."""
         reached, s = new, np.inf
-        for which, low, high in self.limits.box:
-            value = float(new.X[which])
-            if low <= value <= high:
-                continue
-            last = self.curve.at_edge(self.point, new, low if value < low else high, which)
+        for which, edge in self._beyond(new):
+            last = self.curve.at_edge(self.point, new, edge, which)
             if last is None:
                 return None
-            there = float(self.point.tangent @ (last.Y - self.point.Y))
-            if there < s:
+            if (there := self.point.along(last.Y)) < s:
                 reached, s = last, there
         numbers, margins = self._watched(reached)
         return Step(
@@ -250,10 +264,8 @@ class _Marching:
         if step.virtual:
             met = sorted([*met, *self.policy.passed_by(step)], key=lambda one: one.s)
         for one in met:
-            edge = self._beyond(one.point)
-            if edge is not None:  # a fold just beyond the edge of the range
-                which, end = edge
-                step.ends("range", one.s, self.curve.at_edge(step.a, one.point, end, which) or one.point)
+            for which, edge in self._beyond(one.point):  # a fold just beyond the edge of the range
+                step.ends("range", one.s, self.curve.at_edge(step.a, one.point, edge, which) or one.point)
                 return False
             self.policy.record(self.found, step, one)
             if one.ending is not None:
@@ -261,13 +273,10 @@ class _Marching:
                 return True
         return False
 
-    def _beyond(self, point: Any) -> tuple[int, float] | None:
-        """The edge of the range that a point lies beyond: the place of the parameter, and the edge."""
-        for which, low, high in self.limits.box:
-            value = float(point.X[which])
-            if not low <= value <= high:
-                return which, low if value < low else high
-        return None
+    def _beyond(self, point: Any) -> list[tuple[int, float]]:
+        """The edges of the range that a point lies beyond: places of parameters, each with its edge."""
+        return [(which, low if point.X[which] < low else high) for which, low, high in self.limits.box
+                if not low <= point.X[which] <= high]  # fmt: skip
 
     def _ended(self, step: Step) -> bool:
         """Take the step; True where the branch ends with it."""
@@ -307,7 +316,6 @@ def came_back(place: Place | None, step: Step) -> float | None:
     word, X, seen = place
     if word == step.curve.word():
         Y = X / step.curve.scale
-        along = float(step.a.tangent @ (Y - step.a.Y))
-        return along if passing(Y, step.a.Y, step.b.Y) is not None else None
+        return step.a.along(Y) if passing(Y, step.a.Y, step.b.Y) is not None else None
     x = passing(seen, step.curve.seen(step.a), step.curve.seen(step.b))
     return None if x is None else x * step.end

@@ -52,9 +52,18 @@ class Point:
         return float(self.X[-1])
 
     @property
+    def rise(self) -> float:
+        """The change of the last parameter along the branch."""
+        return float(self.tangent[-1])
+
+    @property
     def virtual(self) -> bool:
         """True for a point that belongs to no motion of the system."""
         return False
+
+    def along(self, Y: FloatArray) -> float:
+        """The distance of another place along the tangent."""
+        return float(self.tangent @ (Y - self.Y))
 
     def turned(self) -> Self:
         """The same point looked at the other way along the branch; the bordered determinant turns with the tangent."""
@@ -62,7 +71,7 @@ class Point:
 
     def facing(self, sign: float) -> Self:
         """The same point with its tangent towards rising (1) or falling (-1) values."""
-        return self if (float(self.tangent[-1]) or 1.0) * sign > 0 else self.turned()
+        return self if (self.rise or 1.0) * sign > 0 else self.turned()
 
 
 P = TypeVar("P", bound=Point)
@@ -145,6 +154,12 @@ class Curve(ABC, Generic[P]):
 
     # --- along the curve
 
+    def jacobian(self, solved: Any) -> FloatArray:
+        """The scaled Jacobian (n - 1, n)."""
+        matrix = np.empty((self.n - 1, self.n))
+        self.fill(solved, matrix)
+        return matrix
+
     def bordered(self, solved: Any, border: FloatArray) -> FloatArray:
         """The scaled Jacobian with a last row."""
         matrix = np.empty((self.n, self.n))
@@ -206,9 +221,7 @@ class Curve(ABC, Generic[P]):
 
     def null_vectors(self, solved: Any, tolerance: float = 1e-7) -> FloatArray:
         """Orthonormal vectors (k, n) that the scaled Jacobian takes to zero."""
-        matrix = np.empty((self.n - 1, self.n))
-        self.fill(solved, matrix)
-        _, values, right = np.linalg.svd(matrix)
+        _, values, right = np.linalg.svd(self.jacobian(solved))
         rank = int((values > tolerance * values[0]).sum())
         return np.asarray(right[rank:])
 
@@ -225,12 +238,9 @@ class Curve(ABC, Generic[P]):
     def predicted(self, point: P, ds: float, before: P | None) -> FloatArray:
         """A guess at distance ds along the tangent: straight, or on the cubic through both last points and tangents."""
         Y = point.Y + ds * point.tangent
-        if before is None:
+        if before is None or not ds < FARTHEST * (h := before.along(point.Y)):
             return Y
         back = point.Y - before.Y
-        h = float(before.tangent @ back)
-        if not (h > 0.0 and ds < FARTHEST * h):
-            return Y
         second = (2 * before.tangent + 4 * point.tangent - 6 / h * back) / h
         third = (6 * (before.tangent + point.tangent) - 12 / h * back) / (h * h)
         return Y + ds * ds * (0.5 * second + ds / 6 * third)
@@ -249,7 +259,7 @@ class Curve(ABC, Generic[P]):
 
     def between(self, a: P, b: P, s: float) -> P | None:
         """The point at distance s from ``a`` towards ``b``, to the last digits."""
-        end = float(a.tangent @ (b.Y - a.Y))
+        end = a.along(b.Y)
         x = s / end
         # Hermite's cubic through both points and tangents.
         slope = end / max(float(a.tangent @ b.tangent), 1e-3)
@@ -314,7 +324,7 @@ def tangents(curve: Curve[Any], Y: FloatArray) -> FloatArray | None:
     """
 
     def jacobian(Z: FloatArray) -> FloatArray:
-        return curve.bordered(curve.evaluate(Z), np.zeros(curve.n))[:-1]
+        return curve.jacobian(curve.evaluate(Z))
 
     left, _, right = np.linalg.svd(jacobian(Y))
     plane, psi = right[-2:], left[:, -1]
@@ -339,7 +349,7 @@ def branch_point(curve: Curve[Any], Y: FloatArray, *, tolerance: float = 1e-11, 
 
     def scaled(Z: FloatArray) -> tuple[FloatArray, FloatArray]:
         solved = curve.evaluate(Z)
-        return curve.residual(solved), curve.bordered(solved, np.zeros(n + 1))[:-1]
+        return curve.residual(solved), curve.jacobian(solved)
 
     _, J = scaled(Y)
     psi = np.linalg.svd(J)[0][:, -1]

@@ -135,111 +135,87 @@ class Equilibria(Curve[Rest]):
             return True
         found = equilibrium_sets(self.system, rest.u, values=self._at(rest.X)[1], modes=self.watched)
         size = ALIKE * self.system.scale_vector()
-        return any(
-            _within(rest.lower, rest.upper, one.lower, one.upper, size)
-            and _within(one.lower, one.upper, rest.lower, rest.upper, size)
-            for one in found
-        )
-
-    def at(self, u: FloatArray, value: float) -> Rest | None:
-        """The equilibrium at a value of the parameter, by Newton from a state."""
-        return self.at_parameter(np.append(u[self.own], value) / self.scale, value)
+        return any(_within(rest, one, size) and _within(one, rest, size) for one in found)
 
 
-class _Corner:
+class _Corner(Equilibria):
     """An extreme point of a set: the independent equations of its mode's field and the conditions that vanish there."""
 
-    def __init__(self, curve: Equilibria, extreme: Extreme, value: float) -> None:
+    def __init__(self, system: System, parameter: str, width: float, extreme: Extreme, value: float) -> None:
+        super().__init__(system, extreme.mode, parameter, width)
         self.known = {value: extreme.u}  # by the parameter
-        self.curve, self.u, self.side, self.keys = curve, extreme.u, extreme.side, [i for i, _ in extreme.keys]
-        place, traced = curve.place, curve.system.traced
-        same = extreme.mode == curve.mode
-        self.field = curve.field if same else mode_field(traced, extreme.mode, (place,))
-        self.own, self.scale = self.field.own, curve.system.scale_vector()[self.field.own]
-        self.unit = np.eye(len(curve.values))[place] * STEP * curve.width
+        self.u, self.side, self.keys = extreme.u, extreme.side, [i for i, _ in extreme.keys]
+        self.unit = np.eye(len(self.values))[self.place] * STEP * width
         # conditions that are met there by construction
-        self.met = [any(row.indicator in self.keys for row in jump.rows) for jump in traced.transitions]
+        self.met = [any(row.indicator in self.keys for row in jump.rows) for jump in system.traced.transitions]
         self.signs = np.array([sign for _, sign in extreme.keys])
         self.across = np.zeros((0, 0))  # the independent equations among those of the field
 
-    def equations(self, u: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def evaluate(self, Y: FloatArray) -> _Field:
         """As many equations as states, and their derivatives in scaled unknowns; what nothing bounds rests."""
-        curve, keys = self.curve, self.keys
-        f, J, f_p = self.field.evaluate(u, values, curve.memory)
-        J = np.column_stack([J * self.scale, f_p * curve.width])
+        solved, keys = super().evaluate(Y), self.keys
+        (u, values), f, J = self._at(solved.X), solved.f, solved.J
         if not len(self.across):
             left, sizes, _ = np.linalg.svd(J[:, :-1])
             self.across = left[:, : int((sizes > FREE * max(float(sizes[0]), FREE)).sum())].T
-        h, h_u = self.field.indicators(u, values, curve.memory)
+        h, h_u = self.field.indicators(u, values, self.memory)
         # indicators are differentiated in the states only
-        there = [self.field.indicators(u, values + one, curve.memory)[0] for one in (self.unit, -self.unit)]
-        slopes = np.column_stack([h_u[:, self.own] * self.scale, (there[0] - there[1]) / (2.0 * STEP)])[keys]
+        there = [self.field.indicators(u, values + one, self.memory)[0] for one in (self.unit, -self.unit)]
+        slopes = np.column_stack([h_u[:, self.own] * self.scale[:-1], (there[0] - there[1]) / (2.0 * STEP)])[keys]
         J, f = np.vstack([self.across @ J, slopes]), np.append(self.across @ f, h[keys])
         if (missing := len(self.own) - len(f)) > 0:
             still = np.linalg.svd(J[:, :-1])[2][-missing:]
-            f = np.append(f, still @ ((u - self.u)[self.own] / self.scale))
+            f = np.append(f, still @ (Y[:-1] - self.u[self.own] / self.scale[:-1]))
             J = np.vstack([J, np.pad(still, ((0, 0), (0, 1)))])
-        return f, J
+        return _Field(solved.X, f, J)
 
-    def solved(self, values: FloatArray) -> FloatArray | None:
-        """The corner at other values of the parameters, from the nearest where it is known."""
-        value = float(values[self.curve.place])
+    def solved(self, value: float) -> FloatArray | None:
+        """The corner at another value of the parameter, from the nearest where it is known."""
         begun = self.known[min(self.known, key=lambda one: abs(one - value))]
-        u = begun.copy()
-        for _ in range(self.curve.most):
-            f, J = self.equations(u, values)
-            step = np.linalg.lstsq(J[:, :-1], -f, rcond=None)[0]
-            u[self.own] += step * self.scale
-            if np.abs((u - begun)[self.own] / self.scale).max() > FARTHEST:
-                return None
-            if np.abs(step).max() < CLOSE:
-                self.known[value] = u
-                return u
-        return None
+        Y, border = np.append(begun[self.own], value) / self.scale, np.eye(self.n)[-1]
+        found = self.correct(Y, border, float(Y[-1]), tolerance=CLOSE, singular=True)
+        if found is None or np.abs(found[1] - Y).max() > FARTHEST:
+            return None
+        self.known[value] = self._at(found[0].X)[0]
+        return self.known[value]
 
-    def margins(self, u: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
+    def clearances(self, u: FloatArray, value: float) -> tuple[FloatArray, float]:
         """Margins of the conditions that are not met by construction; and how nearly another corner is as extreme."""
-        h, h_u = self.field.indicators(u, values, self.curve.memory)
-        edge = EDGE * (np.abs(h_u) @ (self.curve.system.scale_vector() + np.abs(u)))
+        solved = self.evaluate(np.append(u[self.own], value) / self.scale)
+        h, h_u = self.field.indicators(*self._at(solved.X), self.memory)
+        edge = EDGE * (np.abs(h_u) @ (self.system.scale_vector() + np.abs(u)))
         margins = np.where(self.met, -np.inf, self.field.margins(h, edge))
         if not self.keys:
             return margins, -np.inf
-        (k, sign), J = self.side, self.equations(u, values)[1][:, :-1]
+        (k, sign), J = self.side, solved.J[:, :-1]
         pushes = np.linalg.lstsq(J.T, sign * np.eye(len(J))[self.own.index(k)], rcond=None)[0]
         own = (pushes * np.abs(J).max(axis=1))[len(self.across) :][: len(self.keys)] * self.signs
         return margins, -float(own.min() / max(np.abs(own).max(), FREE)) - FREE
 
 
-class SetOfEquilibria(Equilibria):
+class SetOfEquilibria(_Corner):
     """A set of equilibria, as dry friction leaves it: one of its extreme points is followed, the others beside it."""
 
     def __init__(self, system: System, parameter: str, width: float, found: EquilibriumSet, value: float) -> None:
-        super().__init__(system, found.modes[0], parameter, width)
-        self.found = found
-        first = min(found.extremes, key=lambda one: one.mode != self.mode, default=None)
-        first = first or Extreme(found.point, self.mode)
-        self.corners = [_Corner(self, one, value) for one in (first, *(e for e in found.extremes if e is not first))]
-        self.scale = np.append(self.corners[0].scale, width)
-
-    def evaluate(self, Y: FloatArray) -> _Field:
-        """The equations of the extreme point that is followed."""
-        X = Y * self.scale
-        return _Field(X, *self.corners[0].equations(*self._at(X)))
+        mode = found.modes[0]
+        first = min(found.extremes, key=lambda one: one.mode != mode, default=None) or Extreme(found.point, mode)
+        super().__init__(system, parameter, width, first, value)
+        self.found, self.mode = found, mode
+        others = (_Corner(system, parameter, width, one, value) for one in found.extremes if one is not first)
+        self.corners: list[_Corner] = [self, *others]
 
     def described(self, point: Point) -> Rest | None:
         """The middle of the set with its extent; None where an extreme point is not found."""
         first, values = self._at(point.X)
-        ends = [first]
-        for corner in self.corners[1:]:
-            if (end := corner.solved(values)) is None:
-                return None
-            ends.append(end)
-        both = [corner.margins(u, values) for corner, u in zip(self.corners, ends, strict=True)]
+        ends: list[Any] = [first, *(corner.solved(point.value) for corner in self.corners[1:])]
+        if any(end is None for end in ends):
+            return None
+        both = [corner.clearances(u, point.value) for corner, u in zip(self.corners, ends, strict=True)]
         margins = np.append(np.max([one for one, _ in both], axis=0), max(other for _, other in both))
         lower = np.where(np.isinf(self.found.lower), -np.inf, np.min(ends, axis=0))
         upper = np.where(np.isinf(self.found.upper), np.inf, np.max(ends, axis=0))
         middle = np.mean(ends, axis=0)
-        jacobian = self.field.evaluate(middle, values, self.memory)[1]
+        jacobian = mode_field(self.system.traced, self.mode, (self.place,)).evaluate(middle, values, self.memory)[1]
         return self._measured(point, middle, jacobian, margins, lower, upper)
 
     def word(self) -> Any:
@@ -261,21 +237,22 @@ def equilibria_near(
     found = equilibrium_sets(system, u, values=values, modes=modes)
     watched = modes_of_sets(system)
     for one in sorted(found, key=lambda one: one.distance(u)):
-        curve = Equilibria(system, one.modes[0], parameter, width)
+        curve, begun = Equilibria(system, one.modes[0], parameter, width), one.point
         if one.free:
-            curve = SetOfEquilibria(system, parameter, width, one, value)
+            curve = several = SetOfEquilibria(system, parameter, width, one, value)
+            begun = several.u
         if watched:
             curve.watched = tuple({*watched, *one.modes})
-        rest = curve.at(curve.corners[0].u if isinstance(curve, SetOfEquilibria) else one.point, value)
+        rest = curve.at_parameter(np.append(begun[curve.own], value) / curve.scale, value)
         if rest is not None:
             yield rest
 
 
 def goes_on(rest: Rest, other: Rest, size: FloatArray) -> bool:
     """Return whether of two sets beside each other one is part of the other."""
-    ends = rest.lower, rest.upper, other.lower, other.upper
-    return _within(*ends, size) or _within(*ends[2:], *ends[:2], size)
+    return _within(rest, other, size) or _within(other, rest, size)
 
 
-def _within(low: FloatArray, high: FloatArray, lower: FloatArray, upper: FloatArray, size: FloatArray) -> bool:
-    return bool((low >= lower - size).all() and (high <= upper + size).all())
+def _within(a: Any, b: Any, size: FloatArray) -> bool:
+    """Return whether the extent of a set is part of that of another."""
+    return bool((a.lower >= b.lower - size).all() and (a.upper <= b.upper + size).all())

@@ -6,15 +6,15 @@ and is left out where ``forced`` is False.
 
 from __future__ import annotations
 
-from functools import cache
+from itertools import combinations
+from math import prod
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 
 __all__ = [
-    "EDGE", "multipliers_of", "nearest_to_one", "pairs", "product_of_pairs", "stability", "stable_by", "without_own",
+    "EDGE", "multipliers_of", "nearest_to_one", "product_of_pairs", "stability", "stable_by", "without_own",
 ]  # fmt: skip
 
 EDGE = 1e-9  # a modulus within this of 1 counts as neither
@@ -69,13 +69,4 @@ def nearest_to_one(mu: ComplexArray, forced: bool) -> complex:
 
 def product_of_pairs(mu: ComplexArray) -> float:
     r""":math:`\prod_{i<j} (\mu_i \mu_j - 1)`, zero where a pair reaches the unit circle; NaN where there is no pair."""
-    if len(mu) < 2:
-        return np.nan
-    i, j = pairs(len(mu))
-    return float(np.prod(mu[i] * mu[j] - 1.0).real)
-
-
-@cache
-def pairs(n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Places i < j of all pairs among n."""
-    return np.triu_indices(n, 1)
+    return prod(a * b - 1.0 for a, b in combinations(mu.tolist(), 2)).real if len(mu) > 1 else np.nan

@@ -58,6 +58,26 @@ class OrbitPoint(Point):
         return self.curve.shooting
 
     @property
+    def signature(self) -> Signature:
+        """The signature."""
+        return self.curve.shooting.signature
+
+    @property
+    def values(self) -> FloatArray:
+        """All parameters."""
+        return self.solved.values
+
+    @property
+    def period(self) -> float:
+        """The time once round."""
+        return float(self.solved.times[-1])
+
+    @property
+    def once(self) -> Round:
+        """Once round it."""
+        return self.curve.shooting.once(self.X)
+
+    @property
     def virtual(self) -> bool:
         """True where its path goes through a boundary that it should obey."""
         return self.path.virtual
@@ -175,6 +195,9 @@ class Orbits(Curve[OrbitPoint]):
         it."""
         shooting, z = self.shooting, point.X[: self.shooting.n]
         if shooting.reference is None:
+            farthest = np.fmax(np.abs(point.path.maximum), np.abs(point.path.minimum))
+            if not (farthest > GROWN * self.size[: len(farthest)]).any():
+                return None
             size = size_of(point.path.maximum, point.path.minimum, shooting.system)
             if not (size > GROWN * self.size).any():
                 return None

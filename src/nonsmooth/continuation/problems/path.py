@@ -77,12 +77,10 @@ class Walk:
         traced: Traced = system.traced
         self.net, (jet, n_scratch) = pack_net(traced), shooting.flow.path()
         self.functions = addresses(jet)
-        n_t = len(traced.transitions)
+        jumps, visits, self.modes = traced.transitions, shooting.signature.visits, shooting.modes
         n, m = len(traced.u), shooting.m + 1
-        visits = shooting.signature.visits
-        self.modes = shooting.modes
         both = [_in_net(traced, self.net, v.transition, v.row) for v in visits]
-        self.fired, self.fired_row = (np.array(part, dtype=np.int64) for part in zip(*both, strict=True))
+        self.fired, self.fired_row = np.array(both, dtype=np.int64).T.copy()
         self.lacking = np.array(traced.lacking, dtype=np.int64).reshape(len(traced.mode_names), n)
         self.weight = system.scale_vector() * 1e-3
         rows = n + len(traced.indicators) + len(traced.outputs)
@@ -90,34 +88,24 @@ class Walk:
             np.zeros((rows, ORDER + 1)), np.zeros((n_scratch, ORDER + 1)), np.zeros(n),
             np.zeros(len(traced.indicators)),
         )  # fmt: skip
-        self.memory = len(traced.m)
-        self.shape = (m, n_t)
-        self.n = n
-        fires = np.array([jump.fires for jump in traced.transitions], dtype=bool)
-        conditions = (self.net.at < 0) & fires
-        armed = [[traced.transitions[k].source == mode for k in range(n_t)] for mode in self.modes]
-        self.armed = np.array(armed, dtype=bool).reshape(m, n_t)
-        self.armed &= conditions[None, :]
+        self.memory, self.shape, self.n = len(traced.m), (m, len(jumps)), n
+        sources = np.array([jump.source for jump in jumps], dtype=np.int64)
+        fires = np.array([jump.fires for jump in jumps], dtype=bool) & (self.net.at < 0)
+        self.armed = (sources == self.modes[:, None]) & fires
         self.elsewhere = self.armed.copy()  # transitions that could fire at the end of a visit but do not
         for i, (k, r) in enumerate(zip(self.fired, self.fired_row, strict=True)):
             if k >= 0:  # what holds wherever this one does, and was declared behind it, is not taken
-                own = set(traced.transitions[k].rows)
+                own = set(jumps[k].rows)
                 self.elsewhere[i, k] = False
-                behind = traced.transitions[k:]
-                self.elsewhere[i, k:] &= np.array([not (jump.rows and set(jump.rows) <= own) for jump in behind])
+                self.elsewhere[i, k:] &= np.array([not (jump.rows and set(jump.rows) <= own) for jump in jumps[k:]])
             if traced.asks and r >= 0:  # what several decide fires with what one does
-                self.elsewhere[i] &= [all(one.indicator != self.net.rows[r, 0] for one in jump.rows)
-                                      for jump in traced.transitions]  # fmt: skip
+                self.elsewhere[i] &= [all(one.indicator != self.net.rows[r, 0] for one in jump.rows) for jump in jumps]
         self.conditional = np.flatnonzero(self.fired_row[:-1] >= 0)
         self.at_once = np.array([*shooting.at_once, False], dtype=bool)  # visits of no length
         fixed = [shooting.forced]
-        for visit in visits[:-1]:
-            if visit.row == AT_ONCE:
-                fixed.append(fixed[-1])
-            else:  # at a phase that does not depend on the parameters
-                fixed.append(isinstance(traced.transitions[visit.transition].at, int | float))
-        fixed.append(shooting.forced)
-        ends = np.array(fixed, dtype=bool)
+        for visit in visits[:-1]:  # at a phase that does not depend on the parameters
+            fixed.append(fixed[-1] if visit.row == AT_ONCE else isinstance(jumps[visit.transition].at, int | float))
+        ends = np.array([*fixed, shooting.forced], dtype=bool)
         # Visits whose length cannot vanish
         self.fixed = (ends[:-1] & ends[1:]) | self.at_once if m > 1 else np.array([True])
         self.crossed = np.zeros((m, len(traced.indicators)), dtype=bool)  # indicators zero where a visit begins

@@ -138,23 +138,19 @@ class Shooting:
 
     def _constants(self) -> list[int]:
         """Components of z that no visit moves and no transition sets."""
-        traced, signature = self.system.traced, self.signature
-        n_u = len(traced.u)
-        kept = []
-        for j in range(self.n):
-            if j < n_u:
-                moved = any(traced.fields[v.mode][j] != 0 for v in signature.visits)
-                jumps = [traced.transitions[v.transition] for v in signature.crossings]
-                resets = any(t.reset is not None and t.reset[j] != traced.u[j] for t in jumps)
-                dropped = any(traced.lacking[v.mode][j] for v in signature.visits)
-                never = all(traced.lacking[v.mode][j] for v in signature.visits)
-                if never or not (moved or resets or dropped):
-                    kept.append(j)
-            elif not any(
-                index == j - n_u for v in signature.crossings for index, _ in traced.transitions[v.transition].writes
-            ):
-                kept.append(j)
-        return kept
+        traced, crossings = self.system.traced, self.signature.crossings
+        taken, n_u = [traced.transitions[v.transition] for v in crossings], len(traced.u)
+        written = {index for jump in taken for index, _ in jump.writes}
+
+        def changes(j: int) -> bool:
+            if j >= n_u:
+                return j - n_u in written
+            lacks = [traced.lacking[mode][j] for mode in self.modes]
+            moved = any(traced.fields[mode][j] != 0 for mode in self.modes)
+            resets = any(jump.reset is not None and jump.reset[j] != traced.u[j] for jump in taken)
+            return not all(lacks) and (moved or resets or any(lacks))
+
+        return [j for j in range(self.n) if not changes(j)]
 
     def prepare(self, X: FloatArray, size: FloatArray) -> None:
         """Anchor the orbit at X, and look at the surfaces there."""
@@ -177,15 +173,11 @@ class Shooting:
         values = self.parameters(X)
         traced = self.system.traced
         for i, (k, row, at, _) in enumerate(self.jumps):
-            n_rows = len(traced.transitions[k].rows)
-            if at is None and n_rows > 1 and not self.at_once[i]:
-                found = [self.flow.jump(values, k, float(times[i]), z[i + 1], r) for r in range(n_rows)]
-                signs = [r.sign for r in traced.transitions[k].rows]
-                self.alone[i] = all(
-                    coincide(signs[row] * found[row].h_z, signs[row] * found[row].h, signs[r] * one.h_z,
-                              signs[r] * one.h, z[i + 1])
-                    for r, one in enumerate(found) if r != row
-                )  # fmt: skip
+            rows = traced.transitions[k].rows
+            if at is None and len(rows) > 1 and not self.at_once[i]:
+                jumps = [self.flow.jump(values, k, float(times[i]), z[i + 1], r) for r in range(len(rows))]
+                signed = [(one.sign * jump.h_z, one.sign * jump.h) for one, jump in zip(rows, jumps, strict=True)]
+                self.alone[i] = all(coincide(*signed[row], *one, z[i + 1]) for one in signed)
         for i in range(0 if self.forced and self.m > 1 else 1, self.m):
             if self.jumps[i][2] is self.jumps[i - 1][2] is None and not (self.at_once[i] or self.at_once[i - 1]):
                 self.divided[i] = self._order(i, values, float(times[i - 1]), z[i or -1])

@@ -76,17 +76,10 @@ def _sign(odd: NDArray[np.bool_]) -> float:
 
 
 def _parity(permutation: NDArray[np.int32]) -> float:
-    """1 for an even permutation, -1 for an odd one."""
-    seen = np.zeros(len(permutation), dtype=bool)
-    parity = 1.0
-    for i in range(len(permutation)):
-        if seen[i]:
-            continue
-        j, length = i, 0
-        while not seen[j]:
-            seen[j] = True
-            j = int(permutation[j])
-            length += 1
-        if length % 2 == 0:
-            parity = -parity
-    return parity
+    """1 for an even permutation, -1 for an odd one: each cycle of n places is n - 1 exchanges."""
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    n = len(permutation)
+    cycles = connected_components(csr_matrix((np.ones(n), permutation, np.arange(n + 1))))[0]
+    return -1.0 if (n - cycles) % 2 else 1.0

@@ -61,14 +61,17 @@ def _size(flow: VariationalFlow, jump: Jump, z: FloatArray) -> float:
 
 
 def round_of(
-    flow: VariationalFlow, values: FloatArray, log: Log, z: FloatArray, mode: int, period: float, period_number: int = 0
-) -> Round | None:
-    """A log that begins at the section, in the state z of a mode, as once round; None where it ends in another mode."""
-    visits, after = visits_of(flow, values, log, z[flow.n_u :])
+    flow: VariationalFlow, values: FloatArray, log: Log, z: FloatArray, mode: int, period: float,
+    period_number: int = 0, first: int = 0, begin: float = 0.0,
+) -> Round | None:  # fmt: skip
+    """A log as once round from a time on, in the state z of a mode, before the transition ``first``.
+
+    None where it ends in another mode."""
+    visits, after = visits_of(flow, values, log, z[flow.n_u :], first)
     if visits and flow.traced.transitions[visits[-1].transition].target != mode:
         return None
     signature = Signature((*visits, Visit(mode)))
-    return Round(period_number, period, signature, log.crossing_time, np.vstack([z, after]))
+    return Round(period_number, period, signature, log.crossing_time[first:] - begin, np.vstack([z, after]))
 
 
 def anchored(flow: VariationalFlow, values: FloatArray, once: Round) -> Round:

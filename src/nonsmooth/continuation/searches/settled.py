@@ -8,14 +8,14 @@ half way up the state that swings most, passed upwards.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.signature import Round, Signature, Visit
-from nonsmooth.continuation.problems.visits import anchored, round_of, visits_of
+from nonsmooth.continuation.problems.visits import anchored, round_of
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import IntArray, Log, Section, State
 from nonsmooth.flow.equilibria import AT_REST, ROUNDING, equilibrium_at
@@ -35,7 +35,7 @@ CLOSED = 1e-8  # a return nearer than this has closed: the shortest such period 
 TOUCH = 1e-6  # of the period, of the motion's size: a contact as short, an impact as weak as this may be a touch
 NEAR = 0.2  # of the motion's size: a return farther off than this is no candidate
 SAMPLES = 4001
-FEW, MANY = 8, 200  # rounds in a stretch of motion that is long, and short, enough to look at
+FEW, MANY = 8, 200  # rounds in an interval of motion that is long, and short, enough to look at
 LONGEST = 1e6
 REST = 1e-7  # of its scale: a motion smaller than this has come to rest
 AT_ONCE = 1e-12  # of a unit of time: what happens within it happens at the start
@@ -57,93 +57,65 @@ class Guess(Round):
 
 @dataclass
 class Settled:
-    """Section points after the transient."""
+    """Section points after the transient, and the state at the last of them."""
 
     points: FloatArray  # (keep, n_u)
     modes: NDArray[np.int64]  # (keep,)
     size: FloatArray
     state: State
     status: int
-    engine: Engine
-    tables: Any
 
 
-def settle_forced(system: System, engine: Engine, state: State, transient: int, keep: int, search: Search) -> Settled:
+def settle_forced(system: System, engine: Engine, state: State, transient: int, keep: int) -> Settled:
     """Run a forced system through a transient and keep the section points after it."""
-    tables = engine.prepare(system.parameter_vector()[None, :])
-    passed, left, begun = engine.kept(1, 1), transient, state.copy()
-
-    def march(piece: float) -> bool:
-        nonlocal left
-        some = min(max(1, round(piece)), left)
-        if some:
-            engine.chain(tables, 0, 1, state, None, Section(), some - 1, 1, passed)
-            left -= some
-        return int(passed.status[0]) in (codes.OK, codes.NOT_GUARANTEED)
-
-    search.in_pieces(float(transient), march)
-    if passed.status[0] == codes.BEYOND_STOP:  # an impact on the section: a motion that was cut there cannot begin
-        state, left, passed.status[0] = begun, transient, codes.OK
-    out = engine.kept(1, keep)
-    if passed.status[0] in (codes.OK, codes.NOT_GUARANTEED):
-        engine.chain(tables, 0, 1, state, None, Section(), left, keep, out)
-    else:
-        out.status[0] = passed.status[0]
-    search.look()
-    scale = system.scale_vector()
+    out, scale = engine.kept(1, keep), system.scale_vector()
+    engine.chain(engine.prepare(system.parameter_vector()[None, :]), 0, 1, state, None, Section(), transient, keep, out)
     size = np.maximum(0.5 * (out.high - out.low)[0, : len(scale)], 1e-3 * scale)
-    return Settled(np.nan_to_num(out.section[0]), out.section_mode[0], size, state, int(out.status[0]), engine, tables)
+    return Settled(np.nan_to_num(out.section[0]), out.section_mode[0], size, state, int(out.status[0]))
 
 
-def forced_guesses(system: System, settled: Settled, period_number: int | None, most: int) -> list[Guess]:
+def forced_guesses(
+    system: System, engine: Engine, settled: Settled, period_number: int | None, most: int
+) -> list[Guess]:
     """Candidates for the period number, the smallest first, from the last section point.
 
     For a given period number: from the section points that return nearest to themselves. A return is one in the mode
     it began in.
     """
-    points = settled.points / settled.size
+    points, modes = settled.points / settled.size, settled.modes
+    last = len(points) - 1
 
     def gap(i: int, j: int) -> float:
-        return float(np.abs(points[i] - points[j]).max()) if settled.modes[i] == settled.modes[j] else np.inf
+        return float(np.abs(points[i] - points[j]).max()) if modes[i] == modes[j] else np.inf
 
-    guesses = []
     if period_number is not None:
-        p = period_number
-        gaps = np.array([gap(i, i + p) for i in range(len(points) - p)])
-        places = [int(i) for i in np.argsort(gaps, kind="stable")[:CHOICE]]
-        if len(settled.state.memory):  # the memory is known at the last point only
-            places = [len(gaps) - 1]
-        starts = [(p, i, float(gaps[i])) for i in places]
+        way, p = 1, period_number
+        # The memory is known at the last point only.
+        places = [last - p] if len(settled.state.memory) else range(last - p + 1)
+        starts = [(p, i) for i in sorted(places, key=lambda i: gap(i, i + p))[:CHOICE]]
     else:
-        last = len(points) - 1
-        gaps = np.array([gap(last, last - p) for p in range(1, most + 1)])
-        starts = [(p, last, float(gaps[p - 1])) for p in range(1, most + 1) if gaps[p - 1] <= NEAR]
+        way, near = -1, [p for p in range(1, most + 1) if gap(last, last - p) <= NEAR]
         # Chaos comes near its beginning again and again: the nearest few are tried.
-        starts = sorted(sorted(starts, key=lambda start: (max(start[2], CLOSED), start[0]))[:CHOICE])
-    for p, i, _ in starts:
-        back = period_number is None
-        returns = np.array([gap(i, i - q if back else i + q) for q in range(1, p + 1)])
-        guess = _read_round(system, settled, p, i, returns) if np.isfinite(returns[-1]) else None
-        if guess is not None:
-            guesses.append(guess)
-    return guesses
+        near.sort(key=lambda p: max(gap(last, last - p), CLOSED))
+        starts = [(p, last) for p in sorted(near[:CHOICE])]
+    rounds = ((p, i, np.array([gap(i, i + way * q) for q in range(1, p + 1)])) for p, i in starts)
+    guesses = [_read_round(system, engine, settled, *one) for one in rounds if np.isfinite(one[2][-1])]
+    return [guess for guess in guesses if guess is not None]
 
 
-def _read_round(system: System, settled: Settled, p: int, i: int, gaps: FloatArray) -> Guess | None:
+def _read_round(
+    system: System, engine: Engine, settled: Settled, p: int, i: int, gaps: FloatArray
+) -> Guess | None:
     """The motion over p forcing periods from section point i, as an orbit; None where it ends in another mode."""
     state = settled.state.copy()
     if i < len(settled.points) - 1:
-        state.u[:], state.counters[0] = settled.points[i], settled.modes[i]
-        state.counters[1:] = (-1, 0, 0)
+        state.u[:], state.counters[:] = settled.points[i], (settled.modes[i], -1, 0, 0)
     state.clock[:], state.settled = 0.0, True
-    period = float(system.period() or 0.0)
-    start = np.concatenate([state.u, state.memory])
-    mode = int(state.counters[0])
-    log = settled.engine.record(settled.tables, state, p * period, np.empty(0))
-    if log.status not in (codes.OK, codes.NOT_GUARANTEED):
-        return None
-    flow, values = VariationalFlow.of(system), system.parameter_vector()
-    once = round_of(flow, values, log, start, mode, p * period, p)
+    values, period = system.parameter_vector(), p * float(system.period() or 0.0)
+    start, mode = np.concatenate([state.u, state.memory]), int(state.counters[0])
+    log = engine.record(engine.prepare(values[None, :]), state, period, np.empty(0))
+    flow, good = VariationalFlow.of(system), log.status in (codes.OK, codes.NOT_GUARANTEED)
+    once = round_of(flow, values, log, start, mode, period, p) if good else None
     if once is None:
         return None
     kicks = np.abs(np.nan_to_num(log.u_after - log.u_before) / settled.size).max(axis=1, initial=0.0)
@@ -177,8 +149,8 @@ def touching(guess: R, system: System, kicks: FloatArray | None = None) -> list[
 
 
 @dataclass
-class _Stretch:
-    """A stretch of motion, and what its second half tells: passages of the level half way up, and half the ranges."""
+class _Interval:
+    """An interval of motion, and what its second half tells: passages of the level half way up, and half the ranges."""
 
     log: Log
     times: FloatArray  # of the passages upwards, interpolated
@@ -194,10 +166,11 @@ def autonomous_guesses(
     """Candidates for once round, the shortest first."""
     tables = engine.prepare(system.parameter_vector()[None, :])
 
-    def run(duration: float) -> _Stretch:
+    def run(duration: float) -> _Interval:
         begin = float(state.clock[0])
         instants = begin + np.linspace(0.0, duration, SAMPLES)
-        log = search.record(engine, tables, state, begin + duration, instants)
+        state.settled = False  # an event just where it begins is taken as at any start
+        log = engine.record(tables, state, begin + duration, instants)
         if log.status not in (codes.OK, codes.NOT_GUARANTEED):
             raise solve_error(log.status, begun=(system, state.u))
         return _seen(log, instants, system)
@@ -207,9 +180,9 @@ def autonomous_guesses(
     _refuse_equilibrium(system, first, "the start", ROUNDING)
     duration = 64.0
     while True:
-        stretch = run(duration)
-        rounds = len(stretch.times)
-        if stretch.rests:
+        interval = run(duration)
+        rounds = len(interval.times)
+        if interval.rests:
             _refuse_equilibrium(system, state, TENDS, AT_REST, stable=True)
         if rounds < FEW and duration < LONGEST:
             duration *= 4.0
@@ -228,15 +201,15 @@ def autonomous_guesses(
     if transient:
         search.doing = f"letting {transient} rounds of some {one:.3g} units of time pass"
         run(transient * one)
-    stretch = run(max((2 * (given or min(most, 8)) + 3), FEW) * one)
-    if stretch.rests:
+    interval = run(max((2 * (given or min(most, 8)) + 3), FEW) * one)
+    if interval.rests:
         _refuse_equilibrium(system, state, TENDS, AT_REST)
         raise SolveError(f"{TENDS} there is no cycle here. {ELSEWHERE}", status="equilibrium")
-    found = _by_transitions(system, stretch, most, given) if len(stretch.log.crossing_time) > 1 else []
-    return found or _by_level(stretch, most, given)
+    found = _by_transitions(system, interval, most, given) if len(interval.log.crossing_time) > 1 else []
+    return found or _by_level(interval, most, given)
 
 
-def _seen(log: Log, instants: FloatArray, system: System) -> _Stretch:
+def _seen(log: Log, instants: FloatArray, system: System) -> _Interval:
     """The passages of the level half way up the state that swings most."""
     u, scale = np.nan_to_num(log.sample_u), system.scale_vector()
     begin = len(u) // 2
@@ -248,7 +221,7 @@ def _seen(log: Log, instants: FloatArray, system: System) -> _Stretch:
     part = x[at] / (x[at] - x[at + 1])
     points = (1 - part)[:, None] * u[at] + part[:, None] * u[at + 1]
     times = instants[at] + part * (instants[1] - instants[0])
-    return _Stretch(log, times, points, log.sample_mode[at], rests, np.maximum(half, 1e-3 * scale))
+    return _Interval(log, times, points, log.sample_mode[at], rests, np.maximum(half, 1e-3 * scale))
 
 
 def _refuse_equilibrium(system: System, state: State, what: str, near: float, stable: bool = False) -> None:
@@ -260,37 +233,34 @@ def _refuse_equilibrium(system: System, state: State, what: str, near: float, st
         )
 
 
-def _by_transitions(system: System, stretch: _Stretch, most: int, given: int | None) -> list[Guess]:
+def _by_transitions(system: System, interval: _Interval, most: int, given: int | None) -> list[Guess]:
     """Sequences of transitions that repeat."""
-    flow, values, log = VariationalFlow.of(system), system.parameter_vector(), stretch.log
+    flow, values, log = VariationalFlow.of(system), system.parameter_vector(), interval.log
     k, after = log.crossing_transition, np.nan_to_num(log.u_after)
-    last, guesses = len(k) - 1, []
-    for length in range(1, min(last, 40 * most) + 1):
-        begun = last - length
-        gap = float(np.abs((after[last] - after[begun]) / stretch.size).max())
+    last, mode, guesses = len(k) - 1, system.traced.transitions[k[-1]].target, []
+    for begun in range(last - 1, max(last - 40 * most, 0) - 1, -1):
+        gap = float(np.abs((after[last] - after[begun]) / interval.size).max())
         if k[begun] != k[last] or gap > NEAR:
             continue
-        begin, end = float(log.crossing_time[begun]), float(log.crossing_time[last])
-        visits, states = visits_of(flow, values, log, log.memory_after[begun], begun + 1)
-        signature = Signature((*visits, Visit(system.traced.transitions[k[last]].target)))
-        times, states = log.crossing_time[begun + 1 :] - begin, np.vstack([states[-1:], states])
-        once = anchored(flow, values, Round(0, end - begin, signature, times, states))
-        guesses.append(Guess(**vars(once), gap=gap, size=stretch.size))
+        begin, z = float(log.crossing_time[begun]), np.append(after[begun], log.memory_after[begun])
+        once = round_of(flow, values, log, z, mode, float(log.crossing_time[last]) - begin, 0, begun + 1, begin)
+        if once is not None:
+            guesses.append(Guess(**vars(anchored(flow, values, once)), gap=gap, size=interval.size))
         if len(guesses) >= (given or most):
             break
     return guesses[given - 1 : given] if given else guesses
 
 
-def _by_level(stretch: _Stretch, most: int, given: int | None) -> list[Guess]:
+def _by_level(interval: _Interval, most: int, given: int | None) -> list[Guess]:
     """Returns to the level half way up."""
-    times, points, guesses = stretch.times, stretch.points, []
+    times, points, guesses = interval.times, interval.points, []
     for p in [given] if given else range(1, most + 1):
         if p >= len(points) or p > most:
             break
-        gap = float(np.abs((points[-1] - points[-1 - p]) / stretch.size).max())
+        gap = float(np.abs((points[-1] - points[-1 - p]) / interval.size).max())
         if gap <= NEAR:
-            z = np.concatenate([points[-1], stretch.log.sample_memory[-1]])[None, :]
-            signature = Signature((Visit(int(stretch.modes[-1])),))
+            z = np.concatenate([points[-1], interval.log.sample_memory[-1]])[None, :]
+            signature = Signature((Visit(int(interval.modes[-1])),))
             guesses.append(Guess(0, float(times[-1] - times[-1 - p]), signature, np.empty(0), z, max(gap, 1e-3),
-                                 stretch.size))  # fmt: skip
+                                 interval.size))  # fmt: skip
     return guesses

@@ -11,9 +11,10 @@ from bokeh.models import BoxAnnotation
 from nonsmooth.explorer.figures import BLUE, MOST, Panel, extent
 from nonsmooth.explorer.labels import number, plain_of
 from nonsmooth.explorer.views.view import Request, Requests, View
-from nonsmooth.plot.labels import column, in_words
+from nonsmooth.plot.labels import column
 from nonsmooth.plot.style import COLORS
 from nonsmooth.plot.trajectories import pieces_by_mode, with_gaps
+from nonsmooth.results.statuses import in_words
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import State

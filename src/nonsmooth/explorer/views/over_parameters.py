@@ -15,9 +15,9 @@ from nonsmooth.explorer.schedule import key_of
 from nonsmooth.explorer.state import CHOICES
 from nonsmooth.explorer.views.view import Ends, Request, Requests, View
 from nonsmooth.plot.branches import MARKS, lines_of, ordinates_of, with_breaks
-from nonsmooth.plot.labels import in_words
 from nonsmooth.plot.style import COLORS
 from nonsmooth.plot.sweeps import one_branch
+from nonsmooth.results.statuses import in_words
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import State
@@ -188,10 +188,8 @@ class Diagram(View):
 _LINES = {"-": ("stable", "solid", 1.8), "--": ("unstable", "dashed", 1.3), ":": ("virtual", "dotted", 1.3)}
 _STROKES = {"-": "━", "--": "╍", ":": "┈"}  # in the legend
 #: Markers of Bokeh for the kinds of special points, and the letter that shows each in the legend.
-_SIGNS = dict(zip(MARKS, (
-    ("circle", "○"), ("square", "□"), ("diamond", "◇"), ("triangle", "△"), ("triangle_pin", "▲"),
-    ("inverted_triangle", "▽"), ("x", "×"), ("cross", "+"), ("hex", "⬡"), ("star", "☆"),
-), strict=True))  # fmt: skip
+_SHAPES = ["circle", "square", "diamond", "triangle", "triangle_pin", "inverted_triangle", "x", "cross", "hex", "star"]
+_SIGNS = dict(zip(MARKS, zip(_SHAPES, "○□◇△▲▽×+⬡☆", strict=True), strict=True))
 _OTHER = "asterisk", "∗"
 _WORDS = {"neimark_sacker": "Neimark-Sacker bifurcation", "flip": "flip (period doubling)"}
 
@@ -229,7 +227,7 @@ class Branches(View):
         self._points = figure.source("x", "y", "words")
         near = figure.plot.scatter("x", "y", source=self._points, size=9, fill_alpha=0.0, line_alpha=0.0)
         figure.tell(near, attachment="left", limit=1)
-        self._marks = figure.source("x", "y", "marker", "words", name="special points")
+        self._marks = figure.source("x", "y", "words", "marker", name="special points")
         special = figure.plot.scatter("x", "y", marker="marker", source=self._marks, size=9, line_width=1.4)
         self.ink(INK, special)
         self.ink(("#FFFFFF", "#171B20"), special, field="fill_color")
@@ -248,9 +246,10 @@ class Branches(View):
         parameter = str(result.attrs["parameter"])
         unit = self.quantity(parameter)[1]
         lines: dict[str, list[Any]] = {line: [np.empty((2, 0))] for line in self._lines}
-        points: dict[str, list[Any]] = {key: [] for key in self._points.data}
-        marks: dict[str, list[Any]] = {key: [] for key in self._marks.data}
-        whole, self._kinds = "branch" in result, {}
+        points: list[tuple[Any, ...]] = []
+        special: list[tuple[Any, ...]] = []
+        self._kinds = {}
+        whole = "branch" in result
         for branch in [one_branch(result, k) for k in range(result.sizes["branch_id"])] if whole else [result]:
             values, period = branch[parameter].values, branch.sizes.get("return", 1)
             places = [number(float(value), unit, 6) for value in values]
@@ -259,27 +258,21 @@ class Branches(View):
                 f"{place}: {'' if good else 'un'}stable, {orbit}"
                 for place, good, orbit in zip(places, branch["stable"].values, orbits, strict=True)
             ]
-            at = branch["special_point"].values.astype(int) if branch.sizes.get("special") else np.zeros(0, int)
-            kinds = [str(kind) for kind in branch["special_kind"].values] if len(at) else []
-            named = [
-                f"{_WORDS.get(kind, kind.replace('_', ' '))} at {places[i]}: {orbits[i]}"
-                for kind, i in zip(kinds, at, strict=True)
-            ]
+            there = branch.sizes.get("special", 0)
+            marks = [*zip(branch["special_point"].values, branch["special_kind"].values, strict=True)] if there else []
+            self._kinds |= {str(kind): None for _, kind in marks}
             for row in ordinates_of(branch, self.state.shown, "section"):
                 for line, some in lines_of(branch):
                     lines[line] += [[with_breaks(values, some), with_breaks(row, some)], [[np.nan], [np.nan]]]
-                # of points at one place the first is told: the special ones
-                for some, of in ((np.arange(len(values)), told), (at, named)):
-                    for key, more in (("x", values[some].tolist()), ("y", row[some].tolist()), ("words", of)):
-                        points[key][:0] = more
-                signs = [_SIGNS.get(kind, _OTHER)[0] for kind in kinds]
-                self._kinds |= dict.fromkeys(kinds)
-                new = {"x": values[at].tolist(), "y": row[at].tolist(), "marker": signs, "words": named}
-                for key, more in new.items():
-                    marks[key] += more
+                points += zip(values, row, told, strict=True)
+                for at, kind in marks:
+                    words = f"{_WORDS.get(kind, kind.replace('_', ' '))} at {places[at]}: {orbits[at]}"
+                    special.append((values[at], row[at], words, _SIGNS.get(kind, _OTHER)[0]))
         for line, source in self._lines.items():
             source.data = dict(zip("xy", np.concatenate(lines[line], axis=1), strict=True))
-        self._points.data, self._marks.data = points, marks
+        # of points at one place the first is told: the special ones
+        for source, rows in ((self._points, [one[:3] for one in special] + points), (self._marks, special)):
+            source.data = {key: [row[k] for row in rows] for k, key in enumerate(source.data)}
 
     def signs(self) -> list[tuple[str, ...]]:
         """Lines and marks that are drawn, each with the sign that shows it."""

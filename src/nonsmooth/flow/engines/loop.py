@@ -28,10 +28,12 @@ from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, OWN, TOG
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
-__all__ = ["DIVERGENCE", "Engine", "end_if_not_wanted", "pack_net"]
+__all__ = ["DIVERGENCE", "Engine", "at_pause", "end_if_not_wanted", "pack_net"]
 
 DIVERGENCE = 1e9  # in units of a state's scale
 KINDS = {ALONE: places.ALONE, OWN: places.OWN, ASKS_BEHIND: places.ASKS_BEHIND}  # place 4 of ``Net.transitions``
+#: Called by the thread of a run whenever it pauses.
+at_pause: list[Callable[[], None]] = []
 SPARE = 64  # crossings that one leg may add to a log
 
 
@@ -225,6 +227,8 @@ class Engine(ABC):
             if self.go_on(tables, march, system):
                 system = self.system(tables, int(march.orders[0]), indicator)
             end_if_not_wanted()
+            for look in at_pause:
+                look()
         return code, system
 
     def room(self, tables: Any) -> Any:

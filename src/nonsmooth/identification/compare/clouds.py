@@ -16,9 +16,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray
 
 __all__ = ["CloudDistance", "block_length", "cloud_distance", "energy_distance", "wasserstein"]
 
@@ -175,7 +175,7 @@ def _energy(between: FloatArray, within: FloatArray, beyond: FloatArray) -> Floa
     return np.asarray(np.sqrt(np.maximum(2 * between - within - beyond, 0.0)))
 
 
-def _halves(n: int, block: int, rng: np.random.Generator) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _halves(n: int, block: int, rng: np.random.Generator) -> tuple[BoolArray, BoolArray]:
     """Two random halves of n points, in blocks; what does not fill a pair of blocks is left out at a random end."""
     count = n // (2 * block)
     first = int(rng.integers(0, n - 2 * count * block + 1))
@@ -185,7 +185,7 @@ def _halves(n: int, block: int, rng: np.random.Generator) -> tuple[NDArray[np.bo
     return halves[0], halves[1]
 
 
-def _parts(n: int, block: int, size: int, rng: np.random.Generator) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _parts(n: int, block: int, size: int, rng: np.random.Generator) -> tuple[BoolArray, BoolArray]:
     """Two random parts of n points, apart from each other, each of ``size`` points or half of all."""
     one, two = _halves(n, block, rng)
     for part in (one, two):

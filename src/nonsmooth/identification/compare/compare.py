@@ -10,7 +10,7 @@ import numpy as np
 from nonsmooth.flow.arguments import real_number
 from nonsmooth.flow.options import solver_of
 from nonsmooth.identification.blas import one_blas_thread
-from nonsmooth.identification.compare.draws import Model, nominal, read_settings
+from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
 from nonsmooth.identification.compare.measured import recorded_motion
 from nonsmooth.identification.options import Prediction
 from nonsmooth.system.arguments import checked
@@ -182,7 +182,7 @@ def compare(
             measured, model, noise=_noise(measured, noise, states), start=start, phases=phases,
             grid=options["grid"], max_period=options["max_period"], splits=options["splits"],
         )  # fmt: skip
-        variables["section_phase"] = (("section_phase",), np.array(phases), {
+        variables["section_phase"] = ("section_phase", np.array(phases), {
             "long_name": "phase of the section", "units": "forcing periods"})  # fmt: skip
     given = {
         "settings": {key: ["follows" if one.follows else one.value, one.uncertainty] for key, one in set_.items()},
@@ -259,9 +259,8 @@ def _noise(measured: xr.Dataset, noise: Any, states: list[str]) -> np.ndarray:
 
 
 def _parameter(name: str, theory: Any) -> str:
-    if hasattr(theory, "parameters") and name not in theory.parameters:
-        units = {key: item.unit for key, item in theory.parameters.items()}
-        raise ValueError(unknown(name, "a parameter", repr(theory.name), units))
+    if hasattr(theory, "parameters"):
+        check_parameter(name, theory)
     return name
 
 
@@ -307,7 +306,7 @@ def _dataset(
         "state_unit": ("state", np.array([units[name] for name in model.states]), {"long_name": "unit"}),
     }
     parameter_names = set(getattr(theory, "parameters", ()))
-    named = {key for key, (dims, _, _) in variables.items() if dims == (key,) or (not dims and key in parameter_names)}
+    named = {key for key, (dims, _, _) in variables.items() if dims == key or (not dims and key in parameter_names)}
     coords |= {key: variables.pop(key) for key in sorted(named)}
     data = {key: (dims, np.asarray(values), attrs) for key, (dims, values, attrs) in variables.items()}
     attrs = {"comparison": kind, "synthetic": synthetic, "title": str(measured.attrs.get("title", ""))}

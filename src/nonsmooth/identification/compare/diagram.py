@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.identification.compare.draws import Model
-from nonsmooth.identification.compare.flips import Flip, delayed_flips
-from nonsmooth.identification.compare.periods import flips, measured_period, period_numbers
+from nonsmooth.identification.compare.periods import Flip, delayed_flips, flips, measured_period, period_numbers
 from nonsmooth.identification.compare.predict import Motions
 
 if TYPE_CHECKING:
@@ -36,7 +34,7 @@ def compare_diagram(
     grid = np.linspace(at.min(), at.max(), FINE) if values is None else np.asarray(values, dtype=float)
     words = ["up", "down"] if direction == "both" else [direction]
 
-    def diagram(system: System) -> tuple[FloatArray, NDArray[np.int64]]:
+    def diagram(system: System) -> tuple[FloatArray, IntArray]:
         return _marched(system, model, name, grid, words, max_period, phase)
 
     theory = model.theory
@@ -50,13 +48,13 @@ def compare_diagram(
         periods = theory["period_number"].transpose(..., name).values.reshape(-1, len(grid))
     over = (name, "direction", "iterate", "state")
     variables: dict[str, Any] = {
-        f"measured_{name}": (("sample",), at, {"long_name": f"measured {name}", "units": unit}),
+        f"measured_{name}": ("sample", at, {"long_name": f"measured {name}", "units": unit}),
         "measured_section": (("sample", "state"), points, {"long_name": "measured section points"}),
-        "measured_period_number": (("sample",), numbers, {"long_name": "measured period number (0: none found)"}),
+        "measured_period_number": ("sample", numbers, {"long_name": "measured period number (0: none found)"}),
         "theory_section": (over, np.moveaxis(sections, 0, 1), {"long_name": "predicted section points"}),
         "theory_period_number": ((name, "direction"), periods.T, {"long_name": "predicted period number (0: none)"}),
-        name: ((name,), grid, {"long_name": name, "units": unit}),
-        "direction": (("direction",), np.array(words), {"long_name": "direction of the sweep"}),
+        name: (name, grid, {"long_name": name, "units": unit}),
+        "direction": ("direction", np.array(words), {"long_name": "direction of the sweep"}),
     }  # fmt: skip
     drawn_flips: list[dict[str, float]] = []
     if model.system is not None and model.draws:
@@ -83,7 +81,7 @@ def compare_diagram(
 
 def _marched(
     system: System, model: Model, name: str, grid: FloatArray, words: Sequence[str], max_period: int, phase: float
-) -> tuple[FloatArray, NDArray[np.int64]]:
+) -> tuple[FloatArray, IntArray]:
     """The diagram, the state carried along; settings that follow from the parameter change with it."""
     rules = {key: setting for key, setting in model.settings.items() if setting.follows and key != name}
     # A drawn system is off its rule by an error that stays the same along the diagram.
@@ -92,10 +90,7 @@ def _marched(
     for value in grid:
         here = {**system.values, name: float(value)}
         systems.append(system.with_parameters(here | {k: rule.at(here) + beside[k] for k, rule in rules.items()}))
-    motions = Motions(
-        systems, transient=model.transient, keep=KEEP, max_period=max_period, options=model.options, phase=phase,
-        places=model.places,
-    )  # fmt: skip
+    motions = Motions(systems, model, keep=KEEP, max_period=max_period, phase=phase)
     rising = np.argsort(grid, kind="stable").tolist()
     found = [motions.carried(rising if word == "up" else rising[::-1]) for word in words]
     return np.stack([sections for sections, _ in found]), np.stack([periods for _, periods in found])
@@ -103,7 +98,7 @@ def _marched(
 
 def _measured(
     measured: xr.Dataset, name: str, noise: FloatArray, max_period: int
-) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+) -> tuple[FloatArray, FloatArray, IntArray]:
     """Values, points and period numbers, one row for each point: steady runs, or one slow rise."""
     section = measured["section"]
     if name in section.dims:
@@ -132,7 +127,7 @@ def _flips(
     nothing = Flip(np.nan, np.nan, np.nan)
     m, error, read = np.array([measured.get(word, nothing) for word in words], dtype=float).reshape(-1, 3).T
     t = np.array([theory.get(word, np.nan) for word in words], dtype=float)
-    over = ("flip",)
+    over = "flip"
     variables: dict[str, Any] = {
         "flip": (over, np.array(words, dtype=str), {"long_name": "period numbers on the two sides of the flip"}),
         "measured_flip": (over, m, {"long_name": "measured flip (NaN: none was seen)", "units": unit}),

@@ -11,11 +11,16 @@ import numpy as np
 
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.flow.arguments import ends, real_number
+from nonsmooth.identification.uncertainty import normal_draws
+from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Model", "Setting", "Settings", "draw_systems", "drawn_variables", "nominal", "read_settings", "settled"]
+__all__ = [
+    "Model", "Setting", "Settings", "check_parameter", "draw_systems", "drawn_variables", "nominal", "read_settings",
+    "settled",
+]  # fmt: skip
 
 Rule = Callable[[Mapping[str, float]], float]
 
@@ -52,13 +57,9 @@ def read_settings(settings: Mapping[str, Any] | None, system: System) -> dict[st
     ValueError
         A name that is no parameter of the system, or a negative uncertainty.
     """
-    from nonsmooth.system.names import unknown
-
     read: dict[str, Setting] = {}
     for name, given in (settings or {}).items():
-        if name not in system.parameters:
-            units = {key: item.unit for key, item in system.parameters.items()}
-            raise ValueError(unknown(name, "a parameter", repr(system.name), units))
+        check_parameter(name, system)
         if isinstance(given, Mapping):
             extra = set(given) - {"value", "uncertainty"}
             if extra or "value" not in given:
@@ -158,21 +159,22 @@ def draw_systems(
 
 
 def _ends(bounds: Mapping[str, Any], system: System) -> dict[str, tuple[float, float]]:
-    from nonsmooth.system.names import unknown
+    for name in bounds:
+        check_parameter(name, system)
+    return {name: ends(pair, name) for name, pair in bounds.items()}
 
-    found = {}
-    for name, pair in bounds.items():
-        if name not in system.parameters:
-            units = {key: item.unit for key, item in system.parameters.items()}
-            raise ValueError(unknown(name, "a parameter", repr(system.name), units))
-        found[name] = ends(pair, name)
-    return found
+
+def check_parameter(name: str, system: System) -> None:
+    """Refuse a name that is no parameter of the system."""
+    if name not in system.parameters:
+        units = {key: item.unit for key, item in system.parameters.items()}
+        raise ValueError(unknown(name, "a parameter", repr(system.name), units))
 
 
 def drawn_variables(drawn: Mapping[str, np.ndarray], system: System) -> dict[str, Any]:
     """The draws as variables ``drawn_<name>`` over ``draw``, to be kept with a comparison."""
     return {
-        f"drawn_{name}": (("draw",), column, {
+        f"drawn_{name}": ("draw", column, {
             "long_name": f"drawn {name}", "units": system.parameters[name].unit or "1"})
         for name, column in drawn.items()
     }  # fmt: skip
@@ -191,13 +193,8 @@ def _identified(parameters: Any, count: int, seed: int) -> dict[str, np.ndarray]
         return {name: np.full(count, float(parameters[name])) for name in parameters}
     names = [str(name) for name in covariance[covariance.dims[0]].values]
     held = [i for i, name in enumerate(names) if name in parameters]
-    matrix = np.asarray(covariance.values, dtype=float)[np.ix_(held, held)]
-    mean = np.array([float(parameters[names[i]]) for i in held])
-    sizes = np.sqrt(np.diag(matrix))
-    scale = np.where(sizes > 0, sizes, 1.0)  # parameters differ by 10^5 in size: draw in units of their own errors
-    correlation = matrix / np.outer(scale, scale)
-    unit = np.random.default_rng(seed).multivariate_normal(np.zeros(len(held)), correlation, count, method="eigh")
-    table = mean + unit * scale
+    mean, matrix = [float(parameters[names[i]]) for i in held], np.asarray(covariance.values, float)
+    table = normal_draws(mean, matrix[np.ix_(held, held)], count, seed)
     return {names[i]: table[:, k] for k, i in enumerate(held)}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,7 +98,7 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
             rows.append((word, np.nan, other, step, *_interval(other, word, drawn, level)))
     words, values, others, steps, lows, highs = zip(*rows, strict=True) if rows else ((),) * 6
     m, t = np.array(values, dtype=float), np.array(others, dtype=float)
-    over = ("jump",)
+    over = "jump"
     variables: dict[str, Any] = {
         "jump_direction": (over, np.array(words, dtype=str), {"long_name": "direction in which the jump is met"}),
         "measured_jump": (over, m, {"long_name": "measured jump (NaN: none was seen)", "units": unit}),
@@ -116,33 +115,19 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
 
 def _pairs(seen: list[Jump], expected: list[Jump]) -> dict[int, int]:
     """Pairs of predicted and measured jumps."""
-    every = (range(len(seen)), range(len(expected)))
-    groups: list[tuple[list[int], list[int]]] = [(list(every[0]), list(every[1]))]
+    from scipy.optimize import linear_sum_assignment
+
     # Jumps as an experimenter read them off do not say whether the amplitude rose.
-    if not any(np.isnan(jump.after) for jump in seen):
-        groups = [
-            ([i for i in every[0] if _rises(seen[i]) == up], [j for j in every[1] if _rises(expected[j]) == up])
-            for up in (False, True)
-        ]
+    alike = any(np.isnan(jump.after) for jump in seen)
+    kinds = [[alike or jump.after > jump.before for jump in jumps] for jumps in (seen, expected)]
     pairs: dict[int, int] = {}
-    for mine, theirs in groups:
+    for up in (False, True):
+        mine, theirs = (np.flatnonzero([rises == up for rises in kind]) for kind in kinds)
         away = np.abs(np.subtract.outer([seen[i].value for i in mine], [expected[j].value for j in theirs]))
-        if len(mine) <= len(theirs):
-            pairs |= {i: theirs[j] for i, j in zip(mine, _nearest(away), strict=True)}
-        else:
-            pairs |= {mine[i]: j for i, j in zip(_nearest(away.T), theirs, strict=True)}
+        rows, columns = linear_sum_assignment(away.reshape(len(mine), len(theirs)))
+        # Of numbers along a line those in order leave the least sum too.
+        pairs |= dict(zip(mine[np.sort(rows)].tolist(), theirs[np.sort(columns)].tolist(), strict=True))
     return pairs
-
-
-def _nearest(away: FloatArray) -> tuple[int, ...]:
-    """The columns, in rising order, one for each row, that leave the sum of the distances least."""
-    rows, columns = away.shape
-    sums = {chosen: float(away[range(rows), chosen].sum()) for chosen in combinations(range(columns), rows)}
-    return min(sums, key=sums.__getitem__)
-
-
-def _rises(jump: Jump) -> bool:
-    return jump.after > jump.before
 
 
 def _interval(value: float, word: str, drawn: Sequence[Jumps], level: float) -> tuple[float, float]:

@@ -10,8 +10,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.clouds import cloud_distance, energy_distance, wasserstein
 from nonsmooth.identification.compare.draws import Model
-from nonsmooth.identification.compare.fold import fold, mean_orbit
-from nonsmooth.identification.compare.orbits import common_length, orbit_distance
+from nonsmooth.identification.compare.orbits import common_length, fold, mean_orbit, orbit_distance
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.identification.compare.predict import Attractor, Motions, Prediction, from_result, predict
 
@@ -40,10 +39,7 @@ def compare_motion(
     motions = None
     if model.system is not None:
         starts = _starts(sections[0] if phases[0] == 0 else None, folded, model, start)
-        motions = Motions(
-            [model.system], transient=model.transient, keep=KEEP, max_period=max_period, options=model.options,
-            places=model.places,
-        )  # fmt: skip
+        motions = Motions([model.system], model, keep=KEEP, max_period=max_period)
         predicted = predict(motions, sections, phases, scale, starts=starts, n=max(CLOUD, len(sections[0])), grid=grid)
     else:
         predicted = from_result(model.theory, model.states, phases, grid, max_period)
@@ -105,13 +101,13 @@ def _clouds(
     from scipy.stats import wasserstein_distance
 
     size = min(len(points) for points in sections)
-    at = ("section_phase",)
+    at = "section_phase"
     variables: dict[str, Any] = {
-        "measured_section": ((*at, "measured_iterate", "state"), np.stack([p[:size] for p in sections]),
+        "measured_section": ((at, "measured_iterate", "state"), np.stack([p[:size] for p in sections]),
                              {"long_name": "measured section points"}),
-        "theory_section": ((*at, "theory_iterate", "state"), np.stack(exact),
+        "theory_section": ((at, "theory_iterate", "state"), np.stack(exact),
                            {"long_name": "predicted section points"}),
-        "section_scale": (("state",), scale, {"long_name": "unit of each state in the distances of clouds"}),
+        "section_scale": ("state", scale, {"long_name": "unit of each state in the distances of clouds"}),
     }  # fmt: skip
     found = [
         cloud_distance(a / scale, b / scale, splits=splits, seed=seed) if min(len(a), len(b)) >= 40 else None
@@ -122,7 +118,7 @@ def _clouds(
         for a, b in zip(sections, blurred, strict=True)
     ]
     both = [wasserstein(a / scale, b / scale, seed) for a, b in zip(sections, blurred, strict=True)]
-    variables["wasserstein_distance"] = ((*at, "state"), np.array(moved), {
+    variables["wasserstein_distance"] = ((at, "state"), np.array(moved), {
         "long_name": "Wasserstein distance of the section clouds, in the state's unit"})  # fmt: skip
     variables["wasserstein_distance_joint"] = (at, np.array(both), {
         "long_name": "Wasserstein distance of the section clouds in all states, scaled"})  # fmt: skip
@@ -158,7 +154,7 @@ def _periods(
         "measured_period_number": ((), np.int64(number), {"long_name": "measured period number (0: none found)"}),
         "theory_period_number": ((), np.int64(predicted.period_number), {
             "long_name": "period number of the nearest predicted motion (0: none found)"}),
-        "coexisting_period_number": (("attractor",), coexisting, {
+        "coexisting_period_number": ("attractor", coexisting, {
             "long_name": "period numbers of all predicted motions"}),
         "period_agrees": ((), np.int8(number == predicted.period_number), {
             "long_name": "1 where the nearest predicted motion has the measured period number"}),
@@ -226,7 +222,7 @@ def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, grid:
         variables["measured_scatter"] = (over, scatter, {"long_name": "standard deviation of one pass"})
     for name, values in zip(names, (a, b), strict=True):
         coordinate = np.arange(len(values)) / grid
-        variables[name] = ((name,), coordinate, {"long_name": "phase of the drive", "units": "forcing periods"})
+        variables[name] = (name, coordinate, {"long_name": "phase of the drive", "units": "forcing periods"})
     return variables
 
 
@@ -262,9 +258,7 @@ def motion_band(
     distances = np.full((draws, len(phases)), np.nan)
     to_measured = np.full(draws, np.nan)
     orbits: list[FloatArray] = []
-    motions = Motions(
-        systems, transient=model.transient, keep=64, max_period=max_period, options=model.options, places=model.places
-    )
+    motions = Motions(systems, model, keep=64, max_period=max_period)
     for i in range(draws):
         (one,) = motions.attractors(i, nearest.point)
         numbers[i] = one.period_number
@@ -279,13 +273,13 @@ def motion_band(
             orbits.append(motion)
             to_measured[i] = orbit_distance(closed[0], motion, length).distance
     variables: dict[str, Any] = {
-        "draw_period_number": (("draw",), numbers, {"long_name": "period number for drawn parameters"}),
+        "draw_period_number": ("draw", numbers, {"long_name": "period number for drawn parameters"}),
         "draw_energy_distance": (("section_phase", "draw"), distances.T, {
             "long_name": "energy distance of the section clouds for drawn parameters, scaled"}),
     }  # fmt: skip
     if closed is None:
         return variables
-    variables["draw_orbit_distance"] = (("draw",), to_measured, {
+    variables["draw_orbit_distance"] = ("draw", to_measured, {
         "long_name": "normalised distance of the orbits for drawn parameters"})  # fmt: skip
     variables["band_share"] = ((), len(orbits) / draws, {
         "long_name": "share of the draws that keep the period; these make the band"})  # fmt: skip
@@ -295,6 +289,6 @@ def motion_band(
         for word, values in (("low", low), ("median", middle), ("high", high)):
             variables[f"theory_{word}"] = (("phase", "state"), values, {"long_name": f"{word} of the band"})
         inside = ((closed[0] >= low) & (closed[0] <= high)).mean(axis=0)
-        variables["inside_band"] = (("state",), inside, {
+        variables["inside_band"] = ("state", inside, {
             "long_name": "share of the measured orbit that lies inside the band"})  # fmt: skip
     return variables

@@ -7,19 +7,33 @@ A measured return is never exact. With a standard error :math:`\sigma_i` of each
 is 1 for a motion of period p and larger for any other. The period number is the smallest p with r_p below a bound;
 0 where there is none: chaos, or a motion that has not settled. A period-doubled orbit whose points are closer together
 than the noise cannot be told from the one before the doubling.
+
+A rise is late: near the flip the amplitude A by which successive section points part, :math:`\pm A`, settles ever more
+slowly, and it is seen to vanish (or to appear) only some way beyond. How far depends on the rate and on the noise, so
+the place where it is lost is no property of the motion. What holds on the way is the amplitude equation of a flip,
+
+.. math::
+
+    \frac{\mathrm d A}{\mathrm d n} = \kappa A \Big[ y + q y^2 - \frac{A^2}{C} \Big], \qquad y = \pm (\rho_f - \rho_n)
+
+with y > 0 on the side of the doubled motion and n counting returns. Its steady amplitude is the square root law
+:math:`A^2 = C (y + q y^2)`; the flip is at :math:`\rho_f` whatever the rate. With :math:`w = A^{-2}` it is linear, and
+is solved step by step. The four numbers and the first amplitude are fitted to the record. Source of the equation: the
+normal form of the flip, Kuznetsov, *Elements of Applied Bifurcation Theory* (2004), Section 4.5, with its parameter
+drifting.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["BOUND", "MeasuredPeriod", "flips", "measured_period", "period_numbers"]
-
+__all__ = ["BOUND", "Flip", "MeasuredPeriod", "delayed_flips", "flips", "measured_period", "period_numbers"]
 
 BOUND = 2.0  # of r_p: the stated noise may be wrong by as much before a period is lost
 FEWEST_RETURNS = 4
@@ -77,7 +91,7 @@ def measured_period(
 
 def period_numbers(
     points: ArrayLike, noise: ArrayLike, *, window: int = 24, max_period: int = 8, bound: float = BOUND
-) -> NDArray[np.int64]:
+) -> IntArray:
     """The period number in a window that moves along a slow rise of a parameter, one for each point.
 
     The points of an orbit drift with the parameter: an even drift within the window is no return's fault.
@@ -126,7 +140,7 @@ def flips(values: ArrayLike, numbers: ArrayLike, *, last: int = 4) -> dict[str, 
     return found
 
 
-def _parting(x: FloatArray, single: NDArray[np.bool_], double: NDArray[np.bool_]) -> float:
+def _parting(x: FloatArray, single: BoolArray, double: BoolArray) -> float:
     """The value with the fewest singles on the doubles' side and the other way round; in the middle of a tie."""
     below = np.concatenate([[0], np.cumsum(single)]) + (double.sum() - np.concatenate([[0], np.cumsum(double)]))
     above = np.concatenate([[0], np.cumsum(double)]) + (single.sum() - np.concatenate([[0], np.cumsum(single)]))
@@ -135,3 +149,175 @@ def _parting(x: FloatArray, single: NDArray[np.bool_], double: NDArray[np.bool_]
     best = np.flatnonzero(wrong == wrong.min())
     edges = np.concatenate([[x[0]], 0.5 * (x[1:] + x[:-1]), [x[-1]]])
     return float(0.5 * (edges[best[0]] + edges[best[-1]]))
+
+
+FEWEST = 12  # points with a splitting that can be seen
+STRAY = 12  # points of another period number in a row that end the doubled side
+ALIKE = 8 / 3  # second differences overlap: as many of them say as much as one
+
+
+class Flip(NamedTuple):
+    """A flip found in a slow rise.
+
+    Attributes
+    ----------
+    value, error : float
+        The parameter at the flip and its standard error; NaN where the amplitude could not be followed.
+    read : float
+        Where the record itself changes its period number: later than the flip.
+    """
+
+    value: float
+    error: float
+    read: float
+
+
+def delayed_flips(at: FloatArray, points: FloatArray, noise: FloatArray, numbers: IntArray) -> dict[str, Flip]:
+    """The flips along a slow and even rise (or fall) of a parameter, ``{"1-2": Flip, "2-4": ...}``.
+
+    Parameters
+    ----------
+    at : array (n,)
+        The parameter at each section point, in the order in which they came.
+    points : array (n, states)
+    noise : array (states,)
+        Standard error of a point.
+    numbers : array (n,)
+        The period number at each point, as
+        :func:`nonsmooth.identification.compare.periods.period_numbers` finds it.
+    """
+    return {word: _followed(at, points / noise, numbers, word, read) for word, read in flips(at, numbers).items()}
+
+
+def _followed(at: FloatArray, points: FloatArray, numbers: IntArray, word: str, read: float) -> Flip:
+    p = int(word.split("-")[0])
+    nothing = Flip(np.nan, np.nan, read)
+    cut = int(np.argmin(np.abs(at - read)))
+    # Time runs from the doubled side to the other (closing), or the other way round.
+    doubled = numbers == 2 * p
+    closing = doubled[max(cut - 4 * STRAY, 0) : cut].mean() > 0.5 if cut else False
+    order = slice(None, None, 1 if closing else -1)  # now the doubled side comes first
+    where, cloud, known = at[order], points[order], numbers[order]
+    cut = cut if closing else len(at) - 1 - cut
+    begin, end = _reach(known, cut, 2 * p), len(known) - _reach(known[::-1], len(known) - 1 - cut, p)
+    best: tuple[float, FloatArray, FloatArray] | None = None
+    for k in range(p):
+        one = slice(begin + k, end, p)
+        rho, size = _splitting(where[one], cloud[one])
+        if len(size) >= FEWEST and (best is None or size.max() > best[0]):
+            best = (float(size.max()), rho, size)
+    if best is None:
+        return nothing
+    largest, rho, size = best
+    # The square root law and its next order hold near the flip: from half of the largest square on.
+    first = int(np.flatnonzero(size**2 > 0.5 * largest**2).max()) + 1
+    rho, size = rho[first:], size[first:]
+    seen = int(np.count_nonzero(size > 3.0))
+    if seen < FEWEST:
+        return nothing
+    stop = min(len(size), 2 * seen + FEWEST)
+    rho, size = rho[:stop], size[:stop]
+    found = _fitted(rho, size, 1.0 if closing else -1.0)
+    return nothing if found is None else Flip(*found, read)
+
+
+def _reach(numbers: IntArray, cut: int, number: int) -> int:
+    """Length, back from the cut, over which the record keeps this period number, strays apart."""
+    stray = 0
+    for i in range(cut, -1, -1):
+        stray = 0 if numbers[i] == number else stray + 1
+        if stray > STRAY and i < cut - 2 * STRAY:
+            return i + stray
+    return 0
+
+
+def _splitting(at: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Amplitude of the alternation along its main direction, in standard errors of a point; an even drift has none."""
+    if len(points) < FEWEST:
+        return at[:0], at[:0]
+    parity = np.where(np.arange(len(points) - 2) % 2 == 0, 0.25, -0.25)[:, None]
+    parted = parity * (points[2:] - 2 * points[1:-1] + points[:-2])
+    along = np.linalg.svd(parted, full_matrices=False)[2][0]
+    size = parted @ along
+    return at[1:-1], size if size.sum() > 0 else -size
+
+
+def _fitted(rho: FloatArray, size: FloatArray, time: float) -> tuple[float, float] | None:
+    """Flip and its standard error; ``rho`` leads from the doubled side across, ``time`` is -1 where it runs back.
+
+    The next order of the equation is fitted in two ways, of which data rarely choose one: the better is taken, and
+    half of what they differ counts as an error of its own.
+    """
+    span = rho[-1] - rho[0]
+    forward = slice(None, None, 1 if time > 0 else -1)
+    place = (rho - rho[0]) / span  # 0 ... 1 from the doubled side across
+    guess = _guess(place[forward], size[forward])
+    if guess is None:
+        return None
+    edge = -2 * np.log(max(size[forward][:4].mean(), 0.3))
+    tried = [_one_fit(place, size, forward, [*guess, 0.0, edge, *more]) for more in ([], [0.0])]
+    held = sorted(one for one in tried if one is not None)
+    if not held:
+        return None
+    _, flip, error = held[0]
+    spread = 0.5 * (max(one[1] for one in held) - min(one[1] for one in held))
+    return float(rho[0] + span * flip), float(abs(span) * np.hypot(error, spread))
+
+
+def _one_fit(
+    place: FloatArray, size: FloatArray, forward: slice, start: list[float]
+) -> tuple[float, float, float] | None:
+    """Cost (with its price for parameters), flip and standard error in 0 ... 1; None where nothing is found there."""
+    from scipy.optimize import least_squares
+
+    def model(z: FloatArray) -> FloatArray:
+        y = z[0] - place
+        growth = (2 * np.exp(z[1]) * (y + z[3] * y**2))[forward]
+        gain = (2 * np.exp(z[1] - 2 * z[2]) * (1 + (z[5] * y if len(z) > 5 else 0 * y)))[forward]
+        return _amplitude(growth, gain, z[4])[forward]
+
+    found = least_squares(
+        lambda z: model(z) - size, start, x_scale=[0.1, *[1.0] * (len(start) - 1)], loss="soft_l1", f_scale=2.0,
+        max_nfev=200,
+    )  # fmt: skip
+    if not found.success:  # 200 evaluations and not there
+        return None
+    freedom = max(len(size) - len(start), 1)
+    variance = max(float(np.sum((model(found.x) - size) ** 2)) / freedom, 0.375)
+    try:
+        covariance = np.linalg.inv(found.jac.T @ found.jac) * variance * ALIKE
+    except np.linalg.LinAlgError:
+        return None
+    flip, error = float(found.x[0]), float(np.sqrt(covariance[0, 0]))
+    if not (0 < flip < 1 and error < 0.5):
+        return None
+    return float(found.cost) / variance + len(start), flip, error
+
+
+def _guess(place: FloatArray, size: FloatArray) -> tuple[float, float, float] | None:
+    """Flip, log of the rate and of the height from d(ln A)/dn = rate (flip - place) - rate A^2 / height^2, linear."""
+    smooth = np.convolve(size, np.ones(5) / 5, mode="valid")
+    at = place[2 : len(place) - 2]
+    good = smooth > 2.0
+    both = good[4:] & good[:-4]
+    if np.count_nonzero(both) < 6:
+        return None
+    middle = smooth[2:-2][both]
+    slope = np.log(smooth[4:][both] / smooth[:-4][both]) / 4
+    columns = np.column_stack([np.ones(len(middle)), -at[2:-2][both], -(middle**2)])
+    weight = middle[:, None]  # the error of ln A goes like 1/A
+    (constant, rate, fall), *_ = np.linalg.lstsq(columns * weight, slope * middle, rcond=None)
+    if rate <= 0 or fall <= 0:
+        return None
+    return float(constant / rate), float(np.log(rate)), float(0.5 * np.log(rate / fall))
+
+
+def _amplitude(growth: FloatArray, gain: float, first: float) -> FloatArray:
+    """A along the record from w' = -growth w + gain, exact for constant growth within a step; w_0 = exp(first)."""
+    w, found = float(np.exp(np.clip(first, -500.0, 500.0))), np.empty(len(growth))
+    decay = np.exp(-np.clip(growth, -50.0, 50.0))
+    fed = gain * np.where(np.abs(growth) < 1e-9, 1.0, (1 - decay) / np.where(growth == 0, 1.0, growth))
+    for i in range(len(growth)):
+        found[i] = w
+        w = min(max(w * decay[i] + fed[i], 1e-250), 1e250)
+    return np.asarray(found**-0.5)

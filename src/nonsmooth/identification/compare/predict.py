@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.attractors.mapper import Mapper
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.attractors.settler import Settler
@@ -20,7 +19,8 @@ from nonsmooth.flow.options import longest_period
 from nonsmooth.flow.sections import Stroboscopic, section_plan
 from nonsmooth.flow.simulate import check_complete
 from nonsmooth.identification.compare.clouds import energy_distance
-from nonsmooth.identification.compare.fold import fold, mean_orbit
+from nonsmooth.identification.compare.draws import Model
+from nonsmooth.identification.compare.orbits import fold, mean_orbit
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.statuses import by_code
@@ -50,14 +50,12 @@ class Motions:
     Parameters
     ----------
     systems : sequence of System
-    transient, keep, max_period : int
+    model : Model
+        With the transient, the method and its tolerances, and the states that `cloud`, `orbit` and `carried` return.
+    keep, max_period : int
         See :func:`nonsmooth.sweep`.
-    options : mapping
-        ``method``, ``rtol``, ``atol``.
     phase : float
         Of the stroboscopic section, in forcing periods.
-    places : list of int, optional
-        The states that `cloud`, `orbit` and `carried` return; all where not given.
 
     Raises
     ------
@@ -66,19 +64,18 @@ class Motions:
     """
 
     def __init__(
-        self, systems: Sequence[System], *, transient: int, keep: int, max_period: int, options: Mapping[str, Any],
-        phase: float = 0.0, places: list[int] | None = None,
-    ) -> None:  # fmt: skip
+        self, systems: Sequence[System], model: Model, *, keep: int, max_period: int, phase: float = 0.0
+    ) -> None:
         self.system = systems[0]
         if self.system.period() is None:
             raise ValueError(f"{self.system.name!r} has no forcing period; compare takes forced systems")
-        self.places = list(range(len(self.system.states))) if places is None else places
+        self.places = model.places
         self.periods = [float(one.period() or np.nan) for one in systems]
-        self.engine = engine_for(self.system, **options)
+        self.engine = engine_for(self.system, **model.options)
         self.points = np.array([one.parameter_vector() for one in systems])
         keep = max(keep, max_period + 1)
         self.settler = Settler(
-            self.system, self.engine, self._plan(phase), transient, keep, longest_period(keep, max_period), False,
+            self.system, self.engine, self._plan(phase), model.transient, keep, longest_period(keep, max_period), False,
         )  # fmt: skip
 
     def _plan(self, phase: float) -> Section:
@@ -90,7 +87,7 @@ class Motions:
     def _alone(self, i: int) -> Any:
         return self.engine.prepare(self.points[i : i + 1])
 
-    def carried(self, order: Iterable[int]) -> tuple[FloatArray, NDArray[np.int64]]:
+    def carried(self, order: Iterable[int]) -> tuple[FloatArray, IntArray]:
         """Section points and period numbers of all systems, the state carried from one to the next, from rest."""
         rows, periods = np.array([*order], dtype=np.int64), np.zeros(len(self.periods), dtype=np.int64)
         sections = self.engine.kept(len(periods), self.settler.keep).section
@@ -99,7 +96,7 @@ class Motions:
         sections[rows[good]] = kept.section[good]
         return sections[..., self.places], periods
 
-    def _settled(self, rows: NDArray[np.int64], starts: FloatArray, carried: int) -> tuple[Kept, Settled]:
+    def _settled(self, rows: IntArray, starts: FloatArray, carried: int) -> tuple[Kept, Settled]:
         """The kept returns of jobs, and what is known of them."""
         kept, into = self.engine.kept(len(rows), self.settler.keep), np.arange(len(rows))
         mapper = Mapper(self.settler, self.engine.prepare(self.points), rows, starts, kept=kept, into=into)
@@ -190,7 +187,7 @@ class Prediction:
     period_number: int
     sections: list[FloatArray]
     orbit: FloatArray | None
-    coexisting: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    coexisting: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     attractor: Attractor | None = None
 
 

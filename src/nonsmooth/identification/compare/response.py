@@ -39,18 +39,18 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: st
         values = np.linspace(runs["value"].min(), runs["value"].max(), FINE)
         curves, at_runs = _curves(model.system, model, name, state, values, runs, directions)
     variables: dict[str, Any] = {
-        f"measured_{name}": (("run",), runs["value"], {"long_name": f"measured {name}", "units": unit}),
-        "measured_direction": (("run",), runs["direction"], {"long_name": "direction in which the run was reached"}),
-        "measured_amplitude": (("run",), runs["amplitude"], {"long_name": "measured amplitude"}),
-        "measured_amplitude_error": (("run",), runs["error"], {"long_name": "standard error of it"}),
-        "measured_period_number": (("run",), runs["period"], {
+        f"measured_{name}": ("run", runs["value"], {"long_name": f"measured {name}", "units": unit}),
+        "measured_direction": ("run", runs["direction"], {"long_name": "direction in which the run was reached"}),
+        "measured_amplitude": ("run", runs["amplitude"], {"long_name": "measured amplitude"}),
+        "measured_amplitude_error": ("run", runs["error"], {"long_name": "standard error of it"}),
+        "measured_period_number": ("run", runs["period"], {
             "long_name": "measured period number (0: none found, -1: not known)"}),
         "theory_amplitude": ((name, "direction"), curves, {"long_name": "predicted amplitude"}),
-        "theory_at_run": (("run",), at_runs, {"long_name": "predicted amplitude at the run"}),
-        "relative_difference": (("run",), at_runs / runs["amplitude"] - 1, {
+        "theory_at_run": ("run", at_runs, {"long_name": "predicted amplitude at the run"}),
+        "relative_difference": ("run", at_runs / runs["amplitude"] - 1, {
             "long_name": "prediction over measurement, minus 1"}),
-        name: ((name,), values, {"long_name": name, "units": unit}),
-        "direction": (("direction",), np.array(directions), {"long_name": "direction of the sweep"}),
+        name: (name, values, {"long_name": name, "units": unit}),
+        "direction": ("direction", np.array(directions), {"long_name": "direction of the sweep"}),
     }  # fmt: skip
     expected = _jumps(values, curves, directions)
     seen = _measured_jumps(measured, runs, directions)

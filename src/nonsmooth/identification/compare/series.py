@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.compare.fold import fold
+from nonsmooth.identification.compare.orbits import fold
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -107,7 +107,7 @@ def measured_rise(motion: xr.Dataset, parameter: str, first: float, last: float,
     return xr.Dataset(
         {
             "section": (("iterate", "state"), points[:, :2], {"long_name": "section points"}),
-            "section_error": (("state",), np.median(motion["u_error"].values, axis=0)),
+            "section_error": ("state", np.median(motion["u_error"].values, axis=0)),
             parameter: ("iterate", at, {"long_name": parameter, "units": unit}),
         },
         {"state": motion["state"].values, "state_unit": ("state", motion["state_unit"].values)},
@@ -149,7 +149,7 @@ def measured_sections(
     return xr.Dataset(
         {
             "section": ((parameter, "iterate", "state"), points, {"long_name": "section points"}),
-            "section_error": (("state",), error),
+            "section_error": ("state", error),
         },
         {
             parameter: (parameter, np.asarray(values, dtype=float)[order], {"long_name": parameter, "units": unit}),

@@ -13,10 +13,9 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.fit.first_level import settle_soft
-from nonsmooth.identification.fit.first_windows import WIDE, first_windows, states_from_samples
+from nonsmooth.identification.fit.first_level import misfits, settle_soft
+from nonsmooth.identification.fit.first_windows import WIDE, first_windows, told_start
 from nonsmooth.identification.fit.growth import POOR
-from nonsmooth.identification.fit.rough import misfits
 from nonsmooth.identification.fit.windows import Window, Windows
 
 __all__ = ["beginnings", "drawn"]
@@ -102,8 +101,7 @@ def _best_drawn(problem: Windows, rng: np.random.Generator) -> list[tuple[FloatA
         theta = drawn(problem, rng) if k else problem.unknowns.guess
         total, starts = 0.0, np.empty_like(problem.starts)
         for i, window in enumerate(problem.pieces):
-            told = states_from_samples(problem, theta, problem.records[i], slice(0, 1))[0]
-            told = np.append(told, np.full(len(window.start) - len(told), np.nan))
+            told = told_start(problem, theta, window)
             known, least = np.isfinite(told), np.inf
             size = np.where(known, 0.0, window.spread / WIDE)
             for j in range(_STARTS):

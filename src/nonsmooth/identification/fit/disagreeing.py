@@ -6,12 +6,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.fit.first_level import settle_first
+from nonsmooth.arrays import BoolArray, FloatArray
+from nonsmooth.identification.fit.first_level import misfits, settle_first
 from nonsmooth.identification.fit.first_windows import first_length
-from nonsmooth.identification.fit.rough import misfits
 from nonsmooth.identification.fit.windows import Windows
 
 __all__ = ["without_disagreeing"]
@@ -58,7 +56,7 @@ def without_disagreeing(problem: Windows, theta: FloatArray) -> tuple[Windows, l
     return replace(problem, records=records, modes=modes, unknowns=unknowns), said
 
 
-def _closed(bad: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _closed(bad: BoolArray) -> BoolArray:
     """The same, with short parts between two that disagree."""
     found = bad.copy()
     for first, last in _runs(~bad):
@@ -67,7 +65,7 @@ def _closed(bad: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return found
 
 
-def _runs(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+def _runs(mask: BoolArray) -> Iterator[tuple[int, int]]:
     """First and last place of each run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     yield from ((int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True))

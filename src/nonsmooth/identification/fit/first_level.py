@@ -3,7 +3,8 @@
 Far from the solution the noise is taken for as large as a part of the residuals, and the parameters for known about
 their guess to their own size: so no step runs away while the residuals are large, and both fade as they fall. A window
 that fits much worse than most has missed a transition, or has one too many, and no small step of its start mends it;
-its start is then searched anew: from the window before, from the samples, and at random.
+its start is then searched anew: from the window before, from the samples, and at random. Rough fits on the way are of
+all windows together (`level`), and of one alone at given parameters (`alone`).
 
 In a relay with hysteresis, or behind a play, no state tells the mode in which a record begins. It is a discrete unknown
 of each record: over the record's first window every other mode is tried whose conditions do not end it at once, at the
@@ -20,16 +21,63 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, shortened
-from nonsmooth.identification.fit.first_windows import first_windows, states_from_samples
-from nonsmooth.identification.fit.rough import alone, level, misfits, own_size
+from nonsmooth.identification.arrow import State, settle
+from nonsmooth.identification.fit.first_windows import first_windows, told_start
 from nonsmooth.identification.fit.windows import Window, Windows
-from nonsmooth.identification.pieces import State
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["BETTER", "other_beginnings", "read_modes", "rechosen", "settle_first", "settle_soft"]
+__all__ = [
+    "BETTER", "alone", "level", "misfits", "other_beginnings", "own_size", "read_modes", "rechosen", "settle_first",
+    "settle_soft",
+]  # fmt: skip
+
+def level(
+    problem: Windows, theta: FloatArray, starts: FloatArray, used: Any = None
+) -> tuple[FloatArray, FloatArray, State]:
+    """A rough fit on the way, in which the parameters are known to about their own size.
+
+    What windows so short do not tell then stays where it is: a coefficient of restitution of 1e8, tried where hardly an
+    impact was seen, makes a motion of hours.
+    """
+    if not np.isfinite(np.concatenate(problem.residuals(theta, starts).residuals)).all():
+        raise SolveError("a motion over longer windows does not come to its end")
+    known = problem.unknowns.precision + np.diag(own_size(problem) ** -2.0)
+    return settle(problem, theta, starts, used, known, rough=True)
+
+
+def own_size(problem: Windows) -> FloatArray:
+    guess = problem.unknowns.guess
+    return np.where(guess != 0.0, np.abs(guess), np.inf)
+
+
+def misfits(problem: Windows, state: State) -> FloatArray:
+    """Mean squared residual over the noise, of each window."""
+    return np.array([float(np.mean((r / problem.noise[w.readings[1]]) ** 2)) for w, r in problem.rows(state)])
+
+
+def alone(
+    problem: Windows, theta: FloatArray, trials: list[tuple[Window, FloatArray]], most: int
+) -> list[tuple[float, Window, FloatArray]]:
+    """Of these windows with starts, those that fit best before their starts are fitted, fitted; the best first."""
+    fixed = replace(problem, unknowns=replace(problem.unknowns, low=theta, high=theta, centre=theta))
+    costs = []
+    for window, start in trials:
+        one = fixed.of([window])
+        costs.append(float(misfits(one, one.residuals(theta, start[None, :]))[0]))
+    found = []
+    for k in np.argsort(costs, kind="stable")[:most]:
+        window, start = trials[k]
+        one = fixed.of([replace(window, start=start)])
+        try:
+            _, moved, state = level(one, theta, start[None, :])
+        except SolveError:
+            continue
+        found.append((float(misfits(one, state)[0]), one.pieces[0], moved[0]))
+    return sorted(found, key=lambda row: row[0])
+
 
 BETTER = 9.0  # by which the sum of squares has to fall for another mode
 _TRIED = 12  # starts drawn for each mode
@@ -79,8 +127,7 @@ def other_beginnings(
     window = problem.pieces[i]
     if window.first or len(problem.modes[window.record]) == 1:
         return []
-    told = states_from_samples(problem, theta, problem.records[window.record], slice(0, 1))[0]
-    told = np.append(told, np.full(len(window.start) - len(told), np.nan))
+    told = told_start(problem, theta, window)
     known = np.isfinite(told) & (window.spread > 0)
     rng, found = np.random.default_rng(0), []
     for mode in problem.modes[window.record]:
@@ -179,17 +226,12 @@ def _soft(problem: Windows, noise: FloatArray) -> Windows:
     return replace(problem, noise=noise, unknowns=replace(u, low=low, high=high))
 
 
-def _rows(problem: Windows, state: State) -> list[tuple[Window, FloatArray]]:
-    return [(w, r[: len(w.readings[0])]) for w, r in zip(problem.pieces, state.residuals, strict=True)]
-
-
 def _sizes(problem: Windows, state: State) -> FloatArray:
     """Size of the residuals of each quantity, of most windows."""
     found = np.zeros(len(problem.sensors))
     for c in range(len(found)):
-        each = [
-            float(np.mean(r[w.readings[1] == c] ** 2)) for w, r in _rows(problem, state) if (w.readings[1] == c).any()
-        ]
+        rows = [r[w.readings[1] == c] for w, r in problem.rows(state)]
+        each = [float(np.mean(r**2)) for r in rows if len(r)]
         found[c] = np.sqrt(np.median(each))
     return found
 
@@ -211,18 +253,11 @@ def _others(
 ) -> list[tuple[Window, FloatArray]]:
     """Other starts of a window: as the window before it ends, as the samples tell, and drawn about these."""
     window = problem.pieces[i]
-    record = problem.records[window.record]
-    told = states_from_samples(problem, theta, record, slice(window.first, window.first + 1))[0]
-    told = np.append(told, np.full(len(window.start) - len(told), np.nan))
+    told, run = told_start(problem, theta, window), window.record
     found = [(window, starts[i])]
-    values = problem.values(theta, window.record)
-    if i and problem.pieces[i - 1].record == window.record and values is not None:
-        before = problem.pieces[i - 1]
-        shift, clock = problem.shift(theta, window), problem.clock(theta, window.record)
-        motion = problem.marcher.run(
-            values, clock * before.begin + shift, np.array([clock * window.begin + shift]), starts[i - 1], before.mode,
-            drive=record.drive,
-        )  # fmt: skip
+    if i and problem.pieces[i - 1].record == run:
+        before, begin = problem.pieces[i - 1], np.array([problem.clock(theta, run) * window.begin])
+        motion = problem.march(theta, run, before.begin, begin, starts[i - 1], before.mode)
         if motion is not None:
             found.append((replace(window, mode=int(motion.mode[0])), motion.z[0]))
     known = np.isfinite(told) & (window.spread > 0)

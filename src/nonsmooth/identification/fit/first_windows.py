@@ -20,7 +20,7 @@ from nonsmooth.identification.fit.windows import Window, Windows
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["first_length", "first_windows", "rates", "states_from_samples"]
+__all__ = ["first_length", "first_windows", "rates", "states_from_samples", "told_start"]
 
 _AROUND = 3  # samples on either side, from which value and slope at a sample are taken
 _SWING = 0.15  # of a quantity's range: what counts as a swing
@@ -74,14 +74,11 @@ def _of_record(
 ) -> list[Window]:
     n_u, early = len(problem.system.states), _lead(problem, theta, i)
     memory = problem.system.memory_vector()
-    told = states_from_samples(problem, theta, record, slice(None))
+    told = states_from_samples(problem, theta, i, slice(None))
     z = np.concatenate([np.zeros(n_u) if start is None else start, memory])
-    values = problem.values(theta, i)
-    if values is None:
+    if problem.values(theta, i) is None:
         return []
-    period = problem.system.period_at(values)
     which, clock = problem.unknowns.places[i], problem.clock(theta, i)
-    shift = 0.0 if period is None or not problem.unknowns.phases else float(theta[which[-1]]) * period
     sizes = np.max(np.abs(np.nan_to_num(told)), axis=0)
     time, mode, first, windows = record.time, problem.modes[i][0], 0, []
     while first < len(time) - 1:
@@ -92,10 +89,7 @@ def _of_record(
         set_ = np.where(known, np.append(np.nan_to_num(told[first]), memory), z)
         begin = float(time[first]) - early
         for candidate in [z] if first == 0 and start is not None else [set_, z]:  # beyond a stop: as it was going
-            motion = problem.marcher.run(
-                values, clock * begin + shift, clock * (time[first:end] - early) + shift, candidate, mode,
-                drive=record.drive,
-            )  # fmt: skip
+            motion = problem.march(theta, i, begin, clock * (time[first:end] - early), candidate, mode)
             if motion is not None:
                 break
         if motion is None:  # the samples of this window come back when windows are joined
@@ -140,13 +134,19 @@ def _quiet(time: FloatArray, crossings: FloatArray, length: float) -> int:
     return int(near[np.argmax(np.minimum(before, behind))])
 
 
-def states_from_samples(problem: Windows, theta: FloatArray, record: Record, which: slice) -> FloatArray:
+def told_start(problem: Windows, theta: FloatArray, window: Window) -> FloatArray:
+    """The start of a window as its samples tell it; NaN where they do not."""
+    told = states_from_samples(problem, theta, window.record, slice(window.first, window.first + 1))[0]
+    return np.append(told, np.full(len(window.start) - len(told), np.nan))
+
+
+def states_from_samples(problem: Windows, theta: FloatArray, run: int, which: slice) -> FloatArray:
     """States (N, n_u) that the samples tell: those measured, and those that are the rate of one; NaN elsewhere."""
+    record, measured = problem.records[run], problem.sensor_values(theta, run)
     at = record.time[which]
     system, names = problem.system, list(problem.system.states)
     told = np.full((len(at), len(names)), np.nan)
     known = rates(system)
-    measured = problem.sensor_values(theta, next(i for i, one in enumerate(problem.records) if one is record))
     for c, (quantity, sensor) in enumerate(measured.items()):
         if quantity not in names:
             continue

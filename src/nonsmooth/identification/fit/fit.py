@@ -272,7 +272,7 @@ def _guesses(
 
     given, rng = with_phases(u.guess), np.random.default_rng(seed)
     hidden = free and any(
-        np.isnan(states_from_samples(problem, given, record, slice(0, 1))).any() for record in problem.records
+        np.isnan(states_from_samples(problem, given, run, slice(0, 1))).any() for run in range(len(problem.records))
     )
 
     def others() -> Iterator[tuple[FloatArray, float, FloatArray | None]]:
@@ -295,7 +295,7 @@ def _distances(problem: Windows, guess: FloatArray, start: FloatArray | None, fr
     total, count = np.zeros(len(problem.records)), np.zeros(len(problem.records))
     windows = problem.of(first_windows(problem, guess, length, start, free))
     if windows.pieces:
-        weights = windows.weights(None, 0.0)
+        weights = windows.weights(None)
         for w, r, weight in zip(
             windows.pieces, windows.residuals(guess, windows.starts).residuals, weights, strict=True
         ):

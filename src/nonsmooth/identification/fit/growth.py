@@ -15,13 +15,11 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.arrow import Unsettled, settle
-from nonsmooth.identification.fit.first_level import BETTER, other_beginnings, rechosen, settle_first
+from nonsmooth.identification.arrow import State, Unsettled, settle
+from nonsmooth.identification.fit.first_level import BETTER, level, other_beginnings, rechosen, settle_first
 from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
-from nonsmooth.identification.fit.rough import LEAST, level
 from nonsmooth.identification.fit.windows import Window, Windows
-from nonsmooth.identification.pieces import State
 
 __all__ = ["POOR", "SHORT", "Grown", "grow"]
 
@@ -72,10 +70,19 @@ class Grown:
     begins: tuple[tuple[int, int, float], ...] = ()
 
     @property
+    def readings(self) -> int:
+        """Number of readings that were used."""
+        return sum(len(window.readings[0]) for window in self.problem.pieces)
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """Names of the runs."""
+        return tuple(record.name for record in self.problem.records)
+
+    @property
     def unused(self) -> int:
         """Number of readings in parts of the record that could not be simulated."""
-        given = sum(int(np.isfinite(record.values).sum()) for record in self.problem.records)
-        return given - sum(len(window.readings[0]) for window in self.problem.pieces)
+        return sum(int(np.isfinite(record.values).sum()) for record in self.problem.records) - self.readings
 
     @property
     def whole(self) -> bool:
@@ -94,7 +101,7 @@ class Grown:
         Where a record is sampled so coarsely that its irregularity is the motion itself, the residuals still have to
         be independent, and over windows with starts of their own they are not taken for coloured noise.
         """
-        tau = [w.correlation(r) for w, r in zip(self.problem.pieces, self.state.residuals, strict=True)]
+        tau = [w.correlation(r) for w, r in self.problem.rows(self.state)]
         ends = not self.stuck and not self.unused and self.short <= SHORT
         white = not self.problem.colour.any() and float(np.median(tau)) < _WHITE
         return self.rms <= _GOOD and not self.missing and ends and (self.whole or white)
@@ -219,10 +226,7 @@ def _joined(problem: Windows, starts: FloatArray, length: float) -> list[Window]
 
 def _reduced(problem: Windows, state: State) -> float:
     """Sum of squared residuals over the noise, per degree of freedom."""
-    rows = [
-        r[: len(w.readings[0])] / problem.noise[w.readings[1]]
-        for w, r in zip(problem.pieces, state.residuals, strict=True)
-    ]
+    rows = [r / problem.noise[w.readings[1]] for w, r in problem.rows(state)]
     free = sum(w.n_free for w in problem.pieces) + len(problem.unknowns.names)
     total = sum(map(len, rows))
     return float(sum(float(r @ r) for r in rows)) / max(total - free, 0.1 * total)
@@ -230,7 +234,7 @@ def _reduced(problem: Windows, state: State) -> float:
 
 def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: FloatArray, rounds: int) -> Grown:
     """The fit at its minimum, with the noise of each quantity from its residuals."""
-    u, short, left = problem.unknowns, 0.0, np.zeros(len(theta))
+    short, left = 0.0, np.zeros(len(theta))
     for _ in range(rounds):
         colour = colours(problem, problem.plain.residuals(theta, starts))
         problem, before = replace(problem, colour=colour), problem
@@ -238,10 +242,7 @@ def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: F
         changed = float(max(np.max(np.abs(noise / before.noise - 1.0)), np.max(np.abs(colour - before.colour))))
         problem = replace(problem, noise=noise)
         try:
-            theta, starts, _, _ = settle(
-                problem, theta, starts, 0.0, [True] * len(starts), u.centre, u.precision, 50, False, (u.low, u.high),
-                LEAST,
-            )  # fmt: skip
+            theta, starts, _ = settle(problem, theta, starts)
             short, left = 0.0, np.zeros(len(theta))
         except Unsettled as reason:  # a sum of squares with corners: grazes, rest
             theta, starts = reason.values, reason.starts
@@ -257,7 +258,7 @@ def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:
     """The fit with each record in the mode in which it fits best from its beginning, all unknowns free."""
     begins = []
     for i in range(len(final.problem.pieces)):
-        now, best = _chi2(final.problem, final.state), None
+        now, best = final.state.chi2(final.problem.weights(final.state)), None
         others = other_beginnings(final.problem, final.theta, final.starts, i)
         if not others:
             continue
@@ -269,17 +270,12 @@ def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:
                 theta, starts, state = level(final.problem.of(pieces), final.theta, starts)
             except SolveError:
                 continue
-            if (far := _chi2(final.problem, state)) < least:
+            if (far := state.chi2(final.problem.weights(state))) < least:
                 least, best = far, (final.problem.of(pieces), theta, starts)
         if best is not None and least < now - BETTER:
             final, mode = _final(*best, irregular, rounds), best[0].pieces[i].mode
         begins.append((final.problem.pieces[i].record, mode, abs(least - now)))
     return replace(final, begins=tuple(begins))
-
-
-def _chi2(problem: Windows, state: State) -> float:
-    rows = zip(state.residuals, problem.weights(state, 0.0), strict=True)
-    return sum(float(np.sum((r * weight) ** 2)) for r, weight in rows)
 
 
 def _noise(problem: Windows, state: State) -> FloatArray:

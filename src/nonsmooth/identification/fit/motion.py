@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.flow.engines.engine import Log, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
@@ -44,8 +43,8 @@ class Motion:
 
     time: FloatArray
     z: FloatArray
-    mode: NDArray[np.int64]
-    segment: NDArray[np.int64]
+    mode: IntArray
+    segment: IntArray
     log: Log
     rate: FloatArray | None = None
     D: FloatArray | None = None

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.identification.arrow import State
 from nonsmooth.identification.fit.windows import Windows
-from nonsmooth.identification.pieces import State
 
 __all__ = ["OUTLYING", "colours", "parts", "robust_size", "strange"]
 
@@ -68,8 +68,7 @@ def strange(problem: Windows, plain: State, white: State, irregular: FloatArray)
 
 def parts(problem: Windows, state: State, c: int) -> list[FloatArray]:
     """Residuals of a quantity, window by window, without the readings at a limit of the sensor."""
-    rows = zip(problem.pieces, state.residuals, strict=True)
-    return [r[np.flatnonzero((w.readings[1] == c) & (problem.limits(w) == 0))] for w, r in rows]
+    return [r[(w.readings[1] == c) & (problem.limits(w) == 0)] for w, r in problem.rows(state)]
 
 
 def _has_structure(r: FloatArray, e: FloatArray) -> bool:

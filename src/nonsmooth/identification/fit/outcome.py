@@ -9,16 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.arrow import inverted, reduced
+from nonsmooth.identification.arrow import Sandwich, inverted, sandwich
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.first_level import BETTER
 from nonsmooth.identification.fit.growth import SHORT, Grown
 from nonsmooth.identification.fit.noise import OUTLYING, robust_size
 from nonsmooth.identification.fit.profile import profiled
 from nonsmooth.identification.fit.residuals import by_place, residual_data
-from nonsmooth.identification.fit.rough import LEAST
 from nonsmooth.identification.parameter_set import ParameterSet
-from nonsmooth.identification.sandwich import Sandwich, sandwich
 from nonsmooth.results.progress import Progress
 
 if TYPE_CHECKING:
@@ -42,12 +40,11 @@ def outcome(
 ) -> ParameterSet:  # fmt: skip
     """The parameters, with what is known of how well."""
     problem, theta = grown.problem, grown.theta
-    u, used = problem.unknowns, np.ones(len(problem.pieces), dtype=bool)
-    found = sandwich(problem, theta, grown.starts, 0.0, used, u.precision, LEAST)
-    weights = problem.weights(found.state, 0.0)
-    normal, _, back = reduced(problem, found.state, weights, used, len(theta))
-    loose = _undetermined(inverted(normal + u.precision, LEAST)[1])
-    starts = _starts(grown, found, back)
+    u = problem.unknowns
+    found = sandwich(problem, theta, grown.starts)
+    normal = found.normal + u.precision
+    loose = _undetermined(inverted(normal)[1])
+    starts = _starts(grown, found)
     noise = _noise(grown, found)
     jacobian = np.vstack([np.eye(len(theta)), starts.jacobian])
     of_theta = found.covariance + np.outer(grown.left, grown.left)
@@ -70,11 +67,11 @@ def outcome(
     extra = {**dict(zip([*u.names[a:], *starts.names], rows[a:], strict=True)), **noise}
     data = residual_data(grown, options).assign_attrs(synthetic="yes" if synthetic else "no")
     known = [name for name in profiles if np.isfinite(rows[u.names.index(name)].uncertainty)]
-    beside = [*profiled(grown, known, normal + u.precision, found.covariance, synthetic, watched), *beside]
+    beside = [*profiled(grown, known, normal, found.covariance, synthetic, watched), *beside]
     notes = [*left, *_notes(grown, found, data)] + [note for finding in beside for note in finding.notes]
     finding = Finding(
         "fit", next(iter({**estimates, **extra}.values())), METHOD, data.sizes["sample"],
-        tuple(record.name for record in problem.records), tuple(notes), data=data, plot="fit_residuals",
+        grown.runs, tuple(notes), data=data, plot="fit_residuals",
     )  # fmt: skip
     return ParameterSet(
         estimates, covariance, extra=extra, findings=[finding, *beside],
@@ -94,7 +91,7 @@ class _Starts:
     own: FloatArray
 
 
-def _starts(grown: Grown, found: Sandwich, back: list[Any]) -> _Starts:
+def _starts(grown: Grown, found: Sandwich) -> _Starts:
     from scipy.linalg import block_diag
 
     problem, states = grown.problem, grown.problem.system.states
@@ -102,7 +99,7 @@ def _starts(grown: Grown, found: Sandwich, back: list[Any]) -> _Starts:
     for i, window in enumerate(problem.pieces):
         if i and problem.pieces[i - 1].record == window.record:
             continue
-        inverse, cross, _ = back[i]
+        inverse, cross, _ = found.back[i]
         follows = np.zeros((len(window.start), len(grown.theta)))
         follows[:, window.which] = -inverse @ cross
         label = f", {problem.records[window.record].name}" if len(problem.records) > 1 else ""

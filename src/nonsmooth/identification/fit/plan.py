@@ -12,7 +12,6 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.blas import one_blas_thread
-from nonsmooth.identification.fit.rough import LEAST
 from nonsmooth.identification.options import Known
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.names import unknown
@@ -120,29 +119,22 @@ def plan_experiment(
         found.append(told)
     alone = np.array([_uncertainties(one + precision) for one in found])
     size = np.where(theta != 0, np.abs(theta), 1.0)
-    left, total = list(range(len(found))), precision
-    order, after, measure = [], [], []
-    while left:
-        best = max(left, key=lambda i: _gain(total + found[i], size))
-        left.remove(best)
-        total = total + found[best]
-        order.append(best)
-        after.append(_uncertainties(total))
-        measure.append(_log_det(total, size))
+    order, totals = _ordered(found, precision, size)
     labels = np.array(list(map(str, runs)), dtype=object)
     units = np.array(_units(system, names), dtype=object)
     return xr.Dataset(
         {
             "uncertainty": (("run", "parameter"), alone, {"long_name": "standard uncertainty by this run"}),
-            "log_det": (("run",), [_log_det(one + precision, size) for one in found], {
+            "log_det": ("run", [_log_det(one + precision, size) for one in found], {
                 "long_name": "log det of the information, in units of the parameters' values"}),
-            "best": (("parameter",), labels[np.argmin(alone, axis=0)].astype(str), {
+            "best": ("parameter", labels[np.argmin(alone, axis=0)].astype(str), {
                 "long_name": "run with the least uncertainty"}),
             "information": (("run", "parameter", "other"), np.array(found), {"long_name": "Fisher information"}),
-            "order": (("step",), labels[order].astype(str), {"long_name": "run that adds most to the determinant"}),
-            "uncertainty_after": (("step", "parameter"), np.array(after), {
+            "order": ("step", labels[order].astype(str), {"long_name": "run that adds most to the determinant"}),
+            "uncertainty_after": (("step", "parameter"), np.array([*map(_uncertainties, totals)]), {
                 "long_name": "standard uncertainty by this run and those before"}),
-            "log_det_after": (("step",), measure, {"long_name": "log det by this run and those before"}),
+            "log_det_after": ("step", [_log_det(one, size) for one in totals], {
+                "long_name": "log det by this run and those before"}),
         },
         {
             "run": labels.astype(str), "parameter": names, "other": names, "step": np.arange(1, len(order) + 1),
@@ -175,8 +167,7 @@ def _information(
     state = whole.derivatives(theta, whole.starts)
     if not whole.pieces or not all(np.isfinite(r).all() for r in state.residuals):
         raise SolveError(f"run {name!r} cannot be followed to its end; shorten it", status="no_convergence")
-    used = np.ones(len(whole.pieces), dtype=bool)
-    normal = reduced(whole, state, whole.weights(None, 0.0), used, len(theta))[0]
+    normal = reduced(whole, state, whole.weights(None), len(theta))[0]
     shared = len(theta) - problem.unknowns.phases
     own = np.linalg.pinv(normal[shared:, shared:], hermitian=True)
     eliminated = normal[:shared, :shared] - normal[:shared, shared:] @ own @ normal[shared:, :shared]
@@ -184,9 +175,21 @@ def _information(
     return list(problem.unknowns.names[:shared]), eliminated, known, theta[:shared]
 
 
+def _ordered(
+    found: list[FloatArray], known: FloatArray, size: FloatArray
+) -> tuple[list[int], list[FloatArray]]:
+    """The runs, each the one that adds most to the determinant, and the information with each and those before."""
+    order: list[int] = []
+    totals: list[FloatArray] = []
+    while left := [i for i in range(len(found)) if i not in order]:
+        order.append(max(left, key=lambda i: _gain(known + found[i], size)))
+        totals.append(known := known + found[order[-1]])
+    return order, totals
+
+
 def _uncertainties(information: FloatArray) -> FloatArray:
     """Standard uncertainties; infinite of what a direction has in it that is not determined."""
-    covariance, loose = inverted(information, LEAST)
+    covariance, loose = inverted(information)
     found = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     for direction in loose.T:
         found[np.abs(direction) > 1e-3 * np.abs(direction).max()] = np.inf

@@ -11,7 +11,6 @@ from nonsmooth.errors import SolveError, not_installed
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.growth import Grown
-from nonsmooth.identification.fit.rough import LEAST
 from nonsmooth.results.progress import Progress, progress
 
 __all__ = ["posterior_of"]
@@ -51,7 +50,7 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
             f"a posterior over {size} numbers ({p} unknowns and the starts of {len(problem.pieces)} windows) does not "
             f"mix; at most {_MOST}: fit a shorter part of the record"
         )
-    weights = problem.weights(problem.residuals(grown.theta, grown.starts), 0.0)
+    weights = problem.weights(problem.residuals(grown.theta, grown.starts))
 
     def log_density(x: FloatArray) -> float:
         theta, starts = x[:p], grown.starts.copy()
@@ -59,10 +58,7 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
             return -np.inf
         for value, place in zip(x[p:], at, strict=True):
             starts[place] = value
-        state = problem.residuals(theta, starts)
-        data = sum(float(np.sum((r * w) ** 2)) for r, w in zip(state.residuals, weights, strict=True))
-        away = theta - u.centre
-        found = -0.5 * (data + float(away @ u.precision @ away))
+        found = -0.5 * problem.cost(theta, starts, weights)
         return found if np.isfinite(found) else -np.inf
 
     rng = np.random.default_rng(seed)
@@ -94,10 +90,8 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
         {"value": (("draw", "parameter"), draws, {"long_name": "draws from the posterior"})},
         {"parameter": list(u.names), "unit": ("parameter", list(u.units))},
     )
-    readings = sum(len(window.readings[0]) for window in problem.pieces)
-    runs = tuple(record.name for record in problem.records)
     others = {other: row for other, row in rows.items() if other != name}
-    return Finding("posterior", estimate, METHOD, readings, runs, tuple(notes), others, data=data)
+    return Finding("posterior", estimate, METHOD, grown.readings, grown.runs, tuple(notes), others, data=data)
 
 
 def _drawn(
@@ -106,8 +100,8 @@ def _drawn(
     """First places of the walkers: from the normal law of the unknowns and the starts about the optimum."""
     problem, u, p = grown.problem, grown.problem.unknowns, len(grown.theta)
     state = problem.derivatives(grown.theta, grown.starts)
-    normal, _, back = reduced(problem, state, weights, [True] * len(problem.pieces), p)
-    covariance, loose = inverted(normal + u.precision, LEAST)
+    normal, _, back = reduced(problem, state, weights, p)
+    covariance, loose = inverted(normal + u.precision)
     if loose.size:
         names = [u.names[i] for i in np.flatnonzero(np.abs(loose).max(axis=1) > 1e-3)]
         raise SolveError(f"the records do not determine {', '.join(names)}: give a prior or a value, then sample")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,11 +11,52 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import Unsettled, inverted, settle
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.growth import Grown
-from nonsmooth.identification.fit.rough import LEAST
-from nonsmooth.identification.profiles import Profile, profile_of
 from nonsmooth.results.progress import Progress, progress
 
-__all__ = ["profiled"]
+__all__ = ["Profile", "profile_of", "profiled"]
+
+class Profile(NamedTuple):
+    """A parameter's profile likelihood: its values, the rise of chi^2 above its least, and the 95 % limits.
+
+    A limit is NaN where chi^2 does not rise to 3.84 within the values: the data do not bound the parameter there.
+    """
+
+    values: FloatArray
+    cost: FloatArray
+    best: float
+    low: float
+    high: float
+
+
+def profile_of(values: Any, rise: Any, best: float, *, level: float = 0.95) -> Profile:
+    """Profile of a rise of chi^2, with its limits.
+
+    Parameters
+    ----------
+    values, rise : array (m,)
+        The parameter in rising order, and chi^2 above its least there.
+    best : float
+        Where it is least, between the first and the last value.
+    level : float
+        Probability of the interval.
+    """
+    from scipy.stats import chi2
+
+    grid, above, bound = np.asarray(values, np.float64), np.asarray(rise, np.float64), float(chi2.ppf(level, 1))
+    middle = int(np.argmin(np.abs(grid - best)))
+    low = _crossed(grid[middle::-1], above[middle::-1], bound)
+    return Profile(grid, above, float(best), low, _crossed(grid[middle:], above[middle:], bound))
+
+
+def _crossed(values: FloatArray, rise: FloatArray, bound: float) -> float:
+    """Value at which the rise of chi^2 from the best value passes the bound; NaN where it does not."""
+    over = np.flatnonzero(rise > bound)
+    if len(over) == 0 or over[0] == 0:
+        return float("nan")
+    i = int(over[0])
+    part = (bound - rise[i - 1]) / (rise[i] - rise[i - 1])
+    return float(values[i - 1] + part * (values[i] - values[i - 1]))
+
 
 _STEP = 0.5  # of a standard uncertainty
 _STEPS = 16  # on either side, at most
@@ -37,7 +79,7 @@ def profiled(
     covariance : array (p, p)
         That of the fit, by which the rise of chi^2 is scaled.
     """
-    u, white, found = grown.problem.unknowns, np.diag(inverted(normal, LEAST)[0]), []
+    u, white, found = grown.problem.unknowns, np.diag(inverted(normal)[0]), []
     with progress(2 * len(names), "profiles", watched) as advance:
         for name in names:
             i = u.names.index(name)
@@ -57,7 +99,7 @@ def profiled(
 def _side(grown: Grown, i: int, step: float, scale: float) -> list[tuple[float, float]]:
     """Values of an unknown on one side and the rise of chi^2 there, up to where it is enough."""
     problem, u = grown.problem, grown.problem.unknowns
-    theta, starts, least = grown.theta, grown.starts, _cost(grown, grown.theta, grown.starts)
+    theta, starts, least = grown.theta, grown.starts, problem.cost(grown.theta, grown.starts)
     rows: list[tuple[float, float]] = []
     for k in range(1, _STEPS + 1):
         value = grown.theta[i] + k * _STEP * step
@@ -66,26 +108,17 @@ def _side(grown: Grown, i: int, step: float, scale: float) -> list[tuple[float, 
         low, high, theta = u.low.copy(), u.high.copy(), theta.copy()
         low[i] = high[i] = theta[i] = value
         try:
-            theta, starts, _, _ = settle(
-                replace(problem, unknowns=replace(u, low=low, high=high)), theta, starts, 0.0, [True] * len(starts),
-                u.centre, u.precision, 50, False, (low, high), LEAST,
-            )  # fmt: skip
+            held = replace(problem, unknowns=replace(u, low=low, high=high))
+            theta, starts, _ = settle(held, theta, starts)
         except Unsettled as reason:
             theta, starts = reason.values, reason.starts
-        rise = (_cost(grown, theta, starts) - least) * scale
+        rise = (problem.cost(theta, starts) - least) * scale
         if not np.isfinite(rise):
             break
         rows.append((float(value), rise))
         if rise > _ENOUGH:
             break
     return rows
-
-
-def _cost(grown: Grown, theta: FloatArray, starts: FloatArray) -> float:
-    problem, u = grown.problem, grown.problem.unknowns
-    state = problem.residuals(theta, starts)
-    data = sum(float(np.sum((r * w) ** 2)) for r, w in zip(state.residuals, problem.weights(state, 0.0), strict=True))
-    return data + float((theta - u.centre) @ u.precision @ (theta - u.centre))
 
 
 def _finding(grown: Grown, name: str, profile: Profile, estimate: Estimate, synthetic: bool) -> Finding:
@@ -97,9 +130,8 @@ def _finding(grown: Grown, name: str, profile: Profile, estimate: Estimate, synt
     note = f"{name}: 95 % limits {low} to {high} by its profile; {by_error} by its standard uncertainty"
     if not np.isfinite(list(ends.values())).all():
         note += "; the record does not bound it on both sides"
-    readings = sum(len(window.readings[0]) for window in grown.problem.pieces)
     return Finding(
-        f"{name}, profile", estimate, METHOD, readings, tuple(record.name for record in grown.problem.records), (note,),
+        f"{name}, profile", estimate, METHOD, grown.readings, grown.runs, (note,),
         data=xr.Dataset(
             {"cost": ("value", profile.cost), "best": ((), profile.best), **{k: ((), v) for k, v in ends.items()}},
             {"value": ("value", profile.values, {"units": estimate.unit})},

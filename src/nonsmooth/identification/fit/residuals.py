@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nonsmooth.arrays import IntArray
 from nonsmooth.identification.fit.growth import Grown
 from nonsmooth.identification.fit.motion import Motion
 from nonsmooth.system.system import System
@@ -111,7 +111,7 @@ def _places(system: System) -> tuple[list[str], dict[tuple[str, int], int]]:
     return names, marks
 
 
-def _of_samples(system: System, motion: Motion, marks: Mapping[tuple[str, int], int]) -> NDArray[np.int64]:
+def _of_samples(system: System, motion: Motion, marks: Mapping[tuple[str, int], int]) -> IntArray:
     """The place of each sample of a motion: the nearest transition, a graze, else its mode."""
     from sympy import lambdify
 

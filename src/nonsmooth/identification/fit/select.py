@@ -7,9 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.options import Recorded
@@ -114,7 +113,7 @@ def select_model(
     )
 
 
-def _held_out(problem: Windows, folds: int) -> list[NDArray[np.int64]]:
+def _held_out(problem: Windows, folds: int) -> list[IntArray]:
     """The fold in which each instant of each record is held out; -1: never, at the record's beginning."""
     from nonsmooth.identification.fit.first_windows import first_length
 
@@ -131,7 +130,7 @@ def _held_out(problem: Windows, folds: int) -> list[NDArray[np.int64]]:
     return found
 
 
-def _error(problem: Windows, held: list[NDArray[np.bool_]], tries: int, seed: int) -> float:
+def _error(problem: Windows, held: list[BoolArray], tries: int, seed: int) -> float:
     """Mean squared error at the readings held out, over the noise."""
     from nonsmooth.identification.fit.fit import best_of
 

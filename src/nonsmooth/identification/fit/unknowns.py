@@ -81,12 +81,12 @@ def read_unknowns(
     """
     given = [parameters] if isinstance(parameters, str) else list(parameters)
     bounds = dict(parameters) if isinstance(parameters, Mapping) else {}
+    known = _known_unknowns(system, sensors)
+    allowed = {name: unit for name, (_, unit) in known.items()}
     if not given:
-        raise ValueError(f"parameters names nothing to be found; allowed: {', '.join(_allowed(system, sensors))}")
+        raise ValueError(f"parameters names nothing to be found; allowed: {', '.join(allowed)}")
     if twice := [name for name in given if given.count(name) > 1]:
         raise ValueError(f"parameters names {twice[0]!r} twice; name each once")
-    units = {key: parameter.unit for key, parameter in system.parameters.items()}
-    allowed = _allowed(system, sensors)
     for name in given:
         if name not in allowed:
             raise ValueError(unknown(name, "an unknown of this fit", repr(system.name), allowed))
@@ -112,15 +112,7 @@ def read_unknowns(
         base += [name] * (len(runs) if name in each else 1)
         names += [f"{name}, {run}" for run in runs] if name in each else [name]
     places = np.array([[first[n] + run * (n in each) for n in local] for run in range(len(runs))], dtype=np.intp)
-    quantity = {**system.states, **system.outputs}
-    of_names = {**units, "clock": "", "phase": "periods"} | {
-        f"{q}.{what}": "" if what == "delay" else "" if what == "gain" and not quantity[q] else
-        f"1/({quantity[q]})" if what == "gain" and sensors[q].gain != 1 else "" if what == "gain" else quantity[q]
-        for q, what in of_sensors
-    }  # fmt: skip
-    values = {**system.values, "clock": 1.0, "phase": 0.0}
-    values |= {f"{q}.{what}": getattr(sensors[q], what) for q, what in of_sensors}
-    guess = np.array([values[name] for name in base])
+    guess = np.array([known[name][0] for name in base])
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
     for i, name in enumerate(names):
         if name.partition(",")[0] == "clock":
@@ -130,15 +122,20 @@ def read_unknowns(
             low[i], high[i] = _bounds(name, pair, guess[i])
     centre, precision = _known(tuple(names), priors, guess)
     return Unknowns(
-        tuple(names), active, of_sensors, clock, phases, tuple(of_names[name] for name in base), guess, low, high,
+        tuple(names), active, of_sensors, clock, phases, tuple(allowed[name] for name in base), guess, low, high,
         centre, precision, places,
     )  # fmt: skip
 
 
-def _allowed(system: System, sensors: Mapping[str, Sensor]) -> dict[str, str]:
-    units = {key: parameter.unit for key, parameter in system.parameters.items()}
-    of_sensors = {f"{q}.{what}": "" for q in sensors for what in OF_A_SENSOR}
-    return {**units, **of_sensors, "clock": "", "phase": "periods"}
+def _known_unknowns(system: System, sensors: Mapping[str, Sensor]) -> dict[str, tuple[float, str]]:
+    """First guess and unit of everything that may be found."""
+    found = {name: (system.values[name], parameter.unit) for name, parameter in system.parameters.items()}
+    for q, unit in {**system.states, **system.outputs}.items():
+        if q in sensors:
+            inverse = f"1/({unit})" if unit and sensors[q].gain != 1 else ""
+            for what, own in zip(OF_A_SENSOR, (inverse, unit, ""), strict=True):  # gain, offset, delay
+                found[f"{q}.{what}"] = (getattr(sensors[q], what), own)
+    return {**found, "clock": (1.0, ""), "phase": (0.0, "periods")}
 
 
 def _bounds(name: str, pair: Any, guess: float) -> tuple[float, float]:

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.identification.arrow import State
 from nonsmooth.identification.fit.motion import Marcher, Motion
 from nonsmooth.identification.fit.records import Record
 from nonsmooth.identification.fit.sensors import Readout, Sensor
 from nonsmooth.identification.fit.unknowns import Unknowns
-from nonsmooth.identification.pieces import State
 from nonsmooth.identification.uncertainty import correlation_times
 
 if TYPE_CHECKING:
@@ -143,32 +143,33 @@ class Windows:
         except (SystemDefinitionError, ValueError):
             return None
 
-    def phase(self, theta: FloatArray, window: Window) -> float:
-        return float(theta[window.which[-1]]) if self.unknowns.phases else 0.0
+    def phase(self, theta: FloatArray, run: int) -> float:
+        return float(theta[self.unknowns.places[run][-1]]) if self.unknowns.phases else 0.0
 
     def clock(self, theta: FloatArray, run: int) -> float:
         """The system's time over that of the recording."""
         return float(theta[self.unknowns.clock_place(run)]) if self.unknowns.clock else 1.0
 
-    def shift(self, theta: FloatArray, window: Window) -> float:
-        """The system's time less that of the record's corrected clock, from the phase of the run."""
-        values = self.values(theta, window.record) if self.unknowns.phases else None
-        period = None if values is None else self.system.period_at(values)
-        return 0.0 if period is None else self.phase(theta, window) * period
-
     def motion(self, theta: FloatArray, window: Window, start: FloatArray, derivatives: bool = False) -> Motion | None:
         """The motion of a window at its samples; where delays differ, at the instants of each quantity in turn."""
-        values = self.values(theta, window.record)
+        instants = self.instants(theta, window)
+        return self.march(theta, window.record, window.begin, instants, start, window.mode, derivatives)
+
+    def march(
+        self, theta: FloatArray, run: int, begin: float, times: FloatArray, start: FloatArray, mode: int,
+        derivatives: bool = False,
+    ) -> Motion | None:  # fmt: skip
+        """A motion from an instant of a run to times of its corrected clock; None where it does not come to its end."""
+        values, begin = self.values(theta, run), self.clock(theta, run) * begin
         if values is None or not np.isfinite(theta).all() or not np.isfinite(start).all():
             return None
-        shift = self.shift(theta, window)
-        instants, begin = self.instants(theta, window), self.clock(theta, window.record) * window.begin
-        if instants[0] < begin:  # a delay beyond what its bounds allow
+        if times[0] < begin:  # a delay beyond what its bounds allow
             return None
+        period = self.system.period_at(values)
+        shift = 0.0 if period is None else self.phase(theta, run) * period
         return self.marcher.run(
-            values, begin + shift, instants + shift, start, window.mode, derivatives,
-            self.records[window.record].drive,
-        )  # fmt: skip
+            values, begin + shift, times + shift, start, mode, derivatives, self.records[run].drive
+        )
 
     def delays(self, theta: FloatArray, run: int) -> FloatArray:
         return np.array([sensor.delay for sensor in self.sensor_values(theta, run).values()])
@@ -191,7 +192,7 @@ class Windows:
         k, c = window.readings
         n, a, p = self.marcher.flow.n, len(u.active), len(window.which)
         period, of_period = self.marcher.flow.period(values)
-        phase = self.phase(theta, window)
+        phase = self.phase(theta, window.record)
         predicted, table = np.empty(len(k)), np.zeros((len(k) if slopes else 0, p + n))
         offset = 0.0 if not np.isfinite(period) else phase * period
         for j, (name, sensor) in enumerate(sensors.items()):
@@ -266,6 +267,16 @@ class Windows:
             out[at[1:]] = (rows[at[1:]] - told * rows[at[:-1]]) / np.sqrt(1.0 - told**2)
         return out
 
+    def rows(self, state: State) -> list[tuple[Window, FloatArray]]:
+        """The windows with the residuals of their readings."""
+        return [(w, r[: len(w.readings[0])]) for w, r in zip(self.pieces, state.residuals, strict=True)]
+
+    def cost(self, theta: FloatArray, starts: FloatArray, weights: list[FloatArray] | None = None) -> float:
+        """Sum of squares, priors included."""
+        state, away = self.residuals(theta, starts), theta - self.unknowns.centre
+        weights = self.weights(state) if weights is None else weights
+        return state.chi2(weights) + float(away @ self.unknowns.precision @ away)
+
     def residuals(self, theta: FloatArray, starts: FloatArray) -> State:
         """Residuals of all windows; not finite where a motion does not come to its end."""
         return self._state(theta, starts, False)
@@ -301,7 +312,7 @@ class Windows:
                 state.in_parameters.append(np.vstack([table[:, :p], np.zeros((len(free), p))]))
         return state
 
-    def weights(self, state: State | None, spread: float) -> list[FloatArray]:
+    def weights(self, state: State | None) -> list[FloatArray]:
         """One over the standard deviation of each row; less for those that the loss weighs down."""
         found = []
         for i, w in enumerate(self.pieces):

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import MEASURED
-from nonsmooth.plot.identification.picture import number, picture
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from nonsmooth.plot.identification.picture import Picture, number, picture
 
 __all__ = [
-    "amplitude_fit", "backbone", "drop_decay", "forced_responses", "free_decay", "half_power", "modal_damping",
+    "amplitude_fit",
+    "backbone",
+    "drop_decay",
+    "forced_responses",
+    "free_decay",
+    "half_power",
+    "modal_damping",
     "nyquist",
-]  # fmt: skip
+]
 
+_TIME = ("time", "s")
 _OMEGA, _AMPLITUDE = (r"$\omega$", "rad/s"), ("amplitude of $x$", "m")
 _MARKERS = {"up": "^", "down": "v"}
 _FITS = (("joint", "$c$ beside dry friction", "first", "-", "s"), ("viscous", "$c$ alone", "second", "--", "D"))
@@ -26,7 +30,8 @@ _ENVELOPES = (("both", "viscous and dry", "first", "-"), ("viscous", "viscous al
 _CRANKS = (("first", "o"), ("second", "s"), ("third", "^"), ("fourth", "D"))
 
 
-def amplitude_fit(finding: Any, ax: Axes | None = None) -> Axes:
+@picture("amplitude omega omega_fine", _OMEGA, _AMPLITUDE, ratio=0.85)
+def amplitude_fit(one: Picture, finding: Any) -> None:
     """Draw measured amplitudes over frequency with the fits; below, what each fit leaves.
 
     The fit that knows no friction puts all losses into c; its bias is written beside it.
@@ -39,27 +44,24 @@ def amplitude_fit(finding: Any, ax: Axes | None = None) -> Axes:
     ax
         Where to draw; a new one-column figure if None.
     """
-    with picture(finding, ax, "amplitude omega omega_fine", _OMEGA, _AMPLITUDE, ratio=0.85) as one:
-        omega, heights, fine = one.values("omega", "amplitude", "omega_fine")
-        words = one.data["direction"].values.astype(str) if "direction" in one.data else np.full(len(omega), "")
-        for word in dict.fromkeys(words):
-            label, mark = f"{one.word}, steps {word}" if word else "", _MARKERS.get(word, "o")
-            one.points("omega", "amplitude", label, where=words == word, mark=mark, face="white")
-        error = one.data["amplitude_error"].values if "amplitude_error" in one.data else None
-        for name, word, color, line, mark in _FITS:
-            if f"{name}_amplitude" in one.data:
-                curve = one.data[f"{name}_amplitude"].values
-                one.line(fine, curve, word + one.text(f"c_{name}", "N s/m", before=": "), color, line)
-                left, error = error, None  # bars on the first residuals alone
-                one.residual(
-                    omega, heights - np.interp(omega, fine, curve), f"residual, {word}", error=left, marker=mark,
-                    color=style.COLORS[color],
-                )  # fmt: skip
-        one.ax.set_ylim(bottom=0)
-    return one.ax
+    omega, heights, fine = one.values("omega", "amplitude", "omega_fine")
+    words = one.data["direction"].values.astype(str) if "direction" in one.data else np.full(len(omega), "")
+    for word in dict.fromkeys(words):
+        label, mark = f"{one.word}, steps {word}" if word else "", _MARKERS.get(word, "o")
+        one.points("omega", "amplitude", label, where=words == word, mark=mark, face="white")
+    error = one.data["amplitude_error"].values if "amplitude_error" in one.data else None
+    for name, word, color, line, mark in _FITS:
+        if f"{name}_amplitude" in one.data:
+            curve = one.data[f"{name}_amplitude"].values
+            one.line(fine, curve, word + one.text(f"c_{name}", "N s/m", before=": "), color, line)
+            left, error = error, None  # bars on the first residuals alone
+            rest = heights - np.interp(omega, fine, curve)
+            one.residual(omega, rest, f"residual, {word}", error=left, marker=mark, color=style.COLORS[color])
+    one.ax.set_ylim(bottom=0)
 
 
-def half_power(finding: Any, ax: Axes | None = None) -> Axes:
+@picture("omega amplitude omega_low omega_high largest", _OMEGA, _AMPLITUDE)
+def half_power(one: Picture, finding: Any) -> None:
     """Draw amplitudes over frequency, the half-power level and the bandwidth.
 
     Parameters
@@ -70,17 +72,18 @@ def half_power(finding: Any, ax: Axes | None = None) -> Axes:
     ax
         Where to draw; a new one-column figure if None.
     """
-    with picture(finding, ax, "omega amplitude omega_low omega_high largest", _OMEGA, _AMPLITUDE) as one:
-        low, high, top = (number(one.data, name) for name in ("omega_low", "omega_high", "largest"))
-        one.span(low, high, f"bandwidth, {low:.3f} to {high:.3f} rad/s")
-        one.level(top / np.sqrt(2), r"largest amplitude$/\sqrt{2}$")
-        one.points("omega", "amplitude", face="white")
-        one.note(0.97, 0.95, one.text("damping_ratio", before=r"$\xi$ = "), one.text("c", "N s/m", before="$c$ = "))
-        one.ax.set_ylim(bottom=0)
-    return one.ax
+    low, high, top = (number(one.data, name) for name in ("omega_low", "omega_high", "largest"))
+    one.span(low, high, f"bandwidth, {low:.3f} to {high:.3f} rad/s")
+    one.level(top / np.sqrt(2), r"largest amplitude$/\sqrt{2}$")
+    one.points("omega", "amplitude", face="white")
+    one.note(0.97, 0.95, one.text("damping_ratio", before=r"$\xi$ = "), one.text("c", "N s/m", before="$c$ = "))
+    one.ax.set_ylim(bottom=0)
 
 
-def nyquist(finding: Any, ax: Axes | None = None) -> Axes:
+@picture(
+    "real imaginary crank fitted_real fitted_imaginary crank_length", (r"Re $X/a$", ""), (r"Im $X/a$", ""), ratio=0.95
+)
+def nyquist(one: Picture, finding: Any) -> None:
     """Draw the response over the crank's length, X/a, in the complex plane, each crank with its fitted curve.
 
     Without friction all lengths lie on one curve. The natural frequency is where the car lags by a quarter of a turn.
@@ -93,23 +96,21 @@ def nyquist(finding: Any, ax: Axes | None = None) -> Axes:
     ax
         Where to draw; a new one-column figure if None.
     """
-    needed = "real imaginary crank fitted_real fitted_imaginary crank_length"
-    with picture(finding, ax, needed, (r"Re $X/a$", ""), (r"Im $X/a$", ""), ratio=0.95) as one:
-        lengths, crank, real, imaginary = one.values("crank_length", "crank", "fitted_real", "fitted_imaginary")
-        for k, length in enumerate(lengths):
-            color, mark = _CRANKS[k % len(_CRANKS)]
-            one.line(real[k], imaginary[k], f"fitted, crank {1e3 * length:.4g} mm", color, linewidth=0.9)
-            here, label = np.isclose(crank, length), f"{one.word}, {1e3 * length:.4g} mm"
-            one.points("real", "imaginary", label, where=here, mark=mark, face="white")
-        for axis in (one.ax.axhline, one.ax.axvline):
-            axis(0, color=style.COLORS["muted"], linewidth=0.5)
-        natural = one.text("omega_0", "rad/s", before=r"$\omega_0$ = ")
-        one.note(0.5, 0.5, natural, one.text("c", "N s/m", before="$c$ = "))
-        one.ax.set_aspect("equal", adjustable="datalim")
-    return one.ax
+    lengths, crank, real, imaginary = one.values("crank_length", "crank", "fitted_real", "fitted_imaginary")
+    for k, length in enumerate(lengths):
+        color, mark = _CRANKS[k % len(_CRANKS)]
+        one.line(real[k], imaginary[k], f"fitted, crank {1e3 * length:.4g} mm", color, linewidth=0.9)
+        here, label = np.isclose(crank, length), f"{one.word}, {1e3 * length:.4g} mm"
+        one.points("real", "imaginary", label, where=here, mark=mark, face="white")
+    for axis in (one.ax.axhline, one.ax.axvline):
+        axis(0, color=style.COLORS["muted"], linewidth=0.5)
+    natural = one.text("omega_0", "rad/s", before=r"$\omega_0$ = ")
+    one.note(0.5, 0.5, natural, one.text("c", "N s/m", before="$c$ = "))
+    one.ax.set_aspect("equal", adjustable="datalim")
 
 
-def free_decay(finding: Any, ax: Axes | None = None) -> Axes:
+@picture("peak_time peak_height", _TIME, ("peak height (mm)", ""), loc="upper right", columns=1)
+def free_decay(one: Picture, finding: Any) -> None:
     r"""Draw the heights of a free decay's peaks on a logarithmic scale, with the fitted envelopes.
 
     Viscous damping alone gives a straight line. Dry friction takes a constant part from each half cycle and bends it
@@ -123,22 +124,20 @@ def free_decay(finding: Any, ax: Axes | None = None) -> Axes:
     ax
         Where to draw; a new one-column figure if None.
     """
-    labels = ("time", "s"), ("peak height (mm)", "")
-    with picture(finding, ax, "peak_time peak_height", *labels, loc="upper right", columns=1) as one:
-        height = 1e3 * one.data["peak_height"].values
-        one.points("peak_time", "peak_height", f"peaks, {one.word}", scale=1e3)
-        for name, word, color, line in _ENVELOPES:
-            if f"envelope_{name}" in one.data:
-                time, curve = one.values("fine_time", f"envelope_{name}")
-                one.line(time[curve > 0], 1e3 * curve[curve > 0], word, color, line)
-        one.ax.set_yscale("log")
-        one.ax.set_ylim(0.5 * np.nanmin(height[height > 0]), 1.6 * np.nanmax(height))
-        friction = one.text("friction_force", "mN", 1e3, "friction ")
-        one.note(0.04, 0.06, one.text("c", "N s/m", before="$c$ = "), friction)
-    return one.ax
+    height = 1e3 * one.data["peak_height"].values
+    one.points("peak_time", "peak_height", f"peaks, {one.word}", scale=1e3)
+    for name, word, color, line in _ENVELOPES:
+        if f"envelope_{name}" in one.data:
+            time, curve = one.values("fine_time", f"envelope_{name}")
+            one.line(time[curve > 0], 1e3 * curve[curve > 0], word, color, line)
+    one.ax.set_yscale("log")
+    one.ax.set_ylim(0.5 * np.nanmin(height[height > 0]), 1.6 * np.nanmax(height))
+    friction = one.text("friction_force", "mN", 1e3, "friction ")
+    one.note(0.04, 0.06, one.text("c", "N s/m", before="$c$ = "), friction)
 
 
-def drop_decay(finding: Any, ax: Axes | None = None) -> Axes:
+@picture("peak_time log_height slope intercept", _TIME, ("ln (peak height / m)", ""), loc="upper right", columns=1)
+def drop_decay(one: Picture, finding: Any) -> None:
     """Draw the logarithm of the peaks' heights of the support's free decay with its regression line.
 
     Parameters
@@ -150,24 +149,22 @@ def drop_decay(finding: Any, ax: Axes | None = None) -> Axes:
     ax
         Where to draw; a new one-column figure if None.
     """
-    needed, labels = "peak_time log_height slope intercept", (("time", "s"), ("ln (peak height / m)", ""))
-    with picture(finding, ax, needed, *labels, loc="upper right", columns=1) as one:
-        time, data = one.data["peak_time"].values, one.data
-        used = data["used"].values.astype(bool) if "used" in data else np.ones(len(time), dtype=bool)
-        runs = data["peak_run"].values if "peak_run" in data else np.zeros(len(time), dtype=int)
-        for chosen, face, word in ((used, MEASURED, ", used"), (~used, "white", ", left out")):
-            label = one.word + word * bool((~used).any())
-            one.points("peak_time", "log_height", label, where=chosen, face=face)
-        slope, intercepts = float(data["slope"].values.mean()), np.atleast_1d(data["intercept"].values)
-        for k, run in enumerate(np.unique(runs[used])):
-            mine = time[used & (runs == run)]
-            ends = np.array([mine.min(), mine.max()])
-            height = intercepts[min(k, len(intercepts) - 1)] + slope * ends
-            one.line(ends, height, one.text("damping_ratio", before=r"regression, $\xi_s$ = "), "second", zorder=4)
-    return one.ax
+    time, data = one.data["peak_time"].values, one.data
+    used = data["used"].values.astype(bool) if "used" in data else np.ones(len(time), dtype=bool)
+    runs = data["peak_run"].values if "peak_run" in data else np.zeros(len(time), dtype=int)
+    for chosen, face, word in ((used, MEASURED, ", used"), (~used, "white", ", left out")):
+        label = one.word + word * bool((~used).any())
+        one.points("peak_time", "log_height", label, where=chosen, face=face)
+    slope, intercepts = float(data["slope"].values.mean()), np.atleast_1d(data["intercept"].values)
+    for k, run in enumerate(np.unique(runs[used])):
+        mine = time[used & (runs == run)]
+        ends = np.array([mine.min(), mine.max()])
+        height = intercepts[min(k, len(intercepts) - 1)] + slope * ends
+        one.line(ends, height, one.text("damping_ratio", before=r"regression, $\xi_s$ = "), "second", zorder=4)
 
 
-def backbone(finding: Any, ax: Axes | None = None) -> Axes:
+@picture("f_n f_n_error amplitude curve_f_n", ("amplitude", "m"), ("natural frequency (Hz)", ""), loc="best", columns=1)
+def backbone(one: Picture, finding: Any) -> None:
     """Draw the natural frequency over the amplitude with its 95 % band, and each curve's own beside it.
 
     Parameters
@@ -177,26 +174,25 @@ def backbone(finding: Any, ax: Axes | None = None) -> Axes:
     ax
         Where to draw; a new one-column figure if None.
     """
-    return _over_amplitude(finding, ax, "f_n", 1.0, "natural frequency (Hz)")
+    _over_amplitude(one, "f_n", 1.0)
 
 
-def modal_damping(finding: Any, ax: Axes | None = None) -> Axes:
+@picture("zeta zeta_error amplitude curve_zeta", ("amplitude", "m"), ("damping ratio (%)", ""), loc="best", columns=1)
+def modal_damping(one: Picture, finding: Any) -> None:
     """Draw the damping ratio over the amplitude, as :func:`backbone` does the frequency."""
-    return _over_amplitude(finding, ax, "zeta", 100.0, "damping ratio (%)")
+    _over_amplitude(one, "zeta", 100.0)
 
 
-def _over_amplitude(finding: Any, ax: Axes | None, name: str, scale: float, label: str) -> Axes:
-    needed = f"{name} {name}_error amplitude curve_{name}"
-    with picture(finding, ax, needed, ("amplitude", "m"), (label, ""), loc="best", columns=1) as one:
-        a, y, error = one.values("amplitude", name, f"{name}_error")
-        low, high = (scale * (y + sign * 1.96 * error) for sign in (-1, 1))
-        one.ax.fill_between(a, low, high, color=style.COLORS["first"], alpha=0.2, linewidth=0, label="95 %")
-        one.line(a, scale * y, "mode")
-        one.points("curve_amplitude", f"curve_{name}", "each curve by itself", scale=scale, face="white")
-    return one.ax
+def _over_amplitude(one: Picture, name: str, scale: float) -> None:
+    a, y, error = one.values("amplitude", name, f"{name}_error")
+    low, high = (scale * (y + sign * 1.96 * error) for sign in (-1, 1))
+    one.ax.fill_between(a, low, high, color=style.COLORS["first"], alpha=0.2, linewidth=0, label="95 %")
+    one.line(a, scale * y, "mode")
+    one.points("curve_amplitude", f"curve_{name}", "each curve by itself", scale=scale, face="white")
 
 
-def forced_responses(finding: Any, ax: Axes | None = None, *, responses: Sequence[Any] = ()) -> Axes:
+@picture("frequency response unstable f_n amplitude", ("frequency", "Hz"), ("amplitude", "m"), loc="upper left")
+def forced_responses(one: Picture, finding: Any, *, responses: Sequence[Any] = ()) -> None:
     """Draw the measured points over frequency, the backbone, and computed responses along their curves.
 
     Parameters
@@ -208,29 +204,24 @@ def forced_responses(finding: Any, ax: Axes | None = None, *, responses: Sequenc
     responses : sequence of Dataset
         Curves for constant forces, from ``NonlinearMode.response``; their unstable parts are dashed.
     """
-    labels = ("frequency", "Hz"), ("amplitude", "m")
-    with picture(finding, ax, "frequency response unstable f_n amplitude", *labels, loc="upper left") as one:
-        frequency, height, unstable = one.values("frequency", "response", "unstable")
-        for chosen, face, word in ((unstable == 0, MEASURED, one.word), (unstable != 0, "white", "unstable part")):
-            if chosen.any():
-                looks: dict[str, Any] = {"markersize": 3.0, "markerfacecolor": face, "markeredgewidth": 0.4}
-                one.line(frequency[chosen], height[chosen], word, "section", ".", zorder=3, **looks)
-        for curve in responses:
-            f, a, stable = (curve[name].values for name in ("frequency", "amplitude", "stable"))
-            one.line(f, np.where(stable, a, np.nan), "mode, constant force", "second", zorder=4)
-            if not stable.all():
-                wide = ~stable | np.roll(~stable, 1) | np.roll(~stable, -1)
-                one.line(f, np.where(wide, a, np.nan), "", "second", "--", zorder=4)
-            if len(a):
-                top = int(np.argmax(a))
-                one.ax.annotate(
-                    f"{curve.attrs['force']:.2g} N", (f[top], a[top]), xytext=(3, 2), textcoords="offset points",
-                    ha="left", va="bottom", fontsize=style.small(one.ax), color=style.COLORS["second"], zorder=6,
-                    bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.4},
-                )  # fmt: skip
-        natural, a = one.values("f_n", "amplitude")
-        one.line(natural, a, "backbone", linewidth=1.1, zorder=5)
-        one.ax.set_ylim(bottom=0, top=1.32 * float(height.max()))
-        reach = 0.03 * np.ptp(frequency)
-        one.ax.set_xlim(frequency.min() - reach, frequency.max() + reach)
-    return one.ax
+    frequency, height, unstable = one.values("frequency", "response", "unstable")
+    for chosen, face, word in ((unstable == 0, MEASURED, one.word), (unstable != 0, "white", "unstable part")):
+        if chosen.any():
+            looks: dict[str, Any] = {"markersize": 3.0, "markerfacecolor": face, "markeredgewidth": 0.4}
+            one.line(frequency[chosen], height[chosen], word, "section", ".", zorder=3, **looks)
+    for curve in responses:
+        f, a, stable = (curve[name].values for name in ("frequency", "amplitude", "stable"))
+        one.line(f, np.where(stable, a, np.nan), "mode, constant force", "second", zorder=4)
+        if not stable.all():
+            wide = ~stable | np.roll(~stable, 1) | np.roll(~stable, -1)
+            one.line(f, np.where(wide, a, np.nan), "", "second", "--", zorder=4)
+        if len(a):
+            top = int(np.argmax(a))
+            paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.4}
+            looks = {"color": style.COLORS["second"], "ha": "left", "va": "bottom", "bbox": paper}
+            style.label(one.ax, f"{curve.attrs['force']:.2g} N", (f[top], a[top]), (3, 2), **looks)
+    natural, a = one.values("f_n", "amplitude")
+    one.line(natural, a, "backbone", linewidth=1.1, zorder=5)
+    one.ax.set_ylim(bottom=0, top=1.32 * float(height.max()))
+    reach = 0.03 * np.ptp(frequency)
+    one.ax.set_xlim(frequency.min() - reach, frequency.max() + reach)

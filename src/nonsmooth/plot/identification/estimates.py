@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.plot import style
-from nonsmooth.plot.identification.picture import Picture, data_of, number, picture
+from nonsmooth.plot.identification.picture import Picture, data_of, drawing, number, picture
 from nonsmooth.plot.labels import symbol_of
+from nonsmooth.results.statuses import words_of_flags
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,7 +21,8 @@ SHOWN = 600
 _WAYS = {1: ("growing", "first"), -1: ("falling", "zone")}
 
 
-def force_displacement(finding: Any, ax: Axes | None = None) -> Axes:
+@picture("displacement force slope intercept", ("displacement", "m"), ("force", "N"), margin=0.03, ratio=0.85)
+def force_displacement(one: Picture, finding: Any) -> None:
     """Draw the samples of slow pulls, the fitted lines and their slopes; below, what the mean line leaves.
 
     Where the data say which way the car was moved, the two ways have two colours: they differ by twice the friction.
@@ -33,30 +35,28 @@ def force_displacement(finding: Any, ax: Axes | None = None) -> Axes:
     ax
         Where to draw; a new one-column figure if None.
     """
-    needed, labels = "displacement force slope intercept", (("displacement", "m"), ("force", "N"))
-    with picture(finding, ax, needed, *labels, margin=0.03, ratio=0.85) as one:
-        x, force, slopes, intercepts = map(np.atleast_1d, one.values("displacement", "force", "slope", "intercept"))
-        # Thinned for the eye only: half of the samples lie on top of each other.
-        shown = np.linspace(0, len(x) - 1, min(SHOWN, len(x))).astype(int)
-        one.cloud(x[shown], force[shown])
-        ends = np.array([np.nanmin(x), np.nanmax(x)])
-        alike = len(slopes) == 1 or np.ptp(slopes) < 1e-9 * abs(slopes[0])  # one slope was fitted to all
-        many = f"{len(slopes)} lines, slopes {slopes.min():.4g} to {slopes.max():.4g} N/m"
-        label = one.text("slope", "N/m", before="slope ") if alike else many
-        for slope, intercept in zip(slopes, intercepts, strict=True):
-            one.line(ends, intercept + slope * ends, label, "second", linewidth=1.6, alpha=0.7)
-        one.note(0.97, 0.36, one.text("friction_force", "mN", 1e3, "friction "))
-        at, left = x[shown], (force - float(np.mean(slopes)) * x - float(np.mean(intercepts)))[shown]
-        if "pull" not in one.data:
-            one.residual(at, left)
-        else:
-            for way, (words, color) in _WAYS.items():
-                here = one.data["pull"].values[shown] * way > 0
-                one.residual(at[here], left[here], f"residual, displacement {words}", color=style.COLORS[color])
-    return one.ax
+    x, force, slopes, intercepts = map(np.atleast_1d, one.values("displacement", "force", "slope", "intercept"))
+    # Thinned for the eye only: half of the samples lie on top of each other.
+    shown = np.linspace(0, len(x) - 1, min(SHOWN, len(x))).astype(int)
+    one.cloud(x[shown], force[shown])
+    ends = np.array([np.nanmin(x), np.nanmax(x)])
+    alike = len(slopes) == 1 or np.ptp(slopes) < 1e-9 * abs(slopes[0])  # one slope was fitted to all
+    many = f"{len(slopes)} lines, slopes {slopes.min():.4g} to {slopes.max():.4g} N/m"
+    label = one.text("slope", "N/m", before="slope ") if alike else many
+    for slope, intercept in zip(slopes, intercepts, strict=True):
+        one.line(ends, intercept + slope * ends, label, "second", linewidth=1.6, alpha=0.7)
+    one.note(0.97, 0.36, one.text("friction_force", "mN", 1e3, "friction "))
+    at, left = x[shown], (force - float(np.mean(slopes)) * x - float(np.mean(intercepts)))[shown]
+    if "pull" not in one.data:
+        one.residual(at, left)
+    else:
+        for way, (words, color) in _WAYS.items():
+            here = one.data["pull"].values[shown] * way > 0
+            one.residual(at[here], left[here], f"residual, displacement {words}", color=style.COLORS[color])
 
 
-def calibration(finding: Any, ax: Axes | None = None) -> Axes:
+@picture("setting reading", "setting", "reading", columns=3, margin=0.03, ratio=0.85)
+def calibration(one: Picture, finding: Any) -> None:
     """Draw a calibration: frequency over motor voltage, or the forcing's amplitude over the crank's length.
 
     Parameters
@@ -67,23 +67,21 @@ def calibration(finding: Any, ax: Axes | None = None) -> Axes:
     ax
         Where to draw; a new one-column figure if None.
     """
-    with picture(finding, ax, "setting reading", "setting", "reading", columns=3, margin=0.03, ratio=0.85) as one:
-        setting, reading = one.values("setting", "reading")
-        if "fitted" in one.data:
-            at, fitted = one.values("setting_fine", "fitted")
-            # No further than to zero: what is measured here has one sign.
-            there = fitted * np.sign(np.mean(reading)) >= 0
-            one.line(at[there], fitted[there], "fitted")
-            band = None
-            if "fitted_low" in one.data:
-                band = [at[there], *((one.data[f"fitted_{end}"].values - fitted)[there] for end in ("low", "high"))]
-                looks: dict[str, Any] = {"color": style.COLORS["first"], "alpha": 0.25, "linewidth": 0}
-                one.ax.fill_between([], [], label="its 95 % band (below)", **looks)
-            error = one.data["reading_error"].values if "reading_error" in one.data else None
-            one.residual(setting, reading - np.interp(setting, at, fitted), error=error, band=band, marker="o")
-        one.points("setting", "reading")
-        one.note(0.04, 0.96, _law(one))
-    return one.ax
+    setting, reading = one.values("setting", "reading")
+    if "fitted" in one.data:
+        at, fitted = one.values("setting_fine", "fitted")
+        # No further than to zero: what is measured here has one sign.
+        there = fitted * np.sign(np.mean(reading)) >= 0
+        one.line(at[there], fitted[there], "fitted")
+        band = None
+        if "fitted_low" in one.data:
+            band = [at[there], *((one.data[f"fitted_{end}"].values - fitted)[there] for end in ("low", "high"))]
+            looks: dict[str, Any] = {"color": style.COLORS["first"], "alpha": 0.25, "linewidth": 0}
+            one.ax.fill_between([], [], label="its 95 % band (below)", **looks)
+        error = one.data["reading_error"].values if "reading_error" in one.data else None
+        one.residual(setting, reading - np.interp(setting, at, fitted), error=error, band=band, marker="o")
+    one.points("setting", "reading")
+    one.note(0.04, 0.96, _law(one))
 
 
 def _law(one: Picture) -> str:
@@ -122,14 +120,10 @@ def fit_residuals(
     return _over_time(data, ax, quantity, run) if show == "time" else _by_place(data, ax)
 
 
-def _words(data: Any, name: str) -> list[str]:
-    return [str(word) for word in data[name].attrs["flag_meanings"].split()]
-
-
 def _chosen(data: Any, name: str, given: str | None) -> int:
     from nonsmooth.system.names import unknown
 
-    words = _words(data, name)
+    words = words_of_flags(data[name])
     asked = words[0] if given is None else given.replace(" ", "_")
     if asked not in words:
         raise ValueError(unknown(given, f"a {name}", "this fit", words))
@@ -139,10 +133,10 @@ def _chosen(data: Any, name: str, given: str | None) -> int:
 def _over_time(data: Any, ax: Axes | None, quantity: str | None, run: str | None) -> Axes:
     q, r = _chosen(data, "quantity", quantity), _chosen(data, "run", run)
     part = data.isel(sample=np.flatnonzero((data["quantity"].values == q) & (data["run"].values == r)))
-    modes, unit = _words(data, "mode"), str(part["measured"].attrs.get("units", ""))
-    labels, numbers = (("time", ""), (_words(data, "quantity")[q], unit)), np.unique(part["mode"].values)
+    modes, unit = words_of_flags(data["mode"]), str(part["measured"].attrs.get("units", ""))
+    labels, numbers = (("time", ""), (words_of_flags(data["quantity"])[q], unit)), np.unique(part["mode"].values)
     looks: dict[str, Any] = {"columns": min(3, len(numbers) + 1), "margin": 0.05, "ratio": 0.9}
-    with picture(part, ax, "", *labels, strip="standard deviations", **looks) as one:
+    with drawing(part, ax, "", *labels, strip="standard deviations", **looks) as one:
         time, mode, window, residual = one.values("time", "mode", "window", "residual")
         one.cloud(time, part["measured"].values)
         for k, m in enumerate(numbers):
@@ -158,9 +152,9 @@ def _over_time(data: Any, ax: Axes | None, quantity: str | None, run: str | None
 
 
 def _by_place(data: Any, ax: Axes | None) -> Axes:
-    names, place, residual = _words(data, "place"), data["place"].values, data["residual"].values
+    names, place, residual = words_of_flags(data["place"]), data["place"].values, data["residual"].values
     held = [i for i in np.unique(place) if np.count_nonzero(place == i) >= _FEW]
-    n_modes = len(_words(data, "mode"))
+    n_modes = len(words_of_flags(data["mode"]))
     with style.axes(ax) as drawn:
         for row, i in enumerate(held):
             r = residual[place == i]
@@ -196,7 +190,7 @@ def profile(finding: Any, ax: Axes | None = None) -> Axes:
     data = data_of(finding, "value", "cost")
     unit = str(data["value"].attrs.get("units", data.attrs.get("units", "")))
     labels = (symbol_of(str(data.attrs.get("parameter", "value"))), unit), (r"$\chi^2$ above its least", "")
-    with picture(data, ax, "", *labels, loc="upper center", margin=0) as one:
+    with drawing(data, ax, "", *labels, loc="upper center", margin=0) as one:
         value, cost = one.values("value", "cost")
         one.span(number(data, "low"), number(data, "high"), "95 % interval", ymax=0.74)
         one.line(value, cost, f"profile, {one.word}", marker="o", markersize=1.5)
@@ -243,10 +237,9 @@ def coverage(finding: Any, ax: Axes | None = None) -> Axes:
             for mine, color in ((held[:, k], "section"), (~held[:, k], "second")):
                 drawn.plot(k + spread[mine], off[mine, k], ".", color=style.COLORS[color], markersize=3)
             rms = float(np.sqrt(np.nanmean(off[:, k] ** 2)))
-            drawn.annotate(
-                f"{np.count_nonzero(held[:, k])}/{rigs}\nrms {rms:.2f}", (k, 1.02), xycoords=("data", "axes fraction"),
-                ha="center", va="bottom", fontsize=style.small(drawn),
-            )  # fmt: skip
+            words = f"{np.count_nonzero(held[:, k])}/{rigs}\nrms {rms:.2f}"
+            above: dict[str, Any] = {"transform": drawn.get_xaxis_transform(), "ha": "center", "va": "bottom"}
+            drawn.text(k, 1.02, words, fontsize=style.small(drawn), **above)
         reach = max(3.0, 1.08 * float(np.nanmax(np.abs(off[np.isfinite(off)]), initial=0.0)))
         drawn.set_ylim(-reach, reach)
         drawn.set_xticks(range(len(names)), [symbol_of(name) for name in names])

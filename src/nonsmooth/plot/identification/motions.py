@@ -8,15 +8,21 @@ import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import MEASURED
-from nonsmooth.plot.identification.picture import number, picture
+from nonsmooth.plot.identification.picture import Picture, drawing, number, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
-    "grazing", "impulse_history", "impulse_response", "multiple_shooting", "restitution", "steady_amplitude",
-    "steady_phase", "toss",
-]  # fmt: skip
+    "grazing",
+    "impulse_history",
+    "impulse_response",
+    "multiple_shooting",
+    "restitution",
+    "steady_amplitude",
+    "steady_phase",
+    "toss",
+]
 
 _TIME, _DISPLACEMENT = ("time", "s"), ("displacement", "m")
 _BINS = 9  # shown on either side of the peak
@@ -29,7 +35,8 @@ _METHODS = {
 }
 
 
-def impulse_response(finding: Any, ax: Axes | None = None) -> Axes:
+@picture("magnitude frequency peak_frequency", ("frequency", "Hz"), "magnitude")
+def impulse_response(one: Picture, finding: Any) -> None:
     """Draw the spectrum of an impulse response about its peak.
 
     Stems are the lines of the transform. The largest of them can be half a step away from the frequency; the
@@ -43,41 +50,39 @@ def impulse_response(finding: Any, ax: Axes | None = None) -> Axes:
     ax
         Where to draw; a new one-column figure if None.
     """
-    with picture(finding, ax, "magnitude frequency peak_frequency", ("frequency", "Hz"), "magnitude") as one:
-        frequency, magnitude = one.values("frequency", "magnitude")
-        peak, step = number(one.data, "grid_peak"), number(one.data, "grid_step")
-        top = int(np.nanargmax(magnitude if np.isnan(peak) else -np.abs(frequency - peak)))
-        shown = slice(max(top - _BINS, 0), top + _BINS + 1)
-        at, heights = frequency[shown], magnitude[shown]
-        one.ax.vlines(at, 0, heights, color=MEASURED, linewidth=0.7)
-        one.ax.plot(at, heights, "o", color=MEASURED, markersize=2.6, label=f"DFT, {one.word}")
-        if "fine_magnitude" in one.data:
-            fine, curve = one.values("fine_frequency", "fine_magnitude")
-            inside = (fine >= at[0]) & (fine <= at[-1])
-            one.line(fine[inside], curve[inside], "transform between its lines", "muted", linewidth=0.7)
-        largest = frequency[top]
-        words = f"largest line {largest:.4f} Hz, half a step to each side"
-        one.span(largest - step / 2, largest + step / 2, words)
-        for name, word, color, line in _PEAKS:
-            if np.isfinite(value := number(one.data, name)):
-                looks: dict[str, Any] = {"color": style.COLORS[color], "linestyle": line, "linewidth": 1.0}
-                one.ax.axvline(value, label=f"{word} {value:.4f} Hz", **looks)
-        one.ax.set_ylim(0, 1.06 * heights.max())
-    return one.ax
+    frequency, magnitude = one.values("frequency", "magnitude")
+    peak, step = number(one.data, "grid_peak"), number(one.data, "grid_step")
+    top = int(np.nanargmax(magnitude if np.isnan(peak) else -np.abs(frequency - peak)))
+    shown = slice(max(top - _BINS, 0), top + _BINS + 1)
+    at, heights = frequency[shown], magnitude[shown]
+    one.ax.vlines(at, 0, heights, color=MEASURED, linewidth=0.7)
+    one.ax.plot(at, heights, "o", color=MEASURED, markersize=2.6, label=f"DFT, {one.word}")
+    if "fine_magnitude" in one.data:
+        fine, curve = one.values("fine_frequency", "fine_magnitude")
+        inside = (fine >= at[0]) & (fine <= at[-1])
+        one.line(fine[inside], curve[inside], "transform between its lines", "muted", linewidth=0.7)
+    largest = frequency[top]
+    words = f"largest line {largest:.4f} Hz, half a step to each side"
+    one.span(largest - step / 2, largest + step / 2, words)
+    for name, word, color, line in _PEAKS:
+        if np.isfinite(value := number(one.data, name)):
+            looks: dict[str, Any] = {"color": style.COLORS[color], "linestyle": line, "linewidth": 1.0}
+            one.ax.axvline(value, label=f"{word} {value:.4f} Hz", **looks)
+    one.ax.set_ylim(0, 1.06 * heights.max())
 
 
-def impulse_history(finding: Any, ax: Axes | None = None) -> Axes:
+@picture("x time", _TIME, _DISPLACEMENT, loc="upper right", columns=1, margin=0)
+def impulse_history(one: Picture, finding: Any) -> None:
     """Draw the impulse response over time, with the decay that was fitted to it."""
-    with picture(finding, ax, "x time", _TIME, _DISPLACEMENT, loc="upper right", columns=1, margin=0) as one:
-        time, x = one.values("time", "x")
-        # Joined: a few unjoined samples per oscillation make patterns that are not there.
-        one.line(time, x, one.word, "section", linewidth=0.5)
-        if "fitted" in one.data:
-            one.line(time, one.data["fitted"].values, "fitted decay", "second", "--", linewidth=1.0)
-    return one.ax
+    time, x = one.values("time", "x")
+    # Joined: a few unjoined samples per oscillation make patterns that are not there.
+    one.line(time, x, one.word, "section", linewidth=0.5)
+    if "fitted" in one.data:
+        one.line(time, one.data["fitted"].values, "fitted decay", "second", "--", linewidth=1.0)
 
 
-def grazing(finding: Any, ax: Axes | None = None) -> Axes:
+@picture("setting amplitude", "setting", ("largest displacement", "m"))
+def grazing(one: Picture, finding: Any) -> None:
     """Draw the largest displacement over the stepped setting, free runs and runs with contact told apart.
 
     Parameters
@@ -88,17 +93,16 @@ def grazing(finding: Any, ax: Axes | None = None) -> Axes:
     ax
         Where to draw; a new one-column figure if None.
     """
-    with picture(finding, ax, "setting amplitude", "setting", ("largest displacement", "m")) as one:
-        data = one.data
-        contact = data["contact"].values.astype(bool) if "contact" in data else np.zeros(data["setting"].shape, bool)
-        for chosen, face, word in ((~contact, "white", "free"), (contact, MEASURED, "contact")):
-            one.points("setting", "amplitude", f"{one.word}, {word}", where=chosen, face=face)
-        one.span(number(data, "grazing_low"), number(data, "grazing_high"), "first contact")
-        one.level(number(data, "gap"), one.text("gap", "mm", 1e3, "$g$ = "))
-    return one.ax
+    data = one.data
+    contact = data["contact"].values.astype(bool) if "contact" in data else np.zeros(data["setting"].shape, bool)
+    for chosen, face, word in ((~contact, "white", "free"), (contact, MEASURED, "contact")):
+        one.points("setting", "amplitude", f"{one.word}, {word}", where=chosen, face=face)
+    one.span(number(data, "grazing_low"), number(data, "grazing_high"), "first contact")
+    one.level(number(data, "gap"), one.text("gap", "mm", 1e3, "$g$ = "))
 
 
-def multiple_shooting(finding: Any, ax: Axes | None = None, *, seconds: float = 6.0) -> Axes:
+@picture("x fitted time", _TIME, _DISPLACEMENT, margin=0, ratio=0.9)
+def multiple_shooting(one: Picture, finding: Any, *, seconds: float = 6.0) -> None:
     """Draw a record with contact, the segments fitted to it, and their residuals.
 
     Parameters
@@ -111,27 +115,22 @@ def multiple_shooting(finding: Any, ax: Axes | None = None, *, seconds: float = 
     seconds
         Length shown, from the first fitted sample on.
     """
-    with picture(finding, ax, "x fitted time", _TIME, _DISPLACEMENT, margin=0, ratio=0.9) as one:
-        time, x, fitted = one.values("time", "x", "fitted")
-        used = np.flatnonzero(np.isfinite(fitted))
-        if not len(used):
-            raise ValueError("no sample of this record was fitted")
-        first = time[used[0]]
-        data = one.data.isel(time=(time >= first) & (time <= first + seconds))
-        time, x, fitted = (data[name].values for name in ("time", "x", "fitted"))
-        one.cloud(time, x)
-        segment = data["segment"].values if "segment" in data else np.zeros(len(time))
-        cut = np.flatnonzero(np.diff(segment) != 0) + 1
-        curve = np.insert(np.where(segment >= 0, fitted, np.nan), cut, np.nan)
-        one.line(np.insert(time, cut, np.nan), curve, "fitted, segment by segment", linewidth=0.9)
-        if "in_contact" in data:
-            one.ax.fill_between(
-                time, 0, 1, where=data["in_contact"].values.astype(bool), color=style.COLORS["zone"],
-                transform=one.ax.get_xaxis_transform(), alpha=0.3, linewidth=0, zorder=0, label="contact",
-            )  # fmt: skip
-        one.level(number(data, "gap"), one.text("gap", "mm", 1e3, "$g$ = "))
-        one.residual(time, data["residual"].values if "residual" in data else x - fitted)
-    return one.ax
+    time, x, fitted = one.values("time", "x", "fitted")
+    used = np.flatnonzero(np.isfinite(fitted))
+    if not len(used):
+        raise ValueError("no sample of this record was fitted")
+    first = time[used[0]]
+    data = one.data.isel(time=(time >= first) & (time <= first + seconds))
+    time, x, fitted = (data[name].values for name in ("time", "x", "fitted"))
+    one.cloud(time, x)
+    segment = data["segment"].values if "segment" in data else np.zeros(len(time))
+    cut = np.flatnonzero(np.diff(segment) != 0) + 1
+    curve = np.insert(np.where(segment >= 0, fitted, np.nan), cut, np.nan)
+    one.line(np.insert(time, cut, np.nan), curve, "fitted, segment by segment", linewidth=0.9)
+    if "in_contact" in data:
+        style.shade(one.ax, time, data["in_contact"].values.astype(bool), alpha=0.3, label="contact", zorder=0)
+    one.level(number(data, "gap"), one.text("gap", "mm", 1e3, "$g$ = "))
+    one.residual(time, data["residual"].values if "residual" in data else x - fitted)
 
 
 def toss(time: Any, centre: Any, lowest: Any, impacts: Any, ax: Axes | None = None, *, unit: str = "m") -> Axes:
@@ -148,7 +147,7 @@ def toss(time: Any, centre: Any, lowest: Any, impacts: Any, ax: Axes | None = No
     unit : str
         Unit of the heights.
     """
-    with picture(impacts, ax, "single impact_time", _TIME, (f"height ({unit})", ""), loc="upper right") as one:
+    with drawing(impacts, ax, "single impact_time", _TIME, (f"height ({unit})", ""), loc="upper right") as one:
         one.cloud(time, centre, "centre")
         one.cloud(time, lowest, "lowest corner", style.COLORS["muted"])
         single, at = one.values("single", "impact_time")
@@ -178,7 +177,7 @@ def restitution(impacts: Any, ax: Axes | None = None, *, unit: str = "m/s") -> A
     e = single["restitution"].values
     data = single.assign(speed=-single["v_before"], restitution_error=single["half_sample"])
     labels = (f"speed of the corner before ({unit})", ""), ("restitution", "")
-    with picture(data, ax, "restitution", *labels, loc="upper left", margin=0.08) as one:
+    with drawing(data, ax, "restitution", *labels, loc="upper left", margin=0.08) as one:
         one.points("speed", "restitution", f"{len(e)} impacts of one corner")
         if len(e):
             looks: dict[str, Any] = {"color": style.COLORS["first"]}
@@ -204,7 +203,7 @@ def steady_amplitude(response: Any, ax: Axes | None = None) -> Axes:
         change=blocks["amplitude"] / middle - 1, change_error=blocks["amplitude_error"] / middle
     ).assign_attrs(blocks.attrs)
     labels = ("time", "s"), ("amplitude, change (1/1000)", "")
-    with picture(data, ax, "", *labels, loc="upper right", columns=1) as one:
+    with drawing(data, ax, "", *labels, loc="upper right", columns=1) as one:
         one.points("time", "change", f"blocks, {one.word}", scale=1e3)
         t = data["time"].values
         fine = np.linspace(t[0], t[-1], 50)
@@ -220,7 +219,7 @@ def steady_amplitude(response: Any, ax: Axes | None = None) -> Axes:
 def steady_phase(response: Any, ax: Axes | None = None) -> Axes:
     """Draw the phase of each block less that of the fitted frequency, with the line of each other method."""
     labels = ("time", "s"), ("phase (mrad)", "")
-    with picture(response.blocks, ax, "", *labels, loc="upper right", columns=1) as one:
+    with drawing(response.blocks, ax, "", *labels, loc="upper right", columns=1) as one:
         one.points("time", "phase", f"blocks, {one.word}", scale=1e3)
         t, phase, error = one.values("time", "phase", "phase_error")
         for name, (value, own) in response.by_method.items():

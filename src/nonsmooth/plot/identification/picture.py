@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import inspect
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import MEASURED, measured_label
+from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import name_axes
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["Picture", "data_of", "number", "picture", "pictures", "with_error"]
+__all__ = ["Picture", "data_of", "drawing", "number", "picture", "pictures", "with_error"]
 
 _SHARE = 0.30  # of the height of the axes, for residuals
 
@@ -53,10 +56,19 @@ def with_error(value: float, error: float, unit: str = "") -> str:
 
 
 @contextmanager
-def picture(
-    finding: Any, ax: Axes | None, needed: str, x: tuple[str, str] | str, y: tuple[str, str] | str, *, loc: str = "",
-    columns: int = 2, margin: float = 0.02, strip: str | None = None, **size: float,
-) -> Iterator[Picture]:  # fmt: skip
+def drawing(
+    finding: Any,
+    ax: Axes | None,
+    needed: str,
+    x: tuple[str, str] | str,
+    y: tuple[str, str] | str,
+    *,
+    loc: str = "",
+    columns: int = 2,
+    margin: float = 0.02,
+    strip: str | None = None,
+    **size: float,
+) -> Iterator[Picture]:
     """Draw within the block; then axes are named, residuals drawn below and the legend set, ``loc`` or above the axes.
 
     ``x`` and ``y`` are names with units, or a variable of the data that has them. The unit of the residuals is that of
@@ -80,6 +92,23 @@ def picture(
         style.even_dots(drawn.legend(**({"loc": loc} if loc else above), ncols=columns, columnspacing=1.0))
 
 
+def picture(*given: Any, **options: Any) -> Callable[[Callable[..., None]], Callable[..., Axes]]:
+    """Make a figure ``(finding, ax=None, ...) -> ax`` of a function ``(one, finding, ...)`` that draws with a
+    :class:`Picture`; further arguments are those of :func:`drawing`."""
+
+    def made(draw: Callable[..., None]) -> Callable[..., Axes]:
+        @wraps(draw)
+        def drawn(ax: Axes, finding: Any, **named: Any) -> None:
+            with drawing(finding, ax, *given, **options) as one:
+                draw(one, finding, **named)
+
+        own, *others = inspect.signature(draw).parameters.values()
+        drawn.__signature__ = inspect.Signature([own.replace(name="ax", annotation="Axes"), *others])  # type: ignore[attr-defined]
+        return figure(**{key: options[key] for key in ("ratio",) if key in options})(drawn)
+
+    return made
+
+
 class Picture:
     """Axes, the data that are drawn in them, and the words for what was measured."""
 
@@ -96,21 +125,15 @@ class Picture:
         value, error = (scale * number(self.data, key) for key in (name, f"{name}_error"))
         return before + with_error(value, error, unit) if np.isfinite(value) else ""
 
-    def points(
-        self, x: str, y: str, label: str = "", *, where: Any = True, scale: float = 1.0, mark: str = "o",
-        face: str = MEASURED,
-    ) -> None:  # fmt: skip
+    def points(self, x: str, y: str, label: str = "", *, where: Any = True, scale: float = 1.0, **looks: Any) -> None:
         """Measured points of two variables, with the error of the second where the data have one."""
         here = np.broadcast_to(where, self.data[y].shape)
         if here.size and not here.any():
             return
         error = scale * self.data[f"{y}_error"].values[here] if f"{y}_error" in self.data else np.nan
         at, heights = (self.data[name].values[here] for name in (x, y))
-        self.ax.errorbar(
-            at, scale * heights, yerr=error if np.isfinite(error).any() else None, fmt=mark, color=MEASURED,
-            markerfacecolor=face, markersize=2.8, markeredgewidth=0.7, elinewidth=0.6, zorder=4,
-            label=style.once(self.ax, label or self.word),
-        )  # fmt: skip
+        words = style.once(self.ax, label or self.word)
+        style.points(self.ax, at, scale * heights, yerr=error, size=2.8, label=words, **looks)
 
     def cloud(self, x: Any, y: Any, label: str = "", color: str = MEASURED) -> None:
         """Small dots of many samples."""
@@ -136,10 +159,9 @@ class Picture:
     def note(self, x: float, y: float, *lines: str) -> None:
         """Words in the axes, at a place in their own units."""
         sides = "left" if x < 0.5 else "right" if x > 0.5 else "center", "top" if y > 0.5 else "bottom"
-        self.ax.annotate(
-            "\n".join(filter(None, lines)), (x, y), xycoords="axes fraction", ha=sides[0],
-            va="center" if y == 0.5 else sides[1], fontsize=style.small(self.ax),
-        )  # fmt: skip
+        looks: dict[str, Any] = {"ha": sides[0], "va": "center" if y == 0.5 else sides[1]}
+        text, size = "\n".join(filter(None, lines)), style.small(self.ax)
+        self.ax.text(x, y, text, transform=self.ax.transAxes, fontsize=size, **looks)
 
     def residual(
         self, x: Any, left: Any, label: str = "", *, error: Any = None, band: Any = None, **looks: Any

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.recordings.readers.fields import Field, Table, label, traces_of
-from nonsmooth.recordings.readers.loaders import LOADERS
+from nonsmooth.recordings.readers.loaders import load
 from nonsmooth.recordings.reading import (
     MAX_COLUMNS,
     MAX_DEPTH,
@@ -38,7 +38,7 @@ _TOP = "Run #1"
 def read(data: bytes, source: Source, options: Options) -> Reading:
     """Read the arrays of a file."""
     reading = Reading()
-    variables, reading.header = LOADERS[source.format](data, source, reading.remarks)
+    variables, reading.header = load(data, source, reading.remarks)
     if options.columns is not None:
         reading.traces = list(traces_of(_chosen(variables, options, source), options, source, reading))
         return reading

@@ -21,8 +21,8 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import DataFileError
-from nonsmooth.recordings.readers.archive import Archive
-from nonsmooth.recordings.reading import MAX_COLUMNS, Options, Reading, Remarks, Source, Trace
+from nonsmooth.recordings.readers.text_table import number
+from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Options, Reading, Remarks, Source, Trace
 
 __all__ = ["RECORD", "SYNTHETIC", "Experiment", "Segment", "parse", "read"]
 
@@ -88,10 +88,10 @@ def _trace(
         if stretch is None:
             remarks.of(run, name, f"{segment.values} holds text that a user typed, no measurement; left out")
             continue
-        if stretch.blank:
-            remarks.of(run, name, f"{stretch.blank} records between valid ones are marked invalid; they are NaN")
-        times.append(stretch.times)
-        values.append(stretch.values)
+        times.append(stretch[0])
+        values.append(stretch[1])
+        if stretch[2]:
+            remarks.of(run, name, f"{stretch[2]} records between valid ones are marked invalid; they are NaN")
     if not values:
         return None
     # As in the CSV export, so that a channel has one name in both.
@@ -109,89 +109,56 @@ def _trace(
     return Trace(run, name, unit, axis, column, origin, attrs=attrs)
 
 
-@dataclass(frozen=True, eq=False)
-class _Stretch:
-    times: FloatArray
-    values: FloatArray
-    blank: int
-
-
-def _stretch(segment: Segment, archive: Archive, comma: bool, source: Source) -> _Stretch | None:
+def _stretch(
+    segment: Segment, archive: Archive, comma: bool, source: Source
+) -> tuple[FloatArray, FloatArray, int] | None:
+    """Times and values of a block, and how many of its records are blank; None if it holds typed text."""
     place = f"main.xml, line {segment.line}"
     if not (segment.size.isascii() and segment.size.isdigit() and len(segment.size) < 16):
         raise source.error(place, f"DataCacheDataSize is {segment.size[:40]!r}, expected a number of records")
     size = int(segment.size)
     values = _records(segment.values, size, archive, source)
-    if values is None:
-        return None
-    if size == 0:
-        return _Stretch(np.empty(0), np.empty(0), 0)
-    blank = len(values) - size
+    if values is None or size == 0:
+        return None if values is None else (values, values, 0)
     if segment.times:
         times = _records(segment.times, size, archive, source)
         if times is None or len(times) != len(values):
             raise source.error(segment.times, f"does not hold one time for each of the {len(values)} values")
-        return _Stretch(times, values, blank)
-    start = _decimal(segment.start, comma)
-    interval = _decimal(segment.interval, comma)
-    if start is None or interval is None or not interval > 0:
+        return times, values, len(values) - size
+    start, interval = (
+        number(text.replace(",", ".") if comma else text, ".") for text in (segment.start, segment.interval)
+    )
+    if start is None or interval is None or not (math.isfinite(start) and 0 < interval < math.inf):
         raise source.error(
             place,
             f"the clock of {segment.values} is IntervalCacheStartValue = {segment.start[:40]!r}, "
             f"IntervalCacheInterval = {segment.interval[:40]!r}; expected a time and a step > 0",
         )
-    return _Stretch(start + interval * np.arange(len(values), dtype=np.float64), values, blank)
+    return start + interval * np.arange(len(values), dtype=np.float64), values, len(values) - size
 
 
 def _records(member: str, size: int, archive: Archive, source: Source) -> FloatArray | None:
     """The values up to the last valid one (an invalid one before it is NaN); None if the member holds typed text."""
-    found: list[FloatArray] = []
-    rest, records, valid, last = b"", 0, 0, 0
-    for piece in archive.pieces(member):
-        rest += piece
-        whole = len(rest) // RECORD.itemsize * RECORD.itemsize
-        table = np.frombuffer(rest[:whole], RECORD)
-        rest = rest[whole:]
-        if records == 0 and len(table) and table["valid"][0] == _TYPED_TEXT:
-            return None
-        odd = np.flatnonzero(table["valid"] > 1)
-        if len(odd):
-            k = int(odd[0])
-            raise source.error(
-                f"{member}, record {records + k + 1}", f"its valid flag is {table['valid'][k]}, expected 0 or 1"
-            )
-        marked = np.flatnonzero(table["valid"])
-        valid += len(marked)
-        if valid > size:
-            raise source.error(
-                f"{member}, record {records + len(table)}", f"has more valid records than the {size} of main.xml"
-            )
-        if len(marked):
-            last = records + int(marked[-1]) + 1
-        if valid < size or len(marked):
-            # Nothing behind the last valid record is kept.
-            end = int(marked[-1]) + 1 if valid == size else len(table)
-            found.append(np.where(table["valid"][:end] == 1, table["value"][:end], math.nan))
-        records += len(table)
+    content = b"".join(archive.pieces(member))
+    count, rest = divmod(len(content), RECORD.itemsize)
+    table = np.frombuffer(content, RECORD, count)
+    valid, marked = table["valid"], np.flatnonzero(table["valid"])
+
+    def error(record: int, message: str) -> DataFileError:
+        return source.error(f"{member}, record {record}", message)
+
+    if count and valid[0] == _TYPED_TEXT:
+        return None
+    if len(odd := np.flatnonzero(valid > 1)):
+        raise error(int(odd[0]) + 1, f"its valid flag is {valid[odd[0]]}, expected 0 or 1")
+    if len(marked) > size:
+        raise error(count, f"has more valid records than the {size} of main.xml")
     if rest:
-        raise source.error(f"{member}, record {records + 1}", f"is cut short: {len(rest)} of {RECORD.itemsize} bytes")
-    if valid < size:
-        raise source.error(
-            f"{member}, record {records}", f"{valid} of {records} records are valid, main.xml announces {size}"
-        )
-    return np.concatenate(found)[:last] if found else np.empty(0)
-
-
-def _decimal(text: str, comma: bool) -> float | None:
-    if comma:
-        text = text.replace(",", ".")
-    if not text.isascii() or "_" in text or len(text) > 64:
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
+        raise error(count + 1, f"is cut short: {rest} of {RECORD.itemsize} bytes")
+    if len(marked) < size:
+        raise error(count, f"{len(marked)} of {count} records are valid, main.xml announces {size}")
+    end = int(marked[-1]) + 1 if size else 0
+    return np.where(valid[:end] == 1, table["value"][:end], math.nan)
 
 
 _MAX_NESTING = 256

@@ -12,7 +12,7 @@ import re
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.readers.fields import Field, Table, split_unit, traces_of
-from nonsmooth.recordings.readers.text_table import Cells, Numerals, checked_header, decoded, read_cells, rows
+from nonsmooth.recordings.readers.text_table import Cells, Numerals, checked_header, decoded, read_cells, rows, sniffed
 from nonsmooth.recordings.reading import MAX_COLUMNS, TIME_WORDS, Options, Reading, Remarks, Source, Trace, names_of
 
 __all__ = ["SYNTHETIC", "looks_like_capstone", "read"]
@@ -131,16 +131,9 @@ def _without_mark(trace: Trace) -> Trace:
 
 def _delimiter(data: bytes, source: Source) -> str:
     """``;`` if the first line holds one outside quotes, else ``,``."""
-    end = data.find(b"\n")
-    first = data[: end if end >= 0 else len(data)][: 1 << 20]
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        text = data[: min(len(data), 1 << 21) // 2 * 2].decode("utf-16", errors="replace").split("\n", 1)[0]
-    else:
-        text = first.decode("utf-8", errors="replace")
-    outside = "".join(text.split('"')[::2])
-    for candidate in ("\t", ";", ","):
-        if candidate in outside:
-            return candidate
-    if "\t" in text or not outside.strip():
-        return ","
-    raise source.error("line 1", "holds one field only; expected fields separated by ',' or ';'")
+    wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+    text = data[: 1 << 20].decode("utf-16" if wide else "utf-8", errors="replace").split("\n", 1)[0]
+    found = sniffed(text)
+    if found == " " and "\t" not in text and text.strip('" \r\n'):
+        raise source.error("line 1", "holds one field only; expected fields separated by ',' or ';'")
+    return found if found != " " else ","

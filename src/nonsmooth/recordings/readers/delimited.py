@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.readers.fields import Field, Table, chosen, traces_of
-from nonsmooth.recordings.readers.text_table import Numerals, Row, checked_header, decoded, read_cells, rows
+from nonsmooth.recordings.readers.text_table import Numerals, Row, checked_header, decoded, read_cells, rows, sniffed
 from nonsmooth.recordings.reading import Options, Reading, Source, Trace, names_of
 
 __all__ = ["read", "read_lines"]
@@ -49,7 +49,7 @@ def read_lines(
             at = len(top)
         if not first:
             raise source.error("", "holds no table, only blank lines or comments")
-        delimiter = options.delimiter or delimiter or _delimiter(first)
+        delimiter = options.delimiter or delimiter or sniffed(first)
         lines: Iterator[str] = itertools.chain([first], kept)
         if _ARROW.match(first):
             lines = (_ARROW.sub(rf"\1{delimiter}", text) for text in lines)
@@ -135,11 +135,6 @@ def _units(table: Iterator[Row], at: int, source: Source) -> tuple[list[str], It
                 return [text.strip().strip("[]()").strip() for text in fields], table
             break
     raise source.error(f"line {at}", "is no row of units below the header, as units_row says")
-
-
-def _delimiter(line: str) -> str:
-    outside = "".join(line.split('"')[::2])
-    return next((d for d in ("\t", ";", ",") if d in outside), " ")
 
 
 def _advice(head: list[str]) -> str:

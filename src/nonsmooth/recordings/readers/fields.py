@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.recordings.reading import (
     MAX_COLUMNS,
     Options,
@@ -32,7 +32,7 @@ class Field:
     unit: str
     values: NDArray[Any]
     origin: str
-    rows: NDArray[np.int64] | None = None
+    rows: IntArray | None = None
     attrs: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -43,7 +43,7 @@ class Table:
     run: str
     fields: list[Field]
     rows: int
-    lines: NDArray[np.int64] | None = None
+    lines: IntArray | None = None
     rate: float | None = None
 
 
@@ -154,8 +154,8 @@ def traces_of(table: Table, options: Options, source: Source, reading: Reading) 
 
 
 def places(
-    held: NDArray[np.int64], axis: NDArray[np.int64], lines: NDArray[np.int64] | None, source: Source, complaint: str
-) -> NDArray[np.int64]:
+    held: IntArray, axis: IntArray, lines: IntArray | None, source: Source, complaint: str
+) -> IntArray:
     """Place among the rows of the axis of each row in which a channel has a value; all must be there."""
     place = np.minimum(np.searchsorted(axis, held), max(len(axis) - 1, 0))
     missing = held[axis[place] != held] if len(axis) else held
@@ -164,7 +164,7 @@ def places(
     return place
 
 
-def row_of(row: int, lines: NDArray[np.int64] | None) -> str:
+def row_of(row: int, lines: IntArray | None) -> str:
     """Name of a row (from 0) in messages: its line in a text, else its number."""
     return f"row {row + 1}" if lines is None else f"line {lines[row]}"
 
@@ -207,7 +207,7 @@ def _along(
     return scaled, "s"
 
 
-def _runs(table: Table, numbers: Field | None, source: Source) -> list[tuple[str, NDArray[np.bool_] | None]]:
+def _runs(table: Table, numbers: Field | None, source: Source) -> list[tuple[str, BoolArray | None]]:
     """The runs, each with the mask of its rows; one run where no column numbers them."""
     if numbers is None:
         return [(table.run, None)]
@@ -231,7 +231,7 @@ _ISO = re.compile(r"\d{4}-?\d\d-?\d\d[ T]\d\d.*")
 _CLOCK = re.compile(r"(?:(\d+):)?(\d{1,2}):(\d{1,2}(?:[.,]\d*)?)")
 
 
-def seconds_of(axis: Field, lines: NDArray[np.int64] | None, source: Source) -> tuple[FloatArray, str]:
+def seconds_of(axis: Field, lines: IntArray | None, source: Source) -> tuple[FloatArray, str]:
     """Seconds since the first stamp and, where stamps have dates, when that was."""
     import pandas
 
@@ -255,12 +255,12 @@ def seconds_of(axis: Field, lines: NDArray[np.int64] | None, source: Source) -> 
     return _since(read.as_unit("ns").asi8), str(read[0].isoformat()) if len(read) else ""
 
 
-def _since(nanoseconds: NDArray[np.int64]) -> FloatArray:
+def _since(nanoseconds: IntArray) -> FloatArray:
     return np.asarray((nanoseconds - nanoseconds[:1]) * 1e-9, np.float64)
 
 
 def _unread(
-    texts: list[str], place: int, axis: Field, lines: NDArray[np.int64] | None, source: Source
+    texts: list[str], place: int, axis: Field, lines: IntArray | None, source: Source
 ) -> Exception:
     row = f"row {place + 1}" if lines is None else f"line {lines[place if axis.rows is None else axis.rows[place]]}"
     return source.error(

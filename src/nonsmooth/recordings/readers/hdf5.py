@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.reading import MAX_COLUMNS, MAX_DEPTH, Group, Remarks, Source, inflation_limit
 
 __all__ = ["load_hdf5"]
@@ -20,15 +19,8 @@ def load_hdf5(data: bytes, source: Source, remarks: Remarks, *, matlab: bool) ->
     """The variables of a file, as dicts (structs), lists (cells, arrays of structs), text and arrays."""
     import h5py
 
-    try:
-        with h5py.File(io.BytesIO(data), "r") as opened:
-            return _Reader(h5py, opened, source, remarks, inflation_limit(len(data)), matlab).group(opened, 0)
-    except DataFileError:
-        raise
-    # A damaged file surfaces as almost any exception of the library.
-    except Exception as error:
-        message = f"cannot be read as HDF5, it is damaged or cut short ({type(error).__name__}: {error})"
-        raise source.error("", message[:300]) from error
+    with h5py.File(io.BytesIO(data), "r") as opened:
+        return _Reader(h5py, opened, source, remarks, inflation_limit(len(data)), matlab).group(opened, 0)
 
 
 class _Reader:

@@ -16,18 +16,17 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.errors import DataFileError
-from nonsmooth.recordings.readers.archive import Archive
-from nonsmooth.recordings.reading import MAX_COLUMNS, Group, Remarks, Source, inflation_limit, needed
+from nonsmooth.recordings.readers.hdf5 import load_hdf5
+from nonsmooth.recordings.readers.matlab_v5 import load_v5
+from nonsmooth.recordings.readers.tdms import load_tdms
+from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Group, Remarks, Source, inflation_limit, needed
 
-__all__ = ["LOADERS"]
+__all__ = ["load"]
 
 Loaded = tuple[Mapping[str, Any], dict[str, Any]]
 
 
 def _matlab(data: bytes, source: Source, remarks: Remarks) -> Loaded:
-    from nonsmooth.recordings.readers.hdf5 import load_hdf5
-    from nonsmooth.recordings.readers.matlab_v5 import load_v5
-
     is_hdf5 = data.startswith(b"\x89HDF") or data[512:516] == b"\x89HDF"
     variables = load_hdf5(data, source, remarks, matlab=True) if is_hdf5 else load_v5(data, source, remarks)
     # An HDF5 file that another program wrote has no text before its own mark.
@@ -36,15 +35,7 @@ def _matlab(data: bytes, source: Source, remarks: Remarks) -> Loaded:
 
 
 def _hdf5(data: bytes, source: Source, remarks: Remarks) -> Loaded:
-    from nonsmooth.recordings.readers.hdf5 import load_hdf5
-
     return load_hdf5(data, source, remarks, matlab=False), {}
-
-
-def _tdms(data: bytes, source: Source, remarks: Remarks) -> Loaded:
-    from nonsmooth.recordings.readers.tdms import load_tdms
-
-    return load_tdms(data, source, remarks)
 
 
 def _numpy(data: bytes, source: Source, remarks: Remarks) -> Loaded:
@@ -164,29 +155,26 @@ def _measured(data: bytes, source: Source, remarks: Remarks) -> Loaded:
     return groups, {"version": str(opened.version)}
 
 
-def _guarded(load: Callable[[bytes, Source, Remarks], Loaded], what: str) -> Callable[[bytes, Source, Remarks], Loaded]:
-    """The loader; what a damaged file makes its library raise becomes a DataFileError."""
-
-    def guarded(data: bytes, source: Source, remarks: Remarks) -> Loaded:
-        try:
-            return load(data, source, remarks)
-        except DataFileError:
-            raise
-        except Exception as error:
-            message = f"cannot be read as {what}, it is damaged or cut short ({type(error).__name__}: {error})"
-            raise source.error("", message[:300]) from error
-
-    return guarded
+def load(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+    """The arrays of a file; what a damaged one makes its library raise, almost anything, becomes a DataFileError."""
+    loader, what = _LOADERS[source.format]
+    try:
+        return loader(data, source, remarks)
+    except DataFileError:
+        raise
+    except Exception as error:
+        message = f"cannot be read as {what}, it is damaged or cut short ({type(error).__name__}: {error})"
+        raise source.error("", message[:300]) from error
 
 
-#: Each format of arrays and what loads it.
-LOADERS = {
-    "mat": _matlab,
-    "hdf5": _hdf5,
-    "tdms": _tdms,
-    "npy": _numpy,
-    "arrow": _guarded(_arrow, "Parquet or Arrow"),
-    "wav": _guarded(_wave, "a WAV file"),
-    "uff": _guarded(_universal, "a universal file"),
-    "mf4": _guarded(_measured, "a measurement of ASAM MDF"),
+#: What loads each format of arrays, and its name in messages.
+_LOADERS: dict[str, tuple[Callable[[bytes, Source, Remarks], Loaded], str]] = {
+    "mat": (_matlab, "a MATLAB file"),
+    "hdf5": (_hdf5, "HDF5"),
+    "tdms": (load_tdms, "TDMS"),
+    "npy": (_numpy, "NumPy's arrays"),
+    "arrow": (_arrow, "Parquet or Arrow"),
+    "wav": (_wave, "a WAV file"),
+    "uff": (_universal, "a universal file"),
+    "mf4": (_measured, "a measurement of ASAM MDF"),
 }

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.recordings.readers.fields import places
+from nonsmooth.recordings.readers.fields import Field, Table, traces_of
 from nonsmooth.recordings.readers.text_table import Cells, Numerals, decoded, number, read_cells
 from nonsmooth.recordings.reading import MAX_COLUMNS, Options, Reading, Remarks, Source, Trace
 
@@ -62,7 +62,7 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
             more = len(segment.comments) - _MAX_COMMENTS
             said = segment.comments[:_MAX_COMMENTS] + ([f"(and {more} more)"] if more > 0 else [])
             reading.run_attrs[run] = {"comments": "\n".join(said)}
-        reading.traces += _traces(run, segment, clocks, decimal, source, options, reading.remarks)
+        reading.traces += _traces(run, segment, clocks, decimal, options, source, reading)
     if not reading.traces:
         raise source.error("", f"holds no segment of data after its header; expected one that ends in {_END}")
     return reading
@@ -189,50 +189,42 @@ def _begin(
 
 
 def _traces(
-    run: str, segment: _Segment, clocks: str, decimal: str, source: Source, options: Options, remarks: Remarks
+    run: str, segment: _Segment, clocks: str, decimal: str, options: Options, source: Source, reading: Reading
 ) -> Iterator[Trace]:
     at = f"line {segment.line}"
-    n = len(segment.names)
-    start = _numbers(segment, "X0", 0.0, decimal, at, source)
-    step = _numbers(segment, "Delta_X", math.nan, decimal, at, source)
-    said = _numbers(segment, "Samples", math.nan, decimal, at, source)
-    units = _texts(segment, "Y_Unit_Label", n)
-    cells, lines, first = segment.cells, segment.cells.lines, clocks != "No"
-    clock = np.full(len(lines), np.nan)
-    if clocks == "One":
-        clock[cells.rows[0]] = cells.values[0]
+    n, cells = len(segment.names), segment.cells
+    start, step, said = (
+        _numbers(segment, key, default, decimal, at, source)
+        for key, default in (("X0", 0.0), ("Delta_X", math.nan), ("Samples", math.nan))
+    )
+    units, dates, times = (_texts(segment, key, n) for key in ("Y_Unit_Label", "Date", "Time"))
     dimension = (_texts(segment, "X_Dimension", n)[0] or "Time").strip()
     if dimension.casefold() != options.axis.casefold():
         raise source.error(at, f"its channels are over {dimension!r}; read it with axis={dimension.lower()!r}")
     unit = "s" if options.axis == "time" else _texts(segment, "X_Unit_Label", n)[0]
-    dates, times = _texts(segment, "Date", n), _texts(segment, "Time", n)
     for k, name in enumerate(segment.names):
-        where = f"run {run!r}, channel {name!r}"
-        column = 2 * k + 1 if clocks == "Multi" else k + first
+        column = 2 * k + 1 if clocks == "Multi" else k + (clocks != "No")
         rows, values = cells.rows[column], cells.values[column]
         if clocks == "Multi":
-            own = places(rows, cells.rows[column - 1], lines, source, f"{where} has a value without its X_Value")
-            axis = cells.values[column - 1][own]
-        elif clocks == "One" and _same(step[k], step[0]) and len(rows) and len(clock):
-            axis = clock[rows] + (start[k] - start[0])
+            axis, held = cells.values[column - 1], cells.rows[column - 1]
+        elif clocks == "One" and _same(step[k], step[0]) and len(cells.values[0]):
+            axis, held = cells.values[0] + (start[k] - start[0]), cells.rows[0]
         else:
             if len(values) > 1 and not step[k] > 0:
-                raise source.error(at, f"{where}: Delta_X is {step[k]:g}, expected a step > 0")
-            axis = start[k] + np.arange(len(values)) * (step[k] if step[k] > 0 else 1.0)
-        blanks = len(lines) - len(values)
-        if blanks and len(values):
-            remarks.of(run, name, f"{blanks} blank fields dropped; {len(values)} values in {len(lines)} rows")
+                raise source.error(at, f"run {run!r}, channel {name!r}: Delta_X is {step[k]:g}, expected a step > 0")
+            axis, held = start[k] + np.arange(len(values)) * (step[k] if step[k] > 0 else 1.0), rows
         if said[k] < len(values):
-            remarks.of(run, name, f"Samples says {said[k]:g} (its first write), {len(values)} were read")
+            reading.remarks.of(run, name, f"Samples says {said[k]:g} (its first write), {len(values)} were read")
         elif said[k] > len(values):
-            remarks.of(run, name, f"Samples says {said[k]:g}, only {len(values)} follow; the file may be cut short")
+            said_more = f"Samples says {said[k]:g}, only {len(values)} follow; the file may be cut short"
+            reading.remarks.of(run, name, said_more)
         if k and start[k] != start[0]:
-            remarks.of(run, name, f"its clock begins at X0 = {start[k]:g}, that of the first channel at {start[0]:g}")
-        begun = f"{dates[k]} {times[k]}".strip()
-        yield Trace(
-            run, name, units[k], axis, values, f"column {k + 2} from line {segment.line} on", unit,
-            lines=lines[rows], attrs={"started": begun} if begun else {},
-        )  # fmt: skip
+            begins = f"its clock begins at X0 = {start[k]:g}, that of the first channel at {start[0]:g}"
+            reading.remarks.of(run, name, begins)
+        begun, origin = f"{dates[k]} {times[k]}".strip(), f"column {k + 2} from line {segment.line} on"
+        clock = Field(options.axis, unit, axis, f"X_Value of {name}", held)
+        channel = Field(name, units[k], values, origin, rows, {"started": begun} if begun else {})
+        yield from traces_of(Table(run, [clock, channel], len(cells.lines), cells.lines), options, source, reading)
 
 
 def _same(one: float, other: float) -> bool:

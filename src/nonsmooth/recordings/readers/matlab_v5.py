@@ -55,11 +55,7 @@ def load_v5(data: bytes, source: Source, remarks: Remarks) -> dict[str, Any]:
             continue
         if name:
             plain += struct.pack(order + "II", _MATRIX, len(body)) + body
-    try:
-        found = loadmat(io.BytesIO(bytes(plain)), struct_as_record=True, squeeze_me=False, mat_dtype=False)
-    # What is still wrong surfaces as almost any exception of the reader.
-    except Exception as error:
-        raise source.error("", f"cannot be read as a MATLAB file ({type(error).__name__}: {error})"[:300]) from error
+    found = loadmat(io.BytesIO(bytes(plain)), struct_as_record=True, squeeze_me=False, mat_dtype=False)
     return {name: _plain(value) for name, value in found.items() if not name.startswith("__")}
 
 

@@ -9,9 +9,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from nonsmooth.errors import DataFileError
-from nonsmooth.recordings.readers.archive import Archive
 from nonsmooth.recordings.readers.delimited import read_lines
-from nonsmooth.recordings.reading import Options, Reading, Source, needed
+from nonsmooth.recordings.reading import Archive, Options, Reading, Source, needed
 
 __all__ = ["read"]
 

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.reading import MAX_COLUMNS, Group, Remarks, Source, is_axis_name, needed
 
 __all__ = ["check_layout", "load_tdms"]
@@ -24,23 +23,16 @@ def load_tdms(data: bytes, source: Source, remarks: Remarks) -> tuple[dict[str, 
     """The groups of a file by clock, and its properties."""
     nptdms = needed("nptdms", "npTDMS", source)
     check_layout(data, source)
-    try:
-        with _heard(remarks), nptdms.TdmsFile.open(io.BytesIO(data)) as opened:
-            if sum(len(group.channels()) for group in opened.groups()) > MAX_COLUMNS:
-                raise source.error("", f"holds more than {MAX_COLUMNS} channels")
-            found = {}
-            for group in opened.groups():
-                notes = {f"property_{key}": value for key, value in _plain(group.properties).items()}
-                for k, clocked in enumerate(_by_clock(group, data, source, remarks)):
-                    clocked.run, clocked.notes = group.name, notes
-                    found[f"{group.name} ({k + 1})" if k else group.name] = clocked
-            return found, {"properties": _plain(opened.properties)}
-    except DataFileError:
-        raise
-    # Damaged metadata surfaces as almost any exception of the library.
-    except Exception as error:
-        said = f"{type(error).__name__}: {error}"[:200]
-        raise source.error("", f"cannot be read as TDMS, it is damaged or cut short ({said})") from error
+    with _heard(remarks), nptdms.TdmsFile.open(io.BytesIO(data)) as opened:
+        if sum(len(group.channels()) for group in opened.groups()) > MAX_COLUMNS:
+            raise source.error("", f"holds more than {MAX_COLUMNS} channels")
+        found = {}
+        for group in opened.groups():
+            notes = {f"property_{key}": value for key, value in _plain(group.properties).items()}
+            for k, clocked in enumerate(_by_clock(group, data, source, remarks)):
+                clocked.run, clocked.notes = group.name, notes
+                found[f"{group.name} ({k + 1})" if k else group.name] = clocked
+        return found, {"properties": _plain(opened.properties)}
 
 
 @contextlib.contextmanager

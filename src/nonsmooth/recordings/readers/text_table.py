@@ -17,9 +17,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import IntArray
 from nonsmooth.recordings.reading import MAX_COLUMNS, Remarks, Source
 
-__all__ = ["Cells", "Numerals", "Row", "checked_header", "decoded", "number", "read_cells", "rows"]
+__all__ = ["Cells", "Numerals", "Row", "checked_header", "decoded", "number", "read_cells", "rows", "sniffed"]
 
 #: Line number and fields.
 Row = tuple[int, list[str]]
@@ -51,6 +52,12 @@ def decoded(data: bytes, source: Source, remarks: Remarks) -> io.TextIOWrapper:
             raise source.error(where, "is neither UTF-8 nor Windows-1252 text") from None
         remarks.say(f"{where}: the text is not UTF-8; read as Windows-1252, so check names and units")
     return io.TextIOWrapper(io.BytesIO(data), encoding=encoding, newline="")
+
+
+def sniffed(line: str) -> str:
+    """The character between the fields of a line, " " where it holds none."""
+    outside = "".join(line.split('"')[::2])
+    return next((d for d in ("\t", ";", ",") if d in outside), " ")
 
 
 def rows(lines: Iterable[str], delimiter: str, source: Source, first_line: int = 1) -> Iterator[Row]:
@@ -119,8 +126,8 @@ class Cells:
     """The columns of a table: values, and the rows (from 0) in which each has one; the line of every row."""
 
     values: list[NDArray[Any]]
-    rows: list[NDArray[np.int64]]
-    lines: NDArray[np.int64]
+    rows: list[IntArray]
+    lines: IntArray
 
 
 def read_cells(

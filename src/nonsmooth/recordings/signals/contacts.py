@@ -10,9 +10,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal
 from nonsmooth.recordings.signals.smoothing import smooth
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 __all__ = ["contacts"]
 
 _UNDECIDED = 0.01  # of the samples: at the edge of contact, of which none is used for the support
-
-Mask = NDArray[np.bool_]
-
 
 def contacts(
     time: ArrayLike,
@@ -119,7 +116,7 @@ def _support(found: xr.Dataset, omega: float | None, resolution: float) -> tuple
     return float(g), 2.0 * math.sqrt(float(along @ C @ along)), float(-line[1])
 
 
-def _beside_the_free_motion(found: xr.Dataset, omega: float | None, free: Mask) -> tuple[FloatArray, Mask]:
+def _beside_the_free_motion(found: xr.Dataset, omega: float | None, free: BoolArray) -> tuple[FloatArray, BoolArray]:
     """Acceleration that the free motion does not explain, and the samples that it does; empty if it fits nowhere."""
     t, x, v, a = (found[name].values for name in ("time", "x", "v", "a"))
     columns = [np.ones_like(x), x, v]
@@ -147,7 +144,7 @@ def _beside_the_free_motion(found: xr.Dataset, omega: float | None, free: Mask) 
     return left, free
 
 
-def _drive(t: FloatArray, left: FloatArray, free: Mask) -> float | None:
+def _drive(t: FloatArray, left: FloatArray, free: BoolArray) -> float | None:
     """The frequency of a forcing in what is left of the free motion: its largest line, with zeros in the gaps."""
     from scipy import fft
 
@@ -166,7 +163,7 @@ def _drive(t: FloatArray, left: FloatArray, free: Mask) -> float | None:
     return float(2 * np.pi * place * (n - 1) / (8 * n * (t[-1] - t[0])))
 
 
-def _intervals(found: xr.Dataset, gap: float) -> tuple[FloatArray, FloatArray, Mask]:
+def _intervals(found: xr.Dataset, gap: float) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Begin and end of each interval with x > gap, and whether the record cuts it off."""
     from nonsmooth.recordings.signals.sections import poincare
 

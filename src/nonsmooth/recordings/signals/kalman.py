@@ -69,10 +69,10 @@ def predict(n: Any, F: Any, Q: Any, u: Any, P: Any, u_next: Any, P_next: Any, wo
 
 @inline
 def run_filter(
-    n: Any, step: Any, y: Any, r: Any, jump: Any, wide: Any, q: Any,
-    u_p: Any, P_p: Any, u_f: Any, P_f: Any, work: Any, sums: Any,
-) -> None:  # fmt: skip
+    n: Any, step: Any, y: Any, r: Any, jump: Any, wide: Any, q: Any, u: Any, P: Any, work: Any, sums: Any
+) -> None:
     F, Q, W = work[0], work[1], work[2]
+    u_p, u_f, P_p, P_f = u[0], u[1], P[0], P[1]
     sums[0] = 0.0
     sums[1] = 0.0
     for k in range(len(step)):
@@ -110,36 +110,35 @@ def run_filter(
 
 
 @kernel(
-    "void(int64, float64[::1], float64[::1], float64[::1], int64[::1], float64[::1], float64[::1], float64[:, ::1], "
-    "float64[:, :, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], float64[::1])"
+    "void(int64, float64[::1], float64[::1], float64[::1], int64[::1], float64[::1], float64[::1], "
+    "float64[:, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1], float64[::1])"
 )
 def filter_nodes(
-    n: Any, step: Any, y: Any, r: Any, jump: Any, wide: Any, q: Any,
-    u_p: Any, P_p: Any, u_f: Any, P_f: Any, work: Any, sums: Any,
-) -> None:  # fmt: skip
-    """Predicted (p) and filtered (f) states and covariances of all nodes; ``sums`` becomes (sum e^2/S, sum log S)."""
+    n: Any, step: Any, y: Any, r: Any, jump: Any, wide: Any, q: Any, u: Any, P: Any, work: Any, sums: Any
+) -> None:
+    """Predicted [0] and filtered [1] states and covariances of all nodes; ``sums`` becomes (sum e^2/S, sum log S)."""
     # A number of states that the compiler knows lets it write the loops out: a quarter of the time.
     if n == 4:
-        run_filter(4, step, y, r, jump, wide, q, u_p, P_p, u_f, P_f, work, sums)
+        run_filter(4, step, y, r, jump, wide, q, u, P, work, sums)
     elif n == 3:
-        run_filter(3, step, y, r, jump, wide, q, u_p, P_p, u_f, P_f, work, sums)
+        run_filter(3, step, y, r, jump, wide, q, u, P, work, sums)
     else:
-        run_filter(n, step, y, r, jump, wide, q, u_p, P_p, u_f, P_f, work, sums)
+        run_filter(n, step, y, r, jump, wide, q, u, P, work, sums)
 
 
 @kernel(
-    "void(int64, float64[::1], float64[::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1], "
-    "float64[:, :, ::1], float64[:, :, ::1])"
+    "void(int64, float64[::1], float64[::1], float64[:, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1])"
 )
-def smooth_nodes(n: Any, step: Any, q: Any, u_p: Any, P_p: Any, u_f: Any, P_f: Any, work: Any) -> None:
-    """Turn the filtered states and covariances ``u_f, P_f`` into smoothed ones, from the last node back."""
+def smooth_nodes(n: Any, step: Any, q: Any, u: Any, P: Any, work: Any) -> None:
+    """Turn the filtered states and covariances into smoothed ones, from the last node back."""
+    u_p, u_f, P_p, P_f = u[0], u[1], P[0], P[1]
     F, Q, C, G, D = work[0], work[1], work[2], work[3], work[4]
     for k in range(len(step) - 2, -1, -1):
         fill_step(n, step[k + 1], q[k + 1], F, Q)
-        P = P_p[k + 1]
+        ahead = P_p[k + 1]
         for j in range(n):  # Cholesky factor of the predicted covariance
             for i in range(j, n):
-                total = P[i, j]
+                total = ahead[i, j]
                 for m in range(j):
                     total -= C[i, m] * C[j, m]
                 if i == j:
@@ -161,7 +160,7 @@ def smooth_nodes(n: Any, step: Any, q: Any, u_p: Any, P_p: Any, u_f: Any, P_f: A
                 G[i, j] = total / C[j, j]
         for i in range(n):
             for j in range(n):
-                D[i, j] = P_f[k + 1, i, j] - P[i, j]
+                D[i, j] = P_f[k + 1, i, j] - ahead[i, j]
         for i in range(n):
             total = 0.0
             for j in range(n):

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.recordings.signals.checks import signal, warn, whose
 
 __all__ = ["DrivePhase", "drive_phase"]
@@ -46,7 +46,7 @@ class DrivePhase:
     scatter: float
     method: str
     turn_times: FloatArray = field(repr=False)
-    turns: NDArray[np.int64] = field(repr=False)
+    turns: IntArray = field(repr=False)
     span: tuple[float, float]
 
     @property
@@ -132,13 +132,11 @@ def drive_phase(
     """
     if x is None:
         return _by_gate(time, resolution, span)
-    from nonsmooth.recordings.signals import harmonics, spectrum
+    from nonsmooth.recordings.signals import harmonics
+    from nonsmooth.recordings.signals.spectrum import largest_line
 
     t, values = signal(time, x, least=16, purpose="finding the drive's phase")
-    if omega is None:
-        even = np.linspace(t[0], t[-1], len(t))
-        lines = spectrum.spectrum(np.interp(even, t, values), (len(t) - 1) / (t[-1] - t[0]))
-        omega = spectrum.peak(lines).omega
+    omega = largest_line(t, values) if omega is None else omega
     if omega * (t[-1] - t[0]) < 3 * TURN:
         raise ValueError(
             f"{whose(x)}: {t[-1] - t[0]:.4g} s hold fewer than three turns at {omega:.4g} rad/s: record longer"

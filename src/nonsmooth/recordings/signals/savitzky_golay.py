@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nonsmooth.recordings.signals.checks import even_rate, signal, whose
+from nonsmooth.recordings.signals.smoothing import labelled_motion
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,7 +55,6 @@ def savitzky_golay(
     ValueError
         If the rate is not even, values are missing, or a piece between impacts is shorter than the window.
     """
-    import xarray as xr
     from scipy.signal import savgol_coeffs, savgol_filter
 
     if window % 2 == 0 or not 2 <= order < window - 2:
@@ -65,13 +65,11 @@ def savitzky_golay(
     step = 1.0 / even_rate(t, x, "Savitzky-Golay smoothing")
     hits = np.unique(np.asarray(impacts, np.float64).ravel())
     segment = np.searchsorted(hits, t, side="left")
-    unit = str(getattr(x, "attrs", {}).get("units", "m"))
-    names = {"x": ("position", unit), "v": ("velocity", f"{unit}/s"), "a": ("acceleration", f"{unit}/s^2")}
-    data: dict[str, Any] = {}
+    states, errors = np.empty((3, len(t))), np.empty((3, len(t)))
     attrs: dict[str, Any] = {"method": "Savitzky-Golay", "window": window, "order": order}
     half = window // 2
-    for k, (name, (long_name, of)) in enumerate(names.items()):
-        found, error, bias = np.empty_like(values), np.empty_like(values), []
+    for k, name in enumerate("xva"):
+        bias = []
         # Weights of each place in the window; the middle ones serve everywhere but at the ends.
         norms = [float(np.linalg.norm(savgol_coeffs(window, order, k, step, pos=i))) for i in range(window)]
         for part in np.unique(segment):
@@ -82,16 +80,10 @@ def savitzky_golay(
                     f"window has {window}: take a shorter one, or smooth()"
                 )
             piece = values[here]
-            found[here] = savgol_filter(piece, window, order, deriv=k, delta=step)
+            states[k, here] = savgol_filter(piece, window, order, deriv=k, delta=step)
             place = np.minimum(np.minimum(np.arange(len(here)), np.arange(len(here))[::-1]), half)
-            error[here] = np.array(norms)[place] * resolution / math.sqrt(12.0)
+            errors[k, here] = np.array(norms)[place] * resolution / math.sqrt(12.0)
             finer = savgol_filter(piece, window, min(order + 2, window - 1), deriv=k, delta=step)
-            bias.append(finer[half:-half] - found[here][half:-half])
-        data[name] = ("time", found, {"long_name": long_name, "units": of})
-        data[f"{name}_error"] = ("time", error, {"long_name": f"standard error of the {long_name}", "units": of})
+            bias.append(finer[half:-half] - states[k, here][half:-half])
         attrs[f"{name}_bias"] = float(np.sqrt(np.mean(np.concatenate(bias) ** 2)))
-    coords = {
-        "time": ("time", t, {"long_name": "time", "units": "s"}),
-        "segment": ("time", segment, {"long_name": "number of impacts before this sample"}),
-    }
-    return xr.Dataset(data, coords, attrs)
+    return labelled_motion(t, states, errors, hits, x).assign_attrs(attrs)

@@ -9,20 +9,20 @@ free; nothing is carried across it.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal, whose
-from nonsmooth.recordings.signals.savitzky_golay import savitzky_golay
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MODELS", "savitzky_golay", "smooth"]
+__all__ = ["MODELS", "labelled_motion", "smooth"]
 
 #: The derivative that is white noise, by the name of the model.
 MODELS = {"white_acceleration": 2, "white_jerk": 3, "white_snap": 4}
@@ -124,7 +124,7 @@ class _Intervals:
             )
         self.begin, self.end = begin, end
 
-    def hold(self, times: FloatArray) -> NDArray[np.bool_]:
+    def hold(self, times: FloatArray) -> BoolArray:
         """Mask of the times that lie inside one of them."""
         k = np.searchsorted(self.begin, times, side="right") - 1
         return (k >= 0) & (times < np.append(self.end, -np.inf)[k])
@@ -175,8 +175,7 @@ class _Nodes:
         self.inside = contacts.hold(middle)
         self.wide = self._wide(t[good] / self.h, y[good])
         n, count_nodes = order, len(when)
-        self.u_p, self.u_f = np.zeros((count_nodes, n)), np.zeros((count_nodes, n))
-        self.P_p, self.P_f = np.zeros((count_nodes, n, n)), np.zeros((count_nodes, n, n))
+        self.u, self.P = np.zeros((2, count_nodes, n)), np.zeros((2, count_nodes, n, n))  # predicted, filtered
         self.work, self.sums = np.zeros((5, n, n)), np.zeros(2)
 
     def _wide(self, t: FloatArray, y: FloatArray) -> FloatArray:
@@ -202,7 +201,7 @@ class _Nodes:
 
         filter_nodes(
             self.order, self.step, self.y, self.r, self.jump, self.wide, np.where(self.inside, q[1], q[0]),
-            self.u_p, self.P_p, self.u_f, self.P_f, self.work, self.sums,
+            self.u, self.P, self.work, self.sums,
         )  # fmt: skip
         if self.known:
             return float(self.sums[0] + self.sums[1])
@@ -241,29 +240,20 @@ class _Nodes:
 
     def result(self, q: FloatArray, model: str, x: Any) -> xr.Dataset:
         """Filter, smooth, and label."""
-        import xarray as xr
-
         from nonsmooth.recordings.signals.kalman import smooth_nodes
 
         n, cost = self.order, self.cost(q)
-        shake = np.where(self.inside, q[1], q[0])
-        smooth_nodes(n, self.step, shake, self.u_p, self.P_p, self.u_f, self.P_f, self.work)
+        smooth_nodes(n, self.step, np.where(self.inside, q[1], q[0]), self.u, self.P, self.work)
         used = int(np.count_nonzero(np.isfinite(self.r)))
         sigma = self.sigma if self.known else self.sigma * math.sqrt(self.sums[0] / (used - n))
         units = [self.h**-k for k in range(n)]
-        states = self.u_f * self.sigma * units
+        states = self.u[1] * self.sigma * units
         states[:, 0] += self.offset
-        errors = np.sqrt(np.maximum(np.einsum("kii->ki", self.P_f), 0.0)) * sigma * units
+        errors = np.sqrt(np.maximum(np.einsum("kii->ki", self.P[1]), 0.0)) * sigma * units
         sample, before, after = (self.kind == kind for kind in range(3))
         unit = str(getattr(x, "attrs", {}).get("units", "m"))
-        names = {"x": ("position", unit), "v": ("velocity", f"{unit}/s"), "a": ("acceleration", f"{unit}/s^2")}
-        data: dict[str, Any] = {}
-        for k, (name, (long_name, of)) in enumerate(list(names.items())[:n]):
-            data[name] = ("time", states[sample, k], {"long_name": long_name, "units": of})
-            error = {"long_name": f"standard error of the {long_name}", "units": of}
-            data[f"{name}_error"] = ("time", errors[sample, k], error)
         speed = {"units": f"{unit}/s"}
-        data |= {
+        at_impacts = {
             "impact_time": ("impact", self.impacts, {"long_name": "time of the impact", "units": "s"}),
             "impact_x": ("impact", states[before, 0], {"long_name": "position at the impact", "units": unit}),
             "impact_x_error": ("impact", errors[before, 0], {"units": unit}),
@@ -272,11 +262,6 @@ class _Nodes:
             "v_after": ("impact", states[after, 1], {"long_name": "velocity after the impact", **speed}),
             "v_after_error": ("impact", errors[after, 1], speed),
         }
-        segment = np.searchsorted(self.impacts, self.t, side="left")
-        coords = {
-            "time": ("time", self.t, {"long_name": "time", "units": "s"}),
-            "segment": ("time", segment, {"long_name": "number of impacts before this sample"}),
-        }
         attrs = {
             "method": "Kalman smoother (Rauch-Tung-Striebel)", "model": model,
             "intensity": float(q[0]) * sigma**2 / self.h ** (2 * n - 1), "sample_error": sigma,
@@ -284,7 +269,28 @@ class _Nodes:
         }  # fmt: skip
         if self.inside.any():
             attrs["intensity_in_contact"] = float(q[1]) * sigma**2 / self.h ** (2 * n - 1)
-        return xr.Dataset(data, coords, attrs)
+        found = labelled_motion(self.t, states[sample].T[:3], errors[sample].T[:3], self.impacts, x)
+        return found.assign(at_impacts).assign_attrs(attrs)
+
+
+def labelled_motion(
+    t: FloatArray, states: Iterable[FloatArray], errors: Iterable[FloatArray], impacts: FloatArray, x: Any
+) -> xr.Dataset:
+    """Position, velocity and acceleration (as many as are given) with their errors, in the unit of ``x``."""
+    import xarray as xr
+
+    unit, data = str(getattr(x, "attrs", {}).get("units", "m")), {}
+    names = {"x": ("position", ""), "v": ("velocity", "/s"), "a": ("acceleration", "/s^2")}
+    for (name, (long_name, per)), state, error in zip(names.items(), states, errors, strict=False):
+        attrs = {"units": unit + per}
+        data[name] = ("time", state, {"long_name": long_name, **attrs})
+        data[f"{name}_error"] = ("time", error, {"long_name": f"standard error of the {long_name}", **attrs})
+    coords = {
+        "time": ("time", t, {"long_name": "time", "units": "s"}),
+        "segment": ("time", np.searchsorted(impacts, t, side="left"), {
+            "long_name": "number of impacts before this sample"}),
+    }  # fmt: skip
+    return xr.Dataset(data, coords)
 
 
 class _Edges:

@@ -19,7 +19,7 @@ from nonsmooth.recordings.signals.checks import even_rate, signal, whose
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["INTERPOLATIONS", "Peak", "peak", "spectrum"]
+__all__ = ["INTERPOLATIONS", "Peak", "largest_line", "peak", "spectrum"]
 
 #: Ways to find a peak between lines.
 INTERPOLATIONS = ("window", "parabola", "none")
@@ -198,6 +198,12 @@ def peak(
         error = spacing * shape.spread(three, _noise(spectrum, k), interpolation)
     place = float(frequency[k]) + delta * spacing
     return Peak(place, error, spacing * shape.bias(place / spacing, interpolation), step, height, interpolation)
+
+
+def largest_line(t: FloatArray, values: FloatArray) -> float:
+    """Angular frequency of the largest line; evenly interpolated, since this is only a start."""
+    even = np.linspace(t[0], t[-1], len(t))
+    return peak(spectrum(np.interp(even, t, values), (len(t) - 1) / (t[-1] - t[0]))).omega
 
 
 class _Shape:

@@ -18,7 +18,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.sampling import examine
 from nonsmooth.recordings.signals.checks import signal, whose
 from nonsmooth.recordings.signals.harmonics import fit
-from nonsmooth.recordings.signals.spectrum import peak, spectrum
+from nonsmooth.recordings.signals.spectrum import largest_line, peak, spectrum
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -136,7 +136,7 @@ def steady_response(
     name = whose(x)
     length = float(t[-1] - t[0])
     if omega is None:
-        omega = _largest_line(t, values)
+        omega = largest_line(t, values)
     rate = (len(t) - 1) / length
     harmonics = max(1, min(harmonics, int(0.95 * math.pi * rate / omega)))
     periods = omega * length / (2.0 * math.pi)
@@ -187,13 +187,6 @@ def steady_response(
         by_fit, error, methods, float(whole.amplitudes[0]), float(whole.amplitude_errors[0]), -decay, decay_error,
         -decay > 3.0 * decay_error, length, name, table,
     )  # fmt: skip
-
-
-def _largest_line(t: FloatArray, values: FloatArray) -> float:
-    """Angular frequency of the largest line; evenly interpolated, since this is only a start."""
-    even = np.linspace(t[0], t[-1], len(t))
-    found = peak(spectrum(np.interp(even, t, values), (len(t) - 1) / (t[-1] - t[0])))
-    return found.omega
 
 
 def _slope(t: FloatArray, y: FloatArray, errors: FloatArray) -> tuple[float, float]:

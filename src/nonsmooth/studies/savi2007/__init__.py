@@ -3,7 +3,7 @@
 ``reproduce`` computes Figs. 2, 9-15, 17 and 18 of the paper by the exact flow and by the paper's own way (the smoothed
 switch with eta = 1e-5, integrated by Runge-Kutta-Fehlberg), the effect of eta, and a report that puts each statement of
 the paper beside what the model gives; beside Figs. 13 and 17 the basins of what coexists there, and in a full run
-charts over two parameters. In ``figures`` (of the model) and ``rig_figures`` one file computes and draws one group of
+charts over two parameters. In ``figures`` one file computes and draws one group of
 figures; ``claims`` measures the statements on the datasets of the figures, its ``verdicts`` is the rule by which they
 are judged, ``report`` writes them down; ``finished`` knows what is there already. The paper's experiment is ``rig``
 (the virtual one, which writes sessions), ``identification`` (its Section 3.1: ``nonsmooth.identify``) and

@@ -25,11 +25,8 @@ __all__ = ["Reproduction", "figures_of_the_study", "reproduce"]
 
 PICTURE_DPI = 200
 PARAMETERS = "table1"
-#: Files that hold figures: of the model, and of the virtual rig.
-ROOMS = (
-    ("figures", ("regions", "resonance", "amplitude", "gap", "frequency", "coexisting", "charts", "band")),
-    ("rig_figures", ("parameters", "response", "amplitude", "gap", "frequency")),
-)
+#: Files that hold figures.
+FILES = ("regions", "resonance", "amplitude", "gap", "frequency", "coexisting", "charts", "band", "parameters")
 
 
 @dataclass(frozen=True)
@@ -48,8 +45,8 @@ def figures_of_the_study(full: bool = False) -> tuple[Figure, ...]:
 
     Those that take long only where ``full`` is asked for.
     """
-    rooms = [import_module(f"nonsmooth.studies.savi2007.{room}.{name}") for room, names in ROOMS for name in names]
-    figures = [figure for room in rooms for figure in room.FIGURES if full or not figure.full]
+    files = [import_module(f"nonsmooth.studies.savi2007.figures.{name}") for name in FILES]
+    figures = [figure for file in files for figure in file.FIGURES if full or not figure.full]
     places = {PARAMETERS: 8.5}
     return tuple(sorted(figures, key=lambda figure: (places.get(figure.name, figure.place), figure.rig)))
 

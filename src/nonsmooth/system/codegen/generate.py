@@ -167,7 +167,7 @@ def unpacked(lines: Iterable[str]) -> list[str]:
 
 
 def constants_of(traced: Traced) -> dict[Basic, str]:
-    """What parameters and memory are called in generated code."""
+    """Names of parameters and memory in generated code."""
     return {symbol: f"q{i}" for i, symbol in enumerate([*traced.p, *traced.m])}
 
 

@@ -11,10 +11,10 @@ from dataclasses import replace
 
 from nonsmooth.studies.savi2007.claims.rows import Cell, Data, Row, against_printed, printed_cell
 from nonsmooth.studies.savi2007.claims.verdicts import Known, Verdict, agreed
+from nonsmooth.studies.savi2007.figures.parameters import table_rows
 from nonsmooth.studies.savi2007.findings import Found, Number, found_in
 from nonsmooth.studies.savi2007.measure import Interval
 from nonsmooth.studies.savi2007.printed import NATURAL_FREQUENCY, NUMBERS, TABLE_1, TEST_MASS, Printed
-from nonsmooth.studies.savi2007.rig_figures.parameters import table_rows
 
 __all__ = ["p1", "p2", "p3", "p4", "p5", "p6", "p7", "p8", "r1", "r2"]
 

@@ -10,6 +10,8 @@ import numpy as np
 from nonsmooth.studies.savi2007.claims.rig_response import against, grazing_of_paper, main_jump, small_jump
 from nonsmooth.studies.savi2007.claims.rows import Cell, Data, Row, printed_cell
 from nonsmooth.studies.savi2007.claims.verdicts import CLOSE, Verdict, agreed
+from nonsmooth.studies.savi2007.figures.amplitude import flip_of, rate_of, slowest
+from nonsmooth.studies.savi2007.figures.motions import measured_periods_at
 from nonsmooth.studies.savi2007.measure import APERIODIC, Interval, measured_jumps
 from nonsmooth.studies.savi2007.printed import (
     FIGURE_9,
@@ -20,8 +22,6 @@ from nonsmooth.studies.savi2007.printed import (
     FIGURE_18,
     NUMBERS,
 )
-from nonsmooth.studies.savi2007.rig_figures.amplitude import flip_of, rate_of, slowest
-from nonsmooth.studies.savi2007.rig_figures.motions import measured_periods_at
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,7 +11,7 @@ from nonsmooth import System, plot, poincare, simulate
 from nonsmooth.results.labels import labels_of
 from nonsmooth.results.provenance import provenance
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, drawn
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth.studies.savi2007.flows import ETA, EXACT, SMOOTHED, Settings
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies, steady_state
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_11, FIGURE_13
@@ -112,7 +112,6 @@ def order_in_eta(errors: xr.Dataset, form: str) -> np.ndarray:
     )
 
 
-@drawn(1.0, 0.52)
 def _draw(canvas: Canvas, data: Datasets) -> None:
     errors, grazing = data["error"], data["grazing"]
     left, right = canvas.subplots(1, 2)
@@ -167,4 +166,4 @@ def _caption(data: Datasets) -> str:
     )
 
 
-FIGURES = (Figure("eta", None, "The choice of eta", _compute, _draw, _caption),)
+FIGURES = (Figure("eta", None, "The choice of eta", _compute, _draw, _caption, (1.0, 0.52)),)

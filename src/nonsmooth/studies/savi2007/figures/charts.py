@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ from nonsmooth import SolveError, chart, continue_curve, continue_orbit, find_or
 from nonsmooth.plot.branches import KINDS
 from nonsmooth.results.statuses import by_code
 from nonsmooth.studies.savi2007.figures.branches import BEGINNINGS, branches, rows_of
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Figure, drawn
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth.studies.savi2007.flows import EXACT, Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_13
 
@@ -54,18 +55,14 @@ def grid_of(plane: Plane, n: int) -> dict[str, np.ndarray]:
     return {name: np.linspace(*ends, n) for name, ends in plane.ranges.items()}
 
 
-def _compute(name: str) -> Compute:
-    def compute(settings: Settings) -> Datasets:
-        plane = CHARTS[name]
-        grid = grid_of(plane, _QUICK if settings.quick else _FULL)
-        store = None if settings.folder is None else settings.folder / f"{name}_store.zarr"
-        found = chart(
-            EXACT.system(**plane.parameters), grid, extremes=False, store=store, progress=settings.progress,
-            **EXACT.options,
-        )  # fmt: skip
-        return {"chart": found} | {f"curve_{k}": one for k, one in enumerate(curves(plane))}
-
-    return compute
+def _compute(settings: Settings, name: str) -> Datasets:
+    plane = CHARTS[name]
+    store = None if settings.folder is None else settings.folder / f"{name}_store.zarr"
+    found = chart(
+        EXACT.system(**plane.parameters), grid_of(plane, _QUICK if settings.quick else _FULL), extremes=False,
+        store=store, progress=settings.progress, **EXACT.options,
+    )  # fmt: skip
+    return {"chart": found} | {f"curve_{k}": one for k, one in enumerate(curves(plane))}
 
 
 def curves(plane: Plane) -> list[xr.Dataset]:
@@ -110,7 +107,6 @@ def _on(curve: xr.Dataset, row: xr.Dataset, parameter: str) -> bool:
     return False
 
 
-@drawn(1.0, 0.42)
 def _draw(canvas: Canvas, data: Datasets) -> None:
     found = data["chart"]
     left, right = canvas.subplots(1, 2, sharey=True)
@@ -156,13 +152,11 @@ def _caption(data: Datasets) -> str:
     )
 
 
-FIGURES = (
-    Figure(
-        "chart09", None, "Chart over frequency and amplitude at the gap of Fig. 9", _compute("chart09"), _draw,
-        _caption, beside=9, full=True,
-    ),
-    Figure(
-        "chart13", None, "Chart over gap and amplitude at the frequency of Fig. 13", _compute("chart13"), _draw,
-        _caption, beside=13, full=True,
-    ),
+FIGURES = tuple(
+    Figure(name, None, f"Chart over {words}", partial(_compute, name=name), _draw, _caption, (1.0, 0.42),
+           beside=beside, full=True)
+    for name, words, beside in (
+        ("chart09", "frequency and amplitude at the gap of Fig. 9", 9),
+        ("chart13", "gap and amplitude at the frequency of Fig. 13", 13),
+    )
 )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from nonsmooth.plot.planes import names_of as kinds_of
 from nonsmooth.plot.planes import section_mark
 from nonsmooth.plot.trajectories import ZONE, shade_zone
 from nonsmooth.plot.units import prefixed
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Figure, drawn
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth.studies.savi2007.flows import EXACT, Settings
 from nonsmooth.studies.savi2007.printed import FIGURE_13, FIGURE_17
 
@@ -31,22 +32,19 @@ _POINTS, _FULL, _QUICK = 160, 500, 40  # along each side
 _WANDERING = 60  # periods drawn of an attractor that is no cycle
 
 
-def _compute(name: str) -> Compute:
-    def compute(settings: Settings) -> Datasets:
-        n = _QUICK if settings.quick else _FULL if settings.full else _POINTS
-        system = EXACT.system(**BASINS[name])
-        found = basins(
-            system, {state: np.linspace(*ends, n) for state, ends in _PLANE.items()}, progress=settings.progress,
-            **EXACT.options,
-        )  # fmt: skip
-        data = {"basins": found}
-        for k in range(found.sizes["attractor"]):
-            periods = int(found["period_number"][k]) or _WANDERING
-            start = found["section_points"].values[found["point_attractor"].values == k][0]
-            data[f"orbit_{k}"] = simulate(system, start=start, periods=periods, **EXACT.options)
-        return data
-
-    return compute
+def _compute(settings: Settings, name: str) -> Datasets:
+    n = _QUICK if settings.quick else _FULL if settings.full else _POINTS
+    system = EXACT.system(**BASINS[name])
+    found = basins(
+        system, {state: np.linspace(*ends, n) for state, ends in _PLANE.items()}, progress=settings.progress,
+        **EXACT.options,
+    )  # fmt: skip
+    data = {"basins": found}
+    for k in range(found.sizes["attractor"]):
+        periods = int(found["period_number"][k]) or _WANDERING
+        start = found["section_points"].values[found["point_attractor"].values == k][0]
+        data[f"orbit_{k}"] = simulate(system, start=start, periods=periods, **EXACT.options)
+    return data
 
 
 def names_of(found: xr.Dataset) -> list[str]:
@@ -58,7 +56,6 @@ def names_of(found: xr.Dataset) -> list[str]:
     return words
 
 
-@drawn(1.0, 0.5)
 def _draw(canvas: Canvas, data: Datasets) -> None:
     found = data["basins"]
     left, right = canvas.subplots(1, 2)
@@ -111,7 +108,7 @@ def _caption(data: Datasets) -> str:
 
 
 FIGURES = tuple(
-    Figure(name, None, f"Basins at {words}", _compute(name), _draw, _caption, beside=beside)
+    Figure(name, None, f"Basins at {words}", partial(_compute, name=name), _draw, _caption, beside=beside)
     for name, words, beside in (
         ("basins13", "g = 1.4 mm", 13), ("basins17", "omega = 9.55 rad/s", 17),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,8 +11,8 @@ from nonsmooth import plot, sweep
 from nonsmooth.plot.branches import draw_branch
 from nonsmooth.plot.style import even_dots, halo, small
 from nonsmooth.results.provenance import read_provenance
-from nonsmooth.studies.savi2007.figures.branches import branches_of
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Draw, drawn, only_outer
+from nonsmooth.studies.savi2007.figures.branches import BEGINNINGS, branches, branches_of
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, only_outer
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 
 if TYPE_CHECKING:
@@ -34,41 +34,34 @@ ABOUT_BRANCHES = (
 
 
 def diagrams(
-    settings: Settings,
-    parameters: Mapping[str, float],
-    parameter: str,
-    low: float,
-    high: float,
-    steps: tuple[int, int],
-    also: tuple[float, ...],
-    patience: int = 600,
+    settings: Settings, figure: str, steps: tuple[int, int], also: Iterable[float], patience: int = 600
 ) -> Datasets:
-    """Sweeps up and down (``exact``, ``smoothed``) and from several starts (``exact_starts``, ``smoothed_starts``).
+    """Sweeps up and down (``exact``, ``smoothed``), from several starts (``exact_starts``, ...), and the branches.
 
     ``steps``: of the exact and of the smoothed sweep; the starts are tried at a half or a quarter of them.
     ``also``: values to be among those swept. ``patience``: transient of the exact flow from the starts.
     """
-    data = {}
+    begin, data = BEGINNINGS[figure], {}
+
+    def grid(steps: int) -> np.ndarray:
+        return np.unique(np.round([*np.linspace(*begin.range, steps + 1), *also], 9))
+
     for flow in FLOWS:
-        system = flow.system(**parameters)
+        system = flow.system(**begin.parameters)
         n = settings.of(flow, exact=steps[0], smoothed=steps[1], quick=70)
         data[flow.key] = sweep(
-            system, parameter, _grid(low, high, n, also), direction="both", progress=settings.progress,
+            system, begin.parameter, grid(n), direction="both", progress=settings.progress,
             transient=settings.of(flow, exact=600, smoothed=200, quick=100),
             keep=settings.of(flow, exact=200, smoothed=64, quick=40), **flow.options,
         )  # fmt: skip
         fewer = 2 if patience <= 600 else 4
         n = settings.of(flow, exact=steps[0] // fewer, smoothed=steps[1] // 4, quick=10)
         data[f"{flow.key}_starts"] = sweep(
-            system, parameter, _grid(low, high, n, also), direction=None,
+            system, begin.parameter, grid(n), direction=None,
             start=starts(settings.of(flow, exact=12, smoothed=8, quick=4)), progress=settings.progress,
             transient=settings.of(flow, exact=patience, smoothed=150, quick=80), keep=32, **flow.options,
         )  # fmt: skip
-    return data
-
-
-def _grid(low: float, high: float, steps: int, also: tuple[float, ...]) -> np.ndarray:
-    return np.unique(np.round(np.concatenate([np.linspace(low, high, steps + 1), also]), 9))
+    return data | branches(figure)
 
 
 def draw_diagram(
@@ -94,19 +87,14 @@ def draw_diagram(
     mark_values(ax, values, words)
 
 
-def draw_both(values: Mapping[float, str], words: str) -> Draw:
-    """The sheet: the velocity at the section, of each flow; ``values`` and ``words`` as in `draw_diagram`."""
-
-    @drawn(1.0, 0.5)
-    def draw(canvas: Canvas, data: Datasets) -> None:
-        grid = canvas.subplots(1, 2, sharey=True)
-        for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
-            draw_diagram(ax, data, flow.key, "v", values=values, words=words)
-            ax.set_title(f"({letter}) {flow.title}")
-        only_outer(grid)
-        shared_legend(canvas)
-
-    return draw
+def draw_both(canvas: Canvas, data: Datasets, *, values: Mapping[float, str], words: str) -> None:
+    """Draw the velocity at the section, of each flow; ``values`` and ``words`` as in `draw_diagram`."""
+    grid = canvas.subplots(1, 2, sharey=True)
+    for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
+        draw_diagram(ax, data, flow.key, "v", values=values, words=words)
+        ax.set_title(f"({letter}) {flow.title}")
+    only_outer(grid)
+    shared_legend(canvas)
 
 
 def other_motions(many: xr.Dataset, swept: xr.Dataset) -> xr.DataArray:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import wraps
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -13,16 +12,15 @@ from nonsmooth import plot
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure as MatplotlibFigure
 
     from nonsmooth.studies.savi2007.flows import Settings
 
-__all__ = ["Canvas", "Compute", "Datasets", "Draw", "Figure", "drawn", "only_outer"]
+__all__ = ["Canvas", "Datasets", "Figure", "only_outer", "two_rows"]
 
 Canvas: TypeAlias = "MatplotlibFigure"
 Datasets: TypeAlias = "dict[str, xr.Dataset]"  # of a figure, by key
-Compute: TypeAlias = "Callable[[Settings], Datasets]"
-Draw: TypeAlias = "Callable[[Datasets], Canvas]"
 
 #: The procedures on which those parameters rest with which records of the rig are laid over the model.
 RESTS_ON = ("springs", "support", "impulse", "response", "drop", "contact")
@@ -41,10 +39,12 @@ class Figure:
     title : str
     compute : callable
         Settings -> datasets by key; the file of key ``exact`` is ``fig11_exact.nc``.
-    draw : callable
-        Datasets -> a Matplotlib figure.
+    sheet : callable
+        (an empty Matplotlib figure, datasets) -> None: draws on it.
     caption : callable
         Datasets -> the caption, with the numbers of this run.
+    size : (float, float)
+        Width and height in widths of a page.
     rig : bool
         Whether it is measured on the virtual rig (``settings.bench``); what it shows is then synthetic.
     beside : int, optional
@@ -58,9 +58,10 @@ class Figure:
     name: str
     number: int | None
     title: str
-    compute: Compute
-    draw: Draw
+    compute: Callable[[Settings], Datasets]
+    sheet: Callable[[Canvas, Datasets], None]
     caption: Callable[[Datasets], str]
+    size: tuple[float, float] = (1.0, 0.5)
     rig: bool = False
     beside: int | None = None
     full: bool = False
@@ -73,6 +74,15 @@ class Figure:
             return self.beside + 0.5
         return 99.0 if self.number is None else float(self.number)
 
+    def draw(self, data: Datasets) -> Canvas:
+        """The figure of these data, which pyplot does not list."""
+        from matplotlib.figure import Figure as Sheet
+
+        with plot.journal():
+            canvas = Sheet(figsize=(self.size[0] * plot.PAGE, self.size[1] * plot.PAGE))
+            self.sheet(canvas, data)
+        return canvas
+
 
 def only_outer(grid: Any) -> None:
     """Hide the axes' names but for those at the foot and on the left; hidden, they still tell the unit of the ticks."""
@@ -84,19 +94,16 @@ def only_outer(grid: Any) -> None:
         ax.yaxis.label.set_visible(False)
 
 
-def drawn(width: float, height: float) -> Callable[[Callable[[Canvas, Datasets], None]], Draw]:
-    """Give what a function draws on an empty sheet, which pyplot does not list; lengths in widths of a page."""
-
-    def decorated(draw: Callable[[Canvas, Datasets], None]) -> Draw:
-        @wraps(draw)
-        def framed(data: Datasets) -> Canvas:
-            from matplotlib.figure import Figure as Sheet
-
-            with plot.journal():
-                canvas = Sheet(figsize=(width * plot.PAGE, height * plot.PAGE))
-                draw(canvas, data)
-            return canvas
-
-        return framed
-
-    return decorated
+def two_rows(
+    canvas: Canvas, rows: Sequence[str], titles: Sequence[str], cell: Callable[[Axes, int, int], object],
+    sharey: bool | Literal["col"] = True,
+) -> None:  # fmt: skip
+    """Draw a sheet of two rows with names and of titled columns; ``cell(ax, i, j)`` draws a place."""
+    grid = canvas.subplots(2, len(titles), sharex="col", sharey=sharey, squeeze=False)
+    for i, name in enumerate(rows):
+        for j, title in enumerate(titles):
+            cell(grid[i, j], i, j)
+            grid[i, j].set_ylabel(f"{name}\n{grid[i, j].get_ylabel()}")
+            if i == 0:
+                grid[i, j].set_title(f"({'abcd'[j]}) {title}", y=1.0, pad=9)
+    only_outer(grid)

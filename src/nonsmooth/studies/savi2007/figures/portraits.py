@@ -10,14 +10,18 @@ import numpy as np
 from nonsmooth import plot, simulate, sweep
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Draw, drawn, only_outer
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, two_rows
 from nonsmooth.studies.savi2007.flows import FLOWS, Settings, starts
 from nonsmooth.studies.savi2007.measure import APERIODIC, periods_reached
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
 
-__all__ = ["chosen_start", "describe", "draw_portraits", "portraits", "setting"]
+__all__ = ["QUANTITIES", "chosen_start", "describe", "draw_portraits", "portraits", "sheet_size", "titles"]
+
+#: Units and symbols of what the figures vary.
+QUANTITIES = {"g": ("m", "g"), "omega": ("rad/s", r"\omega"), "rho": ("N", r"\rho")}
 
 CHAOTIC_PERIODS = 40  # drawn of an orbit without a period
 
@@ -55,51 +59,47 @@ def chosen_start(survey: xr.Dataset, value: float, wanted: int) -> int:
     return int(at[0]) if len(at) else 0
 
 
-def draw_portraits(
-    parameter: str, unit: str, symbol: str, shown: Mapping[float, int]
-) -> Draw:
-    """The sheet: columns are values, rows are flows."""
-
-    @drawn(1.0, 1.24 / max(len(shown) - 1, 2) + 0.5 / plot.PAGE)
-    def draw(canvas: Canvas, data: Datasets) -> None:
-        grid = canvas.subplots(2, len(shown), sharex="col", sharey=True, squeeze=False)
-        for row, flow in zip(grid, FLOWS, strict=True):
-            for i, (ax, (value, wanted)) in enumerate(zip(row, shown.items(), strict=True)):
-                orbit, survey = data[f"{flow.key}_{value:g}"], data[flow.key]
-                points = survey.sel({parameter: value}, method="nearest").isel(
-                    start=chosen_start(survey, value, wanted)
-                )
-                plot.phase_portrait(orbit, ax, section=points if wanted != APERIODIC else None, zone="g")
-                if wanted == APERIODIC:
-                    for line in ax.get_lines():
-                        line.set(linewidth=0.35)
-                    plot.section(points, ax, size=3.0)
-                    ax.get_lines()[-1].set(zorder=4, label="section points")
-                for line in ax.get_lines():
-                    if str(line.get_label()).endswith("band"):
-                        line.set_label("_")  # 2 eta wide: not to be seen
-                ax.set_ylabel(f"{flow.short}\n{ax.get_ylabel()}")
-                if flow is FLOWS[0]:
-                    ax.set_title(f"({'abcd'[i]}) {setting(symbol, value, unit)}", y=1.0, pad=9)
-        only_outer(grid)
-        shared_legend(canvas)
-
-    return draw
+def sheet_size(shown: Mapping[float, int]) -> tuple[float, float]:
+    """Size of a sheet of two rows with a square for each value."""
+    return 1.0, 1.24 / max(len(shown) - 1, 2) + 0.5 / plot.PAGE
 
 
-def setting(symbol: str, value: float, unit: str) -> str:
-    """``$g = -1.2$ mm``: a setting in the unit of the axes."""
-    number, prefix = prefixed(value, unit)
-    return f"${symbol} = {number}$ {prefix}"
+def titles(parameter: str, shown: Mapping[float, int]) -> list[str]:
+    """``$g = -1.2$ mm``: each setting in the unit of the axes."""
+    unit, symbol = QUANTITIES[parameter]
+    return ["${} = {}$ {}".format(symbol, *prefixed(value, unit)) for value in shown]
+
+
+def draw_portraits(canvas: Canvas, data: Datasets, *, parameter: str, shown: Mapping[float, int]) -> None:
+    """Draw a portrait for each value (columns) and flow (rows)."""
+    rows = list(shown.items())
+
+    def cell(ax: Axes, i: int, j: int) -> None:
+        (value, wanted), key = rows[j], FLOWS[i].key
+        points = data[key].sel({parameter: value}, method="nearest").isel(start=chosen_start(data[key], value, wanted))
+        plot.phase_portrait(
+            data[f"{key}_{value:g}"], ax, section=points if wanted != APERIODIC else None, zone="g"
+        )  # fmt: skip
+        if wanted == APERIODIC:
+            for line in ax.get_lines():
+                line.set(linewidth=0.35)
+            plot.section(points, ax, size=3.0)
+            ax.get_lines()[-1].set(zorder=4, label="section points")
+        for line in ax.get_lines():
+            if str(line.get_label()).endswith("band"):
+                line.set_label("_")  # 2 eta wide: not to be seen
+
+    two_rows(canvas, [flow.short for flow in FLOWS], titles(parameter, shown), cell)
+    shared_legend(canvas)
 
 
 def describe(data: Datasets, shown: Mapping[float, int]) -> str:
     """Regimes that the starts reached at each value, by the exact flow."""
     survey = data["exact"]
     name = _parameter(survey)
-    unit = str(survey[name].attrs["units"])
     words = [
-        f"{name} = {' '.join(prefixed(value, unit))}: {words_of(periods_reached(survey, value))}" for value in shown
+        f"{name} = {' '.join(prefixed(value, QUANTITIES[name][0]))}: {words_of(periods_reached(survey, value))}"
+        for value in shown
     ]
     return f"Reached by {survey.sizes['start']} starts (exact): " + "; ".join(words) + "."
 

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from nonsmooth import plot
 from nonsmooth.plot.labels import name_axes
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, drawn
-from nonsmooth.studies.savi2007.flows import ETA, EXACT, SMOOTHED, Settings
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure
+from nonsmooth.studies.savi2007.flows import ETA, EXACT, SMOOTHED
 
 __all__ = ["FIGURES"]
 
 
-def _compute(settings: Settings) -> Datasets:
-    return {}
-
-
-@drawn(1.0, 0.42)
 def _draw(canvas: Canvas, data: Datasets) -> None:
     left, right = canvas.subplots(1, 2)
     for ax, flow in ((left, EXACT), (right, SMOOTHED)):
@@ -33,4 +28,4 @@ def _caption(data: Datasets) -> str:
     )
 
 
-FIGURES = (Figure("fig02", 2, "Regions and surfaces", _compute, _draw, _caption),)
+FIGURES = (Figure("fig02", 2, "Regions and surfaces", lambda settings: {}, _draw, _caption, (1.0, 0.42)),)

@@ -38,8 +38,7 @@ __all__ = ["OWN", "SHARED", "ContactFit", "fit_contact", "known_before", "shoot_
 
 SHARED = ("omega_0", "b", "f", "kappa", "gamma")
 OWN = ("g", "x_e", "crank", "mark", "cosine_2", "sine_2")  # of each run
-_MORE = ("more_cosine", "more_sine")
-_POINTS = 12  # of a turn at which they are given
+_TURNING = ("omega", "turned")  # of an even drive: its angle is omega t + turned
 _WINDOW = 1.3  # s: about as long as a motion with contact is told by its start
 _LONGEST = 40.0  # s: of a run
 _BEGINS = 2.0  # s within which a run begins, at its farthest from the support
@@ -97,22 +96,20 @@ class ContactFit:
 def _rig(wanders: bool) -> System:
     """The car between its springs, with the support; x in the sensor's count.
 
-    The crank turns evenly. Inputs of a motor that wanders: what its cosine and sine are more than those.
+    The crank turns evenly, so that the model is linear in each mode; where the motor ``wanders`` its angle is an input.
     """
 
     def push(t: Any, p: Any) -> Any:
-        turn = p.omega * t + p.turned
-        first = p.crank * np.cos(turn + p.mark)
-        if wanders:
-            first = first + p.crank * (np.cos(p.mark) * p.more_cosine - np.sin(p.mark) * p.more_sine)
-        second = p.cosine_2 * np.cos(2 * turn) + p.sine_2 * np.sin(2 * turn)
-        return p.omega_0**2 * (0.5 * (first + second) + p.x_e)
+        angle = p.phi if wanders else p.omega * t + p.turned
+        drive = p.crank * np.cos(angle + p.mark) + p.cosine_2 * np.cos(2 * angle) + p.sine_2 * np.sin(2 * angle)
+        return p.omega_0**2 * (0.5 * drive + p.x_e)
 
     units = ("rad/s", "1/s", "N/kg", "1/s^2", "1/s", "m", "m", "m", "rad", "m", "m", "rad/s", "rad")
+    names = (*SHARED, *OWN) if wanders else (*SHARED, *OWN, *_TURNING)
     return mechanical(
         1.0, "b", lambda p: [[p.omega_0**2]], coordinates={"x": "m"}, forcing={"x": push},
-        inputs=dict.fromkeys(_MORE, "1") if wanders else None,
-        parameters={name: (1.0, unit) for name, unit in zip((*SHARED, *OWN, "omega", "turned"), units, strict=True)},
+        inputs={"phi": "rad"} if wanders else None,
+        parameters={name: (1.0, unit) for name, unit in zip(names, units, strict=False)},
         elements={
             "dry": elements.Coulomb(at="x", friction="f"),
             "support": elements.ElasticStop(at="x", position="g", stiffness="kappa", damping="gamma"),
@@ -142,16 +139,15 @@ def fit_contact(
 ) -> ParameterSet:  # fmt: skip
     """Fit a run, or its part between two times (s), from first values; ``options`` of :func:`nonsmooth.fit`."""
     inside = (run.time >= span[0]) & (run.time <= span[1])
-    omega, turned = np.polyfit(drive.turn_times, 2 * np.pi * drive.turns, 1).tolist()
-    recorded = {"x": (run.time[inside], run.positions[inside])}
+    recorded, set_to = {"x": (run.time[inside], run.positions[inside])}, {}
     if wanders:
-        low, high = span[0] - 0.1, span[1] + 0.1
-        at, step = np.linspace(low, high, int(_POINTS * (high - low) / drive.period) + 2, retstep=True)
-        between = np.exp(1j * drive.phase(at)) - np.exp(1j * (omega * at + turned))
-        between /= np.sinc(omega * step / (2 * np.pi)) ** 2  # straight lines between points of a wave make it smaller
-        recorded |= dict(zip(_MORE, ((at, between.real), (at, between.imag)), strict=True))
+        at = drive.turn_times
+        at = np.unique(np.r_[span[0] - 0.1, at[(at > span[0]) & (at < span[1])], span[1] + 0.1])
+        recorded["phi"] = at, drive.phase(at)
+    else:
+        set_to = dict(zip(_TURNING, np.polyfit(drive.turn_times, 2 * np.pi * drive.turns, 1).tolist(), strict=True))
     return fit(
-        _rig(wanders).with_parameters({**first, "omega": omega, "turned": turned}), recorded,
+        _rig(wanders).with_parameters({**first, **set_to}), recorded,
         dict.fromkeys([*SHARED, *OWN]) | {"gamma": (0.0, None)}, measured={"x": Sensor(resolution=resolution)},
         priors=known, window=_WINDOW, tries=1, progress=False, mode="dry_stick_support_open", **options,
     )  # fmt: skip

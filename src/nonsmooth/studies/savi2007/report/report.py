@@ -12,6 +12,7 @@ from nonsmooth import __version__
 from nonsmooth.studies.savi2007.claims.rows import Data, Row
 from nonsmooth.studies.savi2007.claims.verdicts import CLOSE, MEANING, RULE, Cause, Verdict, judge
 from nonsmooth.studies.savi2007.figures.figure import Figure
+from nonsmooth.studies.savi2007.figures.parameters import NAMES, table_rows
 from nonsmooth.studies.savi2007.flows import ETA, SMOOTHED, Settings
 from nonsmooth.studies.savi2007.report.pages import (
     Block,
@@ -29,7 +30,6 @@ from nonsmooth.studies.savi2007.report.pages import (
     to_markdown,
 )  # fmt: skip
 from nonsmooth.studies.savi2007.report.special import SpecialPoint, ratios, special_table, table_of_points
-from nonsmooth.studies.savi2007.rig_figures.parameters import NAMES, table_rows
 
 __all__ = ["REPORTS", "write_report"]
 

@@ -14,8 +14,8 @@ from nonsmooth.plot.labels import name_and_unit, name_axes
 from nonsmooth.plot.trajectories import shade_zone
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Draw, drawn, only_outer
-from nonsmooth.studies.savi2007.figures.portraits import setting
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, two_rows
+from nonsmooth.studies.savi2007.figures.portraits import QUANTITIES, titles
 from nonsmooth.studies.savi2007.laboratory import as_result
 from nonsmooth.studies.savi2007.measure import APERIODIC
 
@@ -63,9 +63,8 @@ def diagram_of(found: Motions, parameter: str) -> tuple[xr.Dataset, dict[str, An
     """Section points of motions at several values of a parameter, as ``compare`` takes a diagram; settings."""
     measured, settings = zip(*found.values(), strict=True)
     values = [float(np.atleast_1d(one[parameter])[0]) for one in settings]
-    unit = {"g": "m", "omega": "rad/s", "rho": "N"}[parameter]
     others = {key: value for key, value in settings[0].items() if key != parameter}
-    return measured_sections(measured, parameter, values, unit=unit), others
+    return measured_sections(measured, parameter, values, unit=QUANTITIES[parameter][0]), others
 
 
 def model_at(bench: Laboratory, settings: Mapping[str, Any]) -> System:
@@ -142,22 +141,14 @@ def _name(period: int) -> str:
     return "no period" if period == APERIODIC else f"period {period}"
 
 
-def draw_pairs(unit: str, symbol: str, shown: Mapping[float, int]) -> Draw:
-    """The sheet: columns are values; the model above, the rig below, in the same axes."""
-
-    @drawn(1.0, 1.24 / max(len(shown) - 1, 2) + 0.5 / plot.PAGE)
-    def draw(canvas: Canvas, data: Datasets) -> None:
-        grid = canvas.subplots(2, len(shown), sharex="col", sharey=True, squeeze=False)
-        for i, (value, wanted) in enumerate(shown.items()):
-            result = chosen(data, value, wanted)
-            for ax, side in zip(grid[:, i], ("theory", "measured"), strict=True):
-                _portrait(ax, result, side)
-                ax.set_ylabel(f"{SIDES[side]}\n{ax.get_ylabel()}")
-            grid[0, i].set_title(f"({'abcd'[i]}) {setting(symbol, value, unit)}", y=1.0, pad=9)
-        only_outer(grid)
-        shared_legend(canvas)
-
-    return draw
+def draw_pairs(canvas: Canvas, data: Datasets, *, parameter: str, shown: Mapping[float, int]) -> None:
+    """Draw the motion at each value (columns): the model above, the rig below, in the same axes."""
+    results = [chosen(data, value, wanted) for value, wanted in shown.items()]
+    two_rows(
+        canvas, list(SIDES.values()), titles(parameter, shown),
+        lambda ax, i, j: _portrait(ax, results[j], list(SIDES)[i]),
+    )  # fmt: skip
+    shared_legend(canvas)
 
 
 def _portrait(ax: Axes, result: xr.Dataset, side: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from nonsmooth import plot
 from nonsmooth.plot import identification as pictures
 from nonsmooth.plot.comparison import ABOVE
-from nonsmooth.studies.savi2007.figures.figure import Canvas, Compute, Datasets, Draw, Figure, drawn
+from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth.studies.savi2007.findings import Number, estimates_of, found_in, kept, the_finding
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.printed import NUMBERS, TABLE_1
@@ -30,27 +31,16 @@ NAMES = {
 }  # fmt: skip
 
 
-def _findings(names: Mapping[str, str]) -> Compute:
-    def compute(settings: Settings) -> Datasets:
-        identified = settings.bench.identified
-        return {key: kept(the_finding(identified, name)) for key, name in names.items()}
-
-    return compute
+def _findings(settings: Settings, names: Mapping[str, str]) -> Datasets:
+    return {key: kept(the_finding(settings.bench.identified, name)) for key, name in names.items()}
 
 
-def _side_by_side(
-    *parts: tuple[str, Callable[..., Any], str], width: float = 1.0, height: float = 0.42
-) -> Draw:
-    """A sheet of pictures in a row: key of the dataset, what draws it, title."""
-
-    @drawn(width, height)
-    def draw(canvas: Canvas, data: Datasets) -> None:
-        axes = np.atleast_1d(canvas.subplots(1, len(parts)))
-        for ax, (key, picture, title) in zip(axes, parts, strict=True):
-            picture(data[key], ax)
-            ax.set_title(title, loc="left", pad=6 + _legend_above(ax))
-
-    return draw
+def _side_by_side(canvas: Canvas, data: Datasets, *parts: tuple[str, Callable[..., Any], str]) -> None:
+    """Draw pictures in a row: key of the dataset, what draws it, title."""
+    axes = np.atleast_1d(canvas.subplots(1, len(parts)))
+    for ax, (key, picture, title) in zip(axes, parts, strict=True):
+        picture(data[key], ax)
+        ax.set_title(title, loc="left", pad=6 + _legend_above(ax))
 
 
 def _legend_above(ax: Axes) -> float:
@@ -145,7 +135,6 @@ def table_rows(data: Datasets) -> dict[str, tuple[str, Number, float]]:
     return rows
 
 
-@drawn(1.0, 0.36)
 def _draw_table(canvas: Canvas, data: Datasets) -> None:
     rows = table_rows(data)
     ax = canvas.subplots()
@@ -180,38 +169,43 @@ def _caption_table(data: Datasets) -> str:
     )
 
 
+def _procedure(
+    number: int, title: str, caption: Callable[[Datasets], str], procedures: tuple[str, ...], names: Mapping[str, str],
+    *parts: tuple[str, Callable[..., Any], str], size: tuple[float, float] = (1.0, 0.5),
+) -> Figure:  # fmt: skip
+    """A figure of findings: ``names`` by key of the dataset; ``parts`` as for `_side_by_side`."""
+    return Figure(
+        f"fig{number:02d}", number, title, partial(_findings, names=names),
+        lambda canvas, data: _side_by_side(canvas, data, *parts), caption, size, rig=True, procedures=procedures,
+    )  # fmt: skip
+
+
 FIGURES = (
-    Figure(
-        "fig04", 4, "Spring stiffness: force against displacement",
-        _findings({"oscillator": "spring_slope", "support": "support_slope"}),
-        _side_by_side(("oscillator", pictures.force_displacement, "(a) oscillator"),
-                      ("support", pictures.force_displacement, "(b) support"), height=0.5),
-        _caption_4, rig=True, procedures=("springs", "support"),
+    _procedure(
+        4, "Spring stiffness: force against displacement", _caption_4, ("springs", "support"),
+        {"oscillator": "spring_slope", "support": "support_slope"},
+        ("oscillator", pictures.force_displacement, "(a) oscillator"),
+        ("support", pictures.force_displacement, "(b) support"),
     ),
-    Figure(
-        "fig05", 5, "Natural frequency from an impulsive response", _findings({"tap": "omega_0"}),
-        _side_by_side(("tap", pictures.impulse_history, "(a) displacement"),
-                      ("tap", _spectrum, "(b) magnitude of the DFT"), height=0.5),
-        _caption_5, rig=True, procedures=("impulse",),
+    _procedure(
+        5, "Natural frequency from an impulsive response", _caption_5, ("impulse",), {"tap": "omega_0"},
+        ("tap", pictures.impulse_history, "(a) displacement"), ("tap", _spectrum, "(b) magnitude of the DFT"),
     ),
-    Figure(
-        "fig06", 6, "Damping from the amplitude over frequency",
-        _findings({"viscous": "c_viscous_only", "amplitudes": "c_response"}),
-        _side_by_side(("amplitudes", pictures.amplitude_fit, ""), width=0.62, height=0.5), _caption_6,
-        rig=True, procedures=("impulse", "response"),
+    _procedure(
+        6, "Damping from the amplitude over frequency", _caption_6, ("impulse", "response"),
+        {"viscous": "c_viscous_only", "amplitudes": "c_response"},
+        ("amplitudes", pictures.amplitude_fit, ""), size=(0.62, 0.5),
     ),
-    Figure(
-        "fig07", 7, "Damping of the support from a free decay", _findings({"drop": "c_s_drop"}),
-        _side_by_side(("drop", pictures.impulse_history, "(a) displacement of the test mass"),
-                      ("drop", pictures.drop_decay, "(b) turning points")),
-        _caption_7, rig=True, procedures=("drop",),
+    _procedure(
+        7, "Damping of the support from a free decay", _caption_7, ("drop",), {"drop": "c_s_drop"},
+        ("drop", pictures.impulse_history, "(a) displacement of the test mass"),
+        ("drop", pictures.drop_decay, "(b) turning points"), size=(1.0, 0.42),
     ),
-    Figure(
-        "fig08", 8, "Calibrations of the drive", _findings({"voltage": "voltage_frequency", "crank": "crank_force"}),
-        _side_by_side(("voltage", pictures.calibration, "(a) motor"), ("crank", pictures.calibration, "(b) crank"),
-                      height=0.5),
-        _caption_8, rig=True, procedures=("springs", "voltage", "crank"),
+    _procedure(
+        8, "Calibrations of the drive", _caption_8, ("springs", "voltage", "crank"),
+        {"voltage": "voltage_frequency", "crank": "crank_force"},
+        ("voltage", pictures.calibration, "(a) motor"), ("crank", pictures.calibration, "(b) crank"),
     ),
-    Figure("table1", None, "Table 1: parameters identified", _compute_table, _draw_table, _caption_table, rig=True,
-           procedures=IDENTIFICATION),
+    Figure("table1", None, "Table 1: parameters identified", _compute_table, _draw_table, _caption_table, (1.0, 0.36),
+           rig=True, procedures=IDENTIFICATION),
 )  # fmt: skip
