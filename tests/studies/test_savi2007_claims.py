@@ -75,12 +75,15 @@ def test_regimes_and_changes_read_a_sweep_by_rising_values() -> None:
     assert changes(swept, 1, 4) == []
 
 
+FLAGS = {"flag_values": np.arange(3), "flag_meanings": "ok slow not_periodic"}
+
+
 def _swept(values: list[float], period: list[int], status: list[int]) -> xr.Dataset:
     return xr.Dataset(
         {
             "maximum": (("rho", "state"), np.zeros((len(values), 2))),
             "period_number": ("rho", period),
-            "status": ("rho", np.array(status, dtype=np.int8)),
+            "status": ("rho", np.array(status, dtype=np.int8), FLAGS),
         },
         {"rho": np.array(values, dtype=float), "state": ["x", "v"]},
     )

@@ -11,7 +11,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.studies.savi2007 import reproduce
-from nonsmooth.studies.savi2007.claims.basins import f13_basins, f17_basins
+from nonsmooth.studies.savi2007.claims.diagrams import f13_basins, f17_basins
 from nonsmooth.studies.savi2007.figures.charts import CHARTS, curves, grid_of
 from nonsmooth.studies.savi2007.figures.coexisting import names_of
 from nonsmooth.studies.savi2007.flows import Settings

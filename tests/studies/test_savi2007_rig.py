@@ -10,14 +10,13 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.studies.savi2007.claims import response as claims_response
 from nonsmooth.studies.savi2007.claims import rig as claims_rig
-from nonsmooth.studies.savi2007.claims import rig_response as claims_rig_response
-from nonsmooth.studies.savi2007.claims.rows import Cell, Row, printed_cell
-from nonsmooth.studies.savi2007.claims.verdicts import Verdict
+from nonsmooth.studies.savi2007.claims.verdicts import Cell, Row, Verdict, printed_cell
 from nonsmooth.studies.savi2007.figures.motions import chosen, measured_periods_at, said
 from nonsmooth.studies.savi2007.findings import Number, found_in, kept, the_finding
 from nonsmooth.studies.savi2007.flows import Settings
-from nonsmooth.studies.savi2007.measure import Interval, measured_jumps, measured_periods
+from nonsmooth.studies.savi2007.measure import Interval, jumps, measured_periods
 from nonsmooth.studies.savi2007.printed import FIGURE_14, NUMBERS, TABLE_1
 
 STEP = 0.05
@@ -39,7 +38,7 @@ def _response(jumps: dict[str, float], doubled: tuple[float, float] = (3.6, 4.0)
 
 def test_jumps_and_periods_of_a_response_made_by_hand() -> None:
     runs = _response({"up": 5.81, "down": 5.16})["runs"]
-    (up,), (down,) = (measured_jumps(runs, direction) for direction in ("up", "down"))
+    (up,), (down,) = (jumps(runs, direction) for direction in ("up", "down"))
     assert (up.low, up.high) == pytest.approx((5.80, 5.85))
     assert (down.low, down.high) == pytest.approx((5.15, 5.20))
     omega, number = measured_periods(runs, "up")
@@ -48,20 +47,20 @@ def test_jumps_and_periods_of_a_response_made_by_hand() -> None:
 
 def test_the_cells_of_figure_9_are_those_of_the_response() -> None:
     data = {"fig09_rig": _response({"up": 5.86, "down": 5.26})}
-    region, rising = claims_rig_response.f9a(data)
+    region, rising = claims_response.f9a_rig(data)
     assert region == Cell("period 2 from 3.600 to 4.000 rad/s (9 runs)", Verdict.AGREES)  # 3.63 lies within
     assert rising.verdict == "agrees"  # 5.88 lies in the step 5.85 ... 5.90
-    falling, closed, again = claims_rig_response.f9b(data)
+    falling, closed, again = claims_response.f9b_rig(data)
     assert falling.verdict == "agrees"  # 5.29 in 5.25 ... 5.30, by its rounding
     assert closed.verdict == "undecided"  # 5.275, known to 0.025, against grazing at 5.15986: 1.7 to 2.7 %
     assert again.verdict == "agrees"
-    (between,) = claims_rig_response.f9c(data)
+    (between,) = claims_response.f9c_rig(data)
     assert between.verdict == "agrees in part"
-    missing = claims_rig_response.f9a({"fig09_rig": _response({"up": 9.0, "down": 9.0})})[1]
+    missing = claims_response.f9a_rig({"fig09_rig": _response({"up": 9.0, "down": 9.0})})[1]
     assert missing.verdict == "undecided" and "not found" in missing.text
     near, outside = (_response({"up": 5.86, "down": 5.26}, doubled=(low, 4.0)) for low in (3.65, 3.75))
-    assert claims_rig_response.f9a({"fig09_rig": near})[0].verdict == "undecided"  # runs at 3.60 and 3.65
-    assert claims_rig_response.f9a({"fig09_rig": outside})[0].verdict == "differs"
+    assert claims_response.f9a_rig({"fig09_rig": near})[0].verdict == "undecided"  # runs at 3.60 and 3.65
+    assert claims_response.f9a_rig({"fig09_rig": outside})[0].verdict == "differs"
 
 
 def _steady(numbers: dict[str, int]) -> dict[str, xr.Dataset]:
@@ -131,6 +130,6 @@ def test_what_is_not_there_is_said() -> None:
 
 def test_single_runs_with_period_two_make_no_range() -> None:
     data = {"fig10_rig": _response({"up": 5.81, "down": 5.16}, doubled=(3.6, 3.6))}
-    cell = claims_rig_response.f10(data)[2]
+    cell = claims_response.f10_rig(data)[2]
     assert (cell.text, cell.verdict) == ("2 of 140 runs with period 2, no two neighbours", "agrees")
-    assert claims_rig_response.f10({"fig10_rig": _response({"up": 5.81, "down": 5.16})})[2].verdict == "differs"
+    assert claims_response.f10_rig({"fig10_rig": _response({"up": 5.81, "down": 5.16})})[2].verdict == "differs"

@@ -9,8 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nonsmooth.studies.savi2007.claims.rows import Cell, Row, against_printed, printed_cell
-from nonsmooth.studies.savi2007.claims.verdicts import MEANING, RULE, Beside, Cause, Verdict, judge, judge_step
+from nonsmooth.studies.savi2007.claims.verdicts import (
+    MEANING,
+    RULE,
+    Beside,
+    Cause,
+    Cell,
+    Row,
+    Verdict,
+    against_printed,
+    judge,
+    judge_step,
+    printed_cell,
+)
 from nonsmooth.studies.savi2007.findings import Number
 from nonsmooth.studies.savi2007.flows import Settings
 from nonsmooth.studies.savi2007.measure import Interval

@@ -418,3 +418,19 @@ def test_small_numbers_without_scales_are_warned_of() -> None:
                       elements={"s": Stop(at="q", position=1.0, restitution=0.5)}), periods=3,
     )  # fmt: skip
     assert run["u"].values[-1] * 1e7 == pytest.approx(true["u"].values[-1], rel=1e-9)
+
+
+@pytest.mark.parametrize("impacts", ["simultaneous", "sequential"])  # modes written out, and made when visited
+def test_what_sticks_or_rests_keeps_no_speed(impacts: str) -> None:
+    """Exactly none, whatever the mass: what rounding leaves would decide where a load is as large as the friction."""
+    for mass in (0.838, 2.4734, 0.41010313678540405):
+        walls = {"up": Stop(at="q", position=0.5), "down": Stop(at="q", position=-0.8, side=-1, restitution=0.4)}
+        system = ns.mechanical(
+            mass, 0.3, 1.0, parameters={}, forcing={"q": lambda t, p: 2.0 * np.cos(0.7 * t)}, impacts=impacts,
+            elements={"rub": Coulomb(at="q", friction=0.6), **walls},
+        )  # fmt: skip
+        run = ns.simulate(system, periods=6, start={"q": 0.1})
+        held = [any(word in system.modes[system.transitions[k].target] for word in ("stick", "rest"))
+                for k in run.crossing_transition.values]  # fmt: skip
+        assert sum(held) > 4
+        assert not run.u_after.values[held, 1].any()

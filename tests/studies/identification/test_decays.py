@@ -6,9 +6,13 @@ from tests.studies.identification.made import COUNT, counted, run
 
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.session import Quantity
-from nonsmooth.studies.savi2007.identification.decay_damping import decay_damping, envelope
+from nonsmooth.studies.savi2007.identification.decay_findings import (
+    decay_damping,
+    envelope,
+    log_decrement,
+    support_damping,
+)
 from nonsmooth.studies.savi2007.identification.free_decay import free_decay
-from nonsmooth.studies.savi2007.identification.support_damping import log_decrement, support_damping
 
 MASS, STIFF, C_S = 1.33, 1210.0, 0.60
 

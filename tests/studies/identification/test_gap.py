@@ -7,8 +7,9 @@ import pytest
 from tests.studies.identification import made
 from tests.studies.identification.made import COUNT, counted, decay_of, driven, run, swinging
 
-from nonsmooth.studies.savi2007.identification.gap import grazing_amplitude, mean_of_drive, mean_shift
 from nonsmooth.studies.savi2007.identification.grazing import _sensor_error, _unseen, grazing_gap
+from nonsmooth.studies.savi2007.identification.referral import mean_of_drive, mean_shift
+from nonsmooth.studies.savi2007.identification.response_fits import grazing_amplitude
 from nonsmooth.studies.savi2007.identification.steady import steady
 
 W, B, F, KAPPA = 4.5, 1.04, 0.01, 1400.0

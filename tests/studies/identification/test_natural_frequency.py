@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from tests.studies.identification.made import COUNT, counted, run
 
+from nonsmooth.studies.savi2007.identification.decay_findings import GRID, natural_frequency, spectral_peak
 from nonsmooth.studies.savi2007.identification.free_decay import free_decay
-from nonsmooth.studies.savi2007.identification.natural_frequency import GRID, natural_frequency, spectral_peak
 
 #: Table 1 of Savi et al. (2007): omega_0 = sqrt(2k/m) and c/m.
 PAPER = np.sqrt(2 * 8.47 / 0.838), 0.87 / 0.838

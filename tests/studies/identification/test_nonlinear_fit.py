@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nonsmooth.studies.savi2007.identification.nonlinear_fit import nonlinear_fit
+from nonsmooth.studies.savi2007.identification.least_squares import nonlinear_fit
 
 FREE = -np.inf
 

@@ -8,10 +8,14 @@ import pytest
 from tests.studies.identification.made import COUNT, decay_of, run, swinging
 
 from nonsmooth.recordings.session import Quantity
-from nonsmooth.studies.savi2007.identification.damping import amplitude_fit, viscous_bias
-from nonsmooth.studies.savi2007.identification.gap import grazing_amplitude
 from nonsmooth.studies.savi2007.identification.half_power import half_power, half_power_points
-from nonsmooth.studies.savi2007.identification.receptance import receptance, receptance_fit
+from nonsmooth.studies.savi2007.identification.response_fits import (
+    amplitude_fit,
+    grazing_amplitude,
+    receptance,
+    receptance_fit,
+    viscous_bias,
+)
 from nonsmooth.studies.savi2007.identification.steady import steady
 
 W, B, M = 4.5, 1.04, 0.84

@@ -19,7 +19,7 @@ import nonsmooth as ns
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.identification.report import report
-from nonsmooth.studies.savi2007.identification.gap import mean_of_drive
+from nonsmooth.studies.savi2007.identification.referral import mean_of_drive
 from nonsmooth.studies.savi2007.identification.statements import for_model, require
 
 

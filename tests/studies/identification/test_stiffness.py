@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.studies.identification.made import COUNT, counted, run
 
-from nonsmooth.studies.savi2007.identification.lines import york
+from nonsmooth.studies.savi2007.identification.least_squares import york
 from nonsmooth.studies.savi2007.identification.stiffness import stiffness
 
 S, M, DRY, C = 17.0, 0.84, 0.010, 0.9

@@ -14,7 +14,7 @@ import nonsmooth as ns
 from nonsmooth.studies.savi2007.rig import VirtualRig
 from nonsmooth.studies.savi2007.rig.motor import mean_position, passages
 from nonsmooth.studies.savi2007.rig.physics import AT_REST, car, crank_angle, friction, support_force
-from nonsmooth.studies.savi2007.rig.sampled import sampled
+from nonsmooth.studies.savi2007.rig.sampled import simulated
 
 OFF = {
     "ripple": False, "string": False, "friction": False, "support_relaxation": False, "jitter": False, "noise": False,
@@ -158,7 +158,7 @@ def test_friction_is_followed_through_its_steep_piece(velocity: float) -> None:
 
     t = np.linspace(0.0, 3.0, 301)
     other = solve_ivp(field, (0, 3), (0, velocity), method="DOP853", rtol=1e-12, atol=1e-15, max_step=1e-3, t_eval=t)
-    ours = sampled(
+    ours, _ = simulated(
         rig.system().with_parameters(vars(p)), "Run #1", instants=t, duration=3.0, start={"v": velocity}
     )  # fmt: skip
     np.testing.assert_allclose(ours[0], other.y[0], rtol=0, atol=3e-9)

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from nonsmooth import __version__
-from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
+from nonsmooth.studies.savi2007.laboratory import as_result
 from nonsmooth.studies.savi2007.measure import with_uncertainty
 
 if TYPE_CHECKING:
@@ -67,22 +66,22 @@ def the_finding(identified: ParameterSet, name: str) -> Finding:
 
 
 def kept(finding: Finding) -> xr.Dataset:
-    """The finding's data for its picture, with the finding itself in the attribute ``nonsmooth``."""
+    """The finding's data for its picture, with the finding itself in the attribute ``finding``."""
     import xarray as xr
 
     data = xr.Dataset(attrs={"synthetic": "yes"}) if finding.data is None else finding.data.copy()
     record = {
-        "version": __version__, "verb": "identify", "synthetic": data.attrs.get("synthetic") == "yes",
         "name": finding.name, "number": _plain(finding.estimate), "method": finding.method,
         "others": {name: _plain(other) for name, other in finding.others.items()}, "notes": list(finding.notes),
         "samples": finding.samples_used, "runs": len(finding.runs),
     }  # fmt: skip
-    return data.assign_attrs({ATTRIBUTE: json.dumps(record, ensure_ascii=False)})
+    result = as_result(data, finding.name, "identify", synthetic=data.attrs.get("synthetic") == "yes")
+    return result.assign_attrs(finding=json.dumps(record, ensure_ascii=False))
 
 
 def found_in(data: xr.Dataset) -> Found:
     """Read back what :func:`kept` put into the dataset."""
-    record = read_provenance(data)
+    record = json.loads(data.attrs["finding"])
     others = {name: Number(*row) for name, row in record["others"].items()}
     return Found(
         record["name"], Number(*record["number"]), others, record["method"], tuple(record["notes"]),

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from nonsmooth import __version__
 from nonsmooth.models import discontinuous_support
 from nonsmooth.recordings import RecordingWarning
-from nonsmooth.results.provenance import ATTRIBUTE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -188,7 +187,7 @@ class Laboratory:
                 warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
 
 
-def as_result(dataset: xr.Dataset, what: str) -> xr.Dataset:
-    """A dataset that was put together here, with the record that ``nonsmooth.load`` asks for; synthetic."""
-    record = {"version": __version__, "verb": "rig", "what": what, "synthetic": True}
-    return dataset.assign_attrs({"synthetic": "yes", ATTRIBUTE: json.dumps(record)})
+def as_result(dataset: xr.Dataset, what: str, verb: str = "rig", *, synthetic: bool = True) -> xr.Dataset:
+    """A dataset that was put together here, with the record that ``nonsmooth.load`` asks for."""
+    record = {"version": __version__, "verb": verb, "what": what, "synthetic": synthetic}
+    return dataset.assign_attrs({"nonsmooth": json.dumps(record)} | ({"synthetic": "yes"} if synthetic else {}))

@@ -11,18 +11,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.results.statuses import by_name
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "APERIODIC", "UNSETTLED", "Interval", "changes", "highest", "jumps", "lowest", "measured_jumps",
-    "measured_periods", "periods_reached", "range_of", "regimes", "separation_rate", "with_uncertainty",
+    "APERIODIC",
+    "UNSETTLED",
+    "Interval",
+    "changes",
+    "highest",
+    "jumps",
+    "lowest",
+    "main_jump",
+    "measured_periods",
+    "period_word",
+    "periods_reached",
+    "range_of",
+    "regimes",
+    "separation_rate",
+    "small_jump",
+    "status_names",
+    "with_uncertainty",
 ]  # fmt: skip
 
 APERIODIC = 0  # no period found up to the longest looked for
 UNSETTLED = -1  # the transient did not decide it
+
+
+def period_word(number: int) -> str:
+    """``period 3``, ``no period``, ``unsettled``."""
+    return {APERIODIC: "no period", UNSETTLED: "unsettled"}.get(number, f"period {number}")
 
 
 @dataclass(frozen=True)
@@ -64,10 +83,20 @@ def regimes(swept: xr.Dataset, direction: str | None = None) -> tuple[FloatArray
     one = swept if direction is None or "direction" not in swept.dims else swept.sel(direction=direction)
     values = one[str(one["maximum"].dims[0])].values
     order = np.argsort(values)
-    status = one["status"].values[order]
-    number = one["period_number"].values[order].astype(np.int64)
-    settled = np.isin(status, [by_name(word).code for word in ("ok", "not_periodic", "not_guaranteed")])
-    return values[order], np.where(settled, number, UNSETTLED)
+    return values[order], _regime(one)[order]
+
+
+def status_names(result: xr.Dataset) -> NDArray[np.str_]:
+    """The name of the status at each point, by the result's own attributes."""
+    attrs = result["status"].attrs
+    names = dict(zip(np.atleast_1d(attrs["flag_values"]).tolist(), attrs["flag_meanings"].split(), strict=True))
+    return np.array([names[code] for code in result["status"].values.ravel().tolist()]).reshape(result["status"].shape)
+
+
+def _regime(result: xr.Dataset) -> NDArray[np.int64]:
+    """The period number at each point, UNSETTLED where the transient did not decide it."""
+    settled = np.isin(status_names(result), ("ok", "not_periodic", "not_guaranteed"))
+    return np.where(settled, result["period_number"].values.astype(np.int64), UNSETTLED)
 
 
 def changes(swept: xr.Dataset, first: int, second: int, direction: str | None = None) -> list[Interval]:
@@ -98,28 +127,42 @@ def range_of(swept: xr.Dataset, regime_wanted: int, direction: str | None = None
     return (float(values[at[0]]), float(values[at[-1]])) if len(at) else None
 
 
+def _sized_jumps(response: xr.Dataset, direction: str) -> list[tuple[float, Interval]]:
+    """The jumps of an amplitude in one direction, computed or read off measured runs: size, and the step that holds it.
+
+    At rising values.
+    """
+    from nonsmooth.identification.compare.jumps import Jump, jumps_in_steps
+
+    if "jump_value" in response:
+        here = response["jump_direction"].values.astype(str) == direction
+        if "jump_variable" in response:
+            here &= response["jump_variable"].values.astype(str) == "x"
+        columns = (response[f"jump_{name}"].values[here].tolist() for name in ("value", "step", "before", "after"))
+        found = [Jump(value, 0.5 * step, *ends) for value, step, *ends in zip(*columns, strict=True)]
+    else:
+        mine = response.isel(run=response["direction"].values.astype(str) == direction)
+        order = np.argsort(mine["omega"].values)[:: 1 if direction == "up" else -1]
+        found = jumps_in_steps(*(mine[name].values[order] for name in ("omega", "amplitude", "amplitude_error")))
+    rows = [(abs(one.after - one.before), Interval(one.value - one.half, one.value + one.half)) for one in found]
+    return sorted(rows, key=lambda row: row[1].low)
+
+
 def jumps(response: xr.Dataset, direction: str) -> list[Interval]:
     """The steps in which the amplitude jumps in one direction, at rising values."""
-    here = response["jump_direction"].values.astype(str) == direction
-    if "jump_variable" in response:
-        here &= response["jump_variable"].values.astype(str) == "x"
-    value, step = response["jump_value"].values[here], response["jump_step"].values[here]
-    return sorted(
-        (Interval(float(a - 0.5 * b), float(a + 0.5 * b)) for a, b in zip(value, step, strict=True)),
-        key=lambda interval: interval.low,
-    )
+    return [step for _, step in _sized_jumps(response, direction)]
 
 
-def measured_jumps(runs: xr.Dataset, direction: str) -> list[Interval]:
-    """The steps of a measured response in which its amplitude jumps, at rising values; read off the runs alone."""
-    from nonsmooth.identification.compare.jumps import jumps_in_steps
+def main_jump(response: xr.Dataset, direction: str) -> Interval | None:
+    """The jump above resonance: that with the largest step in amplitude."""
+    found = _sized_jumps(response, direction)
+    return max(found, key=lambda row: row[0])[1] if found else None
 
-    mine = runs.isel(run=runs["direction"].values.astype(str) == direction)
-    order = np.argsort(mine["omega"].values)[:: 1 if direction == "up" else -1]
-    found = jumps_in_steps(*(mine[name].values[order] for name in ("omega", "amplitude", "amplitude_error")))
-    return sorted(
-        (Interval(jump.value - jump.half, jump.value + jump.half) for jump in found), key=lambda jump: jump.low
-    )
+
+def small_jump(response: xr.Dataset, direction: str) -> Interval | None:
+    """The smallest of several jumps."""
+    found = _sized_jumps(response, direction)
+    return min(found, key=lambda row: row[0])[1] if len(found) > 1 else None
 
 
 def measured_periods(runs: xr.Dataset, direction: str | None = None) -> tuple[FloatArray, NDArray[np.int64]]:
@@ -132,8 +175,7 @@ def measured_periods(runs: xr.Dataset, direction: str | None = None) -> tuple[Fl
 def periods_reached(survey: xr.Dataset, value: float) -> dict[int, int]:
     """Number of starts of a ``survey`` (a sweep from several starts) that end in each regime at one parameter value."""
     one = survey.sel({str(survey["maximum"].dims[0]): value}, method="nearest")
-    ok = [by_name(word).code for word in ("ok", "not_periodic", "not_guaranteed")]
-    regime = np.where(np.isin(one["status"].values, ok), one["period_number"].values, UNSETTLED)
+    regime = _regime(one)
     return {int(r): int((regime == r).sum()) for r in np.unique(regime)}
 
 

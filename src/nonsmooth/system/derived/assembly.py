@@ -93,9 +93,9 @@ class Assembler(ABC):
         """One map of the states behind another."""
 
     @abstractmethod
-    def holding(self, field: Any, rate: Any, pull: Any) -> Any:
-        """The field with the derivative of a held rate as ``pull``, without rounding, where the rate is that of a state
-        and constant in time: else what is left of large forces moves what rests, in each mode elsewhere."""
+    def holding(self, vector: Any, rate: Any, value: Any, states: bool = False) -> Any:
+        """A field, or ``states``, with the derivative of a rate, or the rate itself, as ``value``, without rounding,
+        where the rate is that of a state and constant in time: else what is left of large forces moves what rests."""
 
     @abstractmethod
     def joined(self, part: Part, other: Part, share: Any) -> Part:
@@ -340,6 +340,8 @@ class Assembler(ABC):
         after = self.identity()
         for k, amount in zip(some, self.solved(self.effects(some, mode), wanted), strict=True):
             after = self.moved(after, self.parts[k], amount)
+        for k, e in zip(some, factors, strict=True):
+            after = self.holding(after, self.rate(k, mode), -e * self.rate(k, mode), states=True)
         return self.tidy(self.mapped(self.impact(still, mode, 0), after) if still else after)
 
     def leaving(self, k: int, mode: str, pattern: Pattern) -> list[Leaving]:

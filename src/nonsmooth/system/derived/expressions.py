@@ -117,13 +117,14 @@ class Expressions(Assembler):
     def moved(self, vector: Sequence[sp.Expr], part: Part, amount: sp.Expr) -> list[sp.Expr]:
         return [entry + part.direction.get(i, 0) * amount for i, entry in enumerate(vector)]
 
-    def holding(self, field: list[sp.Expr], rate: sp.Expr, pull: sp.Expr) -> list[sp.Expr]:
+    def holding(self, vector: list[sp.Expr], rate: sp.Expr, value: sp.Expr, states: bool = False) -> list[sp.Expr]:
         slopes = [sp.diff(rate, symbol) for symbol in self.u]
         some = [i for i, slope in enumerate(slopes) if slope != 0]
         if len(some) != 1 or not slopes[some[0]].is_number or sp.diff(rate, self.symbols.t) != 0:
-            return field
+            return vector
         (i,) = some
-        return [*field[:i], sp.expand(pull / slopes[i]), *field[i + 1 :]]
+        own = sp.expand(rate - slopes[i] * self.u[i]) if states else 0
+        return [*vector[:i], sp.expand((value - own) / slopes[i]), *vector[i + 1 :]]
 
     def joined(self, part: Part, other: Part, share: Any) -> Part:
         both = {*part.direction, *other.direction}

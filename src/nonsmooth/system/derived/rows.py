@@ -178,12 +178,13 @@ class Rows(Assembler):
     def moved(self, vector: FloatArray, part: Part, amount: Any) -> FloatArray:
         return vector + np.outer(part.direction, amount.values) if isinstance(amount, Row) else vector
 
-    def holding(self, field: FloatArray, rate: Row, pull: Any) -> FloatArray:
+    def holding(self, vector: FloatArray, rate: Row, value: Any, states: bool = False) -> FloatArray:
         some, waves = np.flatnonzero(rate.values[: self.n]), rate.values[self.n + 1 :]
         if len(some) == 1 and not waves.any():
-            field = field.copy()
-            field[some[0]] = pull.values / rate.values[some[0]] if isinstance(pull, Row) else 0.0
-        return field
+            vector, slope = vector.copy(), rate.values[some[0]]
+            vector[some[0]] = value.values / slope if isinstance(value, Row) else 0.0
+            vector[some[0], self.n] -= rate.values[self.n] / slope if states else 0.0
+        return vector
 
     def joined(self, part: Part, other: Part, share: Any) -> Part:
         return replace(part, direction=part.direction + share * other.direction)

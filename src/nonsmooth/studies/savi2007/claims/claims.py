@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from nonsmooth.studies.savi2007.claims import basins, diagrams, model, parameters, response, rig, rig_response
-from nonsmooth.studies.savi2007.claims.rows import Cell, Data, Row
+from nonsmooth.studies.savi2007.claims import diagrams, model, parameters, response, rig
+from nonsmooth.studies.savi2007.claims.verdicts import Cell, Data, Row
 
 __all__ = ["CLAIMS", "Claim", "Row", "measure_claims"]
 
@@ -50,22 +50,22 @@ CLAIMS = (
     Claim("P6", ("fig08",), parameters.p6),
     Claim("P7", ("fig08",), parameters.p7),
     Claim("P8", ("table1",), parameters.p8),
-    Claim("F9a", ("fig09", "fig09_rig"), response.f9a, rig_response.f9a),
-    Claim("F9b", ("fig09", "fig09_rig"), response.f9b, rig_response.f9b),
-    Claim("F9c", ("fig09", "fig09_rig"), response.f9c, rig_response.f9c),
-    Claim("F10", ("fig10", "fig10_rig"), response.f10, rig_response.f10),
+    Claim("F9a", ("fig09", "fig09_rig"), response.f9a, response.f9a_rig),
+    Claim("F9b", ("fig09", "fig09_rig"), response.f9b, response.f9b_rig),
+    Claim("F9c", ("fig09", "fig09_rig"), response.f9c, response.f9c_rig),
+    Claim("F10", ("fig10", "fig10_rig"), response.f10, response.f10_rig),
     Claim("F10", ("fig09", "fig09_rig", "fig10"), response.grazing_behind_both,
-          rig_response.grazing_behind_both),
+          response.grazing_behind_both_rig),
     Claim("F11", ("fig11", "fig11_rig"), diagrams.f11, rig.f11),
     Claim("F12", ("fig12", "fig12_rig"), diagrams.f12, rig.f12),
     Claim("F13", ("fig13", "fig13_rig"), diagrams.f13, rig.f13),
-    Claim("F13", ("basins13",), basins.f13_basins, _model(1)),
+    Claim("F13", ("basins13",), diagrams.f13_basins, _model(1)),
     Claim("F14", ("fig14", "fig14_rig"), diagrams.f14, rig.f14),
     Claim("F15", ("fig15",), diagrams.f15, rig.f15),
     Claim("F16", ("fig16",), rig.f16),
     Claim("F17", ("fig17", "fig17_rig"), diagrams.f17, rig.f17),
     Claim("F17", ("fig17", "fig17_rig"), diagrams.f17_grazing, rig.f17_grazing),
-    Claim("F17", ("basins17",), basins.f17_basins, _model(1)),
+    Claim("F17", ("basins17",), diagrams.f17_basins, _model(1)),
     Claim("F18", ("fig18", "fig18_rig"), diagrams.f18, rig.f18),
     Claim("C1", ("fig09_rig", "fig10_rig", "fig11_rig", "fig16", "fig09", "fig10", "fig11", "fig15"), model.c1, rig.c1),
     Claim("C1", ("eta",), model.c1_other_systems, _model(1)),

@@ -1,4 +1,4 @@
-"""Claims F11 to F18: bifurcation diagrams, phase portraits, the strange attractor."""
+"""Claims F11 to F18: bifurcation diagrams, phase portraits, the strange attractor, basins."""
 
 from __future__ import annotations
 
@@ -7,9 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth.results.provenance import read_provenance
-from nonsmooth.studies.savi2007.claims.rows import Data, Row, against_closed_form, against_printed
-from nonsmooth.studies.savi2007.claims.verdicts import Cause, Verdict, agreed
+from nonsmooth.studies.savi2007.claims.verdicts import (
+    Cause,
+    Data,
+    Row,
+    Verdict,
+    against_closed_form,
+    against_printed,
+    agreed,
+)
+from nonsmooth.studies.savi2007.figures.coexisting import names_of
 from nonsmooth.studies.savi2007.figures.gap import PHASES
 from nonsmooth.studies.savi2007.figures.portraits import chosen_start, words_of
 from nonsmooth.studies.savi2007.figures.resonance import grazing_of
@@ -31,7 +38,8 @@ from nonsmooth.studies.savi2007.printed import FIGURE_12, FIGURE_14, FIGURE_14_T
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["f11", "f12", "f13", "f14", "f15", "f17", "f17_grazing", "f18"]
+__all__ = ["f11", "f12", "f13", "f13_basins", "f14", "f15", "f17", "f17_basins", "f17_grazing", "f18"]
+
 
 FLOWS = ("exact", "smoothed")
 
@@ -283,7 +291,7 @@ def _lasting(data: Data) -> str:
     short, long = (data["fig17"][f"exact_{word}"] for word in ("short", "long"))
     omega = float(short["omega"][0])
     left = [periods_reached(survey, omega).get(APERIODIC, 0) for survey in (short, long)]
-    waited = [read_provenance(survey)["options"]["transient"] for survey in (short, long)]
+    waited = [survey.attrs["transient"] for survey in (short, long)]
     return (
         "The transition at the higher frequency is abrupt. Above grazing chaos is a transient, which looks like "
         f"hysteresis: at {omega:g} rad/s {left[0]} of {short.sizes['start']} starts have no period after {waited[0]} "
@@ -318,3 +326,34 @@ def f18(data: Data) -> list[Row]:
             f"exp({rate:.2f} ± {error:.2f}) per period (exact).",
         )
     ]  # fmt: skip
+
+
+def f13_basins(data: Data) -> list[Row]:
+    """Attractors at g = 0.0014 m with their shares."""
+    return [_row(data, "basins13", "F13", "Fig. 14(c)", "g = 0.0014 m: period 3", 3)]
+
+
+def f17_basins(data: Data) -> list[Row]:
+    """Attractors at omega = 9.55 rad/s with their shares."""
+    return [_row(data, "basins17", "F17", "Fig. 18(b)", "omega = 9.55 rad/s: chaotic", APERIODIC)]
+
+
+def _row(data: Data, figure: str, claim: str, place: str, says: str, period: int) -> Row:
+    found = data[figure]["basins"]
+    names = names_of(found)
+    periods = found["period_number"].values.tolist()
+    alone = len(names) == 1
+    first, second = (str(dim) for dim in found["label"].dims)
+    starts = found.sizes[first] * found.sizes[second]
+    lost = int((found["label"].values < 0).sum())
+    ranges = " and ".join(
+        f"{name} in {float(found[name][0]):g} ... {float(found[name][-1]):g} {found[name].attrs['units']}"
+        for name in (first, second)
+    )
+    others = ", ".join(name for name, number in zip(names, periods, strict=True) if number != period)
+    return Row(
+        claim, place, says, f"attractors of {starts} starts: {'; '.join(names)}; none reached by {lost}",
+        "not asked: of the exact flow", "none" if alone else f"not alone: {others}",
+        Verdict.DIFFERS if period not in periods else Verdict.AGREES if alone else Verdict.IN_PART,
+        f"Starts at phase 0 with {ranges}; the shares, with their binomial standard errors, are those of this plane.",
+    )  # fmt: skip

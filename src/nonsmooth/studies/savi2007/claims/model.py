@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.studies.savi2007.claims.response import main_jump, small_jump
-from nonsmooth.studies.savi2007.claims.rows import Data, Row
-from nonsmooth.studies.savi2007.claims.verdicts import Verdict, agreed, judge_step
+from nonsmooth.studies.savi2007.claims.verdicts import Data, Row, Verdict, agreed, judge_step
 from nonsmooth.studies.savi2007.figures.band import FITTED, order_in_eta
 from nonsmooth.studies.savi2007.figures.resonance import grazing_of
 from nonsmooth.studies.savi2007.flows import ETA
-from nonsmooth.studies.savi2007.measure import jumps, regimes, separation_rate
+from nonsmooth.studies.savi2007.measure import jumps, main_jump, regimes, separation_rate, small_jump
 from nonsmooth.studies.savi2007.printed import FIGURE_12, NUMBERS
 
 if TYPE_CHECKING:

@@ -9,8 +9,16 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from nonsmooth.studies.savi2007.claims.rows import Cell, Data, Row, against_printed, printed_cell
-from nonsmooth.studies.savi2007.claims.verdicts import Known, Verdict, agreed
+from nonsmooth.studies.savi2007.claims.verdicts import (
+    Cell,
+    Data,
+    Known,
+    Row,
+    Verdict,
+    against_printed,
+    agreed,
+    printed_cell,
+)
 from nonsmooth.studies.savi2007.figures.parameters import table_rows
 from nonsmooth.studies.savi2007.findings import Found, Number, found_in
 from nonsmooth.studies.savi2007.measure import Interval

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth.studies.savi2007.claims.rig_response import against, grazing_of_paper, main_jump, small_jump
-from nonsmooth.studies.savi2007.claims.rows import Cell, Data, Row, printed_cell
-from nonsmooth.studies.savi2007.claims.verdicts import CLOSE, Verdict, agreed
+from nonsmooth.studies.savi2007.claims.response import against, grazing_of_paper
+from nonsmooth.studies.savi2007.claims.verdicts import CLOSE, Cell, Data, Row, Verdict, agreed, printed_cell
 from nonsmooth.studies.savi2007.figures.amplitude import flip_of, rate_of, slowest
 from nonsmooth.studies.savi2007.figures.motions import measured_periods_at
-from nonsmooth.studies.savi2007.measure import APERIODIC, Interval, measured_jumps
+from nonsmooth.studies.savi2007.measure import APERIODIC, Interval, jumps, main_jump, period_word, small_jump
 from nonsmooth.studies.savi2007.printed import (
     FIGURE_9,
     FIGURE_10,
@@ -45,7 +44,7 @@ def f11(data: Data) -> list[Cell]:
         return [*cells, Cell(f"no turn below {end}")]
     kinds, counts = np.unique(numbers, return_counts=True)
     kind, share = int(kinds[counts.argmax()]), float(counts.max() / counts.sum())
-    text = f"{_words({kind: 1})} in {100 * share:.0f} % of the turns below {end}"
+    text = f"{period_word(kind)} in {100 * share:.0f} % of the turns below {end}"
     return [*cells, Cell(text, agreed(kind == APERIODIC))]
 
 
@@ -68,8 +67,8 @@ def _flip(data: Data, rise: xr.Dataset, n: int) -> Cell:
     return printed_cell(printed, found, why=" ".join(words))
 
 
-def _words(numbers: Mapping[int, int]) -> str:
-    return " and ".join("no period" if n == APERIODIC else f"period {n}" for n in numbers)
+def _words(numbers: Iterable[int]) -> str:
+    return " and ".join(map(period_word, numbers))
 
 
 def _at_all(data: dict[str, xr.Dataset], shown: Mapping[float, int]) -> Cell:
@@ -133,7 +132,7 @@ def f16(data: Data) -> list[Row]:
             Verdict.NOT_ASKED,
             "At phases 0, pi/2, pi, 3 pi/2, to the exact model with the parameters identified; below 2 the clouds can "
             "hardly be told apart by a record of this length.",
-            f"{_words({number: 1})}, {result.sizes['measured_iterate']} turns", agreed(alike),
+            f"{period_word(number)}, {result.sizes['measured_iterate']} turns", agreed(alike),
         )
     ]  # fmt: skip
 
@@ -147,7 +146,7 @@ def f17(data: Data) -> list[Cell]:
         number, touches = int(one["period_number"]), bool(one["contact"])
         right = (number == APERIODIC) == ("chaotic" in says)
         swapped = "chaotic" not in says and touches != ("with contact" in says)
-        text = f"{_words({number: 1})}, {'contact' if touches else 'no contact'} (at {float(one['value']):.3f} rad/s)"
+        text = f"{period_word(number)}, {'contact' if touches else 'no contact'} (at {float(one['value']):.3f} rad/s)"
         cells.append(Cell(text, agreed(right and not swapped)))
     return [*cells, _transitions(runs)]
 
@@ -180,7 +179,7 @@ def f18(data: Data) -> list[Cell]:
 def c1(data: Data) -> list[Cell]:
     """Jumps, flips and chaos; jumps at grazing."""
     ninth, tenth = (data[name]["runs"] for name in ("fig09_rig", "fig10_rig"))
-    count = sum(len(measured_jumps(runs, d)) for runs in (ninth, tenth) for d in ("up", "down"))
+    count = sum(len(jumps(runs, d)) for runs in (ninth, tenth) for d in ("up", "down"))
     flips = int(np.isfinite(slowest(data["fig11_rig"])["measured_flip"].values).sum())
     chaos = int(data["fig16"]["attractor"]["measured_period_number"]) == APERIODIC
     pairs = [

@@ -3,7 +3,7 @@ r"""Mean position of the car, and the gap counted from there.
 Three places are told apart. The rig's position counts from where the *sensor was zeroed*; the car *rests* where its
 springs balance, and a car with dry friction stops, and is zeroed, anywhere within :math:`F_C/2k` of it; under the drive
 it swings about a *mean position*, which string and uneven turning move away from rest
-(``identification.gap``). The model's drive has no mean, so its x and g count from the mean position. The
+(``identification.referral``). The model's drive has no mean, so its x and g count from the mean position. The
 screw has a zero of its own: identification tells the gap at rest.
 
 Taps of the session tell where the car rests, its steady runs without the support where it swings; `identify` takes both
@@ -21,7 +21,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from nonsmooth.recordings import Session
-    from nonsmooth.studies.savi2007.identification.gap import MeanShift
+    from nonsmooth.studies.savi2007.identification.referral import MeanShift
 
 __all__ = ["GapOffset", "GapReference", "gap_offset", "gap_reference"]
 

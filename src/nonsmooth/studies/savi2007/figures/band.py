@@ -8,12 +8,11 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth import System, plot, poincare, simulate
-from nonsmooth.results.labels import labels_of
-from nonsmooth.results.provenance import provenance
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
 from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth.studies.savi2007.flows import ETA, EXACT, SMOOTHED, Settings
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies, steady_state
+from nonsmooth.studies.savi2007.laboratory import as_result
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_11, FIGURE_13
 
 __all__ = ["FIGURES", "order_in_eta"]
@@ -60,15 +59,14 @@ def _errors(settings: Settings) -> xr.Dataset:
                 )
                 difference = (run["u"].values[-1] - truth["u"].values[-1]) / sharp.scale_vector()
                 error[k, i, j] = np.linalg.norm(difference)
-    sharp = EXACT.system()
-    return xr.Dataset(
+    found = xr.Dataset(
         {
             "error": (("form", "orbit", "eta"), error, {"long_name": "distance to the exact flow, 1 mm and 1 cm/s"}),
             "slowest_contact": ("orbit", slowest, {"long_name": "least speed at a transition", "units": "m/s"}),
         },
         {"form": ["paper", "paper, coarse", "general"], "orbit": list(ORBITS), "eta": ("eta", etas, {"units": "m"})},
-        provenance(labels_of(sharp), "simulate", {"periods": PERIODS, "orbits": ORBITS, "rtol": FINE}, method="rkf45"),
     )  # fmt: skip
+    return as_result(found, f"error after {PERIODS} periods at rtol {FINE:g}", "simulate", synthetic=False)
 
 
 def _grazing(settings: Settings) -> xr.Dataset:
@@ -77,14 +75,14 @@ def _grazing(settings: Settings) -> xr.Dataset:
     found = np.array([_first_meeting(float(eta)) for eta in etas])
     sharp = EXACT.system(**FIGURE_9)
     closed = [grazing_frequencies({**sharp.values, "g": FIGURE_9["g"] - eta})[-1] for eta in etas]
-    return xr.Dataset(
+    made = xr.Dataset(
         {
             "grazing": ("eta", found, {"long_name": "grazing frequency, bisected", "units": "rad/s"}),
             "closed_form": ("eta", closed, {"long_name": "grazing frequency of the gap g - eta", "units": "rad/s"}),
         },
         {"eta": ("eta", etas, {"units": "m"})},
-        provenance(labels_of(sharp), "simulate", {"periods": 1, "width": NARROW}, method="rkf45"),
     )
+    return as_result(made, f"grazing, bisected to {NARROW:g} rad/s", "simulate", synthetic=False)
 
 
 def _first_meeting(eta: float) -> float:

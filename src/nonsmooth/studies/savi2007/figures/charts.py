@@ -15,10 +15,10 @@ import numpy as np
 
 from nonsmooth import SolveError, chart, continue_curve, continue_orbit, find_orbit, plot
 from nonsmooth.plot.branches import KINDS
-from nonsmooth.results.statuses import by_code
 from nonsmooth.studies.savi2007.figures.branches import BEGINNINGS, branches, rows_of
 from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth.studies.savi2007.flows import EXACT, Settings
+from nonsmooth.studies.savi2007.measure import status_names
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_13
 
 if TYPE_CHECKING:
@@ -133,8 +133,8 @@ def _ends(found: xr.Dataset, axis: int) -> tuple[float, float]:
 def _caption(data: Datasets) -> str:
     found = data["chart"]
     first, second = (str(dim) for dim in found["status"].dims)
-    codes, counts = np.unique(found["status"].values, return_counts=True)
-    ended = ", ".join(f"{by_code(code).name} {count}" for code, count in zip(codes, counts, strict=True))
+    names, counts = np.unique(status_names(found), return_counts=True)
+    ended = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
     kinds = [str(one["kind"].values) for key, one in data.items() if key.startswith("curve")]
     counted = ", ".join(f"{kinds.count(kind)} of {words}" for kind, (_, _, words) in KINDS.items() if kind in kinds)
     fixed = "g" if "g" not in (first, second) else "omega"

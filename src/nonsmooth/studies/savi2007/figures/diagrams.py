@@ -10,7 +10,6 @@ import numpy as np
 from nonsmooth import plot, sweep
 from nonsmooth.plot.branches import draw_branch
 from nonsmooth.plot.style import even_dots, halo, small
-from nonsmooth.results.provenance import read_provenance
 from nonsmooth.studies.savi2007.figures.branches import BEGINNINGS, branches, branches_of
 from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, only_outer
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
@@ -49,18 +48,19 @@ def diagrams(
     for flow in FLOWS:
         system = flow.system(**begin.parameters)
         n = settings.of(flow, exact=steps[0], smoothed=steps[1], quick=70)
+        transient = settings.of(flow, exact=600, smoothed=200, quick=100)
         data[flow.key] = sweep(
-            system, begin.parameter, grid(n), direction="both", progress=settings.progress,
-            transient=settings.of(flow, exact=600, smoothed=200, quick=100),
+            system, begin.parameter, grid(n), direction="both", progress=settings.progress, transient=transient,
             keep=settings.of(flow, exact=200, smoothed=64, quick=40), **flow.options,
-        )  # fmt: skip
+        ).assign_attrs(transient=transient)  # fmt: skip
         fewer = 2 if patience <= 600 else 4
         n = settings.of(flow, exact=steps[0] // fewer, smoothed=steps[1] // 4, quick=10)
+        transient = settings.of(flow, exact=patience, smoothed=150, quick=80)
         data[f"{flow.key}_starts"] = sweep(
             system, begin.parameter, grid(n), direction=None,
             start=starts(settings.of(flow, exact=12, smoothed=8, quick=4)), progress=settings.progress,
-            transient=settings.of(flow, exact=patience, smoothed=150, quick=80), keep=32, **flow.options,
-        )  # fmt: skip
+            transient=transient, keep=32, **flow.options,
+        ).assign_attrs(transient=transient)  # fmt: skip
     return data | branches(figure)
 
 
@@ -158,11 +158,7 @@ def how(data: Datasets) -> str:
         parameter = str(swept["maximum"].dims[0])
         words.append(
             f"{flow.key}: {swept.sizes[parameter]} values up and down, {swept.sizes['iterate']} section points each "
-            f"after {_transient(swept)} periods; {many.sizes['start']} starts at {many.sizes[parameter]} values, after "
-            f"{_transient(many)} periods"
+            f"after {swept.attrs['transient']} periods; {many.sizes['start']} starts at {many.sizes[parameter]} "
+            f"values, after {many.attrs['transient']} periods"
         )
     return "Section at phase 0. " + "; ".join(words) + "."
-
-
-def _transient(swept: xr.Dataset) -> int:
-    return int(read_provenance(swept)["options"]["transient"])

@@ -37,9 +37,9 @@ from nonsmooth.studies.savi2007.figures.portraits import (
     draw_portraits,
     portraits,
     sheet_size,
+    twins,
 )  # fmt: skip
 from nonsmooth.studies.savi2007.figures.resonance import grazing_of
-from nonsmooth.studies.savi2007.figures.twins import twins
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 from nonsmooth.studies.savi2007.printed import FIGURE_17, FIGURE_18
 
@@ -62,7 +62,7 @@ def _compute_17(settings: Settings) -> Datasets:
         data[f"exact_{word}"] = sweep(
             EXACT.system(**FIGURE_17), "omega", [_JUST_ABOVE], direction=None, start=starts(16), transient=transient,
             keep=64, progress=settings.progress, **EXACT.options,
-        )  # fmt: skip
+        ).assign_attrs(transient=transient)  # fmt: skip
     return data
 
 

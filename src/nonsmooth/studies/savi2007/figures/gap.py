@@ -39,8 +39,7 @@ from nonsmooth.studies.savi2007.figures.motions import (
     said,
     without_flips,
 )  # fmt: skip
-from nonsmooth.studies.savi2007.figures.portraits import describe, draw_portraits, portraits, sheet_size
-from nonsmooth.studies.savi2007.figures.twins import twins
+from nonsmooth.studies.savi2007.figures.portraits import describe, draw_portraits, portraits, sheet_size, twins
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings, starts
 from nonsmooth.studies.savi2007.printed import FIGURE_13, FIGURE_14, FIGURE_14_TEXT
 

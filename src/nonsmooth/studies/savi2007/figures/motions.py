@@ -17,7 +17,7 @@ from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
 from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, two_rows
 from nonsmooth.studies.savi2007.figures.portraits import QUANTITIES, titles
 from nonsmooth.studies.savi2007.laboratory import as_result
-from nonsmooth.studies.savi2007.measure import APERIODIC
+from nonsmooth.studies.savi2007.measure import period_word
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -131,14 +131,10 @@ def said(data: Datasets, shown: Mapping[float, int], unit: str) -> str:
     """Motions of the rig at each value, beside those of the model."""
     words = []
     for value in shown:
-        rig = " and ".join(_name(n) for n in measured_periods_at(data, value))
+        rig = " and ".join(period_word(n) for n in measured_periods_at(data, value))
         model = sorted({int(n) for run in runs_at(data, value) for n in run["coexisting_period_number"].values})
-        words.append(f"{' '.join(prefixed(value, unit))}: {rig} (model: {', '.join(_name(n) for n in model)})")
+        words.append(f"{' '.join(prefixed(value, unit))}: {rig} (model: {', '.join(period_word(n) for n in model)})")
     return "; ".join(words)
-
-
-def _name(period: int) -> str:
-    return "no period" if period == APERIODIC else f"period {period}"
 
 
 def draw_pairs(canvas: Canvas, data: Datasets, *, parameter: str, shown: Mapping[float, int]) -> None:

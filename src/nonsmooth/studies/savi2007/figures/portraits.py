@@ -1,4 +1,4 @@
-"""Sheets of phase portraits: one orbit per parameter value, exact above smoothed, with its section points."""
+"""Sheets of phase portraits: an orbit per parameter value, exact above smoothed; and neighbours on an attractor."""
 
 from __future__ import annotations
 
@@ -7,18 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth import plot, simulate, sweep
+from nonsmooth import plot, poincare, simulate, sweep
 from nonsmooth.plot.units import prefixed
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
 from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, two_rows
-from nonsmooth.studies.savi2007.flows import FLOWS, Settings, starts
-from nonsmooth.studies.savi2007.measure import APERIODIC, periods_reached
+from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Flow, Settings, starts
+from nonsmooth.studies.savi2007.measure import APERIODIC, period_word, periods_reached
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["QUANTITIES", "chosen_start", "describe", "draw_portraits", "portraits", "sheet_size", "titles"]
+    from nonsmooth import System
+
+__all__ = ["QUANTITIES", "chosen_start", "describe", "draw_portraits", "portraits", "sheet_size", "titles", "twins"]
+
 
 #: Units and symbols of what the figures vary.
 QUANTITIES = {"g": ("m", "g"), "omega": ("rad/s", r"\omega"), "rho": ("N", r"\rho")}
@@ -106,9 +109,25 @@ def describe(data: Datasets, shown: Mapping[float, int]) -> str:
 
 def words_of(reached: Mapping[int, int]) -> str:
     """``period 3 (8 starts), period 4 (8 starts)``."""
-    names = {APERIODIC: "no period", -1: "unsettled"}
-    return ", ".join(f"{names.get(p, f'period {p}')} ({n})" for p, n in reached.items())
+    return ", ".join(f"{period_word(p)} ({n})" for p, n in reached.items())
 
 
 def _parameter(survey: xr.Dataset) -> str:
     return str(survey["maximum"].dims[0])
+
+
+PAIRS = 400
+RETURNS = 12
+APART = {"exact": 1e-9, "smoothed": 1e-6}  # m; above what rounding (exact) or rtol 1e-6 (smoothed) does by itself
+
+
+def twins(flow: Flow, system: System, attractor: xr.Dataset) -> xr.Dataset:
+    """Sections from points of an ``attractor`` (the first half of the starts) and from their twins (the second).
+
+    A twin begins 1e-9 m beside its point in x (1e-6 m for the smoothed switch).
+    """
+    points = attractor["section"].transpose("iterate", "state").values
+    chosen = points[np.linspace(0, len(points) - 1, PAIRS).astype(int)]
+    beside = chosen + np.array([APART[flow.key], 0.0])
+    options = flow.options if flow is EXACT else {**flow.options, "rtol": 1e-9}
+    return poincare(system, start=[list(map(float, u)) for u in (*chosen, *beside)], n=RETURNS, **options)

@@ -20,7 +20,7 @@ from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure, 
 from nonsmooth.studies.savi2007.flows import EXACT, FLOWS, Settings
 from nonsmooth.studies.savi2007.grazing import grazing_frequencies
 from nonsmooth.studies.savi2007.laboratory import as_result
-from nonsmooth.studies.savi2007.measure import measured_jumps, measured_periods
+from nonsmooth.studies.savi2007.measure import jumps, measured_periods
 from nonsmooth.studies.savi2007.printed import NUMBERS
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ def _caption_rig(data: Datasets) -> str:
     runs, compared = data["runs"], data["compared"]
     words = []
     for direction, word in (("up", "rising"), ("down", "falling")):
-        found = ", ".join(str(jump) for jump in measured_jumps(runs, direction)) or "none"
+        found = ", ".join(str(jump) for jump in jumps(runs, direction)) or "none"
         words.append(f"{word}: {found} rad/s")
     doubled = int(np.count_nonzero(measured_periods(runs)[1] == 2))
     differences = 100 * np.abs(compared["relative_difference"].values)

@@ -40,7 +40,7 @@ UNKNOWNS: Mapping[str, str] = {
 }  # fmt: skip
 
 #: What is observed, as a function of the unknowns.
-LAWS: Mapping[str, Callable[[Any], float]] = {
+LAWS: Mapping[str, Callable[[Any], Any]] = {
     "mass": lambda u: u["m"],
     "test_mass": lambda u: u["test_mass"],
     "spring_slope": lambda u: 2 * u["k"] * u["gain"],
@@ -136,16 +136,10 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
     for _ in range(_ROUNDS):
         at = dict(zip(names, u, strict=True))
         left = (y - np.array([LAWS[label](at) for label in labels])) / size
-        jacobian = np.empty((n, len(names)))
-        for k in range(len(names)):
-            step = 1e-6 * scale[k]
-            high, low = u.copy(), u.copy()
-            high[k] += step
-            low[k] -= step
-            ahead, behind = dict(zip(names, high, strict=True)), dict(zip(names, low, strict=True))
-            jacobian[:, k] = [
-                (LAWS[label](ahead) - LAWS[label](behind)) / 2e-6 / s for label, s in zip(labels, size, strict=True)
-            ]
+        beside = u + 1e-30j * np.diag(scale)  # derivatives by imaginary parts
+        jacobian = np.array([
+            [LAWS[label](dict(zip(names, row, strict=True))).imag for row in beside] for label in labels
+        ]) / (1e-30 * size[:, None])  # fmt: skip
         normal = jacobian.T @ weight @ jacobian + prior
         change = np.linalg.solve(normal, jacobian.T @ weight @ left - prior @ ((u - known) / scale))
         u = u + change * scale

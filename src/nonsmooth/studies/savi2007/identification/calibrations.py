@@ -21,7 +21,7 @@ from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.uncertainty import coverage_factor, uniform
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth.studies.savi2007.identification.evidence import Run
-from nonsmooth.studies.savi2007.identification.lines import StraightLine, scattered_line
+from nonsmooth.studies.savi2007.identification.least_squares import StraightLine, scattered_line
 from nonsmooth.studies.savi2007.identification.steady import harmonics_of
 
 if TYPE_CHECKING:
@@ -59,10 +59,9 @@ def voltage_frequency(runs: Sequence[Run], *, voltage_error: float = 0.0) -> Fin
     line, scatter = scattered_line(volts, omega, voltage_error, error)
     slope, intercept = line.slope, line.intercept
     offset = -intercept / slope
-    block = _block(line)
     # slope, offset = -intercept / slope, intercept
     jacobian = np.array([[1.0, 0.0], [intercept / slope**2, -1 / slope], [0.0, 1.0]])
-    covariance = jacobian @ block @ jacobian.T
+    covariance = jacobian @ line.covariance @ jacobian.T
     errors = np.sqrt(np.diag(covariance))
     notes = [f"the motor turns from {offset:.3f} V on; omega = {slope:.5g} rad/(s V) x (V - {offset:.4g} V)"]
     notes += _scatter(scatter, error, "rad/s")
@@ -74,7 +73,7 @@ def voltage_frequency(runs: Sequence[Run], *, voltage_error: float = 0.0) -> Fin
             "offset": Estimate(offset, float(errors[1]), "V"),
             "intercept": Estimate(intercept, float(errors[2]), "rad/s"),
         },
-        covariance, _data(volts, omega, np.hypot(error, scatter), line, block, ("motor voltage", "V"),
+        covariance, _data(volts, omega, np.hypot(error, scatter), line, ("motor voltage", "V"),
                           ("frequency", "rad/s"), runs), "calibration",
     )  # fmt: skip
 
@@ -112,8 +111,7 @@ def crank_force(
         fitted = harmonics_of(run, np.asarray(run.force["time"].values, dtype=np.float64), run.force)[0]
         force[i], error[i] = float(fitted.amplitudes[0]), float(fitted.amplitude_errors[0])
     line, scatter = scattered_line(length, force, length_error, error)
-    block = _block(line)
-    type_a, half = float(np.sqrt(block[0, 0])), gain_limit * line.slope
+    type_a, half = float(np.sqrt(line.covariance[0, 0])), gain_limit * line.slope
     total = float(np.hypot(type_a, uniform(half)))
     notes = [
         f"type A {type_a:.2g} N/m; type B {uniform(half):.2g} N/m, the sensor's gain within ±{100 * gain_limit:g} %",
@@ -129,9 +127,9 @@ def crank_force(
         int(sum(run.force.size for run in runs)), tuple(run.name for run in runs), tuple(notes),
         {
             "slope_a": Estimate(line.slope, type_a, "N/m"),
-            "intercept": Estimate(line.intercept, float(np.sqrt(block[1, 1])), "N"),
+            "intercept": Estimate(line.intercept, float(np.sqrt(line.covariance[1, 1])), "N"),
         },
-        data=_data(length, force, np.hypot(error, scatter), line, block, ("crank length", "m"),
+        data=_data(length, force, np.hypot(error, scatter), line, ("crank length", "m"),
                    ("forcing amplitude", "N"), runs), plot="calibration",
     )  # fmt: skip
 
@@ -140,10 +138,6 @@ def _enough(settings: FloatArray, what: str) -> None:
     n = len(np.unique(settings))
     if n < 3:
         raise ValueError(f"a calibration needs runs at three different {what} or more, got {n}")
-
-
-def _block(line: StraightLine) -> FloatArray:
-    return np.array([[line.slope_error**2, line.covariance], [line.covariance, line.intercept_error**2]])
 
 
 def _scatter(scatter: float, error: FloatArray, unit: str) -> list[str]:
@@ -156,7 +150,7 @@ def _scatter(scatter: float, error: FloatArray, unit: str) -> list[str]:
 
 
 def _data(
-    setting: FloatArray, reading: FloatArray, error: FloatArray, line: StraightLine, block: FloatArray,
+    setting: FloatArray, reading: FloatArray, error: FloatArray, line: StraightLine,
     named: tuple[str, str], read: tuple[str, str], runs: Sequence[Run],
 ) -> xr.Dataset:  # fmt: skip
     import xarray as xr
@@ -164,8 +158,8 @@ def _data(
     low = min(float(setting.min()), 0.0)
     fine = np.linspace(low, float(setting.max()), 200)
     rows = np.column_stack([fine, np.ones_like(fine)])
-    reach = coverage_factor() * np.sqrt(np.einsum("ij,jk,ik->i", rows, block, rows))
-    fitted = line.intercept + line.slope * fine
+    reach = coverage_factor() * np.sqrt(np.einsum("ij,jk,ik->i", rows, line.covariance, rows))
+    fitted, errors = line.intercept + line.slope * fine, np.sqrt(np.diag(line.covariance))
     unit = {"units": read[1], "long_name": read[0]}
     return xr.Dataset(
         {
@@ -173,8 +167,8 @@ def _data(
             "reading": ("run", reading, unit), "reading_error": ("run", error, unit),
             "fitted": ("setting_fine", fitted, unit), "fitted_low": ("setting_fine", fitted - reach, unit),
             "fitted_high": ("setting_fine", fitted + reach, unit),
-            "slope": ((), line.slope), "slope_error": ((), float(np.sqrt(block[0, 0]))),
-            "intercept": ((), line.intercept, unit), "intercept_error": ((), float(np.sqrt(block[1, 1])), unit),
+            "slope": ((), line.slope), "slope_error": ((), errors[0]),
+            "intercept": ((), line.intercept, unit), "intercept_error": ((), errors[1], unit),
         },
         {"setting_fine": ("setting_fine", fine, {"units": named[1], "long_name": named[0]})},
         {"synthetic": "yes" if any(run.synthetic for run in runs) else "no"},

@@ -21,28 +21,25 @@ from nonsmooth.studies.savi2007.identification.adjustment import Adjusted, Obser
 from nonsmooth.studies.savi2007.identification.calibrations import crank_force, voltage_frequency
 from nonsmooth.studies.savi2007.identification.contact_findings import contact_finding, one_contact
 from nonsmooth.studies.savi2007.identification.cross_checks import cross_checks, sentences
-from nonsmooth.studies.savi2007.identification.damping import amplitude_fit
-from nonsmooth.studies.savi2007.identification.decay_damping import decay_damping
+from nonsmooth.studies.savi2007.identification.decay_findings import decay_damping, natural_frequency, support_damping
 from nonsmooth.studies.savi2007.identification.evidence import Evidence, Run, gather
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit, free_decay
 from nonsmooth.studies.savi2007.identification.grazing import grazing_gap
 from nonsmooth.studies.savi2007.identification.half_power import half_power
-from nonsmooth.studies.savi2007.identification.joining import joined
 from nonsmooth.studies.savi2007.identification.multiple_shooting import ContactFit, shoot_contacts
-from nonsmooth.studies.savi2007.identification.natural_frequency import natural_frequency
 from nonsmooth.studies.savi2007.identification.plausibility import check_plausible, not_driven, slipped_late
-from nonsmooth.studies.savi2007.identification.receptance import receptance_fit
 from nonsmooth.studies.savi2007.identification.referral import counted_gap, mark_of, refer
+from nonsmooth.studies.savi2007.identification.response_fits import amplitude_fit, receptance_fit
 from nonsmooth.studies.savi2007.identification.statements import (
     agreement,
     disagreement,
     for_model,
     identifiability,
     impossible,
+    joined,
 )
 from nonsmooth.studies.savi2007.identification.steady import Steady, steady
 from nonsmooth.studies.savi2007.identification.stiffness import stiffness
-from nonsmooth.studies.savi2007.identification.support_damping import support_damping
 
 __all__ = ["identify"]
 

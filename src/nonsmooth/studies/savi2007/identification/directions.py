@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nonsmooth.studies.savi2007.identification.plausibility import few
+
 if TYPE_CHECKING:
     from nonsmooth.studies.savi2007.identification.evidence import Run
 
@@ -57,7 +59,7 @@ def oriented(runs: Mapping[str, tuple[Run, ...]]) -> tuple[dict[str, tuple[Run, 
             )
     if backwards := [run.label for rows in runs.values() for run in rows if run.backwards]:
         notes.append(
-            f"the photogate counts backwards in {len(backwards)} runs ({_few(backwards)}): only the times of channel "
+            f"the photogate counts backwards in {len(backwards)} runs ({few(backwards)}): only the times of channel "
             "'Turn' are used, which is right whichever way the motor turns"
         )
     return found, -1 if sign < 0 else 1, tuple(notes)
@@ -75,8 +77,8 @@ def towards_support(runs: Sequence[Run]) -> tuple[int, str]:
     up, down = ([run.label for run, vote in votes.items() if vote == sign] for sign in (1, -1))
     if min(len(up), len(down)) > 0.2 * (len(up) + len(down)):
         raise ValueError(
-            f"the support pushes the car towards falling positions in {len(up)} runs ({_few(up)}) and towards growing "
-            f"ones in {len(down)} ({_few(down)}): the rotary sensor counts one way in some runs and the other way in "
+            f"the support pushes the car towards falling positions in {len(up)} runs ({few(up)}) and towards growing "
+            f"ones in {len(down)} ({few(down)}): the rotary sensor counts one way in some runs and the other way in "
             "others. Give the runs of one direction, or turn the sign of channel 'Angle' in the others' files"
         )
     if len(down) > len(up):
@@ -130,7 +132,3 @@ def _turned(run: Run) -> Run:
 
 def _pushed(run: Run) -> Run:
     return replace(run, force=run.force.copy(data=-run.force.values))
-
-
-def _few(names: Sequence[str]) -> str:
-    return ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")

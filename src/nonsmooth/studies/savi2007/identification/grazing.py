@@ -40,7 +40,7 @@ from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.uncertainty import uniform
 from nonsmooth.studies.savi2007.identification.evidence import Run
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit
-from nonsmooth.studies.savi2007.identification.gap import grazing_amplitude
+from nonsmooth.studies.savi2007.identification.response_fits import grazing_amplitude
 from nonsmooth.studies.savi2007.identification.steady import Steady, steady
 
 if TYPE_CHECKING:

@@ -158,7 +158,7 @@ def _data(part: Steady, value: FloatArray, error: FloatArray, c: Estimate) -> xr
     return xr.Dataset(
         {
             "omega": ("run", part.omega, {"units": "rad/s"}), "amplitude": ("run", part.amplitude, {"units": "m"}),
-            "amplitude_error": ("run", part.error, {"units": "m"}), "direction": ("run", list(part.direction)),
+            "amplitude_error": ("run", part.error, {"units": "m"}), "direction": ("run", part.direction),
             "omega_low": ((), value[2], {"units": "rad/s"}), "omega_high": ((), value[3], {"units": "rad/s"}),
             "largest": ((), value[4], {"units": "m"}), "damping_ratio": ((), value[0]),
             "damping_ratio_error": ((), error[0]), "c": ((), c.value, {"units": "N s/m"}),

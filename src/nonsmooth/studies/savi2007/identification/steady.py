@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,7 @@ class Steady:
         Standard deviation of what the harmonics leave (m): the sensor's own in free motion, more in contact.
     """
 
+    runs: tuple[Run, ...]
     omega: FloatArray
     omega_error: FloatArray
     crank: FloatArray
@@ -55,11 +56,14 @@ class Steady:
     highest: FloatArray
     rest: FloatArray
     lean: FloatArray
-    direction: tuple[str, ...]
-    runs: tuple[Run, ...]
 
     def __len__(self) -> int:
         return len(self.runs)
+
+    @property
+    def direction(self) -> list[str]:
+        """``up`` for a run that was reached with rising frequency, else ``down``."""
+        return [str(run.settings.get("direction", "up")) for run in self.runs]
 
     @property
     def samples(self) -> int:
@@ -79,11 +83,7 @@ class Steady:
     def only(self, chosen: Any) -> Steady:
         """The rows that are chosen (a mask or indices)."""
         rows = np.flatnonzero(chosen) if np.asarray(chosen).dtype == bool else np.asarray(chosen, dtype=int)
-        arrays = (
-            self.omega, self.omega_error, self.crank, self.amplitude, self.error, self.response, self.mean,
-            self.mean_error, self.highest, self.rest, self.lean,
-        )  # fmt: skip
-        return _steady([array[rows] for array in arrays], [self.runs[i] for i in rows])
+        return Steady(tuple(self.runs[i] for i in rows), *(getattr(self, one.name)[rows] for one in fields(self)[1:]))
 
 
 def harmonics_of(run: Run, time: FloatArray, values: Any) -> tuple[HarmonicFit, float, float, float]:
@@ -121,8 +121,8 @@ def steady(runs: Sequence[Run]) -> Steady:
             omega, omega_error, float(run.settings["crank_length"]), amplitude, float(fitted.amplitude_errors[0]),
             response, fitted.mean, fitted.mean_error, fitted.mean + float(shape.max()), fitted.residual, _lean(fitted),
         ))  # fmt: skip
-    columns = [np.array(column) for column in zip(*rows, strict=True)] if rows else [np.zeros(0)] * 11
-    return _steady(columns, runs)
+    columns = [np.array(column) for column in zip(*rows, strict=True)] or [np.zeros(0)] * (len(fields(Steady)) - 1)
+    return Steady(tuple(runs), *columns)
 
 
 def _lean(fitted: HarmonicFit) -> float:
@@ -135,11 +135,3 @@ def _lean(fitted: HarmonicFit) -> float:
     step = np.where(before == after, 1.0, np.abs(after - before))
     part = np.where(before * after < 0, np.maximum(before, after) / step, (before + after > 0).astype(float))
     return float(2 * np.mean(part) - 1)
-
-
-def _steady(columns: list[Any], runs: Sequence[Run]) -> Steady:
-    omega, omega_error, crank, amplitude, error, response, mean, mean_error, highest, rest, lean = columns
-    return Steady(
-        omega, omega_error, crank, amplitude, error, response, mean, mean_error, highest, rest, lean,
-        tuple(str(run.settings.get("direction", "up")) for run in runs), tuple(runs),
-    )  # fmt: skip

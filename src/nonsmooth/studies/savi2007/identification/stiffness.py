@@ -27,7 +27,7 @@ from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.uncertainty import uniform
 from nonsmooth.recordings.signals.savitzky_golay import savitzky_golay
 from nonsmooth.studies.savi2007.identification.evidence import Run
-from nonsmooth.studies.savi2007.identification.lines import linear_law
+from nonsmooth.studies.savi2007.identification.least_squares import linear_law
 
 if TYPE_CHECKING:
     import xarray as xr

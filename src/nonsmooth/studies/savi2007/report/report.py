@@ -9,8 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from nonsmooth import __version__
-from nonsmooth.studies.savi2007.claims.rows import Data, Row
-from nonsmooth.studies.savi2007.claims.verdicts import CLOSE, MEANING, RULE, Cause, Verdict, judge
+from nonsmooth.studies.savi2007.claims.verdicts import CLOSE, MEANING, RULE, Cause, Data, Row, Verdict, judge
 from nonsmooth.studies.savi2007.figures.figure import Figure
 from nonsmooth.studies.savi2007.figures.parameters import NAMES, table_rows
 from nonsmooth.studies.savi2007.flows import ETA, SMOOTHED, Settings

@@ -15,7 +15,7 @@ from nonsmooth.studies.savi2007.report.pages import Table
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.studies.savi2007.claims.rows import Data
+    from nonsmooth.studies.savi2007.claims.verdicts import Data
 
 __all__ = ["SpecialPoint", "ratios", "special_table", "table_of_points"]
 

@@ -9,7 +9,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.studies.savi2007.rig import sensors
 from nonsmooth.studies.savi2007.rig.physics import NO_SUPPORT, hanging_mass
-from nonsmooth.studies.savi2007.rig.sampled import sampled
+from nonsmooth.studies.savi2007.rig.sampled import simulated
 
 if TYPE_CHECKING:
     from nonsmooth import Recording, System
@@ -67,7 +67,7 @@ def _decay(
     begin = float(rng.uniform(0.4, 1.0))
     time, at = sensors.instants(rig, rng, begin + duration)
     moving = at >= begin
-    states = sampled(
+    states, _ = simulated(
         system, name, start=start, duration=duration + 0.01, instants=at[moving] - begin, side=rig.truth["motor_side"]
     )
     held = np.zeros((2, len(at)))

@@ -6,7 +6,7 @@ force-displacement loop has the width 2 (F_C + c v), and a hand trembles.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,30 +33,32 @@ def springs(rig: VirtualRig, *, reach: float = 0.12, n: int = 6) -> Recording:
     limit = p.pretension / p.k
     if reach * 1.01 > limit:
         raise ValueError(f"reach = {reach!r} m would slacken a string; stay below {limit:.3f} m")
-    runs: list[Run] = []
-    for i in range(n):
-        rng = rig.generator("springs", i)
-        duration = float(rng.uniform(40.0, 60.0))
-        name, far = f"Run #{i + 1}", reach * float(rng.uniform(0.9, 1.0)) * (-1.0 if i % 2 else 1.0)
-        time, at = sensors.instants(rig, rng, duration)
-        x, v, acceleration = _hand(rng, at, far, duration)
-        pulled = p.m * acceleration + 2 * p.k * x + friction(v, p)
-        runs.append((name, rig.channels(rng, name, time, x, v, pulled=pulled), {}))
-    return rig.recording("springs", runs)
+    return _by_hand(
+        rig, "springs", (40.0, 60.0), [(-1.0 if i % 2 else 1.0) * reach for i in range(n)], 0.9,
+        lambda x, v, acceleration: p.m * acceleration + 2 * p.k * x + friction(v, p),
+    )  # fmt: skip
 
 
 def support(rig: VirtualRig, *, force: float = 35.0, n: int = 6) -> Recording:
     """Push the support's spring up to about ``force`` (N) and let it come back; ``n`` runs: Fig. 4b."""
-    runs: list[Run] = []
     k_s, c_s = rig.truth["k_s"], rig.truth["c_s"]
-    for i in range(n):
-        rng = rig.generator("support", i)
-        duration = float(rng.uniform(15.0, 25.0))
-        name, far = f"Run #{i + 1}", force / k_s * float(rng.uniform(0.85, 1.0))
+    return _by_hand(rig, "support", (15.0, 25.0), [force / k_s] * n, 0.85, lambda y, v, _: k_s * y + c_s * v)
+
+
+def _by_hand(
+    rig: VirtualRig, procedure: str, lasting: tuple[float, float], reaches: Sequence[float], least: float,
+    force: Callable[[FloatArray, FloatArray, FloatArray], FloatArray],
+) -> Recording:  # fmt: skip
+    """One run to about each of ``reaches``, from a share ``least`` of it on; ``force`` on position and its rates."""
+    runs: list[Run] = []
+    for i, reach in enumerate(reaches):
+        rng, name = rig.generator(procedure, i), f"Run #{i + 1}"
+        duration = float(rng.uniform(*lasting))
+        far = reach * float(rng.uniform(least, 1.0))
         time, at = sensors.instants(rig, rng, duration)
-        y, v, _ = _hand(rng, at, far, duration)
-        runs.append((name, rig.channels(rng, name, time, y, v, pulled=k_s * y + c_s * v), {}))
-    return rig.recording("support", runs)
+        x, v, acceleration = _hand(rng, at, far, duration)
+        runs.append((name, rig.channels(rng, name, time, x, v, pulled=force(x, v, acceleration)), {}))
+    return rig.recording(procedure, runs)
 
 
 def _hand(

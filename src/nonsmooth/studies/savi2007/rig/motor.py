@@ -57,28 +57,15 @@ def mean_position(rig: VirtualRig, crank_length: float) -> float:
 
 
 def passages(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wander = ()) -> FloatArray:
-    """The times in [begin, end] at which the crank's angle is a multiple of 2 pi."""
-    if wander:
-        return _uneven(rig, omega, begin, end, wander)
-    ripple, phase = rig.truth["ripple"], rig.truth["ripple_phase"]
-    angle = 0.0  # omega t of the passage near t = 0, by Newton's method: angle + ripple sin(angle + phase) = 0
-    for _ in range(50):
-        step = (angle + ripple * np.sin(angle + phase)) / (1.0 + ripple * np.cos(angle + phase))
-        angle -= step
-        if abs(step) < 1e-15:
-            break
-    first, period = angle / omega, 2 * np.pi / omega
-    n = np.arange(np.ceil((begin - first) / period), np.floor((end - first) / period) + 1)
-    return first + period * n
+    """The times in [begin, end] at which the crank's angle is a multiple of 2 pi.
 
-
-def _uneven(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wander) -> FloatArray:
-    """The same for a motor that wanders: each passage by Newton's method from where even turning has it."""
+    Each by Newton's method from where even turning has it: the slope is omega (1 +- the ripple), so this contracts.
+    """
     p = rig.named_parameters(omega=omega)
     first, last = crank_angle(np.array([begin, end]), p, wander) / (2 * np.pi)
     target = 2 * np.pi * np.arange(np.ceil(first), np.floor(last) + 1)
     at = target / omega
-    for _ in range(50):  # the slope is omega (1 +- the ripple): this contracts
+    for _ in range(50):
         off = crank_angle(at, p, wander) - target
         at = at - off / omega
         if np.max(np.abs(off), initial=0.0) < 1e-12:

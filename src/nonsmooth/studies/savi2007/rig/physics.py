@@ -81,11 +81,6 @@ def support_force(x: Any, v: Any, p: Any) -> Any:
     return -(p.k_s * (x - p.g) + p.c_s * v)
 
 
-def hanging_mass() -> System:
-    """The support's spring with the test mass on it, about its equilibrium: M y'' + c_s y' + k_s y = 0."""
-    return _hanging_mass()
-
-
 def wander_of(p: Any) -> Wander:
     """The slow terms of the motor's angle among the parameters of a system whose motor wanders."""
     return tuple(
@@ -94,6 +89,24 @@ def wander_of(p: Any) -> Wander:
     )
 
 
+@cache
+def hanging_mass() -> System:
+    """The support's spring with the test mass on it, about its equilibrium: M y'' + c_s y' + k_s y = 0."""
+    from nonsmooth import System
+
+    def field(t: Any, u: Any, p: Any) -> Any:
+        return u.v, -(p.k_s * u.x + p.c_s * u.v) / p.test_mass
+
+    return System(
+        name="support with test mass",
+        states={"x": "m", "v": "m/s"},
+        parameters={"k_s": (1210.0, "N/m"), "c_s": (0.60, "N s/m"), "test_mass": (1.33, "kg")},
+        modes={"hanging": field},
+        scale={"x": 1e-3, "v": 1e-2},
+    )
+
+
+@cache
 def car(*, relaxing: bool = True, rising: bool = False, wandering: bool = False, side: int = 1) -> System:
     """The car with its springs, strings and support.
 
@@ -117,27 +130,6 @@ def car(*, relaxing: bool = True, rising: bool = False, wandering: bool = False,
         ``relaxing``. It has no outputs, which would cost every run more than its integration; the forces are
         functions of this file.
     """
-    return _car(relaxing, rising, wandering, side)
-
-
-@cache
-def _hanging_mass() -> System:
-    from nonsmooth import System
-
-    def field(t: Any, u: Any, p: Any) -> Any:
-        return u.v, -(p.k_s * u.x + p.c_s * u.v) / p.test_mass
-
-    return System(
-        name="support with test mass",
-        states={"x": "m", "v": "m/s"},
-        parameters={"k_s": (1210.0, "N/m"), "c_s": (0.60, "N s/m"), "test_mass": (1.33, "kg")},
-        modes={"hanging": field},
-        scale={"x": 1e-3, "v": 1e-2},
-    )
-
-
-@cache
-def _car(relaxing: bool, rising: bool, wandering: bool, side: int) -> System:
     from nonsmooth import Mode, System, Transition
 
     def driven(t: Any, u: Any, p: Any) -> Any:

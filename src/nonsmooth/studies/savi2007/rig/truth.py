@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -19,16 +19,25 @@ __all__ = ["FEATURES", "HOLDING", "NOMINAL_GAP", "UNITS", "awkward", "drawn", "l
 #: Reading of the support's screw at which the true gap is ``truth["g"]`` (Fig. 15).
 NOMINAL_GAP = 0.0018
 
-#: Units of all that a truth holds, and which numbers there are.
-UNITS: Mapping[str, str] = MappingProxyType({
-    "m": "kg", "k": "N/m", "k_s": "N/m", "c": "N s/m", "c_s": "N s/m", "g": "m",
-    "friction": "N", "creep_velocity": "m/s", "pretension": "N", "string_length": "m", "test_mass": "kg",
-    "motor_slope": "rad/(s V)", "motor_offset": "V", "ripple": "rad", "ripple_phase": "rad",
-    "force_gain": "", "force_noise": "N", "clock_jitter": "s", "encoder_zero": "counts",
-    "sensor_zero": "m", "motor_side": "", "motor_wander": "", "angle_sign": "", "force_sign": "",
-    "turn_sign": "", "slipped_tap": "",
-})  # fmt: skip
-
+#: Of all that a truth holds: the paper's value (Table 1 and 3.1, typical ones where it prints none), unit, and range.
+_TABLE: Mapping[str, tuple[float, str, str]] = {
+    "m": (0.838, "kg", "positive"), "k": (8.47, "N/m", "positive"), "k_s": (1210.0, "N/m", "positive"),
+    "c": (0.87, "N s/m", "zero or more"), "c_s": (0.60, "N s/m", "positive"), "g": (NOMINAL_GAP, "m", "finite"),
+    "friction": (0.005, "N", "zero or more"), "creep_velocity": (1e-3, "m/s", "positive"),
+    "pretension": (2.0, "N", "positive"), "string_length": (1.0, "m", "positive"),
+    "test_mass": (1.33, "kg", "positive"), "motor_slope": (1.25, "rad/(s V)", "positive"),
+    "motor_offset": (1.0, "V", "finite"), "ripple": (0.01, "rad", "zero or more"),
+    "ripple_phase": (0.7, "rad", "finite"), "force_gain": (1.0, "", "zero or more"),
+    "force_noise": (0.02, "N", "zero or more"), "clock_jitter": (5e-5, "s", "zero or more"),
+    "encoder_zero": (0.0, "counts", "finite"), "sensor_zero": (0.0, "m", "finite"), "motor_side": (1.0, "", "1 or -1"),
+    "motor_wander": (0.0, "", "finite"), "angle_sign": (1.0, "", "1 or -1"), "force_sign": (1.0, "", "1 or -1"),
+    "turn_sign": (1.0, "", "1 or -1"), "slipped_tap": (0.0, "", "zero or more"),
+}  # fmt: skip
+_ALLOWED: Mapping[str, Callable[[float], bool]] = {
+    "positive": lambda value: value > 0, "zero or more": lambda value: value >= 0,
+    "1 or -1": lambda value: abs(value) == 1, "finite": lambda value: True,
+}  # fmt: skip
+UNITS: Mapping[str, str] = MappingProxyType({name: unit for name, (_, unit, _) in _TABLE.items()})
 #: Each feature of the rig that can be switched off, and what the truth is without it.
 FEATURES: Mapping[str, Mapping[str, float]] = MappingProxyType({
     "ripple": {"ripple": 0.0},
@@ -44,7 +53,6 @@ FEATURES: Mapping[str, Mapping[str, float]] = MappingProxyType({
 #: Creep velocity (m/s) of a friction that holds: 2 µm in a record of 20 s, a thirtieth of a count.
 HOLDING = 1e-7
 
-_NOT_NEGATIVE = ("c", "friction", "ripple", "force_noise", "clock_jitter", "force_gain", "slipped_tap")
 _SPREAD = 0.2  # around Table 1
 
 
@@ -55,14 +63,7 @@ def published() -> dict[str, float]:
     ----------
     M.A. Savi, S. Divenyi, L.F.P. Franca, H.I. Weber, J. Sound Vib. 301 (2007) 59-73, Section 3.1, Table 1.
     """
-    return {
-        "m": 0.838, "k": 8.47, "k_s": 1210.0, "c": 0.87, "c_s": 0.60, "g": NOMINAL_GAP,
-        "friction": 0.005, "creep_velocity": 1e-3, "pretension": 2.0, "string_length": 1.0, "test_mass": 1.33,
-        "motor_slope": 1.25, "motor_offset": 1.0, "ripple": 0.01, "ripple_phase": 0.7,
-        "force_gain": 1.0, "force_noise": 0.02, "clock_jitter": 5e-5, "encoder_zero": 0.0,
-        "sensor_zero": 0.0, "motor_side": 1.0, "motor_wander": 0.0, "angle_sign": 1.0,
-        "force_sign": 1.0, "turn_sign": 1.0, "slipped_tap": 0.0,
-    }  # fmt: skip
+    return {name: value for name, (value, _, _) in _TABLE.items()}
 
 
 def drawn(seed: int) -> dict[str, float]:
@@ -119,16 +120,12 @@ def switched(truth: Mapping[str, float], given: Mapping[str, Any] | None, on: Ma
 
 
 def _check(truth: Mapping[str, float]) -> None:
-    positive = ("m", "k", "k_s", "c_s", "creep_velocity", "pretension", "string_length", "test_mass", "motor_slope")
     for name, value in truth.items():
+        kind = _TABLE[name][2]
         if not math.isfinite(value) and not (name == "string_length" and value == math.inf):
             raise ValueError(f"truth[{name!r}] = {value!r} must be finite")
-        if name in positive and value <= 0:
-            raise ValueError(f"truth[{name!r}] = {value!r} must be positive")
-        if name in _NOT_NEGATIVE and value < 0:
-            raise ValueError(f"truth[{name!r}] = {value!r} must not be negative")
-        if name in ("motor_side", "angle_sign", "force_sign", "turn_sign") and abs(value) != 1:
-            raise ValueError(f"truth[{name!r}] = {value!r} must be 1 or -1")
+        if not _ALLOWED[kind](value):
+            raise ValueError(f"truth[{name!r}] = {value!r} must be {kind}")
     if not 0 <= truth["motor_wander"] <= 0.05:
         raise ValueError(f"truth['motor_wander'] = {truth['motor_wander']!r} must lie between 0 and 0.05 (relative)")
     if truth["ripple"] >= 1:

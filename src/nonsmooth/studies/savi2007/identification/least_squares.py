@@ -1,4 +1,4 @@
-r"""Straight lines through points with errors in both axes, and linear laws with further terms.
+r"""Least squares: lines with errors in both axes, linear laws with further terms, nonlinear laws with their covariance.
 
 The effective variance of a point, :math:`\sigma_y^2 + b^2 \sigma_x^2`, depends on the slope b; York's solution moves
 each point along its error ellipse and so has no bias from the error in x.
@@ -9,6 +9,7 @@ appendix; J. Orear, Am. J. Phys. 50 (1982) 912.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,17 +18,15 @@ from nonsmooth import SolveError
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.uncertainty import correlated
 
-__all__ = ["LinearLaw", "StraightLine", "linear_law", "scattered_line", "york"]
+__all__ = ["LinearLaw", "StraightLine", "linear_law", "nonlinear_fit", "scattered_line", "york"]
 
 
 class StraightLine(NamedTuple):
-    """y = intercept + slope x, standard uncertainties, their covariance, and chi^2 per degree of freedom."""
+    """y = intercept + slope x, the covariance (2, 2) of slope and intercept, and chi^2 per degree of freedom."""
 
     slope: float
     intercept: float
-    slope_error: float
-    intercept_error: float
-    covariance: float
+    covariance: FloatArray
     reduced: float
 
 
@@ -74,10 +73,8 @@ def york(x: Any, y: Any, x_error: Any, y_error: Any) -> StraightLine:
     intercept = float(y_mean - slope * x_mean)
     intercept_var = 1.0 / float(np.sum(weight)) + centre**2 * slope_var
     chi2 = float(np.sum(weight * (ys - intercept - slope * xs) ** 2))
-    return StraightLine(
-        slope, intercept, float(np.sqrt(slope_var)), float(np.sqrt(intercept_var)), float(-centre * slope_var),
-        chi2 / max(len(xs) - 2, 1),
-    )  # fmt: skip
+    covariance = np.array([[slope_var, -centre * slope_var], [-centre * slope_var, intercept_var]])
+    return StraightLine(slope, intercept, covariance, chi2 / max(len(xs) - 2, 1))
 
 
 def scattered_line(x: Any, y: Any, x_error: Any, y_error: Any) -> tuple[StraightLine, float]:
@@ -134,3 +131,44 @@ def linear_law(columns: Any, y: Any, variance: Any, pieces: Any) -> LinearLaw:
     covariance = correlated(a * weight[:, None], weighted, pieces)
     reduced = float(weighted @ weighted) / max(len(b) - a.shape[1], 1)
     return LinearLaw(np.asarray(values, dtype=np.float64), covariance, residuals, reduced)
+
+
+def nonlinear_fit(
+    residual: Callable[[FloatArray], FloatArray], start: Any, lower: Any
+) -> tuple[FloatArray, FloatArray] | None:
+    r"""Values and covariance of parameters, by weighted residuals whose common scale is taken from themselves.
+
+    .. math::
+
+        C = (J^T J)^{-1} \frac{r^T r}{n - p}
+
+    Parameters
+    ----------
+    residual : callable
+        The n residuals, each over its standard uncertainty (or in proportion to it), at values of the p parameters.
+    start, lower : array (p,)
+        Where to begin, and lower bounds (-inf: none).
+
+    Returns
+    -------
+    tuple of array (p,) and array (p, p), or None
+        None where the iteration does not converge. Variances are infinite where the data do not tell the parameters
+        apart.
+    """
+    from scipy.optimize import least_squares
+
+    begin = np.asarray(start, dtype=np.float64)
+    size = np.where(begin != 0, np.abs(begin), 1.0)  # the steps of its differences are relative to numbers of order 1
+    found = least_squares(
+        lambda scaled: residual(scaled * size), begin / size, jac="3-point", bounds=(np.asarray(lower) / size, np.inf),
+        x_scale="jac", ftol=1e-12, xtol=1e-12, gtol=1e-12,
+    )  # fmt: skip
+    n, p = found.jac.shape
+    if not found.success or n <= p:
+        return None
+    scale = np.linalg.norm(found.jac, axis=0)
+    if not np.all(scale > 0) or np.linalg.cond(found.jac / scale) > 1 / np.sqrt(np.finfo(float).eps):
+        return found.x * size, np.diag(np.full(p, np.inf))
+    inverse = np.linalg.pinv(found.jac / scale)
+    covariance = inverse @ inverse.T / np.outer(scale, scale) * (2 * found.cost / (n - p))
+    return found.x * size, covariance * np.outer(size, size)
