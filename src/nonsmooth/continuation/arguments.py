@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.kinds import within
+from nonsmooth.system.kinds import at_least
 from nonsmooth.system.system import System
 
 __all__ = ["LargestStep", "allowed_range", "limits"]
@@ -17,7 +17,7 @@ INSIDE = 1e-3  # of the range: the equations are singular at the edge itself
 
 
 #: The largest step along a branch, whose own size is 1.
-LargestStep = Annotated[float, within(1e-9, 1.0), "the branch's own size is 1"]
+LargestStep = Annotated[float, at_least(1e-9, 1.0), "the branch's own size is 1"]
 
 
 def limits(

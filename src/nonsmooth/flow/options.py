@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypedDict, cast
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import plain_start
 from nonsmooth.results.progress import Progress
-from nonsmooth.system.kinds import Default, above, at_least, within
+from nonsmooth.system.kinds import Default, above, at_least
 
 __all__ = [
     "LONGEST_RUN", "Campaign", "Length", "Settling", "Solver", "Varied", "Work", "as_called", "kept_of",
@@ -39,9 +39,9 @@ class Solver(TypedDict, total=False):
     """
 
     method: Annotated[Literal["auto", "exact", "taylor", "rkf45"], Default("auto")]
-    rtol: Annotated[float, within(1e-15, 1e-2)] | None
+    rtol: Annotated[float, at_least(1e-15, 1e-2)] | None
     atol: Any
-    order: Annotated[int, within(2, 30)] | None
+    order: Annotated[int, at_least(2, 30)] | None
     locate: Annotated[bool, Default(True)]
 
 

@@ -32,6 +32,7 @@ __all__ = ["check_complete", "run_length", "simulate"]
 
 SAMPLES_PER_PERIOD = 256
 SAMPLES = 4096
+MOST_STEPS = 1e9  # an hour and more
 
 
 @checked
@@ -99,6 +100,8 @@ def simulate(
     if not is_one_start(start):
         raise ValueError("simulate marches one trajectory: give one start; sweep and poincare take several")
     t_begin, t_end = transient * unit, transient * unit + length
+    if step is not None and t_end / step > MOST_STEPS:
+        raise ValueError(f"step = {step!r}: a run to t = {t_end:.6g} would take more than {MOST_STEPS:g} steps")
     traced = system.traced
     if ramps:
         from nonsmooth.flow.ramps import values_along, with_ramps

@@ -2,7 +2,7 @@
 
 ==============================================  =======================================================
 ``keep: Annotated[int, at_least(2)] = 100``     a whole number; 3.0 passes for 3; 2.5, True, "3" and NaN do not
-``budget: Annotated[float, above(0)] = 60``     a finite number; ``at_least``, ``within`` as well
+``budget: Annotated[float, above(0)] = 60``     a finite number; ``at_least`` as well, both with a largest
 ``judge: bool = True``                          yes or no, also 0 and 1 or of NumPy; no word
 ``side: Literal["up", "down", None] = "up"``    one of these
 ``rtol: float | None = None``                   that, or None
@@ -28,7 +28,7 @@ from nonsmooth.errors import shortened
 from nonsmooth.system.parameter import finite_number as real_number
 
 __all__ = [
-    "Default", "Limit", "Range", "above", "at_least", "reader_of", "real_number", "whole_number", "within", "yes_or_no",
+    "Default", "Limit", "Range", "above", "at_least", "reader_of", "real_number", "whole_number", "yes_or_no",
 ]  # fmt: skip
 
 Reader = Callable[[Any, str], Any]  # (what was given, the name of the argument) -> what the verb gets
@@ -45,16 +45,22 @@ class Default:
 
 @dataclass(frozen=True)
 class Limit:
-    """The least and the largest of a number, in words too."""
+    """The least and the largest of a number."""
 
-    words: str
-    low: float = -math.inf
+    low: float
     high: float = math.inf
     without_low: bool = False
 
     def holds(self, number: float) -> bool:
         """Return whether a number is within."""
         return self.low < number <= self.high if self.without_low else self.low <= number <= self.high
+
+    @property
+    def words(self) -> str:
+        """The limits in words."""
+        least = f"above {self.low:g}" if self.without_low else f"at least {self.low:g}"
+        least = {"above 0": "positive", "at least 0": "zero or more"}.get(least, least)
+        return least if self.high == math.inf else f"{least} and at most {self.high:g}"
 
 
 #: Two ends, the first below the second.
@@ -63,19 +69,12 @@ Range = Annotated[tuple[float, float], "rising"]
 
 def at_least(low: float, most: float = math.inf) -> Limit:
     """No less than ``low``."""
-    words = f"at least {low:g}" if low else "zero or more"
-    return Limit(words if most == math.inf else f"{words}, at most {most:g}", low, most)
+    return Limit(low, most)
 
 
 def above(low: float, most: float = math.inf) -> Limit:
     """More than ``low``."""
-    words = f"above {low:g}" if low else "positive"
-    return Limit(words if most == math.inf else f"{words}, at most {most:g}", low, most, without_low=True)
-
-
-def within(low: float, high: float) -> Limit:
-    """From ``low`` to ``high``, both included."""
-    return Limit(f"within {low:g} ... {high:g}", low, high)
+    return Limit(low, most, without_low=True)
 
 
 def whole_number(value: Any, name: str, least: int) -> int:
@@ -116,7 +115,7 @@ def reader_of(what: Any) -> Reader:
     if what is bool:
         return yes_or_no
     if what in (int, float):
-        return _number(what, Limit("", -_MOST))
+        return _number(what, Limit(-math.inf if what is float else -_MOST))
     kind = origin or what
     if kind in (Any, Sequence) or getattr(kind, "_is_protocol", False) or not isinstance(kind, type):
         return lambda value, name: value
