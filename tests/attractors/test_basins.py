@@ -189,3 +189,12 @@ def test_bad_planes_are_told_at_the_door(grid, options, message) -> None:
 def test_bad_boxes_are_told_at_the_door(box) -> None:
     with pytest.raises(ValueError, match="box|low"):
         basin_fractions(ns.models.discontinuous_support(), "g", [0.001], box=box, **QUIET)
+
+
+def test_where_no_run_settles_there_is_no_attractor() -> None:
+    """A Taylor series of order 2 does not hold a cycle to the tolerance of a judgement."""
+    s = ns.models.discontinuous_support(g=0.02, rho=0.14, omega=5.0)
+    found = ns.basin_fractions(
+        s, "rho", [0.14], n_starts=3, box={"x": (0.0, 0.01)}, transient=10, keep=12, order=2, progress=False
+    )
+    assert found.sizes["attractor"] == 0 and found["not_converged"].values == [1.0]

@@ -181,8 +181,8 @@ def test_wrong_arguments(arguments: tuple[object, ...], words: str) -> None:
     ("options", "words"),
     [
         ({"range": 3.0}, "two ends"), ({"range": (0.5, 1.5, 2.0)}, "two ends"), ({"range": (2.0, 0.5)}, "below"),
-        ({"range": (2.0, 3.0)}, "the system lies at a = 1.0, outside"), ({"step": 0}, "above 0"),
-        ({"step": -0.1}, "above 0"),
+        ({"range": (2.0, 3.0)}, "the system lies at a = 1.0, outside"), ({"step": 0}, "must be at least"),
+        ({"step": -0.1}, "must be at least"),
     ],
 )  # fmt: skip
 def test_wrong_arguments_of_an_equilibrium(options: dict[str, Any], words: str) -> None:
@@ -194,12 +194,12 @@ def test_wrong_arguments_of_an_equilibrium(options: dict[str, Any], words: str) 
 @pytest.mark.parametrize(
     ("ranges", "options", "words"),
     [
-        ({"omega": (3.9, 5.0), "rho": 0.2}, {}, "the range of rho = 0.2: give its two ends"),
+        ({"omega": (3.9, 5.0), "rho": 0.2}, {}, "rho.* = 0.2: give its two ends"),
         ({"omega": (3.9, 5.0), "rho": (0.2, 0.1)}, {}, "below"),
         ({"omega": (3.9, 5.0), "rho": (0.2, 0.3)}, {}, "the special point lies at rho = 0.14, outside"),
         ({"omega": (3.9, 5.0), "roh": (0.1, 0.3)}, {}, "nearest: rho"),
         ({"omega": (3.9, 5.0)}, {}, "two parameters"),
-        ({"omega": (3.9, 5.0), "rho": (0.1, 0.3)}, {"step": 0}, "above 0"),
+        ({"omega": (3.9, 5.0), "rho": (0.1, 0.3)}, {"step": 0}, "must be at least"),
     ],
 )  # fmt: skip
 def test_wrong_arguments_of_a_curve(ranges: Any, options: dict[str, Any], words: str, flip: xr.Dataset) -> None:

@@ -169,13 +169,13 @@ def test_what_has_no_manifolds_is_refused(tmp_path: Any) -> None:
     with pytest.raises(ValueError, match="has no unstable manifold that is a curve: 0 multipliers lie outside"):
         ns.manifolds(stable, kind="unstable")
     orbit = ns.find_orbit(linear(), period_number=1, transient=0, max_period=1)
-    with pytest.raises(ValueError, match='allowed: "both"'):
+    with pytest.raises(ValueError, match="allowed: 'both'"):
         ns.manifolds(orbit, kind="other")
     with pytest.raises(ValueError, match="length = -1"):
         ns.manifolds(orbit, length=-1)
     few = ns.manifolds(orbit, length=1.0, kind="unstable", distance=0.01, points=30)
     assert "largest number of points" in str(few["ended_because"].values[0])
-    with pytest.raises(TypeError, match="takes an Orbit"):
+    with pytest.raises(TypeError, match="orbit must be ns.Orbit"):
         ns.manifolds("orbit")
     short = ns.manifolds(orbit, length=1.0, kind="unstable", distance=0.2)
     ns.save(short, tmp_path / "m.nc")

@@ -168,8 +168,8 @@ def test_delays_and_rates(capsys):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"greatest_force": 0.0}, "greatest_force"), ({"greatest_position": 0.0}, "above 0"),
-        ({"greatest_position": (2, 1)}, "low < high"), ({"greatest_position": "far"}, "low, high"),
+        ({"greatest_force": 0.0}, "greatest_force"), ({"greatest_position": 0.0}, "positive"),
+        ({"greatest_position": (2, 1)}, "first end must be below"), ({"greatest_position": "far"}, "low, high"),
     ],
 )  # fmt: skip
 def test_limits_that_are_none_are_answered(given, message):

@@ -129,7 +129,7 @@ def test_ctrl_c_leaves_the_rig_without_a_force_and_keeps_the_points():
     ("changed", "message"),
     [
         ({"parameter": "frequenzy"}, "nearest: frequency"),
-        ({"range": (7.0, 6.0)}, "lower end"),
+        ({"range": (7.0, 6.0)}, "first end must be below"),
         ({"range": (4.0, 5.0)}, "begin within it"),
         ({"direction": "left"}, "'up', 'down'"),
         ({"holding": ns.Holding(harmonics=90, transient=0)}, "at most"),

@@ -102,7 +102,7 @@ def test_what_cannot_be_read_is_said(struck, text: str, words: str) -> None:
 def test_no_result_no_text(struck) -> None:
     with pytest.raises(TypeError, match="a result is wanted"):
         ns.region(3, "q < 1")
-    with pytest.raises(TypeError, match="condition is a condition such as"):
+    with pytest.raises(TypeError, match="condition must be text, not 3; a condition such as"):
         ns.region(struck, 3)
     without = struck[[name for name in struck if not str(name).startswith(("left", "right"))]]
     with pytest.raises(ValueError, match="loads=True"):

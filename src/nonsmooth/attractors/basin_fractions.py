@@ -16,12 +16,13 @@ from nonsmooth.attractors.basins_work import StartsWork, settled_from
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import inputs
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import real_number, swept_values
+from nonsmooth.flow.arguments import swept_values
 from nonsmooth.flow.options import Campaign, Varied, as_called, kept_of
 from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import random_starts, start_states
 from nonsmooth.results.memory import room_for
-from nonsmooth.system.arguments import at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -108,14 +109,11 @@ def basin_fractions(
     )
 
 
-def _starts(system: System, box: Any, n_starts: int, seed: int) -> Any:
+def _starts(system: System, box: Mapping[str, tuple[float, float]] | None, n_starts: int, seed: int) -> Any:
     form = ", ".join(f'"{name}": (low, high)' for name in system.states)
-    if not isinstance(box, Mapping) or not box:
+    if not box:
         raise ValueError(f"box = {shortened(box)}: give the box from which starts are drawn, box={{{form}}}")
-    for name, ends in box.items():
-        if np.shape(ends) != (2,):
-            raise ValueError(f"box[{name!r}] = {shortened(ends)}: give its lowest and highest value; box={{{form}}}")
-    low, high = ({name: real_number(ends[k], f"box[{name!r}]") for name, ends in box.items()} for k in (0, 1))
+    low, high = ({name: ends[k] for name, ends in box.items()} for k in (0, 1))
     return random_starts(n_starts, low, high, seed)
 
 
@@ -128,7 +126,7 @@ def _dataset(
     from nonsmooth.results.provenance import provenance
 
     numbers, n_starts, n = asked["values"], labels.shape[1], len(system.states)
-    count = np.stack([(labels == k).sum(axis=1) for k in range(n_attractors)], axis=1).reshape(len(numbers), -1)
+    count = (labels[:, None] == np.arange(n_attractors)[:, None]).sum(axis=2)
     fraction, error = share_errors(count, n_starts)
     period = np.full(count.shape, -1, dtype=np.int64)
     exponent, spread = np.full(count.shape, np.nan), np.full(count.shape, np.nan)

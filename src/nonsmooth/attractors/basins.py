@@ -22,7 +22,7 @@ from nonsmooth.attractors.settler import Settler, settler_for
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import CHUNK, STORED, inputs
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import float_array, real_number
+from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.engines.devices import BATCH
 from nonsmooth.flow.options import Campaign, as_called, kept_of
 from nonsmooth.flow.scales import warn_if_small
@@ -211,5 +211,5 @@ def _fixed(system: System, values: Mapping[str, Any], fixed: Any) -> FloatArray:
             raise ValueError(unknown(name, "a state", repr(system.name), dict(system.states)))
         if name in values:
             raise ValueError(f"state {name!r} is in the grid and in fixed; give it once")
-        rest[names.index(name)] = real_number(value, f"fixed {name!r}")
+        rest[names.index(name)] = value
     return rest

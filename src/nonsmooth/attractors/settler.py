@@ -247,14 +247,14 @@ class Settler:
 def settler_for(
     system: System, verb: str, options: Settling, *, carried: bool = False, **changes: Any
 ) -> Settler:  # fmt: skip
-    """The settler that a verb's options describe; what cannot be done on the device asked for is refused.
+    """The attractor mapper that a verb's options describe; what cannot be done on the device asked for is refused.
 
     Parameters
     ----------
     carried : bool
         Whether a state is carried from one parameter point to the next.
     **changes
-        Fields of the settler beyond its options.
+        Fields of the mapper beyond its options.
     """
     plan = section_plan(system, options["section"])[1]
     longest = longest_period(options["keep"], options["max_period"])

@@ -140,8 +140,8 @@ def _option(option: Option) -> dict[str, Any]:
 
 
 def _of_kind(kind: Any) -> dict[str, Any]:
-    """What a verb declares of an argument; anything where it declares nothing."""
-    from nonsmooth.system.arguments import Limit
+    """The values that a verb declares of an argument; any where it declares nothing."""
+    from nonsmooth.system.kinds import Limit
 
     parts = get_args(kind)
     if get_origin(kind) is Annotated:

@@ -2,40 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
-from nonsmooth.errors import SystemDefinitionError, shortened
-from nonsmooth.flow.arguments import real_number
+from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.kinds import at_least
 from nonsmooth.system.system import System
 
-__all__ = ["allowed_range", "largest_step", "limits"]
+__all__ = ["LargestStep", "allowed_range", "limits"]
 
 GRID = 65
 INSIDE = 1e-3  # of the range: the equations are singular at the edge itself
 
 
-def largest_step(step: Any) -> float:
-    """The largest step, checked."""
-    largest = real_number(step, "step")
-    if not 0 < largest <= 1:
-        raise ValueError(f"step = {step!r}: the largest step is above 0 and at most 1 (the branch's own size is 1)")
-    return largest
+#: The largest step along a branch, whose own size is 1.
+LargestStep = Annotated[float, at_least(1e-9, 1.0), "the branch's own size is 1"]
 
 
 def limits(
-    system: System, name: Any, given: Any, here: float | None, *, word: str = "range", what: str = "the orbit"
+    system: System, name: str, given: tuple[float, float], here: float | None, *, what: str = "the orbit"
 ) -> tuple[float, float]:
-    """The range given for a parameter, checked; ``here``: where ``what`` lies, which must be within it."""
-    if not isinstance(name, str) or name not in system.values:
+    """The range given for a parameter; ``here``: where ``what`` lies, which must be within it."""
+    if name not in system.values:
         system.with_parameters({str(name): 0.0})  # raises with the names there are
-    try:
-        low, high = (real_number(x, "an end of the range") for x in given)
-    except (TypeError, ValueError):
-        raise ValueError(f"{word} = {shortened(given)}: give its two ends, (low, high)") from None
-    if not low < high:
-        raise ValueError(f"{word} = {shortened(given)}: the first end must be below the second")
+    low, high = given
     if here is not None and not low <= here <= high:
         raise ValueError(f"{what} lies at {name} = {here!r}, outside the range {low!r} ... {high!r}")
     return low, high

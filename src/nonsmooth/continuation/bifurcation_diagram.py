@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.arguments import largest_step, limits
+from nonsmooth.continuation.arguments import LargestStep, limits
 from nonsmooth.continuation.branches.other_branches import SWITCHES
 from nonsmooth.continuation.branches.reading import read_branch
 from nonsmooth.continuation.continue_orbit import continue_orbit
@@ -17,9 +17,10 @@ from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.continuation.searches.search import Search, search_within
 from nonsmooth.continuation.special import special_points
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.arguments import check_system, real_number, whole_number
+from nonsmooth.flow.options import Varied, as_called
 from nonsmooth.results.progress import Progress
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, above, at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,20 +68,20 @@ def _branch(data: xr.Dataset, parent: int, level: int) -> _Branch:
     return _Branch(data, parent, level, data[data.attrs["parameter"]].values, returns_of(data))
 
 
-@by_name
+@checked
 def bifurcation_diagram(
     system: System,
-    parameter: str,
-    range: tuple[float, float],
+    parameter: Varied,
+    range: Range,
     *,
-    n: int = 101,
+    n: Annotated[int, at_least(2)] = 101,
     start: Any = None,
-    transient: int = 300,
-    depth: int = 3,
-    max_period: int = 8,
-    step: float = 0.05,
-    points: int = 2000,
-    budget: float = 60.0,
+    transient: Annotated[int, at_least(0)] = 300,
+    depth: Annotated[int, at_least(0)] = 3,
+    max_period: Annotated[int, at_least(1)] = 8,
+    step: LargestStep = 0.05,
+    points: Annotated[int, at_least(1)] = 2000,
+    budget: Annotated[float, above(0)] = 60.0,
     progress: Progress = True,
 ) -> xr.Dataset:
     """Compute the branches of periodic orbits over a range of a parameter, stable and unstable, with special points.
@@ -128,21 +129,17 @@ def bifurcation_diagram(
     SolveError
         No periodic orbit was found.
     """
-    check_system(system, "bifurcation_diagram")
+    asked = as_called(locals())
     if system.period() is None and not system.is_map:
         raise ValueError(
             f"{system.name!r} has no forcing: follow its equilibria with continue_equilibrium, its cycles with "
             "find_orbit and continue_orbit"
         )
     low, high = limits(system, parameter, range, None)
-    n, transient = whole_number(n, "n", 2), whole_number(transient, "transient", 0)
-    depth, points = whole_number(depth, "depth", 0), whole_number(points, "points", 1)
-    max_period = whole_number(max_period, "max_period", 1)
-    largest, seconds = largest_step(step), real_number(budget, "budget")
     swept = _swept(system, parameter, np.linspace(low, high, n), start, transient, max_period)
     found, complete = list[_Branch](), True
-    more: dict[str, Any] = {"step": largest, "points": points}
-    with search_within(seconds, "bifurcation_diagram", progress) as search:
+    more: dict[str, Any] = {"step": step, "points": points}
+    with search_within(budget, "bifurcation_diagram", progress) as search:
         for value, period, u in _periodic(swept, parameter):
             if any(int(one.data["period_number"]) == period and one.holds(value, u) for one in found):
                 continue
@@ -157,18 +154,14 @@ def bifurcation_diagram(
                 continue
             complete = _switched(found, depth, max_period, search, more, SAME * (high - low))
     if not found and not complete:
-        raise SolveError(f"the budget of {seconds:g} s was spent before a branch was found", status="budget")
+        raise SolveError(f"the budget of {budget:g} s was spent before a branch was found", status="budget")
     if not found:
         raise SolveError(
             f"no periodic orbit was found over {parameter} = {low!r} ... {high!r}: the sweeps show none up to period "
             f"{max_period}, or Newton's method converged to none of them. Give another start, range or transient",
             status="not_periodic",
         )
-    options = {
-        "parameter": parameter, "range": (low, high), "n": n, "transient": transient, "depth": depth,
-        "max_period": max_period, **more,
-    }  # fmt: skip
-    return _dataset(system, parameter, found, swept, options, complete)
+    return _dataset(system, parameter, found, swept, asked, complete)
 
 
 def _swept(system: System, name: str, values: FloatArray, start: Any, transient: int, most: int) -> xr.Dataset:

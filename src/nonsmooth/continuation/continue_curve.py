@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from nonsmooth.continuation.arguments import allowed_range, largest_step, limits
+from nonsmooth.continuation.arguments import LargestStep, allowed_range, limits
 from nonsmooth.continuation.branches.following import both_ways, dataset
 from nonsmooth.continuation.branches.reading import special_row
 from nonsmooth.continuation.branches.records import record_of
@@ -17,8 +17,8 @@ from nonsmooth.continuation.problems.locus import Locus
 from nonsmooth.continuation.problems.orbits import size_of
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.errors import SolveError, shortened
-from nonsmooth.flow.arguments import whole_number
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, at_least
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
@@ -27,10 +27,11 @@ if TYPE_CHECKING:
 __all__ = ["continue_curve"]
 
 
-@by_name
+@checked
 def continue_curve(
-    special_point: Any, ranges: Mapping[str, tuple[float, float]], *, step: float = 0.05, points: int = 1000
-) -> xr.Dataset:
+    special_point: Any, ranges: Mapping[str, Range], *, step: LargestStep = 0.05,
+    points: Annotated[int, at_least(1)] = 1000,
+) -> xr.Dataset:  # fmt: skip
     """Follow a fold, flip, Neimark-Sacker or grazing point in two parameters.
 
     Parameters
@@ -67,7 +68,6 @@ def continue_curve(
     from nonsmooth.results.branches import CURVE, SPECIAL
     from nonsmooth.results.labels import labels_of
 
-    largest, most = largest_step(step), whole_number(points, "points", 1)
     system, kind, own, point, period_number, _ = special_row(special_point, "continue_curve")
     if kind not in KINDS:
         raise ValueError(f"a {kind} has no curve here; possible: {', '.join(KINDS)}")
@@ -84,10 +84,10 @@ def continue_curve(
         raise SolveError(f"the curve of the {kind} could not be begun at this point", status="no_convergence")
     allowed = tuple((i - 2, *allowed_range(start, names[i], *ends)) for i, ends in enumerate(box))
     policy = AlongCurve(kind, shooting.forced)
-    within = Limits(allowed, largest, most, locus.landmark(first))
+    within = Limits(allowed, step, points, locus.landmark(first))
     record = both_ways(policy, within, first.turned(), [record_of(Row(first))], first)
     options = {
-        "ranges": {name: list(ends) for name, ends in zip(names, box, strict=True)}, "step": largest, "points": most,
+        "ranges": {name: list(ends) for name, ends in zip(names, box, strict=True)}, "step": step, "points": points,
         "kind": kind,
     }  # fmt: skip
     more = {
@@ -99,15 +99,15 @@ def continue_curve(
     return dataset(system, "continue_curve", values, (CURVE, SPECIAL), record, policy, options, more, {})
 
 
-def _box(system: System, ranges: Any) -> tuple[tuple[str, str], list[tuple[float, float]]]:
+def _box(system: System, ranges: Mapping[str, Range]) -> tuple[tuple[str, str], list[Range]]:
     """The two parameters and their ranges, which hold the system's own values."""
-    if not isinstance(ranges, Mapping) or len(ranges) != 2:
+    if len(ranges) != 2:
         raise ValueError(
             'ranges names two parameters with their ends, {"omega": (3, 7), "rho": (0.1, 0.3)}; '
             f"not {shortened(ranges)}"
         )
     box = [
-        limits(system, name, ends, system.values.get(name), word=f"the range of {name}", what="the special point")
+        limits(system, name, ends, system.values.get(name), what="the special point")
         for name, ends in ranges.items()
     ]
     first, second = ranges

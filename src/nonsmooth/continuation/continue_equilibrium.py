@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from nonsmooth.continuation.arguments import allowed_range, largest_step, limits
+from nonsmooth.continuation.arguments import LargestStep, allowed_range, limits
 from nonsmooth.continuation.branches.following import both_ways, dataset
 from nonsmooth.continuation.branches.records import record_of
 from nonsmooth.continuation.events.of_equilibria import AlongEquilibria, beyond
 from nonsmooth.continuation.march.march import Limits, Row
 from nonsmooth.continuation.problems.equilibrium import Rest, equilibria_near
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.arguments import check_system, whole_number
 from nonsmooth.flow.mode_fields import MOST, every_mode
+from nonsmooth.flow.options import Varied
 from nonsmooth.flow.starts import first_state
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, at_least
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
@@ -25,16 +26,16 @@ if TYPE_CHECKING:
 __all__ = ["continue_equilibrium"]
 
 
-@by_name
+@checked
 def continue_equilibrium(
     system: System,
-    parameter: str,
-    range: tuple[float, float],
+    parameter: Varied,
+    range: Range,
     *,
     start: Any = None,
     mode: str | None = None,
-    step: float = 0.02,
-    points: int = 1000,
+    step: LargestStep = 0.02,
+    points: Annotated[int, at_least(1)] = 1000,
 ) -> xr.Dataset:
     """Follow an equilibrium of an autonomous system in a parameter.
 
@@ -74,14 +75,12 @@ def continue_equilibrium(
     """
     from nonsmooth.results.branches import EQUILIBRIUM, SPECIAL_EQUILIBRIUM
 
-    check_system(system, "continue_equilibrium")
     if every_mode(system.traced, system.parameter_vector()) is None:
         raise ValueError(f"{system.name!r} has more than {MOST} combinations of contact states: take fewer elements")
     if system.depends_on_time:
         raise ValueError(f"{system.name!r} depends on time: it has no equilibria; find_orbit finds its periodic orbits")
     low, high = limits(system, parameter, range, system.values.get(parameter), what="the system")
     here = system.values[parameter]
-    largest, most = largest_step(step), whole_number(points, "points", 1)
     state = first_state(system, start, mode)
     modes = None if mode is None else [list(system.modes).index(mode)]
     first: Rest | None = None
@@ -98,9 +97,9 @@ def continue_equilibrium(
         )
     box = ((-1, *allowed_range(system, parameter, low, high)),)
     policy, ahead = AlongEquilibria(), first.facing(1.0)
-    record = both_ways(policy, Limits(box, largest, most), first.facing(-1.0), [record_of(Row(ahead))], ahead)
+    record = both_ways(policy, Limits(box, step, points), first.facing(-1.0), [record_of(Row(ahead))], ahead)
     options = {
-        "parameter": parameter, "range": (low, high), "step": largest, "points": most, "mode": mode,
+        "parameter": parameter, "range": (low, high), "step": step, "points": points, "mode": mode,
         "start": [float(x) for x in state.u],
     }  # fmt: skip
     values, tables = {parameter: [point.value for point in record.points]}, (EQUILIBRIUM, SPECIAL_EQUILIBRIUM)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from nonsmooth.continuation.arguments import largest_step
+from nonsmooth.continuation.arguments import LargestStep
 from nonsmooth.continuation.branches.following import Asked, Start, curve_of
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.branches.other_branches import born, straight_on, switched
@@ -14,8 +14,8 @@ from nonsmooth.continuation.branches.reading import read_branch
 from nonsmooth.continuation.branches.records import record_of
 from nonsmooth.continuation.march.march import March, Row
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.arguments import whole_number
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 __all__ = ["continue_orbit"]
 
 
-@by_name
+@checked
 def continue_orbit(
     start: Any,
     parameter: str | None = None,
-    range: tuple[float, float] | None = None,
+    range: Range | None = None,
     *,
-    step: float = 0.05,
-    points: int = 2000,
+    step: LargestStep = 0.05,
+    points: Annotated[int, at_least(1)] = 2000,
     virtual: bool = False,
 ) -> xr.Dataset:
     """Follow a periodic orbit in a parameter.
@@ -76,7 +76,7 @@ def continue_orbit(
     Pseudo-arclength continuation of the multiple-shooting equations in scaled unknowns. Special points are zeros of
     functions along the branch, found by Brent's method on orbits corrected to rounding.
     """
-    asked = Asked(range, largest_step(step), whole_number(points, "points", 1), bool(virtual))
+    asked = Asked(range, step, points, virtual)
     if isinstance(start, Orbit):
         return _from_orbit(start, parameter, asked)
     if hasattr(start, "data_vars"):

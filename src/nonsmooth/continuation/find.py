@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -26,15 +26,16 @@ from nonsmooth.continuation.searches.settled import (
     touching,
 )
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.arguments import check_system, real_number, whole_number
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.loads import checked_loads
+from nonsmooth.flow.options import as_called
 from nonsmooth.flow.scales import warn_if_slow
-from nonsmooth.flow.starts import first_state, plain_start
+from nonsmooth.flow.starts import first_state
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import above, at_least
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.searches.search import Search
@@ -52,16 +53,16 @@ NEUTRAL = 1e-2  # a multiplier nearer to 1 than this explains that Newton's meth
 SLOW = 3.0  # or of the distance that its multipliers give for that gap
 
 
-@by_name
+@checked
 def find_orbit(
     system: System,
     *,
     start: Any = None,
-    period_number: int | None = None,
-    transient: int = 500,
-    max_period: int = 32,
+    period_number: Annotated[int, at_least(1)] | None = None,
+    transient: Annotated[int, at_least(0)] = 500,
+    max_period: Annotated[int, at_least(1)] = 32,
     loads: bool = False,
-    budget: float = 60.0,
+    budget: Annotated[float, above(0)] = 60.0,
     progress: Progress = True,
 ) -> Orbit:
     """Find a periodic orbit from a simulation: period, signature and phases are read off it, Newton does the rest.
@@ -102,26 +103,16 @@ def find_orbit(
     ValueError, TypeError
         Arguments that do not fit.
     """
-    check_system(system, "find_orbit")
+    asked = as_called(locals())
     if system.explicit_time:
         raise ValueError(f"{system.name!r} depends on time without a period: it has no periodic orbits")
-    if period_number is not None:
-        period_number = whole_number(period_number, "period_number", 1)
-    transient, max_period = whole_number(transient, "transient", 0), whole_number(max_period, "max_period", 1)
-    seconds = real_number(budget, "budget")
-    if not seconds > 0:
-        raise ValueError(f"budget = {budget!r}: a search takes a positive number of seconds")
     wanted = bool(checked_loads(system, loads, "find_orbit"))
     state = first_state(system, start)
-    with search_within(seconds, "find_orbit", progress, looks=True) as search:
+    with search_within(budget, "find_orbit", progress, looks=True) as search:
         guesses = _guesses(system, state, period_number, transient, max_period, search)
         orbit = _polished(system, guesses, period_number is not None, transient == 0, search)
     warn_if_slow(system, orbit.maximum, orbit.minimum)
-    options = {
-        "start": plain_start(system, start), "period_number": period_number, "transient": transient,
-        "max_period": max_period, **({"loads": True} if wanted else {}),
-    }  # fmt: skip
-    return replace(orbit.with_loads() if wanted else orbit, options=options)
+    return replace(orbit.with_loads() if wanted else orbit, options=asked)
 
 
 def _guesses(

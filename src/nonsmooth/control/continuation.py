@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
@@ -18,11 +18,11 @@ from nonsmooth.control.release import UNKNOWN
 from nonsmooth.control.release import release as let_go
 from nonsmooth.control.rig import Rig
 from nonsmooth.errors import Interrupted, SolveError, shortened
-from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as bar
 from nonsmooth.results.provenance import options_as_data, package_version
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, above, at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,17 +33,17 @@ PER_HARMONIC = 2.5  # samples
 MOST_HARMONICS = 20
 
 
-@by_name
+@checked
 def control_based_continuation(
     rig: Rig,
     parameter: str,
-    range: tuple[float, float],
+    range: Range,
     *,
-    frequency: float,
+    frequency: Annotated[float, above(0)],
     amplitude: float,
-    direction: str = "up",
-    step: float = 0.1,
-    points: int = 100,
+    direction: Literal["up", "down"] = "up",
+    step: Annotated[float, above(0)] = 0.1,
+    points: Annotated[int, at_least(1)] = 100,
     holding: Holding = Holding(),  # noqa: B008  it is frozen
     progress: Progress = True,
 ) -> xr.Dataset:
@@ -133,22 +133,15 @@ def control_based_continuation(
     """
     names = _names(rig)
     course = course_of(names, parameter, range, frequency, amplitude, direction)
-    if real_number(step, "step") <= 0:
-        raise ValueError(f"step = {step!r} must be positive")
-    most = whole_number(points, "points", 1)
-    if not isinstance(holding, Holding):
-        raise TypeError(f"holding = {shortened(holding)}: give Holding(mass=..., gains=..., ...)")
     guard = Guard(rig, *holding.positions)
     branch = _Branch(Holder(guard, holding, holding.mass_of(rig)), course, names)
-    options = {**asdict(course), "step": step, "points": points, "holding": asdict(holding)}
-    record = {
-        "version": package_version(), "verb": "control_based_continuation", "rig": type(rig).__name__,
-        "options": options_as_data(options),
-    }  # fmt: skip
+    options = options_as_data({**asdict(course), "step": step, "points": points, "holding": asdict(holding)})
+    record: dict[str, Any] = {"version": package_version(), "verb": "control_based_continuation"}
+    record |= {"rig": type(rig).__name__, "options": options}
     try:
         branch.begin()
-        with bar(most, "control-based continuation", progress) as advance:
-            ending = branch.follow(step, most, advance)
+        with bar(points, "control-based continuation", progress) as advance:
+            ending = branch.follow(step, points, advance)
     except KeyboardInterrupt as error:
         if not branch.points:
             raise

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from nonsmooth.control.held import Held
 from nonsmooth.control.outcome import Names
-from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import real_number
 from nonsmooth.system.names import unknown
 
 __all__ = ["Course", "course_of"]
@@ -39,7 +36,7 @@ class Course:
 
 
 def course_of(
-    names: Names, parameter: Any, range: Any, frequency: float, amplitude: float, direction: str
+    names: Names, parameter: str, range: tuple[float, float], frequency: float, amplitude: float, direction: str
 ) -> Course:
     """The course that was asked for, checked.
 
@@ -52,24 +49,8 @@ def course_of(
     known = own | {names.frequency: "frequency", names.amplitude: "amplitude"}
     if parameter not in known:
         raise ValueError(unknown(parameter, "a parameter", "the drive", known))
-    low, high = _limits(range)
-    begin = {"frequency": real_number(frequency, "frequency"), "amplitude": real_number(amplitude, "amplitude")}
-    if begin["frequency"] <= 0:
-        raise ValueError(f"frequency = {frequency!r}: the angular frequency of the drive is positive")
-    varied = known[parameter]
+    (low, high), varied = range, known[parameter]
+    begin = {"frequency": frequency, "amplitude": amplitude}
     if not low <= begin[varied] <= high:
         raise ValueError(f"{varied} = {begin[varied]!r} lies outside the range {low:g} ... {high:g}: begin within it")
-    if direction not in ("up", "down"):
-        raise ValueError(f"direction = {direction!r}; allowed: 'up', 'down'")
     return Course(varied, low, high, rising=direction == "up", **begin)
-
-
-def _limits(given: Any) -> tuple[float, float]:
-    try:
-        low, high = given
-    except (TypeError, ValueError):
-        raise ValueError(f"range = {shortened(given)}: give (low, high)") from None
-    low, high = real_number(low, "the lower end of the range"), real_number(high, "the upper end of the range")
-    if not low < high:
-        raise ValueError(f"range = ({low:g}, {high:g}): the lower end comes first")
-    return low, high

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
-from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import real_number, whole_number
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, above, at_least, real_number
 
 __all__ = ["Holding"]
 
-#: Turns of the drive, with the fewest that make sense.
-TURNS = {"transient": 0, "settle": 1, "record": 3, "release": 0}
 
-
+@checked
 @dataclass(frozen=True, kw_only=True)
 class Holding:
     r"""Gains and limits of the controller, and the turns of the drive that each measurement takes.
@@ -52,35 +50,26 @@ class Holding:
         Values that make no sense.
     """
 
-    mass: float | None = None
-    gains: tuple[float, float] | None = None
-    greatest_force: float | None = None
-    greatest_position: float | tuple[float, float] | None = None
-    harmonics: int | None = None
-    transient: int = 50
-    settle: int = 5
-    record: int = 10
-    release: int = 12
-    tolerance: float = 1e-3
+    mass: Annotated[float, above(0)] | None = None
+    gains: Annotated[tuple[float, float], "give (K_p, K_d), two numbers"] | None = None
+    greatest_force: Annotated[float, above(0)] | None = None
+    greatest_position: Annotated[float, above(0)] | Range | None = None
+    harmonics: Annotated[int, at_least(1)] | None = None
+    transient: Annotated[int, at_least(0)] = 50
+    settle: Annotated[int, at_least(1)] = 5
+    record: Annotated[int, at_least(3)] = 10
+    release: Annotated[int, at_least(0)] = 12
+    tolerance: Annotated[float, above(0)] = 1e-3
 
     def __post_init__(self) -> None:
-        checked: dict[str, Any] = {name: whole_number(getattr(self, name), name, n) for name, n in TURNS.items()}
-        if self.harmonics is not None:
-            checked["harmonics"] = whole_number(self.harmonics, "harmonics", 1)
-        optional = {"mass": self.mass, "greatest_force": self.greatest_force}
-        positive = {"tolerance": self.tolerance} | {name: one for name, one in optional.items() if one is not None}
-        for name, value in positive.items():
-            if real_number(value, name) <= 0:
-                raise ValueError(f"{name} = {value!r} must be positive")
-        checked["gains"] = _gains(self.gains)
-        checked["greatest_position"] = _range(self.greatest_position)
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)
+        if self.gains is not None and self.gains[1] <= 0:
+            raise ValueError(f"K_d = {self.gains[1]:g}: without damping the controller holds nothing; give more than 0")
 
     @property
     def positions(self) -> tuple[float, float]:
         """Least and greatest reading."""
-        return self.greatest_position or (-math.inf, math.inf)  # type: ignore[return-value]  # made a pair above
+        far = math.inf if self.greatest_position is None else self.greatest_position
+        return far if isinstance(far, tuple) else (-far, far)
 
     def mass_of(self, rig: Any) -> float:
         """Mass from which the gains follow; 1 where they are given.
@@ -101,28 +90,3 @@ class Holding:
         if real_number(mass, "mass") <= 0:
             raise ValueError(f"mass = {mass!r} of the rig must be positive")
         return float(mass)
-
-
-def _gains(given: Any) -> tuple[float, float] | None:
-    if given is None:
-        return None
-    try:
-        proportional, derivative = (real_number(one, "gains") for one in given)
-    except (TypeError, ValueError):
-        raise ValueError(f"gains = {shortened(given)}: give (K_p, K_d), two numbers") from None
-    if derivative <= 0:
-        raise ValueError(f"K_d = {derivative:g}: without damping the controller holds nothing; give more than 0")
-    return proportional, derivative
-
-
-def _range(given: Any) -> tuple[float, float] | None:
-    if given is None:
-        return None
-    pair = given if isinstance(given, tuple | list) else (-given, given) if isinstance(given, int | float) else ()
-    try:
-        low, high = (real_number(one, "greatest_position") for one in pair)
-    except (TypeError, ValueError):
-        raise ValueError(f"greatest_position = {shortened(given)}: give a number, or (low, high)") from None
-    if not low < high:
-        raise ValueError(f"greatest_position = {shortened(given)}: give a number above 0, or (low, high), low < high")
-    return low, high

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
 from nonsmooth.control.actuated import FORCE, actuated
-from nonsmooth.flow.arguments import check_system, real_number, whole_number
+from nonsmooth.flow.arguments import real_number
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.system.names import by_name, unknown
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import above, at_least
+from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -64,7 +66,7 @@ class SimulatedRig:
     >>> phase, position = rig.read()
     """
 
-    @by_name
+    @checked
     def __init__(
         self,
         system: System,
@@ -74,29 +76,23 @@ class SimulatedRig:
         mass: str | float = "m",
         frequency: str = "omega",
         amplitude: str = "rho",
-        rate: float = 100.0,
-        resolution: float = 0.0,
-        noise: float = 0.0,
-        jitter: float = 0.0,
-        seed: int = 0,
+        rate: Annotated[float, above(0), "samples per unit of time"] = 100.0,
+        resolution: Annotated[float, at_least(0)] = 0.0,
+        noise: Annotated[float, at_least(0)] = 0.0,
+        jitter: Annotated[float, at_least(0)] = 0.0,
+        seed: Annotated[int, at_least(0)] = 0,
         start: Any = None,
-        method: str = "auto",
+        method: Literal["auto", "exact", "taylor", "rkf45"] = "auto",
     ) -> None:
         from nonsmooth.flow.engines.methods import engine_for
         from nonsmooth.flow.starts import first_state
 
-        check_system(system, "SimulatedRig")
         if position not in system.states:
             raise ValueError(unknown(position, "a state", repr(system.name), system.states))
         for name in (frequency, amplitude):
             if name not in system.parameters:
                 known = {key: one.unit for key, one in system.parameters.items()}
                 raise ValueError(unknown(name, "a parameter", repr(system.name), known))
-        for word, number in (("resolution", resolution), ("noise", noise), ("jitter", jitter)):
-            if real_number(number, word) < 0:
-                raise ValueError(f"{word} = {number!r} must not be negative")
-        if real_number(rate, "rate") <= 0:
-            raise ValueError(f"rate = {rate!r}: samples per unit of time, more than 0")
         self.names = {"frequency": frequency, "amplitude": amplitude, "position": position, "velocity": velocity}
         self.units = {name: system.parameters[name].unit for name in (frequency, amplitude)} | dict(system.states)
         self.mass = float(system.values[mass]) if isinstance(mass, str) and mass in system.values else mass
@@ -107,7 +103,7 @@ class SimulatedRig:
         self._state = first_state(self._system, start)
         self._place = list(system.states).index(position)
         self._memory = list(self._system.memory).index(FORCE)
-        self._rng = np.random.default_rng(whole_number(seed, "seed", 0))
+        self._rng = np.random.default_rng(seed)
         self._tables: Any = None
         self._due = 1.0 / self.rate  # until the next sample
         self._late = 0.0  # of the last sample, by jitter

@@ -25,7 +25,8 @@ from nonsmooth.flow.simulate import simulate
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
-from nonsmooth.system.arguments import at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import at_least
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, Unpack, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack, cast
 
 import numpy as np
 
@@ -20,7 +20,8 @@ from nonsmooth.flow.loads import Quantities, checked_loads
 from nonsmooth.flow.options import Campaign, as_called, kept_of, workers_of
 from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import is_one_start, start_states
-from nonsmooth.system.arguments import at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,7 +40,7 @@ def chart(
     grid: Mapping[str, Any],
     *,
     start: Any = None,
-    carry: Annotated[Mapping[str, str], 'write carry={"rho": "up"} (or "down")'] | None = None,
+    carry: Annotated[Mapping[str, Literal["up", "down"]], 'write carry={"rho": "up"} (or "down")'] | None = None,
     stop_early: bool = True,
     extremes: bool = True,
     loads: bool = False,
@@ -191,13 +192,9 @@ def _corners(system: System, values: Mapping[str, FloatArray]) -> FloatArray:
 def _carry(values: Mapping[str, FloatArray], carry: Any) -> tuple[str, str] | None:
     if carry is None:
         return None
-    form = f'carry={{"{next(iter(values))}": "up"}} (or "down")'
-    if not isinstance(carry, Mapping) or len(carry) != 1:
-        raise ValueError(f"carry = {shortened(carry)}: the state is carried along one parameter; write {form}")
-    ((name, direction),) = carry.items()
-    if name not in values or direction not in ("up", "down"):
-        raise ValueError(f"carry = {shortened(carry)}: allowed are the grid's parameters {list(values)}; write {form}")
-    return name, direction
+    if len(carry) != 1 or not carry.keys() <= values.keys():
+        raise ValueError(f"carry = {shortened(carry)}: the state is carried along one of the grid's {list(values)}")
+    return next(iter(carry.items()))
 
 
 def _axes(values: Mapping[str, FloatArray], along: tuple[str, str] | None) -> tuple[dict[str, FloatArray], Any]:

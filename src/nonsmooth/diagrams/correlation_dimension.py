@@ -13,14 +13,15 @@ P. Grassberger, I. Procaccia, Physica D 9 (1983) 189-208; J. Theiler, Phys. Rev.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import float_array, real_number, whole_number
+from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.engines.engine import FloatArray
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,9 +36,9 @@ LEAST_DECADES = 0.8
 BLOCK = 256  # points that are near each other, whose neighbours are counted at once
 
 
-@by_name
+@checked
 def correlation_dimension(
-    section: Any, *, window: int = 1, scale: Any = None, range: tuple[float, float] | None = None
+    section: Any, *, window: Annotated[int, at_least(0)] = 1, scale: Any = None, range: Range | None = None
 ) -> xr.Dataset:
     """Correlation dimension of section points, with the scaling range it rests on (Grassberger and Procaccia).
 
@@ -74,7 +75,6 @@ def correlation_dimension(
     import xarray as xr
 
     points = _points(section)
-    window = whole_number(window, "window", 0)
     size = points.std(axis=0) if scale is None else float_array(scale, "scale")
     if np.shape(size) != points.shape[1:] or not np.isfinite(size).all() or (np.asarray(size) < 0).any():
         raise ValueError(
@@ -188,11 +188,8 @@ def _range(radius: FloatArray, slope: FloatArray, pairs: FloatArray, extent: flo
     return float(radius[steadiest[0]]), float(radius[steadiest[1]])
 
 
-def _given(limits: Any, radius: FloatArray) -> tuple[float, float]:
-    try:
-        low, high = (real_number(value, "an end of the range") for value in limits)
-    except (TypeError, ValueError):
-        raise ValueError(f"range = {shortened(limits)}: give its two ends, (low, high)") from None
+def _given(limits: tuple[float, float], radius: FloatArray) -> tuple[float, float]:
+    low, high = limits
     if not radius[0] <= low < high <= radius[-1] * (1 + 1e-9):
-        raise ValueError(f"range = {shortened(limits)} must rise and lie within {radius[0]:.3g} ... {radius[-1]:.3g}")
+        raise ValueError(f"range = {shortened(limits)} must lie within {radius[0]:.3g} ... {radius[-1]:.3g}")
     return low, high

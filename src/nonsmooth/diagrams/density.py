@@ -5,13 +5,11 @@ The points of one parameter value at a time are run into a buffer, counted there
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import real_number
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -28,24 +26,15 @@ def given_ranges(system: System, density: Any) -> dict[str, tuple[float, float]]
 
     Raises
     ------
-    ValueError, TypeError
-        A name that is no state, limits that are none.
+    ValueError
+        A name that is no state.
     """
     if density is True:
         return {}
-    first = next(iter(system.states))
-    form = f'density=True, or density={{"{first}": (lowest, highest)}}'
-    ranges = {}
-    for name, limits in density.items():
+    for name in density:
         if name not in system.states:
             raise ValueError(f"density names {name!r}, which is not a state; states: {', '.join(system.states)}")
-        if not isinstance(limits, Sequence | np.ndarray) or isinstance(limits, str) or len(limits) != 2:
-            raise ValueError(f"density of {name!r} is {shortened(limits)}; write {form}")
-        low, high = (real_number(one, f"a limit of {name!r}") for one in limits)
-        if not (np.isfinite([low, high]).all() and low < high):
-            raise ValueError(f"density of {name!r} from {low} to {high}: the first limit must be less than the second")
-        ranges[name] = (low, high)
-    return ranges
+    return dict(density)
 
 
 def coarse_values(numbers: FloatArray) -> FloatArray:

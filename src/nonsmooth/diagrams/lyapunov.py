@@ -32,7 +32,7 @@ from nonsmooth.flow.engines.devices import on_gpu
 from nonsmooth.flow.engines.engine import FloatArray, IntArray, State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import solve_error
-from nonsmooth.flow.options import Length, Solver, Varied, as_called, solver_of
+from nonsmooth.flow.options import LONGEST_RUN, Length, Solver, Varied, as_called, solver_of
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state, is_one_start
@@ -40,7 +40,8 @@ from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 from nonsmooth.results.statuses import EQUILIBRIA
-from nonsmooth.system.arguments import at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,7 +63,7 @@ def lyapunov(
     direction: Literal["up", "down", None] = "up",
     periods: Annotated[int, at_least(1)] | None = None,
     duration: Length | None = None,
-    transient: Annotated[float, at_least(0)] | None = None,
+    transient: Annotated[float, at_least(0, LONGEST_RUN)] | None = None,
     start: Any = None,
     mode: str | None = None,
     device: Literal["cpu", "cuda"] = "cpu",

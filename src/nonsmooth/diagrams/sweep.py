@@ -24,7 +24,8 @@ from nonsmooth.flow.options import Settling, Varied, as_called, workers_of
 from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.results.memory import room_for
-from nonsmooth.system.arguments import at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import Range, at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,7 +50,7 @@ def sweep(
     judge: bool = True,
     extremes: bool = True,
     loads: bool = False,
-    density: Annotated[bool | Mapping[str, Any], 'write density=True, or {"x": (lowest, highest)}'] = False,
+    density: Annotated[bool | Mapping[str, Range], 'write density=True, or {"x": (lowest, highest)}'] = False,
     bins: Annotated[int, at_least(1)] = 400,
     **options: Unpack[Settling],
 ) -> xr.Dataset:
@@ -128,12 +129,7 @@ def sweep(
     carried = direction is not None
     settler = settler_for(system, "sweep", options, carried=carried, stop_early=False, device="cpu")
     gpu = options["device"] == "cuda"
-    if judge and not extremes:
-        raise ValueError("a period number rests on the size of the motion: give judge=False with extremes=False")
-    if not judge and (gpu or density is not False):
-        raise ValueError('judge=False records section points on the processor: leave out density and device="cuda"')
-    if gpu and density is not False:
-        raise ValueError('section points are counted on the processor: leave out density, or device="cuda"')
+    _refuse_together(judge, extremes, density is not False, gpu)
     threads, starts = workers_of(options), start_states(system, start)
     settler = replace(
         settler, plan=settler.plan._replace(extremes=extremes), max_period=settler.max_period if judge else 0
@@ -168,6 +164,16 @@ def sweep(
     return work.dataset(asked, squeeze)
 
 
+def _refuse_together(judge: bool, extremes: bool, counted: bool, gpu: bool) -> None:
+    """ValueError for options that exclude each other."""
+    if judge and not extremes:
+        raise ValueError("a period number rests on the size of the motion: give judge=False with extremes=False")
+    if not judge and (gpu or counted):
+        raise ValueError('judge=False records section points on the processor: leave out density and device="cuda"')
+    if gpu and counted:
+        raise ValueError('section points are counted on the processor: leave out density, or device="cuda"')
+
+
 @dataclass
 class _Sweep:
     """A sweep that has been checked: its points, how they settle, and what is kept of them."""
@@ -194,7 +200,7 @@ class _Sweep:
 
     @cached_property
     def slots(self) -> dict[tuple[int, int], Slot]:
-        """What is kept of each direction and start."""
+        """Points, verdicts and loads of each direction and start."""
         both = product(range(len(self.directions)), range(len(self.starts)))
         return {key: Slot(self.settler, self.points, self.edges, self.measured) for key in both}
 

@@ -15,14 +15,15 @@ the mean is taken out beforehand, so that the oscillation of Eq. 3.3 is zero).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from nonsmooth.flow.arguments import float_array, whole_number
+from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.results.memory import room_for
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,8 +33,10 @@ __all__ = ["zero_one_test"]
 LEAST = 100
 
 
-@by_name
-def zero_one_test(section: Any, *, n_frequencies: int = 100, seed: int = 0) -> xr.DataArray:
+@checked
+def zero_one_test(
+    section: Any, *, n_frequencies: Annotated[int, at_least(1)] = 100, seed: Annotated[int, at_least(0)] = 0
+) -> xr.DataArray:
     """K of the 0-1 test for every state: near 0 for regular motion, near 1 for chaos.
 
     Parameters
@@ -58,8 +61,6 @@ def zero_one_test(section: Any, *, n_frequencies: int = 100, seed: int = 0) -> x
     """
     import xarray as xr
 
-    n_frequencies = whole_number(n_frequencies, "n_frequencies", 1)
-    seed = whole_number(seed, "seed", 0)
     data = section["section"] if hasattr(section, "data_vars") and "section" in section else section
     if not isinstance(data, xr.DataArray):
         if hasattr(data, "data_vars"):

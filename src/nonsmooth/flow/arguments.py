@@ -8,7 +8,8 @@ import numpy as np
 
 from nonsmooth.errors import shortened
 from nonsmooth.flow.engines.engine import FloatArray
-from nonsmooth.system.arguments import check_system, real_number, whole_number, yes_or_no
+from nonsmooth.system.arguments import check_system
+from nonsmooth.system.kinds import real_number, whole_number, yes_or_no
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import float_array, real_number
+from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.engines.engine import Changes
 from nonsmooth.flow.saltation import Jump
+from nonsmooth.system.arguments import checked
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
@@ -21,9 +22,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Course", "Driven", "Input", "driven"]
 
-BETWEEN = ("linear", "steps")
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Input:
     """Samples of an input of a system: linear between them, or held until the next.
@@ -51,14 +52,10 @@ class Input:
 
     time: Any
     values: Any = None
-    between: str = "linear"
+    between: Literal["linear", "steps"] = "linear"
     delay: float | str = 0.0
 
     def __post_init__(self) -> None:
-        if self.between not in BETWEEN:
-            raise ValueError(f"between = {self.between!r}; allowed: {', '.join(map(repr, BETWEEN))}")
-        if not isinstance(self.delay, str):
-            object.__setattr__(self, "delay", real_number(self.delay, "delay"))
         if isinstance(self.time, str) and self.values is None:
             return
         t, y = float_array(self.time, "the time of an input"), float_array(self.values, "the values of an input")

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.arguments import yes_or_no
 from nonsmooth.flow.engines.engine import FloatArray, Log, State
 from nonsmooth.flow.outputs import output_values
 from nonsmooth.kernels.hybrid import codes
@@ -326,15 +325,15 @@ def meter_of(system: System) -> Meter | None:
     return found
 
 
-def checked_loads(system: System, wanted: Any, verb: str) -> Quantities:
+def checked_loads(system: System, wanted: bool, verb: str) -> Quantities:
     """The quantities of a system whose loads are wanted; none where they are not.
 
     Raises
     ------
-    ValueError, TypeError
-        A system that has none; a word that is not True or False.
+    ValueError
+        A system that has none.
     """
-    if not yes_or_no(wanted, "loads"):
+    if not wanted:
         return {}
     meter = meter_of(system)
     if meter is None or not meter.per_period:

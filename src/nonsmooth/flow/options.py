@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypedDict
+from typing import Annotated, Any, Literal, TypedDict, cast
 
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import plain_start
 from nonsmooth.results.progress import Progress
-from nonsmooth.system.arguments import Default, above, at_least, within
+from nonsmooth.system.kinds import Default, above, at_least
 
 __all__ = [
-    "Campaign", "Length", "Settling", "Solver", "Varied", "Work", "as_called", "kept_of", "longest_period", "solver_of",
-    "workers_of",
+    "LONGEST_RUN", "Campaign", "Length", "Settling", "Solver", "Varied", "Work", "as_called", "kept_of",
+    "longest_period", "solver_of", "workers_of",
 ]  # fmt: skip
 
 
+LONGEST_RUN = 1e12  # periods, or units of time: what is longer does not end
 #: Of a run, in periods or in time.
-Length = Annotated[float, above(0), "it is the length of a run"]
+Length = Annotated[float, above(0, LONGEST_RUN), "it is the length of a run"]
 #: The parameter that a verb varies.
 Varied = Annotated[str, 'the parameter is given by its name in quotes, as "rho", before its values']
 
 
 class Solver(TypedDict, total=False):
-    """How a trajectory is computed.
+    """The way a trajectory is computed.
 
     Parameters
     ----------
@@ -38,9 +39,9 @@ class Solver(TypedDict, total=False):
     """
 
     method: Annotated[Literal["auto", "exact", "taylor", "rkf45"], Default("auto")]
-    rtol: Annotated[float, within(1e-15, 1e-2)] | None
+    rtol: Annotated[float, at_least(1e-15, 1e-2)] | None
     atol: Any
-    order: Annotated[int, within(2, 30)] | None
+    order: Annotated[int, at_least(2, 30)] | None
     locate: Annotated[bool, Default(True)]
 
 
@@ -106,7 +107,7 @@ class Campaign(Settling, total=False):
 
 LONGEST = 16  # period number looked for where none is given and as many points are kept
 #: Options that say who computes, not what: results do not depend on them.
-_UNRECORDED = ("threads", "progress", "store", "client", "any_cpu")
+_UNRECORDED = ("threads", "progress", "budget", "store", "client", "any_cpu")
 
 
 def workers_of(options: Work) -> int | None:
@@ -128,10 +129,7 @@ def workers_of(options: Work) -> int | None:
 
 def solver_of(options: Solver) -> Solver:
     """The part that says how a trajectory is computed."""
-    return {
-        "method": options["method"], "rtol": options["rtol"], "atol": options["atol"], "order": options["order"],
-        "locate": options["locate"],
-    }  # fmt: skip
+    return cast(Solver, {name: value for name, value in options.items() if name in Solver.__annotations__})
 
 
 def longest_period(keep: int, max_period: int | None) -> int:
@@ -148,10 +146,8 @@ def longest_period(keep: int, max_period: int | None) -> int:
 
 def kept_of(options: Campaign) -> dict[str, Any]:
     """The part that says where chunks are computed and kept: what :func:`nonsmooth.campaign.run.run` takes."""
-    return {
-        "threads": workers_of(options), "progress": options["progress"], "store": options["store"],
-        "client": options["client"], "any_cpu": options["any_cpu"],
-    }  # fmt: skip
+    own = ("progress", "store", "client", "any_cpu")
+    return {"threads": workers_of(options)} | {name: value for name, value in options.items() if name in own}
 
 
 def as_called(arguments: Mapping[str, Any]) -> dict[str, Any]:
@@ -161,8 +157,8 @@ def as_called(arguments: Mapping[str, Any]) -> dict[str, Any]:
     record = {**own, **arguments.get("options", {})}
     if "start" in record:
         record["start"] = plain_start(arguments["system"], record["start"])
-    if "section" in record:
+    if "section" in record and (record["section"] is not None or arguments["system"].period() is not None):
         record["section"] = section_plan(arguments["system"], record["section"])[0]
-    if "max_period" in record:
+    if "keep" in record and "max_period" in record:
         record["max_period"] = longest_period(record["keep"], record["max_period"])
     return {name: value for name, value in record.items() if name not in _UNRECORDED}

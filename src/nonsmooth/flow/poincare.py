@@ -15,7 +15,8 @@ from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.system.arguments import at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import at_least
 
 if TYPE_CHECKING:
     import xarray as xr

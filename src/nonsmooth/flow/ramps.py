@@ -49,8 +49,6 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
     from nonsmooth.system.symbolic.tracing import call_scalar, refuse_corners
 
     traced = system.declared
-    if not isinstance(ramps, Mapping):
-        raise TypeError(f'ramps must map parameters to ramps, {{"rho": (0.2, 0.5)}}, not {shortened(ramps)}')
     changes: dict[Any, Any] = {}
     for name, ramp in ramps.items():
         if name not in traced.parameter_names:

@@ -6,11 +6,12 @@ The rules in code are ``note_side`` of the steppers (:mod:`nonsmooth.kernels.lin
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.flow.engines.engine import Section
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import above, at_least
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["Poincare", "Stroboscopic", "section_plan"]
 
 
+@checked
 @dataclass(frozen=True)
 class Stroboscopic:
     """The state at one phase of every forcing period.
@@ -36,10 +38,11 @@ class Stroboscopic:
     phase: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.0 <= real_number(self.phase, "phase") < 1.0:
+        if not 0.0 <= self.phase < 1.0:
             raise ValueError(f"phase = {self.phase}: the phase is given in forcing periods, 0 <= phase < 1")
 
 
+@checked
 @dataclass(frozen=True)
 class Poincare:
     """The state each time an indicator goes through zero.
@@ -63,20 +66,14 @@ class Poincare:
     """
 
     indicator: str
-    rising: bool | None = True
+    rising: Annotated[bool, "True (upwards), False (downwards), None (both)"] | None = True
     mode: str | None = None
-    side: str = "after"
-    every: int = 1
-    t_max: float | None = None
+    side: Literal["after", "before"] = "after"
+    every: Annotated[int, at_least(1)] = 1
+    t_max: Annotated[float, above(0)] | None = None
 
-    def __post_init__(self) -> None:
-        if self.side not in ("before", "after"):
-            raise ValueError(f'side = {self.side!r}; allowed: "before", "after"')
-        if self.rising not in (True, False, None):
-            raise ValueError(f"rising = {self.rising!r}; allowed: True (upwards), False (downwards), None (both)")
-        whole_number(self.every, "every", 1)
-        if self.t_max is not None and not real_number(self.t_max, "t_max") > 0:
-            raise ValueError(f"t_max = {self.t_max!r}: the longest wait for a return is a positive time")
+
+_EACH_PERIOD = Stroboscopic()
 
 
 def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare, Section]:
@@ -94,7 +91,7 @@ def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare,
                 f"{system.name!r} has no forcing period, so there is no stroboscopic section; "
                 f'pass section=ns.Poincare("indicator"), one of: {", ".join(system.indicators) or "(it has none)"}'
             )
-        section = Stroboscopic()
+        section = _EACH_PERIOD
     if isinstance(section, Stroboscopic):
         if period is None:
             raise ValueError(f"{system.name!r} has no forcing period: use ns.Poincare(...) in place of {section}")

@@ -15,12 +15,13 @@ from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
 from nonsmooth.flow.failure import refuse_beyond_stops, solve_error, wrong_way
 from nonsmooth.flow.inputs import driven
 from nonsmooth.flow.loads import meter_of
-from nonsmooth.flow.options import Length, Solver, as_called, solver_of
+from nonsmooth.flow.options import LONGEST_RUN, Length, Solver, as_called, solver_of
 from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state, is_one_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
-from nonsmooth.system.arguments import above, at_least, checked
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import above, at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +32,7 @@ __all__ = ["check_complete", "run_length", "simulate"]
 
 SAMPLES_PER_PERIOD = 256
 SAMPLES = 4096
+MOST_STEPS = 1e9  # an hour and more
 
 
 @checked
@@ -41,7 +43,7 @@ def simulate(
     duration: Length | None = None,
     start: Any = None,
     mode: str | None = None,
-    transient: Annotated[float, at_least(0)] = 0,
+    transient: Annotated[float, at_least(0, LONGEST_RUN)] = 0,
     samples: Any = None,
     step: Annotated[float, above(0)] | None = None,
     ramps: Mapping[str, Any] | None = None,
@@ -98,6 +100,8 @@ def simulate(
     if not is_one_start(start):
         raise ValueError("simulate marches one trajectory: give one start; sweep and poincare take several")
     t_begin, t_end = transient * unit, transient * unit + length
+    if step is not None and t_end / step > MOST_STEPS:
+        raise ValueError(f"step = {step!r}: a run to t = {t_end:.6g} would take more than {MOST_STEPS:g} steps")
     traced = system.traced
     if ramps:
         from nonsmooth.flow.ramps import values_along, with_ramps

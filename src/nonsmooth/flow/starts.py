@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import float_array, real_number, whole_number
+from nonsmooth.flow.arguments import float_array, real_number
 from nonsmooth.flow.engines.engine import FloatArray, State
 from nonsmooth.results.memory import room_for
-from nonsmooth.system.names import by_name, unknown
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import at_least
+from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -19,8 +21,10 @@ if TYPE_CHECKING:
 __all__ = ["first_state", "is_one_start", "plain_start", "random_starts", "start_states"]
 
 
-@by_name
-def random_starts(n: int, low: Any, high: Any, seed: int) -> list[Any]:
+@checked
+def random_starts(
+    n: Annotated[int, at_least(1), "the number of starts"], low: Any, high: Any, seed: Annotated[int, at_least(0)]
+) -> list[Any]:  # fmt: skip
     """``n`` states drawn uniformly from a box, the same for the same seed.
 
     Parameters
@@ -48,7 +52,6 @@ def random_starts(n: int, low: Any, high: Any, seed: int) -> list[Any]:
     >>> ns.random_starts(2, {"x": 0.0}, {"x": 0.01}, seed=1)  # doctest: +ELLIPSIS
     [{'x': 0.005...}, {'x': 0.009...}]
     """
-    n = whole_number(n, "n (the number of starts)", 1)
     room_for(300.0 * n, f"a list of {n:.6g} starts", "draw fewer")
     rng = np.random.default_rng(seed)
     if isinstance(low, Mapping) or isinstance(high, Mapping):

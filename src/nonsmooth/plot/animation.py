@@ -8,18 +8,18 @@ import os
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from nonsmooth.errors import DataFileError
-from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import column, first_states, name_plane, variable_along
 from nonsmooth.plot.mechanism import sketch_of_run
 from nonsmooth.plot.pen import put
 from nonsmooth.plot.trajectories import with_gaps
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import above, at_least
 from nonsmooth.system.origin import system_of
 from nonsmooth.tables.sampled import sampled
 
@@ -33,16 +33,16 @@ _COLORS = 48  # of a palette: lines and letters need few
 _TRAIL = 0.2  # of the run: the length of the bright end of an orbit
 
 
-@by_name
+@checked
 def animate(
     run: xr.Dataset,
     *,
     x: str | None = None,
     y: str | None = None,
     history: str | None = None,
-    seconds: float = 6.0,
-    rate: int = 20,
-    pixels: int = 720,
+    seconds: Annotated[float, above(0)] = 6.0,
+    rate: Annotated[int, at_least(1)] = 20,
+    pixels: Annotated[int, at_least(100)] = 720,
 ) -> Animation:
     """Animate a run: the sketch of its mechanism, the plane of two states and the history of one, together.
 
@@ -82,17 +82,15 @@ def animate(
     10
     """
     variable_along(run, "u", "simulate")
-    length, per_second = real_number(seconds, "seconds"), whole_number(rate, "rate", 1)
-    if not 0 < length * per_second <= 5000:
+    if not seconds * rate <= 5000:
         raise ValueError(f"seconds = {seconds!r} at rate = {rate!r}: from 1 to 5000 pictures are made")
-    wide = whole_number(pixels, "pixels", 100)
-    n = max(1, round(length * per_second))
+    n = max(1, round(seconds * rate))
     time = run["time"].values
     at = sampled(run, None, np.linspace(time[0], time[-1], n, endpoint=False) if n > 1 else time[:1])
     sketch = sketch_of_run(system_of(run), at)
     first = None if sketch is None else sketch[0].scheme.coordinates[0]
     names = first_states(run, x or first, y or _speed(run, first))
-    return Animation(run, at, sketch, [*names, history or names[0]], per_second, wide)
+    return Animation(run, at, sketch, [*names, history or names[0]], rate, pixels)
 
 
 def _speed(run: xr.Dataset, name: str | None) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -13,25 +13,25 @@ from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.find import find_orbit
 from nonsmooth.diagrams.lyapunov import lyapunov
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.arguments import check_system, whole_number
-from nonsmooth.flow.starts import plain_start
+from nonsmooth.flow.options import Length, as_called
+from nonsmooth.flow.sections import Poincare, Stroboscopic
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 from nonsmooth.smoothing.attractors import Box, Found, attractors_of, matched
+from nonsmooth.system.arguments import checked
 from nonsmooth.system.derived.smoothing import BANDS
-from nonsmooth.system.names import by_name
+from nonsmooth.system.kinds import at_least
 from nonsmooth.system.parameter import finite_number
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.flow.sections import Poincare, Stroboscopic
     from nonsmooth.system.system import System
 
 __all__ = ["smoothing_report"]
 
 
-@by_name
+@checked
 def smoothing_report(
     system: System,
     etas: Any,
@@ -39,13 +39,13 @@ def smoothing_report(
     band: str | Sequence[str] = "linear",
     orbit: Orbit | None = None,
     start: Any = None,
-    transient: int = 20,
-    periods: int | None = None,
-    duration: float | None = None,
-    n_starts: int = 0,
+    transient: Annotated[int, at_least(0)] = 20,
+    periods: Annotated[int, at_least(1)] | None = None,
+    duration: Length | None = None,
+    n_starts: Annotated[int, at_least(0)] = 0,
     box: Mapping[str, tuple[float, float]] | None = None,
     section: Stroboscopic | Poincare | None = None,
-    seed: int = 0,
+    seed: Annotated[int, at_least(0)] = 0,
     progress: Progress = True,
 ) -> xr.Dataset:
     r"""Differences between smoothed systems and the event-driven one, over the half width of the bands.
@@ -119,16 +119,15 @@ def smoothing_report(
     >>> float(report.multiplier_order.sel(band="linear", eta=1e-3).round(2))
     1.0
     """
+    asked = as_called(locals())
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.progress import progress as bar
     from nonsmooth.results.provenance import provenance
     from nonsmooth.results.smoothing import report
 
-    check_system(system, "smoothing_report")
     if system.is_smoothed:
         raise ValueError("smoothing_report compares with the event-driven system: give it without smoothed(...)")
     widths, bands = _widths(etas), _bands(band)
-    n_starts, transient = whole_number(n_starts, "n_starts", 0), whole_number(transient, "transient", 0)
     if orbit is not None and orbit.system != system:
         raise ValueError("the orbit belongs to another system, or to other values of its parameters")
     for shape in bands:  # overlapping bands are refused before anything is computed
@@ -146,14 +145,10 @@ def smoothing_report(
             for j, eta in enumerate(widths.tolist()):
                 rows[i, j], near = sharp.row(system.smoothed(eta, shape), eta, near)
                 advance()
-    options = {
-        "etas": widths, "band": bands, "orbit": None if sharp.orbit is None else sharp.orbit.u, "transient": transient,
-        "start": plain_start(system, start), "n_starts": n_starts, "box": box and dict(box), "section": section,
-        "seed": seed, **sharp.length,
-    }  # fmt: skip
+    asked |= {"etas": widths, "band": bands, "orbit": None if sharp.orbit is None else sharp.orbit.u, **sharp.length}
     labels = labels_of(system)
     return report(
-        labels, provenance(labels, "smoothing_report", options, method="events", seed=seed), bands, widths, reference,
+        labels, provenance(labels, "smoothing_report", asked, method="events", seed=seed), bands, widths, reference,
         rows, scale=system.scale_vector(), forced=system.period() is not None,
     )  # fmt: skip
 

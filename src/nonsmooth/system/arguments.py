@@ -1,16 +1,5 @@
 """Arguments of verbs: what each may be stands in the signature, and one decorator, :func:`checked`, reads it.
 
-==============================================  =======================================================
-``keep: Annotated[int, at_least(2)] = 100``     a whole number; 3.0 passes for 3; 2.5, True, "3" and NaN do not
-``budget: Annotated[float, above(0)] = 60``     a finite number; ``at_least``, ``within`` as well
-``judge: bool = True``                          yes or no, also 0 and 1 or of NumPy; no word
-``side: Literal["up", "down", None] = "up"``    one of these
-``rtol: float | None = None``                   that, or None
-``orbit: Orbit``, ``box: Mapping[...]``         one of a class; what stands in it is the verb's to read
-``name: Annotated[str, "its name in quotes"]``  with what to do, for the sentence
-``start: Any``                                  not read here
-==============================================  =======================================================
-
 What verbs share is a ``TypedDict`` of such declarations, a group: a verb takes it as ``**options: Unpack[Group]``, its
 users write plain keywords, signature and docstring show them, and the verb receives one record with all its keys.
 """
@@ -18,97 +7,24 @@ users write plain keywords, signature and docstring show them, and the verb rece
 from __future__ import annotations
 
 import inspect
-import math
 import re
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import cached_property, wraps
 from inspect import Parameter
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints, overload
+from typing import Any, TypeVar, cast, get_args, get_type_hints, overload
 from typing import is_typeddict as is_group
 
-import numpy as np
-
 from nonsmooth.errors import shortened
+from nonsmooth.system.kinds import Default, Reader, reader_of
 from nonsmooth.system.names import unknown
-from nonsmooth.system.parameter import finite_number as real_number
 
-__all__ = [
-    "Default",
-    "above",
-    "at_least",
-    "check_system",
-    "checked",
-    "declared",
-    "entries",
-    "reader_of",
-    "real_number",
-    "whole_number",
-    "within",
-    "yes_or_no",
-]  # fmt: skip
+__all__ = ["check_system", "checked", "declared", "entries"]
 
 Verb = Callable[..., Any]
 F = TypeVar("F", bound=Verb)
-Reader = Callable[[Any, str], Any]  # (what was given, the name of the argument) -> what the verb gets
 
-_MOST = 2**53  # whole numbers up to here are exact in floating point
 _NEEDED = Parameter.empty  # the default of what must be given
-
-
-@dataclass(frozen=True)
-class Default:
-    """The value of an option of a group that is not given; None of one that may be None needs no mark."""
-
-    value: Any
-
-
-@dataclass(frozen=True)
-class Limit:
-    """The least and the largest of a number, in words too."""
-
-    words: str
-    low: float = -math.inf
-    high: float = math.inf
-    without_low: bool = False
-
-    def holds(self, number: float) -> bool:
-        """Return whether a number is within."""
-        return self.low < number <= self.high if self.without_low else self.low <= number <= self.high
-
-
-def at_least(low: float) -> Limit:
-    """No less than ``low``."""
-    return Limit(f"at least {low:g}" if low else "zero or more", low)
-
-
-def above(low: float) -> Limit:
-    """More than ``low``."""
-    return Limit(f"above {low:g}" if low else "positive", low, without_low=True)
-
-
-def within(low: float, high: float) -> Limit:
-    """From ``low`` to ``high``, both included."""
-    return Limit(f"within {low:g} ... {high:g}", low, high)
-
-
-def whole_number(value: Any, name: str, least: int) -> int:
-    """``value`` as an integer of at least ``least``; 3.0 passes, 2.5, True, "3" and NaN do not."""
-    number = real_number(value, name)
-    if number != int(number) or number < least:
-        raise ValueError(f"{name} = {shortened(value)} must be a whole number, at least {least}")
-    if number > _MOST:
-        raise ValueError(f"{name} = {shortened(value)} is more than can be counted: at most {_MOST}")
-    return int(number)
-
-
-def yes_or_no(value: Any, name: str) -> bool:
-    """``value`` as a bool: a word would pass for True, whatever it says."""
-    if not isinstance(value, bool | np.bool_ | int | float | np.number) or value not in (0, 1):
-        raise TypeError(f"{name} = {shortened(value)}; allowed: True, False")
-    return bool(value)
 
 
 def check_system(system: Any, verb: str, inputs: bool = False) -> Any:
@@ -133,10 +49,10 @@ def check_system(system: Any, verb: str, inputs: bool = False) -> Any:
 @overload
 def checked(function: F) -> F: ...
 @overload
-def checked(*, of: Verb | None = None, **defaults: Any) -> Callable[[F], F]: ...
+def checked(*, of: Verb | None = None, read: bool = True, **defaults: Any) -> Callable[[F], F]: ...
 
 
-def checked(function: Any = None, *, of: Verb | None = None, **defaults: Any) -> Any:
+def checked(function: Any = None, *, of: Verb | None = None, read: bool = True, **defaults: Any) -> Any:
     """Decorate a verb: its arguments are read as its signature declares them, or refused in a sentence.
 
     A call that does not fit is answered with how the verb is called, a misspelt name with the nearest.
@@ -147,6 +63,8 @@ def checked(function: Any = None, *, of: Verb | None = None, **defaults: Any) ->
         An argument ``system: System`` is checked by :func:`check_system`.
     of : callable, optional
         A checked verb whose further arguments are this one's ``**options``.
+    read : bool
+        False: names are checked alone, what is given is the function's own to read.
     **defaults
         Of options of the group, where they differ in this verb.
     """
@@ -156,13 +74,21 @@ def checked(function: Any = None, *, of: Verb | None = None, **defaults: Any) ->
 
         @wraps(function)
         def called(*given: Any, **named: Any) -> Any:
-            values = door.read(given, named)
-            return function(*(values.pop(name) for name in door.nameless if name in values), **values)
+            if read:
+                return function(**door.read(given, named))
+            door.fit(given, named)
+            return function(*given, **named)
+
+        if not read:
+            door.readers = {}
 
         called.__doc__ = door.documentation()
         called.__signature__, called.door = door.signature, door  # type: ignore[attr-defined]
         return cast(F, called)
 
+    if isinstance(function, type):  # a class: the arguments of its objects
+        function.__init__ = decorated(function.__init__)  # type: ignore[misc]
+        return function
     return decorated if function is None else decorated(function)
 
 
@@ -172,40 +98,44 @@ class _Door:
     def __init__(self, function: Verb, of: Verb | None, defaults: Mapping[str, Any]) -> None:
         own = inspect.signature(function)
         self.function, self.verb = function, function.__qualname__.removesuffix(".__init__")
-        self.items = {name: item for name, item in own.parameters.items() if item.kind is not item.VAR_KEYWORD}
-        rest = next((item for item in own.parameters.values() if item.name not in self.items), None)
+        self.items = dict(own.parameters)
+        rest = next((item for item in self.items.values() if item.kind is item.VAR_KEYWORD), None)
         self.group = None if rest is None else _group(rest.annotation, function)
         self.behind: _Door | None = getattr(of, "door", None)
         others = inspect.signature(of).parameters.values() if of else _parameters(self.group, defaults)
-        others = [item.replace(kind=item.KEYWORD_ONLY) for item in others if item.name not in self.items]
-        self.items |= {item.name: item for item in others}
-        self.takes_any = rest is not None and not others
-        self.signature = own.replace(parameters=[*self.items.values(), *([rest] if rest and self.takes_any else [])])
-        self.shared = {item.name: item.default for item in others}
-        self.nameless = [name for name, item in self.items.items() if item.kind is item.POSITIONAL_ONLY]
-        self.positional = [name for name, item in self.items.items() if item.kind is not item.KEYWORD_ONLY]
-        self.needed = [name for name, item in self.items.items() if item.default is _NEEDED]
+        self.shared = {item.name: item.default for item in others if item.name not in self.items}
+        if rest is not None and self.shared:
+            del self.items[rest.name]
+            added = {item.name: item.replace(kind=item.KEYWORD_ONLY) for item in others}
+            self.items |= {name: item for name, item in added.items() if name in self.shared}
+        self.signature = own.replace(parameters=[*self.items.values()])
+        self.needed = {name for name, item in self.items.items() if item.default is _NEEDED}
+        self.first = [name for name, item in self.items.items() if item.kind is item.POSITIONAL_OR_KEYWORD]
 
-    def read(self, given: tuple[Any, ...], named: Mapping[str, Any]) -> dict[str, Any]:
-        """What the verb is called with."""
-        values = dict(zip(self.positional, given, strict=False))
-        twice = values.keys() & named
-        values |= named
-        unknown_ = not self.takes_any and not values.keys() <= self.items.keys()
-        if twice or unknown_ or len(given) > len(self.positional) or not values.keys() >= set(self.needed):
-            raise TypeError(self.misfit(given, named, values))
+    def fit(self, given: tuple[Any, ...], named: Mapping[str, Any]) -> None:
+        """TypeError for a call that does not fit the signature."""
+        try:
+            self.signature.bind(*given, **named)
+        except TypeError as error:
+            raise TypeError(self.misfit(given, named, str(error))) from None
+
+    def read(self, given: tuple[Any, ...], named: dict[str, Any]) -> dict[str, Any]:
+        """The arguments as read, in the order in which they were given, behind defaults of what is shared."""
+        values = dict(zip(self.first, given, strict=False)) | named
+        whole = len(values) == len(given) + len(named)
+        if not (whole and self.needed <= values.keys() <= self.items.keys()):
+            self.fit(given, named)
         readers = self.readers
-        return self.shared | {
-            name: readers[name](value, name) if name in readers else value for name, value in values.items()
-        }  # no reader: of a verb that takes any names
+        read = {name: readers[name](value, name) if name in readers else value for name, value in values.items()}
+        return self.shared | read
 
     @cached_property
     def kinds(self) -> dict[str, Any]:
-        """What each argument may be, as its annotation says."""
+        """The type of each argument, as its annotation says."""
         shared = get_type_hints(self.group, include_extras=True) if self.group else {}
         if self.behind:
             shared = {name: self.behind.kinds[name] for name in self.shared}
-        own = {name: item.annotation for name, item in self.items.items() if name not in shared}
+        own = {name: item.annotation for name, item in self.items.items() if name not in shared and name != "self"}
         return {name: _evaluated(annotation, self.function) for name, annotation in own.items()} | shared
 
     @cached_property
@@ -216,30 +146,29 @@ class _Door:
             found["system"] = lambda value, _: check_system(value, self.verb, "inputs" in self.items)
         return found
 
-    def misfit(self, given: tuple[Any, ...], named: Mapping[str, Any], values: Mapping[str, Any]) -> str:
+    def misfit(self, given: tuple[Any, ...], named: Mapping[str, Any], error: str) -> str:
         """The sentence for a call that does not fit the signature."""
-        own = [name for name in self.positional if name != "self"]
-        options = [name for name in self.items if name not in self.positional]
-        usage = f"{self.verb}({', '.join([*own, *(f'{name}=' for name in options or ['name'])])})"
-        if len(given) > len(self.positional):
-            count = f"{len(own) or 'no'} argument{'s' * (len(own) != 1)}"
-            number = len(given) - (len(self.positional) - len(own))
-            over = shortened(given[len(self.positional)])
-            return f"{self.verb} takes {count} by position, not {number}: give {over} by its name; {usage}"
-        if missing := [name for name in self.needed if name not in values]:
+        items = {name: item for name, item in self.items.items() if name != "self"}
+        given = given[len(self.items) - len(items) :]
+        options = [name for name, item in items.items() if item.kind is item.KEYWORD_ONLY]
+        first = [name for name, item in items.items() if item.kind is not item.VAR_KEYWORD and name not in options]
+        usage = f"{self.verb}({', '.join([*first, *(f'{name}=' for name in options or ['name'])])})"
+        if len(given) > len(first):
+            count = f"{len(first) or 'no'} argument{'s' * (len(first) != 1)}"
+            over = shortened(given[len(first)])
+            return f"{self.verb} takes {count} by position, not {len(given)}: give {over} by its name; {usage}"
+        there = {*first[: len(given)], *named}
+        if missing := [name for name, item in items.items() if item.default is _NEEDED and name not in there]:
             return f"{self.verb} needs {' and '.join(missing)}: {usage}"
-        for name in named:
-            if name not in self.items and not self.takes_any:
-                system = values.get("system")
-                if name in getattr(system, "parameters", ()):
-                    return (
-                        f"`{name}` is a parameter of {getattr(system, 'name', '')!r}, not an option of {self.verb}: "
-                        f"set it with system.with_parameters({name}=...)"
-                    )
-                known = [one for one in self.items if one not in ("self", "system")]
-                return unknown(name, "an option", self.verb, known)
-        twice = next(name for name in named if name in self.positional[: len(given)])
-        return f"{self.verb}: {twice} is given twice, by position and by its name; {usage}"
+        system = named.get("system", given[0] if given else None)
+        for name in named.keys() - items.keys():
+            if name in getattr(system, "parameters", ()):
+                return (
+                    f"`{name}` is a parameter of {getattr(system, 'name', '')!r}, not an option of {self.verb}: "
+                    f"set it with system.with_parameters({name}=...)"
+                )
+            return unknown(name, "an option", self.verb, [one for one in items if one != "system"])
+        return f"{self.verb}: {error}; {usage}"
 
     def documentation(self) -> str | None:
         """The docstring, with what is shared written into its list of parameters."""
@@ -263,8 +192,8 @@ _PARAMETERS = re.compile(r"^Parameters\n-+\n(?:(?!\n+\w[\w ]*\n-{3,}).)*", re.MU
 
 
 def declared(function: Verb) -> dict[str, Any]:
-    """What each argument of a verb, or of a class, may be."""
-    door = getattr(function, "door", None)
+    """The values that each argument of a verb, or of a class, may have, as declared."""
+    door = getattr(getattr(function, "__init__") if isinstance(function, type) else function, "door", None)  # noqa: B009
     return get_type_hints(function, include_extras=True) if door is None else dict(door.kinds)
 
 
@@ -283,9 +212,9 @@ def entries(doc: str | None) -> dict[tuple[str, ...], tuple[str, list[str]]]:
 
 
 def _evaluated(annotation: Any, function: Verb) -> Any:
-    """What an annotation means; Any where it names what is imported for type checkers alone."""
+    """The type that an annotation means; Any where it names what is imported for type checkers alone."""
     try:
-        return eval(annotation, function.__globals__) if isinstance(annotation, str) else annotation
+        return eval(annotation, inspect.unwrap(function).__globals__) if isinstance(annotation, str) else annotation
     except NameError:
         return Any
 
@@ -302,96 +231,7 @@ def _parameters(group: Any, defaults: Mapping[str, Any]) -> list[Parameter]:
     for name, hint in get_type_hints(group, include_extras=True).items() if group else ():
         default = next((mark.value for mark in get_args(hint) if isinstance(mark, Default)), None)
         written = str(getattr(group.__annotations__[name], "__forward_arg__", hint))
-        written = re.sub(r"Annotated\[(.*), Default\(.*\)\]", r"\1", written)
-        written = f"Annotated[{written}]" if any(isinstance(mark, Limit) for mark in get_args(hint)) else written
+        written = re.sub(r"Annotated\[(\w+|Literal\[.*\]), Default\(.*\)\]|, Default\(.*?\)", r"\1", written)
         default = defaults.get(name, default)
         found.append(Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=written))
     return found
-
-
-def reader_of(what: Any) -> Reader:
-    """The reader of what an annotation allows."""
-    origin, parts = get_origin(what), get_args(what)
-    if origin is Annotated:
-        limit = next((mark for mark in parts if isinstance(mark, Limit)), None)
-        hint = next((mark for mark in parts if isinstance(mark, str)), None)
-        read = reader_of(parts[0]) if limit is None else _number(parts[0], limit)
-        return read if hint is None else _hinted(read, hint)
-    if origin in (Union, UnionType):
-        some = [part for part in parts if part is not NoneType]
-        one = reader_of(some[0]) if len(some) == 1 else _one_of(some)
-        return one if len(some) == len(parts) else lambda value, name: None if value is None else one(value, name)
-    if origin is Literal:
-        return lambda value, name: _chosen(value, name, parts)
-    if what is bool:
-        return yes_or_no
-    if what in (int, float):
-        return _number(what, Limit("", -_MOST))
-    kind = origin or what
-    if kind is Any or not isinstance(kind, type):
-        return lambda value, name: value
-    return lambda value, name: _instance(value, name, kind, what)
-
-
-def _number(kind: type, limit: Limit) -> Reader:
-    def read(value: Any, name: str) -> Any:
-        number = whole_number(value, name, int(limit.low)) if kind is int else real_number(value, name)
-        if not limit.holds(number):
-            raise ValueError(f"{name} = {shortened(value)} must be {limit.words}")
-        return value if type(value) is int else number
-
-    return read
-
-
-def _hinted(reader: Reader, hint: str) -> Reader:
-    def read(value: Any, name: str) -> Any:
-        try:
-            return reader(value, name)
-        except (TypeError, ValueError) as error:
-            raise type(error)(f"{error}; {hint}") from None
-
-    return read
-
-
-def _one_of(kinds: list[Any]) -> Reader:
-    """The first that takes the value; a number is no bool here."""
-    readers = [reader_of(kind) for kind in kinds]
-
-    def read(value: Any, name: str) -> Any:
-        wrong: Exception = TypeError(f"{name} must be {' or '.join(map(_words, kinds))}, not {shortened(value)}")
-        for kind, reader in zip(kinds, readers, strict=True):
-            if kind is bool and not isinstance(value, bool | np.bool_):
-                continue
-            try:
-                return reader(value, name)
-            except ValueError as error:  # of this kind, but beyond its limits
-                wrong = error
-            except TypeError:
-                pass
-        raise wrong
-
-    return read
-
-
-def _chosen(value: Any, name: str, choices: tuple[Any, ...]) -> Any:
-    if not isinstance(value, str | None) or value not in choices:
-        raise ValueError(f"{name} = {shortened(value)}; allowed: {', '.join(map(repr, choices))}")
-    return value
-
-
-def _instance(value: Any, name: str, kind: type, what: Any) -> Any:
-    if not isinstance(value, kind):
-        raise TypeError(f"{name} must be {_words(what)}, not {shortened(value)}")
-    return value
-
-
-def _words(what: Any) -> str:
-    """What an annotation allows, in words."""
-    kind = get_origin(what) or what
-    if kind is Annotated:
-        return _words(get_args(what)[0])
-    known: dict[Any, str] = {
-        bool: "True, False", int: "a whole number", float: "a real number", str: "text", Mapping: "a mapping",
-        Callable: "a function",
-    }  # fmt: skip
-    return known.get(kind) or f"ns.{kind.__name__}(...)"

@@ -1,4 +1,4 @@
-"""Names that may be used, and helpful answers to those that may not, in calls too.
+"""Names that may be used, and helpful answers to those that may not.
 
 A parameter's name becomes a dim of a result and a state's name a coordinate, so that the names the
 results use themselves are reserved.
@@ -7,18 +7,13 @@ results use themselves are reserved.
 from __future__ import annotations
 
 import difflib
-import inspect
 import keyword
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping
-from functools import wraps
-from typing import Any, TypeVar, cast
+from collections.abc import Iterable, Mapping
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 
-__all__ = ["RESERVED", "by_name", "check_keys", "check_names", "nearest", "unknown"]
-
-F = TypeVar("F", bound=Callable[..., Any])
+__all__ = ["RESERVED", "check_keys", "check_names", "nearest", "unknown"]
 
 RESERVED = frozenset(
     [
@@ -127,44 +122,3 @@ def _likeness(given: str, candidate: str) -> float:
     """Similarity, 0 to about 1; the same beginning counts (``gap`` means g rather than omega)."""
     begins = given[:1].lower() == candidate[:1].lower()
     return difflib.SequenceMatcher(None, given.lower(), candidate.lower()).ratio() + 0.2 * begins
-
-
-def by_name(function: F) -> F:
-    """Decorate a verb: arguments that do not fit its signature are answered with how it is called."""
-    signature = inspect.signature(function)
-    verb = function.__qualname__.removesuffix(".__init__")
-
-    @wraps(function)
-    def called(*given: Any, **named: Any) -> Any:
-        try:
-            return function(*given, **named)
-        except TypeError:
-            try:
-                signature.bind(*given, **named)
-            except TypeError as error:
-                misfit = _misfit(verb, signature, given, named, str(error))
-            else:
-                raise  # the function's own
-        raise TypeError(misfit)
-
-    return cast(F, called)
-
-
-def _misfit(verb: str, signature: inspect.Signature, given: tuple[Any, ...], named: dict[str, Any], error: str) -> str:
-    items = {key: item for key, item in signature.parameters.items() if key != "self"}
-    given = given[len(signature.parameters) - len(items) :]
-    first = [key for key, item in items.items() if item.kind in (item.POSITIONAL_ONLY, item.POSITIONAL_OR_KEYWORD)]
-    options = [key for key, item in items.items() if item.kind is item.KEYWORD_ONLY]
-    usage = f"{verb}({', '.join([*first, *(f'{key}=' for key in options or ['name'])])})"
-    if len(given) > len(first):
-        count = f"{len(first) or 'no'} argument{'s' * (len(first) != 1)}"
-        over = shortened(given[len(first)])
-        return f"{verb} takes {count} by position, not {len(given)}: give {over} by its name; {usage}"
-    missing = [key for key in first[len(given) :] if key not in named and items[key].default is inspect.Parameter.empty]
-    missing += [key for key in options if key not in named and items[key].default is inspect.Parameter.empty]
-    if missing:
-        return f"{verb} needs {' and '.join(missing)}: {usage}"
-    for key in named:
-        if key not in items:
-            return unknown(key, "an option", verb, [*first, *options])
-    return f"{verb}: {error}; {usage}"

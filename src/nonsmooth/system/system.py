@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from nonsmooth.system.arguments import checked
 from nonsmooth.system.description import Description, describe
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.mode import Band, Mode
-from nonsmooth.system.names import by_name
 from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.transition import Surface, Transition
 from nonsmooth.system.values import changed_values, no_attribute, parameter_rows, smoothed_values
@@ -80,7 +80,7 @@ class System:
     _values: dict[str, float]
     _variant: Variant
 
-    @by_name
+    @checked(read=False)
     def __init__(
         self,
         *,
@@ -289,7 +289,7 @@ class System:
 
     # Copies
 
-    @by_name
+    @checked(read=False)
     def with_parameters(self, given: Any = None, /, **values: float) -> Self:
         """Return the same system at other values of its parameters.
 

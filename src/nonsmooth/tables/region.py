@@ -7,13 +7,13 @@ import operator
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import shortened
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
 from nonsmooth.system.symbolic.expressions import read_expression
 from nonsmooth.tables.quantities import dataset_of, quantities_of, quantity
 
@@ -32,8 +32,8 @@ _OF_ELEMENTS = ("force", "friction_force", "impact_speed", "impacts", "impulse",
 _FORM = 'a condition such as "abs(q) < 2e-3 and impact_speed < 0.1"'
 
 
-@by_name
-def region(result: Any, condition: str) -> xr.DataArray:
+@checked
+def region(result: Any, condition: Annotated[str, _FORM]) -> xr.DataArray:
     r"""The points of a result at which a condition on its quantities holds.
 
     Parameters
@@ -129,10 +129,8 @@ def _held(data: xr.Dataset, name: str, known: Mapping[str, xr.DataArray]) -> _He
     return _Held((least, most), ranges=True)
 
 
-def _parsed(condition: Any) -> ast.expr:
+def _parsed(condition: str) -> ast.expr:
     """The condition, ``a < b < c`` as ``a < b and b < c``; what has no meaning for ranges is refused."""
-    if not isinstance(condition, str):
-        raise TypeError(f"condition is {_FORM}, not {shortened(condition)}")
     if len(condition) > _LONGEST:
         raise ValueError(f"a condition of {len(condition)} characters is too long; at most {_LONGEST} are read")
     try:

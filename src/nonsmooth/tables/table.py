@@ -13,7 +13,7 @@ import numpy as np
 from nonsmooth.errors import DataFileError
 from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
 from nonsmooth.results.statuses import in_words
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
 from nonsmooth.tables.quantities import coordinates_of, dataset_of, quantities_of, quantity, rows_of
 from nonsmooth.tables.sampled import once, sampled
 
@@ -27,7 +27,7 @@ _WRITERS = {".csv": "", ".xlsx": "openpyxl", ".parquet": "pyarrow"}
 _BESIDE = ("segment", "start_state", "provenance")
 
 
-@by_name
+@checked
 def table(
     result: Any,
     columns: Sequence[str] | None = None,

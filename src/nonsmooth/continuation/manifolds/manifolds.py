@@ -26,7 +26,7 @@ from __future__ import annotations
 
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
@@ -36,9 +36,9 @@ from nonsmooth.continuation.manifolds.arcs import BEGIN, Arc
 from nonsmooth.continuation.manifolds.section_map import SectionMap
 from nonsmooth.continuation.problems.multipliers import EDGE
 from nonsmooth.continuation.problems.orbits import size_of
-from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.flow.sections import Stroboscopic
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import above, at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,17 +56,17 @@ ENDS = {
 RETURN = 1e-6
 
 
-@by_name
+@checked
 def manifolds(
     orbit: Orbit,
     *,
     section: Stroboscopic | None = None,
-    length: float = 10.0,
-    kind: str = "both",
-    distance: float = 0.02,
-    angle: float = 0.2,
-    delta: float = 1e-5,
-    points: int = 20_000,
+    length: Annotated[float, above(0)] = 10.0,
+    kind: Literal["both", "unstable", "stable"] = "both",
+    distance: Annotated[float, above(0)] = 0.02,
+    angle: Annotated[float, above(0)] = 0.2,
+    delta: Annotated[float, above(0)] = 1e-5,
+    points: Annotated[int, at_least(2 * BEGIN)] = 20_000,
 ) -> xr.Dataset:
     """Grow the stable and unstable manifolds of a saddle orbit in the stroboscopic section.
 
@@ -107,17 +107,6 @@ def manifolds(
         An orbit without such a manifold (no saddle, complex multipliers, an autonomous or virtual orbit), or whose mode
         or memory at the section does not follow from the states.
     """
-    if not isinstance(orbit, Orbit):
-        raise TypeError(f"manifolds takes an Orbit, a result of find_orbit; not {type(orbit).__name__}")
-    if kind not in ("both", "unstable", "stable"):
-        raise ValueError(f'kind = {kind!r}; allowed: "both", "unstable", "stable"')
-    reach, near, turn, first = (
-        _positive(value, name)
-        for value, name in ((length, "length"), (distance, "distance"), (angle, "angle"), (delta, "delta"))
-    )
-    most = whole_number(points, "points", 2 * BEGIN)
-    if not (section is None or isinstance(section, Stroboscopic)):
-        raise TypeError(f"section = {section!r}: manifolds are grown in a stroboscopic section, ns.Stroboscopic(phase)")
     phase = 0.0 if section is None else float(section.phase)
     size = _checked(orbit)
     wanted = ("unstable", "stable") if kind == "both" else (kind,)
@@ -138,22 +127,16 @@ def manifolds(
         section_map = SectionMap(orbit.system, size, orbit.period_number * (2 if mu < 0.0 else 1))
         step = section_map.forward if one == "unstable" else section_map.backward
         for side in (1, -1):
-            q = cycle[0] + side * first * e
+            q = cycle[0] + side * delta * e
             for j, u in enumerate(cycle):
                 if j:
                     q = once.forward(q[None, :])[0]
-                    q = u + (q - u) * (first / np.linalg.norm(q - u))
-                arcs.append((one, side, j, mu, Arc(step, view, reach, near, turn, most).grow(u, q)))
-    options = {"length": reach, "kind": kind, "distance": near, "angle": turn, "delta": first, "points": most,
+                    q = u + (q - u) * (delta / np.linalg.norm(q - u))
+                arcs.append((one, side, j, mu, Arc(step, view, length, distance, angle, points).grow(u, q)))
+    options = {"length": length, "kind": kind, "distance": distance, "angle": angle, "delta": delta, "points": points,
                "section": f"Stroboscopic(phase={phase!r})"}  # fmt: skip
     return _dataset(orbit, size, view(np.array(cycle)), arcs, options)
 
-
-def _positive(value: Any, name: str) -> float:
-    number = real_number(value, name)
-    if number <= 0.0:
-        raise ValueError(f"{name} = {value!r} must be positive")
-    return number
 
 
 def _checked(orbit: Orbit) -> FloatArray:

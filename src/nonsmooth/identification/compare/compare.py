@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 import numpy as np
 
-from nonsmooth.flow.arguments import real_number, whole_number
+from nonsmooth.flow.arguments import real_number
+from nonsmooth.flow.options import solver_of
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
 from nonsmooth.identification.compare.measured import recorded_motion
+from nonsmooth.identification.options import Prediction
+from nonsmooth.system.arguments import checked
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
@@ -29,6 +32,7 @@ FORMS = (
 NEGLIGIBLE = 1e-4  # relative uncertainties of settings below this ask for no band
 
 
+@checked
 @one_blas_thread()
 def compare(
     measured: Any,
@@ -41,17 +45,10 @@ def compare(
     noise: Any = None,
     parameter: str | None = None,
     values: Any = None,
-    direction: str = "down",
+    direction: Literal["up", "down", "both"] = "down",
     start: Any = None,
-    section_phase: float | list[float] = 0.0,
-    grid: int = 128,
-    transient: int = 300,
-    max_period: int = 16,
-    draws: int | None = None,
-    level: float = 0.95,
-    splits: int = 400,
-    seed: int = 0,
-    **options: Any,
+    section_phase: Any = 0.0,
+    **options: Unpack[Prediction],
 ) -> xr.Dataset:
     r"""Lay a measurement over the theory: what both show, how far apart they are, and how far they may be.
 
@@ -95,21 +92,6 @@ def compare(
         0. Of all motions they lead to the nearest is taken; all period numbers are kept.
     section_phase : float or list of float
         Phases of the stroboscopic sections, in forcing periods.
-    grid : int
-        Samples of an orbit per forcing period.
-    transient, max_period
-        See :func:`nonsmooth.sweep`.
-    draws : int, optional
-        Parameter sets drawn for the band: 60 where something is uncertain, else 0 (a frequency known to
-        1e-4 is not).
-    level : float
-        Of the band.
-    splits : int
-        Random halves drawn of each section cloud.
-    seed : int
-        Of all that is drawn at random.
-    **options
-        ``method``, ``rtol``, ``atol``: see :func:`nonsmooth.flow.engines.methods.engine_for`.
 
     Returns
     -------
@@ -158,13 +140,13 @@ def compare(
     if not is_system and (parameters is not None or settings):
         raise ValueError("parameters and settings change a System; this theory is a result that is at hand already")
     set_ = read_settings(settings, theory) if isinstance(theory, System) else {}
+    draws, level = options["draws"], options["level"]
     if draws is None:
         uncertain = hasattr(parameters, "covariance") or any(
             pair.uncertainty > (0.0 if pair.follows else NEGLIGIBLE * abs(pair.at({}))) for pair in set_.values()
         )
         draws = DRAWS if is_system and uncertain else 0
-    draws = whole_number(draws, "draws", 0)
-    if not 0 < real_number(level, "level") < 1:
+    if not 0 < level < 1:
         raise ValueError(f"level = {level!r} must lie between 0 and 1, as 0.95")
     if not isinstance(measured, xr.Dataset) or channels is not None:
         if not isinstance(theory, System):
@@ -173,7 +155,7 @@ def compare(
     kind = _kind(measured, parameter)
     states = _states(measured, theory)
     model = Model(
-        theory, states, parameters, set_, whole_number(transient, "transient", 0), draws, level, seed, options
+        theory, states, parameters, set_, options["transient"], draws, level, options["seed"], solver_of(options)
     )
     squeeze: tuple[str, ...] = ()
     if kind == "response":
@@ -185,11 +167,9 @@ def compare(
         from nonsmooth.identification.compare.diagram import compare_diagram
 
         name = _parameter(parameter or _swept(measured), theory)
-        if direction not in ("up", "down", "both"):
-            raise ValueError(f"direction = {direction!r}; allowed: 'up', 'down', 'both'")
         variables = compare_diagram(
             measured, model, name=name, noise=_noise(measured, noise, states), direction=direction, values=values,
-            phase=real_number(section_phase, "section_phase"), max_period=max_period,
+            phase=real_number(section_phase, "section_phase"), max_period=options["max_period"],
         )  # fmt: skip
     else:
         from nonsmooth.identification.compare.motion import compare_motion
@@ -200,16 +180,14 @@ def compare(
         squeeze = ("section_phase",) if np.ndim(section_phase) == 0 else ()
         variables = compare_motion(
             measured, model, noise=_noise(measured, noise, states), start=start, phases=phases,
-            grid=whole_number(grid, "grid", 8), max_period=whole_number(max_period, "max_period", 1),
-            splits=whole_number(splits, "splits", 20),
+            grid=options["grid"], max_period=options["max_period"], splits=options["splits"],
         )  # fmt: skip
         variables["section_phase"] = ("section_phase", np.array(phases), {
             "long_name": "phase of the section", "units": "forcing periods"})  # fmt: skip
     given = {
         "settings": {key: ["follows" if one.follows else one.value, one.uncertainty] for key, one in set_.items()},
         "parameter": parameter, "direction": direction,
-        "section_phase": section_phase, "grid": grid, "transient": transient, "max_period": max_period,
-        "draws": draws, "level": level, "splits": splits, "seed": seed, **options,
+        "section_phase": section_phase, **options, "draws": draws,
     }  # fmt: skip
     result = _dataset(variables, measured, model, kind, given)
     return result.squeeze([dim for dim in squeeze if dim in result.dims])

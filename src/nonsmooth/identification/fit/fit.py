@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import SolveError, shortened
-from nonsmooth.flow.arguments import check_system, real_number, whole_number, yes_or_no
+from nonsmooth.errors import SolveError
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.identification.blas import one_blas_thread
+from nonsmooth.identification.options import Fitting
 from nonsmooth.results.progress import Progress, progress
-from nonsmooth.system.names import by_name, unknown
+from nonsmooth.system.arguments import check_system, checked
+from nonsmooth.system.kinds import above, at_least
+from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     from nonsmooth.identification.fit.growth import Grown
@@ -30,31 +32,23 @@ _LOSSES = {"linear": np.inf, "huber": 2.5}  # noise deviations from which on a r
 _MORE = 3  # guesses that are looked at, for each that is fitted
 
 
-@by_name
+@checked
 @one_blas_thread()
 def fit(
     system: System,
     recording: Any,
     parameters: Any,
     *,
-    measured: Any = None,
     start: Any = None,
-    free_start: bool = True,
     mode: Any = None,
     per_run: Sequence[str] = (),
-    priors: Any = None,
-    settings: Any = None,
     inputs: Any = None,
-    runs: Sequence[str] | None = None,
-    time: str = "time",
-    window: float | None = None,
+    window: Annotated[float, above(0)] | None = None,
     profile: Sequence[str] = (),
-    loss: str = "linear",
+    loss: Literal["linear", "huber"] = "linear",
     leave_out: bool = False,
-    posterior: int = 0,
-    tries: int = 8,
-    seed: int = 0,
-    progress: Progress = True,
+    posterior: Annotated[int, at_least(0)] = 0,
+    **options: Unpack[Fitting],
 ) -> ParameterSet:
     r"""Parameters of a system from recorded motions, with their standard uncertainties.
 
@@ -80,30 +74,17 @@ def fit(
         ``"clock"`` (time of the model over that of the recording: 1.0001 where its clock is slow by that much, between
         0.9 and 1.1) and ``"phase"`` (of the forcing at t = 0, in periods, for each run). A mapping gives bounds (None:
         none).
-    measured : mapping of str to str or Sensor, optional
-        ``{"x": "position channel"}``: which channel shows which state or output of the system, or with which
-        :class:`nonsmooth.Sensor`. Channels named as states or outputs where not given.
     start : mapping or sequence of floats, optional
         First guess of the states at the first sample; measured states need none.
-    free_start : bool
-        False: the motion begins exactly at ``start``.
     mode : str or mapping of str to str, optional
         Mode in which the recording begins, or each run of it. Where not given, each one is tried in which a motion may
         begin there (a relay with hysteresis: both), and a note says which fits best and by how much.
     per_run : sequence of str
         Unknowns of which each run has its own, as ``"c, Run #1"`` in ``extra``; the others are shared by all runs.
-    priors : mapping of str to (value, standard uncertainty), or ParameterSet, optional
-        What is known before of the unknowns.
-    settings : mapping or sequence, optional
-        Parameters that were set in each run, ``{run: {"omega": 3.0}}``, or in all.
     inputs : mapping of input to channel, Input or (time, values), optional
         The courses of the system's inputs: ``{"force": "motor force"}``, or
         ``{"force": ns.Input("motor force", between="steps", delay="late")}``, where ``late`` may be a parameter that is
         to be found. Channels named as inputs where not given.
-    runs : sequence of str, optional
-        Runs of a ``Recording``; all where not given.
-    time : str
-        Name of the column or coordinate that holds the time.
     window : float, optional
         The longest window, in units of time, for motions that the model can be followed along only so far.
     profile : sequence of str
@@ -119,12 +100,6 @@ def fit(
         Steps of an ensemble sampler (emcee, extra ``posterior``) that starts about the optimum: the finding
         ``"posterior"``, ``.posterior`` of the set, and what its ``draw`` then draws from. For a law that is no normal
         one; some thousand steps of a likelihood that costs a simulation of the record each.
-    tries : int
-        First guesses to try, the given one and others around it (or within the bounds), while none fits.
-    seed : int
-        Of the other first guesses.
-    progress : bool or callable
-        See :func:`nonsmooth.sweep`.
 
     Returns
     -------
@@ -162,39 +137,37 @@ def fit(
     from nonsmooth.identification.fit.outcome import outcome
 
     problem = problem_of(
-        system, recording, parameters, measured, priors, settings, runs, time, mode, loss, per_run, inputs
-    )
+        system, recording, parameters, options["measured"], options["priors"], options["settings"], options["runs"],
+        options["time"], mode, loss, per_run, inputs,
+    )  # fmt: skip
     if start is not None and not is_one_start(start):
         raise ValueError("fit takes one first guess of the start, for all runs; settings= differ from run to run")
     begin = None if start is None else np.tile(start_states(system, start)[0], (len(problem.records), 1))
-    if not yes_or_no(free_start, "free_start") and begin is None:
+    free, tries, seed, progress = options["free_start"], options["tries"], options["seed"], options["progress"]
+    if not free and begin is None:
         raise ValueError("free_start=False says that the start is known: give start=, the states at the first sample")
-    longest = np.inf if window is None else real_number(window, "window")
-    if not longest > 0:
-        raise ValueError(f"window = {window!r}: the longest window is a positive time; leave it out for none")
+    longest = np.inf if window is None else window
     profiles = [profile] if isinstance(profile, str) else list(profile)
     for name in profiles:
         if name not in problem.unknowns.names:
             raise ValueError(f"profile: {unknown(name, 'an unknown', 'this fit', list(problem.unknowns.names))}")
-    tried = whole_number(tries, "tries", 1)
     left: list[str] = []
-    rests = yes_or_no(leave_out, "leave_out")
-    if rests and not free_start:
+    if leave_out and not free:
         raise ValueError("leave_out=True begins anew behind what it leaves out: it needs free starts, free_start=True")
-    best = best_of(problem, begin, bool(free_start), longest, tried, whole_number(seed, "seed", 0), progress)
-    if rests:
+    best = best_of(problem, begin, free, longest, tries, seed, progress)
+    if leave_out:
         problem, left = without_disagreeing(problem, best.theta)
         if len(problem.records) != len(best.problem.records) or problem.records[0] is not best.problem.records[0]:
-            best = best_of(problem, None, True, longest, tried, whole_number(seed, "seed", 0), progress)
+            best = best_of(problem, None, True, longest, tries, seed, progress)
     beside = []
-    if steps := whole_number(posterior, "posterior", 0):
+    if posterior:
         from nonsmooth.identification.fit.posterior import posterior_of
 
-        beside.append(posterior_of(best, steps, whole_number(seed, "seed", 0), progress))
-    options = {"parameters": list(problem.unknowns.names), "window": window, "tries": tries, "seed": seed}
+        beside.append(posterior_of(best, posterior, seed, progress))
+    asked = {"parameters": list(problem.unknowns.names), "window": window, "tries": tries, "seed": seed}
     given = recording if isinstance(recording, list | tuple) else [recording]
     return outcome(
-        best, options, synthetic=any(getattr(one, "synthetic", False) for one in given), profiles=profiles,
+        best, asked, synthetic=any(getattr(one, "synthetic", False) for one in given), profiles=profiles,
         watched=progress, left=left, beside=beside,
     )  # fmt: skip
 
@@ -226,8 +199,6 @@ def problem_of(
         max(np.sqrt(np.mean([irregularity(y) ** 2 for y in readings])), sensor.floor, 1e-300)
         for readings, sensor in zip(within, sensors.values(), strict=True)
     ])  # fmt: skip
-    if loss not in _LOSSES:
-        raise ValueError(f"loss = {shortened(loss)}; allowed: {', '.join(map(repr, _LOSSES))}")
     return Windows(
         system, Marcher(system, unknowns.active), records, sensors, unknowns, irregular,
         read_modes(system, mode, labels), np.zeros(len(sensors)), _LOSSES[loss],

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import SolveError, shortened
-from nonsmooth.flow.arguments import check_system, yes_or_no
+from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.blas import one_blas_thread
-from nonsmooth.system.names import by_name, unknown
+from nonsmooth.identification.options import Known
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,7 +26,7 @@ __all__ = ["plan_experiment"]
 _OF_A_RUN = ("duration", "periods", "samples", "start", "mode", "settings")
 
 
-@by_name
+@checked
 @one_blas_thread()
 def plan_experiment(
     system: System,
@@ -33,8 +34,7 @@ def plan_experiment(
     parameters: Sequence[str],
     *,
     measured: Any,
-    free_start: bool = True,
-    priors: Any = None,
+    **options: Unpack[Known],
 ) -> xr.Dataset:
     r"""Return the information of candidate runs about parameters, and the order in which to make them.
 
@@ -59,10 +59,6 @@ def plan_experiment(
         The unknowns, as :func:`nonsmooth.fit` takes them.
     measured : mapping of str to Sensor
         What is measured, each with ``Sensor(noise=...)`` or ``Sensor(resolution=...)``.
-    free_start : bool
-        False: the start of each run is known.
-    priors : mapping of str to (value, standard uncertainty), or ParameterSet, optional
-        What is known before, from runs that were made.
 
     Returns
     -------
@@ -106,13 +102,8 @@ def plan_experiment(
 
     from nonsmooth.identification.fit.sensors import read_sensors
 
-    check_system(system, "plan_experiment")
-    free = yes_or_no(free_start, "free_start")
-    if not isinstance(runs, Mapping) or not runs or not all(isinstance(one, Mapping) for one in runs.values()):
-        raise TypeError(
-            f"runs = {shortened(runs)}: give the candidates by name, "
-            "{'slow': {'duration': 20.0, 'samples': 2000, 'settings': {'omega': 3.0}}}"
-        )
+    if not runs:
+        raise TypeError("runs = {}: give the candidates by name, {'slow': {'duration': 20.0, 'samples': 2000}}")
     sensors = {name: replace(one, channel=name) for name, one in read_sensors(system, measured, []).items()}
     noise = np.array([np.hypot(one.noise or 0.0, one.floor) for one in sensors.values()])
     for name, size in zip(sensors, noise, strict=True):
@@ -124,7 +115,7 @@ def plan_experiment(
         for key in run:
             if key not in _OF_A_RUN:
                 raise ValueError(f"runs[{name!r}]: {unknown(key, 'a property', 'a run', dict.fromkeys(_OF_A_RUN, ''))}")
-        names, told, precision, theta = _information(system, str(name), run, parameters, sensors, noise, free, priors)
+        names, told, precision, theta = _information(system, str(name), run, parameters, sensors, noise, options)
         found.append(told)
     alone = np.array([_uncertainties(one + precision) for one in found])
     size = np.where(theta != 0, np.abs(theta), 1.0)
@@ -154,7 +145,7 @@ def plan_experiment(
 
 def _information(
     system: System, name: str, run: Mapping[str, Any], parameters: Sequence[str], sensors: Mapping[str, Any],
-    noise: FloatArray, free: bool, priors: Any,
+    noise: FloatArray, known_before: Known,
 ) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:  # fmt: skip
     """Names of the unknowns that runs share, what the run tells of them, what is known before, and their values."""
     from nonsmooth.flow.simulate import simulate
@@ -167,11 +158,12 @@ def _information(
     motion = simulate(system.with_parameters(settings), **asked)
     motion = motion.isel(time=~np.isin(motion["time"], motion["crossing_time"]))  # no readings are taken there
     mode = list(system.modes)[int(motion["mode"].values[0])] if motion["mode"].dtype.kind in "iu" else None
-    problem = problem_of(system, motion, parameters, sensors, priors, settings, None, "time", run.get("mode") or mode)
+    priors, mode = known_before["priors"], run.get("mode") or mode
+    problem = problem_of(system, motion, parameters, sensors, priors, settings, None, "time", mode)
     problem = replace(problem, noise=noise)
     theta = problem.unknowns.guess
     begin = motion["u"].values[:1]
-    whole = problem.of(first_windows(problem, theta, np.inf, np.nan_to_num(begin), free))
+    whole = problem.of(first_windows(problem, theta, np.inf, np.nan_to_num(begin), known_before["free_start"]))
     state = whole.derivatives(theta, whole.starts)
     if not whole.pieces or not all(np.isfinite(r).all() for r in state.residuals):
         raise SolveError(f"run {name!r} cannot be followed to its end; shorten it", status="no_convergence")

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.arguments import check_system, whole_number
 from nonsmooth.identification.blas import one_blas_thread
-from nonsmooth.results.progress import Progress
+from nonsmooth.identification.options import Recorded
 from nonsmooth.results.progress import progress as watched
-from nonsmooth.system.names import by_name
+from nonsmooth.system.arguments import check_system, checked
+from nonsmooth.system.kinds import at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,20 +27,14 @@ __all__ = ["select_model"]
 _BLOCK = 2.0  # first windows: the length of a part that is held out
 
 
-@by_name
+@checked(tries=4)
 @one_blas_thread()
 def select_model(
     models: Mapping[str, Any],
     recording: Any,
     *,
-    measured: Any = None,
-    settings: Any = None,
-    runs: Sequence[str] | None = None,
-    time: str = "time",
-    folds: int = 5,
-    tries: int = 4,
-    seed: int = 0,
-    progress: Progress = True,
+    folds: Annotated[int, at_least(2)] = 5,
+    **options: Unpack[Recorded],
 ) -> xr.Dataset:
     r"""Errors with which systems predict parts of a recording that they were not fitted to.
 
@@ -52,12 +46,10 @@ def select_model(
     ----------
     models : mapping of str to (System, parameters)
         The systems to compare, each with what is to be found of it, as :func:`nonsmooth.fit` takes it.
-    recording, measured, settings, runs, time
+    recording
         See :func:`nonsmooth.fit`; the measured states or outputs are those of every system.
     folds : int
         How many times a part is held out.
-    tries, seed, progress
-        See :func:`nonsmooth.fit`.
 
     Returns
     -------
@@ -85,23 +77,26 @@ def select_model(
 
     from nonsmooth.identification.fit.fit import problem_of
 
-    if not isinstance(models, Mapping) or len(models) < 2:
+    if len(models) < 2:
         raise ValueError(
             "models must name at least two systems, each with what is to be found of it: "
             '{"viscous": (system, ["k", "c"]), "dry": (other, ["k", "f"])}'
         )
-    n = whole_number(folds, "folds", 2)
+    progress, tries, seed = options["progress"], options["tries"], options["seed"]
     problems = {}
     for name, pair in models.items():
         if not isinstance(pair, list | tuple) or len(pair) != 2:
             raise TypeError(f"models[{name!r}] must be a pair (system, parameters), not {type(pair).__name__}")
         check_system(pair[0], "select_model")
-        problems[str(name)] = problem_of(pair[0], recording, pair[1], measured, None, settings, runs, time)
-    held = _held_out(next(iter(problems.values())), n)
-    found = np.empty((len(problems), n))
-    with watched(len(problems) * n, "models", progress) as advance:
+        problems[str(name)] = problem_of(
+            pair[0], recording, pair[1], options["measured"], None, options["settings"],
+            options["runs"], options["time"],
+        )  # fmt: skip
+    held = _held_out(next(iter(problems.values())), folds)
+    found = np.empty((len(problems), folds))
+    with watched(len(problems) * folds, "models", progress) as advance:
         for i, problem in enumerate(problems.values()):
-            for fold in range(n):
+            for fold in range(folds):
                 found[i, fold] = _error(problem, [part == fold for part in held], tries, seed)
                 advance()
     best = int(np.argmin(found.mean(axis=1)))
@@ -111,9 +106,9 @@ def select_model(
             "squared_error": (("model", "fold"), found, {"units": "1"}),
             "rms": ("model", np.sqrt(found.mean(axis=1)), {"units": "1"}),
             "difference": ("model", excess.mean(axis=1), {"units": "1"}),
-            "difference_error": ("model", excess.std(axis=1, ddof=1) / np.sqrt(n), {"units": "1"}),
+            "difference_error": ("model", excess.std(axis=1, ddof=1) / np.sqrt(folds), {"units": "1"}),
         },
-        {"model": list(problems), "fold": np.arange(n)},
+        {"model": list(problems), "fold": np.arange(folds)},
         {"best": list(problems)[best]},
     )
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import real_number
+from nonsmooth.system.arguments import checked
 from nonsmooth.system.inputs import input_states
+from nonsmooth.system.kinds import above, at_least
 from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ __all__ = ["OF_A_SENSOR", "Readout", "Sensor", "read_sensors"]
 OF_A_SENSOR = ("gain", "offset", "delay")
 
 
+@checked
 @dataclass(frozen=True)
 class Sensor:
     r"""A sensor between a state or an output of a system and a channel of a recording.
@@ -55,25 +57,17 @@ class Sensor:
     0.001
     """
 
-    channel: str = ""
+    channel: Annotated[str, "a sensor's channel is given by its name"] = ""
     gain: float = 1.0
     offset: float = 0.0
     delay: float = 0.0
-    resolution: float = 0.0
-    noise: float | None = None
-    range: tuple[float, float] | None = None
+    resolution: Annotated[float, at_least(0)] = 0.0
+    noise: Annotated[float, above(0), "leave it out where unknown"] | None = None
+    range: Any = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.channel, str):
-            raise TypeError(f"channel = {self.channel!r}: a sensor's channel is given by its name")
-        for name in ("gain", "offset", "delay", "resolution"):
-            object.__setattr__(self, name, real_number(getattr(self, name), name))
         if self.gain == 0:
             raise ValueError("gain = 0: a sensor with this gain shows nothing; give how the channel grows with it")
-        if self.resolution < 0:
-            raise ValueError(f"resolution = {self.resolution}: the distance of two readings is zero or more")
-        if self.noise is not None and not real_number(self.noise, "noise") > 0:
-            raise ValueError(f"noise = {self.noise}: a standard deviation is positive; leave it out where unknown")
         if self.range is not None:
             try:
                 low, high = map(float, self.range)

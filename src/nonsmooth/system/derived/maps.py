@@ -16,8 +16,8 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.system.arguments import checked
 from nonsmooth.system.condition import condition_text, read_condition
-from nonsmooth.system.names import by_name
 from nonsmooth.system.system import System
 from nonsmooth.system.transition import Transition
 
@@ -87,7 +87,7 @@ class Map(System):
 
     __slots__ = ()
 
-    @by_name
+    @checked(read=False)
     def __init__(
         self,
         *,

@@ -10,10 +10,11 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.system.arguments import checked
 from nonsmooth.system.derived.combinations import element_names
 from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.derived.loads import Loads
-from nonsmooth.system.names import by_name, unknown
+from nonsmooth.system.names import unknown
 from nonsmooth.system.symbolic.scalar import Scalar, to_expression
 from nonsmooth.system.symbolic.tracing import Symbols
 from nonsmooth.system.system import System
@@ -22,7 +23,7 @@ from nonsmooth.system.units import product, read_unit, unit_of, write_unit
 __all__ = ["mechanical"]
 
 
-@by_name
+@checked(read=False)
 def mechanical(
     M: Any,
     C: Any,

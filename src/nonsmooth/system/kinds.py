@@ -1,0 +1,204 @@
+"""Kinds of arguments, as signatures declare them, and the reader of each, which refuses the rest in a sentence.
+
+==============================================  =======================================================
+``keep: Annotated[int, at_least(2)] = 100``     a whole number; 3.0 passes for 3; 2.5, True, "3" and NaN do not
+``budget: Annotated[float, above(0)] = 60``     a finite number; ``at_least`` as well, both with a largest
+``judge: bool = True``                          yes or no, also 0 and 1 or of NumPy; no word
+``side: Literal["up", "down", None] = "up"``    one of these
+``rtol: float | None = None``                   that, or None
+``range: Range``                                two ends, (low, high)
+``box: Mapping[str, float]``                    by name; what it holds is read too
+``orbit: Orbit``                                one of a class
+``name: Annotated[str, "its name in quotes"]``  with what to do, for the sentence
+``start: Any``                                  not read here
+==============================================  =======================================================
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import numpy as np
+
+from nonsmooth.errors import shortened
+from nonsmooth.system.parameter import finite_number as real_number
+
+__all__ = [
+    "Default", "Limit", "Range", "above", "at_least", "reader_of", "real_number", "whole_number", "yes_or_no",
+]  # fmt: skip
+
+Reader = Callable[[Any, str], Any]  # (what was given, the name of the argument) -> what the verb gets
+
+_MOST = 2**53  # whole numbers up to here are exact in floating point
+
+
+@dataclass(frozen=True)
+class Default:
+    """The value of an option of a group that is not given; None of one that may be None needs no mark."""
+
+    value: Any
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The least and the largest of a number."""
+
+    low: float
+    high: float = math.inf
+    without_low: bool = False
+
+    def holds(self, number: float) -> bool:
+        """Return whether a number is within."""
+        return self.low < number <= self.high if self.without_low else self.low <= number <= self.high
+
+    @property
+    def words(self) -> str:
+        """The limits in words."""
+        least = f"above {self.low:g}" if self.without_low else f"at least {self.low:g}"
+        least = {"above 0": "positive", "at least 0": "zero or more"}.get(least, least)
+        return least if self.high == math.inf else f"{least} and at most {self.high:g}"
+
+
+#: Two ends, the first below the second.
+Range = Annotated[tuple[float, float], "rising"]
+
+
+def at_least(low: float, most: float = math.inf) -> Limit:
+    """No less than ``low``."""
+    return Limit(low, most)
+
+
+def above(low: float, most: float = math.inf) -> Limit:
+    """More than ``low``."""
+    return Limit(low, most, without_low=True)
+
+
+def whole_number(value: Any, name: str, least: int) -> int:
+    """``value`` as an integer of at least ``least``; 3.0 passes, 2.5, True, "3" and NaN do not."""
+    number = real_number(value, name)
+    if number != int(number) or number < least:
+        raise ValueError(f"{name} = {shortened(value)} must be a whole number, at least {least}")
+    if number > _MOST:
+        raise ValueError(f"{name} = {shortened(value)} is more than can be counted: at most {_MOST}")
+    return int(number)
+
+
+def yes_or_no(value: Any, name: str) -> bool:
+    """``value`` as a bool: a word would pass for True, whatever it says."""
+    if not isinstance(value, bool | np.bool_ | int | float | np.number) or value not in (0, 1):
+        raise TypeError(f"{name} = {shortened(value)}; allowed: True, False")
+    return bool(value)
+
+
+def reader_of(what: Any) -> Reader:
+    """The reader of what an annotation allows."""
+    origin, parts = get_origin(what), get_args(what)
+    if origin is Annotated:
+        limit = next((mark for mark in parts if isinstance(mark, Limit)), None)
+        hint = next((mark for mark in parts if isinstance(mark, str)), None)
+        read = reader_of(parts[0]) if limit is None else _number(parts[0], limit)
+        return read if hint is None else _rising if hint == "rising" else _hinted(read, hint)
+    if origin in (Union, UnionType):
+        some = [part for part in parts if part is not NoneType]
+        one = reader_of(some[0]) if len(some) == 1 else _one_of(some)
+        return one if len(some) == len(parts) else lambda value, name: None if value is None else one(value, name)
+    if origin is tuple:
+        return _two_numbers
+    if origin is Mapping and parts[1] is not Any:
+        return lambda value, name: _mapping(value, name, reader_of(parts[1]))
+    if origin is Literal:
+        return lambda value, name: _chosen(value, name, parts)
+    if what is bool:
+        return yes_or_no
+    if what in (int, float):
+        return _number(what, Limit(-math.inf if what is float else -_MOST))
+    kind = origin or what
+    if kind in (Any, Sequence) or getattr(kind, "_is_protocol", False) or not isinstance(kind, type):
+        return lambda value, name: value
+    return lambda value, name: _instance(value, name, kind, what)
+
+
+def _number(kind: type, limit: Limit) -> Reader:
+    def read(value: Any, name: str) -> Any:
+        number = whole_number(value, name, int(limit.low)) if kind is int else real_number(value, name)
+        if not limit.holds(number):
+            raise ValueError(f"{name} = {shortened(value)} must be {limit.words}")
+        return value if type(value) is int else number
+
+    return read
+
+
+def _two_numbers(value: Any, name: str) -> tuple[float, float]:
+    if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
+        raise ValueError(f"{name} = {shortened(value)}: give its two ends, (low, high)")
+    low, high = (real_number(end, f"an end of {name}") for end in value)
+    return low, high
+
+
+def _rising(value: Any, name: str) -> tuple[float, float]:
+    low, high = _two_numbers(value, name)
+    if not low < high:
+        raise ValueError(f"{name} = {shortened(value)}: the first end must be below the second")
+    return low, high
+
+
+def _mapping(value: Any, name: str, reader: Reader) -> dict[Any, Any]:
+    return {key: reader(one, f"{name}[{key!r}]") for key, one in _instance(value, name, Mapping, Mapping).items()}
+
+
+def _hinted(reader: Reader, hint: str) -> Reader:
+    def read(value: Any, name: str) -> Any:
+        try:
+            return reader(value, name)
+        except (TypeError, ValueError) as error:
+            raise type(error)(f"{error}; {hint}") from None
+
+    return read
+
+
+def _one_of(kinds: list[Any]) -> Reader:
+    """The first that takes the value; a number is no bool here."""
+    readers = [reader_of(kind) for kind in kinds]
+
+    def read(value: Any, name: str) -> Any:
+        wrong: Exception = TypeError(f"{name} must be {' or '.join(map(_words, kinds))}, not {shortened(value)}")
+        for kind, reader in zip(kinds, readers, strict=True):
+            if kind is bool and not isinstance(value, bool | np.bool_):
+                continue
+            try:
+                return reader(value, name)
+            except ValueError as error:  # of this kind, but beyond its limits
+                wrong = wrong if isinstance(wrong, ValueError) else error
+            except TypeError:
+                pass
+        raise wrong
+
+    return read
+
+
+def _chosen(value: Any, name: str, choices: tuple[Any, ...]) -> Any:
+    if not isinstance(value, str | None) or value not in choices:
+        raise ValueError(f"{name} = {shortened(value)}; allowed: {', '.join(map(repr, choices))}")
+    return value
+
+
+def _instance(value: Any, name: str, kind: type, what: Any) -> Any:
+    if not isinstance(value, kind):
+        raise TypeError(f"{name} must be {_words(what)}, not {shortened(value)}")
+    return value
+
+
+def _words(what: Any) -> str:
+    """Name in words what an annotation allows."""
+    kind = get_origin(what) or what
+    if kind is Annotated:
+        return _words(get_args(what)[0])
+    known: dict[Any, str] = {
+        bool: "True, False", int: "a whole number", float: "a real number", str: "text", Mapping: "a mapping",
+        Callable: "a function",
+    }  # fmt: skip
+    return known.get(kind) or f"ns.{kind.__name__}(...)"
