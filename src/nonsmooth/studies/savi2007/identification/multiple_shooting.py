@@ -239,7 +239,7 @@ def _values(found: ParameterSet) -> FloatArray:
 
 
 def _joined(rows: Sequence[tuple[ParameterSet, ParameterSet, FloatArray]]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Values, covariance and shift by turns of all runs together: informations add, that of the decays counts once."""
+    """Values, covariance and shift by turns of all runs together: weights add, that of the decays counts once."""
     s, n = len(SHARED), len(SHARED) + len(OWN) * len(rows)
     scale, total = np.ones(n), np.zeros((n, n))
     pull, shift = np.zeros(n), np.zeros(n)
