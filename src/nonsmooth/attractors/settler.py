@@ -1,4 +1,4 @@
-"""Many starts brought to their attractors and judged: the work behind charts and basins.
+"""Many starts brought to their attractors and judged, to a tolerance: the work behind charts and basins.
 
 A *job* is a start at one parameter point. All jobs of a call run in one compiled loop (``mapper``), on a GPU in rounds.
 What is done is decided in one place (``kernels.judging.settle``): a period number is granted with a certificate only.
@@ -15,14 +15,13 @@ import numpy as np
 
 from nonsmooth.attractors.exponents import rates, separation_sizes
 from nonsmooth.attractors.mapper import Mapper
-from nonsmooth.attractors.settle import tolerance_of
 from nonsmooth.attractors.settle_cuda import separate_on_gpu, settle_on_gpu
 from nonsmooth.attractors.settled import ROUNDED, Settled, least_sizes, usable
 from nonsmooth.attractors.trace import Trace, mode_at
 from nonsmooth.flow.engines.devices import engine_on, on_gpu
 from nonsmooth.flow.engines.engine import FloatArray, Section, State
 from nonsmooth.flow.engines.loop import Engine
-from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.engines.methods import RTOL, engine_for
 from nonsmooth.flow.loads import meter_of
 from nonsmooth.flow.options import Settling, Solver, longest_period, solver_of
 from nonsmooth.flow.scales import LEAST
@@ -37,6 +36,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ATTEMPTS", "FIRST_LOOK", "Settler", "settler_for"]
 
+TOLERANCE = 1e-9  # of a return, in units of the motion's size
 ATTEMPTS = 3  # further transients for a point that is still settling: of 1, 2 and 4 times the first
 DIFFERENCE = 1e-6  # finite differences of the return map, in units of the motion's size
 MEASURED = 200  # returns over which loads of a motion without a period are measured, at most
@@ -72,7 +72,10 @@ class Settler:
 
     def __post_init__(self) -> None:
         room_for(16.0 * self.keep * len(self.system.states), f"keep = {self.keep:.6g} section points", "keep fewer")
-        object.__setattr__(self, "tolerance", tolerance_of(self.engine))
+        tolerance = TOLERANCE  # no less than what the engine's own shows
+        if self.engine.name != "exact":
+            tolerance = max(TOLERANCE, 10.0 * getattr(self.engine, "rtol", RTOL))
+        object.__setattr__(self, "tolerance", tolerance)
         u, m, forced = self.system.traced.u, self.system.traced.m, self.system.traced.period is not None
         object.__setattr__(self, "width", len(u) + len(m) + int(forced and self.plan.indicator >= 0))
 

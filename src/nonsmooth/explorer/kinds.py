@@ -1,4 +1,4 @@
-"""The views of the page as data, below its state: panels, tabs, requests, settings, what is saved of each."""
+"""The views of the page as data: panels, tabs, settings, what is saved of each, and the order of its requests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cells of a plane: charts over two parameters and basins over two states; shares of starts over a parameter."""
+"""Charts over two parameters and basins over two states as cells with their legends; shares over a parameter."""
 
 from __future__ import annotations
 

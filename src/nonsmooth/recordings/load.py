@@ -1,4 +1,4 @@
-"""``load_recording``: find out which format a file has, read it, hand back a ``Recording``."""
+"""``load_recording`` and the table of all formats: find out which one a file has, read it, return a ``Recording``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-r"""Special points of branches of orbits, and the end of a signature: its record, and the orbit with which it goes on.
+r"""Test functions of branches of orbits (fold, flip, torus, crossing), and the end of a signature: how it goes on.
 
 Special points that do not end a signature:
 
