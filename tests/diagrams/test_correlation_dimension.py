@@ -92,7 +92,7 @@ def test_errors_at_the_door() -> None:
         correlation_dimension(np.full((500, 2), np.nan))
     with pytest.raises(ValueError, match=r"section\(iterate, state\)"):
         correlation_dimension(ns.simulate(ns.models.discontinuous_support(), periods=1))
-    with pytest.raises(ValueError, match="must rise"):
+    with pytest.raises(ValueError, match="the first end must be below the second"):
         correlation_dimension(henon(300), range=(0.5, 0.1))
 
 

@@ -6,11 +6,13 @@ import importlib.util
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +29,10 @@ class Server:
     def __init__(self, *arguments: str, browser: bool = False) -> None:
         told = [*arguments, *([] if browser else ["--no-browser"]), "--port", "0"]
         command = [sys.executable, "-m", "nonsmooth", "explore", *told]
-        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+        heard = None  # a test run in the background of a shell ignores Ctrl-C, and so would what it starts
+        if os.name != "nt":
+            heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heard)
         self.said: list[str] = []
         assert self.process.stderr is not None
         for line in self.process.stderr:

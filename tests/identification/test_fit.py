@@ -331,7 +331,7 @@ def test_mistakes_are_answered_with_what_to_do():
         ({"parameters": {"k": (9.0, 12.0)}}, "lies outside its bounds"),
         ({"parameters": ["k"], "settings": {"k": 8.0}}, "leave one out"),
         ({"parameters": ["k"], "priors": {"c": (1.0, 0.1)}}, "is not an unknown of this fit"),
-        ({"parameters": ["k"], "window": -1.0}, "positive time"),
+        ({"parameters": ["k"], "window": -1.0}, "must be positive"),
         ({"parameters": ["k"], "free_start": False}, "give start="),
     ):  # fmt: skip
         with pytest.raises(ValueError, match=sentence.replace("(", r"\(")):

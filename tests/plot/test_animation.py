@@ -72,7 +72,8 @@ def test_a_system_without_masses_has_plane_and_history() -> None:
 def test_what_does_not_fit_is_said(moving, tmp_path) -> None:
     run = ns.simulate(ns.models.impact_oscillator(), periods=1)
     for wrong, words in [
-        (lambda: ns.animate(run, seconds=0.0), "from 1 to 5000 pictures"),
+        (lambda: ns.animate(run, seconds=0.0), "seconds = 0.0 must be positive"),
+        (lambda: ns.animate(run, seconds=1e6), "from 1 to 5000 pictures"),
         (lambda: ns.animate(run, y="z"), "neither a state nor an output"),
         (lambda: ns.animate(ns.poincare(ns.models.impact_oscillator(), n=2)), "not the result of simulate"),
         (lambda: moving.save("run.avi"), "saved as .gif, .mp4 or .html"),

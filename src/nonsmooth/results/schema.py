@@ -122,11 +122,10 @@ def attributes(labels: Labels, column: Column) -> dict[str, Any]:
 
 def columns(labels: Labels, known: Sequence[Column], arrays: Mapping[str, Any], *lead: str) -> dict[str, Any]:
     """Variables of a table for those of its fields that there are; their dims come behind ``lead``."""
-    by_field = {column.field: column for column in known}
-    found = {by_field[field]: values for field, values in arrays.items() if field in by_field}
     return {
-        column.name: ((*lead, *column.dims), typed(column, values), attributes(labels, column))
-        for column, values in found.items()
+        column.name: ((*lead, *column.dims), typed(column, arrays[column.field]), attributes(labels, column))
+        for column in known
+        if column.field in arrays
     }
 
 

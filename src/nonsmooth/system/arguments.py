@@ -86,10 +86,13 @@ def checked(function: Any = None, *, of: Verb | None = None, read: bool = True, 
         called.__signature__, called.door = door.signature, door  # type: ignore[attr-defined]
         return cast(F, called)
 
-    if isinstance(function, type):  # a class: the arguments of its objects
-        function.__init__ = decorated(function.__init__)  # type: ignore[misc]
-        return function
-    return decorated if function is None else decorated(function)
+    def outer(one: Any) -> Any:
+        if not isinstance(one, type):
+            return decorated(one)
+        one.__init__ = decorated(one.__init__)  # type: ignore[misc]  # a class: the arguments of its objects
+        return one
+
+    return outer if function is None else outer(function)
 
 
 class _Door:
