@@ -109,7 +109,7 @@ def propagate(
 
     Examples
     --------
-    The amplitude of a linear oscillator is F / |k - m w^2 + i c w|:
+    The amplitude of a linear oscillator is :math:`F / |k - m \omega^2 + i c \omega|`:
 
     >>> import numpy as np
     >>> import nonsmooth as ns
