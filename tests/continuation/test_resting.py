@@ -216,3 +216,26 @@ def test_equal_elements_on_other_springs() -> None:
         )
         branch = ns.continue_equilibrium(system, "F", (-1.0, 1.0))
         np.testing.assert_allclose(branch.u.sel(state="q"), branch.F / k, atol=1e-12)
+
+
+def test_equal_systems_number_their_modes_themselves() -> None:
+    """Whatever was visited first: the ends are F -+ mu before the elastic stop, and where it closes is found in both."""
+    found = []
+    for first in ({}, {"q": -0.9, "v_q": -2.0}, {"q": 0.9, "v_q": 3.0}):
+        elements = {
+            "friction": ns.elements.Coulomb(at="q", friction=0.2),
+            "soft": ns.elements.ElasticStop(at="q", position=0.5, stiffness=2.0),
+            "up": ns.elements.Stop(at="q", position=1.0), "down": ns.elements.Stop(at="q", position=-1.0, side=-1),
+        }  # fmt: skip
+        system = ns.mechanical(
+            1.0, 0.1, 1.0, parameters={"F": 0.0}, forcing={"q": "F"}, impacts="sequential", elements=elements
+        )
+        if first:
+            ns.simulate(system, duration=20.0, start=first)
+        found.append(ns.continue_equilibrium(system, "F", (-0.6, 0.6)))
+    for branch in found:
+        q = branch.F.values[:, None] + np.array([-0.2, 0.2])
+        ends = np.where(q > 0.5, (q + 1.0) / 3.0, q)  # q + 2 (q - 0.5) = F -+ mu
+        np.testing.assert_allclose(branch.u_lower.sel(state="q"), ends[:, 0], atol=1e-9)
+        np.testing.assert_allclose(branch.u_upper.sel(state="q"), ends[:, 1], atol=1e-9)
+        np.testing.assert_allclose(ns.special_points(branch).F, [0.3], atol=1e-9)

@@ -242,7 +242,10 @@ class Workshop:
     @property
     def actions(self) -> dict[str, Callable[[str, Any], object]]:
         """Messages of the page that concern the form."""
-        show = lambda *_: self._write()  # noqa: E731
+
+        def show(name: str, value: Any) -> None:
+            self._write()
+
         return {"build": self._build, "build form": show, "build add": self._add, "build remove": self._remove}
 
     def set(self, name: str, value: Any) -> None:

@@ -110,9 +110,14 @@ def equilibrium_sets(
     return _joined(parts)
 
 
-@lru_cache(maxsize=16)
 def modes_of_sets(system: System) -> tuple[int, ...]:
     """The modes that leave some direction free; none where fields or indicators are not affine in the states."""
+    return _modes_of_sets(system, system.traced.patterns)
+
+
+@lru_cache(maxsize=16)
+def _modes_of_sets(system: System, patterns: Any) -> tuple[int, ...]:
+    """The same; equal systems whose modes are made when visited number them in orders of their own."""
     u, values, memory = np.zeros(len(system.states)), system.parameter_vector(), system.memory_vector()
     found, scale = [], system.scale_vector()
     for mode in every_mode(system.traced, values) or ():

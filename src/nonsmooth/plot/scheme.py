@@ -241,8 +241,8 @@ class _Reader:
     def _value(self, node: ast.expr | None) -> float:
         if not isinstance(node, ast.Constant):
             return 0.0
-        value = node.value
-        return float(self.system.values.get(value, 0.0)) if isinstance(value, str) else float(value)  # type: ignore[arg-type]
+        value: Any = node.value
+        return float(self.system.values.get(value, 0.0) if isinstance(value, str) else value)
 
     # Transitions of a system's own
 
