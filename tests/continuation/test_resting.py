@@ -219,7 +219,7 @@ def test_equal_elements_on_other_springs() -> None:
 
 
 def test_equal_systems_number_their_modes_themselves() -> None:
-    """Whatever was visited first: the ends are F -+ mu before the elastic stop, and where it closes is found in both."""
+    """Whatever was visited first: the ends are F -+ mu before the elastic stop, and where it closes is found."""
     found = []
     for first in ({}, {"q": -0.9, "v_q": -2.0}, {"q": 0.9, "v_q": 3.0}):
         elements = {

@@ -168,17 +168,9 @@ class _Instant:
         G = self.numbers.effects(contacts, contacts)
         size = len(contacts)
         impulses = least(G, before * (1.0 + given_back), np.zeros(size), np.full(size, np.inf))
-        bearing = sorted({*self.contacts, *self.frictions})
-        changes, terms = (f(self.numbers.effects(bearing, contacts)) @ impulses for f in (np.array, np.abs))
-        for k, change, of in zip(bearing, changes, terms, strict=True):
-            total = self.speeds[k] + change
-            self.speeds[k] = total if abs(total) > ZERO * (abs(self.speeds[k]) + of) else 0.0
-        for k, speed, e, impulse in zip(contacts, before, given_back, impulses, strict=True):
-            if impulse > 0.0:
-                self.speeds[k] = max(0.0, -e * speed)
-            self.numbers.shift(self.numbers.direction(k) * impulse)
-        bore = [(k, e) for k, e, impulse in zip(contacts, given_back, impulses, strict=True) if impulse > 0.0]
-        return tuple(k if e == self.restitution(k) else ~k for k, e in bore)
+        bore = {k: e for k, e, impulse in zip(contacts, given_back, impulses, strict=True) if impulse > 0.0}
+        self._struck(contacts, impulses, {k: max(0.0, -e * self.speeds[k]) for k, e in bore.items()})
+        return tuple(k if e == self.restitution(k) else ~k for k, e in bore.items())
 
     def _rub(self, k: int, contacts: list[int], restitution: float) -> tuple[int, ...]:
         """The impact of one contact that rubs, the others that are closed without friction."""
@@ -190,17 +182,13 @@ class _Instant:
             self.ends = "no_motion"
             return ()
         impulses, slopes, after = found
-        self._struck(some, impulses, after)
+        self._struck(some, impulses, dict(zip(some, map(float, after), strict=True)))
         self.rubbed = tuple(some), slopes
         return (k,)
 
-    def _struck(self, some: list[int], impulses: FloatArray, after: FloatArray) -> None:
-        """Put in the impulses of some elements, whose rates are then ``after``."""
-        bearing = [*self.contacts, *self.frictions]
-        for j, change in zip(bearing, self.numbers.effects(bearing, some), strict=True):
-            total, terms = self.speeds[j] + change @ impulses, abs(self.speeds[j]) + np.abs(change) @ np.abs(impulses)
-            self.speeds[j] = total if abs(total) > ZERO * terms else 0.0
-        self.speeds |= dict(zip(some, map(float, after), strict=True))
+    def _struck(self, some: list[int], impulses: FloatArray, after: dict[int, float]) -> None:
+        """Put in the impulses of some elements; of those ``after`` the rates behind them are known."""
+        self.speeds = self._behind(self.speeds, some, impulses) | after
         for j, impulse in zip(some, impulses, strict=True):
             self.numbers.shift(self.numbers.direction(j) * impulse)
 
@@ -231,7 +219,8 @@ class _Instant:
         else:
             self.ends = "no_motion"
             return ()
-        self._struck(contacts, impulses, np.where(np.abs(v) <= ZERO * np.abs(G) @ impulses, 0.0, v))
+        v = np.where(np.abs(v) <= ZERO * np.abs(G) @ impulses, 0.0, v)
+        self._struck(contacts, impulses, dict(zip(contacts, map(float, v), strict=True)))
         self.rubbed = tuple(contacts), slopes
         return tuple(k for k, impulse in zip(contacts, impulses, strict=True) if impulse > 0.0)
 
@@ -276,10 +265,14 @@ class _Instant:
             return speeds
         off = -np.array([speeds[k] for k in slow])
         amounts = np.linalg.lstsq(self.numbers.effects(slow, slow), off, rcond=1e-10)[0]
+        return self._behind(speeds, slow, amounts) | dict.fromkeys(slow, 0.0)
+
+    def _behind(self, speeds: dict[int, float], some: list[int], impulses: FloatArray) -> dict[int, float]:
+        """All rates behind impulses of some elements, 0 where they are rounding."""
         found = {}
-        for k, effects in zip(speeds, self.numbers.effects(list(speeds), slow), strict=True):
-            total, terms = speeds[k] + effects @ amounts, abs(speeds[k]) + np.abs(effects) @ np.abs(amounts)
-            found[k] = 0.0 if k in slow or abs(total) <= ZERO * terms else float(total)
+        for k, effects in zip(speeds, self.numbers.effects(list(speeds), some), strict=True):
+            total, terms = speeds[k] + effects @ impulses, abs(speeds[k]) + np.abs(effects) @ np.abs(impulses)
+            found[k] = float(total) if abs(total) > ZERO * terms else 0.0
         return found
 
     def _candidates(self, contacts: list[int], slow: list[int]) -> tuple[list[int], dict[int, int]]:
