@@ -10,12 +10,12 @@ from nonsmooth.identification.finding import Estimate
 from nonsmooth.identification.fit.profile import profile_of
 from nonsmooth.identification.uncertainty import (
     correlated,
-    correlation_times,
     coverage_factor,
     factor_interval,
     interval,
     uniform,
 )
+from nonsmooth.recordings.signals.spectrum import correlation_times
 from nonsmooth.studies.savi2007.identification.least_squares import york
 
 
@@ -45,7 +45,7 @@ def test_correlation_of_an_autoregressive_series():
     x = np.zeros(200_000)
     for i, e in enumerate(rng.standard_normal(len(x) - 1), 1):
         x[i] = a * x[i - 1] + e
-    assert correlation_times(x, longest=60) == pytest.approx(4.0, rel=0.05)
+    assert correlation_times(x) == pytest.approx(4.0, rel=0.05)
     # and the variance of its mean is tau times that of white residuals
     c = correlated(np.ones((20_000, 1)), x[:20_000] - x[:20_000].mean())
     assert c[0, 0] * 20_000 == pytest.approx(1 / (1 - a) ** 2, rel=0.25)

@@ -103,17 +103,13 @@ def _support(found: xr.Dataset, omega: float | None, resolution: float) -> tuple
     deep = pushed & (left < 0.25 * np.quantile(left[pushed], 0.05))
     if np.count_nonzero(deep) < 4 or np.ptp(x[deep]) < 2.0 * resolution:
         deep = pushed
-    B = np.column_stack([np.ones(np.count_nonzero(deep)), x[deep]])
-    line, *_ = np.linalg.lstsq(B, left[deep], rcond=None)
-    if line[1] >= 0:
+    (slope, at_zero), C = np.polyfit(x[deep], left[deep], 1, cov=True)
+    if slope >= 0:
         return none
-    rest = left[deep] - B @ line
-    variance = float(rest @ rest) / max(len(rest) - 2, 1)
-    C = variance * np.linalg.inv(B.T @ B)
-    g = -line[0] / line[1]
-    along = np.array([1.0, g]) / line[1]
+    g = -at_zero / slope
+    along = np.array([g, 1.0]) / slope
     # Samples of one contact are not independent: some 4 of them say as much as one.
-    return float(g), 2.0 * math.sqrt(float(along @ C @ along)), float(-line[1])
+    return float(g), 2.0 * math.sqrt(float(along @ C @ along)), float(-slope)
 
 
 def _beside_the_free_motion(found: xr.Dataset, omega: float | None, free: BoolArray) -> tuple[FloatArray, BoolArray]:

@@ -206,6 +206,22 @@ def largest_line(t: FloatArray, values: FloatArray) -> float:
     return peak(spectrum(np.interp(even, t, values), (len(t) - 1) / (t[-1] - t[0]))).omega
 
 
+def correlation_times(residuals: ArrayLike) -> float:
+    r"""Number of samples that share one independent error: :math:`\tau = 1 + 2 \sum \rho_k`, at least 1.
+
+    The sum stops at the first lag that is not positive (Geyer's initial sequence, Statist. Sci. 7 (1992) 473).
+    """
+    r = np.asarray(residuals, dtype=np.float64)
+    r = r - r.mean()
+    n = len(r)
+    if n < 4 or not r.any():
+        return 1.0
+    rho = np.fft.irfft(np.abs(np.fft.rfft(r, 2 * n)) ** 2, 2 * n)
+    rho = rho[1 : 1 + n // 4] / rho[0]
+    ends = np.append(np.flatnonzero(rho <= 0), len(rho))
+    return float(1.0 + 2.0 * rho[: ends[0]].sum())
+
+
 class _Shape:
     """Transform of the window about its middle, in units of the lines' spacing; 1 at the peak, real."""
 
