@@ -37,10 +37,10 @@ THEORY = style.COLORS["first"]
 MEASURED = style.COLORS["section"]
 
 
-def measured_label(result: xr.Dataset | Any, word: str = "measured") -> str:
+def measured_label(result: xr.Dataset | Any) -> str:
     """The word for the measured side; it says ``synthetic`` where a virtual rig made the data."""
     attrs = getattr(result, "attrs", {})
-    return "virtual rig (synthetic)" if str(attrs.get("synthetic", "no")) in ("yes", "True", "1") else word
+    return "virtual rig (synthetic)" if str(attrs.get("synthetic", "no")) in ("yes", "True", "1") else "measured"
 
 
 def check_kind(result: xr.Dataset, *kinds: str) -> None:

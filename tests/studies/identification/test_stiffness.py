@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from tests.studies.identification.made import COUNT, counted, run
 
-from nonsmooth.studies.savi2007.identification.least_squares import york
 from nonsmooth.studies.savi2007.identification.stiffness import stiffness
 
 S, M, DRY, C = 17.0, 0.84, 0.010, 0.9
@@ -61,22 +60,3 @@ def test_what_cannot_be_used_is_refused_with_the_run_and_what_to_do():
     creeping = run("springs", good.time, counted(1e-4 * good.time), force=np.zeros(len(good.time)))
     with pytest.raises(ValueError, match=r"springs Run #1, channel 'Angle': the hand moves faster than 3 mm/s in"):
         stiffness([creeping], resolution=COUNT, mass=M)
-
-
-def test_york_with_equal_errors_is_demings_closed_form():
-    rng = np.random.default_rng(4)
-    x = np.linspace(0, 5, 40)
-    y = 2.0 * x - 1 + 0.3 * rng.standard_normal(40)
-    x = x + 0.2 * rng.standard_normal(40)
-    ratio = (0.3 / 0.2) ** 2
-    xx, yy, xy = np.var(x), np.var(y), np.mean((x - x.mean()) * (y - y.mean()))
-    deming = (yy - ratio * xx + np.sqrt((yy - ratio * xx) ** 2 + 4 * ratio * xy**2)) / (2 * xy)
-    line = york(x, y, 0.2, 0.3)
-    assert line.slope == pytest.approx(deming, rel=1e-10)
-    assert line.intercept == pytest.approx(y.mean() - deming * x.mean(), rel=1e-10)
-    exact = york(np.arange(5.0), 3 - 0.5 * np.arange(5.0), 0.1, 0.1)
-    assert (exact.slope, exact.intercept, exact.reduced) == pytest.approx((-0.5, 3.0, 0.0), abs=1e-12)
-    with pytest.raises(ValueError, match="two points"):
-        york([1.0], [1.0], 0.1, 0.1)
-    with pytest.raises(ValueError, match="positive error"):
-        york([1.0, 2.0], [1.0, 2.0], 0.0, 0.0)

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth import SolveError, continue_orbit, find_orbit, poincare, special_points
+from nonsmooth import continue_orbit, find_orbit, special_points
+from nonsmooth.continuation.bifurcation_diagram import returns_of
 from nonsmooth.studies.savi2007.figures.figure import Datasets
 from nonsmooth.studies.savi2007.flows import EXACT
 from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_10, FIGURE_11, FIGURE_13, FIGURE_17
@@ -20,11 +21,8 @@ from nonsmooth.studies.savi2007.printed import FIGURE_9, FIGURE_10, FIGURE_11, F
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth import System
-
 __all__ = ["BEGINNINGS", "Beginning", "at_ends", "branches", "branches_of", "rows_of"]
 
-_CLOSED = 1e-6  # of the orbit's size
 _SAME = 1e-8  # of the value of a flip
 
 
@@ -62,7 +60,10 @@ def branches(figure: str) -> Datasets:
     if begin.longest > 1:
         for i, flip in enumerate(_flips(first)):
             _follow(found, flip, begin, 2, cascade=i == 0)
-    return {key: with_returns(system, one) for key, one in found.items()}
+    return {
+        key: one.assign(returns=(("point", "iterate", "state"), returns_of(one), {"long_name": "all section points"}))
+        for key, one in found.items()
+    }
 
 
 def _follow(found: Datasets, flip: xr.Dataset, begin: Beginning, period: int, cascade: bool) -> None:
@@ -100,23 +101,3 @@ def branches_of(data: Datasets) -> list[xr.Dataset]:
     """The branches among the datasets of a figure, those of the shortest period first."""
     found = [one for key, one in data.items() if key.startswith("branch")]
     return sorted(found, key=lambda one: int(one["period_number"]))
-
-
-def with_returns(system: System, branch: xr.Dataset) -> xr.Dataset:
-    """The branch with all section points of its orbits, from their first by the exact flow; NaN where it diverges."""
-    n, parameter = int(branch["period_number"]), str(branch.attrs["parameter"])
-    section = branch["section"].transpose("point", "state").values
-    returns = np.repeat(section[:, None, :], n, axis=1)
-    size = np.ptp(section, axis=0).max(initial=0.0) + np.abs(section).max(axis=0)
-    for i in range(len(section) if n > 1 else 0):
-        one = system.with_parameters({parameter: float(branch[parameter][i])})
-        try:
-            points = poincare(one, n=n, start=section[i], **EXACT.options)["section"]
-            after = points.transpose("iterate", "state").values
-        except SolveError:
-            after = np.full((n, section.shape[1]), np.nan)
-        closed = bool((np.abs(after[-1] - section[i]) <= _CLOSED * size).all())
-        returns[i, 1:] = after[:-1] if closed else np.nan
-    return branch.assign(
-        returns=(("point", "iterate", "state"), returns, {"long_name": "states at the section, all of the orbit"})
-    )

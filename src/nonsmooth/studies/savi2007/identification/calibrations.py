@@ -30,15 +30,13 @@ if TYPE_CHECKING:
 __all__ = ["crank_force", "voltage_frequency"]
 
 
-def voltage_frequency(runs: Sequence[Run], *, voltage_error: float = 0.0) -> Finding:
+def voltage_frequency(runs: Sequence[Run]) -> Finding:
     r"""The law :math:`\omega = s (V - V_0)` of the motor, from runs with a photogate at several voltages (Fig. 8a).
 
     Parameters
     ----------
     runs : sequence of Run
         Each with ``turns`` and the setting ``voltage`` (V).
-    voltage_error : float
-        Standard uncertainty of a voltage (V).
 
     Returns
     -------
@@ -56,7 +54,7 @@ def voltage_frequency(runs: Sequence[Run], *, voltage_error: float = 0.0) -> Fin
     drives = [drive_phase(run.passages) for run in runs]
     omega = np.array([drive.omega for drive in drives])
     error = np.array([drive.omega_error for drive in drives])
-    line, scatter = scattered_line(volts, omega, voltage_error, error)
+    line, scatter = scattered_line(volts, omega, error)
     slope, intercept = line.slope, line.intercept
     offset = -intercept / slope
     # slope, offset = -intercept / slope, intercept
@@ -78,9 +76,7 @@ def voltage_frequency(runs: Sequence[Run], *, voltage_error: float = 0.0) -> Fin
     )  # fmt: skip
 
 
-def crank_force(
-    runs: Sequence[Run], *, gain_limit: float = 0.01, length_error: float = 0.0, k: Estimate | None = None
-) -> Finding:
+def crank_force(runs: Sequence[Run], *, gain_limit: float = 0.01, k: Estimate | None = None) -> Finding:
     r"""The forcing over the crank's length, :math:`\rho = k a`: its slope is the driven spring's stiffness (Fig. 8b).
 
     Parameters
@@ -89,8 +85,6 @@ def crank_force(
         Car held still by the force sensor; each with ``force``, ``turns`` and the setting ``crank_length`` (m).
     gain_limit : float
         The sensor's gain lies within 1 +- this, evenly (type B).
-    length_error : float
-        Standard uncertainty of a crank's length (m).
     k : Estimate, optional
         The stiffness from elsewhere: a note says whether the two agree.
 
@@ -110,7 +104,7 @@ def crank_force(
     for i, run in enumerate(runs):
         fitted = harmonics_of(run, np.asarray(run.force["time"].values, dtype=np.float64), run.force)[0]
         force[i], error[i] = float(fitted.amplitudes[0]), float(fitted.amplitude_errors[0])
-    line, scatter = scattered_line(length, force, length_error, error)
+    line, scatter = scattered_line(length, force, error)
     type_a, half = float(np.sqrt(line.covariance[0, 0])), gain_limit * line.slope
     total = float(np.hypot(type_a, uniform(half)))
     notes = [

@@ -18,6 +18,7 @@ from nonsmooth.recordings import Quantity
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit
 from nonsmooth.studies.savi2007.identification.multiple_shooting import ContactFit, fit_contact, known_before
+from nonsmooth.studies.savi2007.identification.picture_data import picture_data
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -132,8 +133,6 @@ def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: 
 
 def _data(found: ContactFit, resolution: float) -> xr.Dataset:
     """The longest run, sample by sample."""
-    import xarray as xr
-
     which = max(range(len(found.runs)), key=lambda i: found.fits[i].residuals.sizes["sample"])
     run, fitted_of = found.runs[which], found.fits[which].residuals
     time, x = run.time, run.positions
@@ -141,14 +140,13 @@ def _data(found: ContactFit, resolution: float) -> xr.Dataset:
     at = np.searchsorted(time, fitted_of["time"].values)
     fitted[at], segment[at] = fitted_of["fitted"].values, fitted_of["window"].values
     gap = float(found.values[found.place(which, 0)])
-    return xr.Dataset(
-        {
-            "x": ("time", x, {"units": "m"}), "x_error": ("time", np.full(len(x), resolution / np.sqrt(12))),
-            "fitted": ("time", fitted, {"units": "m"}), "residual": ("time", x - fitted, {"units": "m"}),
-            "segment": ("time", segment),
-            "in_contact": ("time", (np.where(np.isfinite(fitted), fitted, -np.inf) > gap).astype(np.int8)),
-            "gap": ((), gap, {"units": "m"}),
-            "gap_error": ((), float(np.sqrt(found.covariance[found.place(which, 0), found.place(which, 0)]))),
-        },
-        {"time": time}, {"synthetic": "yes" if run.synthetic else "no", "run": run.name},
-    )  # fmt: skip
+    gap_error = float(np.sqrt(found.covariance[found.place(which, 0), found.place(which, 0)]))
+    return picture_data(
+        [run],
+        {"time": {
+            "time": time, "x": x, "x_error": np.full(len(x), resolution / np.sqrt(12)), "fitted": fitted,
+            "residual": x - fitted, "segment": segment,
+            "in_contact": (np.where(np.isfinite(fitted), fitted, -np.inf) > gap).astype(np.int8),
+        }},
+        gap=Estimate(gap, gap_error, "m"),
+    ).assign_attrs(run=run.name)  # fmt: skip

@@ -42,6 +42,7 @@ from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.evidence import Run
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit, free_decay
+from nonsmooth.studies.savi2007.identification.picture_data import picture_data
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,6 +52,7 @@ __all__ = [
 ]  # fmt: skip
 
 
+_SLOWEST = 0.02  # m/s, of the slowest half swing of the test mass that is used
 GRID = 2048  # samples of the paper's DFT: 100 Hz / 2048 * 15 = 0.732 Hz
 FINE = 400  # frequencies between its values about the peak
 
@@ -111,8 +113,6 @@ def natural_frequency(runs: Sequence[Run], decay: DecayFit) -> Finding:
         :math:`\omega_0` (rad/s). ``others``: ``dft_grid``, the largest value of a DFT of 2048 samples, known to half a
         step; ``dft_peak``, its peak by interpolation; ``dft_undamped``, :math:`\sqrt{\omega_p^2 + b^2/2}` from it.
     """
-    import xarray as xr
-
     used = [runs[i] for i in decay.runs]
     largest = max(range(len(used)), key=lambda i: float(np.ptp(used[i].positions)))
     run = used[largest]
@@ -144,20 +144,17 @@ def natural_frequency(runs: Sequence[Run], decay: DecayFit) -> Finding:
         "domain: the rest is dry friction's",
         *decay.notes,
     )
-    data = xr.Dataset(
-        {
-            "x": ("time", x, {"units": "m"}), "fitted": ("time", fitted, {"units": "m"}),
-            "magnitude": ("frequency", magnitude, {"units": "m s"}),
-            "peak_frequency": ((), peak, {"units": "Hz"}), "peak_frequency_error": ((), spread, {"units": "Hz"}),
-            "grid_step": ((), grid_step, {"units": "Hz"}), "grid_peak": ((), frequency[top], {"units": "Hz"}),
-            "decay_frequency": ((), value / (2 * np.pi), {"units": "Hz"}),
-            "decay_frequency_error": ((), error / (2 * np.pi), {"units": "Hz"}),
-        },
-        {"time": time, "frequency": frequency}, {"synthetic": "yes" if run.synthetic else "no"},
-    )  # fmt: skip
     fine, between = _between(time, x, float(frequency[max(top - 12, 1)]), float(frequency[top + 12]))
-    data["fine_magnitude"] = ("fine_frequency", between / rate)
-    data["fine_frequency"] = ("fine_frequency", fine, {"units": "Hz"})
+    data = picture_data(
+        [run],
+        {
+            "time": {"time": time, "x": x, "fitted": fitted},
+            "frequency": {"frequency": frequency, "magnitude": magnitude},
+            "fine_frequency": {"fine_frequency": fine, "fine_magnitude": between / rate},
+        },
+        grid_step=grid_step, grid_peak=frequency[top], peak_frequency=Estimate(peak, spread, "Hz"),
+        decay_frequency=Estimate(value, error).times(1 / (2 * np.pi), unit="Hz"),
+    )  # fmt: skip
     return Finding(
         "omega_0", Estimate(value, error, "rad/s"), "free decay in the time domain, viscous damping and dry friction",
         decay.samples, tuple(r.name for r in used), notes,
@@ -205,26 +202,29 @@ def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: Quantity, *, resol
     weight = 1.0 / viscous[:, 2]
     rate = -2 * float(np.average(viscous[:, 0], weights=weight))
     rate_error = 2 * float(np.sqrt(1 / np.sum(weight)))
-    c, friction = mass.value * float(decay.values[1]), mass.value * float(decay.values[2])
     plain = mass.value * rate
     own = mass.value**2 * decay.covariance[1:3, 1:3]
     covariance = own + mass.uncertainty**2 * np.outer(decay.values[1:3], decay.values[1:3])
-    c_error, friction_error = (float(e) for e in np.sqrt(np.diag(covariance)))
+    errors = np.sqrt(np.diag(covariance)).tolist()
+    c, friction = (
+        Estimate(mass.value * value, error, unit)
+        for value, error, unit in zip(decay.values[1:3].tolist(), errors, ("N s/m", "N"), strict=True)
+    )
     related = float(own[0, 1] / np.sqrt(own[0, 0] * own[1, 1])) if own[1, 1] else 0.0
     notes = [
         f"by their logarithmic decrement, without friction, the same decays give {plain:.4g} N s/m, "
-        f"{100 * (plain / c - 1):+.1f} %",
+        f"{100 * (plain / c.value - 1):+.1f} %",
         f"c and the dry friction are told apart by the shape; correlation {related:+.2f}",
         *decay.notes,
     ]
     return Finding(
-        "c_decay", Estimate(c, c_error, "N s/m"), "free decays, viscous damping and dry friction at once",
+        "c_decay", c, "free decays, viscous damping and dry friction at once",
         decay.samples, tuple(runs[i].name for i in decay.runs), tuple(notes),
         {
-            "friction": Estimate(friction, friction_error, "N"),
+            "friction": friction,
             "c_viscous_only": Estimate(rate, rate_error).times(mass.value, mass.uncertainty, "N s/m"),
         },
-        covariance, _data(runs, decay, peaks, (c, c_error, friction, friction_error)), "free_decay",
+        covariance, _data(runs, decay, peaks, c, friction), "free_decay",
     )  # fmt: skip
 
 
@@ -235,10 +235,8 @@ def _peaks(run: Run, span: tuple[int, int], decay: DecayFit, resolution: float) 
 
 
 def _data(
-    runs: Sequence[Run], decay: DecayFit, peaks: Sequence[tuple[FloatArray, ...]], numbers: tuple[float, ...]
+    runs: Sequence[Run], decay: DecayFit, peaks: Sequence[tuple[FloatArray, ...]], c: Estimate, friction: Estimate
 ) -> xr.Dataset:
-    import xarray as xr
-
     natural, b, f, rest = (float(v) for v in decay.values)
     widths = [np.ptp(runs[i].positions[slice(*at)]) for i, at in zip(decay.runs, decay.spans, strict=True)]
     which = int(np.argmax(widths))
@@ -255,18 +253,14 @@ def _data(
     plain = np.exp(intercept + slope * (begun + fine))
     fitted = decay.fitted(which) - rest
     both = envelope(fine, float(abs(first) * (1 + (natural * late) ** 2 / 2)), natural, b, f)
-    return xr.Dataset(
+    return picture_data(
+        [run],
         {
-            "peak_time": ("peak", at, {"units": "s"}), "peak_height": ("peak", height, {"units": "m"}),
-            "peak_height_error": ("peak", error, {"units": "m"}),
-            "x": ("time", x - rest, {"units": "m"}), "fitted": ("time", fitted, {"units": "m"}),
-            "envelope_both": ("fine_time", both, {"units": "m"}),
-            "envelope_viscous": ("fine_time", plain, {"units": "m"}),
-            "c": ((), numbers[0], {"units": "N s/m"}), "c_error": ((), numbers[1], {"units": "N s/m"}),
-            "friction_force": ((), numbers[2], {"units": "N"}),
-            "friction_force_error": ((), numbers[3], {"units": "N"}),
+            "peak": {"peak_time": at, "peak_height": height, "peak_height_error": error},
+            "time": {"time": time - time[0], "x": x - rest, "fitted": fitted},
+            "fine_time": {"fine_time": fine, "envelope_both": both, "envelope_viscous": plain},
         },
-        {"time": time - time[0], "fine_time": fine}, {"synthetic": "yes" if run.synthetic else "no"},
+        c=c, friction_force=friction,
     )  # fmt: skip
 
 
@@ -299,9 +293,7 @@ def decay_rate(t: FloatArray, height: FloatArray, error: FloatArray) -> tuple[fl
     return float(line[0]), float(line[1]), float(covariance[0, 0])
 
 
-def support_damping(
-    runs: Sequence[Run], *, resolution: float, test_mass: Quantity, slowest: float = 0.02
-) -> tuple[Finding, DecayFit]:
+def support_damping(runs: Sequence[Run], *, resolution: float, test_mass: Quantity) -> tuple[Finding, DecayFit]:
     """Damping of the support with a test mass on it, and the fit of the whole decays.
 
     Parameters
@@ -312,13 +304,9 @@ def support_damping(
         Length of a count (m).
     test_mass : Quantity
         Its mass (kg).
-    slowest : float
-        Speed (m/s) of the slowest half swing that is used.
     """
-    import xarray as xr
-
     decay = free_decay(
-        [(run.time, run.positions) for run in runs], resolution=resolution, slowest=slowest, friction=False,
+        [(run.time, run.positions) for run in runs], resolution=resolution, slowest=_SLOWEST, friction=False,
         names=[run.name for run in runs],
     )  # fmt: skip
     slopes, weights, data = [], [], None
@@ -334,16 +322,18 @@ def support_damping(
         weights.append(1 / variance)
         if data is None:
             ratio = -slope / decay.values[0]
-            data = xr.Dataset(
+            spread = float(np.sqrt(variance))
+            data = picture_data(
+                [runs[i]],
                 {
-                    "x": ("time", runs[i].positions - decay.values[3], {"units": "m"}),
-                    "peak_time": ("peak", t, {"units": "s"}), "peak_height": ("peak", height, {"units": "m"}),
-                    "log_height": ("peak", np.log(height)), "log_height_error": ("peak", error / height),
-                    "used": ("peak", np.ones(len(t), dtype=np.int8)), "slope": ((), slope, {"units": "1/s"}),
-                    "intercept": ((), intercept), "damping_ratio": ((), ratio),
-                    "damping_ratio_error": ((), float(np.sqrt(variance)) / decay.values[0]),
+                    "time": {"time": runs[i].time, "x": runs[i].positions - decay.values[3]},
+                    "peak": {
+                        "peak_time": t, "peak_height": height, "log_height": np.log(height),
+                        "log_height_error": error / height, "used": np.ones(len(t), dtype=np.int8),
+                    },
                 },
-                {"time": runs[i].time}, {"synthetic": "yes" if runs[i].synthetic else "no"},
+                intercept=intercept, slope=Estimate(slope, spread, "1/s"),
+                damping_ratio=Estimate(ratio, spread / decay.values[0]),
             )  # fmt: skip
     mass = test_mass.value
     if not slopes:

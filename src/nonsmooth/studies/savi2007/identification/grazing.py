@@ -40,6 +40,7 @@ from nonsmooth.identification import Estimate, Finding
 from nonsmooth.identification.uncertainty import uniform
 from nonsmooth.studies.savi2007.identification.evidence import Run
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit
+from nonsmooth.studies.savi2007.identification.picture_data import picture_data
 from nonsmooth.studies.savi2007.identification.response_fits import grazing_amplitude
 from nonsmooth.studies.savi2007.identification.steady import Steady, steady
 
@@ -248,19 +249,12 @@ def _sensor_error(
 def _data(
     seen: Steady, contact: NDArray[np.bool_], place: float, ends: FloatArray, gap: float, error: float
 ) -> xr.Dataset:
-    import xarray as xr
-
-    return xr.Dataset(
-        {
-            "setting": ("run", seen.omega, {"units": "rad/s", "long_name": "frequency"}),
-            "amplitude": ("run", seen.highest - place, {"units": "m"}),
-            "amplitude_error": ("run", np.hypot(seen.error, seen.mean_error), {"units": "m"}),
-            "contact": ("run", contact.astype(np.int8)),
-            "mean": ("run", seen.mean - place, {"units": "m"}),
-            "grazing_setting": ((), float(ends.mean()), {"units": "rad/s"}),
-            "grazing_low": ((), float(ends.min()), {"units": "rad/s"}),
-            "grazing_high": ((), float(ends.max()), {"units": "rad/s"}),
-            "gap": ((), gap, {"units": "m"}), "gap_error": ((), error, {"units": "m"}),
-        },
-        attrs={"synthetic": seen.synthetic},
+    return picture_data(
+        seen.runs,
+        {"run": {
+            "setting": seen.omega, "amplitude": seen.highest - place,
+            "amplitude_error": np.hypot(seen.error, seen.mean_error), "contact": contact.astype(np.int8),
+            "mean": seen.mean - place,
+        }},
+        grazing_setting=ends.mean(), grazing_low=ends.min(), grazing_high=ends.max(), gap=Estimate(gap, error, "m"),
     )  # fmt: skip

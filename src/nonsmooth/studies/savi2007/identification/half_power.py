@@ -22,18 +22,14 @@ It takes dry friction for damping, as every method that looks at one amplitude d
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
+from nonsmooth.studies.savi2007.identification.picture_data import picture_data
 from nonsmooth.studies.savi2007.identification.steady import Steady
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 __all__ = ["half_power", "half_power_points"]
 
@@ -86,7 +82,7 @@ def _damping(omega: FloatArray, amplitude: FloatArray) -> tuple[float, ...]:
     return float(xi), float(natural), first, second, largest
 
 
-def half_power(seen: Steady, mass: Quantity, *, seed: int = 0) -> Finding:
+def half_power(seen: Steady, mass: Quantity) -> Finding:
     r"""Viscous damping by half-power bandwidth, from the runs at the longest crank, where friction matters least.
 
     Parameters
@@ -95,8 +91,6 @@ def half_power(seen: Steady, mass: Quantity, *, seed: int = 0) -> Finding:
         Frequency steps without support.
     mass : Quantity
         Mass (kg) with its standard uncertainty.
-    seed : int
-        Of the bootstrap over runs that gives the uncertainty.
 
     Returns
     -------
@@ -108,13 +102,13 @@ def half_power(seen: Steady, mass: Quantity, *, seed: int = 0) -> Finding:
     for a in np.unique(seen.crank):
         part = seen.only(seen.crank == a)
         value = np.array(_damping(part.omega, part.amplitude))
-        found[float(a)] = (part, value, _scatter(part, seed))
+        found[float(a)] = (part, value, _scatter(part))
     longest = max(found)
     part, value, error = found[longest]
     for a, (_, row, spread) in found.items():
         if a != longest:
             others[f"c_{1e3 * a:.1f}mm"] = _c(row, spread, mass)
-    c = _c(value, error, mass)
+    c, ratio = _c(value, error, mass), Estimate(float(value[0]), float(error[0]))
     notes = [
         f"half power at {value[2]:.4f} and {value[3]:.4f} rad/s, by a cubic of 1/A^2 over omega^2; uncertainty by "
         f"bootstrap over the {len(part)} runs at a crank of {1e3 * longest:.1f} mm"
@@ -125,10 +119,15 @@ def half_power(seen: Steady, mass: Quantity, *, seed: int = 0) -> Finding:
         "c_half_power", c,
         "half-power bandwidth of the frequency response", part.samples, part.names, tuple(notes),
         {
-            "damping_ratio": Estimate(float(value[0]), float(error[0])),
+            "damping_ratio": ratio,
             "omega_0": Estimate(float(value[1]), float(error[1]), "rad/s"), **others,
         },
-        data=_data(part, value, error, c), plot="half_power",
+        data=picture_data(
+            part.runs,
+            {"run": {"omega": part.omega, "amplitude": part.amplitude, "amplitude_error": part.error,
+                     "direction": part.direction}},
+            omega_low=value[2], omega_high=value[3], largest=value[4], damping_ratio=ratio, c=c,
+        ), plot="half_power",
     )  # fmt: skip
 
 
@@ -137,7 +136,7 @@ def _c(value: FloatArray, error: FloatArray, mass: Quantity) -> Estimate:
     return product.times(mass.value, mass.uncertainty, "N s/m")
 
 
-def _scatter(part: Steady, seed: int) -> FloatArray:
+def _scatter(part: Steady) -> FloatArray:
     """Standard deviations of xi, omega_0, omega_1, omega_2, largest amplitude and xi omega_0 by bootstrap over runs."""
 
     def again(rows: NDArray[np.intp]) -> FloatArray:
@@ -147,22 +146,6 @@ def _scatter(part: Steady, seed: int) -> FloatArray:
             return np.full(6, np.nan)
         return np.append(row, row[0] * row[1])
 
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     drawn = np.array([again(rng.integers(0, len(part), size=len(part))) for _ in range(_DRAWS)])
     return np.asarray(np.nanstd(drawn, axis=0, ddof=1))
-
-
-def _data(part: Steady, value: FloatArray, error: FloatArray, c: Estimate) -> xr.Dataset:
-    import xarray as xr
-
-    return xr.Dataset(
-        {
-            "omega": ("run", part.omega, {"units": "rad/s"}), "amplitude": ("run", part.amplitude, {"units": "m"}),
-            "amplitude_error": ("run", part.error, {"units": "m"}), "direction": ("run", part.direction),
-            "omega_low": ((), value[2], {"units": "rad/s"}), "omega_high": ((), value[3], {"units": "rad/s"}),
-            "largest": ((), value[4], {"units": "m"}), "damping_ratio": ((), value[0]),
-            "damping_ratio_error": ((), error[0]), "c": ((), c.value, {"units": "N s/m"}),
-            "c_error": ((), c.uncertainty, {"units": "N s/m"}),
-        },
-        attrs={"synthetic": part.synthetic},
-    )  # fmt: skip

@@ -1,10 +1,6 @@
-r"""Least squares: lines with errors in both axes, linear laws with further terms, nonlinear laws with their covariance.
+"""Least squares: lines through scattered points, linear laws with further terms, nonlinear laws with their covariance.
 
-The effective variance of a point, :math:`\sigma_y^2 + b^2 \sigma_x^2`, depends on the slope b; York's solution moves
-each point along its error ellipse and so has no bias from the error in x.
-
-References: D. York, N.M. Evensen, M.L. Martinez, J. De Basabe Delgado, Am. J. Phys. 72 (2004) 367, Eqs. 13 and
-appendix; J. Orear, Am. J. Phys. 50 (1982) 912.
+Reference: J. Orear, Am. J. Phys. 50 (1982) 912.
 """
 
 from __future__ import annotations
@@ -14,11 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nonsmooth import SolveError
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.uncertainty import correlated
 
-__all__ = ["LinearLaw", "StraightLine", "linear_law", "nonlinear_fit", "scattered_line", "york"]
+__all__ = ["LinearLaw", "StraightLine", "linear_law", "nonlinear_fit", "scattered_line"]
 
 
 class StraightLine(NamedTuple):
@@ -30,55 +25,8 @@ class StraightLine(NamedTuple):
     reduced: float
 
 
-def york(x: Any, y: Any, x_error: Any, y_error: Any) -> StraightLine:
-    """The line through points with independent errors in both axes.
-
-    Parameters
-    ----------
-    x, y : array (n,)
-    x_error, y_error : array (n,) or float
-        Standard uncertainties; one of them may be zero.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than two points, or a point has no error in either axis.
-    """
-    xs, ys = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    if len(xs) < 2 or xs.shape != ys.shape:
-        raise ValueError(f"a line needs two points or more with both coordinates, got {xs.shape} and {ys.shape}")
-    vx = np.broadcast_to(np.asarray(x_error, dtype=np.float64) ** 2, xs.shape)
-    vy = np.broadcast_to(np.asarray(y_error, dtype=np.float64) ** 2, ys.shape)
-    if np.any(vx + vy <= 0):
-        raise ValueError("every point needs a positive error in x or in y")
-    slope = float(np.polyfit(xs, ys, 1)[0])
-    for _ in range(100):
-        weight = 1.0 / (vy + slope**2 * vx)
-        x_mean, y_mean = np.average(xs, weights=weight), np.average(ys, weights=weight)
-        u, w = xs - x_mean, ys - y_mean
-        beta = weight * (u * vy + slope * w * vx)
-        new = float(np.sum(weight * beta * w) / np.sum(weight * beta * u))
-        change, slope = abs(new - slope), new
-        if change <= 1e-14 * abs(slope):
-            break
-    else:
-        if change > 1e-9 * abs(slope):
-            raise SolveError(
-                f"the slope of the line still changes by {change / abs(slope):.1g} of itself after 100 rounds: the "
-                "points do not lie along a line; look at them"
-            )
-    adjusted = x_mean + beta
-    centre = np.average(adjusted, weights=weight)
-    slope_var = 1.0 / float(np.sum(weight * (adjusted - centre) ** 2))
-    intercept = float(y_mean - slope * x_mean)
-    intercept_var = 1.0 / float(np.sum(weight)) + centre**2 * slope_var
-    chi2 = float(np.sum(weight * (ys - intercept - slope * xs) ** 2))
-    covariance = np.array([[slope_var, -centre * slope_var], [-centre * slope_var, intercept_var]])
-    return StraightLine(slope, intercept, covariance, chi2 / max(len(xs) - 2, 1))
-
-
-def scattered_line(x: Any, y: Any, x_error: Any, y_error: Any) -> tuple[StraightLine, float]:
-    """The line through points that scatter more than their errors say: with the scatter that all have in common.
+def scattered_line(x: FloatArray, y: FloatArray, error: FloatArray) -> tuple[StraightLine, float]:
+    """The weighted line through points that scatter more than their errors say: with the scatter they have in common.
 
     Returns the line and that scatter, the standard deviation s in y which, added to every error, brings chi^2 to its
     expectation; 0 where the errors do. Widening all errors by one factor instead would leave the weight with the points
@@ -86,18 +34,19 @@ def scattered_line(x: Any, y: Any, x_error: Any, y_error: Any) -> tuple[Straight
 
     References: R.C. Paule and J. Mandel, J. Res. Natl. Bur. Stand. 87 (1982) 377.
     """
-    ys = np.asarray(y, dtype=np.float64)
-    own = np.broadcast_to(np.asarray(y_error, dtype=np.float64), ys.shape)
 
     def fitted(s: float) -> StraightLine:
-        return york(x, ys, x_error, np.hypot(own, s))
+        weight = 1.0 / np.hypot(error, s)
+        (slope, intercept), covariance = np.polyfit(x, y, 1, w=weight, cov="unscaled")
+        chi2 = float(np.sum((weight * (y - intercept - slope * x)) ** 2))
+        return StraightLine(float(slope), float(intercept), covariance, chi2 / max(len(x) - 2, 1))
 
     line = fitted(0.0)
-    if len(ys) < 3 or line.reduced <= 1:
+    if len(y) < 3 or line.reduced <= 1:
         return line, 0.0
     from scipy.optimize import brentq
 
-    high = float(np.std(ys - np.polyval(np.polyfit(x, ys, 1), x))) * np.sqrt(len(ys)) + float(own.max())
+    high = float(np.std(y - np.polyval(np.polyfit(x, y, 1), x))) * np.sqrt(len(y)) + float(error.max())
     s = float(brentq(lambda s: fitted(s).reduced - 1.0, 0.0, high, xtol=1e-4 * high))
     return fitted(s), s
 

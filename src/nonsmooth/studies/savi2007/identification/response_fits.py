@@ -30,6 +30,7 @@ from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth.studies.savi2007.identification.free_decay import DecayFit
 from nonsmooth.studies.savi2007.identification.least_squares import nonlinear_fit
+from nonsmooth.studies.savi2007.identification.picture_data import picture_data
 from nonsmooth.studies.savi2007.identification.steady import Steady
 
 __all__ = ["amplitude_fit", "crank_mark", "grazing_amplitude", "receptance", "receptance_fit", "viscous_bias"]
@@ -89,8 +90,20 @@ def amplitude_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> list[Finding
         Estimate(*row).times(mass.value, mass.uncertainty, unit)
         for row, unit in ((viscous["b"], "N s/m"), (both["b"], "N s/m"), (both["f"], "N"))
     )
-    shown = seen.only(seen.crank == np.min(seen.crank))
-    data = _data(shown, natural, viscous, both, (c_viscous, c_both, dry))
+    some = seen.only(seen.crank == np.min(seen.crank))
+    fine = np.linspace(some.omega.min(), some.omega.max(), 300)
+    joint, plain = (
+        _predicted(fine, np.full(300, some.crank[0]), natural, fit["b"][0], fit["f"][0]) for fit in (both, viscous)
+    )
+    data = picture_data(
+        some.runs,
+        {
+            "run": {"omega": some.omega, "amplitude": some.amplitude, "amplitude_error": some.error,
+                    "direction": some.direction},
+            "omega_fine": {"omega_fine": fine, "joint_amplitude": joint, "viscous_amplitude": plain},
+        },
+        c_joint=c_both, friction_joint=dry, c_viscous=c_viscous, crank_length=some.crank[0],
+    )  # fmt: skip
     bias = 100 * (c_viscous.value / (mass.value * float(decay.values[1])) - 1)
     b, f = float(decay.values[1]), float(decay.values[2])
     alone = {a: viscous_bias(natural, b, f, a, seen.omega[seen.crank == a]) for a in np.unique(seen.crank).tolist()}
@@ -162,31 +175,6 @@ def _fit(
     values, covariance = fitted
     rows = zip(names, values.tolist(), np.sqrt(np.diag(covariance)).tolist(), strict=True)
     return {"f": (0.0, 0.0)} | {name: (value, error) for name, value, error in rows}
-
-
-def _data(
-    shown: Steady, natural: float, viscous: dict[str, tuple[float, float]], both: dict[str, tuple[float, float]],
-    found: tuple[Estimate, Estimate, Estimate],
-) -> Any:  # fmt: skip
-    import xarray as xr
-
-    fine = np.linspace(shown.omega.min(), shown.omega.max(), 300)
-    lengths = np.full(300, shown.crank[0])
-    return xr.Dataset(
-        {
-            "omega": ("run", shown.omega, {"units": "rad/s"}), "amplitude": ("run", shown.amplitude, {"units": "m"}),
-            "amplitude_error": ("run", shown.error, {"units": "m"}), "direction": ("run", shown.direction),
-            "joint_amplitude": ("omega_fine", _predicted(fine, lengths, natural, both["b"][0], both["f"][0])),
-            "viscous_amplitude": ("omega_fine", _predicted(fine, lengths, natural, viscous["b"][0], 0.0)),
-            "c_joint": ((), found[1].value, {"units": "N s/m"}),
-            "c_joint_error": ((), found[1].uncertainty, {"units": "N s/m"}),
-            "friction_joint": ((), found[2].value, {"units": "N"}),
-            "c_viscous": ((), found[0].value, {"units": "N s/m"}),
-            "c_viscous_error": ((), found[0].uncertainty, {"units": "N s/m"}),
-            "crank_length": ((), float(shown.crank[0]), {"units": "m"}),
-        },
-        {"omega_fine": ("omega_fine", fine, {"units": "rad/s"})}, {"synthetic": shown.synthetic},
-    )  # fmt: skip
 
 
 def receptance(
@@ -290,26 +278,21 @@ def crank_mark(seen: Steady, decay: DecayFit) -> float:
 
 
 def _complex_data(seen: Steady, rows: list[Estimate], mass: float) -> Any:
-    import xarray as xr
-
     c, natural, friction, scale, mark = (row.value for row in rows)
     fine, lengths = np.linspace(seen.omega.min(), seen.omega.max(), 400), np.unique(seen.crank)
     curves = np.array([receptance(fine, a, natural, c / mass, friction / mass, scale, mark) / a for a in lengths])
     ratio = seen.response / seen.crank
-    return xr.Dataset(
+    return picture_data(
+        seen.runs,
         {
-            "omega": ("run", seen.omega, {"units": "rad/s"}), "crank": ("run", seen.crank, {"units": "m"}),
-            "real": ("run", ratio.real), "imaginary": ("run", ratio.imag), "error": ("run", seen.error / seen.crank),
-            "fitted_real": (("crank_length", "omega_fine"), curves.real),
-            "fitted_imaginary": (("crank_length", "omega_fine"), curves.imag),
-            "omega_0": ((), natural, {"units": "rad/s"}), "omega_0_error": ((), rows[1].uncertainty),
-            "c": ((), c, {"units": "N s/m"}), "c_error": ((), rows[0].uncertainty),
+            "run": {
+                "omega": seen.omega, "crank": seen.crank, "real": ratio.real, "imaginary": ratio.imag,
+                "error": seen.error / seen.crank,
+            },
+            ("crank_length", "omega_fine"): {"fitted_real": curves.real, "fitted_imaginary": curves.imag},
+            "omega_fine": {"omega_fine": fine}, "crank_length": {"crank_length": lengths},
         },
-        {
-            "omega_fine": ("omega_fine", fine, {"units": "rad/s"}),
-            "crank_length": ("crank_length", lengths, {"units": "m"}),
-        },
-        {"synthetic": seen.synthetic},
+        omega_0=rows[1], c=rows[0],
     )  # fmt: skip
 
 

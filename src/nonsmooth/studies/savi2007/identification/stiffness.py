@@ -28,6 +28,7 @@ from nonsmooth.identification.uncertainty import uniform
 from nonsmooth.recordings.signals.savitzky_golay import savitzky_golay
 from nonsmooth.studies.savi2007.identification.evidence import Run
 from nonsmooth.studies.savi2007.identification.least_squares import linear_law
+from nonsmooth.studies.savi2007.identification.picture_data import picture_data
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -142,7 +143,6 @@ def _columns(run: Run, resolution: float, mass: float, friction: bool) -> tuple[
 def _data(
     runs: Sequence[Run], rows: Any, values: FloatArray, covariance: FloatArray, width: int, friction: bool
 ) -> xr.Dataset:
-    import xarray as xr
 
     x = np.concatenate([part[:, 0] for part, _ in rows])
     pull = np.concatenate([np.sign(part[:, 1]) for part, _ in rows])
@@ -150,21 +150,16 @@ def _data(
     force = np.concatenate([force for _, force in rows])
     lines = [(i, s) for i in range(len(rows)) for s in ((1.0, -1.0) if friction else (0.0,))]
     loop = float(values[2]) if friction else 0.0
-    data = xr.Dataset(
+    return picture_data(
+        runs,
         {
-            "displacement": ("sample", x, {"units": "m", "long_name": "displacement"}),
-            "force": ("sample", force, {"units": "N", "long_name": "force without the hand's inertia"}),
-            "run": ("sample", number),
-            "pull": ("sample", pull),
-            "slope": ("line", np.full(len(lines), values[0]), {"units": "N/m"}),
-            "slope_error": ("line", np.full(len(lines), np.sqrt(covariance[0, 0])), {"units": "N/m"}),
-            "intercept": ("line", np.array([values[width + i] + s * loop for i, s in lines]), {"units": "N"}),
-            "line_run": ("line", np.array([i for i, _ in lines])),
-            "line_pull": ("line", np.array([s for _, s in lines])),
+            "sample": {"displacement": x, "force": force, "run": number, "pull": pull},
+            "line": {
+                "slope": np.full(len(lines), values[0]),
+                "slope_error": np.full(len(lines), np.sqrt(covariance[0, 0])),
+                "intercept": np.array([values[width + i] + s * loop for i, s in lines]),
+                "line_run": np.array([i for i, _ in lines]), "line_pull": np.array([s for _, s in lines]),
+            },
         },
-        attrs={"synthetic": "yes" if any(run.synthetic for run in runs) else "no"},
-    )
-    if friction:
-        data["friction_force"] = ((), loop, {"units": "N"})
-        data["friction_force_error"] = ((), float(np.sqrt(covariance[2, 2])), {"units": "N"})
-    return data
+        **({"friction_force": Estimate(loop, float(np.sqrt(covariance[2, 2])), "N")} if friction else {}),
+    )  # fmt: skip
