@@ -16,6 +16,7 @@ from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal
 from nonsmooth.recordings.signals.smoothing import smooth
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -207,9 +208,9 @@ def _labelled(found: xr.Dataset, place: tuple[float, float, float], least: float
             "depth": ("contact", depth, {"long_name": "depth of the contact", **metre}),
             "v_begin": ("contact", speed[0], {"long_name": "velocity at the begin", **rate}),
             "v_end": ("contact", speed[1], {"long_name": "velocity at the end", **rate}),
-            "uncertain": ("contact", (depth < least) | (seen < 2) | cut, {"long_name": "contact is uncertain"}),
+            "uncertain": labelled("contact", (depth < least) | (seen < 2) | cut, "contact is uncertain"),
             "gap": ((), gap, metre),
             "gap_error": ((), gap_error, metre),
-            "stiffness": ((), stiffness, {"long_name": "stiffness of the support by the mass", "units": "1/s^2"}),
+            "stiffness": labelled((), stiffness, "stiffness of the support by the mass", "1/s^2"),
         }
     )

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import even_rate, signal, whose
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -129,11 +130,11 @@ def spectrum(
     name = window if isinstance(window, str) else repr(window)
     return xr.Dataset(
         {
-            "amplitude": ("frequency", amplitude, {"long_name": "amplitude", "units": unit}),
-            "phase": ("frequency", np.angle(lines), {"long_name": "phase", "units": "rad"}),
-            "density": ("frequency", density, {"long_name": "power density", "units": f"({unit or 1})^2/Hz"}),
+            "amplitude": labelled("frequency", amplitude, "amplitude", unit),
+            "phase": labelled("frequency", np.angle(lines), "phase", "rad"),
+            "density": labelled("frequency", density, "power density", f"({unit or 1})^2/Hz"),
         },
-        {"frequency": ("frequency", frequency, {"long_name": "frequency", "units": "Hz"})},
+        {"frequency": labelled("frequency", frequency, "frequency", "Hz")},
         {"window": name, "rate": float(rate), "samples": n, "padding": padding, "grid_step": rate / n,
          "signal": whose(x, "")},
     )  # fmt: skip

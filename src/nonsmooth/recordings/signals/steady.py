@@ -19,6 +19,7 @@ from nonsmooth.recordings.sampling import examine
 from nonsmooth.recordings.signals.checks import signal, whose
 from nonsmooth.recordings.signals.harmonics import fit
 from nonsmooth.recordings.signals.spectrum import largest_line, peak, spectrum
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -175,10 +176,10 @@ def steady_response(
     unit = str(getattr(x, "attrs", {}).get("units", ""))
     table = xr.Dataset(
         {
-            "time": ("block", middles, {"long_name": "middle of the block", "units": "s"}),
-            "amplitude": ("block", sizes, {"long_name": "amplitude of the fundamental", "units": unit}),
+            "time": labelled("block", middles, "middle of the block", "s"),
+            "amplitude": labelled("block", sizes, "amplitude of the fundamental", unit),
             "amplitude_error": ("block", size_errors, {"units": unit}),
-            "phase": ("block", phases, {"long_name": "phase less that of the fitted frequency", "units": "rad"}),
+            "phase": labelled("block", phases, "phase less that of the fitted frequency", "rad"),
             "phase_error": ("block", phase_errors, {"units": "rad"}),
         },
         attrs={"signal": name, "frequency": by_fit, "rate": -decay, "rate_error": decay_error},

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth import System, plot, poincare, simulate
+from nonsmooth.results.labels import labelled
 from nonsmooth.studies.savi2007.figures.diagrams import shared_legend
 from nonsmooth.studies.savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth.studies.savi2007.flows import ETA, EXACT, SMOOTHED, Settings
@@ -61,8 +62,8 @@ def _errors(settings: Settings) -> xr.Dataset:
                 error[k, i, j] = np.linalg.norm(difference)
     found = xr.Dataset(
         {
-            "error": (("form", "orbit", "eta"), error, {"long_name": "distance to the exact flow, 1 mm and 1 cm/s"}),
-            "slowest_contact": ("orbit", slowest, {"long_name": "least speed at a transition", "units": "m/s"}),
+            "error": labelled(("form", "orbit", "eta"), error, "distance to the exact flow, 1 mm and 1 cm/s"),
+            "slowest_contact": labelled("orbit", slowest, "least speed at a transition", "m/s"),
         },
         {"form": ["paper", "paper, coarse", "general"], "orbit": list(ORBITS), "eta": ("eta", etas, {"units": "m"})},
     )  # fmt: skip
@@ -77,8 +78,8 @@ def _grazing(settings: Settings) -> xr.Dataset:
     closed = [grazing_frequencies({**sharp.values, "g": FIGURE_9["g"] - eta})[-1] for eta in etas]
     made = xr.Dataset(
         {
-            "grazing": ("eta", found, {"long_name": "grazing frequency, bisected", "units": "rad/s"}),
-            "closed_form": ("eta", closed, {"long_name": "grazing frequency of the gap g - eta", "units": "rad/s"}),
+            "grazing": labelled("eta", found, "grazing frequency, bisected", "rad/s"),
+            "closed_form": labelled("eta", closed, "grazing frequency of the gap g - eta", "rad/s"),
         },
         {"eta": ("eta", etas, {"units": "m"})},
     )
