@@ -87,7 +87,7 @@ def timed(side: int, only: list[str]) -> dict[str, float]:
 
 
 def of_a_process(checkout: Path, arguments: list[str]) -> dict[str, float]:
-    """What ``timed`` finds in a process of its own, with the package of a checkout and the scenarios of this one."""
+    """The times that a process of its own finds, with the package of a checkout and the scenarios of this one."""
     paths = os.pathsep.join([str(checkout / "src"), str(HERE)])
     done = subprocess.run(
         [sys.executable, str(Path(__file__)), "--child", *arguments], capture_output=True, text=True, check=True,
