@@ -84,19 +84,19 @@ def _loaded(folder: Path, name: str, keys: Sequence[str], seconds: float) -> Mad
 
 
 def _made_by(settings: Settings) -> dict[str, str | bool]:
-    """Identity of a figure: the sources of this package, and how much work was asked for."""
+    """Identity of a figure: the sources of both packages, and how much work was asked for."""
     return {"sources": _sources(), "quick": settings.quick, "full": settings.full}
 
 
 @cache
 def _sources() -> str:
-    """A hash of all sources of this package."""
+    """A hash of all sources of the toolbox and of this study."""
     import nonsmooth
 
     digest = hashlib.sha256()
-    room = Path(nonsmooth.__file__).parent
-    for file in sorted(room.rglob("*.py")):
-        digest.update(f"{file.relative_to(room)}\n".encode() + file.read_bytes())
+    for room in (Path(nonsmooth.__file__).parent, Path(__file__).parent):
+        for file in sorted(room.rglob("*.py")):
+            digest.update(f"{file.relative_to(room)}\n".encode() + file.read_bytes())
     return digest.hexdigest()
 
 
