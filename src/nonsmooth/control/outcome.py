@@ -17,8 +17,6 @@ from nonsmooth.results.labels import labelled
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Names", "branch_dataset"]
-
 TURN = np.linspace(0.0, 1.0, 2048, endpoint=False)
 SIGNIFICANT = 4.0  # standard uncertainties
 MISFIT = 4.0  # mean square of the normalised differences from a parabola

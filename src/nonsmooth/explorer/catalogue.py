@@ -14,8 +14,6 @@ from nonsmooth.studies import installed, study
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["GIVEN", "PAPER", "Catalogue", "first_state", "presets_of", "slider_range"]
-
 PAPER = "discontinuous_support"
 GIVEN = "given"  # the name of a model of one's own
 

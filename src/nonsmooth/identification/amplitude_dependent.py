@@ -38,9 +38,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.recordings.recording import Recording
 
-__all__ = ["ResponseCurve", "amplitude_dependent", "response_curves"]
-
-
 _POWERS = {"m": 0, "m/s": 1, "m/s^2": 2, "m/s²": 2}
 _METHOD = "forced responses fitted along their curves by one mode with amplitude-dependent frequency and damping"
 

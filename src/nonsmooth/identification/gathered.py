@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["Gathered", "matched"]
-
 #: Dims over which results list what they found, however much it was: the value of each and what its rows share.
 LISTS = {"jump": ("jump_value", ("jump_variable", "jump_direction")), "special": (None, ("special_kind", "kind"))}
 FINER = 8  # points to a step of a drawn branch, on a cubic

@@ -23,8 +23,6 @@ from nonsmooth.system.system import System
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["propagate", "to_first_order"]
-
 COARSE = 0.02  # the largest step of draws' branches: values between points lie on a cubic
 
 

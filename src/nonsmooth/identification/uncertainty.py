@@ -16,11 +16,6 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.spectrum import correlation_times
 
-__all__ = [
-    "correlated", "coverage_factor", "factor_interval", "interval", "newey_west", "normal_draws",
-    "not_below", "uniform",
-]  # fmt: skip
-
 
 def uniform(half_width: float) -> float:
     r"""Standard uncertainty (type B) of a quantity known to lie within +- ``half_width``: :math:`a / \sqrt 3`.

@@ -16,22 +16,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = [
-    "ABOVE",
-    "MEASURED",
-    "THEORY",
-    "check_kind",
-    "comparison_diagram",
-    "comparison_distances",
-    "comparison_phase_portrait",
-    "comparison_response",
-    "comparison_section",
-    "comparison_time",
-    "measured_label",
-    "one_phase",
-    "shade_reach",
-]
-
 #: Theory is a blue line or cloud with a pale band, the experiment black points.
 THEORY = style.COLORS["first"]
 MEASURED = style.COLORS["section"]

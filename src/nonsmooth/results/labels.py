@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["Labels", "Quantity", "kind_of", "labelled", "labels_of"]
-
 
 @dataclass(frozen=True)
 class Quantity:

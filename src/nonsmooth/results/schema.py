@@ -37,27 +37,6 @@ from nonsmooth.results.labels import Labels, Quantity, labelled
 from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.statuses import EQUILIBRIA, flag_attributes, status_attributes
 
-__all__ = [
-    "Column",
-    "attributes",
-    "chosen",
-    "columns",
-    "dataset",
-    "floats",
-    "parameter_coords",
-    "quantity_attributes",
-    "response",
-    "section_points",
-    "state_coords",
-    "strings",
-    "sweep",
-    "table",
-    "trajectory",
-    "typed",
-    "varied",
-    "with_impacts",
-]
-
 
 class Column(NamedTuple):
     """A variable of a result: its name, its dims beside those of the result, the rule for its numbers and their unit,

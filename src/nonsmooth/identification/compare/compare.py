@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from nonsmooth.identification.parameter_set import ParameterSet
     from nonsmooth.system.system import System
 
-__all__ = ["compare"]
-
 DRAWS = 60
 FORMS = (
     "nonsmooth.identification.compare.motion_of(time, x, phase) makes one of a sampled position, and measured_motion "

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["compare_diagram"]
-
-
 FINE = 201
 KEEP = 64
 

@@ -10,9 +10,6 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.results.labels import labelled
 
-__all__ = ["Jump", "Jumps", "jumps_in_steps", "match_jumps"]
-
-
 STEEPER = 2.5  # a jump exceeds the steps on both sides by this factor
 LEAST = 0.02  # and this part of the amplitude
 CERTAIN = 6.0  # and its standard error by this factor

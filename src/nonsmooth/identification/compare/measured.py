@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from nonsmooth.recordings.recording import Recording
     from nonsmooth.system.system import System
 
-__all__ = ["measured_motion", "motion_of", "recorded_motion"]
-
 ANGLES = ("rad", "deg", "rev")
 LONG = 150.0  # s: of a longer record the support and the smoother's intensity are found in its middle
 PIECE = 75.0  # s

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["compare_motion", "motion_band"]
-
 KEEP = 128  # section points by which a predicted motion is judged
 CLOUD = 2000  # section points of a predicted motion without a period number
 SHOWN = 16  # forcing periods of the record that are kept for overlays

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["compare_response"]
-
-
 FINE = 301  # values of the predicted curve
 
 

@@ -14,8 +14,6 @@ from nonsmooth.results.labels import labelled
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["measured_response", "measured_rise", "measured_sections", "section_points"]
-
 FEW = 6  # turns of the drive below which no period number is sought
 
 

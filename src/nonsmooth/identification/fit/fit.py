@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from nonsmooth.identification.parameter_set import ParameterSet
     from nonsmooth.system.system import System
 
-__all__ = ["best_of", "fit", "problem_of"]
-
 _PHASES = 8  # first guesses of an unknown phase
 _LONGER = 3.3  # the other length of first windows, in every second try
 _LOSSES = {"linear": np.inf, "huber": 2.5}  # noise deviations from which on a residual counts linearly

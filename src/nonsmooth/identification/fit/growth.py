@@ -21,8 +21,6 @@ from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
 from nonsmooth.identification.fit.windows import Window, Windows
 
-__all__ = ["POOR", "SHORT", "Grown", "grow"]
-
 POOR = 50.0  # chi^2 per degree of freedom of the first windows, from which there is no use in longer ones
 _CHAOS = 1e3  # growth of a start's change within a window, from which neighbouring motions are not followed
 _REGULAR = 10.0  # that growth, below which a motion is regular enough to be followed over twice the time

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["plan_experiment"]
-
 _OF_A_RUN = ("duration", "periods", "samples", "start", "mode", "settings")
 
 

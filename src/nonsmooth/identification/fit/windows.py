@@ -26,8 +26,6 @@ from nonsmooth.recordings.signals.spectrum import correlation_times
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Window", "Windows"]
-
 
 @dataclass(frozen=True, eq=False)
 class Window:

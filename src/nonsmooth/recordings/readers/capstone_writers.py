@@ -25,8 +25,6 @@ from nonsmooth.recordings.recording import Recording
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["write_cap", "write_capstone_csv"]
-
 _PAGE = 256  # records; Capstone's members are longer than what was measured
 
 

@@ -21,8 +21,6 @@ from nonsmooth.results.labels import labelled
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["contacts"]
-
 _UNDECIDED = 0.01  # of the samples: at the edge of contact, of which none is used for the support
 
 def contacts(

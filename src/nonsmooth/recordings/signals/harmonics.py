@@ -17,8 +17,6 @@ from nonsmooth.recordings.signals.spectrum import correlation_times
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["HarmonicFit", "fit"]
-
 
 @dataclass(frozen=True, eq=False)
 class HarmonicFit:

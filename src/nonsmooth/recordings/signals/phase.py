@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike
 from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.recordings.signals.checks import signal, warn, whose
 
-__all__ = ["DrivePhase", "drive_phase"]
-
 TURN = 2.0 * math.pi
 
 

@@ -20,8 +20,6 @@ from nonsmooth.results.labels import labelled
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["flights", "impacts_of", "restitution", "single_contacts"]
-
 
 def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int = 4) -> xr.Dataset:
     """Intervals of a record in which the height of a body's centre falls freely.

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.recordings.signals.phase import DrivePhase
 
-__all__ = ["poincare", "stroboscopic"]
-
 
 class Known(TypedDict, total=False):
     """Of a motion, beside its positions and velocities; ``impacts`` are times at which the velocity jumps."""

@@ -20,8 +20,6 @@ from nonsmooth.results.labels import labelled
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["INTERPOLATIONS", "Peak", "largest_line", "peak", "spectrum"]
-
 #: Ways to find a peak between lines.
 INTERPOLATIONS = ("window", "parabola", "none")
 FINE = 32  # points per line in the table of a window's transform; a cubic between them is right to 1e-7

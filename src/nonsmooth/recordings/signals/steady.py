@@ -24,8 +24,6 @@ from nonsmooth.results.labels import labelled
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["SteadyResponse", "steady_response"]
-
 
 @dataclass(frozen=True, eq=False)
 class SteadyResponse:

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from nonsmooth_savi2007.figures.figure import Figure
     from nonsmooth_savi2007.flows import Settings
 
-__all__ = ["Bench", "main", "measure"]
-
 RIG = "rig"
 _LOG = "log.txt"
 _TIMED = " s of a processor"

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from nonsmooth import ParameterSet
     from nonsmooth.identification import Estimate, Finding
 
-__all__ = ["Found", "Number", "estimates_of", "found_in", "kept", "the_finding"]
-
 
 @dataclass(frozen=True)
 class Number:

@@ -15,8 +15,6 @@ from nonsmooth_savi2007.flows import Settings
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Made", "finish", "finished", "just_made", "refuse_strange"]
-
 #: The datasets of a figure by key, and the seconds that they took.
 Made: TypeAlias = "tuple[dict[str, xr.Dataset], float]"
 

@@ -13,8 +13,6 @@ from nonsmooth.models import discontinuous_support
 if TYPE_CHECKING:
     from nonsmooth_savi2007.laboratory import Laboratory
 
-__all__ = ["ETA", "EXACT", "FLOWS", "SMOOTHED", "Flow", "Settings", "starts"]
-
 ETA = 1e-5  # Section 4: "it is assumed that eta = 1e-5 for all simulations"
 
 _Choice = TypeVar("_Choice")

@@ -11,8 +11,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-__all__ = ["free_amplitude", "grazing_frequencies", "steady_state"]
-
 
 def grazing_frequencies(parameters: Mapping[str, float]) -> list[float]:
     r"""Frequencies at which the steady motion without contact just touches the support.

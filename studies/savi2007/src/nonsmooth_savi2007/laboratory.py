@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from nonsmooth_savi2007.comparison import GapOffset
     from nonsmooth_savi2007.rig import VirtualRig
 
-__all__ = ["SEED", "TRUTH", "Laboratory", "as_result"]
-
 SEED = 0  # of the rig's noise; its parameters are the published ones
 TRUTH = "truth.toml"
 

@@ -15,26 +15,6 @@ from nonsmooth_savi2007.arrays import FloatArray
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "APERIODIC",
-    "UNSETTLED",
-    "Interval",
-    "changes",
-    "highest",
-    "jumps",
-    "lowest",
-    "main_jump",
-    "measured_periods",
-    "period_word",
-    "periods_reached",
-    "range_of",
-    "regimes",
-    "separation_rate",
-    "small_jump",
-    "status_names",
-    "with_uncertainty",
-]  # fmt: skip
-
 APERIODIC = 0  # no period found up to the longest looked for
 UNSETTLED = -1  # the transient did not decide it
 

@@ -5,11 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-__all__ = [
-    "FIGURE_9", "FIGURE_10", "FIGURE_11", "FIGURE_12", "FIGURE_13", "FIGURE_14", "FIGURE_14_TEXT", "FIGURE_17",
-    "FIGURE_17_TEXT", "FIGURE_18", "NATURAL_FREQUENCY", "NUMBERS", "TABLE_1", "TEST_MASS", "Printed",
-]  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Printed:

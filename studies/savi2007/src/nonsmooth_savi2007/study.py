@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from nonsmooth_savi2007.claims.claims import Row
 
-__all__ = ["Reproduction", "figures_of_the_study", "reproduce"]
-
 PICTURE_DPI = 200
 PARAMETERS = "table1"
 #: Files that hold figures.

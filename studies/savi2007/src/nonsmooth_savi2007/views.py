@@ -7,8 +7,6 @@ from typing import Any
 
 from nonsmooth_savi2007 import printed
 
-__all__ = ["VIEWS"]
-
 _GAP = {**printed.FIGURE_13, "over": "g", "low": -0.0015, "high": 0.002, "shown": "v"}
 _AMPLITUDE = {**printed.FIGURE_11, "over": "rho", "low": 0.2, "high": 0.5, "shown": "v"}
 _FREQUENCY = {**printed.FIGURE_17, "over": "omega", "low": 8.4, "high": 10.4, "shown": "v"}

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from nonsmooth_savi2007.claims import diagrams, model, parameters, response, rig
 from nonsmooth_savi2007.claims.verdicts import Cell, Data, Row
 
-__all__ = ["CLAIMS", "Claim", "Row", "measure_claims"]
-
 
 @dataclass(frozen=True)
 class Claim:

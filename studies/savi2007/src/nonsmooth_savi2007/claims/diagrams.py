@@ -38,9 +38,6 @@ from nonsmooth_savi2007.printed import FIGURE_12, FIGURE_14, FIGURE_14_TEXT, FIG
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["f11", "f12", "f13", "f13_basins", "f14", "f15", "f17", "f17_basins", "f17_grazing", "f18"]
-
-
 FLOWS = ("exact", "smoothed")
 
 

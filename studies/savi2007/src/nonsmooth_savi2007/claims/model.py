@@ -17,8 +17,6 @@ from nonsmooth_savi2007.printed import FIGURE_12, NUMBERS
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["c1", "c1_other_systems", "m1", "m2", "m3", "m4"]
-
 ON_A_BORDER = 1e-10  # m; samples nearer to a border than this (the limits at a transition) are of neither side
 
 

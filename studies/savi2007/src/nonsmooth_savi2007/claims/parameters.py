@@ -24,8 +24,6 @@ from nonsmooth_savi2007.findings import Found, Number, found_in
 from nonsmooth_savi2007.measure import Interval
 from nonsmooth_savi2007.printed import NATURAL_FREQUENCY, NUMBERS, TABLE_1, TEST_MASS, Printed
 
-__all__ = ["p1", "p2", "p3", "p4", "p5", "p6", "p7", "p8", "r1", "r2"]
-
 _NO_MODEL = "not in the model"
 _GIVEN = "a parameter"
 _SAME = "as exact: no contact in this"

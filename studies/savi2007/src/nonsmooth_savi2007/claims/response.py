@@ -39,11 +39,6 @@ from nonsmooth_savi2007.printed import FIGURE_9, FIGURE_10, NATURAL_FREQUENCY, N
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "against", "f9a", "f9a_rig", "f9b", "f9b_rig", "f9c", "f9c_rig", "f10", "f10_rig", "grazing_behind_both",
-    "grazing_behind_both_rig", "grazing_of_paper",
-]  # fmt: skip
-
 _FEWEST_APART = 0.05  # of the amplitude: two motions that differ by more are two
 _9, _10 = "Section 4, on Fig. 9", "Section 4, on Fig. 10"
 

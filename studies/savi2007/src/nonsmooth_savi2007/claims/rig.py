@@ -25,8 +25,6 @@ from nonsmooth_savi2007.printed import (
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["c1", "f11", "f12", "f13", "f14", "f15", "f16", "f17", "f17_grazing", "f18", "of_the_model"]
-
 
 def of_the_model(n: int) -> list[Cell]:
     """Cells of claims that no rig can decide."""

@@ -13,12 +13,6 @@ from nonsmooth_savi2007.printed import Printed
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "CLOSE", "MEANING", "RULE", "Beside", "Cause", "Cell", "Data", "Known", "Row", "Verdict", "against_closed_form",
-    "against_printed", "agreed", "judge", "judge_step", "printed_cell",
-]  # fmt: skip
-
-
 CLOSE = 2.0  # percent; the paper's own two natural frequencies, 4.50 and 4.60 rad/s, are 2.2 % apart
 
 

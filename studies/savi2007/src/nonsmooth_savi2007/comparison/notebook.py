@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.recordings import Session
 
-__all__ = ["SHOWS", "session_measurement"]
-
 #: What a run with each procedure shows.
 SHOWS = {"section": "motion", "contact": "motion", "grazing": "motion", "response": "response", "rise": "diagram"}
 

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from nonsmooth.recordings import Session
     from nonsmooth_savi2007.identification.referral import MeanShift
 
-__all__ = ["GapOffset", "GapReference", "gap_offset", "gap_reference"]
-
 #: Procedures that tell the reference: taps, steady runs, and those that show the sensor's direction.
 _TELLING = ("impulse", "response", "contact", "grazing", "section", "rise")
 

@@ -29,8 +29,6 @@ from nonsmooth_savi2007.printed import FIGURE_11, FIGURE_12, NUMBERS
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FIGURES", "flip_of", "flips_said", "rate_of", "slowest"]
-
 PRINTED = {NUMBERS[key].value: NUMBERS[key].text for key in ("period 4 from", "period 2 from", "period 1 from")}
 _WORDS = "printed in the paper (N)"
 RISES = (450.0, 900.0, 1800.0)  # s, from 0.2 to 0.5 N; the one in the middle is drawn

@@ -15,8 +15,6 @@ from nonsmooth_savi2007.grazing import grazing_frequencies, steady_state
 from nonsmooth_savi2007.laboratory import as_result
 from nonsmooth_savi2007.printed import FIGURE_9, FIGURE_11, FIGURE_13
 
-__all__ = ["FIGURES", "order_in_eta"]
-
 ORBITS = {
     r"Fig. 9, $\omega = 4.8$ rad/s": {**FIGURE_9, "omega": 4.8},
     r"Fig. 11, $\rho = 0.45$ N": {**FIGURE_11, "rho": 0.45},

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from nonsmooth import System
 
-__all__ = ["BEGINNINGS", "Beginning", "at_ends", "branches", "branches_of", "rows_of"]
-
 _CLOSED = 1e-6  # of the orbit's size
 _SAME = 1e-8  # of the value of a flip
 

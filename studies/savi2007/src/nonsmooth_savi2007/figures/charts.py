@@ -24,8 +24,6 @@ from nonsmooth_savi2007.printed import FIGURE_9, FIGURE_13
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CHARTS", "FIGURES", "Plane", "curves", "grid_of"]
-
 _FULL, _QUICK = 1000, 24  # points along each parameter
 
 

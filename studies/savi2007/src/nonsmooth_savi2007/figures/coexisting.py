@@ -23,8 +23,6 @@ from nonsmooth_savi2007.printed import FIGURE_13, FIGURE_17
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["BASINS", "FIGURES", "names_of"]
-
 #: Parameters of each picture.
 BASINS = {"basins13": {**FIGURE_13, "g": 0.0014}, "basins17": {**FIGURE_17, "omega": 9.55}}
 _PLANE = {"x": (-0.02, 0.02), "v": (-0.2, 0.2)}

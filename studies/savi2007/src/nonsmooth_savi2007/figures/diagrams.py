@@ -18,11 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = [
-    "ABOUT_BRANCHES", "diagrams", "draw_both", "draw_branches", "draw_diagram", "how", "mark_grazing", "mark_values",
-    "shared_legend",
-]  # fmt: skip
-
 _OTHER, _SHARE = 0.05, 0.25  # another motion: a quarter of its points so far off, in parts of the diagram's range
 
 #: What a caption says of them.

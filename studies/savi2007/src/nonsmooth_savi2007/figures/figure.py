@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from nonsmooth_savi2007.flows import Settings
 
-__all__ = ["Canvas", "Datasets", "Figure", "only_outer", "two_rows"]
-
 Canvas: TypeAlias = "MatplotlibFigure"
 Datasets: TypeAlias = "dict[str, xr.Dataset]"  # of a figure, by key
 

@@ -46,8 +46,6 @@ from nonsmooth_savi2007.printed import FIGURE_17, FIGURE_18
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["FIGURES"]
-
 _CHAOTIC = 9.55
 _JUST_ABOVE = 9.8  # rad/s, above the grazing frequency
 SHOWN = {omega: f"{omega:.2f}" for omega in FIGURE_18}

@@ -49,8 +49,6 @@ if TYPE_CHECKING:
 
     from nonsmooth_savi2007.laboratory import Laboratory
 
-__all__ = ["FIGURES", "PHASES", "transient_points"]
-
 PHASES = {"0": 0.0, "quarter": 0.25, "half": 0.5, "three_quarters": 0.75}  # of a forcing period
 _ANGLES = ("0", r"\pi/2", r"\pi", r"3\pi/2")
 _CHAOTIC = 0.0018

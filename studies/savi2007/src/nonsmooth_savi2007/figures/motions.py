@@ -26,11 +26,6 @@ if TYPE_CHECKING:
     from nonsmooth import System
     from nonsmooth_savi2007.laboratory import Laboratory
 
-__all__ = [
-    "GRID", "SIDES", "Motions", "chosen", "compared", "diagram_of", "draw_pairs", "measured_periods_at", "model_at",
-    "motions", "runs_at", "runs_of", "said", "without_flips",
-]  # fmt: skip
-
 #: The two sides of a sheet, the model above the rig.
 SIDES = {"theory": "model, identified", "measured": "virtual rig (synthetic)"}
 GRID = 384  # samples of an orbit in each forcing period: enough for the eye within a contact

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["FIGURES", "NAMES", "table_rows"]
-
 #: What Table 1 holds and what identification adds to it, with units and symbols.
 NAMES = {
     "k": ("N/m", "$k$"), "k_s": ("N/m", "$k_s$"), "c": ("N s/m", "$c$"), "c_s": ("N s/m", "$c_s$"),

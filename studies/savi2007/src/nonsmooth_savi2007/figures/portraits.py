@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 
     from nonsmooth import System
 
-__all__ = ["QUANTITIES", "chosen_start", "describe", "draw_portraits", "portraits", "sheet_size", "titles", "twins"]
-
-
 #: Units and symbols of what the figures vary.
 QUANTITIES = {"g": ("m", "g"), "omega": ("rad/s", r"\omega"), "rho": ("N", r"\rho")}
 

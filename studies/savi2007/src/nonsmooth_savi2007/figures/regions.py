@@ -7,8 +7,6 @@ from nonsmooth.plot.labels import name_axes
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth_savi2007.flows import ETA, EXACT, SMOOTHED
 
-__all__ = ["FIGURES"]
-
 
 def _draw(canvas: Canvas, data: Datasets) -> None:
     left, right = canvas.subplots(1, 2)

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["FIGURES", "grazing_of"]
-
 
 def grazing_of(response: xr.Dataset) -> list[float]:
     """Closed-form grazing frequencies at the parameters of a response (rad/s): of g - eta where it is smoothed."""

@@ -28,9 +28,6 @@ from nonsmooth.identification import Estimate
 from nonsmooth.identification.uncertainty import uniform
 from nonsmooth_savi2007.arrays import FloatArray
 
-__all__ = ["LAWS", "UNKNOWNS", "Adjusted", "Observation", "adjust"]
-
-
 _ROUNDS = 50
 _CONVERGED = 1e-6  # of a standard uncertainty
 

@@ -27,8 +27,6 @@ from nonsmooth_savi2007.identification.steady import harmonics_of
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["crank_force", "voltage_frequency"]
-
 
 def voltage_frequency(runs: Sequence[Run]) -> Finding:
     r"""The law :math:`\omega = s (V - V_0)` of the motor, from runs with a photogate at several voltages (Fig. 8a).

@@ -41,8 +41,6 @@ from nonsmooth_savi2007.identification.statements import (
 from nonsmooth_savi2007.identification.steady import Steady, steady
 from nonsmooth_savi2007.identification.stiffness import stiffness
 
-__all__ = ["identify"]
-
 #: The findings that name the runs of a procedure which were used.
 _FOUND_BY = {"impulse": ("omega_0", "c_decay"), "drop": ("c_s_drop",), "springs": ("spring_slope",),
              "support": ("support_slope",)}  # fmt: skip

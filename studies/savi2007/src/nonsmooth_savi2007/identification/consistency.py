@@ -23,8 +23,6 @@ from numpy.typing import NDArray
 
 from nonsmooth_savi2007.arrays import FloatArray
 
-__all__ = ["CHANCE", "Consistent", "birge_ratio", "consistent"]
-
 #: Probability of a chi^2 this large by chance, below which measurements disagree.
 CHANCE = 1e-4
 

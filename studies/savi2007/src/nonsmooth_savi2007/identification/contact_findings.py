@@ -23,8 +23,6 @@ from nonsmooth_savi2007.identification.picture_data import picture_data
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["contact_finding", "one_contact"]
-
 _KAPPA, _GAMMA = 3, 4  # indices of k_s/m and c_s/m among the parameters
 _TRIED = 5  # windows of which the median one is shown
 

@@ -17,8 +17,6 @@ from nonsmooth.identification.uncertainty import uniform
 from nonsmooth.recordings import Quantity
 from nonsmooth_savi2007.identification.consistency import birge_ratio
 
-__all__ = ["PAIRS", "Check", "cross_checks", "sentences"]
-
 
 class Check(NamedTuple):
     """Two estimates of one quantity, as ``"c: free decay, complex response"``, and what to look at if they differ.

@@ -47,11 +47,6 @@ from nonsmooth_savi2007.identification.picture_data import picture_data
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "decay_damping", "decay_rate", "envelope", "log_decrement", "natural_frequency", "spectral_peak", "support_damping",
-]  # fmt: skip
-
-
 _SLOWEST = 0.02  # m/s, of the slowest half swing of the test mass that is used
 GRID = 2048  # samples of the paper's DFT: 100 Hz / 2048 * 15 = 0.732 Hz
 FINE = 400  # frequencies between its values about the peak

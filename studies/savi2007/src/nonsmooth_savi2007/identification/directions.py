@@ -20,8 +20,6 @@ from nonsmooth_savi2007.identification.plausibility import few
 if TYPE_CHECKING:
     from nonsmooth_savi2007.identification.evidence import Run
 
-__all__ = ["oriented", "towards_support"]
-
 #: Procedures in which the car may meet the support.
 _AT_SUPPORT = ("contact", "grazing", "section", "rise", "response")
 _LAG = 0.03  # s: over which an acceleration is taken, a third of a contact

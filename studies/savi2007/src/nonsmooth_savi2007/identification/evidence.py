@@ -17,9 +17,6 @@ from nonsmooth.system.names import unknown
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.directions import oriented
 
-__all__ = ["Evidence", "Run", "gather"]
-
-
 #: Channels that a procedure cannot do without.
 _NEEDS: Mapping[str, tuple[str, ...]] = {
     "springs": ("Angle", "Force"), "support": ("Angle", "Force"), "impulse": ("Angle",), "drop": ("Angle",),

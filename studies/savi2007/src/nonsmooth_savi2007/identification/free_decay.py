@@ -31,9 +31,6 @@ from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, m
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.consistency import Consistent, consistent
 
-__all__ = ["DecayFit", "free_decay", "swing"]
-
-
 #: Speed (m/s) of the slowest half swing that is used.
 SLOWEST = 0.03
 _NAMES = ("omega_0", "b", "f", "x_e")

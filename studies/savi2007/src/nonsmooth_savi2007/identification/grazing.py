@@ -47,8 +47,6 @@ from nonsmooth_savi2007.identification.steady import Steady, steady
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["grazing_gap"]
-
 _FIRST = 4  # runs that must be free
 _SIGMAS = 5.0  # by which the mean must leave its place
 _STEADY = 0.5  # counts: by which the mean of free runs may move

@@ -31,8 +31,6 @@ from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.picture_data import picture_data
 from nonsmooth_savi2007.identification.steady import Steady
 
-__all__ = ["half_power", "half_power_points"]
-
 _DEEPEST = 3.0  # amplitudes from a third of the largest on are used
 _DRAWS = 200
 

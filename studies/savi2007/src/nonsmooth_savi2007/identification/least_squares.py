@@ -13,8 +13,6 @@ import numpy as np
 from nonsmooth.identification.uncertainty import correlated
 from nonsmooth_savi2007.arrays import FloatArray
 
-__all__ = ["LinearLaw", "StraightLine", "linear_law", "nonlinear_fit", "scattered_line"]
-
 
 class StraightLine(NamedTuple):
     """y = intercept + slope x, the covariance (2, 2) of slope and intercept, and chi^2 per degree of freedom."""

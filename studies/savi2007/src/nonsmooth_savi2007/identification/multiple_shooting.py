@@ -34,8 +34,6 @@ from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit
 
-__all__ = ["OWN", "SHARED", "ContactFit", "fit_contact", "known_before", "shoot_contacts"]
-
 SHARED = ("omega_0", "b", "f", "kappa", "gamma")
 OWN = ("g", "x_e", "crank", "mark", "cosine_2", "sine_2")  # of each run
 _TURNING = ("omega", "turned")  # of an even drive: its angle is omega t + turned

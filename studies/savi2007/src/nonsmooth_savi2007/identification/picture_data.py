@@ -11,8 +11,6 @@ from nonsmooth_savi2007.identification.evidence import Run
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["picture_data"]
-
 #: Variables by unit; those that are not here are ratios, counts or logarithms.
 _MEASURED = {
     "m": (

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from nonsmooth_savi2007.identification.free_decay import DecayFit
     from nonsmooth_savi2007.identification.steady import Steady
 
-__all__ = ["check_plausible", "few", "not_driven", "slipped_late"]
-
 #: Procedures in which the car (or the test mass) moves, and those in which a force changes.
 _MOVES = ("springs", "support", "impulse", "drop", "response", "grazing", "contact", "rise", "section")
 _PULLS = ("springs", "support", "crank")

@@ -30,12 +30,6 @@ from nonsmooth_savi2007.identification.multiple_shooting import ContactFit
 from nonsmooth_savi2007.identification.response_fits import crank_mark
 from nonsmooth_savi2007.identification.steady import Steady
 
-__all__ = [
-    "CountedGap", "MeanShift", "Referred", "counted_gap", "mark_of", "mean_of_drive", "mean_shift",
-    "places", "refer",
-]  # fmt: skip
-
-
 _CLEAR = 4.0  # standard uncertainties by which a sign, or a contradiction, is taken as seen
 
 

@@ -33,9 +33,6 @@ from nonsmooth_savi2007.identification.least_squares import nonlinear_fit
 from nonsmooth_savi2007.identification.picture_data import picture_data
 from nonsmooth_savi2007.identification.steady import Steady
 
-__all__ = ["amplitude_fit", "crank_mark", "grazing_amplitude", "receptance", "receptance_fit", "viscous_bias"]
-
-
 #: Frequencies relative to the natural one over which Fig. 6 is fitted, where no others are given.
 RANGE = (0.55, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3, 1.45, 1.7)
 LEAST, LEAST_COMPLEX = 5, 8  # runs

@@ -16,8 +16,6 @@ from nonsmooth_savi2007.identification.evidence import Evidence
 from nonsmooth_savi2007.identification.multiple_shooting import ContactFit
 from nonsmooth_savi2007.identification.referral import Referred
 
-__all__ = ["agreement", "disagreement", "for_model", "identifiability", "impossible", "joined", "require"]
-
 #: What must have been recorded to know a parameter.
 _RESTS_ON = {
     "m": "the notebook's mass", "k": "impulse (taps) or springs (pulls)", "c": "impulse (taps)",

@@ -14,8 +14,6 @@ from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth_savi2007.arrays import ComplexArray, FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 
-__all__ = ["Steady", "harmonics_of", "steady"]
-
 HARMONICS = 3
 
 

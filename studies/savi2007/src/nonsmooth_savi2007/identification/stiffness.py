@@ -33,8 +33,6 @@ from nonsmooth_savi2007.identification.picture_data import picture_data
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["stiffness"]
-
 _WINDOW, _ORDER = 21, 4  # samples: follows a hand's tremor, 3 Hz, to 1 %
 
 

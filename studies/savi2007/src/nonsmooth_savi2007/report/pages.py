@@ -13,11 +13,6 @@ from typing import TypeAlias
 from nonsmooth_savi2007.claims.verdicts import Beside, Verdict
 from nonsmooth_savi2007.report.style import STYLE
 
-__all__ = [
-    "Block", "Bullets", "Comparison", "Contents", "Heading", "Lines", "Notice", "Paragraph", "Picture", "Table",
-    "Tally", "to_html", "to_markdown",
-]  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Heading:

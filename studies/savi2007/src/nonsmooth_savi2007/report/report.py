@@ -30,8 +30,6 @@ from nonsmooth_savi2007.report.pages import (
 )  # fmt: skip
 from nonsmooth_savi2007.report.special import SpecialPoint, ratios, special_table, table_of_points
 
-__all__ = ["REPORTS", "write_report"]
-
 REPORTS = ("claims.json", "report.md", "report.html")
 
 TITLE = "Savi, Divenyi, Franca & Weber (2007), reproduced"

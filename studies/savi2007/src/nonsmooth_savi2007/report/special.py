@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from nonsmooth_savi2007.claims.verdicts import Data
 
-__all__ = ["SpecialPoint", "ratios", "special_table", "table_of_points"]
-
 _NAMES = {"fold": "fold", "flip": "flip", "grazing": "grazing", "neimark_sacker": "Neimark-Sacker"}
 _UNITS = {"omega": ("rad/s", 8), "rho": ("N", 8), "g": ("m", 11)}  # decimals: eight digits at least
 

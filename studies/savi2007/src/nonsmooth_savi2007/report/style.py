@@ -1,7 +1,5 @@
 """The style sheet of the report: light and dark, from a phone's width to paper."""
 
-__all__ = ["STYLE"]
-
 #: Verdicts are told by words; the colours (after Okabe and Ito) help the eye.
 STYLE = """
 :root { color-scheme: light dark; --paper: #fff; --ink: #1c1f23; --muted: #59616b; --line: #d4d9df; --soft: #f4f6f8;

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from nonsmooth import Recording, System
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
-__all__ = ["drop", "impulse"]
-
 GRAVITY = 9.81  # m/s^2
 
 

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from nonsmooth import Recording, System
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
-__all__ = ["Setting", "records", "rise"]
-
 
 @dataclass(frozen=True)
 class Setting:

@@ -20,10 +20,6 @@ if TYPE_CHECKING:
     from nonsmooth import Recording
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
-__all__ = [
-    "FIGURES", "RELEASES", "SECTIONS", "TAPS", "crank_for", "figure", "rise", "screw_for", "section", "without_support",
-]  # fmt: skip
-
 #: Settings of the sections: frequency (rad/s), forcing (N), gap (m).
 SECTIONS: dict[int, tuple[tuple[float, float, float], ...]] = {
     12: tuple((3.69, rho, -0.0045) for rho in (0.29, 0.39, 0.42, 0.46)),

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from nonsmooth import Recording
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
-__all__ = ["springs", "support"]
-
 Run = tuple[str, Mapping[str, Any], Mapping[str, Any]]
 _TREMOR = 1e-4  # m, with the frequencies below in Hz
 _TREMBLING = (1.1, 1.7, 2.6)

@@ -14,8 +14,6 @@ from nonsmooth_savi2007.rig.sensors import COUNT, RATE
 if TYPE_CHECKING:
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
-__all__ = ["LiveRig"]
-
 
 class LiveRig(SimulatedRig):
     """A virtual rig as the three methods of a live one.

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from nonsmooth import Recording
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
-__all__ = ["MAX_VOLTAGE", "crank", "frequency", "mean_position", "passages", "voltage", "voltage_for"]
-
 MAX_VOLTAGE = 12.0  # V
 VOLTAGE_STEP = 0.001  # V, of the supply's knob
 

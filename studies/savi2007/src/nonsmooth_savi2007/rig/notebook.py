@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from nonsmooth import Recording
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
-__all__ = ["truth_path", "write_session"]
-
 _CAP = ("impulse",)  # the instrument's own format
 _COMMA = ("voltage",)  # an export under the other locale
 

@@ -33,11 +33,6 @@ import numpy as np
 if TYPE_CHECKING:
     from nonsmooth import System
 
-__all__ = [
-    "AT_REST", "NO_SUPPORT", "WANDERING", "Wander", "car", "crank_angle", "drive", "driven_tension", "fixed_tension",
-    "friction", "hanging_mass", "support_force", "wander_of",
-]  # fmt: skip
-
 NO_SUPPORT = 10.0  # m: a gap that the car never closes
 AT_REST = 1e-9  # m: a relaxing support that is nearer to its rest than this is there
 WANDERING = 3  # slow terms of a motor that wanders

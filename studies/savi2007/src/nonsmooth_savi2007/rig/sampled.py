@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from nonsmooth import System
 
-__all__ = ["METHOD", "simulated"]
-
 #: The paper's method. Over 40 periods with 121 crossings of a rig with friction it differs from the Taylor series at
 #: rtol 1e-12 by 2e-10 m/s, far below what a sensor tells.
 METHOD: dict[str, Any] = {"method": "rkf45", "rtol": 1e-9}

@@ -23,20 +23,6 @@ if TYPE_CHECKING:
 
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
-__all__ = [
-    "COUNT",
-    "COUNTS_PER_TURN",
-    "DISTANCE_PER_TURN",
-    "FORCE_RANGE",
-    "FORCE_STEP",
-    "RATE",
-    "TURN_STEP",
-    "angle",
-    "force",
-    "instants",
-    "turns",
-]  # fmt: skip
-
 RATE = 100.0  # Hz
 DISTANCE_PER_TURN = 0.0789  # m
 COUNTS_PER_TURN = 1440

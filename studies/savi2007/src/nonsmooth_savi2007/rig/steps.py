@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from nonsmooth import Recording
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
-__all__ = ["contact", "graze_frequency", "grazing", "response"]
-
 #: Relative to the natural frequency, dense where the curve bends.
 RELATIVE = (
     0.55, 0.7, 0.8, 0.86, 0.9, 0.93, 0.95, 0.97, 0.985, 1.0, 1.015, 1.03, 1.05, 1.07, 1.1, 1.14, 1.2, 1.3, 1.45, 1.7,

@@ -14,8 +14,6 @@ import numpy as np
 from nonsmooth import DataFileError
 from nonsmooth.system.names import unknown
 
-__all__ = ["FEATURES", "HOLDING", "NOMINAL_GAP", "UNITS", "awkward", "drawn", "load_truth", "published", "switched"]
-
 #: Reading of the support's screw at which the true gap is ``truth["g"]`` (Fig. 15).
 NOMINAL_GAP = 0.0018
 

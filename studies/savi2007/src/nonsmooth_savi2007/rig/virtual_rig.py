@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from nonsmooth import Recording, System
     from nonsmooth_savi2007.rig.live import LiveRig
 
-__all__ = ["IDENTIFICATION", "VirtualRig"]
-
 #: The procedures of Section 3.1 and those for the gap: what identification needs.
 IDENTIFICATION = (
     "springs", "support", "impulse", "response", "drop", "voltage", "crank", "grazing", "contact",
