@@ -16,7 +16,7 @@ from nonsmooth.identification.uncertainty import (
     interval,
     uniform,
 )
-from nonsmooth.studies.savi2007.identification.least_squares import york
+from nonsmooth_savi2007.identification.least_squares import york
 
 
 def test_uniform_and_normal_limits():
