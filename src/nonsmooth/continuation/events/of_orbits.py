@@ -24,8 +24,8 @@ from nonsmooth.continuation.events.boundaries import BOUNDARIES, Boundary, Cross
 from nonsmooth.continuation.events.change import Change, common_orbit, is_tolerance, past_the_section, rest_after
 from nonsmooth.continuation.events.grazing import graze
 from nonsmooth.continuation.events.neighbours import beside
-from nonsmooth.continuation.events.sliding import sliding_bifurcation
-from nonsmooth.continuation.march.event import BESIDE, LARGEST, Crossing, Event, Fold, Met, Name, Step, first_met
+from nonsmooth.continuation.events.sliding import TOUCHES, sliding_bifurcation
+from nonsmooth.continuation.march.event import BESIDE, LARGEST, Crossing, Event, Fold, Met, Name, Step, first_met, special_on
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
@@ -196,13 +196,19 @@ class AlongOrbits(Policy):
         if beyond is not None and _completes(met, beyond):
             return beyond
         centre = beyond is None and _is_centre(first)
-        name = mark(found, met, beyond, "focus_centre" if centre else "")
+        back = None if beyond is None else _seen_back(first.point, beyond)
+        ends = None if back is None else first_met(back, BOUNDARIES)
+        name = mark(found, met, beyond, ends, "focus_centre" if centre else "")
         if beyond is None:
             found.ending = name if centre else first.kind.ending or name
         elif is_doubled(beyond) and not is_doubled(first.point):
             # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
             found.ending = "branching"
             return None
+        elif back is not None and ends:  # what lies between the boundary and the first orbit behind it
+            back.ends("change", ends[0].s, ends[0].point)
+            for one in reversed(special_on(back, self.kinds)):
+                self.record(found, back, replace(one, point=one.point.turned()))
         return beyond
 
     def over(self, point: OrbitPoint) -> str | None:
@@ -227,13 +233,13 @@ class AlongOrbits(Policy):
 def _completes(met: list[Met], beyond: OrbitPoint) -> bool:
     """Return whether only the speed below which impacts are completed as rest is reached.
 
-    An impact that vanishes far from rest passes that speed too, and is a graze."""
-    passed = [one for one in met if is_tolerance(one.point, one.kind.surface(one.point, beyond))]
-    if not passed:
-        return False
-    kind, point = passed[0].kind, passed[0].point
-    same = beyond.shooting.m == point.shooting.m or not isinstance(kind, Crossed)
-    return same or rest_after(point, kind.visit(point)) is not None
+    An impact that vanishes far from rest passes that speed too, and is a graze: rest follows on neither side."""
+    point = met[0].point
+    for kind in (one.kind for one in met):
+        if is_tolerance(point, kind.surface(point, beyond)):
+            same = beyond.shooting.m == point.shooting.m or not isinstance(kind, Crossed)
+            return same or any(rest_after(side, kind.visit(point)) is not None for side in (point, beyond))
+    return False
 
 
 def _is_centre(met: Met) -> bool:
@@ -251,9 +257,13 @@ def contacts_of(met: list[Met]) -> list[Change]:
     return [change for one in met for change in one.kind.contacts(one.point)]
 
 
-def mark(found: March, met: list[Met], beyond: OrbitPoint | None, name: str = "") -> str:
-    """Record the end of a signature, by the contact that begins or ends there where no name is given; its name."""
-    kind, point = met[0].kind, met[0].point
+def mark(
+    found: March, met: list[Met], beyond: OrbitPoint | None, ends: list[Met] | None = None, name: str = ""
+) -> str:
+    """Record the end of a signature, by the contact that begins or ends there where no name is given; its name.
+
+    ``ends`` is the same place seen from ``beyond``: of both sides the better one is listed, named alike from either."""
+    point = met[0].point
     names, sliding = list(point.shooting.system.indicators), ""
     if beyond is not None:
         sliding = sliding_bifurcation(point, beyond)
@@ -266,25 +276,28 @@ def mark(found: March, met: list[Met], beyond: OrbitPoint | None, name: str = ""
                 judged = graze(beyond, change)
                 found.mark("grazing", free, indicator=names[change.indicator], sliding=sliding, **judged)
                 return "grazing"
-        end = _from_behind(point, beyond)
-        if end is not None and _is_better(met[0], end.point):
-            kind, point = end.kind, end.point
-    own = kind.contacts(point)
-    name = name or ("grazing" if own else kind.name)
-    indicator = own[0].indicator if own else kind.surface(point, beyond)
+    sides = [met[0], *[replace(one, point=one.point.turned()) for one in (ends or ())[:1]]]
+    if ends and _is_better(met[0], ends[0].point):
+        sides.reverse()
+    kind, point = sides[0].kind, sides[0].point
+    own = [change.indicator for side in sides for change in side.kind.contacts(side.point)]
+    touches = sliding in TOUCHES if sliding else own or any(side.name == "grazing" for side in sides)
+    name = name or ("grazing" if touches else "corner")
+    indicator = own[0] if own else kind.surface(point, beyond)
     found.mark(name, point, indicator=names[indicator] if indicator >= 0 else "", sliding=sliding)
     return name
 
 
-def _from_behind(point: OrbitPoint, first: OrbitPoint) -> Met | None:
-    """The end of the new signature seen from its first orbit: the place at which the old one ends."""
+def _seen_back(point: OrbitPoint, first: OrbitPoint) -> Step | None:
+    """The step back from the first orbit of the new signature to where that begins: the place at which the old one
+    ends."""
     fresh, back = first.curve, first.turned()
     away, steep = abs(first.value - point.value) / fresh.width, abs(first.rise)
     new = fresh.step(back, 2.0 * away / steep) if steep * FARTHEST > away else None
     if new is None:
         return None
-    met = first_met(Step(back, new, ([], []), (fresh.margins(back), fresh.margins(new)), True), BOUNDARIES)
-    return replace(met[0], point=met[0].point.turned()) if met else None
+    numbers = [[kind.number(one) for kind in AlongOrbits.kinds] for one in (back, new)]
+    return Step(back, new, numbers, (fresh.margins(back), fresh.margins(new)), True)
 
 
 def _is_better(met: Met, there: OrbitPoint) -> bool:
