@@ -21,7 +21,14 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.continuation.events.boundaries import BOUNDARIES, Boundary, Crossed, Unseen
-from nonsmooth.continuation.events.change import Change, common_orbit, is_tolerance, past_the_section, rest_after
+from nonsmooth.continuation.events.change import (
+    BEFORE_REST,
+    Change,
+    common_orbit,
+    is_tolerance,
+    past_the_section,
+    rest_after,
+)
 from nonsmooth.continuation.events.grazing import graze
 from nonsmooth.continuation.events.neighbours import beside
 from nonsmooth.continuation.events.sliding import TOUCHES, sliding_bifurcation
@@ -231,15 +238,33 @@ class AlongOrbits(Policy):
 
 
 def _completes(met: list[Met], beyond: OrbitPoint) -> bool:
-    """Return whether only the speed below which impacts are completed as rest is reached.
+    """Return whether only the number of impacts before rest changes, or the speed below which they are completed as
+    rest is reached.
 
     An impact that vanishes far from rest passes that speed too, and is a graze: rest follows on neither side."""
     point = met[0].point
-    for kind in (one.kind for one in met):
-        if is_tolerance(point, kind.surface(point, beyond)):
-            same = beyond.shooting.m == point.shooting.m or not isinstance(kind, Crossed)
-            return same or any(rest_after(side, kind.visit(point)) is not None for side in (point, beyond))
-    return False
+    if _but_completed(point, beyond):
+        return True
+    passed = [one.kind for one in met if is_tolerance(point, one.kind.surface(point, beyond))]
+    return any(
+        not isinstance(kind, Crossed) or beyond.shooting.m == point.shooting.m
+        or rest_after(side, kind.visit(point)) is not None
+        for kind in passed for side in (point, beyond)
+    )  # fmt: skip
+
+
+def _but_completed(*sides: OrbitPoint) -> bool:
+    """Return whether two orbits take the same transitions but for impacts that rest follows at once in one of them."""
+    rests = [side.solved.times[i + 1] for side in sides for i in range(side.shooting.m) if rest_after(side, i) == 0]
+    soon = BEFORE_REST * sides[0].period
+    words = []
+    for side in sides:
+        visits, times = side.signature.visits, side.solved.times[1:]
+        words.append([
+            (v.transition, v.row) for v, after, t in zip(visits[:-1], visits[1:], times, strict=False)
+            if v.mode != after.mode or not any(0.0 <= rest - t < soon for rest in rests)
+        ])  # fmt: skip
+    return bool(rests) and words[0] == words[1]
 
 
 def _is_centre(met: Met) -> bool:
