@@ -23,8 +23,8 @@ __all__ = [
 ]  # fmt: skip
 
 BEGUN = 1e-6
-ROUNDING = 1e-13  # smaller than this is zero, however short the step
-PLACE = 1e-11  # of a step, and of the numbers at its ends: a bracket narrower than this is noise of solved points
+ROUNDING = 1e-13  # of the numbers at both ends: smaller than this is zero, however short the step
+PLACE = 1e-11  # of a step: a bracket narrower than this is noise of solved points
 LARGEST = 1e3  # of a number, for Brent's method: margins may be infinite
 BESIDE = 1e-6  # along the branch: nearer to a boundary than this is the boundary itself
 TURNED = 1e-7  # along the branch: nearer to a change of equations than this the parameter turns with it
@@ -184,7 +184,7 @@ def locate(step: Step, number: Callable[[Any], float]) -> tuple[float, Any] | No
     if at_ends[0] * at_ends[1] > 0.0 and abs(at_ends[0]) < BEGUN * abs(at_ends[1]):
         return 0.0, step.a  # the branch begins at the event itself
     known: dict[float, Point] = {0.0: step.a, step.end: step.b}
-    nothing = PLACE * max((min(abs(x), LARGEST) for x in at_ends if np.isfinite(x)), default=1.0)
+    nothing = ROUNDING * max((min(abs(x), LARGEST) for x in at_ends if np.isfinite(x)), default=1.0)
 
     def value(s: float) -> float:
         if s not in known:
