@@ -199,7 +199,7 @@ class AlongOrbits(Policy):
             after = past_the_section(first.point)
             if after is not None and (after.path.margins[1:] >= 0.0).all():
                 return after  # else another boundary is met with the section
-        beyond = beside(first.point, contacts_of(met))
+        beyond = beside(first.point, contacts_of(met), [row.point for row in found.rows])
         if beyond is not None and _completes(met, beyond):
             return beyond
         centre = beyond is None and _is_centre(first)
