@@ -49,6 +49,7 @@ SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish
 FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
 WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
 AHEAD = 1e-6  # of the range
+NEARER = 3  # times a tenth of the distance from the boundary: what lies between it and the first orbit behind it
 WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
@@ -203,20 +204,30 @@ class AlongOrbits(Policy):
         if beyond is not None and _completes(met, beyond):
             return beyond
         centre = beyond is None and _is_centre(first)
-        back = None if beyond is None else _seen_back(first.point, beyond)
-        ends = None if back is None else first_met(back, BOUNDARIES)
-        name = mark(found, met, beyond, ends, "focus_centre" if centre else "")
+        name = mark(found, met, beyond, "focus_centre" if centre else "")
         if beyond is None:
             found.ending = name if centre else first.kind.ending or name
         elif is_doubled(beyond) and not is_doubled(first.point):
             # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
             found.ending = "branching"
             return None
-        elif back is not None and ends:  # what lies between the boundary and the first orbit behind it
-            back.ends("change", ends[0].s, ends[0].point)
-            for one in reversed(special_on(back, self.kinds)):
-                self.record(found, back, replace(one, point=one.point.turned()))
+        else:
+            self._watch_between(found, first.point, beyond)
         return beyond
+
+    def _watch_between(self, found: March, point: OrbitPoint, first: OrbitPoint) -> None:
+        """List the special points between a boundary and the first orbit behind it, by orbits that come nearer."""
+        met: list[Met] = []
+        b = first.turned()
+        for _ in range(NEARER):
+            a, b = b, b.curve.at_parameter(b.Y, point.value + 0.1 * (b.value - point.value))
+            if b is None or b.virtual:
+                break
+            b = b if b.tangent @ a.tangent > 0.0 else b.turned()
+            step = Step(a, b, tuple([kind.number(one) for kind in self.kinds] for one in (a, b)), ([], []))
+            met += special_on(step, self.kinds)
+        for one in reversed(met):
+            found.mark(one.name, one.point.turned())
 
     def over(self, point: OrbitPoint) -> str | None:
         """Return ``equilibrium`` where an autonomous orbit has all but shrunk to one, ``homoclinic`` where it only
@@ -282,12 +293,8 @@ def contacts_of(met: list[Met]) -> list[Change]:
     return [change for one in met for change in one.kind.contacts(one.point)]
 
 
-def mark(
-    found: March, met: list[Met], beyond: OrbitPoint | None, ends: list[Met] | None = None, name: str = ""
-) -> str:
-    """Record the end of a signature, by the contact that begins or ends there where no name is given; its name.
-
-    ``ends`` is the same place seen from ``beyond``: of both sides the better one is listed, named alike from either."""
+def mark(found: March, met: list[Met], beyond: OrbitPoint | None, name: str = "") -> str:
+    """Record the end of a signature, by the contact that begins or ends there where no name is given; its name."""
     point = met[0].point
     names, sliding = list(point.shooting.system.indicators), ""
     if beyond is not None:
@@ -301,9 +308,9 @@ def mark(
                 judged = graze(beyond, change)
                 found.mark("grazing", free, indicator=names[change.indicator], sliding=sliding, **judged)
                 return "grazing"
-    sides = [met[0], *[replace(one, point=one.point.turned()) for one in (ends or ())[:1]]]
-    if ends and _is_better(met[0], ends[0].point):
-        sides.reverse()
+    sides = [met[0]]
+    if beyond is not None and (end := _from_behind(point, beyond)):  # named alike from either side
+        sides.insert(0 if _is_better(met[0], end.point) else 1, end)
     kind, point = sides[0].kind, sides[0].point
     own = [change.indicator for side in sides for change in side.kind.contacts(side.point)]
     touches = sliding in TOUCHES if sliding else own or any(side.name == "grazing" for side in sides)
@@ -313,16 +320,15 @@ def mark(
     return name
 
 
-def _seen_back(point: OrbitPoint, first: OrbitPoint) -> Step | None:
-    """The step back from the first orbit of the new signature to where that begins: the place at which the old one
-    ends."""
+def _from_behind(point: OrbitPoint, first: OrbitPoint) -> Met | None:
+    """The end of the new signature seen from its first orbit: the place at which the old one ends."""
     fresh, back = first.curve, first.turned()
     away, steep = abs(first.value - point.value) / fresh.width, abs(first.rise)
     new = fresh.step(back, 2.0 * away / steep) if steep * FARTHEST > away else None
     if new is None:
         return None
-    numbers = [[kind.number(one) for kind in AlongOrbits.kinds] for one in (back, new)]
-    return Step(back, new, numbers, (fresh.margins(back), fresh.margins(new)), True)
+    met = first_met(Step(back, new, ([], []), (fresh.margins(back), fresh.margins(new)), True), BOUNDARIES)
+    return replace(met[0], point=met[0].point.turned()) if met else None
 
 
 def _is_better(met: Met, there: OrbitPoint) -> bool:
