@@ -17,7 +17,7 @@ from nonsmooth_savi2007.identification.free_decay import free_decay
 MASS, STIFF, C_S = 1.33, 1210.0, 0.60
 
 
-def drops(heights=(0.011, 0.009, 0.008, 0.007), c=C_S, seed=0, duration=20):
+def drops(heights=(0.011, 0.009, 0.008, 0.007), c=C_S, seed=0, duration=12):
     rng, found = np.random.default_rng(seed), []
     w, b = np.sqrt(STIFF / MASS), c / MASS
     wd = np.sqrt(w**2 - b**2 / 4)
@@ -86,7 +86,7 @@ def taps(heights=(0.1, -0.09, 0.06, -0.05), w=4.5, b=1.04, f=0.012, seed=3):
     """Half swings about +-f/w^2 from turning point to turning point, after Den Hartog; let go from each height."""
     wd, rng, runs = np.sqrt(w**2 - b**2 / 4), np.random.default_rng(seed), []
     for i, h in enumerate(heights):
-        t = np.arange(0, 10, 0.01)
+        t = np.arange(0, 7, 0.01)
         at = np.maximum(t + 5e-5 * rng.standard_normal(len(t)) - 0.5, 0.0)
         k = np.floor(at * wd / np.pi).astype(int)
         turned = np.array([envelope(np.array([j * np.pi / wd]), abs(h), w, b, f)[0] for j in range(k.max() + 1)])
@@ -110,7 +110,7 @@ def fitted(runs, **options):
     return free_decay(rows, resolution=COUNT, names=[r.name for r in runs], **options)
 
 
-@pytest.mark.parametrize("counts", [1, 2, 20])
+@pytest.mark.parametrize("counts", [1, 20])
 def test_a_tap_that_slipped_is_named_and_left_out(counts):
     runs = taps((0.1, -0.09, 0.08, -0.07, 0.06, -0.05))
     runs[2] = slipped(runs[2], counts)

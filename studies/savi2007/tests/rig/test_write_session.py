@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,13 @@ from nonsmooth_savi2007.rig import IDENTIFICATION, VirtualRig, load_truth
 pytestmark = pytest.mark.filterwarnings("ignore::nonsmooth.recordings.RecordingWarning")
 
 
+#: Shorter than what identification would want.
+OPTIONS: dict[str, dict[str, Any]] = {
+    "springs": {"n": 2}, "support": {"n": 2}, "drop": {"n": 2}, "impulse": {"velocities": (0.5, -0.3), "duration": 5.0},
+    "response": {"voltages": (4.0, 7.0), "duration": 5.0}, "contact": {"regimes": ((9.55, 0.027),), "duration": 5.0},
+}  # fmt: skip
+
+
 @pytest.fixture(scope="module")
 def rig() -> VirtualRig:
     return VirtualRig(3)
@@ -22,7 +30,7 @@ def rig() -> VirtualRig:
 
 @pytest.fixture(scope="module")
 def written(rig: VirtualRig, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return rig.write_session(tmp_path_factory.mktemp("lab") / "rig_03")
+    return rig.write_session(tmp_path_factory.mktemp("lab") / "rig_03", options=OPTIONS)
 
 
 def test_the_session_reads_back(rig: VirtualRig, written: Path) -> None:
@@ -30,7 +38,7 @@ def test_the_session_reads_back(rig: VirtualRig, written: Path) -> None:
     assert session.procedures == IDENTIFICATION
     assert session.synthetic and session.title == "virtual rig, seed 3"
     for procedure in session.procedures:
-        made = rig.record(procedure)
+        made = rig.record(procedure, **OPTIONS.get(procedure, {}))
         runs = session.recordings(procedure)
         assert [run for _, run, _ in runs] == list(made.runs)
         for recording, run, settings in runs:
@@ -68,7 +76,7 @@ def test_the_truth_lies_beside_and_not_within(rig: VirtualRig, written: Path) ->
 
 def test_equal_seeds_write_equal_files(rig: VirtualRig, written: Path, tmp_path: Path) -> None:
     names = ["impulse", "crank", "voltage"]
-    again = VirtualRig(3).write_session(tmp_path / "again", names)
+    again = VirtualRig(3).write_session(tmp_path / "again", names, options={"impulse": OPTIONS["impulse"]})
     for name in ("impulse.cap", "crank.csv", "voltage.csv"):
         assert (again / name).read_bytes() == (written / name).read_bytes()
     assert load_session(again).procedures == tuple(names)
