@@ -161,7 +161,7 @@ SIMULATE = {
     "one sample": ({"periods": 1, "samples": 1}, ValueError, r"samples = 1 must be a whole number, at least 2"),
     "half a sample": ({"periods": 1, "samples": 2.5}, ValueError, r"samples = 2\.5 must be a whole number"),
     "samples NaN": ({"periods": 1, "samples": math.nan}, ValueError, r"samples must be finite"),
-    "samples as text": ({"periods": 1, "samples": "many"}, TypeError, r"samples must be a real number, not 'many'"),
+    "samples as text": ({"periods": 1, "samples": "many"}, TypeError, r"samples must be a whole number, not 'many'"),
     "samples outside": (
         {"periods": 1, "samples": [0, 9.0]},
         ValueError,
@@ -243,7 +243,7 @@ SWEEP = {
     "transient": ("rho", VALUES, {"transient": -1}, ValueError, r"transient = -1 must be a whole number, at least 0"),
     "transient NaN": ("rho", VALUES, {"transient": math.nan}, ValueError, r"transient must be finite"),
     "keep": ("rho", VALUES, {"keep": 1}, ValueError, r"keep = 1 must be a whole number, at least 2"),
-    "keep as text": ("rho", VALUES, {"keep": "all"}, TypeError, r"keep must be a real number, not 'all'"),
+    "keep as text": ("rho", VALUES, {"keep": "all"}, TypeError, r"keep must be a whole number, not 'all'"),
     "max_period": ("rho", VALUES, {"max_period": 0}, ValueError, r"max_period = 0 .*at least 1"),
     "max_period beyond keep": (
         "rho",
@@ -311,7 +311,7 @@ OTHERS: dict[str, tuple[Callable, type[Exception], str]] = {
     "phase as text": (lambda s, v: ns.Stroboscopic("half"), TypeError, r"phase must be a real number"),
     "side": (lambda s, v: ns.Poincare("gap", side="left"), ValueError, r"allowed: 'after', 'before'"),
     "every": (lambda s, v: ns.Poincare("gap", every=0), ValueError, r"every = 0 .*at least 1"),
-    "every as text": (lambda s, v: ns.Poincare("gap", every="2"), TypeError, r"every must be a real number"),
+    "every as text": (lambda s, v: ns.Poincare("gap", every="2"), TypeError, r"every must be a whole number"),
     "rising": (
         lambda s, v: ns.Poincare("gap", rising="up"),
         TypeError,

@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -28,7 +29,8 @@ from nonsmooth.errors import shortened
 from nonsmooth.system.parameter import finite_number as real_number
 
 __all__ = [
-    "Default", "Limit", "Range", "above", "at_least", "reader_of", "real_number", "whole_number", "yes_or_no",
+    "Default", "Limit", "Range", "above", "at_least", "in_words", "reader_of", "real_number", "whole_number",
+    "yes_or_no",
 ]  # fmt: skip
 
 Reader = Callable[[Any, str], Any]  # (what was given, the name of the argument) -> what the verb gets
@@ -124,7 +126,9 @@ def reader_of(what: Any) -> Reader:
 
 def _number(kind: type, limit: Limit) -> Reader:
     def read(value: Any, name: str) -> Any:
-        number = whole_number(value, name, int(limit.low)) if kind is int else real_number(value, name)
+        number = real_number(value, name, in_words(kind))
+        if kind is int:
+            number = whole_number(value, name, int(limit.low))
         if not limit.holds(number):
             raise ValueError(f"{name} = {shortened(value)} must be {limit.words}")
         return value if type(value) is int else number
@@ -165,7 +169,7 @@ def _one_of(kinds: list[Any]) -> Reader:
     readers = [reader_of(kind) for kind in kinds]
 
     def read(value: Any, name: str) -> Any:
-        wrong: Exception = TypeError(f"{name} must be {' or '.join(map(_words, kinds))}, not {shortened(value)}")
+        wrong: Exception = TypeError(f"{name} must be {' or '.join(map(in_words, kinds))}, not {shortened(value)}")
         for kind, reader in zip(kinds, readers, strict=True):
             if kind is bool and not isinstance(value, bool | np.bool_):
                 continue
@@ -188,17 +192,26 @@ def _chosen(value: Any, name: str, choices: tuple[Any, ...]) -> Any:
 
 def _instance(value: Any, name: str, kind: type, what: Any) -> Any:
     if not isinstance(value, kind):
-        raise TypeError(f"{name} must be {_words(what)}, not {shortened(value)}")
+        raise TypeError(f"{name} must be {in_words(what)}, not {shortened(value)}")
     return value
 
 
-def _words(what: Any) -> str:
-    """Name in words what an annotation allows."""
-    kind = get_origin(what) or what
-    if kind is Annotated:
-        return _words(get_args(what)[0])
+def in_words(what: Any) -> str:
+    """The values that an annotation allows; empty where anything is."""
+    origin, parts = get_origin(what), get_args(what)
+    if origin is Annotated:
+        limits = [f" ({mark.words})" for mark in parts if isinstance(mark, Limit)]
+        return "".join([in_words(parts[0]), *limits, *([" (low, high)"] if "rising" in parts else [])])
+    if origin in (Union, UnionType):
+        return " or ".join(map(in_words, parts))
+    if origin is Literal:
+        return ", ".join(map(repr, parts))
+    if origin in (Mapping, Sequence):
+        held = in_words(parts[-1])
+        return {Mapping: "a mapping", Sequence: "a list"}[origin] + (f" of {held}" if held else "")
     known: dict[Any, str] = {
         bool: "True, False", int: "a whole number", float: "a real number", str: "text", Mapping: "a mapping",
-        Callable: "a function",
+        Callable: "a function", PathLike: "a path", tuple: "two numbers", NoneType: "None", Any: "",
     }  # fmt: skip
-    return known.get(kind) or f"ns.{kind.__name__}(...)"
+    kind = origin or what
+    return known.get(kind, f"ns.{kind.__name__}(...)")
