@@ -112,7 +112,8 @@ def judged(error: BaseException) -> str:
     """Empty for an error that is ours; else the library's own, and where it was raised."""
     ours = (ValueError, TypeError, ns.SolveError, MemoryError, ImportError, RuntimeError)
     last = traceback.extract_tb(error.__traceback__)[-1]
-    if isinstance(error, ours) and last.filename.startswith(SOURCE) and len(str(error)) > 12:
+    said = str(last.line).startswith("raise") and len(str(error)) > 12  # else Python's own words
+    if isinstance(error, ours) and last.filename.startswith(SOURCE) and said:
         return ""
     return f"{type(error).__name__}: {str(error)[:150]} ({Path(last.filename).name}:{last.lineno})"
 

@@ -30,7 +30,7 @@ COARSE = 0.02  # the largest step of draws' branches: values between points lie 
 
 @checked
 def propagate(
-    found: Any,
+    found: Annotated[Mapping[str, Any], "such as ns.fit returns, or values by name"],
     verb: Annotated[Callable[..., Any], "a function such as ns.sweep"],
     start: Annotated[
         System | Orbit,
