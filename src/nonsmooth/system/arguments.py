@@ -199,10 +199,9 @@ class _Door:
 _PARAMETERS = re.compile(r"^Parameters\n-+\n(?:(?!\n+\w[\w ]*\n-{3,}).)*", re.MULTILINE | re.DOTALL)
 
 
-def declared(function: Verb) -> dict[str, Any]:
+def declared(verb: Any) -> dict[str, Any]:
     """The values that each argument of a verb, or of a class, may have, as declared."""
-    door = getattr(getattr(function, "__init__") if isinstance(function, type) else function, "door", None)  # noqa: B009
-    return get_type_hints(function, include_extras=True) if door is None else dict(door.kinds)
+    return dict((vars(verb)["__init__"] if isinstance(verb, type) else verb).door.kinds)
 
 
 def entries(doc: str | None) -> dict[tuple[str, ...], tuple[str, list[str]]]:
