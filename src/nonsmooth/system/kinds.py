@@ -129,8 +129,10 @@ def reader_of(what: Any) -> Reader:
 
 
 def _number(kind: type, limit: Limit) -> Reader:
+    words = in_words(kind)
+
     def read(value: Any, name: str) -> Any:
-        number = real_number(value, name, in_words(kind))
+        number = real_number(value, name, words)
         if kind is int:
             number = whole_number(value, name, int(limit.low))
         if not limit.holds(number):
@@ -141,7 +143,7 @@ def _number(kind: type, limit: Limit) -> Reader:
 
 
 def _two_numbers(value: Any, name: str) -> tuple[float, float]:
-    if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
+    if not isinstance(value, list | tuple | np.ndarray) or getattr(value, "shape", None) == () or len(value) != 2:
         raise ValueError(f"{name} = {shortened(value)}: give its two ends, (low, high)")
     low, high = (real_number(end, f"an end of {name}") for end in value)
     return low, high
