@@ -161,7 +161,7 @@ SIMULATE = {
     "one sample": ({"periods": 1, "samples": 1}, ValueError, r"samples = 1 must be a whole number, at least 2"),
     "half a sample": ({"periods": 1, "samples": 2.5}, ValueError, r"samples = 2\.5 must be a whole number"),
     "samples NaN": ({"periods": 1, "samples": math.nan}, ValueError, r"samples must be finite"),
-    "samples as text": ({"periods": 1, "samples": "many"}, TypeError, r"samples must be a whole number, not 'many'"),
+    "samples as text": ({"periods": 1, "samples": "many"}, TypeError, r"samples must be a real number, not 'many'"),
     "samples outside": (
         {"periods": 1, "samples": [0, 9.0]},
         ValueError,
@@ -428,9 +428,9 @@ def test_ctrl_c_in_a_long_sweep(tmp_path: Path) -> None:
     code = (
         "import signal, nonsmooth.diagrams.sweep as s\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a job in the background inherits "ignore"
-        "run = s.run_pieces\n"
+        "run = s.over_items\n"
         "def told(*a):\n    print('running', flush=True)\n    return run(*a)\n"
-        "s.run_pieces = told\n"
+        "s.over_items = told\n"
         "from nonsmooth.cli.main import main\n"
         f"for path in {list(map(str, before))!r}:\n    print(main(['run', path]), flush=True)"
     )
