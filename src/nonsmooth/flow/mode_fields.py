@@ -147,7 +147,6 @@ def every_mode(traced: Traced, values: FloatArray) -> range | None:
     for pattern in sorted({*product(*map(range, counts))} - patterns.led):
         if make.may_hold(make.held(pattern), patterns.mode):
             patterns.look_at(rows, pattern)
-            rows.forget()
     return range(len(patterns.visited))
 
 

@@ -16,7 +16,7 @@ them. A child of :class:`Assembler` brings one.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -245,12 +245,13 @@ class Assembler(ABC):
         sums = np.linalg.lstsq(ways[chosen].T, ways.T, rcond=None)[0].T
         return [held[i] for i in chosen], np.where(np.abs(sums) < INDEPENDENT * np.abs(sums).max(), 0.0, sums)
 
-    def flow(self, mode: str, pattern: Pattern) -> tuple[Any, dict[int, Any]]:
-        """The field of a combination of phases, and the force of each element in it."""
-        f, forces, held = self.base(mode), {}, self.held(pattern)
-        for here in self.places(mode, pattern):
-            if here.k in held:
-                continue
+    def flow(
+        self, mode: str, pattern: Pattern, some: Collection[int] | None = None
+    ) -> tuple[Any, dict[int, Any]]:
+        """The field of a combination of phases, and the force of each element in it; with ``some`` of these alone."""
+        some = range(len(self.parts)) if some is None else some
+        f, forces, held = self.base(mode), {}, [k for k in self.held(pattern) if k in some]
+        for here in (self.place(k, mode, pattern) for k in some if k not in held):
             forces[here.k] = here.part.element.force(here)
             f = self.moved(f, here.part, forces[here.k])
         if held:

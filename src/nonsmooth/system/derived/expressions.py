@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -162,10 +162,12 @@ class Expressions(Assembler):
             self._approaches[key] = super().approach(k, mode)
         return self._approaches[key]
 
-    def flow(self, mode: str, pattern: Pattern) -> tuple[list[sp.Expr], dict[int, sp.Expr]]:
+    def flow(
+        self, mode: str, pattern: Pattern, some: Collection[int] | None = None
+    ) -> tuple[list[sp.Expr], dict[int, sp.Expr]]:
         key = mode, pattern
         if key not in self._flows:
-            field, forces = super().flow(mode, pattern)
+            field, forces = super().flow(mode, pattern, some)
             expanded = {k: sp.expand(force) for k, force in forces.items()}
             self._flows[key] = [sp.expand(entry) for entry in field], expanded
         return self._flows[key]

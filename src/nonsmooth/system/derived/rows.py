@@ -7,7 +7,7 @@ small linear system.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["Row", "Rows"]
 
 ROUNDING = 1e-12  # of the terms of a sum: below it the sum is zero
+ROOM = 2_000_000  # numbers of fields that are kept
 
 
 class Row:
@@ -94,10 +95,14 @@ class Rows(Assembler):
         self._every, self._at = every, patterns.at
         self.parts = [self._part(k, name, patterns) for k, name in enumerate(patterns.elements)]
         self.known: dict[Any, Any] = {}  # of what elements decide together
+        self.ways: dict[tuple[int, Pattern], Any] = {}  # out of its phase, of each element in a combination of its group
         self._bases: dict[Any, tuple[list[int], FloatArray]] = {}
         self._approaches: dict[int, Row] = {}
         self._rates: dict[int, Row] = {}
-        self._flows: dict[Pattern, tuple[FloatArray, dict[int, Any]]] = {}
+        self._laws: dict[Any, Row] = {}
+        self._impacts: dict[Any, FloatArray] = {}
+        self._flows: dict[tuple[int, Pattern], tuple[FloatArray, dict[int, Any]]] = {}
+        self._room = ROOM
 
     def augmented(self, u: FloatArray, time: float) -> FloatArray:
         """w of states at a time."""
@@ -126,7 +131,10 @@ class Rows(Assembler):
         return self.field
 
     def law(self, k: int, name: str, side: int | None = None) -> Row:
-        return Row(self._every[self._at[k, name, side]], self.n)
+        key = k, name, side
+        if key not in self._laws:
+            self._laws[key] = Row(self._every[self._at[key]], self.n)
+        return self._laws[key]
 
     def constant(self, k: int, name: str) -> float:
         number = self.law(k, name).number
@@ -245,17 +253,56 @@ class Rows(Assembler):
         found[np.ix_(bearing, bearing)] = self.effects(bearing, self.mode)
         return found
 
-    def flow(self, mode: str, pattern: Pattern) -> tuple[FloatArray, dict[int, Any]]:
-        if pattern not in self._flows:
-            self._flows[pattern] = super().flow(mode, pattern)
-        return self._flows[pattern]
+    @cached_property
+    def groups(self) -> list[tuple[list[int], Any]]:
+        """The elements apart by whose forces change whose rates, and the states that those of a group act on: what an
+        element does depends on the phases of its group alone."""
+        from scipy.sparse.csgraph import connected_components
+
+        acts = np.array([part.direction != 0.0 for part in self.parts])
+        felt = acts.copy()
+        for k, part in enumerate(self.parts):
+            if part.element.held:
+                felt[k] |= self.rate(k, self.mode).values[: self.n] != 0.0
+        speaks = np.array([[other.name in vars(part.element).values() for other in self.parts] for part in self.parts])
+        number, labels = connected_components(felt @ acts.T | speaks, directed=False)
+        groups = [np.flatnonzero(labels == g).tolist() for g in range(number)]
+        return [(some, np.flatnonzero(acts[some].any(axis=0))) for some in groups]
+
+    @cached_property
+    def group(self) -> dict[int, int]:
+        """The number of each element's group."""
+        return {k: g for g, (some, _) in enumerate(self.groups) for k in some}
+
+    def phases(self, k: int, pattern: Pattern) -> Pattern:
+        """Those of an element's group."""
+        return tuple(pattern[j] for j in self.groups[self.group[k]][0])
+
+    def flow(
+        self, mode: str, pattern: Pattern, some: Collection[int] | None = None
+    ) -> tuple[FloatArray, dict[int, Any]]:
+        f, forces = self.field.copy(), {}
+        for own, states in self.groups:
+            key = own[0], self.phases(own[0], pattern)
+            if key not in self._flows:
+                field, found = super().flow(mode, pattern, own)
+                self._room -= len(states) * len(field[0])
+                if self._room < 0:
+                    self._flows.clear()
+                    self._room = ROOM
+                self._flows[key] = field[states], found
+            f[states] = self._flows[key][0]
+            forces |= self._flows[key][1]
+        return f, {k: forces[k] for k in sorted(forces)}
+
+    def impact(self, some: Sequence[int], mode: str, factor: Any = None) -> FloatArray:
+        key = tuple(some), factor
+        if key not in self._impacts:
+            self._impacts[key] = super().impact(some, mode, factor)
+        return self._impacts[key]
 
     def rubbed(self, some: Sequence[int], slopes: FloatArray) -> FloatArray:
         """The map of an impact by the derivatives of its impulses in the rates of some elements."""
         ways = np.array([self.parts[k].direction for k in some]).T
         found: FloatArray = self.identity() + ways @ slopes @ np.array([self.rate(k, self.mode).values for k in some])
         return found
-
-    def forget(self) -> None:
-        """Let go of the fields that were kept for one pattern's neighbours."""
-        self._flows.clear()
