@@ -63,7 +63,7 @@ class PatternFlow(RowsFlow):
 
     def _taken(self, at: Packed, i: int, mode: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         rows = parts([one.row(mode, i).values for one in at.every])
-        return rows, parts([one.flow(mode) for one in at.every]), at.rates
+        return rows, at.field(mode), at.rates
 
 
 def parts(every: Sequence[FloatArray]) -> FloatArray:
@@ -77,10 +77,6 @@ class Calculus:
 
     patterns: Patterns
     rows: Rows
-
-    def flow(self, mode: int) -> FloatArray:
-        """The field of a mode."""
-        return self.rows.flow(self.patterns.mode, self.patterns.visited[mode])[0]
 
     def row(self, mode: int, slot: int) -> Row:
         """One condition in a mode; those of forces that several share are told by the first of them."""
@@ -97,8 +93,8 @@ class Calculus:
         if change.way < 0:
             found: FloatArray = self.rows.impact(change.elements, self.patterns.mode)
             return found
-        (k,) = change.elements
-        states: FloatArray = self.patterns.ways_of(self.rows, self.patterns.visited[mode], k)[0][change.way].leaving.states
+        (k,), pattern = change.elements, self.patterns.visited[mode]
+        states: FloatArray = self.patterns.ways_of(self.rows, pattern, k)[0][change.way].leaving.states
         return states
 
     def rubbed(self, mode: int, change: Change, w: FloatArray) -> FloatArray:
@@ -121,8 +117,16 @@ class Packed:
         self.rates = np.array(rates).reshape(1 + len(places), -1)
         self.wanted: set[int] = set() if last is None else set(last.wanted)
         self.watched: set[int] = set()
+        self.fields: dict[int, FloatArray] = {}
         self.jumps: dict[int, tuple[FloatArray, FloatArray]] = {}
         self.q = NONE
+
+    def field(self, mode: int) -> FloatArray:
+        """The field of a mode, and its derivatives."""
+        if mode not in self.fields:
+            pattern = self.patterns.visited[mode]
+            self.fields[mode] = parts([one.rows.flow(self.patterns.mode, pattern)[0] for one in self.every])
+        return self.fields[mode]
 
     def of_jump(self, k: int, t: float, z: FloatArray) -> FloatArray:
         """The numbers of a transition and of the modes beside it; those of an impact that rubs are of the instant."""
@@ -172,7 +176,7 @@ class Packed:
             place += sum(map(len, some))
 
         for mode in sorted(modes):
-            put(mode, parts([one.flow(mode) for one in self.every]).ravel())
+            put(mode, self.field(mode).ravel())
         for mode in sorted(watched):
             own = self.every[0]
             put(count + mode, self.patterns.ways_out(own.rows, self.patterns.visited[mode])[0].ravel())

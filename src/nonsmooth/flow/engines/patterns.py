@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PatternEngine"]
 
+NEAR = 1e-9  # of the terms of a condition: what is no more may be zero
 MOST = 1024  # patterns for which room is made at first
 SECTION = np.array([(0, 1, 1), (0, -1, 1)], dtype=np.int64)  # the last rows of a transition table
 
@@ -151,6 +152,7 @@ class PatternTables:
         self.leads: list[Lead] = []  # of each transition
         self.lists: list[list[int]] = []  # transitions out of each mode
         self.together: list[int] = []  # the transition of each mode that is asked where several elements meet
+        self.watched: list[FloatArray] = []  # the rows of the conditions of each mode
         self.meets: list[list[int]] = []  # the conditions of each mode that are looked at then
         self.answers: dict[tuple[int, int, tuple[int, ...], str], int] = {}
         self.maps: list[FloatArray] = [self.rows.identity()]
@@ -210,11 +212,23 @@ class PatternTables:
             if found.ends:
                 self.work.tally[STARTS] = -1 - ENDS.index(found.ends)
         else:
-            found = decide(RowNumbers(rows, mode, w, float(self.own.info[here, 0])), pattern)
+            numbers = RowNumbers(rows, mode, w, float(self.own.info[here, 0]))
+            found = decide(numbers, pattern, (), self._concerned(lead, numbers, here))
             taken = self._answer(waits, found)
         if taken < 0 or not found.struck:
             self.work.w[: rows.n] = found.states
         self.work.tally[WAITS] = taken + 1
+
+    def _concerned(self, lead: Lead, numbers: RowNumbers, here: int) -> list[int] | None:
+        """The elements whose groups an instant concerns: of which a condition was met, or is zero; None: all."""
+        if lead.kind == TOGETHER:
+            return None
+        watched = self.watched[here]
+        zero = np.abs(watched @ numbers.w) <= NEAR * (np.abs(watched) @ numbers.size)
+        owners = {self.patterns.owners[slot] for slot in np.flatnonzero(zero)}
+        owners.add(next(k for k, part in enumerate(self.rows.parts) if part.name == lead.element))
+        groups = {self.rows.group[k] for k in owners}
+        return [k for k, group in self.rows.group.items() if group in groups]
 
     def _answer(self, waits: int, found: Outcome) -> int:
         """The transition to which a question has led; it is made where it is new."""
@@ -275,6 +289,7 @@ class PatternTables:
         self.lists.append([*range(first, len(self.leads) - 1)])
         self.together.append(len(self.leads) - 1)
         self.meets.append(meets)
+        self.watched.append(conditions)
         self.transitions = np.concatenate([self.transitions, np.array(ways, dtype=np.int64).reshape(-1, 5)])
         self.conditions = np.concatenate([self.conditions, np.array(armed, dtype=np.int64).reshape(-1, 3)])
         for t in self.waiting.pop(pattern, []):
@@ -335,9 +350,8 @@ class PatternTables:
         from nonsmooth.kernels.hybrid.records import Form
 
         n = self.rows.n
-        a, b, c, s = _contiguous(flow[None, None], n)
         return Form(
-            a, b, _turned(c), _turned(s), self.multiples, self.omega, self.period,
+            *_turned(flow[None, None], n), self.multiples, self.omega, self.period,
             *_contiguous(conditions[None], n), *_contiguous(outputs[None, :, None], n), **self._maps()[0],
             lacking=np.zeros((0, n), dtype=np.int64),
         )  # fmt: skip
@@ -346,12 +360,12 @@ class PatternTables:
         """The maps of all transitions, as fields of a form; of each how many states it changes, and which."""
         if self.made is None:
             every = np.array(self.maps)
-            a, b, c, s = _contiguous(every[None], self.rows.n)
             changed = np.zeros((len(every), 1 + self.rows.n), dtype=np.int64)
             for m, rows in enumerate((every != every[0]).any(axis=2)):
                 moved = np.flatnonzero(rows)
                 changed[m, 0], changed[m, 1 : len(moved) + 1] = len(moved), moved
-            self.made = {"ra": a, "rb": b, "rc": _turned(c), "rs": _turned(s)}, changed
+            fields = zip(("ra", "rb", "rc", "rs"), _turned(every[None], self.rows.n), strict=True)
+            self.made = dict(fields), changed
         found: tuple[dict[str, FloatArray], IntArray] = self.made
         return found
 
@@ -379,6 +393,8 @@ def _contiguous(rows: FloatArray, n: int) -> tuple[FloatArray, FloatArray, Float
     return a, b, c, s
 
 
-def _turned(waves: FloatArray) -> FloatArray:
-    """With the harmonics before the rows."""
-    return np.ascontiguousarray(np.swapaxes(waves, -1, -2))
+def _turned(rows: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """The same with the harmonics before the rows."""
+    a, b, *waves = _contiguous(rows, n)
+    c, s = (np.ascontiguousarray(np.swapaxes(one, -1, -2)) for one in waves)
+    return a, b, c, s

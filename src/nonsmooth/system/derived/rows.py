@@ -7,9 +7,10 @@ small linear system.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import cached_property
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, SystemDefinitionError
 from nonsmooth.system.codegen.linear import put_together
-from nonsmooth.system.derived.assembly import Assembler, Part, Pattern, VaryingError
+from nonsmooth.system.derived.assembly import Assembler, Part, Pattern, VaryingError, kept
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearTables
@@ -95,13 +96,8 @@ class Rows(Assembler):
         self._every, self._at = every, patterns.at
         self.parts = [self._part(k, name, patterns) for k, name in enumerate(patterns.elements)]
         self.known: dict[Any, Any] = {}  # of what elements decide together
-        self.ways: dict[tuple[int, Pattern], Any] = {}  # out of its phase, of each element in a combination of its group
-        self._bases: dict[Any, tuple[list[int], FloatArray]] = {}
-        self._approaches: dict[int, Row] = {}
-        self._rates: dict[int, Row] = {}
-        self._laws: dict[Any, Row] = {}
-        self._impacts: dict[Any, FloatArray] = {}
-        self._flows: dict[tuple[int, Pattern], tuple[FloatArray, dict[int, Any]]] = {}
+        self.ways: dict[tuple[int, Any], Any] = {}  # out of its phase, of each element in a combination of its group
+        self._flows: dict[tuple[int, Any], tuple[FloatArray, dict[int, Any]]] = {}
         self._room = ROOM
 
     def augmented(self, u: FloatArray, time: float) -> FloatArray:
@@ -130,11 +126,9 @@ class Rows(Assembler):
     def base(self, mode: str) -> FloatArray:
         return self.field
 
+    @kept
     def law(self, k: int, name: str, side: int | None = None) -> Row:
-        key = k, name, side
-        if key not in self._laws:
-            self._laws[key] = Row(self._every[self._at[key]], self.n)
-        return self._laws[key]
+        return Row(self._every[self._at[k, name, side]], self.n)
 
     def constant(self, k: int, name: str) -> float:
         number = self.law(k, name).number
@@ -163,13 +157,12 @@ class Rows(Assembler):
         total = terms.sum(axis=-1)
         return np.where(np.abs(total) > ROUNDING * np.abs(terms).sum(axis=-1), total, 0.0)
 
-    def basis(self, held: Sequence[int], mode: str, pattern: Pattern) -> tuple[list[int], FloatArray]:
-        key = tuple(held), tuple(pattern[r] for r in self.rubbing.values())
-        if key not in self._bases:
-            self._bases[key] = chosen, sums = super().basis(held, mode, pattern)
-            if len(chosen) < len(held) and self.field.dtype == complex:
-                self._refuse_varying(chosen, held, sums, pattern)
-        return self._bases[key]
+    @kept
+    def basis(self, held: tuple[int, ...], mode: str, pattern: Pattern) -> tuple[list[int], FloatArray]:
+        chosen, sums = super().basis(held, mode, pattern)
+        if len(chosen) < len(held) and self.field.dtype == complex:
+            self._refuse_varying(chosen, held, sums, pattern)
+        return chosen, sums
 
     def _refuse_varying(self, chosen: list[int], held: Sequence[int], sums: FloatArray, pattern: Pattern) -> None:
         """Raise where the sums of forces that hold together depend on the parameter of the derivatives."""
@@ -235,16 +228,6 @@ class Rows(Assembler):
     def size(self, expression: Row) -> float:
         return float(max(self.scale[expression.values[: self.n] != 0], default=1.0))
 
-    def approach(self, k: int, mode: str) -> Row:
-        if k not in self._approaches:
-            self._approaches[k] = super().approach(k, mode)
-        return self._approaches[k]
-
-    def rate(self, k: int, mode: str) -> Row:
-        if k not in self._rates:
-            self._rates[k] = super().rate(k, mode)
-        return self._rates[k]
-
     @cached_property
     def changes(self) -> FloatArray:
         """Changes of the derivatives of the rates of all that may hold by unit forces of each of them."""
@@ -254,9 +237,9 @@ class Rows(Assembler):
         return found
 
     @cached_property
-    def groups(self) -> list[tuple[list[int], Any]]:
-        """The elements apart by whose forces change whose rates, and the states that those of a group act on: what an
-        element does depends on the phases of its group alone."""
+    def groups(self) -> list[tuple[list[int], Callable[[Pattern], Any], Any]]:
+        """The elements apart by whose forces change whose rates: what one does depends on the phases of its group
+        alone. Of each group the elements, what takes their phases from a pattern, and the states that they act on."""
         from scipy.sparse.csgraph import connected_components
 
         acts = np.array([part.direction != 0.0 for part in self.parts])
@@ -267,23 +250,23 @@ class Rows(Assembler):
         speaks = np.array([[other.name in vars(part.element).values() for other in self.parts] for part in self.parts])
         number, labels = connected_components(felt @ acts.T | speaks, directed=False)
         groups = [np.flatnonzero(labels == g).tolist() for g in range(number)]
-        return [(some, np.flatnonzero(acts[some].any(axis=0))) for some in groups]
+        return [(some, itemgetter(*some), np.flatnonzero(acts[some].any(axis=0))) for some in groups]
 
     @cached_property
     def group(self) -> dict[int, int]:
         """The number of each element's group."""
-        return {k: g for g, (some, _) in enumerate(self.groups) for k in some}
+        return {k: g for g, (some, *_) in enumerate(self.groups) for k in some}
 
-    def phases(self, k: int, pattern: Pattern) -> Pattern:
+    def phases(self, k: int, pattern: Pattern) -> Any:
         """Those of an element's group."""
-        return tuple(pattern[j] for j in self.groups[self.group[k]][0])
+        return self.groups[self.group[k]][1](pattern)
 
     def flow(
         self, mode: str, pattern: Pattern, some: Collection[int] | None = None
     ) -> tuple[FloatArray, dict[int, Any]]:
-        f, forces = self.field.copy(), {}
-        for own, states in self.groups:
-            key = own[0], self.phases(own[0], pattern)
+        f, forces = self.field.copy(), dict[int, Any]()
+        for own, phases, states in self.groups:
+            key = own[0], phases(pattern)
             if key not in self._flows:
                 field, found = super().flow(mode, pattern, own)
                 self._room -= len(states) * len(field[0])
@@ -294,12 +277,6 @@ class Rows(Assembler):
             f[states] = self._flows[key][0]
             forces |= self._flows[key][1]
         return f, {k: forces[k] for k in sorted(forces)}
-
-    def impact(self, some: Sequence[int], mode: str, factor: Any = None) -> FloatArray:
-        key = tuple(some), factor
-        if key not in self._impacts:
-            self._impacts[key] = super().impact(some, mode, factor)
-        return self._impacts[key]
 
     def rubbed(self, some: Sequence[int], slopes: FloatArray) -> FloatArray:
         """The map of an impact by the derivatives of its impulses in the rates of some elements."""
