@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+STUDY  := --editable studies/savi2007
 OUT    ?= out/savi2007
 # Matrices are tiny: threads of the linear algebra only wait for each other and for a core.
 export OPENBLAS_NUM_THREADS ?= 1
@@ -57,10 +58,10 @@ altered: $(VENV)/.compiled-test  ## alter bytes of 400 saved files of each forma
 	$(BIN)/python -m pytest -m slow tests/results/test_altered_bytes.py -s
 
 coverage: $(VENV)/.compiled-run  ## identify 40 virtual rigs; writes docs/measured_coverage.md
-	$(BIN)/python -m tests.studies.identification.coverage --seeds 0-39 --out docs/measured_coverage.md
+	$(BIN)/python -m studies.savi2007.tests.identification.coverage --seeds 0-39 --out docs/measured_coverage.md
 
 coverage-awkward: $(VENV)/.compiled-run  ## the same on rigs where much goes wrong; writes docs/measured_coverage_awkward.md
-	$(BIN)/python -m tests.studies.identification.coverage --awkward --seeds 0-39 --out docs/measured_coverage_awkward.md
+	$(BIN)/python -m studies.savi2007.tests.identification.coverage --awkward --seeds 0-39 --out docs/measured_coverage_awkward.md
 
 coverage-fit: $(VENV)/.compiled-test  ## fit ten systems to data of SciPy, 40 seeds each; writes docs/measured_coverage_fit.md
 	$(BIN)/python -m tests.identification.fit_coverage --seeds 0-39 --out docs/measured_coverage_fit.md
@@ -78,7 +79,7 @@ check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell, the pros
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md src tests docs benchmarks examples
+	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md src studies tests docs benchmarks examples
 	$(BIN)/python tests/prose.py
 	$(BIN)/python tests/weight.py --check
 
@@ -101,7 +102,7 @@ screenshots: docs  ## pictures of some pages at 1280 and 400 pixels; no page is 
 
 clean:  ## remove results, built documentation and caches
 	rm -rf out docs/_build .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis build dist
-	find src tests benchmarks examples -name __pycache__ -type d -prune -exec rm -rf {} +
+	find src studies tests benchmarks examples -name __pycache__ -type d -prune -exec rm -rf {} +
 
 distclean: clean  ## remove .venv too, and what was compiled ahead
 	rm -rf $(VENV) src/nonsmooth/kernels/ahead
@@ -113,8 +114,8 @@ export HATCH_BUILD_NO_HOOKS := true
 $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
-$(VENV)/.installed-run: pyproject.toml | $(BIN)/python
-	$(PIP) --editable .
+$(VENV)/.installed-run: pyproject.toml studies/savi2007/pyproject.toml | $(BIN)/python
+	$(PIP) --editable . $(STUDY)
 	@touch $@
 
 # Groups of packages for work on this one, which need pip 25.1; all others are extras.
@@ -122,12 +123,12 @@ $(VENV)/.pip: | $(BIN)/python
 	$(PIP) 'pip>=25.1'
 	@touch $@
 
-$(patsubst %,$(VENV)/.installed-%,test dev docs bench): $(VENV)/.installed-%: pyproject.toml | $(VENV)/.pip
-	$(PIP) --editable . --group $*
+$(patsubst %,$(VENV)/.installed-%,test dev docs bench): $(VENV)/.installed-%: pyproject.toml studies/savi2007/pyproject.toml | $(VENV)/.pip
+	$(PIP) --editable . $(STUDY) --group $*
 	@touch $@
 
-$(VENV)/.installed-%: pyproject.toml | $(BIN)/python
-	$(PIP) --editable '.[$*]'
+$(VENV)/.installed-%: pyproject.toml studies/savi2007/pyproject.toml | $(BIN)/python
+	$(PIP) --editable '.[$*]' $(STUDY)
 	@touch $@
 
 .PRECIOUS: $(VENV)/.installed-%

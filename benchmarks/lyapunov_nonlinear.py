@@ -19,7 +19,7 @@ SHORT = 8.0  # time over which both are held against a reference: longer runs of
 UNITS = {"Lorenz": 0.5, "valve": 0.25}  # of time between heyoka's QRs: with longer ones it loses the third exponent
 
 
-def _lorenz() -> ns.System:
+def lorenz() -> ns.System:
     return ns.System(
         states=["x", "y", "z"], parameters=LORENZ,
         modes={"all": lambda t, u, p: (p.s * (u.y - u.x), u.x * (p.r - u.z) - u.y, u.x * u.y - p.b * u.z)},
@@ -28,7 +28,7 @@ def _lorenz() -> ns.System:
 
 def run(effort: float) -> tuple[list[str], list[Verdict]]:
     duration = effort * DURATION
-    cases = {"Lorenz": (_lorenz(), (1.0, 1.0, 20.0), "Lorenz", lyapunov_heyoka.lorenz)}
+    cases = {"Lorenz": (lorenz(), (1.0, 1.0, 20.0), "Lorenz", lyapunov_heyoka.lorenz)}
     for q in VALVE_INFLOWS:
         system = ns.models.relief_valve().with_parameters(q=q)
         cases[f"valve, q = {q}"] = system, (1.0, 0.0, 11.0), "valve", partial(lyapunov_heyoka.valve, q)

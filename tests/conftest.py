@@ -26,7 +26,7 @@ FIRST = (
     "diagrams/test_chart_known_answers.py",  # settle_many
     "flow/test_variational.py",  # march_legs, many models
     "diagrams/test_lyapunov.py",  # spectrum without a harmonic
-    "studies/rig/test_virtual_rig.py",  # the models of the rig
+    "../studies/savi2007/tests/rig/test_virtual_rig.py",  # the models of the rig
     "diagrams/test_correlation_dimension.py",  # spectrum
     "flow/test_poincare.py",  # chain without a harmonic
     "diagrams/test_sweep.py",  # chain
@@ -36,8 +36,8 @@ FIRST = (
     "system/test_jet.py",
     "examples/test_pages.py",
     "examples/test_examples.py",
-    "studies/test_savi2007_global.py",
-    "studies/test_savi2007_claims.py",
+    "../studies/savi2007/tests/test_savi2007_global.py",
+    "../studies/savi2007/tests/test_savi2007_claims.py",
     "test_import.py",
     "test_bad_input.py",
 )
@@ -47,7 +47,7 @@ JUMP_UP, JUMP_DOWN = 5.9, 5.2
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     folder = Path(__file__).parent
-    rank = {folder / name: i for i, name in enumerate(FIRST)}
+    rank = {(folder / name).resolve(): i for i, name in enumerate(FIRST)}
     assert all(path.is_file() for path in rank), "a file of FIRST has been moved"
     items.sort(key=lambda item: rank.get(item.path, len(FIRST)))
 
@@ -60,7 +60,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     class ByFile(LoadFileScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = super()._split_scope(nodeid)
-            return "tests/studies" if file.startswith("tests/studies/test_savi2007") else file
+            return "study" if "tests/test_savi2007" in file else file
 
     return ByFile(config, log) if config.getvalue("dist") == "loadfile" else None
 

@@ -74,7 +74,7 @@ def steps(folder: Path) -> dict[str, Callable[[dict[str, Any]], Any]]:
         )  # fmt: skip
 
     def identify(_: Any) -> Any:
-        from nonsmooth.studies.savi2007.rig import VirtualRig
+        from nonsmooth_savi2007.rig import VirtualRig
 
         return ns.identify(str(VirtualRig(1).write_session(folder / "rig", truth=folder / "truth.toml")))
 

@@ -16,14 +16,16 @@ import tomllib
 from pathlib import Path
 
 HERE = Path(__file__).parent
-SOURCES = HERE.parent / "src"
+ROOT = HERE.parent
+SOURCES = ("src", "studies/savi2007/src")
 
 
-def passes(tests: list[str], sources: Path) -> bool:
-    """Return True where the tests pass with the package from ``sources``."""
+def passes(tests: list[str], copy: Path) -> bool:
+    """Return True where the tests pass with the packages of a copy."""
+    paths = os.pathsep.join(str(copy / one) for one in SOURCES)
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests],
-        cwd=HERE.parent, env={**os.environ, "PYTHONPATH": str(sources)}, capture_output=True, text=True,
+        cwd=ROOT, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True,
     )  # fmt: skip
     if done.returncode not in (0, 1):
         raise SystemExit(f"pytest could not run {' '.join(tests)}:\n{done.stdout}{done.stderr}")
@@ -34,13 +36,14 @@ def main(wanted: str) -> int:
     mutants = [one for one in tomllib.loads((HERE / "mutants.toml").read_text())["mutant"] if wanted in one["name"]]
     survivors, moved = [], 0
     with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder) / "src"
-        shutil.copytree(SOURCES, copy, ignore=shutil.ignore_patterns("__pycache__"))
+        copy = Path(folder)
+        for one in SOURCES:
+            shutil.copytree(ROOT / one, copy / one, ignore=shutil.ignore_patterns("__pycache__"))
         every = sorted({test for one in mutants for test in one["tests"]})
         if every and not passes(every, copy):
             raise SystemExit(f"these tests do not pass as it is: {' '.join(every)}")
         for one in mutants:
-            path = copy / "nonsmooth" / one["file"]
+            path = copy / one["file"]
             text = path.read_text(encoding="utf-8") if path.is_file() else ""
             if text.count(one["old"]) != 1:
                 print(f"MOVED     {one['name']}: stands {text.count(one['old'])} times in {one['file']}: {one['old']}")

@@ -91,9 +91,9 @@ def unmerged(text: str) -> bool:
 
 def complaints() -> Iterator[str]:
     """All complaints, one a line."""
-    sources = ROOT / "src" / "nonsmooth"
-    for path in sorted(sources.rglob("*.py")):
-        yield from of_source(path)
+    for sources in (ROOT / "src", ROOT / "studies"):
+        for path in sorted(sources.rglob("*.py")):
+            yield from of_source(path, words_too="tests" not in path.parts)
     for folder in ("benchmarks", "docs", "examples", "tests"):
         for path in sorted((ROOT / folder).rglob("*.py")):
             yield from of_source(path, words_too=folder != "tests")  # the words are data there

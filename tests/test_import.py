@@ -47,15 +47,15 @@ def run(code: str) -> str:
     return done.stdout.strip()
 
 
-def time_of(code: str) -> float:
-    """Processor time of a fresh process that runs ``code``.
+def time_of(code: str) -> tuple[float, str]:
+    """Processor time of a fresh process that runs ``code``, and what it prints.
 
     One thread works, so on an idle machine it is the wall time; other jobs lengthen it little.
     """
     began = os.times()
-    run(code)
+    printed = run(code)
     ended = os.times()
-    return ended.children_user - began.children_user + ended.children_system - began.children_system
+    return ended.children_user - began.children_user + ended.children_system - began.children_system, printed
 
 
 def new_system() -> str:
@@ -99,8 +99,13 @@ def test_a_new_nonlinear_system_in_a_cold_process_costs_little_more_than_its_lib
 
     Loading the libraries and compiling ten lines takes 1.1 to 1.5 s, so three times that is what 3 to 4 s were. Where
     another job came in between, it is measured again: the first time it may be compiling the package's own kernels."""
-    assert any(time_of(new_system()) < 3.0 * time_of(LIBRARIES) for _ in range(3))
-    loads, compiles, generated = map(int, run(new_system() + COUNT).split())  # a kernel is compiled once for all
+    for _ in range(3):
+        took, counts = time_of(new_system() + COUNT)
+        if took < 3.0 * time_of(LIBRARIES)[0]:
+            break
+    else:
+        pytest.fail(f"a new system took {took:.2f} s")
+    loads, compiles, generated = map(int, counts.split())  # a kernel is compiled once for all
     assert compiles == 0
     assert loads >= 1
     assert generated >= 1

@@ -50,10 +50,10 @@ def tried(program: str, pins: list[str], what: str) -> bool:
         environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
         environment |= {"NONSMOOTH_CACHE_DIR": place, "HATCH_BUILD_NO_HOOKS": "true", "OPENBLAS_NUM_THREADS": "1"}
         python = str(folder / "venv" / ("Scripts" if os.name == "nt" else "bin") / "python")
-        wanted = f"{ROOT}[{','.join(EXTRAS)}]"
+        wanted = [f"{ROOT}[{','.join(EXTRAS)}]", str(ROOT / "studies" / "savi2007")]
         for command in (
             [program, "-m", "venv", str(folder / "venv")],
-            [python, "-m", "pip", "install", "-qq", "-c", str(folder / "pins.txt"), wanted],
+            [python, "-m", "pip", "install", "-qq", "-c", str(folder / "pins.txt"), *wanted],
             [python, str(ROOT / "tests" / "every_verb.py")],
         ):
             if subprocess.run(command, cwd=folder, env=environment).returncode:

@@ -61,7 +61,6 @@ if TYPE_CHECKING:
     from nonsmooth.results.store import load as load
     from nonsmooth.results.store import save as save
     from nonsmooth.smoothing.report import smoothing_report as smoothing_report
-    from nonsmooth.studies.savi2007.identification.chain import identify as identify
     from nonsmooth.system.derived.maps import Branch as Branch
     from nonsmooth.system.derived.maps import Map as Map
     from nonsmooth.system.derived.mechanical import mechanical as mechanical
@@ -74,6 +73,7 @@ if TYPE_CHECKING:
     from nonsmooth.system.transition import Transition as Transition
     from nonsmooth.tables.region import region as region
     from nonsmooth.tables.table import table as table
+    from nonsmooth_savi2007.identification.chain import identify as identify
 
 _WHERE = {
     "System": "system.system",
@@ -120,7 +120,6 @@ _WHERE = {
     "Sensor": "identification.fit.sensors",
     "select_model": "identification.fit.select",
     "plan_experiment": "identification.fit.plan",
-    "identify": "studies.savi2007.identification.chain",
     "ParameterSet": "identification.parameter_set",
     "compare": "identification.compare.compare",
     "propagate": "identification.propagate",
@@ -150,6 +149,11 @@ def __getattr__(name: str) -> Any:
         return package_version()
     if name in _ROOMS:
         return import_module(f"nonsmooth.{name}")
+    if name == "identify":  # of the study of the paper, a distribution of its own
+        try:
+            return import_module("nonsmooth.studies").study("savi2007", "identification").identify
+        except ValueError as error:
+            raise AttributeError(str(error), name=name) from None
     if name in _WHERE:
         value = getattr(import_module(f"nonsmooth.{_WHERE[name]}"), name)
         globals()[name] = value

@@ -100,7 +100,7 @@ def test_a_study_says_what_it_does_before_anything_is_loaded(
         raise ValueError("loaded")
 
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    monkeypatch.setattr("nonsmooth.cli.reproduce.importlib.import_module", load)
+    monkeypatch.setattr("nonsmooth.studies.import_module", load)
     assert run("reproduce", "savi2007", "--quick") == 2
     assert "loaded" in capsys.readouterr().err
 

@@ -10,7 +10,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.recordings import RecordingWarning
-from nonsmooth.studies.savi2007.rig import VirtualRig
+from nonsmooth_savi2007.rig import VirtualRig
 
 CRANK, GAP = 0.01653, 0.02  # m; 0.14 N, Fig. 9
 IDENTIFIED = ["m", "k", "k_s", "c", "c_s", "friction", "g"]

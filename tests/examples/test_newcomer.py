@@ -1,12 +1,13 @@
 """A newcomer's first quarter of an hour: the README, typed line by line in a fresh folder.
 
-The blocks of Python go into an interactive interpreter, the commands to the program ``nonsmooth``, the one that
-computes to the installed one, on a terminal. What the page says is printed must be printed, in that order, and the
+The blocks of Python go into an interactive console, the commands to the program ``nonsmooth``, the one that computes to
+the installed one, on a terminal. What the page says is printed must be printed, in that order, and the
 files it names must be there. The first tutorial, which begins with the same lines, is run by ``test_pages``.
 """
 
 from __future__ import annotations
 
+import code
 import contextlib
 import doctest
 import io
@@ -21,7 +22,6 @@ from page_code import blocks
 
 ROOT = Path(__file__).parents[2]
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
-MARK = "- end of block -"
 
 
 def environment() -> dict[str, str]:
@@ -31,16 +31,17 @@ def environment() -> dict[str, str]:
 
 
 def typed(page: Path, folder: Path) -> list[tuple[str, str | None, int]]:
-    """(what it printed, what the page says, line) of each block of Python, all in one interactive interpreter."""
-    python = [block for block in blocks(page.read_text(encoding="utf-8")) if block[0] == "python"]
-    # An empty line ends a function, here as for somebody who types it.
-    lines = "".join(f"{code}\n\nprint({MARK!r})\n" for _, code, _, _ in python)
-    done = subprocess.run(
-        [sys.executable, "-q", "-i"], input=lines, cwd=folder, env=environment(), capture_output=True, text=True
-    )
-    assert done.returncode == 0 and "Traceback" not in done.stderr and "Error" not in done.stderr, done.stderr
-    printed = done.stdout.split(f"{MARK}\n")[:-1]
-    return [(out, expected, line) for out, (_, _, expected, line) in zip(printed, python, strict=True)]
+    """(what it printed, what the page says, line) of each block of Python, all in one interactive console."""
+    console, found = code.InteractiveConsole(), []
+    for language, lines, expected, line in blocks(page.read_text(encoding="utf-8")):
+        if language == "python":
+            said, wrong = io.StringIO(), io.StringIO()
+            with contextlib.chdir(folder), contextlib.redirect_stdout(said), contextlib.redirect_stderr(wrong):
+                for one in [*lines.splitlines(), ""]:  # an empty line ends a function, as for somebody who types it
+                    console.push(one)
+            assert "Traceback" not in wrong.getvalue() and "Error" not in wrong.getvalue(), wrong.getvalue()
+            found.append((said.getvalue(), expected, line))
+    return found
 
 
 def on_a_terminal(words: list[str], folder: Path) -> str:
@@ -80,9 +81,9 @@ def here(words: list[str], folder: Path) -> str:
 
 def study(page: Path) -> str:
     """The study file that a page shows."""
-    [code] = [code for language, code, _, _ in blocks(page.read_text(encoding="utf-8")) if language == "toml"]
-    assert code.startswith("# fig11.toml\n")
-    return code
+    [text] = [text for language, text, _, _ in blocks(page.read_text(encoding="utf-8")) if language == "toml"]
+    assert text.startswith("# fig11.toml\n")
+    return text
 
 
 README, TUTORIAL = ROOT / "README.md", ROOT / "docs" / "tutorials" / "first_diagram.md"
@@ -103,8 +104,8 @@ def test_commands(tmp_path: Path) -> None:
     """The README's; the tutorial shows the same file."""
     assert study(README) == study(TUTORIAL)
     (tmp_path / "fig11.toml").write_text(study(README), encoding="utf-8")
-    shell = [code for language, code, _, _ in blocks(README.read_text(encoding="utf-8")) if language == "sh"]
-    commands = [line.split("#")[0].split() for code in shell for line in code.splitlines()]
+    shell = [text for language, text, _, _ in blocks(README.read_text(encoding="utf-8")) if language == "sh"]
+    commands = [line.split("#")[0].split() for text in shell for line in text.splitlines()]
     commands = [words for words in commands if words[:1] == ["nonsmooth"]]
     said = {words[1]: (on_a_terminal if words[1] == "run" else here)(words, tmp_path) for words in commands}
     assert list(said) == ["models", "init", "run", "show"]

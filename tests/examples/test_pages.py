@@ -18,8 +18,12 @@ ELSEWHERE = {"recordings", "your_rig", "from_a_paper"}
 PAGES = [page for page in PAGES if page.stem not in ELSEWHERE and blocks(page.read_text(encoding="utf-8"))]
 LONGEST = 60  # lines of an output: in a notebook the next cell stays in sight
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
-#: What a page of more than ten seconds does in place of its own; what that block prints is compared where it does all.
-SHORTER = {"control_based_continuation": ("step=0.3, points=60", "step=0.3, points=3")}
+#: What a page of more than five seconds does in place of its own; what that block prints is compared where it does all.
+SHORTER = {
+    "control_based_continuation": ("step=0.3, points=60", "step=0.3, points=3"),
+    "sketches_and_animations": ("seconds=5, rate=12", "seconds=0.5, rate=12"),
+    "smoothing": ("np.geomspace(1e-4, 1e-1, 7)", "np.geomspace(1e-4, 1e-1, 3)"),
+}
 LONG = [page for page in PAGES if page.stem in SHORTER]
 
 

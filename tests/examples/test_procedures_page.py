@@ -10,7 +10,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.recordings.session import PROCEDURES
-from nonsmooth.studies.savi2007.identification.evidence import _NEEDS
+from nonsmooth_savi2007.identification.evidence import _NEEDS
 
 PAGE = Path(__file__).parents[2] / "docs" / "guides" / "what_each_procedure_needs.md"
 SECTIONS = dict(re.findall(r"^## `(\w+)`\n(.*?)(?=^## |\Z)", PAGE.read_text(encoding="utf-8"), flags=re.S | re.M))

@@ -33,9 +33,9 @@ try:
 except KeyError:
     pass
 assert told() == two
-from nonsmooth.studies.savi2007.identification import identify
+from nonsmooth_savi2007.identification import identify
 seen = []
-import nonsmooth.studies.savi2007.identification.chain as chain
+import nonsmooth_savi2007.identification.chain as chain
 chain.gather = lambda *a, **k: seen.extend(told()) or (_ for _ in ()).throw(KeyError)
 try:
     identify("nowhere")

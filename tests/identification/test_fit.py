@@ -220,6 +220,7 @@ def test_a_profile_holds_where_the_sum_of_squares_is_no_parabola():
 def test_a_model_that_is_not_the_motion_is_said_to_fail_where_it_does():
     case = CASES["impact oscillator"]
     data, measured, _ = case.recording(0)
+    data = {name: (t[:400], x[:400]) for name, (t, x) in data.items()}
     # without the stop: nothing in the model answers for the impacts
     system = case.system().with_parameters({**case.truth, "d": 50.0})
     found = ns.fit(system, data, ["k", "c"], measured=measured, tries=1)
@@ -284,7 +285,7 @@ def test_a_chaotic_record_is_fitted_over_windows_from_one_voltage():
 
 
 def test_models_are_ranked_by_what_they_predict():
-    t = np.arange(0, 14, 0.02)
+    t = np.arange(0, 8, 0.02)
     x = closed_form(t) + 1e-4 * np.random.default_rng(8).standard_normal(len(t))
     system = free().with_parameters(k=9.0)
     ranked = ns.select_model(
@@ -293,7 +294,7 @@ def test_models_are_ranked_by_what_they_predict():
             "undamped": (system.with_parameters(c=0.0), ["k"]),
             "with one more": (system, ["k", "c", "m"]),  # known beside rho: a parameter that nothing asks for
         },
-        {"x": (t, x)}, folds=3, tries=2, progress=False,
+        {"x": (t, x)}, folds=2, tries=1, progress=False,
     )  # fmt: skip
     assert ranked.rms.sel(model="true") == pytest.approx(1.0, abs=0.15)  # white noise of known irregularity
     assert ranked.rms.sel(model="undamped") > 3.0

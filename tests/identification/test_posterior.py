@@ -49,7 +49,7 @@ def test_a_bound_cuts_the_posterior() -> None:
     error = NOISE * np.sqrt(np.linalg.inv(X.T @ X)[0, 0])
     found = ns.fit(
         line().with_parameters(a=0.75), {"x": (T, 0.2 + 0.7 * T + e)}, {"a": (0.7, None)},
-        measured={"x": ns.Sensor(noise=NOISE)}, posterior=2500, progress=False,
+        measured={"x": ns.Sensor(noise=NOISE)}, posterior=1500, progress=False,
     )  # fmt: skip
     a = found.posterior.sel(parameter="a").values
     assert a.min() >= 0.7

@@ -1,4 +1,4 @@
-"""Intervals, correlated residuals, profiles and lines against closed forms and published numbers."""
+"""Intervals, correlated residuals and profiles against closed forms and published numbers."""
 
 from types import SimpleNamespace
 
@@ -10,13 +10,12 @@ from nonsmooth.identification.finding import Estimate
 from nonsmooth.identification.fit.profile import profile_of
 from nonsmooth.identification.uncertainty import (
     correlated,
-    correlation_times,
     coverage_factor,
     factor_interval,
     interval,
     uniform,
 )
-from nonsmooth.studies.savi2007.identification.least_squares import york
+from nonsmooth.recordings.signals.spectrum import correlation_times
 
 
 def test_uniform_and_normal_limits():
@@ -45,7 +44,7 @@ def test_correlation_of_an_autoregressive_series():
     x = np.zeros(200_000)
     for i, e in enumerate(rng.standard_normal(len(x) - 1), 1):
         x[i] = a * x[i - 1] + e
-    assert correlation_times(x, longest=60) == pytest.approx(4.0, rel=0.05)
+    assert correlation_times(x) == pytest.approx(4.0, rel=0.05)
     # and the variance of its mean is tau times that of white residuals
     c = correlated(np.ones((20_000, 1)), x[:20_000] - x[:20_000].mean())
     assert c[0, 0] * 20_000 == pytest.approx(1 / (1 - a) ** 2, rel=0.25)
@@ -103,17 +102,3 @@ def test_a_profile_that_does_not_rise_has_no_limit():
     value = np.linspace(0.1, 3, 59)
     profile = profile_of(value, np.minimum(40 * (value - 1) ** 2, np.where(value > 1, 2.0, np.inf)), 1.0)
     assert np.isnan(profile.high) and profile.low == pytest.approx(1 - np.sqrt(3.8415 / 40), abs=0.01)
-
-
-def test_york_on_pearsons_data_with_yorks_weights():
-    # York et al. (2004), Table 2: slope -0.480533 +- 0.057985, intercept 5.479910 +- 0.294971
-    x = [0.0, 0.9, 1.8, 2.6, 3.3, 4.4, 5.2, 6.1, 6.5, 7.4]
-    y = [5.9, 5.4, 4.4, 4.6, 3.5, 3.7, 2.8, 2.8, 2.4, 1.5]
-    wx = np.array([1000, 1000, 500, 800, 200, 80, 60, 20, 1.8, 1.0])
-    wy = np.array([1.0, 1.8, 4, 8, 20, 20, 70, 70, 100, 500])
-    line = york(x, y, wx**-0.5, wy**-0.5)
-    assert line.slope == pytest.approx(-0.480533, abs=2e-6)
-    assert line.intercept == pytest.approx(5.479910, abs=2e-5)
-    slope_error, intercept_error = np.sqrt(np.diag(line.covariance))
-    assert slope_error == pytest.approx(0.057985, abs=2e-5)
-    assert intercept_error == pytest.approx(0.294971, abs=1e-4)

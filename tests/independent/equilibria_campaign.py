@@ -23,10 +23,10 @@ BESIDE = 1e-4  # of the parameter: before and behind a special point
 STARTS = 12  # beside those near each component
 
 
-def starts(one: Draw, known: list[Component]) -> Any:
+def starts(one: Draw, known: list[Component], anywhere: int) -> Any:
     """Random states: some anywhere, some near each component."""
     rng, n = np.random.default_rng(1000 + one.seed), len(one.K)
-    yield from rng.uniform(-2.0, 2.0, (STARTS, n))
+    yield from rng.uniform(-2.0, 2.0, (anywhere, n))
     for part in known:
         low, high = np.maximum(part.lower, -5.0), np.minimum(part.upper, 5.0)
         yield from rng.uniform(np.minimum(low, high) - 0.02, np.maximum(low, high) + 0.02, (2, n))
@@ -36,12 +36,12 @@ def same(part: Component, lower: Any, upper: Any) -> bool:
     return bool(np.allclose(part.lower, lower, atol=CLOSE) and np.allclose(part.upper, upper, atol=CLOSE))
 
 
-def found_from_starts(one: Draw, system: Any, known: list[Component]) -> tuple[list[str], list[Any]]:
+def found_from_starts(one: Draw, system: Any, known: list[Component], anywhere: int) -> tuple[list[str], list[Any]]:
     """Faults, and a branch through each component."""
     import nonsmooth as ns
 
     n, faults, hit = len(one.K), [], {}
-    for q in starts(one, known):
+    for q in starts(one, known, anywhere):
         try:
             start = [*map(float, q), *[0.0] * n]
             branch = ns.continue_equilibrium(system, "P", (-1.5, 1.5), start=start, step=0.1, points=2000)
@@ -127,11 +127,11 @@ def beside(one: Draw, system: Any, branch: Any, part: Component) -> list[str]:
     return []
 
 
-def check(seed: int) -> tuple[int, list[str]]:
+def check(seed: int, anywhere: int = STARTS) -> tuple[int, list[str]]:
     """The number of components of a seed at P = 0, and all faults."""
     one = draw(seed)
     system, known = one.as_nonsmooth(), components(one, 0.0)
-    faults, branches = found_from_starts(one, system, known)
+    faults, branches = found_from_starts(one, system, known, anywhere)
     for part, branch in zip(known, branches, strict=True):
         if branch is not None:
             faults += along(one, branch) + beside(one, system, branch, part)

@@ -60,7 +60,7 @@ def system_of(name: str, parameters: dict[str, float]) -> ns.System:
 @pytest.mark.parametrize("name", CASES)
 def test_basins_of_a_rigid_stop(name: str) -> None:
     parameters, half, periods = CASES[name]
-    check(system_of(name, parameters), half, 12, periods)
+    check(system_of(name, parameters), half, 10, periods)
 
 
 @pytest.mark.slow

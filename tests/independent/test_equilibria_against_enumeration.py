@@ -15,8 +15,8 @@ SOME = (0, 2, 6, 9, 33, 44, 68, 76, 105, 106, 112, 213, 245)  # those that take 
 
 @pytest.mark.parametrize("seed", SOME)
 def test_all_components_and_no_other(seed: int) -> None:
-    """By random starts, along branches, at their ends, and by runs from neighbours."""
-    components, faults = equilibria_campaign.check(seed)
+    """By starts near them and two random ones, along branches, at their ends, and by runs from neighbours."""
+    components, faults = equilibria_campaign.check(seed, 2)
     assert not faults and components >= 0
 
 

@@ -71,8 +71,9 @@ def _run(options: argparse.Namespace) -> int:
 def _run_folder(options: argparse.Namespace) -> int:
     """Everything in a session that a model can be laid over: a response, a rise, and each section by itself."""
     from nonsmooth.recordings.session import load_session
-    from nonsmooth.studies.savi2007.comparison import gap_reference
-    from nonsmooth.studies.savi2007.comparison.notebook import SHOWS
+    from nonsmooth.studies import study as package
+
+    lab = package("savi2007", "comparison")
 
     here = Path()
     read = cache(load_session)  # each file once, however many runs of it are compared
@@ -80,9 +81,9 @@ def _run_folder(options: argparse.Namespace) -> int:
     wanted: list[dict[str, Any]] = []
     for procedure in session.procedures:
         runs = [item for item in session.recordings(procedure) if "gap" in item.settings]
-        if not runs or procedure not in SHOWS:
+        if not runs or procedure not in lab.SHOWS:
             continue
-        shown: list[dict[str, Any]] = [{}] if SHOWS[procedure] != "motion" else [{"run": item.run} for item in runs]
+        shown: list[dict[str, Any]] = [{}] if lab.SHOWS[procedure] != "motion" else [{"run": item.run} for item in runs]
         wanted += [{"session": str(options.study.resolve()), "procedure": procedure, **one} for one in shown]
     if not wanted:
         raise ValueError(
@@ -94,7 +95,7 @@ def _run_folder(options: argparse.Namespace) -> int:
         if options.identified_from is not None:
             study["identified"]["session"] = str(options.identified_from.resolve())
     _, parameters = _theory(study, here)
-    reference = gap_reference(session, offset=_offset(study, parameters, session, here, read))
+    reference = lab.gap_reference(session, offset=_offset(study, parameters, session, here, read))
     for measured in wanted:
         whole = {**study, "measured": {**measured, "reference": reference}}
         _run_study(whole, here, options.quiet, keep=False, read=read)
@@ -106,7 +107,7 @@ def _run_study(
 ) -> int:
     from nonsmooth.identification.compare import compare
     from nonsmooth.recordings.session import load_session
-    from nonsmooth.studies.savi2007.comparison import session_measurement
+    from nonsmooth.studies import study as package
 
     system, parameters = _theory(study, folder)
     table = dict(study["measured"])
@@ -116,7 +117,7 @@ def _run_study(
     k = float((parameters or system.values).get("k", system.values.get("k", 1.0)))
     if "gap_offset" not in table and "reference" not in table:
         table["gap_offset"] = _offset(study, parameters, session, folder, read)
-    measured, settings = session_measurement(session, procedure, runs, k=k, **table)
+    measured, settings = package("savi2007", "comparison").session_measurement(session, procedure, runs, k=k, **table)
     given = dict(study.get("compare", {}))
     settings |= given.pop("settings", {})
     if procedure == "rise":
@@ -136,13 +137,13 @@ def _run_study(
 
 def _offset(study: Mapping[str, Any], parameters: Any, session: Any, folder: Path, read: Callable[[Path], Any]) -> Any:
     """Identified gap less the screw's reading; 0 where the gap was not identified, or not from contact."""
-    from nonsmooth.studies.savi2007.comparison import gap_offset
+    from nonsmooth.studies import study as package
 
     if "gap_at_rest" not in getattr(parameters, "extra", {}):
         return 0.0
     source = study["identified"].get("session")
     origin = session if source is None else read(folder / source)
-    return gap_offset(parameters, origin) if origin.recordings("contact") else 0.0
+    return package("savi2007", "comparison").gap_offset(parameters, origin) if origin.recordings("contact") else 0.0
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import pkgutil
 import shlex
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -82,14 +81,15 @@ def _arguments(parser: argparse.ArgumentParser) -> Iterator[_Argument]:
 
 def _values(action: argparse.Action) -> tuple[str, ...] | None:
     """Words that an argument takes, where they are known."""
-    from nonsmooth import models, studies
+    from nonsmooth import models
+    from nonsmooth.studies import installed
 
     if action.choices is not None:
         return tuple(map(str, action.choices))
     if action.metavar == "MODEL" or action.dest == "model":
         return models.names()
     if action.metavar == "STUDY":
-        return tuple(sorted(item.name for item in pkgutil.iter_modules(studies.__path__) if item.ispkg))
+        return tuple(sorted(installed()))
     return None
 
 

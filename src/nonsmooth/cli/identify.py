@@ -58,17 +58,17 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from nonsmooth.studies.savi2007.identification.chain import identify
-    from nonsmooth.studies.savi2007.identification.statements import require
+    from nonsmooth.studies import study as package
 
+    rig = package("savi2007", "identification")
     study = _read(options.study)
-    found = identify(
+    found = rig.identify(
         study.session,
         study.model,
         apparatus=study.apparatus,
         crank_length=study.crank_length if options.crank is None else options.crank,
     )
-    require(found, study.parameters)
+    rig.require(found, study.parameters)
     print(found)
     if not options.quiet:
         for finding in found.findings:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import importlib
-import pkgutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -49,17 +47,14 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from nonsmooth import studies
-    from nonsmooth.system.names import unknown
+    from nonsmooth.studies import installed, study
 
-    known = sorted(module.name for module in pkgutil.iter_modules(studies.__path__) if module.ispkg)
-    if options.study not in known:
-        raise ValueError(unknown(options.study, "a study", "this package", known))
     out = options.out or Path("out") / (options.study + "_quick" * options.quick)
-    if not options.quiet and sys.stderr.isatty():  # what follows loads the numerics: that takes a second or more
+    asked = {"figures": options.figure, "quick": options.quick, "full": options.full, "progress": not options.quiet}
+    # what follows loads the numerics: that takes a second or more
+    if options.study in installed() and not options.quiet and sys.stderr.isatty():
         print(f"reproducing {options.study} into {out}", file=sys.stderr, flush=True)
     without_screen()
-    study = importlib.import_module(f"nonsmooth.studies.{options.study}")
-    study.reproduce(out=out, figures=options.figure, quick=options.quick, full=options.full, progress=not options.quiet)
+    study(options.study).reproduce(out=out, **asked)
     print(f"written to {out}", file=sys.stderr)
     return 0

@@ -43,18 +43,17 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from nonsmooth.studies.savi2007.rig import VirtualRig
-    from nonsmooth.studies.savi2007.rig.notebook import truth_path
+    from nonsmooth.studies import study
 
+    rig = study("savi2007", "rig")
     if options.figure is not None and options.procedures:
         raise ValueError("give --figure or --procedures, not both: a figure says itself what is to be recorded")
     if options.figure is None:
-        folder = VirtualRig(options.seed).write_session(options.out, options.procedures, truth=options.truth)
+        folder = rig.VirtualRig(options.seed).write_session(options.out, options.procedures, truth=options.truth)
     else:
-        rig = VirtualRig.published(options.seed)
-        folder = rig.write_figure(options.figure, options.out, truth=options.truth)
+        folder = rig.VirtualRig.published(options.seed).write_figure(options.figure, options.out, truth=options.truth)
     if not options.quiet:
         for file in sorted(path.name for path in folder.iterdir() if path.is_file()):
             print(f"written to {folder / file}")
-        print(f"the truth, not to be shown to who identifies: {truth_path(folder, options.truth)}")
+        print(f"the truth, not to be shown to who identifies: {rig.truth_path(folder, options.truth)}")
     return 0

@@ -11,8 +11,6 @@ from nonsmooth.system.names import unknown
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["FORCE", "actuated"]
-
 FORCE = "control_force"
 
 

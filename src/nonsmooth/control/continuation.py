@@ -27,8 +27,6 @@ from nonsmooth.system.kinds import Range, above, at_least
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["control_based_continuation"]
-
 PER_HARMONIC = 2.5  # samples
 MOST_HARMONICS = 20
 

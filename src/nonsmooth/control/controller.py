@@ -18,8 +18,6 @@ import numpy as np
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.control.rig import Rig
 
-__all__ = ["Controller", "Samples"]
-
 
 class Samples(NamedTuple):
     """Samples of a run: phase of the drive (turns), position, and the force that was applied."""

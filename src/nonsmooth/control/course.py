@@ -8,8 +8,6 @@ from nonsmooth.control.held import Held
 from nonsmooth.control.outcome import Names
 from nonsmooth.system.names import unknown
 
-__all__ = ["Course", "course_of"]
-
 
 @dataclass(frozen=True)
 class Course:

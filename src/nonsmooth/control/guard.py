@@ -10,8 +10,6 @@ from typing import Any
 from nonsmooth.control.rig import Rig
 from nonsmooth.errors import SolveError, shortened
 
-__all__ = ["Guard"]
-
 ATTEMPTS = 3  # to set the force to zero, where the rig answers with an exception
 
 

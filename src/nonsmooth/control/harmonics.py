@@ -8,8 +8,6 @@ import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 
-__all__ = ["Series", "fitted", "mean_square", "values_at"]
-
 SEEN = 4.0  # standard uncertainties
 
 

@@ -12,8 +12,6 @@ from nonsmooth.control.guard import Guard
 from nonsmooth.control.harmonics import Series, fitted, mean_square
 from nonsmooth.control.holding import Holding
 
-__all__ = ["Held", "Holder"]
-
 REPEATS = 0.01  # scatter of the first harmonic over its size: beyond it a motion is not of the drive's period
 FORCE = 3.0  # the greatest where none is given, over that which answers to a displacement of the motion's size
 

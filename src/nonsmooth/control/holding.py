@@ -9,8 +9,6 @@ from typing import Annotated, Any
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import Range, above, at_least, real_number
 
-__all__ = ["Holding"]
-
 
 @checked
 @dataclass(frozen=True, kw_only=True)

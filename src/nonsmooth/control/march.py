@@ -19,8 +19,6 @@ from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.control.held import Held, Holder
 from nonsmooth.errors import SolveError
 
-__all__ = ["March", "Point"]
-
 PROBE = 0.02  # displacement of a reference for a derivative, over the size of the motion
 LONGEST = 0.1  # correction of the first point in one go
 SEEN = 1e-3  # the least displacement that says something about derivatives, over the size of the motion

@@ -12,11 +12,10 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.control.harmonics import values_at
 from nonsmooth.control.march import March, Point
 from nonsmooth.control.release import STABLE, UNKNOWN, UNSTABLE
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["Names", "branch_dataset"]
 
 TURN = np.linspace(0.0, 1.0, 2048, endpoint=False)
 SIGNIFICANT = 4.0  # standard uncertainties
@@ -76,9 +75,9 @@ def branch_dataset(
         return "point", np.asarray(values), {"long_name": words, "units": units, **more}
 
     variables: dict[str, Any] = {
-        "section": (("point", "state"), section, {"long_name": "state at phase 0 of the drive"}),
-        "maximum": (("point", "state"), maximum, {"long_name": "largest value along the orbit"}),
-        "minimum": (("point", "state"), minimum, {"long_name": "smallest value along the orbit"}),
+        "section": labelled(("point", "state"), section, "state at phase 0 of the drive"),
+        "maximum": labelled(("point", "state"), maximum, "largest value along the orbit"),
+        "minimum": labelled(("point", "state"), minimum, "smallest value along the orbit"),
         "amplitude": over(size, "half the peak-to-peak value", unit),
         "amplitude_uncertainty": over(uncertainty, "standard uncertainty of the amplitude at this parameter", unit),
         "parameter_uncertainty": over(
@@ -86,34 +85,47 @@ def branch_dataset(
         ),
         "period": over(2 * np.pi / omega, "period of the drive", "s"),
         "stability": over(
-            kind, "motion that was let go: came back, left, or not known", **flag_attributes(
-                ["not_known", "unstable", "stable"], [UNKNOWN, UNSTABLE, STABLE])),
+            kind,
+            "motion that was let go: came back, left, or not known",
+            **flag_attributes(["not_known", "unstable", "stable"], [UNKNOWN, UNSTABLE, STABLE]),
+        ),
         "growth": over([one[1] for one in released], "mean factor by which the distance changed per turn when let go"),
         "control_effort": over([p.held.effort for p in points], "rms of the control force that repeats", force),
         "control_effort_noise": over([p.held.effort_noise for p in points], "the same of noise alone", force),
         "control_effort_first": over([p.first_effort for p in points], "the same before the first correction", force),
         "control_rms": over([p.held.force_rms for p in points], "rms of the whole control force", force),
         "measurements": over([p.measurements for p in points], "measurements until the control force vanished"),
-        "position_cosine": (("point", "harmonic"), np.array([p.held.position.c.real for p in points]), {
-            "long_name": "cosine coefficients of the motion", "units": unit}),
-        "position_sine": (("point", "harmonic"), np.array([-p.held.position.c.imag for p in points]), {
-            "long_name": "sine coefficients of the motion", "units": unit}),
-        "special_kind": ("special", strings(["fold"] * len(folds)), {"long_name": "kind of the special point"}),
-        "special_point": ("special", np.array([one[2] for one in folds], dtype=np.int64), {
-            "long_name": "nearest of the points"}),
-        "special_value": ("special", np.array([one[0] for one in folds]), {
-            "long_name": f"{parameter} at the special point", "units": names.unit(parameter)}),
-        "special_value_uncertainty": ("special", np.array([one[1] for one in folds]), {
-            "long_name": "its standard uncertainty", "units": names.unit(parameter)}),
-        "turns": ((), np.int64(march.holder.turns), {"long_name": "turns of the drive in all"}),
-        "ended_because": ((), ENDINGS.get(ending, ending), {"long_name": "how the branch ends"}),
-    }  # fmt: skip
+        "position_cosine": labelled(
+            ("point", "harmonic"),
+            np.array([p.held.position.c.real for p in points]),
+            "cosine coefficients of the motion",
+            unit,
+        ),
+        "position_sine": labelled(
+            ("point", "harmonic"),
+            np.array([-p.held.position.c.imag for p in points]),
+            "sine coefficients of the motion",
+            unit,
+        ),
+        "special_kind": labelled("special", strings(["fold"] * len(folds)), "kind of the special point"),
+        "special_point": labelled(
+            "special", np.array([one[2] for one in folds], dtype=np.int64), "nearest of the points"
+        ),
+        "special_value": labelled(
+            "special", np.array([one[0] for one in folds]), f"{parameter} at the special point", names.unit(parameter)
+        ),
+        "special_value_uncertainty": labelled(
+            "special", np.array([one[1] for one in folds]), "its standard uncertainty", names.unit(parameter)
+        ),
+        "turns": labelled((), np.int64(march.holder.turns), "turns of the drive in all"),
+        "ended_because": labelled((), ENDINGS.get(ending, ending), "how the branch ends"),
+    }
     coords: dict[str, Any] = {
         parameter: over(along, parameter, names.unit(parameter)),
-        other: ((), float(np.mean(fixed)), {"long_name": other, "units": names.unit(other)}),
-        "state": ("state", strings([names.position, names.velocity]), {"long_name": "state"}),
-        "state_unit": ("state", strings([unit, names.unit(names.velocity)]), {"long_name": "unit"}),
-        "harmonic": ("harmonic", np.arange(march.holder.harmonics + 1), {"long_name": "harmonic of the drive"}),
+        other: labelled((), float(np.mean(fixed)), other, names.unit(other)),
+        "state": labelled("state", strings([names.position, names.velocity]), "state"),
+        "state_unit": labelled("state", strings([unit, names.unit(names.velocity)]), "unit"),
+        "harmonic": labelled("harmonic", np.arange(march.holder.harmonics + 1), "harmonic of the drive"),
     }
     return xr.Dataset(variables, coords, attrs)
 

@@ -7,8 +7,6 @@ import numpy as np
 from nonsmooth.control.harmonics import fitted
 from nonsmooth.control.held import Held, Holder
 
-__all__ = ["STABLE", "UNKNOWN", "UNSTABLE", "release"]
-
 STABLE, UNSTABLE, UNKNOWN = 1, 0, -1
 PUSH, LARGEST = 0.01, 0.05  # of the motion's first harmonic
 SEEN = 6.0  # times the noise of one turn: the least displacement

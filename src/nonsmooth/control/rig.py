@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Protocol
 
-__all__ = ["Rig"]
-
 
 class Rig(Protocol):
     """An experiment that can be driven, pushed and read.

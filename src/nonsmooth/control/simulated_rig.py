@@ -16,8 +16,6 @@ from nonsmooth.system.names import unknown
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["SimulatedRig"]
-
 _NO_SAMPLES = np.empty(0)
 
 

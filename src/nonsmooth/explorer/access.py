@@ -15,8 +15,6 @@ from bokeh.server.auth_provider import AuthProvider
 from tornado.web import HTTPError
 from tornado.websocket import WebSocketHandler
 
-__all__ = ["Access"]
-
 _LEADING = '<!DOCTYPE html><meta http-equiv="refresh" content="0; url={0}"><a href="{0}">nonsmooth explorer</a>'
 
 

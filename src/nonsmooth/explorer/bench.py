@@ -28,8 +28,6 @@ from nonsmooth.explorer.worker import Answer, Worker
 if TYPE_CHECKING:
     from nonsmooth.explorer.session import Session
 
-__all__ = ["Bench"]
-
 
 class Bench:
     """The recording of a page. Reading and fitting run in a process of their own, so that the views go on."""

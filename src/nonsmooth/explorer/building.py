@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from nonsmooth.explorer.session import Session
     from nonsmooth.system.system import System
 
-__all__ = ["KINDS", "LINK", "Plan", "Workshop", "read_plan"]
-
 _MOST = 4  # masses, and elements
 _KEPT = 50  # models that a page may have made
 

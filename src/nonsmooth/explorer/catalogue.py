@@ -4,58 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from nonsmooth import models
 from nonsmooth.explorer.kinds import USUAL
 from nonsmooth.explorer.state import State, from_query
-from nonsmooth.studies.savi2007 import printed
+from nonsmooth.studies import installed, study
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["GIVEN", "PAPER", "Catalogue", "first_state", "presets_of", "slider_range"]
-
 PAPER = "discontinuous_support"
 GIVEN = "given"  # the name of a model of one's own
-_GAP = {**printed.FIGURE_13, "over": "g", "low": -0.0015, "high": 0.002, "shown": "v"}
-_AMPLITUDE = {**printed.FIGURE_11, "over": "rho", "low": 0.2, "high": 0.5, "shown": "v"}
-_FREQUENCY = {**printed.FIGURE_17, "over": "omega", "low": 8.4, "high": 10.4, "shown": "v"}
-#: Figures of the paper: parameters and fields of the state.
-_FIGURES: Mapping[str, Mapping[str, Any]] = {
-    "Fig. 9": {
-        **printed.FIGURE_9, "omega": 4.8, "over": "omega", "low": 3.0, "high": 7.0, "shown": "x",
-    },
-    "Fig. 10": {
-        **printed.FIGURE_10, "omega": 4.5, "over": "omega", "low": 2.4, "high": 7.4, "shown": "x",
-    },
-    "Fig. 11": {**_AMPLITUDE, "rho": 0.45},
-    **{f"Fig. 12 {'abcd'[i]}": {**_AMPLITUDE, "rho": rho} for i, rho in enumerate(printed.FIGURE_12)},
-    "Fig. 13": {**_GAP, "g": 0.0009},
-    **{f"Fig. 14 {'abcd'[i]}": {**_GAP, "g": g} for i, g in enumerate(printed.FIGURE_14)},
-    "Fig. 15": {**_GAP, "g": 0.0018},
-    "Fig. 17": {**_FREQUENCY, "omega": 9.55},
-    **{f"Fig. 18 {'abc'[i]}": {**_FREQUENCY, "omega": omega} for i, omega in enumerate(printed.FIGURE_18)},
-}  # fmt: skip
 
 
 def presets_of(state: State) -> dict[str, State]:
-    """Named states of a model: the figures of the paper for its oscillator."""
-    if state.model != PAPER:
+    """Named views of a model, by the studies that are installed: the figures of the paper for its oscillator."""
+    views = {name: view for one in installed() for name, view in study(one, "views").VIEWS.get(state.model, {}).items()}
+    if not views:
         return {}
-    base = first_of_paper(state)
+    base = first_state(state.model, getattr(models, state.model)())  # whatever the page shows now
     found = {}
-    for name, given in _FIGURES.items():
+    for name, given in views.items():
         values = {key: value for key, value in given.items() if key in base.values}
         rest = {key: value for key, value in given.items() if key not in base.values}
         found[name] = replace(base, values={**base.values, **values}, **rest)
     return found
-
-
-def first_of_paper(state: State) -> State:
-    """The paper's oscillator at Table 1, whatever the page shows now."""
-    from nonsmooth import models
-
-    return first_state(PAPER, models.discontinuous_support())
 
 
 def first_state(model: str, system: System) -> State:
@@ -107,8 +81,6 @@ class Catalogue:
     @classmethod
     def of(cls, system: System | None) -> Catalogue:
         """The models of the package, behind a system of one's own where one is given."""
-        from nonsmooth import models
-
         found: dict[str, Callable[[], System]] = {name: getattr(models, name) for name in models.names()}
         return cls(found if system is None else {GIVEN: lambda: system, **found})
 
@@ -147,5 +119,5 @@ class Catalogue:
         name = next((value for key, value in pairs if key == "model"), default)
         state = self.first_state(name)
         if name == PAPER and not pairs:
-            state = presets_of(state)["Fig. 11"]
+            state = presets_of(state).get("Fig. 11", state)
         return from_query(pairs, state, list(self.system(name).states))

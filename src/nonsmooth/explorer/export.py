@@ -18,8 +18,6 @@ import nonsmooth as ns
 from nonsmooth.explorer.kinds import KINDS as VIEWS
 from nonsmooth.results.provenance import read_provenance
 
-__all__ = ["KINDS", "as_toml", "exported"]
-
 #: Kinds of files.
 KINDS = {
     "pdf": "PDF", "png": "PNG", "svg": "SVG", "nc": "NetCDF", "py": "Python script", "toml": "study file",

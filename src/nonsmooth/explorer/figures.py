@@ -13,8 +13,6 @@ from bokeh.themes import Theme
 from nonsmooth.explorer.labels import axis_label, power_of
 from nonsmooth.plot.style import COLORS
 
-__all__ = ["BLUE", "GREY", "INK", "MOST", "Panel", "extent", "theme"]
-
 MOST = 64  # section points that are told apart one by one
 #: Colours on a light, and on a dark ground.
 BLUE, GREY, INK = (COLORS["first"], COLORS["pale"]), ("#4A4A4A", "#D0D0D0"), ("#1B1F24", "#E8E8E8")

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from nonsmooth.explorer.state import State
     from nonsmooth.system.system import System
 
-__all__ = ["KINDS", "ORDER", "PANELS", "QUICK", "SETTINGS", "USUAL", "Kind", "Setting", "setting"]
-
 #: What is varied first, where a model has it.
 USUAL = ("rho", "omega", "A", "g", "alpha", "mu", "r", "q", "v_b", "V_in", "gamma")
 

@@ -13,8 +13,6 @@ from nonsmooth.system.parameter import latex_name
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["PREFIXES", "axis_label", "html_of", "number", "plain_of", "power_of", "symbols_of"]
-
 
 def symbols_of(system: System) -> dict[str, str]:
     """LaTeX of every parameter and state, by name."""

@@ -21,8 +21,6 @@ from nonsmooth.recordings.reading import Options
 if TYPE_CHECKING:
     from nonsmooth.explorer.work import Job
 
-__all__ = ["fitted", "laid_over", "read", "strand_distance"]
-
 FloatArray = NDArray[np.float64]
 _GRID = 64  # phases per forcing period at which motions are compared
 _STRANDS = 60  # forcing periods of a record, and of a motion without a period, that are compared

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["opened_result", "opened_study"]
-
 
 def opened_study(system: System, options: Mapping[str, Any], output: Mapping[str, str]) -> tuple[System | None, str]:
     """The system of a study and the query of its view; no system where it is one of ``nonsmooth.models``."""

@@ -6,8 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-__all__ = ["Layer", "drawn"]
-
 #: A cloud: points (columns, n), a colour "#RRGGBB", and the height of a dot in pixels.
 Layer = tuple[NDArray[np.float64], str, int]
 _ALPHA = np.array([0, 150, 205, 255], dtype=np.uint32)  # of 0, 1, 2 and more points in a pixel

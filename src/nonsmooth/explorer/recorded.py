@@ -16,20 +16,6 @@ from nonsmooth.explorer.state import number_of
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = [
-    "LARGEST",
-    "Channel",
-    "Recorded",
-    "Samples",
-    "Setup",
-    "forcing_period",
-    "frequency_of",
-    "matched",
-    "response_points",
-    "samples_of",
-    "unlike",
-]
-
 FloatArray = NDArray[np.float64]
 LARGEST = 64 << 20  # bytes of a file that the page takes
 _MOST = 6000  # samples that are drawn and compared

@@ -14,8 +14,6 @@ from nonsmooth.explorer.worker import Answer, Worker
 if TYPE_CHECKING:
     from nonsmooth.explorer.session import Session
 
-__all__ = ["Asked", "Schedule", "key_of"]
-
 _PATIENCE = 1.0  # seconds after which short work is cancelled like any other
 _DEAF = 10.0  # seconds in which cancelled work must end by itself
 _VAIN = 3  # times in a row that the worker ended before it could take work; then it is not started again

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from nonsmooth.explorer.session import Session
     from nonsmooth.system.system import System
 
-__all__ = ["PORT", "explore"]
-
 PORT = 5180
 
 

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from nonsmooth.explorer.views.view import View
     from nonsmooth.system.system import System
 
-__all__ = ["Session"]
-
 #: To the browser, each one line of JSON; what comes from it is ``act``.
 CHANNELS = ("ui", "readout", "busy", "notes", "file", "recording", "building", "sketch", "equations")
 MOST_TABS = 8  # that compute at a time

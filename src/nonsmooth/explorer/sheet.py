@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from nonsmooth.explorer.schedule import Asked
     from nonsmooth.explorer.session import Session
 
-__all__ = ["Sheet"]
-
 #: Drawing of each of ``KINDS``; what draws into another's figure comes behind it.
 _VIEWS = (
     Portrait, Diagram, Section, Readout, History, Branches, Response, Chart, Basins, Spectrum, Mechanism, Recording,

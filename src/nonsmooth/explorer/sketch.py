@@ -16,8 +16,6 @@ from nonsmooth.plot.mechanism import sketch_of_run
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["equations_of", "moving"]
-
 _LONGEST = 12  # of the equations' modes that are shown
 
 

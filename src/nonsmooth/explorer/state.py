@@ -11,8 +11,6 @@ from urllib.parse import parse_qsl, urlencode
 
 from nonsmooth.explorer.kinds import PANELS, SETTINGS
 
-__all__ = ["CHOICES", "History", "State", "from_query", "to_query", "within"]
-
 #: Fields that hold one of these words, with what a person reads for it.
 CHOICES: dict[str, dict[str, str]] = {
     "direction": {

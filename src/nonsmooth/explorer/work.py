@@ -14,8 +14,6 @@ import nonsmooth as ns
 from nonsmooth.explorer.measured import fitted, laid_over, read
 from nonsmooth.explorer.sketch import moving
 
-__all__ = ["Heard", "Job", "compute", "periods_shown"]
-
 #: Hears the fraction done and says whether the work is still wanted.
 Heard = Callable[[float], bool]
 

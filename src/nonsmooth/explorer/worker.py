@@ -23,8 +23,6 @@ from typing import Any
 
 from nonsmooth.kernels.compile.forking import is_importing
 
-__all__ = ["Answer", "Worker"]
-
 _OFTEN = 0.15  # seconds between two words on progress
 _SILENT = 1.0  # seconds in which cancelled work must end before it is interrupted
 

@@ -44,6 +44,7 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
     """
     from sympy import Float
 
+    from nonsmooth.system.derived.sliding import slide
     from nonsmooth.system.names import unknown
     from nonsmooth.system.symbolic.scalar import Scalar
     from nonsmooth.system.symbolic.tracing import call_scalar, refuse_corners
@@ -88,7 +89,7 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
     )
     if traced.decider is not None:
         moved = traced.decider.with_changes(moved, changes)
-    return system.with_sliding(moved)
+    return slide(moved, system.surfaces, system.scale) if system.surfaces else moved
 
 
 def values_along(

@@ -31,14 +31,12 @@ from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.nonlinear_mode import NonlinearMode, interpolation
 from nonsmooth.identification.response_fit import FEWEST_CURVES, ResponseFit
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from nonsmooth.recordings.recording import Recording
-
-__all__ = ["ResponseCurve", "amplitude_dependent", "response_curves"]
-
 
 _POWERS = {"m": 0, "m/s": 1, "m/s^2": 2, "m/s²": 2}
 _METHOD = "forced responses fitted along their curves by one mode with amplitude-dependent frequency and damping"
@@ -177,15 +175,15 @@ def _data(
         "frequency": ("point", fit.omega / (2 * np.pi), {"units": "Hz"}),
         "response": ("point", np.abs(fit.measured), {"units": "m"}),
         "modal_amplitude": ("point", fit.amplitude, {"units": "m"}),
-        "curve": ("point", fit.curve), "slope": ("point", slope, {"long_name": "d ln F / d ln a"}),
+        "curve": ("point", fit.curve), "slope": labelled("point", slope, "d ln F / d ln a"),
         "unstable": ("point", slope < 0),
-        "f_n": ("amplitude", f, {"long_name": "natural frequency", "units": "Hz"}),
+        "f_n": labelled("amplitude", f, "natural frequency", "Hz"),
         "f_n_error": ("amplitude", f_error, {"units": "Hz"}),
-        "zeta": ("amplitude", zeta, {"long_name": "damping ratio"}), "zeta_error": ("amplitude", zeta_error),
+        "zeta": labelled("amplitude", zeta, "damping ratio"), "zeta_error": ("amplitude", zeta_error),
         "curve_f_n": ("curves", own[0], {"units": "Hz"}), "curve_zeta": ("curves", own[1]),
         "curve_amplitude": ("curves", own[2], {"units": "m"}),
     }  # fmt: skip
-    coords = {"amplitude": ("amplitude", grid, {"long_name": "amplitude of the mode", "units": "m"}),
+    coords = {"amplitude": labelled("amplitude", grid, "amplitude of the mode", "m"),
               "curves": ("curves", list(fit.names))}  # fmt: skip
     return xr.Dataset(rows, coords, {"scatter": fit.sigma})
 

@@ -20,8 +20,6 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.uncertainty import newey_west, not_below
 
-__all__ = ["Fittable", "Sandwich", "State", "Unsettled", "inverted", "reduced", "sandwich", "settle"]
-
 _LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction counts as determined
 _SETTLED = 1e-3  # of a standard uncertainty
 _RIDGE = 1e-13  # of a start's column: what keeps a start that is known or not seen from being divided by

@@ -7,8 +7,6 @@ from contextlib import contextmanager
 from threading import Lock
 from typing import Any
 
-__all__ = ["one_blas_thread"]
-
 _lock = Lock()
 _inside = 0
 _limits: Any = None

@@ -14,8 +14,6 @@ from nonsmooth.results.representation import cut, html_table
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Estimate", "Finding"]
-
 
 @dataclass(frozen=True)
 class Estimate:

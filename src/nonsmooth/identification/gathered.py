@@ -10,13 +10,12 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.draws import drawn_variables
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from nonsmooth.system.system import System
-
-__all__ = ["Gathered", "matched"]
 
 #: Dims over which results list what they found, however much it was: the value of each and what its rows share.
 LISTS = {"jump": ("jump_value", ("jump_variable", "jump_direction")), "special": (None, ("special_kind", "kind"))}
@@ -93,15 +92,16 @@ class Gathered:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RuntimeWarning)  # no draw has this point
                 mean = np.nanmean(np.asarray(stack, float), axis=0)
-            return {f"{name}_probability": (array.dims, mean, {"long_name": f"share of draws: {name}"})}
+            return {f"{name}_probability": labelled(array.dims, mean, f"share of draws: {name}")}
         if name == "period_number":
             numbers = np.unique(np.append(stack, array.values))
             shares = np.stack([np.mean(stack == number, axis=0) for number in numbers])
             return {
-                "period_number_probability": (("period_value", *array.dims), shares, {
-                    "long_name": "share of draws with this period number (0: none found)"}),
-                "period_value": ("period_value", numbers, {"long_name": "period number"}),
-            }  # fmt: skip
+                "period_number_probability": labelled(
+                    ("period_value", *array.dims), shares, "share of draws with this period number (0: none found)"
+                ),
+                "period_value": labelled("period_value", numbers, "period number"),
+            }
         if array.dtype.kind != "f":
             return {}
         return self._numbers(name, stack, edges)
@@ -115,7 +115,7 @@ class Gathered:
         found: dict[str, Any] = {f"{name}_quantiles": (("quantile", *array.dims), bands, attrs)}
         share = np.isfinite(stack).sum(axis=0) / len(self.rows)
         if (share < 1).any():
-            found[f"{name}_share"] = (array.dims, share, {"long_name": f"share of draws that have {name} here"})
+            found[f"{name}_share"] = labelled(array.dims, share, f"share of draws that have {name} here")
         return found
 
 

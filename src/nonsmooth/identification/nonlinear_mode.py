@@ -36,8 +36,6 @@ from nonsmooth.arrays import ComplexArray, FloatArray
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["NonlinearMode", "interpolation"]
-
 
 @dataclass(frozen=True, eq=False)
 class NonlinearMode:

@@ -8,8 +8,6 @@ from nonsmooth.flow.options import Solver
 from nonsmooth.results.progress import Progress
 from nonsmooth.system.kinds import Default, at_least
 
-__all__ = ["Fitting", "Known", "Prediction", "Recorded"]
-
 
 class Known(TypedDict, total=False):
     """Knowledge from before a recording.

@@ -17,8 +17,6 @@ from nonsmooth.results.representation import cut, html_table, text_table
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ParameterSet"]
-
 
 class ParameterSet(Mapping[str, float]):
     """Parameters by name, with what is known of how well: ``system.with_parameters(parameter_set)``.

@@ -15,14 +15,13 @@ from nonsmooth.errors import Interrupted, SolveError, shortened
 from nonsmooth.flow.arguments import real_number, whole_number, yes_or_no
 from nonsmooth.identification.compare.draws import Setting, draw_systems, nominal, read_settings
 from nonsmooth.identification.gathered import Gathered, matched
+from nonsmooth.results.labels import labelled
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as watched
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["propagate", "to_first_order"]
 
 COARSE = 0.02  # the largest step of draws' branches: values between points lie on a cubic
 
@@ -122,24 +121,13 @@ def propagate(
     """
     count, many = whole_number(draws, "draws", 0), whole_number(seed, "seed", 0)
     linear = yes_or_no(first_order, "first_order")
-    system = start.system if isinstance(start, Orbit) else start
-    if not isinstance(system, System):
-        raise TypeError(
-            f"propagate takes a System or an Orbit as the verb's first argument, not {type(start).__name__}; for "
-            "anything else give a function of a System: lambda s: ns.continue_orbit(ns.find_orbit(s), 'omega', (3, 5))"
-        )
-    if not callable(verb):
-        raise TypeError(f"verb = {shortened(verb)}: a function such as ns.sweep")
-    edges = [real_number(q, "quantiles") for q in quantiles]
-    if not edges or sorted(set(edges)) != edges or not 0 < edges[0] <= edges[-1] < 1:
-        raise ValueError(f"quantiles = {shortened(quantiles)}: probabilities that rise, between 0 and 1")
+    call, edges = _Call(verb, start, args, options), _probabilities(quantiles)
     if count < 2 and not linear:
         raise ValueError(f"draws = {count}: a band takes two and more, and some 200 to show its edges")
-    known = read_settings(settings, system)
-    call = _Call(verb, start, args, options)
-    base = nominal(system, found, known)
+    known = read_settings(settings, call.system)
+    base = nominal(call.system, found, known)
     centre = call(base, coarse=False)
-    systems, drawn = draw_systems(system, found, known, count, many, bounds)
+    systems, drawn = draw_systems(call.system, found, known, count, many, bounds)
     gathered = Gathered(centre)
     linear_part = to_first_order(centre, found, known, base, call) if linear else {}
     try:
@@ -158,10 +146,26 @@ def propagate(
     return gathered.banded(edges, linear_part, drawn, base, many)
 
 
+def _probabilities(quantiles: Sequence[float]) -> list[float]:
+    edges = [real_number(q, "quantiles") for q in quantiles]
+    if not edges or sorted(set(edges)) != edges or not 0 < edges[0] <= edges[-1] < 1:
+        raise ValueError(f"quantiles = {shortened(quantiles)}: probabilities that rise, between 0 and 1")
+    return edges
+
+
 class _Call:
     """The verb with its arguments, for one system after another."""
 
     def __init__(self, verb: Callable[..., Any], start: Any, args: tuple[Any, ...], options: dict[str, Any]) -> None:
+        self.system = start.system if isinstance(start, Orbit) else start
+        if not isinstance(self.system, System):
+            raise TypeError(
+                f"propagate takes a System or an Orbit as the verb's first argument, not {type(start).__name__}; for "
+                "anything else give a function of a System: "
+                "lambda s: ns.continue_orbit(ns.find_orbit(s), 'omega', (3, 5))"
+            )
+        if not callable(verb):
+            raise TypeError(f"verb = {shortened(verb)}: a function such as ns.sweep")
         self.verb, self.start, self.args, self.options = verb, start, args, dict(options)
         try:
             takes = set(inspect.signature(verb).parameters)
@@ -244,10 +248,11 @@ def to_first_order(
     unit = system.parameters[own].unit or "1"
     return {
         "source": ("source", [name for name, _ in sources]),
-        "special_slope": (("special", "source"), slope, {"long_name": f"derivative of {own} at a special point"}),
-        "special_first_order": ("special", np.sqrt(variance), {
-            "long_name": f"standard uncertainty of {own} to first order", "units": unit}),
-    }  # fmt: skip
+        "special_slope": labelled(("special", "source"), slope, f"derivative of {own} at a special point"),
+        "special_first_order": labelled(
+            "special", np.sqrt(variance), f"standard uncertainty of {own} to first order", unit
+        ),
+    }
 
 
 def _slope(row: xr.Dataset, name: str) -> float:

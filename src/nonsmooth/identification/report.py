@@ -5,8 +5,6 @@ from __future__ import annotations
 from nonsmooth.identification.finding import Estimate
 from nonsmooth.identification.parameter_set import ParameterSet
 
-__all__ = ["report"]
-
 
 def report(found: ParameterSet, title: str = "Identified parameters") -> str:
     """The set as Markdown.

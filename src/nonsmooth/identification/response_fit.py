@@ -19,8 +19,6 @@ from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.nonlinear_mode import NonlinearMode, interpolation
 
-__all__ = ["FEWEST_CURVES", "ResponseFit"]
-
 _ROUNDS = 40
 FEWEST_CURVES = 4  # curves: how far they differ cannot be told from fewer
 

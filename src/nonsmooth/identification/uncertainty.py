@@ -14,11 +14,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-
-__all__ = [
-    "correlated", "correlation_times", "coverage_factor", "factor_interval", "interval", "newey_west", "normal_draws",
-    "not_below", "uniform",
-]  # fmt: skip
+from nonsmooth.recordings.signals.spectrum import correlation_times
 
 
 def uniform(half_width: float) -> float:
@@ -91,26 +87,6 @@ def factor_interval(value: float, relative: float, level: float = 0.95) -> tuple
         raise ValueError(f"value = {value!r}: only a positive quantity can be known to a factor")
     factor = float(np.exp(coverage_factor(level) * relative))
     return value / factor, value * factor, factor
-
-
-def correlation_times(residuals: Any, *, longest: int | None = None) -> float:
-    r"""Number of samples that share one independent error: :math:`\tau = 1 + 2 \sum \rho_k`, at least 1.
-
-    The sum stops at the first lag that is not positive (Geyer's initial sequence, Statist. Sci. 7 (1992) 473).
-    """
-    r = np.asarray(residuals, dtype=np.float64)
-    r = r - r.mean()
-    n = len(r)
-    power = float(np.dot(r, r))
-    if n < 4 or power == 0:
-        return 1.0
-    size = 1 << (2 * n - 1).bit_length()
-    spectrum = np.fft.rfft(r, size)
-    rho = np.fft.irfft(np.abs(spectrum) ** 2, size)[:n] / power
-    last = min(n - 1, longest if longest is not None else n // 4)
-    below = np.flatnonzero(rho[1 : last + 1] <= 0)
-    end = int(below[0]) + 1 if len(below) else last + 1
-    return max(1.0, float(1.0 + 2.0 * rho[1:end].sum()))
 
 
 def normal_draws(mean: Any, covariance: FloatArray, n: int, seed: int, logarithmic: Any = False) -> FloatArray:

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from PIL import Image
 
-__all__ = ["Animation", "animate"]
-
 _COLORS = 48  # of a palette: lines and letters need few
 _TRAIL = 0.2  # of the run: the length of the bright end of an orbit
 

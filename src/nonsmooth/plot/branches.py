@@ -17,19 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-__all__ = [
-    "MARKS",
-    "branch",
-    "controlled_branch",
-    "curve",
-    "draw_branch",
-    "lines_of",
-    "manifolds",
-    "multipliers",
-    "ordinates_of",
-    "with_breaks",
-]
-
 #: Marker and words of each kind of special point.
 MARKS = {
     "fold": ("o", "fold"),

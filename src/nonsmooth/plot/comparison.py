@@ -16,31 +16,15 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = [
-    "ABOVE",
-    "MEASURED",
-    "THEORY",
-    "check_kind",
-    "comparison_diagram",
-    "comparison_distances",
-    "comparison_phase_portrait",
-    "comparison_response",
-    "comparison_section",
-    "comparison_time",
-    "measured_label",
-    "one_phase",
-    "shade_reach",
-]
-
 #: Theory is a blue line or cloud with a pale band, the experiment black points.
 THEORY = style.COLORS["first"]
 MEASURED = style.COLORS["section"]
 
 
-def measured_label(result: xr.Dataset | Any, word: str = "measured") -> str:
+def measured_label(result: xr.Dataset | Any) -> str:
     """The word for the measured side; it says ``synthetic`` where a virtual rig made the data."""
     attrs = getattr(result, "attrs", {})
-    return "virtual rig (synthetic)" if str(attrs.get("synthetic", "no")) in ("yes", "True", "1") else word
+    return "virtual rig (synthetic)" if str(attrs.get("synthetic", "no")) in ("yes", "True", "1") else "measured"
 
 
 def check_kind(result: xr.Dataset, *kinds: str) -> None:

@@ -14,8 +14,6 @@ from nonsmooth.system.names import unknown
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["figure"]
-
 _LINE = ("alpha", "color", "linestyle", "linewidth", "marker", "markersize", "rasterized", "zorder")
 _COMMON = {"title": None, "legend": True, "unit": None}
 _KEYWORD = inspect.Parameter.KEYWORD_ONLY

@@ -12,18 +12,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = [
-    "column",
-    "first_states",
-    "name_and_unit",
-    "name_axes",
-    "name_plane",
-    "only_states",
-    "symbol_of",
-    "variable_along",
-    "with_unit",
-]
-
 
 def name_and_unit(result: xr.Dataset, name: str) -> tuple[str, str]:
     """``("$\\rho$", "N")``: symbol and unit of a state, a parameter or an output, the unit being that of its values."""

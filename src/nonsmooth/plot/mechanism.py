@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["Sketch", "mechanism", "sketch_of_run"]
-
 _WIDTH, _ZONE, _FLOOR = 1.1, 1.75, 0.2  # of a mass, between two of them, below them
 _LANE = 0.44  # height that one link takes
 _GAP = 0.32  # of a contact in a sketch that is not to scale

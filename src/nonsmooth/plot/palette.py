@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["DIVERGED", "LONGER", "NO_PERIOD", "PERIODS", "UNKNOWN", "attractor_color"]
-
 #: Period numbers 1 ... 8, told apart by all common colour visions: light and dark alternate (after Paul Tol's schemes).
 PERIODS = ("#DDDDDD", "#4477AA", "#EE6677", "#228833", "#CCBB44", "#66CCEE", "#AA3377", "#EE8866")
 LONGER = "#8C6D31"

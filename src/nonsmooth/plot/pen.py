@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.plot.parts import Link
 
-__all__ = ["GREY", "PALE", "Part", "Pen", "put"]
-
 #: ``("line", x, y, color, width, fill)``, filled where a colour is given, or ``("text", x, y, words, color, size, ha,
 #: va)``.
 Part = tuple[Any, ...]

@@ -19,20 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = [
-    "basin_fractions",
-    "basins",
-    "cells",
-    "chart",
-    "classes_of",
-    "edges_of",
-    "held",
-    "legend_of",
-    "names_of",
-    "section_mark",
-    "told_apart",
-]
-
 
 def edges_of(values: np.ndarray) -> np.ndarray:
     """Edges (n + 1,) of the cells around rising values (n,): the middles between them. One value has a cell too."""

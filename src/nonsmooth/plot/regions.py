@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["regions"]
-
 _OUTSIDE, _INSIDE, _BANDS = "#FFFFFF", "#D6E6F2", ("#F7D9B8", "#CDE8DC", "#EED3E2")
 _LINES = ("second", "third", "fourth")
 _GRID = 401

@@ -21,8 +21,6 @@ from nonsmooth.system.parameter import latex_name
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["scheme_of"]
-
 _LONGEST = 18  # characters of a label that is drawn
 
 

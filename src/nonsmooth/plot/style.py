@@ -24,29 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
 
-__all__ = [
-    "ABOVE",
-    "COLORS",
-    "COLUMN",
-    "PAGE",
-    "apart",
-    "axes",
-    "clear_legend",
-    "cloud",
-    "even_dots",
-    "halo",
-    "journal",
-    "label",
-    "make_room",
-    "mark",
-    "once",
-    "points",
-    "save_figure",
-    "shade",
-    "slides",
-    "small",
-]
-
 #: Widths of one column (84 mm) and of the page (174 mm), in inches.
 COLUMN = 84 / 25.4
 PAGE = 174 / 25.4

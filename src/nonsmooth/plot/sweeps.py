@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["bifurcation", "bifurcation_diagram", "density", "frequency_response", "one_branch", "smoothing_report"]
-
 _LINES = ("section", "third", "fourth")
 _COLORS = {"up": "first", "down": "second", "none": "section"}
 _SEAM = 2.0  # a rising point over a falling one, which lies on it: both show

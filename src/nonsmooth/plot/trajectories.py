@@ -17,17 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = [
-    "amplitude_spectrum",
-    "orbit",
-    "phase_portrait",
-    "pieces_by_mode",
-    "section",
-    "shade_zone",
-    "time_history",
-    "with_gaps",
-]
-
 
 def with_gaps(result: xr.Dataset, *curves: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """The curves with NaN between the two limits of every crossing at which the state jumped."""

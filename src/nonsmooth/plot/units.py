@@ -18,8 +18,6 @@ from matplotlib.ticker import ScalarFormatter
 
 from nonsmooth.plot.labels import with_unit
 
-__all__ = ["PREFIXES", "in_unit", "name_axis", "power_for", "prefixed"]
-
 PREFIXES = {0: "", -3: "m", -6: "\N{MICRO SIGN}", -9: "n"}
 #: Units that take a prefix; the first one of a compound does: ``m``, ``m/s``, ``m s``, ``N/m``.
 _FIRST = re.compile(r"(m|s|N|V|A|Pa|W|J|rad)(?=$|[/ ])")

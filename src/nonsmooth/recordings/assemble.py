@@ -14,8 +14,6 @@ from nonsmooth.recordings.sampling import examine, missing_runs
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["assemble"]
-
 #: A sensor with fewer samples says next to nothing of a motion; below this a remark is made.
 SHORT = 32
 #: The photogate's channel: one row for each turn, so that few rows are no fault.

@@ -31,8 +31,6 @@ from nonsmooth.recordings.reading import (
 )
 from nonsmooth.recordings.recording import Recording, RecordingWarning
 
-__all__ = ["FORMATS", "content_of", "load_recording", "parse_recording"]
-
 #: Each format, and the module whose ``read`` reads it.
 FORMATS = {
     "capstone-csv": "capstone_csv",

@@ -22,12 +22,6 @@ from nonsmooth.errors import DataFileError, not_installed
 from nonsmooth.flow.arguments import real_number, whole_number
 from nonsmooth.system.names import check_keys
 
-__all__ = [
-    "MAX_COLUMNS", "MAX_DEPTH", "MAX_FILE_BYTES", "TIME_SCALES", "TIME_WORDS", "Archive", "Column", "Group",
-    "Options", "Reading", "Remarks", "Source", "TableOptions", "Trace", "inflation_limit", "is_axis_name",
-    "names_of", "needed", "scaled_time",
-]  # fmt: skip
-
 MAX_FILE_BYTES = 1 << 30  # read whole into memory, so that the hash is that of what was read
 MAX_COLUMNS = 4096  # over all runs of one file; each becomes a labelled array
 MAX_DEPTH = 32  # of nested containers

@@ -19,8 +19,6 @@ from nonsmooth.results.representation import cut, html_table
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Recording", "RecordingWarning"]
-
 
 class RecordingWarning(UserWarning):
     """Something in a recording that its user should know: it names the run and the channel."""

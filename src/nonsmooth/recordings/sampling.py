@@ -8,8 +8,6 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 
-__all__ = ["Sampling", "examine", "missing_runs"]
-
 _BLOCK = 16  # steps per block; means over a block see a change of rate through jitter and rounding of the times
 _CHANGE = 0.05  # of the rate, between blocks
 _GAP = 1.5  # steps; a longer one is a gap

@@ -23,11 +23,6 @@ from nonsmooth.recordings.reading import Options
 from nonsmooth.recordings.recording import Recording, RecordingWarning
 from nonsmooth.system.names import check_keys, unknown
 
-__all__ = [
-    "APPARATUS", "NOTEBOOK", "PROCEDURES", "SETTINGS", "Entry", "Quantity", "RecordedRun", "Session",
-    "apparatus_of", "entry_of", "load_session", "table_of",
-]  # fmt: skip
-
 NOTEBOOK = "session.toml"
 
 #: What may stand in ``[apparatus]``: unit and meaning.

@@ -27,23 +27,6 @@ from nonsmooth.results.schema import (
 )
 from nonsmooth.results.statuses import flag_attributes
 
-__all__ = [
-    "CURVE",
-    "EQUILIBRIUM",
-    "FOUND",
-    "KINDS",
-    "ORBIT",
-    "SPECIAL",
-    "SPECIAL_EQUILIBRIUM",
-    "SPECIAL_ORBIT",
-    "STEMS",
-    "Column",
-    "attributes",
-    "diagram",
-    "line",
-    "manifolds",
-]
-
 #: One orbit of a branch; builder, writer and reader go by these tables.
 ORBIT = table(
     ("section", "state", "", "state at the section"),

@@ -10,8 +10,6 @@ from typing import Any
 
 from nonsmooth.errors import DataFileError
 
-__all__ = ["of_netcdf", "of_zarr"]
-
 _DEFLATED = 1032  # bytes that a byte of deflated data stands for, at most
 _COMPRESSED = 65536  # the same for the codecs of Zarr, whose best blocks hold 128 KiB of equal bytes in a few
 _NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable."

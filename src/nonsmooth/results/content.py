@@ -21,8 +21,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-__all__ = ["bytes_as_written", "content", "digest", "seal", "sealed", "stamp", "trailer", "unstamp"]
-
 #: A stamped provenance begins with its hash; one from before hashes were written begins with the version.
 _STAMPED = re.compile(r'\{"sha256": "([0-9a-f]{64})", ')
 _UNSTAMPED = '{"version": '

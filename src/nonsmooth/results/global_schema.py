@@ -18,8 +18,6 @@ from numpy.typing import ArrayLike
 from nonsmooth.results.labels import Labels
 from nonsmooth.results.schema import columns, dataset, floats, quantity_attributes, table, varied
 
-__all__ = ["attractor_variables", "basin_fractions", "basins", "chart"]
-
 SHOWN = 4000  # section points kept of one attractor
 
 #: Of a chart behind its plane; without "start" where there was one.

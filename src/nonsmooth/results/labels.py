@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["Labels", "Quantity", "kind_of", "labels_of"]
-
 
 @dataclass(frozen=True)
 class Quantity:
@@ -77,3 +75,8 @@ def kind_of(period: int, chaotic: bool) -> str:
     if period > 0:
         return f"period {period}"
     return "chaos" if chaotic else "no period"
+
+
+def labelled(dims: Any, values: Any, words: str, unit: str | None = None) -> tuple[Any, Any, dict[str, str]]:
+    """A variable of a Dataset with its long name, and its unit where it has one."""
+    return dims, values, {"long_name": words} | ({} if unit is None else {"units": unit})

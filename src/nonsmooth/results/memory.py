@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-__all__ = ["free_memory", "room_for"]
-
 LIMITS = Path("/sys/fs/cgroup")  # of a container, on Linux
 FACTS = Path("/proc/meminfo")
 SMALL = 2**24  # bytes that are not asked for: to ask takes a tenth of a millisecond, as long as a short run

@@ -13,8 +13,6 @@ from typing import Any
 
 from nonsmooth.kernels import before_compiling
 
-__all__ = ["Progress", "is_watched", "progress", "say"]
-
 #: True: a bar where somebody watches; a function of the fraction done, which may return False to cancel.
 Progress = bool | Callable[[float], object]
 

@@ -34,11 +34,6 @@ from nonsmooth.results.labels import Labels
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "ATTRIBUTE", "COORDINATE", "LIMIT", "attribute", "options_as_data", "package_version", "provenance",
-    "read_provenance", "with_short_record",
-]  # fmt: skip
-
 ATTRIBUTE = "nonsmooth"
 COORDINATE = "provenance"
 LIMIT = 2000  # characters of the attribute

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-__all__ = ["cut", "html_table", "text_table"]
-
 LINES = 24  # of a representation
 WIDTH = 100  # of a line that can be broken; one that cannot is cut at twice that
 

@@ -33,31 +33,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from nonsmooth.results.labels import Labels, Quantity
+from nonsmooth.results.labels import Labels, Quantity, labelled
 from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.statuses import EQUILIBRIA, flag_attributes, status_attributes
-
-__all__ = [
-    "Column",
-    "attributes",
-    "chosen",
-    "columns",
-    "dataset",
-    "floats",
-    "parameter_coords",
-    "quantity_attributes",
-    "response",
-    "section_points",
-    "state_coords",
-    "strings",
-    "sweep",
-    "table",
-    "trajectory",
-    "typed",
-    "varied",
-    "with_impacts",
-    "with_unit",
-]
 
 
 class Column(NamedTuple):
@@ -133,11 +111,6 @@ def chosen(dim: str, words: Sequence[str], known: Sequence[str], long_name: str)
     """A variable of words, each one of those ``known``, as integers with their table."""
     codes = np.array([known.index(word) for word in words], dtype=np.int8)
     return dim, codes, {"long_name": long_name, **flag_attributes(known)}
-
-
-def with_unit(dims: Any, values: ArrayLike, words: str, unit: str) -> tuple[Any, NDArray[np.float64], dict[str, str]]:
-    """A variable whose long name and unit are known with it, such as a load of an element."""
-    return dims, floats(values), {"long_name": words, "units": unit}
 
 
 #: Coordinates that several results have.
@@ -251,7 +224,7 @@ def with_impacts(
     each, those of an element one after the other."""
     table = np.stack(columns, axis=2).reshape(run.sizes["crossing"], len(quantities))
     told = zip(quantities.items(), table.T, strict=True)
-    return run.assign({name: with_unit("crossing", values, *named) for (name, named), values in told})
+    return run.assign({name: labelled("crossing", floats(values), *named) for (name, named), values in told})
 
 
 def sweep(
@@ -282,9 +255,9 @@ def sweep(
         for name, stem in stems.items():
             if name in arrays:
                 told = f"{stem} of {output}", quantity.unit
-                variables[f"{output}_{stem}"] = with_unit(leading, arrays[name][..., i], *told)
-    for name, load in (loads or {}).items():  # a maximum of an output is there already
-        variables.setdefault(name, with_unit(leading, *load))
+                variables[f"{output}_{stem}"] = labelled(leading, floats(arrays[name][..., i]), *told)
+    for name, (load, words, unit) in (loads or {}).items():  # a maximum of an output is there already
+        variables.setdefault(name, labelled(leading, floats(load), words, unit))
     along: dict[str, Any] = {**varied(labels, parameter, values), "direction": [*directions]}
     if edges is not None:
         variables["bin_edge"] = (("state", "edge"), floats(edges), {"long_name": "edges of the bins, per state"})
@@ -305,9 +278,9 @@ def response(swept: xr.Dataset, *, amplitude: ArrayLike, jumps: Mapping[str, Arr
     parameter = str(maximum.dims[0])
     full = ("direction", "start", parameter, "state")
     dropped = tuple(i for i, dim in enumerate(full) if dim not in maximum.dims)
-    labelled = xr.DataArray(floats(amplitude).squeeze(dropped), dims=[dim for dim in full if dim in maximum.dims])
+    heights = xr.DataArray(floats(amplitude).squeeze(dropped), dims=[dim for dim in full if dim in maximum.dims])
     variables: dict[str, Any] = {
-        "amplitude": labelled.transpose(*maximum.dims).assign_attrs(long_name="half the peak-to-peak value")
+        "amplitude": heights.transpose(*maximum.dims).assign_attrs(long_name="half the peak-to-peak value")
     }
     for name, values in jumps.items():
         told = {"long_name": _JUMPS[name]} if name in _JUMPS else {}

@@ -7,8 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Segmented", "with_crossings"]
-
 
 class Segmented(NamedTuple):
     """``source[i]`` tells where row i comes from: k >= 0 the sample k; -1 a limit at a crossing."""

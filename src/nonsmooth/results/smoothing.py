@@ -13,9 +13,6 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.results.labels import Labels
 from nonsmooth.results.schema import Column, columns, dataset, table
 
-__all__ = ["report"]
-
-
 _ORBIT = table(
     ("section", "state", "", "state at phase 0, or in the middle of the first segment (autonomous)"),
     ("maximum", "state", "", "largest value along the orbit"),

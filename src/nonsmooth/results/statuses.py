@@ -13,18 +13,6 @@ from nonsmooth.kernels.hybrid import codes
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "EQUILIBRIA",
-    "STATUSES",
-    "Status",
-    "by_code",
-    "by_name",
-    "flag_attributes",
-    "in_words",
-    "status_attributes",
-    "words_of_flags",
-]
-
 
 @dataclass(frozen=True)
 class Status:

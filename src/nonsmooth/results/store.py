@@ -29,8 +29,6 @@ from nonsmooth.results.memory import room_for
 from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
 from nonsmooth.results.whole import beside, replace, told
 
-__all__ = ["check_place", "load", "needs_zarr", "save"]
-
 _EXPECTED = "expected a result written by nonsmooth.save (.nc or .zarr)"
 _ALTERED = (
     "its content is not what was written there: bytes were altered, by a fault or by another program; take a copy that "

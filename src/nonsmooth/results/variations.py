@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike
 from nonsmooth.results.labels import Labels
 from nonsmooth.results.schema import columns, dataset, table, varied
 
-__all__ = ["derivatives_of_run", "spectrum"]
-
 _SENSITIVITY = table(
     ("Phi", "state initial_state", "", "derivative of the end in the start"),
     ("P", "state parameter", "", "derivative of the end in the parameters"),

@@ -21,8 +21,6 @@ from typing import Any
 
 from nonsmooth.errors import DataFileError
 
-__all__ = ["beside", "clear", "replace", "told", "write_whole"]
-
 _OLD = "old"  # where a folder goes that is about to be replaced
 _WRITER = "writer.json"
 _DAY = 86400.0  # seconds after which a folder is left behind whose writer cannot be asked (another machine, a restart)

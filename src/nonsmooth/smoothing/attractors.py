@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from nonsmooth.flow.sections import Poincare, Stroboscopic
     from nonsmooth.system.system import System
 
-__all__ = ["Box", "Found", "attractors_of", "matched"]
-
 ALIKE = 0.1  # of the largest attractor: what extremes of counterparts may differ
 
 

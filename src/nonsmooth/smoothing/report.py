@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["smoothing_report"]
-
 
 @checked
 def smoothing_report(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -14,14 +14,14 @@ from nonsmooth.system.description import Description, describe
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.parameter import Parameter
+from nonsmooth.system.show import latex, page, table
+from nonsmooth.system.symbolic.derivatives import Derivatives
+from nonsmooth.system.symbolic.traced import Traced, TracedTransition
+from nonsmooth.system.symmetry import Symmetry
+from nonsmooth.system.text import read_system, write_system
 from nonsmooth.system.transition import Surface, Transition
 from nonsmooth.system.values import changed_values, no_attribute, parameter_rows, smoothed_values
 from nonsmooth.system.variant import SHARP, Variant, variant_of
-
-if TYPE_CHECKING:
-    from nonsmooth.system.symbolic.derivatives import Derivatives
-    from nonsmooth.system.symbolic.traced import Traced, TracedTransition
-    from nonsmooth.system.symmetry import Symmetry
 
 __all__ = ["System"]
 
@@ -109,15 +109,14 @@ class System:
         self._set(description, values, variant_of(description, SHARP))
         self._variant.domain.check(values)
 
-    def _set(self, description: Description, values: dict[str, float], variant: Variant) -> None:
+    def _set(self, description: Description, values: dict[str, float], variant: Variant) -> Self:
         for name, what in (("_description", description), ("_values", values), ("_variant", variant)):
             object.__setattr__(self, name, what)
+        return self
 
     @classmethod
     def _make(cls, description: Description, values: dict[str, float], variant: Variant) -> Self:
-        new = object.__new__(cls)
-        new._set(description, values, variant)
-        return new
+        return object.__new__(cls)._set(description, values, variant)
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"a System does not change: use with_parameters(...) (tried to set {name!r})")
@@ -201,19 +200,12 @@ class System:
         """The equations as expressions; those of the smoothed system where it is smoothed.
 
         Where modes are made when they are first visited, the names of those visited so far."""
-        traced = self._variant.traced
-        if traced.decider is not None:
-            return traced.decider.known()
-        return traced if traced.patterns is None else traced.patterns.seen()
+        return self._variant.visited
 
     @property
     def declared(self) -> Traced:
         """The equations as expressions, without the sliding modes that are derived from them."""
         return self.traced if self.is_smoothed or self.traced.patterns is not None else self._description.traced
-
-    def with_sliding(self, declared: Traced) -> Traced:
-        """Return what became of the declared equations with the sliding modes that belong to them."""
-        return declared if self.is_smoothed else self._description.with_sliding(declared)
 
     @property
     def derivatives(self) -> Derivatives:
@@ -345,8 +337,6 @@ class System:
 
     def to_text(self) -> str:
         """Return the whole system as text (JSON): equations, units and values; data only."""
-        from nonsmooth.system.text import write_system
-
         return write_system(self)
 
     @classmethod
@@ -358,14 +348,10 @@ class System:
         SystemDefinitionError
             What was expected, and what was found.
         """
-        from nonsmooth.system.text import read_system
-
         return read_system(text)
 
     def content_hash(self, *, values: bool = False) -> str:
         """Return a hash of the equations (64 hex digits); with ``values`` also of the parameters' present values."""
-        from nonsmooth.system.text import write_system
-
         return hashlib.sha256(write_system(self, values=values).encode()).hexdigest()
 
     def __eq__(self, other: object) -> bool:
@@ -388,18 +374,12 @@ class System:
         return System.from_text, (self.to_text(),)
 
     def __repr__(self) -> str:
-        from nonsmooth.system.show import table
-
         return table(self, whole=False)
 
     def __str__(self) -> str:
-        from nonsmooth.system.show import table
-
         return table(self)
 
     def _repr_html_(self) -> str:
-        from nonsmooth.system.show import page
-
         return page(self)
 
     def summary(self, *, verbose: bool = False) -> str:
@@ -410,14 +390,10 @@ class System:
         verbose : bool
             True: the modes, indicators and transitions that were made of elements stand there as well.
         """
-        from nonsmooth.system.show import table
-
         return table(self, verbose=verbose)
 
     def to_latex(self) -> str:
         """Return the equations as LaTeX (an ``align*`` environment)."""
-        from nonsmooth.system.show import latex
-
         return latex(self)
 
     def _repr_latex_(self) -> str | None:

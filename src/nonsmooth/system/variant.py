@@ -46,6 +46,13 @@ class Variant:
         }
         self.domain = Domain(self.traced, (*description.ranges, *extra))
 
+    @property
+    def visited(self) -> Traced:
+        """The equations; where modes are made when they are first visited, the names of those visited so far."""
+        if self.traced.decider is not None:
+            return self.traced.decider.known()
+        return self.traced if self.traced.patterns is None else self.traced.patterns.seen()
+
     @cached_property
     def period(self) -> Callable[..., float] | None:
         """The forcing period as a function of all parameters in order."""

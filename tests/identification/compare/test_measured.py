@@ -17,12 +17,12 @@ from nonsmooth.identification.compare import (
 )
 from nonsmooth.identification.compare import measured as module
 from nonsmooth.recordings import Recording, load_session
-from nonsmooth.studies.savi2007.comparison import gap_reference, session_measurement
-from nonsmooth.studies.savi2007.rig import VirtualRig
-from nonsmooth.studies.savi2007.rig.driven import Setting, records
-from nonsmooth.studies.savi2007.rig.figures import TAPS, without_support
-from nonsmooth.studies.savi2007.rig.motor import frequency, mean_position, voltage_for
-from nonsmooth.studies.savi2007.rig.notebook import write_session
+from nonsmooth_savi2007.comparison import gap_reference, session_measurement
+from nonsmooth_savi2007.rig import VirtualRig
+from nonsmooth_savi2007.rig.driven import Setting, records
+from nonsmooth_savi2007.rig.figures import TAPS, without_support
+from nonsmooth_savi2007.rig.motor import frequency, mean_position, voltage_for
+from nonsmooth_savi2007.rig.notebook import write_session
 
 pytestmark = pytest.mark.filterwarnings("ignore::nonsmooth.recordings.RecordingWarning")
 TRAVEL = 0.0789

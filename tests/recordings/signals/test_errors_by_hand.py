@@ -46,7 +46,7 @@ def test_between_two_samples_the_larger_error_holds() -> None:
 def test_an_amplitude_that_wanders_slowly_is_no_decay() -> None:
     """The amplitude follows a noise that is alike over some blocks: the stated error of the rate covers it."""
     t, z = np.arange(4000) / 200, []
-    for seed in range(40):
+    for seed in range(20):
         noise = np.random.default_rng(seed).standard_normal(len(t) + 4000)
         slow = scipy.signal.lfilter([1.0], [1.0, -np.exp(-1 / 140)], noise)[4000:]  # alike over 0.7 s
         x = (1.0 + 0.002 * slow / slow.std()) * np.cos(2 * np.pi * 10.0 * t)

@@ -50,7 +50,7 @@ def test_the_bounds_are_of_use() -> None:
 @pytest.mark.parametrize("padding", [1, 4])
 def test_errors_are_as_stated_and_no_better_than_they_can_be(window: str, padding: int) -> None:
     noise, z, stated = 0.01, [], []
-    for f, x in tones(noise, 100):
+    for f, x in tones(noise, 50):
         found = peak(spectrum(x, RATE, window=window, padding=padding))
         z.append((found.frequency - f) / found.error)
         stated.append(found.error)

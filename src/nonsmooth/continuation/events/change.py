@@ -100,12 +100,14 @@ def without(point: OrbitPoint, place: int, count: int) -> Change:
 
 def rest_after(point: OrbitPoint, place: int) -> int | None:
     """The number of impacts from visit ``place`` on that rest follows at once; None where it does not."""
-    visits, times = point.signature.visits, point.solved.times
+    visits, times, jumps = point.signature.visits, point.solved.times, point.shooting.system.traced.transitions
     i = place
     while visits[i].row >= 0 and visits[i + 1].mode == visits[place].mode:
         i += 1
+    last = visits[i]
     soon = float(times[i + 1] - times[place + 1]) < BEFORE_REST * float(times[-1])
-    return i - place if visits[i].row >= 0 and soon else None
+    completes = last.row >= 0 and any(is_tolerance(point, row.indicator) for row in jumps[last.transition].rows)
+    return i - place if completes and soon else None
 
 
 def by_others(point: OrbitPoint, place: int, indicator: int) -> list[Change]:

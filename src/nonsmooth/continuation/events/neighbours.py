@@ -16,6 +16,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.events.change import Change, Common, common_orbit
+from nonsmooth.continuation.problems.curve import passing
 from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.signature import Round
 from nonsmooth.continuation.searches.settled import touching
@@ -33,13 +34,16 @@ POWERS = (2.0, 1.0, 0.5)  # of the distance in the parameter: how far from it, b
 ROUNDS = 6  # signatures tried in a row
 STEEP = 1e-3  # of a tangent: its parameter
 BACK = 1e-3  # of its distance: an orbit nearer than this to the branch that has come here is on it
+SAME = 1e-9  # in scaled unknowns: two solutions as near as this are one
 AGAIN = 3  # times that Newton's method is begun with one signature
 
 
-def beside(point: OrbitPoint, contacts: Sequence[Change] = ()) -> OrbitPoint | None:
+def beside(
+    point: OrbitPoint, contacts: Sequence[Change] = (), passed: Sequence[OrbitPoint] = ()
+) -> OrbitPoint | None:
     """The orbit with which a branch goes on at ``point``, where its signature ends, on a curve of its own.
 
-    ``contacts`` are those that may begin or end there. Its tangent leads away from there. None where there is none, or
+    ``contacts`` are those that may begin or end there, ``passed`` the points of the branch so far. Its tangent leads away from there. None where there is none, or
     no simulated round shows it."""
     common = [end for change in contacts if (end := common_orbit(change)) is not None]
     forward = float(np.sign(point.tangent[-1])) or 1.0
@@ -49,7 +53,8 @@ def beside(point: OrbitPoint, contacts: Sequence[Change] = ()) -> OrbitPoint | N
             least = np.inf
             for found in _found(point, common, side, aside):
                 apart = _apart(point, found)
-                if (_arrives(point, found) or _shrink([*before, apart])) and not _leads_back(point, found):
+                arrives = _arrives(point, found) or _shrink([*before, apart])
+                if arrives and not (_leads_back(point, found) or _came_by(found, passed)):
                     return found if side * found.rise >= 0.0 else found.turned()
                 least = min(least, apart)
             before.append(least)
@@ -126,3 +131,15 @@ def _leads_back(point: OrbitPoint, found: OrbitPoint) -> bool:
         return False
     own = point.curve.at_parameter(point.Y, found.value)
     return own is not None and _apart(own, found) < BACK * _apart(point, found)
+
+
+def _came_by(found: OrbitPoint, passed: Sequence[OrbitPoint]) -> bool:
+    """Return whether an orbit is one of those between the points of the branch so far."""
+    for a, b in pairwise(passed):
+        if a.curve is b.curve and a.signature == found.signature:
+            Y = found.X / a.curve.scale
+            if passing(Y, a.Y, b.Y) is not None:
+                there = a.curve.between(a, b, a.along(Y))
+                if there is not None and np.abs(there.Y - Y).max() < SAME:
+                    return True
+    return False

@@ -21,11 +21,18 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.continuation.events.boundaries import BOUNDARIES, Boundary, Crossed, Unseen
-from nonsmooth.continuation.events.change import Change, common_orbit, is_tolerance, past_the_section, rest_after
+from nonsmooth.continuation.events.change import (
+    BEFORE_REST,
+    Change,
+    common_orbit,
+    is_tolerance,
+    past_the_section,
+    rest_after,
+)
 from nonsmooth.continuation.events.grazing import graze
 from nonsmooth.continuation.events.neighbours import beside
-from nonsmooth.continuation.events.sliding import sliding_bifurcation
-from nonsmooth.continuation.march.event import BESIDE, LARGEST, Crossing, Event, Fold, Met, Name, Step, first_met
+from nonsmooth.continuation.events.sliding import TOUCHES, sliding_bifurcation
+from nonsmooth.continuation.march.event import BESIDE, LARGEST, Crossing, Event, Fold, Met, Name, Step, first_met, special_on
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
@@ -42,6 +49,7 @@ SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish
 FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
 WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
 AHEAD = 1e-6  # of the range
+NEARER = 3  # times a tenth of the distance from the boundary: what lies between it and the first orbit behind it
 WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
@@ -192,7 +200,7 @@ class AlongOrbits(Policy):
             after = past_the_section(first.point)
             if after is not None and (after.path.margins[1:] >= 0.0).all():
                 return after  # else another boundary is met with the section
-        beyond = beside(first.point, contacts_of(met))
+        beyond = beside(first.point, contacts_of(met), [row.point for row in found.rows])
         if beyond is not None and _completes(met, beyond):
             return beyond
         centre = beyond is None and _is_centre(first)
@@ -203,7 +211,23 @@ class AlongOrbits(Policy):
             # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
             found.ending = "branching"
             return None
+        else:
+            self._watch_between(found, first.point, beyond)
         return beyond
+
+    def _watch_between(self, found: March, point: OrbitPoint, first: OrbitPoint) -> None:
+        """List the special points between a boundary and the first orbit behind it, by orbits that come nearer."""
+        met: list[Met] = []
+        b = first.turned()
+        for _ in range(NEARER):
+            a, b = b, b.curve.at_parameter(b.Y, point.value + 0.1 * (b.value - point.value))
+            if b is None or b.virtual:
+                break
+            b = b if b.tangent @ a.tangent > 0.0 else b.turned()
+            step = Step(a, b, tuple([kind.number(one) for kind in self.kinds] for one in (a, b)), ([], []))
+            met += special_on(step, self.kinds)
+        for one in reversed(met):
+            found.mark(one.name, one.point.turned())
 
     def over(self, point: OrbitPoint) -> str | None:
         """Return ``equilibrium`` where an autonomous orbit has all but shrunk to one, ``homoclinic`` where it only
@@ -225,15 +249,33 @@ class AlongOrbits(Policy):
 
 
 def _completes(met: list[Met], beyond: OrbitPoint) -> bool:
-    """Return whether only the speed below which impacts are completed as rest is reached.
+    """Return whether only the number of impacts before rest changes, or the speed below which they are completed as
+    rest is reached.
 
-    An impact that vanishes far from rest passes that speed too, and is a graze."""
-    passed = [one for one in met if is_tolerance(one.point, one.kind.surface(one.point, beyond))]
-    if not passed:
-        return False
-    kind, point = passed[0].kind, passed[0].point
-    same = beyond.shooting.m == point.shooting.m or not isinstance(kind, Crossed)
-    return same or rest_after(point, kind.visit(point)) is not None
+    An impact that vanishes far from rest passes that speed too, and is a graze: rest follows on neither side."""
+    point = met[0].point
+    if _but_completed(point, beyond):
+        return True
+    passed = [one.kind for one in met if is_tolerance(point, one.kind.surface(point, beyond))]
+    return any(
+        not isinstance(kind, Crossed) or beyond.shooting.m == point.shooting.m
+        or rest_after(side, kind.visit(point)) is not None
+        for kind in passed for side in (point, beyond)
+    )  # fmt: skip
+
+
+def _but_completed(*sides: OrbitPoint) -> bool:
+    """Return whether two orbits take the same transitions but for impacts that rest follows at once in one of them."""
+    rests = [side.solved.times[i + 1] for side in sides for i in range(side.shooting.m) if rest_after(side, i) == 0]
+    soon = BEFORE_REST * sides[0].period
+    words = []
+    for side in sides:
+        visits, times = side.signature.visits, side.solved.times[1:]
+        words.append([
+            (v.transition, v.row) for v, after, t in zip(visits[:-1], visits[1:], times, strict=False)
+            if v.mode != after.mode or not any(0.0 <= rest - t < soon for rest in rests)
+        ])  # fmt: skip
+    return bool(rests) and words[0] == words[1]
 
 
 def _is_centre(met: Met) -> bool:
@@ -253,7 +295,7 @@ def contacts_of(met: list[Met]) -> list[Change]:
 
 def mark(found: March, met: list[Met], beyond: OrbitPoint | None, name: str = "") -> str:
     """Record the end of a signature, by the contact that begins or ends there where no name is given; its name."""
-    kind, point = met[0].kind, met[0].point
+    point = met[0].point
     names, sliding = list(point.shooting.system.indicators), ""
     if beyond is not None:
         sliding = sliding_bifurcation(point, beyond)
@@ -266,12 +308,14 @@ def mark(found: March, met: list[Met], beyond: OrbitPoint | None, name: str = ""
                 judged = graze(beyond, change)
                 found.mark("grazing", free, indicator=names[change.indicator], sliding=sliding, **judged)
                 return "grazing"
-        end = _from_behind(point, beyond)
-        if end is not None and _is_better(met[0], end.point):
-            kind, point = end.kind, end.point
-    own = kind.contacts(point)
-    name = name or ("grazing" if own else kind.name)
-    indicator = own[0].indicator if own else kind.surface(point, beyond)
+    sides = [met[0]]
+    if beyond is not None and (end := _from_behind(point, beyond)):  # named alike from either side
+        sides.insert(0 if _is_better(met[0], end.point) else 1, end)
+    kind, point = sides[0].kind, sides[0].point
+    own = [change.indicator for side in sides for change in side.kind.contacts(side.point)]
+    touches = sliding in TOUCHES if sliding else own or any(side.name == "grazing" for side in sides)
+    name = name or ("grazing" if touches else "corner")
+    indicator = own[0] if own else kind.surface(point, beyond)
     found.mark(name, point, indicator=names[indicator] if indicator >= 0 else "", sliding=sliding)
     return name
 

@@ -24,8 +24,10 @@ __all__ = [
 
 BEGUN = 1e-6
 ROUNDING = 1e-13  # of the numbers at both ends: smaller than this is zero, however short the step
+PLACE = 1e-11  # of a step: a bracket narrower than this is noise of solved points
 LARGEST = 1e3  # of a number, for Brent's method: margins may be infinite
 BESIDE = 1e-6  # along the branch: nearer to a boundary than this is the boundary itself
+TURNED = 1e-7  # along the branch: nearer to a change of equations than this the parameter turns with it
 CLOSING = 1e-4  # along the branch: nearer to its first point than this is that point, a crossing of branches maybe
 TURN = 1e-4  # along the branch: a fold nearer to a crossing of branches than this is that crossing
 ABOUT = 1e-2  # along the branch: steps are short beside a crossing of branches, and its first place is rough
@@ -198,7 +200,7 @@ def locate(step: Step, number: Callable[[Any], float]) -> tuple[float, Any] | No
         return 0.0 if abs(x) < nothing and 0.0 < s < step.end else min(max(x, -LARGEST), LARGEST)
 
     try:
-        s = float(brentq(value, 0.0, step.end, xtol=1e-16, rtol=1e-15, maxiter=200))
+        s = float(brentq(value, 0.0, step.end, xtol=PLACE * step.end, rtol=1e-15, maxiter=200))
         value(s)
     except (ArithmeticError, ValueError, RuntimeError):
         return None
@@ -252,7 +254,7 @@ def special_on(step: Step, kinds: Sequence[Event]) -> list[Met]:
     found: list[Met] = []
     # At a change of equations the parameter may turn too: that belongs to the change. Where a branch closes its first
     # point has been looked at.
-    stop = step.stop - {"change": BESIDE, "closed": CLOSING}.get(step.cause, 0.0)
+    stop = step.stop - {"change": TURNED, "closed": CLOSING}.get(step.cause, 0.0)
     if stop <= 0.0:
         return []
     curve, a, b, (before, after) = step.curve, step.a, step.b, step.numbers

@@ -157,6 +157,9 @@ class Walk:
         flown = tau < SHORT * float(solved.times[-1])
         inner[flown[:, None] & (np.abs(inner) <= ROUNDING * size.max(axis=0))] = -np.inf
         inner[np.abs(inner) < LEAST * np.where(np.isfinite(size), size, 0.0)] = -np.inf
+        if m == 1:  # the section is a place within the only visit
+            higher = begin > inner
+            inner[higher], place[higher], which[higher] = begin[higher], 0.0, begin_row[higher]
         at = int(inner.argmax()) if n_t else 0
         touched = (at // n_t, at % n_t) if n_t else (0, 0)
         own = end[self.inside]

@@ -27,11 +27,12 @@ __all__ = ["Rounds"]
 RTOL = 1e-13  # where the flow is not exact
 ROUNDING = 1e-14  # of the period
 SHORT = 1e-6  # of the period: as soon after an impact follows the next one shortly before rest
+INTO = 0.38  # of the visit in which a round begins: half way, symmetric motion may touch something
 LATE = 0.25  # of the period: the largest change of the period of a neighbour
 
 
 class Rounds:
-    """Rounds of orbits of one system, begun in the middle of their longest visits."""
+    """Rounds of orbits of one system, begun within their longest visits."""
 
     def __init__(self, shooting: Shooting) -> None:
         self.system, self.flow, self.period_number = shooting.system, shooting.flow, shooting.period_number
@@ -42,10 +43,10 @@ class Rounds:
     def read(
         self, shooting: Shooting, X: FloatArray, values: FloatArray, change: FloatArray | float = 0.0
     ) -> Round | None:
-        """The round at ``values`` from the middle of the longest visit of an orbit, its state changed by ``change``.
+        """The round at ``values`` from within the longest visit of an orbit, its state changed by ``change``.
 
         None where it fails, or does not come back to the mode where it began."""
-        i, begin, z, period = self._middle(shooting, X, values)
+        i, begin, z, period = self._within(shooting, X, values)
         mode = int(shooting.modes[i])
         own = np.ones(len(z), dtype=bool)
         own[: len(self.system.states)] = [not lacks for lacks in self.system.traced.lacking[mode]]
@@ -56,7 +57,7 @@ class Rounds:
         """Return whether the round of an orbit takes the transitions of its signature; True where it fails.
 
         What the exact flow denies the series are asked too."""
-        i, begin, z, period = self._middle(shooting, X, values)
+        i, begin, z, period = self._within(shooting, X, values)
         times, taken = shooting.split(X)[0], [visit.transition for visit in shooting.signature.crossings]
         own, at = taken[i:] + taken[:i], np.concatenate([times[i:], times[:i] + period])
         for engine in (lambda: self.engine, lambda: self.second):
@@ -80,15 +81,15 @@ class Rounds:
         alone = self.engine.name != "exact" or self.system.traced.patterns is not None
         return self.engine if alone else engine_for(self.system, "taylor", rtol=RTOL)
 
-    def _middle(self, shooting: Shooting, X: FloatArray, values: FloatArray) -> tuple[int, float, FloatArray, float]:
-        """The longest visit of an orbit, time and state in its middle, and the period."""
+    def _within(self, shooting: Shooting, X: FloatArray, values: FloatArray) -> tuple[int, float, FloatArray, float]:
+        """The longest visit of an orbit, time and state within it, and the period."""
         times, states = shooting.split(X)
         forced = shooting.forced
         period = self.period_number * self.flow.period(values)[0] if forced else float(X[shooting.size - 1])
         ends = np.concatenate([[0.0], times, [period]])
         i = int(np.diff(ends).argmax()) if forced else 0  # without forcing the section lies within a visit
         begin = float(ends[i])
-        into = 0.5 * float(ends[i + 1] - begin) if forced else 0.0
+        into = INTO * float(ends[i + 1] - begin) if forced else 0.0
         return i, begin + into, led(self.flow, values, shooting.modes[i], begin, into, states[i]), period
 
     def _run(

@@ -19,8 +19,6 @@ from nonsmooth.results.statuses import in_words
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import State
 
-__all__ = ["History", "Mechanism", "Portrait", "Readout", "Section"]
-
 _MODES = [BLUE, *((COLORS[name],) * 2 for name in ("second", "third", "fourth"))]
 _MANY_MODES = 8
 

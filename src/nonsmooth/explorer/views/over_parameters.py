@@ -22,8 +22,6 @@ from nonsmooth.results.statuses import in_words
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import State
 
-__all__ = ["Branches", "Diagram", "Response"]
-
 _HEIGHT = 400  # pixels of an image before the page has said how large it is
 #: Of a sweep up and down, on a light and a dark ground, in every view.
 _DIRECTIONS = {"up": BLUE, "down": (COLORS["second"],) * 2}

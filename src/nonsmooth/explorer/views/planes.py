@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.explorer.state import State
 
-__all__ = ["Basins", "Cells", "Chart"]
-
 _NOTHING = -1e300  # Bokeh writes NaN itself, and asks no formatter
 _PLACE = "return Number((value / Math.pow(10, power)).toPrecision(5)).toString().replace('-', '\\u2212') + unit;"
 _MORE = "return value > -1e299 ? before + value.toPrecision(3).replace('-', '\\u2212') + after : '';"

@@ -10,8 +10,6 @@ import numpy as np
 from nonsmooth.explorer.figures import GREY, MOST
 from nonsmooth.explorer.views.view import Request, Requests, View
 
-__all__ = ["Recording"]
-
 
 class Recording(View):
     """A recorded motion in four figures."""

@@ -9,8 +9,6 @@ from nonsmooth.explorer.labels import axis_label, number
 from nonsmooth.explorer.views.view import Requests, View
 from nonsmooth.plot.trajectories import FLOOR
 
-__all__ = ["Spectrum"]
-
 _LINES = 20  # multiples of the base frequency that are drawn
 
 

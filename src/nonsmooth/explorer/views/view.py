@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from nonsmooth.explorer.state import State
     from nonsmooth.system.system import System
 
-__all__ = ["Ends", "Request", "Requests", "View"]
-
 Request = dict[str, Any]
 Requests = Mapping[str, Request]
 Ends = tuple[float, float]

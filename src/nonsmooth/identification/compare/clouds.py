@@ -20,9 +20,6 @@ from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import BoolArray, FloatArray
 
-__all__ = ["CloudDistance", "block_length", "cloud_distance", "energy_distance", "wasserstein"]
-
-
 FEWEST_BLOCKS = 20
 LIKENESS = 0.1  # successive points are taken as unrelated where their mean distance is within 10 % of that of any two
 MOST = 3000  # points of one cloud, the last ones: the matrix of distances grows like the square

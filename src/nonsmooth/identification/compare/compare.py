@@ -13,6 +13,7 @@ from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
 from nonsmooth.identification.compare.measured import recorded_motion
 from nonsmooth.identification.options import Prediction
+from nonsmooth.results.labels import labelled
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.names import unknown
 
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.identification.parameter_set import ParameterSet
     from nonsmooth.system.system import System
-
-__all__ = ["compare"]
 
 DRAWS = 60
 FORMS = (
@@ -134,63 +133,83 @@ def compare(
 
     from nonsmooth.system.system import System
 
-    if not isinstance(theory, System | xr.Dataset):
-        raise TypeError(f"theory must be a System or a result, not {type(theory).__name__}")
-    is_system = isinstance(theory, System)
-    if not is_system and (parameters is not None or settings):
-        raise ValueError("parameters and settings change a System; this theory is a result that is at hand already")
-    set_ = read_settings(settings, theory) if isinstance(theory, System) else {}
-    draws, level = options["draws"], options["level"]
-    if draws is None:
-        uncertain = hasattr(parameters, "covariance") or any(
-            pair.uncertainty > (0.0 if pair.follows else NEGLIGIBLE * abs(pair.at({}))) for pair in set_.values()
-        )
-        draws = DRAWS if is_system and uncertain else 0
-    if not 0 < level < 1:
-        raise ValueError(f"level = {level!r} must lie between 0 and 1, as 0.95")
+    set_ = _settings(theory, parameters, settings)
+    draws = _draws(options["draws"], theory, parameters, set_)
+    if not 0 < options["level"] < 1:
+        raise ValueError(f"level = {options['level']!r} must lie between 0 and 1, as 0.95")
     if not isinstance(measured, xr.Dataset) or channels is not None:
         if not isinstance(theory, System):
             raise TypeError(f"a recording is laid over a System, not over a result; of a measured motion: {FORMS}")
         measured = recorded_motion(measured, nominal(theory, parameters, set_), channels, run, _phase_found(parameters))
-    kind = _kind(measured, parameter)
-    states = _states(measured, theory)
+    kind, states = _kind(measured, parameter), _states(measured, theory)
     model = Model(
-        theory, states, parameters, set_, options["transient"], draws, level, options["seed"], solver_of(options)
-    )
-    squeeze: tuple[str, ...] = ()
+        theory, states, parameters, set_, options["transient"], draws, options["level"], options["seed"],
+        solver_of(options),
+    )  # fmt: skip
+    given = {
+        "settings": {key: ["follows" if one.follows else one.value, one.uncertainty] for key, one in set_.items()},
+        "parameter": parameter, "direction": direction, "section_phase": section_phase, **options, "draws": draws,
+    }  # fmt: skip
+    variables = _laid(kind, measured, model, states, {**given, "noise": noise, "start": start, "values": values})
+    result = _dataset(variables, measured, model, kind, given)
+    return result.squeeze("section_phase") if kind == "motion" and np.ndim(section_phase) == 0 else result
+
+
+def _settings(theory: Any, parameters: Any, given: Any) -> dict[str, Any]:
+    """The settings of a System; a result at hand takes none."""
+    import xarray as xr
+
+    from nonsmooth.system.system import System
+
+    if isinstance(theory, System):
+        return read_settings(given, theory)
+    if not isinstance(theory, xr.Dataset):
+        raise TypeError(f"theory must be a System or a result, not {type(theory).__name__}")
+    if parameters is not None or given:
+        raise ValueError("parameters and settings change a System; this theory is a result that is at hand already")
+    return {}
+
+
+def _laid(kind: str, measured: xr.Dataset, model: Model, states: list[str], asked: Mapping[str, Any]) -> dict[str, Any]:
+    """The variables of a comparison of this kind, as ``asked``."""
     if kind == "response":
         from nonsmooth.identification.compare.response import compare_response
 
-        name = _parameter(parameter or "omega", theory)
-        variables = compare_response(measured, model, name=name, state=states[0])
-    elif kind == "diagram":
+        name = _parameter(asked["parameter"] or "omega", model.theory)
+        return compare_response(measured, model, name=name, state=states[0])
+    noise, phase, longest = _noise(measured, asked["noise"], states), asked["section_phase"], asked["max_period"]
+    if kind == "diagram":
         from nonsmooth.identification.compare.diagram import compare_diagram
 
-        name = _parameter(parameter or _swept(measured), theory)
-        variables = compare_diagram(
-            measured, model, name=name, noise=_noise(measured, noise, states), direction=direction, values=values,
-            phase=real_number(section_phase, "section_phase"), max_period=options["max_period"],
+        return compare_diagram(
+            measured, model, name=_parameter(asked["parameter"] or _swept(measured), model.theory), noise=noise,
+            direction=asked["direction"], values=asked["values"], phase=real_number(phase, "section_phase"),
+            max_period=longest,
         )  # fmt: skip
-    else:
-        from nonsmooth.identification.compare.motion import compare_motion
+    from nonsmooth.identification.compare.motion import compare_motion
 
-        phases = [real_number(phase, "section_phase") for phase in np.atleast_1d(section_phase)]
-        if "u" not in measured and len(phases) > 1:
-            raise ValueError("measured section points are of one phase: give section_phase as one number")
-        squeeze = ("section_phase",) if np.ndim(section_phase) == 0 else ()
-        variables = compare_motion(
-            measured, model, noise=_noise(measured, noise, states), start=start, phases=phases,
-            grid=options["grid"], max_period=options["max_period"], splits=options["splits"],
-        )  # fmt: skip
-        variables["section_phase"] = ("section_phase", np.array(phases), {
-            "long_name": "phase of the section", "units": "forcing periods"})  # fmt: skip
-    given = {
-        "settings": {key: ["follows" if one.follows else one.value, one.uncertainty] for key, one in set_.items()},
-        "parameter": parameter, "direction": direction,
-        "section_phase": section_phase, **options, "draws": draws,
-    }  # fmt: skip
-    result = _dataset(variables, measured, model, kind, given)
-    return result.squeeze([dim for dim in squeeze if dim in result.dims])
+    return compare_motion(
+        measured, model, noise=noise, start=asked["start"], phases=_phases(phase, "u" in measured),
+        grid=asked["grid"], max_period=longest, splits=asked["splits"],
+    )  # fmt: skip
+
+
+def _draws(given: int | None, theory: Any, parameters: Any, settings: Mapping[str, Any]) -> int:
+    """The number of draws; where none is given, none of a theory in which no uncertainty shows."""
+    if given is not None:
+        return given
+    uncertain = hasattr(parameters, "covariance") or any(
+        pair.uncertainty > (0.0 if pair.follows else NEGLIGIBLE * abs(pair.at({}))) for pair in settings.values()
+    )
+    return DRAWS if uncertain and hasattr(theory, "parameters") else 0
+
+
+def _phases(given: Any, whole: bool) -> list[float]:
+    """Phases of the sections; one alone where the ``whole`` motion was not measured."""
+    phases = [real_number(phase, "section_phase") for phase in np.atleast_1d(given)]
+    if not whole and len(phases) > 1:
+        raise ValueError("measured section points are of one phase: give section_phase as one number")
+    return phases
 
 
 def _kind(measured: xr.Dataset, parameter: str | None) -> str:
@@ -302,8 +321,8 @@ def _dataset(
     record["measured"] = {key: str(value) for key, value in measured.attrs.items() if key != ATTRIBUTE}
     synthetic = str(measured.attrs.get("synthetic", "no"))
     coords = {
-        "state": ("state", np.array(model.states), {"long_name": "state"}),
-        "state_unit": ("state", np.array([units[name] for name in model.states]), {"long_name": "unit"}),
+        "state": labelled("state", np.array(model.states), "state"),
+        "state_unit": labelled("state", np.array([units[name] for name in model.states]), "unit"),
     }
     parameter_names = set(getattr(theory, "parameters", ()))
     named = {key for key, (dims, _, _) in variables.items() if dims == key or (not dims and key in parameter_names)}

@@ -11,14 +11,12 @@ from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.periods import Flip, delayed_flips, flips, measured_period, period_numbers
 from nonsmooth.identification.compare.predict import Motions
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from nonsmooth.system.system import System
-
-__all__ = ["compare_diagram"]
-
 
 FINE = 201
 KEEP = 64
@@ -48,14 +46,14 @@ def compare_diagram(
         periods = theory["period_number"].transpose(..., name).values.reshape(-1, len(grid))
     over = (name, "direction", "iterate", "state")
     variables: dict[str, Any] = {
-        f"measured_{name}": ("sample", at, {"long_name": f"measured {name}", "units": unit}),
-        "measured_section": (("sample", "state"), points, {"long_name": "measured section points"}),
-        "measured_period_number": ("sample", numbers, {"long_name": "measured period number (0: none found)"}),
-        "theory_section": (over, np.moveaxis(sections, 0, 1), {"long_name": "predicted section points"}),
-        "theory_period_number": ((name, "direction"), periods.T, {"long_name": "predicted period number (0: none)"}),
-        name: (name, grid, {"long_name": name, "units": unit}),
-        "direction": ("direction", np.array(words), {"long_name": "direction of the sweep"}),
-    }  # fmt: skip
+        f"measured_{name}": labelled("sample", at, f"measured {name}", unit),
+        "measured_section": labelled(("sample", "state"), points, "measured section points"),
+        "measured_period_number": labelled("sample", numbers, "measured period number (0: none found)"),
+        "theory_section": labelled(over, np.moveaxis(sections, 0, 1), "predicted section points"),
+        "theory_period_number": labelled((name, "direction"), periods.T, "predicted period number (0: none)"),
+        name: labelled(name, grid, name, unit),
+        "direction": labelled("direction", np.array(words), "direction of the sweep"),
+    }
     drawn_flips: list[dict[str, float]] = []
     if model.system is not None and model.draws:
         systems, drawn = model.drawn()
@@ -67,15 +65,19 @@ def compare_diagram(
             drawn_flips.append(flips(grid, counts[0]))
         q, _, _ = model.quantiles
         for word, stack, at_q in (("low", lows, q), ("high", highs, 1 - q)):
-            variables[f"theory_{word}"] = ((name, "state"), np.nanquantile(np.stack(stack), at_q, axis=0), {
-                "long_name": f"{word} edge of the section points for drawn parameters"})  # fmt: skip
+            variables[f"theory_{word}"] = labelled(
+                (name, "state"),
+                np.nanquantile(np.stack(stack), at_q, axis=0),
+                f"{word} edge of the section points for drawn parameters",
+            )
         variables |= drawn
     if name in measured["section"].dims:  # steady runs: a flip lies between two of them
         seen = {word: Flip(place, np.nan, place) for word, place in flips(at, numbers).items()}
     else:
         seen = delayed_flips(at, points, noise, numbers)
-        variables["rise_per_return"] = ((), float((at[-1] - at[0]) / (len(at) - 1)), {
-            "long_name": f"rise of {name} per return", "units": unit})  # fmt: skip
+        variables["rise_per_return"] = labelled(
+            (), float((at[-1] - at[0]) / (len(at) - 1)), f"rise of {name} per return", unit
+        )
     return variables | _flips(seen, flips(grid, periods[0]), drawn_flips, unit, model)
 
 
@@ -129,19 +131,21 @@ def _flips(
     t = np.array([theory.get(word, np.nan) for word in words], dtype=float)
     over = "flip"
     variables: dict[str, Any] = {
-        "flip": (over, np.array(words, dtype=str), {"long_name": "period numbers on the two sides of the flip"}),
-        "measured_flip": (over, m, {"long_name": "measured flip (NaN: none was seen)", "units": unit}),
-        "measured_flip_error": (over, error, {"long_name": "standard error of it", "units": unit}),
-        "measured_flip_read": (over, read, {
-            "long_name": "where the record changes its period number; in a rise later than the flip", "units": unit}),
-        "theory_flip": (over, t, {"long_name": "predicted flip (NaN: none is predicted)", "units": unit}),
-        "flip_relative_difference": (over, t / m - 1, {"long_name": "predicted over measured flip, minus 1"}),
-    }  # fmt: skip
+        "flip": labelled(over, np.array(words, dtype=str), "period numbers on the two sides of the flip"),
+        "measured_flip": labelled(over, m, "measured flip (NaN: none was seen)", unit),
+        "measured_flip_error": labelled(over, error, "standard error of it", unit),
+        "measured_flip_read": labelled(
+            over, read, "where the record changes its period number; in a rise later than the flip", unit
+        ),
+        "theory_flip": labelled(over, t, "predicted flip (NaN: none is predicted)", unit),
+        "flip_relative_difference": labelled(over, t / m - 1, "predicted over measured flip, minus 1"),
+    }
     if drawn:
         table = np.array([[one.get(word, np.nan) for word in words] for one in drawn], dtype=float)
         known = np.isfinite(table).sum(axis=0) * 2 >= len(drawn)
         for word, q in zip(("low", "high"), model.quantiles[::2], strict=True):
             edge = [np.nanquantile(table[:, i], q) if known[i] else np.nan for i in range(len(words))]
-            variables[f"theory_flip_{word}"] = (over, np.array(edge, dtype=float), {
-                "long_name": f"{word} end of the interval for drawn parameters", "units": unit})  # fmt: skip
+            variables[f"theory_flip_{word}"] = labelled(
+                over, np.array(edge, dtype=float), f"{word} end of the interval for drawn parameters", unit
+            )
     return variables

@@ -17,11 +17,6 @@ from nonsmooth.system.names import unknown
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = [
-    "Model", "Setting", "Settings", "check_parameter", "draw_systems", "drawn_variables", "nominal", "read_settings",
-    "settled",
-]  # fmt: skip
-
 Rule = Callable[[Mapping[str, float]], float]
 
 

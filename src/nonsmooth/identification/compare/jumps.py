@@ -8,9 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-
-__all__ = ["Jump", "Jumps", "jumps_in_steps", "match_jumps"]
-
+from nonsmooth.results.labels import labelled
 
 STEEPER = 2.5  # a jump exceeds the steps on both sides by this factor
 LEAST = 0.02  # and this part of the amplitude
@@ -100,16 +98,17 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
     m, t = np.array(values, dtype=float), np.array(others, dtype=float)
     over = "jump"
     variables: dict[str, Any] = {
-        "jump_direction": (over, np.array(words, dtype=str), {"long_name": "direction in which the jump is met"}),
-        "measured_jump": (over, m, {"long_name": "measured jump (NaN: none was seen)", "units": unit}),
-        "theory_jump": (over, t, {"long_name": "predicted jump (NaN: none is predicted)", "units": unit}),
-        "jump_difference": (over, t - m, {"long_name": "predicted minus measured jump", "units": unit}),
-        "jump_tolerance": (over, np.array(steps, dtype=float), {"long_name": "half steps of both", "units": unit}),
-    }  # fmt: skip
+        "jump_direction": labelled(over, np.array(words, dtype=str), "direction in which the jump is met"),
+        "measured_jump": labelled(over, m, "measured jump (NaN: none was seen)", unit),
+        "theory_jump": labelled(over, t, "predicted jump (NaN: none is predicted)", unit),
+        "jump_difference": labelled(over, t - m, "predicted minus measured jump", unit),
+        "jump_tolerance": labelled(over, np.array(steps, dtype=float), "half steps of both", unit),
+    }
     if drawn:
         for word, column in (("low", lows), ("high", highs)):
-            variables[f"theory_jump_{word}"] = (over, np.array(column, dtype=float), {
-                "long_name": f"{word} end of the interval for drawn parameters", "units": unit})  # fmt: skip
+            variables[f"theory_jump_{word}"] = labelled(
+                over, np.array(column, dtype=float), f"{word} end of the interval for drawn parameters", unit
+            )
     return variables
 
 

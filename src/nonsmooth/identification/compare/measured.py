@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from nonsmooth.recordings.recording import Recording
     from nonsmooth.system.system import System
-
-__all__ = ["measured_motion", "motion_of", "recorded_motion"]
 
 ANGLES = ("rad", "deg", "rev")
 LONG = 150.0  # s: of a longer record the support and the smoother's intensity are found in its middle
@@ -73,12 +72,12 @@ def _motion(smoothed: xr.Dataset, phase: FloatArray, states: tuple[str, str] = (
     units = [smoothed[k].attrs["units"] for k in "xv"]
     return xr.Dataset(
         {
-            "u": (("time", "state"), columns[""], {"long_name": "measured state"}),
-            "u_error": (("time", "state"), columns["_error"], {"long_name": "standard error of the measured state"}),
-            "phase": ("time", phase, {"long_name": "phase of the drive", "units": "forcing periods"}),
+            "u": labelled(("time", "state"), columns[""], "measured state"),
+            "u_error": labelled(("time", "state"), columns["_error"], "standard error of the measured state"),
+            "phase": labelled("time", phase, "phase of the drive", "forcing periods"),
         },
         {
-            "time": ("time", smoothed["time"].values, {"long_name": "time", "units": "s"}),
+            "time": labelled("time", smoothed["time"].values, "time", "s"),
             "state": ("state", list(states)), "state_unit": ("state", units),
         },
     )  # fmt: skip
@@ -206,8 +205,8 @@ def measured_motion(
     inside = (time >= turns[0]) & (time <= turns[-1])
     phase = (drive.phase(time[inside]) + mark % (2 * np.pi)) / (2 * np.pi)
     return _motion(smoothed.isel(time=inside), phase).assign_attrs(_attributes(recording, name)).assign_coords(
-        omega=((), drive.omega, {"long_name": "frequency of the drive", "units": "rad/s"}),
-        omega_error=((), drive.omega_error, {"long_name": "standard error of it", "units": "rad/s"}),
+        omega=labelled((), drive.omega, "frequency of the drive", "rad/s"),
+        omega_error=labelled((), drive.omega_error, "standard error of it", "rad/s"),
     )  # fmt: skip
 
 

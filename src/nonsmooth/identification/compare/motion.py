@@ -13,13 +13,12 @@ from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.orbits import common_length, fold, mean_orbit, orbit_distance
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.identification.compare.predict import Attractor, Motions, Prediction, from_result, predict
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from nonsmooth.system.system import System
-
-__all__ = ["compare_motion", "motion_band"]
 
 KEEP = 128  # section points by which a predicted motion is judged
 CLOUD = 2000  # section points of a predicted motion without a period number
@@ -59,7 +58,8 @@ def compare_motion(
             max_period=max_period,
         )  # fmt: skip
         variables |= drawn
-    return variables
+    named = {"long_name": "phase of the section", "units": "forcing periods"}
+    return variables | {"section_phase": ("section_phase", np.array(phases), named)}
 
 
 def _measured(measured: xr.Dataset, phases: list[float], grid: int) -> tuple[FloatArray | None, list[FloatArray]]:
@@ -103,12 +103,12 @@ def _clouds(
     size = min(len(points) for points in sections)
     at = "section_phase"
     variables: dict[str, Any] = {
-        "measured_section": ((at, "measured_iterate", "state"), np.stack([p[:size] for p in sections]),
-                             {"long_name": "measured section points"}),
-        "theory_section": ((at, "theory_iterate", "state"), np.stack(exact),
-                           {"long_name": "predicted section points"}),
-        "section_scale": ("state", scale, {"long_name": "unit of each state in the distances of clouds"}),
-    }  # fmt: skip
+        "measured_section": labelled(
+            (at, "measured_iterate", "state"), np.stack([p[:size] for p in sections]), "measured section points"
+        ),
+        "theory_section": labelled((at, "theory_iterate", "state"), np.stack(exact), "predicted section points"),
+        "section_scale": labelled("state", scale, "unit of each state in the distances of clouds"),
+    }
     found = [
         cloud_distance(a / scale, b / scale, splits=splits, seed=seed) if min(len(a), len(b)) >= 40 else None
         for a, b in zip(sections, blurred, strict=True)
@@ -118,14 +118,16 @@ def _clouds(
         for a, b in zip(sections, blurred, strict=True)
     ]
     both = [wasserstein(a / scale, b / scale, seed) for a, b in zip(sections, blurred, strict=True)]
-    variables["wasserstein_distance"] = ((at, "state"), np.array(moved), {
-        "long_name": "Wasserstein distance of the section clouds, in the state's unit"})  # fmt: skip
-    variables["wasserstein_distance_joint"] = (at, np.array(both), {
-        "long_name": "Wasserstein distance of the section clouds in all states, scaled"})  # fmt: skip
+    variables["wasserstein_distance"] = labelled(
+        (at, "state"), np.array(moved), "Wasserstein distance of the section clouds, in the state's unit"
+    )
+    variables["wasserstein_distance_joint"] = labelled(
+        at, np.array(both), "Wasserstein distance of the section clouds in all states, scaled"
+    )
 
     def column(name: str, read: Any, long_name: str) -> None:
         values = np.array([np.nan if one is None else read(one) for one in found], dtype=float)
-        variables[name] = (at, values, {"long_name": long_name})
+        variables[name] = labelled(at, values, long_name)
 
     column("energy_distance", lambda c: c.distance, "energy distance of the section clouds (root), scaled")
     column("energy_distance_matched", lambda c: c.matched, "median energy distance of parts as large as a half, scaled")
@@ -151,17 +153,21 @@ def _periods(
         words = f"on either side of a flip: the {whose} motion is doubled, its section points part by {by}"
     coexisting = np.asarray(predicted.coexisting, dtype=np.int64)
     return {
-        "measured_period_number": ((), np.int64(number), {"long_name": "measured period number (0: none found)"}),
-        "theory_period_number": ((), np.int64(predicted.period_number), {
-            "long_name": "period number of the nearest predicted motion (0: none found)"}),
-        "coexisting_period_number": ("attractor", coexisting, {
-            "long_name": "period numbers of all predicted motions"}),
-        "period_agrees": ((), np.int8(number == predicted.period_number), {
-            "long_name": "1 where the nearest predicted motion has the measured period number"}),
-        "period_coexists": ((), np.int8(number in coexisting), {
-            "long_name": "1 where the measured period number is among the predicted ones"}),
-        "period_relation": ((), words, {"long_name": "how the two period numbers lie to each other"}),
-    }  # fmt: skip
+        "measured_period_number": labelled((), np.int64(number), "measured period number (0: none found)"),
+        "theory_period_number": labelled(
+            (), np.int64(predicted.period_number), "period number of the nearest predicted motion (0: none found)"
+        ),
+        "coexisting_period_number": labelled("attractor", coexisting, "period numbers of all predicted motions"),
+        "period_agrees": labelled(
+            (),
+            np.int8(number == predicted.period_number),
+            "1 where the nearest predicted motion has the measured period number",
+        ),
+        "period_coexists": labelled(
+            (), np.int8(number in coexisting), "1 where the measured period number is among the predicted ones"
+        ),
+        "period_relation": labelled((), words, "how the two period numbers lie to each other"),
+    }
 
 
 def _doubled(single: FloatArray, doubled: FloatArray, scale: FloatArray, number: int) -> FloatArray | None:
@@ -211,18 +217,19 @@ def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, grid:
     over = ("phase", "state")
     names = ("phase", "phase") if closed else ("measured_phase", "theory_phase")
     variables: dict[str, Any] = {
-        "measured_orbit": ((names[0], "state"), a, {"long_name": "measured motion over the phase of the drive"}),
-        "theory_orbit": ((names[1], "state"), b, {"long_name": "predicted motion over the phase of the drive"}),
-        "orbit_distance": ((), distances[0], {"long_name": "normalised distance of the orbits, phase known"}),
-        "orbit_distance_any_phase": ((), distances[1], {"long_name": "normalised distance modulo phase"}),
-        "phase_shift": ((), distances[2], {
-            "long_name": "lead of the predicted orbit in orbit_distance_any_phase", "units": "forcing periods"}),
-    }  # fmt: skip
+        "measured_orbit": labelled((names[0], "state"), a, "measured motion over the phase of the drive"),
+        "theory_orbit": labelled((names[1], "state"), b, "predicted motion over the phase of the drive"),
+        "orbit_distance": labelled((), distances[0], "normalised distance of the orbits, phase known"),
+        "orbit_distance_any_phase": labelled((), distances[1], "normalised distance modulo phase"),
+        "phase_shift": labelled(
+            (), distances[2], "lead of the predicted orbit in orbit_distance_any_phase", "forcing periods"
+        ),
+    }
     if scatter is not None:
-        variables["measured_scatter"] = (over, scatter, {"long_name": "standard deviation of one pass"})
+        variables["measured_scatter"] = labelled(over, scatter, "standard deviation of one pass")
     for name, values in zip(names, (a, b), strict=True):
         coordinate = np.arange(len(values)) / grid
-        variables[name] = (name, coordinate, {"long_name": "phase of the drive", "units": "forcing periods"})
+        variables[name] = labelled(name, coordinate, "phase of the drive", "forcing periods")
     return variables
 
 
@@ -273,22 +280,24 @@ def motion_band(
             orbits.append(motion)
             to_measured[i] = orbit_distance(closed[0], motion, length).distance
     variables: dict[str, Any] = {
-        "draw_period_number": ("draw", numbers, {"long_name": "period number for drawn parameters"}),
-        "draw_energy_distance": (("section_phase", "draw"), distances.T, {
-            "long_name": "energy distance of the section clouds for drawn parameters, scaled"}),
-    }  # fmt: skip
+        "draw_period_number": labelled("draw", numbers, "period number for drawn parameters"),
+        "draw_energy_distance": labelled(
+            ("section_phase", "draw"), distances.T, "energy distance of the section clouds for drawn parameters, scaled"
+        ),
+    }
     if closed is None:
         return variables
-    variables["draw_orbit_distance"] = ("draw", to_measured, {
-        "long_name": "normalised distance of the orbits for drawn parameters"})  # fmt: skip
-    variables["band_share"] = ((), len(orbits) / draws, {
-        "long_name": "share of the draws that keep the period; these make the band"})  # fmt: skip
+    variables["draw_orbit_distance"] = labelled(
+        "draw", to_measured, "normalised distance of the orbits for drawn parameters"
+    )
+    variables["band_share"] = labelled(
+        (), len(orbits) / draws, "share of the draws that keep the period; these make the band"
+    )
     if orbits:
         stack = np.stack(orbits)
         low, middle, high = np.quantile(stack, model.quantiles, axis=0)
         for word, values in (("low", low), ("median", middle), ("high", high)):
-            variables[f"theory_{word}"] = (("phase", "state"), values, {"long_name": f"{word} of the band"})
+            variables[f"theory_{word}"] = labelled(("phase", "state"), values, f"{word} of the band")
         inside = ((closed[0] >= low) & (closed[0] <= high)).mean(axis=0)
-        variables["inside_band"] = ("state", inside, {
-            "long_name": "share of the measured orbit that lies inside the band"})  # fmt: skip
+        variables["inside_band"] = labelled("state", inside, "share of the measured orbit that lies inside the band")
     return variables

@@ -24,8 +24,6 @@ from numpy.typing import ArrayLike
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 
-__all__ = ["OrbitDistance", "common_length", "fold", "mean_orbit", "orbit_distance"]
-
 FEWEST_SAMPLES = 8  # per forcing period: fewer do not show an orbit
 
 

@@ -33,8 +33,6 @@ from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["BOUND", "Flip", "MeasuredPeriod", "delayed_flips", "flips", "measured_period", "period_numbers"]
-
 BOUND = 2.0  # of r_p: the stated noise may be wrong by as much before a period is lost
 FEWEST_RETURNS = 4
 

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["Attractor", "Motions", "Prediction", "from_result", "predict"]
-
 SAME = 1e-6  # orbits whose points are nearer to each other than this part of the motion are one
 
 

@@ -12,14 +12,12 @@ from nonsmooth.diagrams.response import jumps_in
 from nonsmooth.diagrams.sweep import sweep
 from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.jumps import Jump, Jumps, jumps_in_steps, match_jumps
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from nonsmooth.system.system import System
-
-__all__ = ["compare_response"]
-
 
 FINE = 301  # values of the predicted curve
 
@@ -39,19 +37,19 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: st
         values = np.linspace(runs["value"].min(), runs["value"].max(), FINE)
         curves, at_runs = _curves(model.system, model, name, state, values, runs, directions)
     variables: dict[str, Any] = {
-        f"measured_{name}": ("run", runs["value"], {"long_name": f"measured {name}", "units": unit}),
-        "measured_direction": ("run", runs["direction"], {"long_name": "direction in which the run was reached"}),
-        "measured_amplitude": ("run", runs["amplitude"], {"long_name": "measured amplitude"}),
-        "measured_amplitude_error": ("run", runs["error"], {"long_name": "standard error of it"}),
-        "measured_period_number": ("run", runs["period"], {
-            "long_name": "measured period number (0: none found, -1: not known)"}),
-        "theory_amplitude": ((name, "direction"), curves, {"long_name": "predicted amplitude"}),
-        "theory_at_run": ("run", at_runs, {"long_name": "predicted amplitude at the run"}),
-        "relative_difference": ("run", at_runs / runs["amplitude"] - 1, {
-            "long_name": "prediction over measurement, minus 1"}),
-        name: (name, values, {"long_name": name, "units": unit}),
-        "direction": ("direction", np.array(directions), {"long_name": "direction of the sweep"}),
-    }  # fmt: skip
+        f"measured_{name}": labelled("run", runs["value"], f"measured {name}", unit),
+        "measured_direction": labelled("run", runs["direction"], "direction in which the run was reached"),
+        "measured_amplitude": labelled("run", runs["amplitude"], "measured amplitude"),
+        "measured_amplitude_error": labelled("run", runs["error"], "standard error of it"),
+        "measured_period_number": labelled(
+            "run", runs["period"], "measured period number (0: none found, -1: not known)"
+        ),
+        "theory_amplitude": labelled((name, "direction"), curves, "predicted amplitude"),
+        "theory_at_run": labelled("run", at_runs, "predicted amplitude at the run"),
+        "relative_difference": labelled("run", at_runs / runs["amplitude"] - 1, "prediction over measurement, minus 1"),
+        name: labelled(name, values, name, unit),
+        "direction": labelled("direction", np.array(directions), "direction of the sweep"),
+    }
     expected = _jumps(values, curves, directions)
     seen = _measured_jumps(measured, runs, directions)
     drawn_jumps: list[Jumps] = []
@@ -65,12 +63,13 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: st
             drawn_jumps.append(_jumps(values, curve, directions))
         q = model.quantiles
         for word, curve in zip(("low", "median", "high"), np.nanquantile(np.stack(stack), q, axis=0), strict=True):
-            variables[f"theory_{word}"] = ((name, "direction"), curve, {"long_name": f"{word} of the band"})
+            variables[f"theory_{word}"] = labelled((name, "direction"), curve, f"{word} of the band")
         low, _, high = np.nanquantile(np.stack(stack_runs), q, axis=0)
         reach = 2 * np.nan_to_num(runs["error"])
         inside = (runs["amplitude"] + reach >= low) & (runs["amplitude"] - reach <= high)
-        variables["inside_band"] = ((), float(inside.mean()), {
-            "long_name": "share of the runs within two standard errors of the band"})  # fmt: skip
+        variables["inside_band"] = labelled(
+            (), float(inside.mean()), "share of the runs within two standard errors of the band"
+        )
         variables |= drawn
     return variables | match_jumps(seen, expected, drawn_jumps, unit, model.level)
 

@@ -9,11 +9,10 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.orbits import fold
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["measured_response", "measured_rise", "measured_sections", "section_points"]
 
 FEW = 6  # turns of the drive below which no period number is sought
 
@@ -70,15 +69,16 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
     omega = np.array([float(motion["omega"]) for motion in motions])
     return xr.Dataset(
         {
-            "amplitude": ("run", np.array(heights), {"long_name": "half the range of x", "units": "m"}),
-            "amplitude_error": ("run", np.array(errors), {"long_name": "standard error of it", "units": "m"}),
-            "omega": ("run", omega, {"long_name": "frequency of the drive", "units": "rad/s"}),
-            "direction": ("run", np.array(directions, dtype=str), {"long_name": "how the run was reached"}),
-            "period_number": ("run", np.array(periods, dtype=np.int64), {
-                "long_name": "period number (0: none found, -1: too few turns)"}),
+            "amplitude": labelled("run", np.array(heights), "half the range of x", "m"),
+            "amplitude_error": labelled("run", np.array(errors), "standard error of it", "m"),
+            "omega": labelled("run", omega, "frequency of the drive", "rad/s"),
+            "direction": labelled("run", np.array(directions, dtype=str), "how the run was reached"),
+            "period_number": labelled(
+                "run", np.array(periods, dtype=np.int64), "period number (0: none found, -1: too few turns)"
+            ),
         },
         attrs=attrs,
-    )  # fmt: skip
+    )
 
 
 def measured_rise(motion: xr.Dataset, parameter: str, first: float, last: float, *, unit: str = "") -> xr.Dataset:
@@ -106,13 +106,13 @@ def measured_rise(motion: xr.Dataset, parameter: str, first: float, last: float,
     at = first + (last - first) * (points[:, 2] - time[0]) / (time[-1] - time[0])
     return xr.Dataset(
         {
-            "section": (("iterate", "state"), points[:, :2], {"long_name": "section points"}),
+            "section": labelled(("iterate", "state"), points[:, :2], "section points"),
             "section_error": ("state", np.median(motion["u_error"].values, axis=0)),
-            parameter: ("iterate", at, {"long_name": parameter, "units": unit}),
+            parameter: labelled("iterate", at, parameter, unit),
         },
         {"state": motion["state"].values, "state_unit": ("state", motion["state_unit"].values)},
         motion.attrs,
-    )  # fmt: skip
+    )
 
 
 def measured_sections(
@@ -148,12 +148,13 @@ def measured_sections(
     attrs.pop("run", None)
     return xr.Dataset(
         {
-            "section": ((parameter, "iterate", "state"), points, {"long_name": "section points"}),
+            "section": labelled((parameter, "iterate", "state"), points, "section points"),
             "section_error": ("state", error),
         },
         {
-            parameter: (parameter, np.asarray(values, dtype=float)[order], {"long_name": parameter, "units": unit}),
-            "state": first["state"].values, "state_unit": ("state", first["state_unit"].values),
+            parameter: labelled(parameter, np.asarray(values, dtype=float)[order], parameter, unit),
+            "state": first["state"].values,
+            "state_unit": ("state", first["state_unit"].values),
         },
         attrs,
-    )  # fmt: skip
+    )

@@ -18,8 +18,6 @@ from nonsmooth.identification.fit.first_windows import WIDE, first_windows, told
 from nonsmooth.identification.fit.growth import POOR
 from nonsmooth.identification.fit.windows import Window, Windows
 
-__all__ = ["beginnings", "drawn"]
-
 _SPREAD = 0.5  # other first guesses lie within this factor, exp(+-0.5), of the one that was given
 _GUESSES, _STARTS = 128, 8  # drawn; starts for each guess
 _FITTED = 24  # of these guesses

@@ -12,8 +12,6 @@ from nonsmooth.identification.fit.first_level import misfits, settle_first
 from nonsmooth.identification.fit.first_windows import first_length
 from nonsmooth.identification.fit.windows import Windows
 
-__all__ = ["without_disagreeing"]
-
 _FAR = 8.0  # mean squared residual of a window over that of most, from which it disagrees
 _MOST = 0.5  # of the windows: if more disagree, nothing says which are right
 _LEAST = 3  # windows: a shorter part between two that disagree is left out with them

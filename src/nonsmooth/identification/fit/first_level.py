@@ -29,10 +29,6 @@ from nonsmooth.system.names import unknown
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = [
-    "BETTER", "alone", "level", "misfits", "other_beginnings", "own_size", "read_modes", "rechosen", "settle_first",
-    "settle_soft",
-]  # fmt: skip
 
 def level(
     problem: Windows, theta: FloatArray, starts: FloatArray, used: Any = None

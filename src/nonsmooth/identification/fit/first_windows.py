@@ -20,8 +20,6 @@ from nonsmooth.identification.fit.windows import Window, Windows
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["first_length", "first_windows", "rates", "states_from_samples", "told_start"]
-
 _AROUND = 3  # samples on either side, from which value and slope at a sample are taken
 _SWING = 0.15  # of a quantity's range: what counts as a swing
 _OF_A_SWING = 0.3  # to and fro: the length of the first windows

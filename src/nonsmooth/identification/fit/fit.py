@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from nonsmooth.identification.parameter_set import ParameterSet
     from nonsmooth.system.system import System
 
-__all__ = ["best_of", "fit", "problem_of"]
-
 _PHASES = 8  # first guesses of an unknown phase
 _LONGER = 3.3  # the other length of first windows, in every second try
 _LOSSES = {"linear": np.inf, "huber": 2.5}  # noise deviations from which on a residual counts linearly
@@ -135,41 +133,44 @@ def fit(
     """
     from nonsmooth.identification.fit.disagreeing import without_disagreeing
     from nonsmooth.identification.fit.outcome import outcome
+    from nonsmooth.identification.fit.posterior import posterior_of
 
     problem = problem_of(
         system, recording, parameters, options["measured"], options["priors"], options["settings"], options["runs"],
         options["time"], mode, loss, per_run, inputs,
     )  # fmt: skip
-    if start is not None and not is_one_start(start):
-        raise ValueError("fit takes one first guess of the start, for all runs; settings= differ from run to run")
-    begin = None if start is None else np.tile(start_states(system, start)[0], (len(problem.records), 1))
     free, tries, seed, progress = options["free_start"], options["tries"], options["seed"], options["progress"]
-    if not free and begin is None:
-        raise ValueError("free_start=False says that the start is known: give start=, the states at the first sample")
-    longest = np.inf if window is None else window
-    profiles = [profile] if isinstance(profile, str) else list(profile)
-    for name in profiles:
-        if name not in problem.unknowns.names:
-            raise ValueError(f"profile: {unknown(name, 'an unknown', 'this fit', list(problem.unknowns.names))}")
-    left: list[str] = []
-    if leave_out and not free:
-        raise ValueError("leave_out=True begins anew behind what it leaves out: it needs free starts, free_start=True")
-    best = best_of(problem, begin, free, longest, tries, seed, progress)
+    begin, profiles = _begun(problem, start, free, leave_out), _profiles(problem, profile)
+    best, left = best_of(problem, begin, free, window or np.inf, tries, seed, progress), list[str]()
     if leave_out:
         problem, left = without_disagreeing(problem, best.theta)
         if len(problem.records) != len(best.problem.records) or problem.records[0] is not best.problem.records[0]:
-            best = best_of(problem, None, True, longest, tries, seed, progress)
-    beside = []
-    if posterior:
-        from nonsmooth.identification.fit.posterior import posterior_of
-
-        beside.append(posterior_of(best, posterior, seed, progress))
+            best = best_of(problem, None, True, window or np.inf, tries, seed, progress)
     asked = {"parameters": list(problem.unknowns.names), "window": window, "tries": tries, "seed": seed}
     given = recording if isinstance(recording, list | tuple) else [recording]
     return outcome(
         best, asked, synthetic=any(getattr(one, "synthetic", False) for one in given), profiles=profiles,
-        watched=progress, left=left, beside=beside,
+        watched=progress, left=left, beside=[posterior_of(best, posterior, seed, progress)] if posterior else [],
     )  # fmt: skip
+
+
+def _profiles(problem: Windows, given: str | Sequence[str]) -> list[str]:
+    names = [given] if isinstance(given, str) else list(given)
+    for name in names:
+        if name not in problem.unknowns.names:
+            raise ValueError(f"profile: {unknown(name, 'an unknown', 'this fit', list(problem.unknowns.names))}")
+    return names
+
+
+def _begun(problem: Windows, start: Any, free: bool, leave_out: bool) -> FloatArray | None:
+    """The first guess of the states of each record; ValueError where what is said of the starts does not fit."""
+    if start is not None and not is_one_start(start):
+        raise ValueError("fit takes one first guess of the start, for all runs; settings= differ from run to run")
+    if not free and start is None:
+        raise ValueError("free_start=False says that the start is known: give start=, the states at the first sample")
+    if leave_out and not free:
+        raise ValueError("leave_out=True begins anew behind what it leaves out: it needs free starts, free_start=True")
+    return None if start is None else np.tile(start_states(problem.system, start)[0], (len(problem.records), 1))
 
 
 def problem_of(

@@ -19,8 +19,6 @@ from nonsmooth.kernels.hybrid import codes
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Marcher", "Motion"]
-
 RTOL = 1e-11  # where the flow is not exact: below any noise, and below what a step of a fit changes
 
 

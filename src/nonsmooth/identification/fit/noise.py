@@ -12,8 +12,6 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import State
 from nonsmooth.identification.fit.windows import Windows
 
-__all__ = ["OUTLYING", "colours", "parts", "robust_size", "strange"]
-
 OUTLYING = 6.0  # noise deviations, beyond which a reading is named
 _LEAST, _MOST = 0.1, 0.98  # correlation of neighbours: below it noise counts as white
 _SURE = 4.0  # standard errors of a correlation

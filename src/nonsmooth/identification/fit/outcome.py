@@ -22,8 +22,6 @@ from nonsmooth.results.progress import Progress
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["outcome"]
-
 _TOGETHER = 0.98  # correlation from which two parameters are said to be known only together
 _POOR = 2.0  # residuals over noise, from which the model is said not to be the motion
 _SHARED = 8  # readings that share the record's extreme value

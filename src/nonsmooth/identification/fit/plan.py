@@ -13,6 +13,7 @@ from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.options import Known
+from nonsmooth.results.labels import labelled
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.names import unknown
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from nonsmooth.system.system import System
-
-__all__ = ["plan_experiment"]
 
 _OF_A_RUN = ("duration", "periods", "samples", "start", "mode", "settings")
 
@@ -124,23 +123,34 @@ def plan_experiment(
     units = np.array(_units(system, names), dtype=object)
     return xr.Dataset(
         {
-            "uncertainty": (("run", "parameter"), alone, {"long_name": "standard uncertainty by this run"}),
-            "log_det": ("run", [_log_det(one + precision, size) for one in found], {
-                "long_name": "log det of the information, in units of the parameters' values"}),
-            "best": ("parameter", labels[np.argmin(alone, axis=0)].astype(str), {
-                "long_name": "run with the least uncertainty"}),
-            "information": (("run", "parameter", "other"), np.array(found), {"long_name": "Fisher information"}),
-            "order": ("step", labels[order].astype(str), {"long_name": "run that adds most to the determinant"}),
-            "uncertainty_after": (("step", "parameter"), np.array([*map(_uncertainties, totals)]), {
-                "long_name": "standard uncertainty by this run and those before"}),
-            "log_det_after": ("step", [_log_det(one, size) for one in totals], {
-                "long_name": "log det by this run and those before"}),
+            "uncertainty": labelled(("run", "parameter"), alone, "standard uncertainty by this run"),
+            "log_det": labelled(
+                "run",
+                [_log_det(one + precision, size) for one in found],
+                "log det of the information, in units of the parameters' values",
+            ),
+            "best": labelled(
+                "parameter", labels[np.argmin(alone, axis=0)].astype(str), "run with the least uncertainty"
+            ),
+            "information": labelled(("run", "parameter", "other"), np.array(found), "Fisher information"),
+            "order": labelled("step", labels[order].astype(str), "run that adds most to the determinant"),
+            "uncertainty_after": labelled(
+                ("step", "parameter"),
+                np.array([*map(_uncertainties, totals)]),
+                "standard uncertainty by this run and those before",
+            ),
+            "log_det_after": labelled(
+                "step", [_log_det(one, size) for one in totals], "log det by this run and those before"
+            ),
         },
         {
-            "run": labels.astype(str), "parameter": names, "other": names, "step": np.arange(1, len(order) + 1),
+            "run": labels.astype(str),
+            "parameter": names,
+            "other": names,
+            "step": np.arange(1, len(order) + 1),
             "unit": ("parameter", units.astype(str)),
         },
-    )  # fmt: skip
+    )
 
 
 def _information(
@@ -175,9 +185,7 @@ def _information(
     return list(problem.unknowns.names[:shared]), eliminated, known, theta[:shared]
 
 
-def _ordered(
-    found: list[FloatArray], known: FloatArray, size: FloatArray
-) -> tuple[list[int], list[FloatArray]]:
+def _ordered(found: list[FloatArray], known: FloatArray, size: FloatArray) -> tuple[list[int], list[FloatArray]]:
     """The runs, each the one that adds most to the determinant, and the information with each and those before."""
     order: list[int] = []
     totals: list[FloatArray] = []

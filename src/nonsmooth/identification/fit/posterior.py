@@ -13,8 +13,6 @@ from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.growth import Grown
 from nonsmooth.results.progress import Progress, progress
 
-__all__ = ["posterior_of"]
-
 _MOST = 80  # unknowns and numbers of starts: beyond, an ensemble moves too slowly
 _BURNT = 0.25  # of the steps, before the ensemble has forgotten where it began
 _ENOUGH = 50.0  # autocorrelation times that the steps should span

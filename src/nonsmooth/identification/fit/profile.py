@@ -13,7 +13,6 @@ from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.growth import Grown
 from nonsmooth.results.progress import Progress, progress
 
-__all__ = ["Profile", "profile_of", "profiled"]
 
 class Profile(NamedTuple):
     """A parameter's profile likelihood: its values, the rise of chi^2 above its least, and the 95 % limits.

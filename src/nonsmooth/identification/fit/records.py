@@ -19,8 +19,6 @@ from nonsmooth.system.names import unknown
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Record", "irregularity", "read_records"]
-
 FORMS = (
     "a Recording, a Dataset over time, a DataFrame with a column of time (or time as its index), a mapping of channel "
     "to (t, y), or a list of these"

@@ -15,8 +15,6 @@ from nonsmooth.system.system import System
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["by_place", "residual_data"]
-
 _NEAR = 1.5  # sampling steps from a transition or a graze
 _GRAZING = 0.03  # clearance over the largest size of the indicator, below which a touch is a graze
 

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from nonsmooth.identification.fit.growth import Grown
     from nonsmooth.identification.fit.windows import Windows
 
-__all__ = ["select_model"]
-
 _BLOCK = 2.0  # first windows: the length of a part that is held out
 
 

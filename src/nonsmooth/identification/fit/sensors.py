@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
 
-__all__ = ["OF_A_SENSOR", "Readout", "Sensor", "read_sensors"]
-
 #: What a fit may find of a sensor, as ``"x.offset"``.
 OF_A_SENSOR = ("gain", "offset", "delay")
 

@@ -18,8 +18,6 @@ from nonsmooth.system.names import unknown
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Unknowns", "read_unknowns"]
-
 _CLOCKS = (0.9, 1.1)  # within which the time of the model over that of the recording lies
 
 

@@ -21,12 +21,10 @@ from nonsmooth.identification.fit.motion import Marcher, Motion
 from nonsmooth.identification.fit.records import Record
 from nonsmooth.identification.fit.sensors import Readout, Sensor
 from nonsmooth.identification.fit.unknowns import Unknowns
-from nonsmooth.identification.uncertainty import correlation_times
+from nonsmooth.recordings.signals.spectrum import correlation_times
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
-
-__all__ = ["Window", "Windows"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from types import ModuleType, SimpleNamespace
 CAPABILITY = (9, 0)
 
 
-def ptx_of(entry: str, signature: str, shape: tuple[int, ...], capability: tuple[int, int] = CAPABILITY) -> str:
-    """One entry of the module for a shape of system, compiled for a compute capability.
+def ptx_of(entry: str, signature: str, shape: tuple[int, ...]) -> str:
+    """One entry of the module for a shape of system, compiled for ``CAPABILITY``.
 
     Parameters
     ----------
@@ -24,20 +24,20 @@ def ptx_of(entry: str, signature: str, shape: tuple[int, ...], capability: tuple
     from nonsmooth.kernels.cuda.module import cuda_linear_module
 
     observer = "growth" if entry == "frames" else "sections"
-    return ptx_of_module(cuda_linear_module(*shape, observer), entry, signature, capability)
+    return ptx_of_module(cuda_linear_module(*shape, observer), entry, signature)
 
 
-def ptx_of_module(module: ModuleType, entry: str, signature: str, capability: tuple[int, int] = CAPABILITY) -> str:
+def ptx_of_module(module: ModuleType, entry: str, signature: str) -> str:
     """The same for an entry of any module with the GPU's header."""
     from numba.cuda import compile, dispatcher
 
     from nonsmooth.kernels.cuda.target import THREADS
 
     before = dispatcher.get_current_device
-    dispatcher.get_current_device = lambda: SimpleNamespace(compute_capability=capability)
+    dispatcher.get_current_device = lambda: SimpleNamespace(compute_capability=CAPABILITY)
     try:
         function = getattr(module, entry).py_func
-        text, _ = compile(function, signature, device=False, abi="numba", cc=capability, launch_bounds=THREADS)
+        text, _ = compile(function, signature, device=False, abi="numba", cc=CAPABILITY, launch_bounds=THREADS)
     finally:
         dispatcher.get_current_device = before
     return str(text)

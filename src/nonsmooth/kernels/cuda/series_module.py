@@ -18,8 +18,8 @@ from nonsmooth.kernels.cuda.module import joined, stamp
 
 PARTS = (
     "circular", "series.polynomial", "series.crossing", "series.rkf45", "series.taylor", "series.trust", "series.step",
-    "series.watch", "series.stepper", "hybrid.loop", "hybrid.sections", "hybrid.observers", "judging.judge",
-    "judging.settle", "judging.exponent", "cuda.settle", "cuda.series",
+    "series.watch", "series.instant", "series.stepper", "hybrid.loop", "hybrid.sections", "hybrid.observers",
+    "judging.judge", "judging.settle", "judging.exponent", "cuda.settle", "cuda.series",
 )  # fmt: skip
 
 

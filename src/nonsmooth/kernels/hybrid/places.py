@@ -22,7 +22,6 @@ MOST_AT_ONCE = 60  # at one instant: a log has room for 64 more when a step begi
 MOST_STEPS = 2_000_000  # on the way to the next return
 BURST_LENGTH = 50  # crossings in a row at intervals below SHORT of the stepper's time scale end a run as chatter
 SHORT = 1e-11
-PATIENCE = 1_000_000  # steps of a run between two looks whether somebody wants to stop it
 NO_END = 1e300  # a time that is never reached
 
 # What a run is for (``Goal.kind``), and what an observer says of a segment.

@@ -8,7 +8,7 @@ from types import ModuleType
 from nonsmooth.kernels.compile.assembly import joined
 from nonsmooth.kernels.compile.cache import load_module
 
-STEPPER = ("series.step", "series.watch", "series.stepper", "hybrid.loop")
+STEPPER = ("series.step", "series.watch", "series.instant", "series.stepper", "hybrid.loop")
 OBSERVERS = ("series.growth", "hybrid.sections", "hybrid.record", "hybrid.growth", "hybrid.observers", "hybrid.run")
 
 

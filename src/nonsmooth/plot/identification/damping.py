@@ -11,17 +11,6 @@ from nonsmooth.plot import style
 from nonsmooth.plot.comparison import MEASURED
 from nonsmooth.plot.identification.picture import Picture, number, picture
 
-__all__ = [
-    "amplitude_fit",
-    "backbone",
-    "drop_decay",
-    "forced_responses",
-    "free_decay",
-    "half_power",
-    "modal_damping",
-    "nyquist",
-]
-
 _TIME = ("time", "s")
 _OMEGA, _AMPLITUDE = (r"$\omega$", "rad/s"), ("amplitude of $x$", "m")
 _MARKERS = {"up": "^", "down": "v"}

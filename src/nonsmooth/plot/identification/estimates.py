@@ -15,8 +15,6 @@ from nonsmooth.results.statuses import words_of_flags
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["calibration", "coverage", "fit_residuals", "force_displacement", "profile"]
-
 SHOWN = 600
 #: What the sign of ``pull`` means, and the colour of its residuals.
 _WAYS = {1: ("growing", "first"), -1: ("falling", "zone")}

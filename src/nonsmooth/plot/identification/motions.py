@@ -10,17 +10,6 @@ from nonsmooth.plot import style
 from nonsmooth.plot.comparison import MEASURED
 from nonsmooth.plot.identification.picture import Picture, data_of, number, picture
 
-__all__ = [
-    "grazing",
-    "impulse_history",
-    "impulse_response",
-    "multiple_shooting",
-    "restitution",
-    "steady_amplitude",
-    "steady_phase",
-    "toss",
-]
-
 _TIME, _DISPLACEMENT = ("time", "s"), ("displacement", "m")
 _BINS = 9  # shown on either side of the peak
 _PEAKS = (("peak_frequency", "interpolated peak", "first", "-"), ("decay_frequency", "decay fit", "second", "--"))

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["Picture", "data_of", "number", "picture", "pictures", "with_error"]
-
 _SHARE = 0.30  # of the height of the axes, for residuals
 
 

@@ -29,8 +29,6 @@ from nonsmooth.recordings.reading import (
     names_of,
 )
 
-__all__ = ["read"]
-
 _PICK = re.compile(r"(?P<path>.*?)\((?:(?P<column>:,(?P<k>\d{1,6}))|(?P<row>(?P<j>\d{1,6}),:))\)")
 _TOP = "Run #1"
 

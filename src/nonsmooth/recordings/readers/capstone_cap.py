@@ -24,8 +24,6 @@ from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.readers.text_table import number
 from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Options, Reading, Remarks, Source, Trace
 
-__all__ = ["RECORD", "SYNTHETIC", "Experiment", "Segment", "parse", "read"]
-
 RECORD = np.dtype([("valid", "<u4"), ("value", "<f8")])
 
 #: What ``write_cap`` puts into the header's attribute ``Origin``.

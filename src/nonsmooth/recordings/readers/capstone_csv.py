@@ -15,8 +15,6 @@ from nonsmooth.recordings.readers.fields import Field, Table, split_unit, traces
 from nonsmooth.recordings.readers.text_table import Cells, Numerals, checked_header, decoded, read_cells, rows, sniffed
 from nonsmooth.recordings.reading import MAX_COLUMNS, TIME_WORDS, Options, Reading, Remarks, Source, Trace, names_of
 
-__all__ = ["SYNTHETIC", "looks_like_capstone", "read"]
-
 #: What ``write_capstone_csv`` puts behind a run's name: the only free text of the format.
 SYNTHETIC = " [synthetic]"
 

@@ -6,7 +6,6 @@ labelled synthetic: in the header of a ``.cap``, behind each run's name in a CSV
 
 from __future__ import annotations
 
-import csv
 import io
 import os
 import tempfile
@@ -25,8 +24,6 @@ from nonsmooth.recordings.recording import Recording
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["write_cap", "write_capstone_csv"]
 
 _PAGE = 256  # records; Capstone's members are longer than what was measured
 
@@ -67,35 +64,27 @@ def write_capstone_csv(
         raise ValueError(f"decimal must be '.' or ',', got {decimal!r}")
     if not 1 <= digits <= 17:
         raise ValueError(f"digits must be 1 to 17, got {digits!r}")
-    headers: list[str] = []
-    columns: list[list[str]] = []
+    import pandas as pd
+
+    tables = []
     for run in recording.runs:
-        label = f"{_long_name(recording, run)}{capstone_csv.SYNTHETIC}"
-        sensors = list(_sensors(recording, run))
-        printed = [[_print(t, digits) for t in ds["time"].values.tolist()] for ds in sensors]
-        times = dict(sorted({text: float(text) for texts in printed for text in texts}.items(), key=lambda kv: kv[1]))
-        row = {text: k for k, text in enumerate(times)}
-        headers.append(f"Time (s) {label}")
-        columns.append(list(times))
-        for ds, texts in zip(sensors, printed, strict=True):
-            if len(set(texts)) < len(texts):
+        label = f"{recording.tree[run].attrs.get('long_name') or run}{capstone_csv.SYNTHETIC}"
+        columns = []
+        for ds in _sensors(recording, run):
+            times = ds["time"].values.round(digits) + 0.0
+            if len(np.unique(times)) < len(times):
                 raise ValueError(f"run {run!r}: {digits} decimals are too few for its times; samples would coincide")
             for name, array in ds.data_vars.items():
                 unit = f" ({array.attrs['units']})" if array.attrs.get("units") else ""
-                headers.append(f"{array.attrs.get('long_name', name)}{unit} {label}")
-                column = [""] * len(times)
-                for text, value in zip(texts, array.values.tolist(), strict=True):
-                    column[row[text]] = _print(value, digits) if np.isfinite(value) else ""
-                columns.append(column)
-    longest = max(map(len, columns), default=0)
-    table = io.StringIO(newline="")
-    writer = csv.writer(table, delimiter=";" if decimal == "," else ",", lineterminator="\r\n")
-    writer.writerow(headers)
-    for k in range(longest):
-        fields = (column[k] if k < len(column) else "" for column in columns)
-        writer.writerow([f.replace(".", decimal) for f in fields])
-    mark = b"\xef\xbb\xbf" if byte_order_mark else b""
-    return _put(Path(path), mark + table.getvalue().encode("utf-8"))
+                values = np.where(np.isfinite(array.values), array.values, np.nan)
+                values[np.abs(values) < 0.5 * 0.1**digits] = 0.0  # no "-0.00"
+                columns.append(pd.Series(values, times, name=f"{array.attrs.get('long_name', name)}{unit} {label}"))
+        tables.append(pd.concat(columns, axis=1).sort_index().rename_axis(f"Time (s) {label}").reset_index())
+    text = pd.concat(tables, axis=1).to_csv(
+        sep=";" if decimal == "," else ",", decimal=decimal, float_format=f"%.{digits}f", index=False,
+        lineterminator="\r\n",
+    )  # fmt: skip
+    return _put(Path(path), text.encode("utf-8-sig" if byte_order_mark else "utf-8"))
 
 
 def write_cap(recording: Recording, path: str | os.PathLike[str], *, sensors: Sequence[Mapping[str, str]] = ()) -> Path:
@@ -175,15 +164,6 @@ def _sensors(recording: Recording, run: str) -> Iterator[xr.Dataset]:
         if tuple(dataset.dims) != ("time",):
             raise ValueError(f"run {run!r}, sensor {sensor!r} is over {tuple(dataset.dims)}; only time can be written")
         yield dataset
-
-
-def _long_name(recording: Recording, run: str) -> str:
-    return str(recording.tree[run].attrs.get("long_name") or run)
-
-
-def _print(value: float, digits: int) -> str:
-    text = f"{value:.{digits}f}"
-    return text.removeprefix("-") if float(text) == 0 else text
 
 
 def _records(values: FloatArray) -> bytes:

@@ -15,8 +15,6 @@ from nonsmooth.recordings.readers.fields import Field, Table, chosen, traces_of
 from nonsmooth.recordings.readers.text_table import Numerals, Row, checked_header, decoded, read_cells, rows, sniffed
 from nonsmooth.recordings.reading import Options, Reading, Source, Trace, names_of
 
-__all__ = ["read", "read_lines"]
-
 _COMMENT = ("#", "%")
 _STAMP = re.compile(r"[\d:/.,+\-TZ ]*\d:\d[\d:/.,+\-TZ ]*")
 _LABELLED = re.compile(r"([^\W\d][^:=]*?)\s*[:=]\s*(\S*)")

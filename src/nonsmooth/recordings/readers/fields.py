@@ -22,7 +22,6 @@ from nonsmooth.recordings.reading import (
     scaled_time,
 )
 
-__all__ = ["EPOCH", "Field", "Table", "chosen", "label", "places", "seconds_of", "split_unit", "traces_of"]
 
 @dataclass(frozen=True, eq=False)
 class Field:

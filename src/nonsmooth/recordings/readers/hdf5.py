@@ -9,8 +9,6 @@ import numpy as np
 
 from nonsmooth.recordings.reading import MAX_COLUMNS, MAX_DEPTH, Group, Remarks, Source, inflation_limit
 
-__all__ = ["load_hdf5"]
-
 #: Attributes that give the sample rate of a group's arrays, in Hz.
 _RATES = ("sample_rate", "sampling_rate", "sampling_frequency", "rate", "fs")
 

@@ -21,8 +21,6 @@ from nonsmooth.recordings.readers.matlab_v5 import load_v5
 from nonsmooth.recordings.readers.tdms import load_tdms
 from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Group, Remarks, Source, inflation_limit, needed
 
-__all__ = ["load"]
-
 Loaded = tuple[Mapping[str, Any], dict[str, Any]]
 
 

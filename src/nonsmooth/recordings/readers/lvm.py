@@ -21,8 +21,6 @@ from nonsmooth.recordings.readers.fields import Field, Table, traces_of
 from nonsmooth.recordings.readers.text_table import Cells, Numerals, decoded, number, read_cells
 from nonsmooth.recordings.reading import MAX_COLUMNS, Options, Reading, Remarks, Source, Trace
 
-__all__ = ["read"]
-
 _END = "***End_of_Header***"
 _MAX_SEGMENTS = 1024
 _MAX_COMMENTS = 64  # kept per segment

@@ -18,8 +18,6 @@ import numpy as np
 
 from nonsmooth.recordings.reading import MAX_DEPTH, Remarks, Source, inflation_limit
 
-__all__ = ["load_v5"]
-
 _HEADER = 128
 _INT8, _INT32, _MATRIX, _COMPRESSED = 1, 5, 14, 15
 _NUMERIC, _TEXT = {1, 2, 3, 4, 5, 6, 7, 9, 12, 13}, {1, 2, 3, 4, 16, 17, 18}

@@ -12,8 +12,6 @@ from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.readers.delimited import read_lines
 from nonsmooth.recordings.reading import Archive, Options, Reading, Source, needed
 
-__all__ = ["read"]
-
 
 def read(data: bytes, source: Source, options: Options) -> Reading:
     """Read a workbook; a sheet that is no table is left out, where another is one."""

@@ -17,7 +17,6 @@ import numpy as np
 
 from nonsmooth.recordings.reading import MAX_COLUMNS, Group, Remarks, Source, is_axis_name, needed
 
-__all__ = ["check_layout", "load_tdms"]
 
 def load_tdms(data: bytes, source: Source, remarks: Remarks) -> tuple[dict[str, Any], dict[str, Any]]:
     """The groups of a file by clock, and its properties."""

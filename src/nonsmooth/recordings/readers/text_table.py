@@ -20,8 +20,6 @@ from numpy.typing import NDArray
 from nonsmooth.arrays import IntArray
 from nonsmooth.recordings.reading import MAX_COLUMNS, Remarks, Source
 
-__all__ = ["Cells", "Numerals", "Row", "checked_header", "decoded", "number", "read_cells", "rows", "sniffed"]
-
 #: Line number and fields.
 Row = tuple[int, list[str]]
 

@@ -19,8 +19,6 @@ from nonsmooth.recordings.sampling import examine, missing_runs
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["even_rate", "signal", "take", "warn", "whose"]
-
 
 def whose(x: Any, default: str = "the signal") -> str:
     """``run 'Run #1', channel 'Angle'`` as far as the attributes of ``x`` say it."""

@@ -16,11 +16,10 @@ from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal
 from nonsmooth.recordings.signals.smoothing import smooth
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["contacts"]
 
 _UNDECIDED = 0.01  # of the samples: at the edge of contact, of which none is used for the support
 
@@ -103,17 +102,13 @@ def _support(found: xr.Dataset, omega: float | None, resolution: float) -> tuple
     deep = pushed & (left < 0.25 * np.quantile(left[pushed], 0.05))
     if np.count_nonzero(deep) < 4 or np.ptp(x[deep]) < 2.0 * resolution:
         deep = pushed
-    B = np.column_stack([np.ones(np.count_nonzero(deep)), x[deep]])
-    line, *_ = np.linalg.lstsq(B, left[deep], rcond=None)
-    if line[1] >= 0:
+    (slope, at_zero), C = np.polyfit(x[deep], left[deep], 1, cov=True)
+    if slope >= 0:
         return none
-    rest = left[deep] - B @ line
-    variance = float(rest @ rest) / max(len(rest) - 2, 1)
-    C = variance * np.linalg.inv(B.T @ B)
-    g = -line[0] / line[1]
-    along = np.array([1.0, g]) / line[1]
+    g = -at_zero / slope
+    along = np.array([g, 1.0]) / slope
     # Samples of one contact are not independent: some 4 of them say as much as one.
-    return float(g), 2.0 * math.sqrt(float(along @ C @ along)), float(-line[1])
+    return float(g), 2.0 * math.sqrt(float(along @ C @ along)), float(-slope)
 
 
 def _beside_the_free_motion(found: xr.Dataset, omega: float | None, free: BoolArray) -> tuple[FloatArray, BoolArray]:
@@ -211,9 +206,9 @@ def _labelled(found: xr.Dataset, place: tuple[float, float, float], least: float
             "depth": ("contact", depth, {"long_name": "depth of the contact", **metre}),
             "v_begin": ("contact", speed[0], {"long_name": "velocity at the begin", **rate}),
             "v_end": ("contact", speed[1], {"long_name": "velocity at the end", **rate}),
-            "uncertain": ("contact", (depth < least) | (seen < 2) | cut, {"long_name": "contact is uncertain"}),
+            "uncertain": labelled("contact", (depth < least) | (seen < 2) | cut, "contact is uncertain"),
             "gap": ((), gap, metre),
             "gap_error": ((), gap_error, metre),
-            "stiffness": ((), stiffness, {"long_name": "stiffness of the support by the mass", "units": "1/s^2"}),
+            "stiffness": labelled((), stiffness, "stiffness of the support by the mass", "1/s^2"),
         }
     )

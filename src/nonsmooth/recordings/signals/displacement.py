@@ -11,8 +11,6 @@ from nonsmooth.recordings.signals.checks import whose
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["found_resolution", "position", "resolution"]
-
 #: Turns per unit of angle.
 _TURNS = {
     "rad": 0.5 / np.pi, "radian": 0.5 / np.pi, "radians": 0.5 / np.pi,

@@ -12,11 +12,10 @@ from numpy.typing import ArrayLike
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal, whose
+from nonsmooth.recordings.signals.spectrum import correlation_times
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["HarmonicFit", "fit"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +143,7 @@ def fit(
         names.append("omega")
     free = max(len(t) - A.shape[1], 1)
     variance = float(left @ left) / free
-    correlation = _correlation(left)
+    correlation = correlation_times(left)
     R = np.linalg.qr(A, mode="r")
     inverse = np.linalg.inv(R)
     C = variance * correlation * inverse @ inverse.T
@@ -210,18 +209,3 @@ def _best(tau: FloatArray, values: FloatArray, omega: float, n: int, length: flo
                 "20 steps; give one that is nearer, or a longer record"
             )
     return best
-
-
-def _correlation(left: FloatArray) -> float:
-    """The integrated autocorrelation of residuals, summed up to its first negative value; at least 1."""
-    n = len(left)
-    power = float(left @ left)
-    if power == 0.0:
-        return 1.0
-    total = 1.0
-    for lag in range(1, n // 4):
-        r = float(left[lag:] @ left[:-lag]) / power
-        if r <= 2.0 / math.sqrt(n):
-            break
-        total += 2.0 * r
-    return total

@@ -16,8 +16,6 @@ from nonsmooth.recordings.signals.smoothing import smooth
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["impacts"]
-
 
 def impacts(
     time: ArrayLike,

@@ -19,8 +19,6 @@ from typing import Any
 
 from nonsmooth.kernels.compile.cache import inline, kernel
 
-__all__ = ["filter_nodes", "smooth_nodes"]
-
 
 @inline
 def fill_step(n: Any, h: Any, q: Any, F: Any, Q: Any) -> None:

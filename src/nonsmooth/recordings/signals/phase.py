@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike
 from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.recordings.signals.checks import signal, warn, whose
 
-__all__ = ["DrivePhase", "drive_phase"]
-
 TURN = 2.0 * math.pi
 
 
@@ -179,15 +177,11 @@ def _by_gate(time: Any, resolution: float, span: tuple[float, float] | None) -> 
             f"the gate missed {int((counts - 1).sum())} turns, the first after t = {times[i]:.6g} s; they are counted",
         )
     turns = np.concatenate([[0], np.cumsum(counts)])
-    n = len(times)
-    middle = turns - turns.mean()
-    period = float(middle @ times / (middle @ middle))
-    start = float(times.mean() - period * turns.mean())
-    residual = times - start - period * turns
-    scatter = float(np.sqrt(residual @ residual / max(n - 2, 1)))
+    line, covariance = np.polyfit(turns, times, 1, cov="unscaled")
+    residual = times - np.polyval(line, turns)
+    scatter = float(np.sqrt(residual @ residual / (len(times) - 2)))
     s = max(scatter, resolution / math.sqrt(12.0))
-    period_error = s / math.sqrt(float(middle @ middle))
-    t_0_error = s * math.sqrt(1.0 / n + float(turns.mean()) ** 2 / float(middle @ middle))
+    period, (period_error, t_0_error) = float(line[0]), (s * np.sqrt(np.diag(covariance))).tolist()
     omega = TURN / period
     return DrivePhase(
         omega, omega * period_error / period, float(times[0]), t_0_error, scatter, "photogate", times, turns,

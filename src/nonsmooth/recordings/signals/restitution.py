@@ -15,11 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import even_rate, signal, whose
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["flights", "impacts_of", "restitution", "single_contacts"]
 
 
 def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int = 4) -> xr.Dataset:
@@ -76,8 +75,8 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
         {
             "first": ("flight", first), "last": ("flight", last),
             "begin": ("flight", t[first], {"units": "s"}), "end": ("flight", t[last], {"units": "s"}),
-            "acceleration": ((), acceleration, {"long_name": "acceleration in flight"}),
-            "acceleration_error": ((), error), "noise": ((), noise, {"long_name": "standard deviation of a sample"}),
+            "acceleration": labelled((), acceleration, "acceleration in flight"),
+            "acceleration_error": ((), error), "noise": labelled((), noise, "standard deviation of a sample"),
         }
     )  # fmt: skip
 
@@ -157,17 +156,17 @@ def impacts_of(rows: Sequence[Mapping[str, Any]], more: Mapping[str, tuple[type,
     data: dict[str, Any] = {}
     times = {"impact_time": "time of the impact", "duration": "from the last free sample to the next"}
     for name, long_name in times.items():
-        data[name] = ("impact", column(name, float), {"long_name": long_name, "units": "s"})
+        data[name] = labelled("impact", column(name, float), long_name, "s")
     (v0, e0), (v1, e1) = ([column(name, float, place) for place in (0, 1)] for name in ("v_before", "v_after"))
     for word, v, error in (("before", v0, e0), ("after", v1, e1)):
-        data[f"v_{word}"] = ("impact", v, {"long_name": f"velocity {word} the impact"})
+        data[f"v_{word}"] = labelled("impact", v, f"velocity {word} the impact")
         data[f"v_{word}_error"] = ("impact", error)
     with np.errstate(divide="ignore", invalid="ignore"):
         e = np.where(v0 < -3.0 * e0, -v1 / v0, np.nan)
         e_error = np.hypot(e1, e * e0) / np.abs(v0)
-    data |= {"restitution": ("impact", e, {"long_name": "restitution"}), "restitution_error": ("impact", e_error)}
-    data["flight"] = ("impact", column("flight", int), {"long_name": "flight before"})
-    data |= {name: ("impact", column(name, kind), {"long_name": text}) for name, (kind, text) in more.items()}
+    data |= {"restitution": labelled("impact", e, "restitution"), "restitution_error": ("impact", e_error)}
+    data["flight"] = labelled("impact", column("flight", int), "flight before")
+    data |= {name: labelled("impact", column(name, kind), text) for name, (kind, text) in more.items()}
     return xr.Dataset(data)
 
 

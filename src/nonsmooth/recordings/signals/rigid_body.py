@@ -21,9 +21,6 @@ from nonsmooth.recordings.signals.restitution import impacts_of, single_contacts
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["corner_heights", "corner_restitution", "cube"]
-
-
 _COLUMNS = {
     "corner": (int, "row of the corner"), "half_sample": (float, "change of the restitution by half a sample"),
     "height": (float, "height of the corner"), "touching": (int, "corners at the ground"),

@@ -14,8 +14,6 @@ from nonsmooth.recordings.signals.smoothing import labelled_motion
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["savitzky_golay"]
-
 
 def savitzky_golay(
     time: ArrayLike,

@@ -13,13 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import signal, whose
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from nonsmooth.recordings.signals.phase import DrivePhase
-
-__all__ = ["poincare", "stroboscopic"]
 
 
 class Known(TypedDict, total=False):
@@ -233,14 +232,14 @@ def _points(
     units = [between.unit, f"{between.unit}/s"]
     return xr.Dataset(
         {
-            "section": (("iterate", "state"), section, {"long_name": "section points"}),
-            "section_error": (("iterate", "state"), error, {"long_name": "standard error of the section points"}),
-            "time": ("iterate", times, {"long_name": "time", "units": "s"}),
+            "section": labelled(("iterate", "state"), section, "section points"),
+            "section_error": labelled(("iterate", "state"), error, "standard error of the section points"),
+            "time": labelled("iterate", times, "time", "s"),
         },
         {
             "iterate": np.arange(len(times)),
             "state": ("state", ["x", "v"]),
-            "state_unit": ("state", units, {"long_name": "unit"}),
+            "state_unit": labelled("state", units, "unit"),
         },
         attrs,
     )

@@ -18,11 +18,10 @@ from numpy.typing import ArrayLike
 from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal, whose
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["MODELS", "labelled_motion", "smooth"]
 
 #: The derivative that is white noise, by the name of the model.
 MODELS = {"white_acceleration": 2, "white_jerk": 3, "white_snap": 4}
@@ -254,8 +253,8 @@ class _Nodes:
         unit = str(getattr(x, "attrs", {}).get("units", "m"))
         speed = {"units": f"{unit}/s"}
         at_impacts = {
-            "impact_time": ("impact", self.impacts, {"long_name": "time of the impact", "units": "s"}),
-            "impact_x": ("impact", states[before, 0], {"long_name": "position at the impact", "units": unit}),
+            "impact_time": labelled("impact", self.impacts, "time of the impact", "s"),
+            "impact_x": labelled("impact", states[before, 0], "position at the impact", unit),
             "impact_x_error": ("impact", errors[before, 0], {"units": unit}),
             "v_before": ("impact", states[before, 1], {"long_name": "velocity before the impact", **speed}),
             "v_before_error": ("impact", errors[before, 1], speed),
@@ -286,10 +285,9 @@ def labelled_motion(
         data[name] = ("time", state, {"long_name": long_name, **attrs})
         data[f"{name}_error"] = ("time", error, {"long_name": f"standard error of the {long_name}", **attrs})
     coords = {
-        "time": ("time", t, {"long_name": "time", "units": "s"}),
-        "segment": ("time", np.searchsorted(impacts, t, side="left"), {
-            "long_name": "number of impacts before this sample"}),
-    }  # fmt: skip
+        "time": labelled("time", t, "time", "s"),
+        "segment": labelled("time", np.searchsorted(impacts, t, side="left"), "number of impacts before this sample"),
+    }
     return xr.Dataset(data, coords)
 
 

@@ -15,11 +15,10 @@ from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import even_rate, signal, whose
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["INTERPOLATIONS", "Peak", "largest_line", "peak", "spectrum"]
 
 #: Ways to find a peak between lines.
 INTERPOLATIONS = ("window", "parabola", "none")
@@ -129,11 +128,11 @@ def spectrum(
     name = window if isinstance(window, str) else repr(window)
     return xr.Dataset(
         {
-            "amplitude": ("frequency", amplitude, {"long_name": "amplitude", "units": unit}),
-            "phase": ("frequency", np.angle(lines), {"long_name": "phase", "units": "rad"}),
-            "density": ("frequency", density, {"long_name": "power density", "units": f"({unit or 1})^2/Hz"}),
+            "amplitude": labelled("frequency", amplitude, "amplitude", unit),
+            "phase": labelled("frequency", np.angle(lines), "phase", "rad"),
+            "density": labelled("frequency", density, "power density", f"({unit or 1})^2/Hz"),
         },
-        {"frequency": ("frequency", frequency, {"long_name": "frequency", "units": "Hz"})},
+        {"frequency": labelled("frequency", frequency, "frequency", "Hz")},
         {"window": name, "rate": float(rate), "samples": n, "padding": padding, "grid_step": rate / n,
          "signal": whose(x, "")},
     )  # fmt: skip
@@ -204,6 +203,22 @@ def largest_line(t: FloatArray, values: FloatArray) -> float:
     """Angular frequency of the largest line; evenly interpolated, since this is only a start."""
     even = np.linspace(t[0], t[-1], len(t))
     return peak(spectrum(np.interp(even, t, values), (len(t) - 1) / (t[-1] - t[0]))).omega
+
+
+def correlation_times(residuals: ArrayLike) -> float:
+    r"""Number of samples that share one independent error: :math:`\tau = 1 + 2 \sum \rho_k`, at least 1.
+
+    The sum stops at the first lag that is not positive (Geyer's initial sequence, Statist. Sci. 7 (1992) 473).
+    """
+    r = np.asarray(residuals, dtype=np.float64)
+    r = r - r.mean()
+    n = len(r)
+    if n < 4 or not r.any():
+        return 1.0
+    rho = np.fft.irfft(np.abs(np.fft.rfft(r, 2 * n)) ** 2, 2 * n)
+    rho = rho[1 : 1 + n // 4] / rho[0]
+    ends = np.append(np.flatnonzero(rho <= 0), len(rho))
+    return float(1.0 + 2.0 * rho[: ends[0]].sum())
 
 
 class _Shape:

@@ -19,11 +19,10 @@ from nonsmooth.recordings.sampling import examine
 from nonsmooth.recordings.signals.checks import signal, whose
 from nonsmooth.recordings.signals.harmonics import fit
 from nonsmooth.recordings.signals.spectrum import largest_line, peak, spectrum
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["SteadyResponse", "steady_response"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,10 +174,10 @@ def steady_response(
     unit = str(getattr(x, "attrs", {}).get("units", ""))
     table = xr.Dataset(
         {
-            "time": ("block", middles, {"long_name": "middle of the block", "units": "s"}),
-            "amplitude": ("block", sizes, {"long_name": "amplitude of the fundamental", "units": unit}),
+            "time": labelled("block", middles, "middle of the block", "s"),
+            "amplitude": labelled("block", sizes, "amplitude of the fundamental", unit),
             "amplitude_error": ("block", size_errors, {"units": unit}),
-            "phase": ("block", phases, {"long_name": "phase less that of the fitted frequency", "units": "rad"}),
+            "phase": labelled("block", phases, "phase less that of the fitted frequency", "rad"),
             "phase_error": ("block", phase_errors, {"units": "rad"}),
         },
         attrs={"signal": name, "frequency": by_fit, "rate": -decay, "rate_error": decay_error},
@@ -191,13 +190,11 @@ def steady_response(
 
 def _slope(t: FloatArray, y: FloatArray, errors: FloatArray) -> tuple[float, float]:
     """Slope of a line and its error: by the scatter about it, and at least by the errors of the points."""
-    centred = t - t.mean()
-    spread = float(centred @ centred)
-    slope = float(centred @ y) / spread
-    left = y - y.mean() - slope * centred
-    scatter = float(left @ left) / (len(t) - 2)
-    # Neighbouring blocks that err alike say less.
+    line, covariance = np.polyfit(t, y, 1, cov="unscaled")
+    left = y - np.polyval(line, t)
     power = float(left @ left)
-    alike = float(left[1:] @ left[:-1]) / power if power > 0 else 0.0
-    inflation = (1.0 + max(alike, 0.0)) / (1.0 - min(max(alike, 0.0), 0.8))
-    return slope, math.sqrt(max(scatter * inflation, float(np.mean(errors**2))) / spread)
+    # Neighbouring blocks that err alike say less.
+    alike = max(float(left[1:] @ left[:-1]) / power, 0.0) if power > 0 else 0.0
+    inflation = (1.0 + alike) / (1.0 - min(alike, 0.8))
+    variance = max(power / (len(t) - 2) * inflation, float(np.mean(errors**2)))
+    return float(line[0]), math.sqrt(variance * covariance[0, 0])

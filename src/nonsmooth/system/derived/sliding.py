@@ -35,6 +35,7 @@ import sympy as sp
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.system.derived.additions import Additions
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.symbolic.scalar import as_written
 from nonsmooth.system.symbolic.traced import NOT_UNIQUE, Row, Traced, TracedTransition
@@ -88,12 +89,7 @@ def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str,
     build.inherit(declared)
     for pair in pairs:
         build.add_transitions(pair)
-    return replace(
-        traced,
-        mode_names=tuple(build.modes), fields=tuple(build.fields), lacking=tuple(build.lacking),
-        indicator_names=tuple(build.indicator_names), indicators=tuple(build.indicators),
-        transitions=tuple(build.jumps), outputs=tuple(tuple(row) for row in build.outputs), along=tuple(build.along),
-    )  # fmt: skip
+    return build.put_in(lacking=tuple(build.lacking), along=tuple(build.along))
 
 
 @lru_cache(maxsize=256)
@@ -127,19 +123,15 @@ def repelled(system: System, states: FloatArray) -> tuple[str, int] | None:
     return None
 
 
-class _Builder:
-    """Collects what is added to the declared system."""
+class _Builder(Additions):
+    """The sliding modes that are added to the declared system."""
 
     def __init__(self, traced: Traced, scale: Mapping[str, float]) -> None:
-        self.traced = traced
+        super().__init__(traced)
         self.scale = [sp.Float(scale[name]) for name in traced.state_names]
         self.moving = {traced.t, *traced.u, *traced.m}
         self.kappa = sp.Integer(1) if traced.period is None else 2 * sp.pi / traced.period
-        self.modes, self.fields = list(traced.mode_names), list(traced.fields)
         self.lacking = list(traced.lacking)
-        self.outputs = [list(row) for row in traced.outputs]
-        self.indicator_names, self.indicators = list(traced.indicator_names), list(traced.indicators)
-        self.jumps: list[TracedTransition] = []
         self.sliding: dict[_Pair, int] = {}  # the mode in which motion slides along a surface; none where it cannot
         self.cells = [frozenset({mode}) for mode in range(len(self.modes))]  # declared modes that meet in each mode
         self.along = [frozenset[int]() for _ in self.modes]  # the indicators that each mode keeps at zero
@@ -270,17 +262,6 @@ class _Builder:
                         yield _Pair(other.indicator, *ends, "", other.static)
 
     # Transitions
-
-    def indicator(self, expression: sp.Expr, name: str) -> int:
-        """Index of a derived indicator, added where it is new."""
-        if name not in self.indicator_names:
-            self.indicator_names.append(name)
-            self.indicators.append(expression)
-        return self.indicator_names.index(name)
-
-    def jump(self, source: int, target: int, *rows: Row) -> None:
-        label = f"{self.modes[source]} -> {self.modes[target]}"
-        self.jumps.append(TracedTransition(source, target, rows, contact=source == 0, label=label))
 
     def add_transitions(self, pair: _Pair) -> None:
         """Add the transitions between below, above and sliding."""

@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.system.derived.additions import Additions
 from nonsmooth.system.derived.sticking import without_sticking
 from nonsmooth.system.description import Description
 from nonsmooth.system.equations import TracedBand
@@ -113,19 +114,14 @@ def smoothed_indicators(description: Description) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names[row.indicator] for pair in _pairs(traced) for row in pair.rows))
 
 
-class _Builder:
-    """Collects what is added to the sharp system."""
+class _Builder(Additions):
+    """The bands that are added to the sharp system."""
 
     def __init__(self, description: Description, names: Mapping[str, sp.Symbol], shape: str) -> None:
-        self.description, self.traced, self.eta_of, self.shape = description, description.traced, names, shape
-        self.modes = list(self.traced.mode_names)
-        self.fields = list(self.traced.fields)
-        self.outputs = [list(row) for row in self.traced.outputs]
-        self.indicator_names = list(self.traced.indicator_names)
-        self.indicators = list(self.traced.indicators)
+        super().__init__(description.traced)
+        self.description, self.eta_of, self.shape = description, names, shape
         self.memory: list[tuple[str, str]] = []
         self.m = list(self.traced.m)
-        self.jumps: list[TracedTransition] = []
         self.reach = REACH if shape == "tanh" else 1
 
     def eta(self, row: Row) -> sp.Symbol:
@@ -142,13 +138,6 @@ class _Builder:
 
     def margin(self, row: Row) -> sp.Expr:
         return row.sign * self.traced.indicators[row.indicator]
-
-    def indicator(self, expression: sp.Expr, name: str) -> int:
-        """Index of a derived indicator, added where it is new."""
-        if name not in self.indicator_names:
-            self.indicator_names.append(name)
-            self.indicators.append(expression)
-        return self.indicator_names.index(name)
 
     def beyond(self, row: Row, side: int, upward: int) -> Row:
         """The row ``upward * (g - side * eta) > 0``."""
@@ -205,12 +194,6 @@ class _Builder:
         self.fields.append(field)
         return len(self.modes) - 1, tuple(writes)
 
-    def jump(
-        self, source: int, target: int, rows: tuple[Row, ...], writes: tuple[tuple[int, sp.Expr], ...] = ()
-    ) -> None:
-        label = f"{self.modes[source]} -> {self.modes[target]}"
-        self.jumps.append(TracedTransition(source, target, rows, None, None, writes, source == 0, label))
-
     def add(self, pair: _Pair) -> None:
         """Add the bands of a pair and the transitions over their borders."""
         kept = [r for r, row in enumerate(pair.rows) if not self._repeats(pair, r)]
@@ -220,13 +203,13 @@ class _Builder:
         for r in kept:
             for s in kept:
                 if r != s:
-                    self.jump(bands[r][0], bands[s][0], least[s], bands[s][1])
+                    self.jump(bands[r][0], bands[s][0], *least[s], writes=bands[s][1])
         for r in kept:
             row = pair.rows[r]
-            self.jump(bands[r][0], pair.outer, (self.beyond(row, -1, -1),))
-            self.jump(bands[r][0], pair.inner, (self.beyond(row, 1, 1),))
-            self.jump(pair.outer, bands[r][0], (self.beyond(row, -1, 1), *least[r]), bands[r][1])
-            self.jump(pair.inner, bands[r][0], (self.beyond(row, 1, -1), *least[r]), bands[r][1])
+            self.jump(bands[r][0], pair.outer, self.beyond(row, -1, -1))
+            self.jump(bands[r][0], pair.inner, self.beyond(row, 1, 1))
+            self.jump(pair.outer, bands[r][0], self.beyond(row, -1, 1), *least[r], writes=bands[r][1])
+            self.jump(pair.inner, bands[r][0], self.beyond(row, 1, -1), *least[r], writes=bands[r][1])
 
     def mix(self, pairs: Sequence[_Pair]) -> None:
         """Give every mode the mean of all fields, weighted with the product of what each pair says of its mode.
@@ -298,14 +281,10 @@ def smooth(description: Description, single: bool, shape: str = "linear") -> Smo
         for pair in pairs:
             build.add(pair)
     n_bands = len(build.modes) - len(old.mode_names)
-    traced = replace(
-        old,
+    traced = build.put_in(
         p=old.p + tuple(symbols.values()), parameter_names=old.parameter_names + tuple(symbols),
         m=tuple(build.m), memory_names=old.memory_names + tuple(name for name, _ in build.memory),
-        mode_names=tuple(build.modes), fields=tuple(build.fields),
         lacking=old.lacking + (((False,) * len(old.u)),) * n_bands,
-        indicator_names=tuple(build.indicator_names), indicators=tuple(build.indicators),
-        transitions=tuple(build.jumps), outputs=tuple(tuple(row) for row in build.outputs),
     )  # fmt: skip
     return Smoothed(traced, etas, tuple(build.memory), tuple(apart))
 

@@ -1,1 +1,0 @@
-"""Reproductions of published papers: each is a package with ``reproduce(out, figures, quick, progress)``."""

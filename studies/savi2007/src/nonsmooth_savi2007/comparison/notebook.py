@@ -1,0 +1,167 @@
+r"""From a notebook's settings to the model's parameters, for rigs whose spring is driven by a crank.
+
+The crank of length a moves the end of one spring by :math:`a \cos\varphi`: to first order the force is
+:math:`\rho = k a`. The model's x and g count from the car's mean position under the drive, the screw's reading and the
+sensor's count from elsewhere: both are referred (:mod:`nonsmooth_savi2007.comparison.reference`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.identification.compare import measured_motion, measured_response, measured_rise, measured_sections
+from nonsmooth_savi2007.comparison.reference import GapOffset, GapReference, gap_reference
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth.recordings import Session
+
+#: What a run with each procedure shows.
+SHOWS = {"section": "motion", "contact": "motion", "grazing": "motion", "response": "response", "rise": "diagram"}
+
+
+def session_measurement(
+    session: Session,
+    procedure: str,
+    runs: str | Sequence[str] | None = None,
+    *,
+    k: float,
+    crank_force: float | None = None,
+    gap_offset: float | Sequence[float] | GapOffset = 0.0,
+    referred: bool = True,
+    reference: GapReference | None = None,
+) -> tuple[xr.Dataset, dict[str, Any]]:
+    """The measurement of a session that ``compare`` takes, and the settings of the model that belong to it.
+
+    Parameters
+    ----------
+    session : Session
+    procedure : str
+        ``section``, ``contact``, ``grazing`` (one run: a motion; several named runs that differ in the gap: a diagram
+        over ``g``), ``response`` (all runs of one crank length) or ``rise`` (one run).
+    runs : str or sequence of str, optional
+        The run or runs; needed where there are several motions.
+    k : float
+        The spring's stiffness (N/m), for the parameter over which a rise is drawn.
+    crank_force : float, optional
+        Force per crank length from a calibration (N/m); the spring's ``k`` where not given.
+    gap_offset : float, (value, standard uncertainty) or GapOffset
+        What the gap is more than the screw's reading (m); see
+        :func:`nonsmooth_savi2007.comparison.gap_offset`.
+    referred : bool
+        Refer x and g to the mean position under the drive: by the taps (``impulse``) and the runs of ``response``
+        without the support where the session has them.
+    reference : GapReference, optional
+        Another session's, in place of ``gap_offset`` and ``referred``.
+
+    Returns
+    -------
+    measured : Dataset
+        Of a diagram over ``g`` and of a rise, each point is referred at its own crank length.
+    settings : dict
+        ``rho``, ``g``, ``omega`` as :func:`compare` takes them: values, pairs with the standard uncertainty, or
+        functions of the other parameters.
+
+    Raises
+    ------
+    ValueError
+        A procedure or run that the session does not have, or several where one is meant.
+    """
+    chosen = _chosen(session, procedure, runs)
+    apparatus = session.apparatus
+    if "distance_per_turn" not in apparatus:
+        raise ValueError(
+            f"{session.folder}: [apparatus] needs distance_per_turn, the travel per turn of the sensor's wheel"
+        )
+    shows = SHOWS[procedure] if len(chosen) == 1 or procedure == "response" else "sections"
+    length = _crank_length(chosen)
+    if reference is None:
+        reference = gap_reference(session, referred=referred, offset=gap_offset)
+    # The crank of a rise grows, and the mean position moves with it: it is referred point by point.
+    shift = 0.0 if shows == "diagram" else reference.mean(length)[0]
+    counts = int(float(apparatus["counts_per_turn"])) if "counts_per_turn" in apparatus else 1440
+    travel = reference.direction * float(apparatus["distance_per_turn"])
+    motions = [
+        measured_motion(
+            item.recording, item.run, distance_per_turn=travel,
+            counts_per_turn=counts, zero=shift, mark=reference.mark, support="gap" in item.settings,
+        )
+        for item in chosen
+    ]  # fmt: skip
+    settings: dict[str, Any] = {"rho": _force(length, crank_force)}
+    first = chosen[0].settings
+    if "gap" in first:
+        settings["g"] = reference.gap(float(first["gap"]), length)
+    if shows == "response":
+        # Steps that do not say how they were reached: up as long as the frequency rises.
+        omega = [float(motion["omega"]) for motion in motions]
+        top = int(np.argmax(omega))
+        words = [str(i.settings.get("direction", "up" if n <= top else "down")) for n, i in enumerate(chosen)]
+        return measured_response(motions, words), settings
+    settings["omega"] = (float(motions[0]["omega"]), float(motions[0]["omega_error"]))
+    if shows == "sections":
+        gaps = [reference.gap(float(item.settings["gap"]), length)[0] for item in chosen]
+        omega = [float(motion["omega"]) for motion in motions]
+        if np.ptp(omega) > 1e-2 * np.mean(omega) or len(set(gaps)) < len(gaps):
+            raise ValueError(
+                f"{len(chosen)} runs of {procedure!r}, {', '.join(i.run for i in chosen)}: a diagram over g needs runs "
+                "at one frequency, each with a gap of its own; a motion is one run: run = ..."
+            )
+        settings["omega"] = (float(np.mean(omega)), float(motions[0]["omega_error"]))
+        return measured_sections(motions, "g", gaps, unit="m"), {n: settings[n] for n in ("rho", "omega")}
+    (motion,) = motions
+    if shows == "motion":
+        return motion, settings
+    per, last = k if crank_force is None else crank_force, float(first["crank_length_end"])
+    rise = measured_rise(motion, "rho", per * length, per * last, unit="N")
+    moved = np.zeros(rise["section"].shape)
+    moved[:, 0] = [reference.mean(float(rho) / per)[0] for rho in rise["rho"].values]
+    screw = float(first["gap"])
+    error = max(reference.gap(screw, a)[1] for a in (length, last))
+    settings = {"omega": settings["omega"], "g": (lambda p: reference.gap(screw, p["rho"] / per)[0], error)}
+    return rise.assign(section=(rise["section"] - moved).assign_attrs(rise["section"].attrs)), settings
+
+
+def _chosen(session: Session, procedure: str, runs: str | Sequence[str] | None) -> list[Any]:
+    from nonsmooth.system.names import unknown
+
+    if procedure not in SHOWS:
+        raise ValueError(unknown(procedure, "a procedure", "compare", SHOWS.keys()))
+    found = session.recordings(procedure)
+    if not found:
+        raise ValueError(f"{session.folder} has no run of {procedure!r}; it has: {', '.join(session.procedures)}")
+    if runs is None:
+        # Runs without the support stand beside a response with it: they show the mean position.
+        mounted = [item for item in found if "gap" in item.settings]
+        found = mounted if procedure == "response" and mounted else found
+        if SHOWS[procedure] != "response" and len(found) != 1:
+            names = ", ".join(item.run for item in found)
+            raise ValueError(f"{len(found)} runs of {procedure!r}; a motion is one: run = ... one of {names}")
+        return found
+    wanted = [runs] if isinstance(runs, str) else list(runs)
+    for name in wanted:
+        if name not in [item.run for item in found]:
+            raise ValueError(unknown(name, "a run", f"{procedure!r} in {session.folder}", [i.run for i in found]))
+    if SHOWS[procedure] == "diagram" and len(wanted) != 1:
+        raise ValueError(f"{len(wanted)} runs of {procedure!r}: a slow rise is one run")
+    return [item for item in found if item.run in wanted]
+
+
+def _crank_length(chosen: list[Any]) -> float:
+    lengths = {float(item.settings["crank_length"]) for item in chosen if "crank_length" in item.settings}
+    if len(lengths) > 1:
+        raise ValueError(
+            f"the runs have {len(lengths)} crank lengths ({', '.join(f'{a:g}' for a in sorted(lengths))} m): a "
+            "response, or a diagram, has one; name the runs"
+        )
+    return lengths.pop() if lengths else 0.0
+
+
+def _force(length: float, crank_force: float | None) -> float | Callable[[Mapping[str, float]], float]:
+    if crank_force is not None:
+        return crank_force * length
+    return lambda p: p["k"] * length

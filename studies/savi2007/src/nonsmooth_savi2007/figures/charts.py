@@ -1,0 +1,160 @@
+"""Charts over two parameters, a million points each: made by ``make reproduce-full`` only, and resumable.
+
+Period numbers over (omega, rho) at the gap of Fig. 9 and over (g, rho) at the frequency of Fig. 13, from rest, with the
+curves of folds, flips and grazing that pass through the special points of these figures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nonsmooth import SolveError, chart, continue_curve, continue_orbit, find_orbit, plot
+from nonsmooth.plot.branches import KINDS
+from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, rows_of
+from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
+from nonsmooth_savi2007.flows import EXACT, Settings
+from nonsmooth_savi2007.measure import status_names
+from nonsmooth_savi2007.printed import FIGURE_9, FIGURE_13
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_FULL, _QUICK = 1000, 24  # points along each parameter
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A chart: the figure whose branches its curves begin on, its parameters and the ranges of the two others.
+
+    ``further``: periods and values of the figure's parameter at which further branches begin, from rest.
+    """
+
+    figure: str
+    parameters: Mapping[str, float]
+    ranges: Mapping[str, tuple[float, float]]
+    further: Mapping[int, float]
+
+
+CHARTS = {
+    "chart09": Plane("fig09", {"g": FIGURE_9["g"]}, {"omega": (3.0, 7.0), "rho": (0.1, 0.3)}, {}),
+    "chart13": Plane(
+        "fig13", {"omega": FIGURE_13["omega"]}, {"g": (-0.0015, 0.002), "rho": (0.2, 0.5)}, {3: 0.0014, 6: 0.0002}
+    ),
+}
+
+
+def grid_of(plane: Plane, n: int) -> dict[str, np.ndarray]:
+    """n values of each of the two parameters."""
+    return {name: np.linspace(*ends, n) for name, ends in plane.ranges.items()}
+
+
+def _compute(settings: Settings, name: str) -> Datasets:
+    plane = CHARTS[name]
+    store = None if settings.folder is None else settings.folder / f"{name}_store.zarr"
+    found = chart(
+        EXACT.system(**plane.parameters), grid_of(plane, _QUICK if settings.quick else _FULL), extremes=False,
+        store=store, progress=settings.progress, **EXACT.options,
+    )  # fmt: skip
+    return {"chart": found} | {f"curve_{k}": one for k, one in enumerate(curves(plane))}
+
+
+def curves(plane: Plane) -> list[xr.Dataset]:
+    """Curves through the folds, flips and grazing points of the figure's branches, each curve once."""
+    found: list[xr.Dataset] = []
+    begin = BEGINNINGS[plane.figure]
+    lines = list(branches(plane.figure).values())
+    for period, value in plane.further.items():
+        orbit = find_orbit(
+            EXACT.system(**begin.parameters).with_parameters({begin.parameter: value}),
+            period_number=period,
+            progress=False,
+        )
+        lines.append(continue_orbit(orbit, begin.parameter, begin.range))
+    for branch in lines:
+        table = rows_of(branch)
+        for i in range(table.sizes["special"]):
+            row = table.isel(special=i)
+            if str(row["kind"].values) not in KINDS or any(_on(one, row, begin.parameter) for one in found):
+                continue
+            try:
+                found.append(continue_curve(row, plane.ranges))
+            except SolveError:  # a point where two boundaries meet begins no curve
+                continue
+    return found
+
+
+def _on(curve: xr.Dataset, row: xr.Dataset, parameter: str) -> bool:
+    """Return whether a special point lies on a known curve: of its kind and period, and through its two values."""
+    if str(curve["kind"].values) != str(row["kind"].values):
+        return False
+    if int(curve["period_number"]) != int(row["period_number"]):
+        return False
+    names = [str(name) for name, values in curve.coords.items() if values.dims == ("point",)]
+    other = next(name for name in names if name != parameter)
+    along, across = curve[other].values, curve[parameter].values
+    level, value = float(row[other]), float(row[parameter])
+    for k in np.flatnonzero((along[:-1] - level) * (along[1:] - level) <= 0):
+        part = (level - along[k]) / (along[k + 1] - along[k] or 1.0)
+        if abs(across[k] + part * (across[k + 1] - across[k]) - value) < 1e-3 * np.ptp(across):
+            return True
+    return False
+
+
+def _draw(canvas: Canvas, data: Datasets) -> None:
+    found = data["chart"]
+    left, right = canvas.subplots(1, 2, sharey=True)
+    simple = "omega" in found.dims  # few periods; what tells regions apart there is whether there is contact
+    plot.chart(found, left, show="contacts_per_period" if simple else "period_number")
+    plot.chart(found, right)
+    for key, one in data.items():
+        if key.startswith("curve"):
+            plot.curve(one, right, special=False)
+    if not simple:
+        left.get_legend().remove()
+    right.set_ylabel("")
+    titles = ("(a) contacts per period" if simple else "(a) period", "(b) period, with folds, flips and grazing")
+    for ax, words in zip((left, right), titles, strict=True):
+        ax.set_title(words, y=1.0, pad=9)
+        ax.set(xlim=_ends(found, 0), ylim=_ends(found, 1))
+
+
+def _ends(found: xr.Dataset, axis: int) -> tuple[float, float]:
+    values = found[str(found["status"].dims[axis])].values
+    return float(values[0]), float(values[-1])
+
+
+def _caption(data: Datasets) -> str:
+    found = data["chart"]
+    first, second = (str(dim) for dim in found["status"].dims)
+    names, counts = np.unique(status_names(found), return_counts=True)
+    ended = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
+    kinds = [str(one["kind"].values) for key, one in data.items() if key.startswith("curve")]
+    counted = ", ".join(f"{kinds.count(kind)} of {words}" for kind, (_, _, words) in KINDS.items() if kind in kinds)
+    fixed = "g" if "g" not in (first, second) else "omega"
+    rays = (
+        " The system is piecewise linear, so all depends on g / rho alone: every boundary is a straight line."
+        if fixed == "omega"
+        else ""
+    )
+    shown = "Contacts per forcing period and period number" if fixed == "g" else "Period number"
+    return (
+        f"{shown} over {first} and {second} at {fixed} = {float(found[fixed]):g} {found[fixed].attrs['units']}, "
+        f"{found.sizes[first]} x {found.sizes[second]} points from rest (exact flow). Statuses: {ended}. Curves: "
+        f"{counted}, through the special points of the branches (continue_curve); where they do not bound a region, "
+        f"the motion that changes there is not the one met from rest.{rays}"
+    )
+
+
+FIGURES = tuple(
+    Figure(name, None, f"Chart over {words}", partial(_compute, name=name), _draw, _caption, (1.0, 0.42),
+           beside=beside, full=True)
+    for name, words, beside in (
+        ("chart09", "frequency and amplitude at the gap of Fig. 9", 9),
+        ("chart13", "gap and amplitude at the frequency of Fig. 13", 13),
+    )
+)  # fmt: skip

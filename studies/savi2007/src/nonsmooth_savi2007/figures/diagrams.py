@@ -1,0 +1,159 @@
+"""Bifurcation diagrams beside each other: the exact flow and the smoothed switch, several starts behind the sweeps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth import plot, sweep
+from nonsmooth.plot.branches import draw_branch
+from nonsmooth.plot.style import even_dots, halo, small
+from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, branches_of
+from nonsmooth_savi2007.figures.figure import Canvas, Datasets, only_outer
+from nonsmooth_savi2007.flows import EXACT, FLOWS, Settings, starts
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+_OTHER, _SHARE = 0.05, 0.25  # another motion: a quarter of its points so far off, in parts of the diagram's range
+
+#: What a caption says of them.
+ABOUT_BRANCHES = (
+    "Branches in (a): orbits of period 1, 2, 4 and 8 of the exact flow, continued from one of period 1; where they are "
+    "stable, the swept points lie on them. Special points are marked on those of period 1 and 2. "
+)
+
+
+def diagrams(
+    settings: Settings, figure: str, steps: tuple[int, int], also: Iterable[float], patience: int = 600
+) -> Datasets:
+    """Sweeps up and down (``exact``, ``smoothed``), from several starts (``exact_starts``, ...), and the branches.
+
+    ``steps``: of the exact and of the smoothed sweep; the starts are tried at a half or a quarter of them.
+    ``also``: values to be among those swept. ``patience``: transient of the exact flow from the starts.
+    """
+    begin, data = BEGINNINGS[figure], {}
+
+    def grid(steps: int) -> np.ndarray:
+        return np.unique(np.round([*np.linspace(*begin.range, steps + 1), *also], 9))
+
+    for flow in FLOWS:
+        system = flow.system(**begin.parameters)
+        n = settings.of(flow, exact=steps[0], smoothed=steps[1], quick=70)
+        transient = settings.of(flow, exact=600, smoothed=200, quick=100)
+        data[flow.key] = sweep(
+            system, begin.parameter, grid(n), direction="both", progress=settings.progress, transient=transient,
+            keep=settings.of(flow, exact=200, smoothed=64, quick=40), **flow.options,
+        ).assign_attrs(transient=transient)  # fmt: skip
+        fewer = 2 if patience <= 600 else 4
+        n = settings.of(flow, exact=steps[0] // fewer, smoothed=steps[1] // 4, quick=10)
+        transient = settings.of(flow, exact=patience, smoothed=150, quick=80)
+        data[f"{flow.key}_starts"] = sweep(
+            system, begin.parameter, grid(n), direction=None,
+            start=starts(settings.of(flow, exact=12, smoothed=8, quick=4)), progress=settings.progress,
+            transient=transient, keep=32, **flow.options,
+        ).assign_attrs(transient=transient)  # fmt: skip
+    return data | branches(figure)
+
+
+def draw_diagram(
+    ax: Axes, data: Datasets, key: str, y: str, *, values: Mapping[float, str], words: str
+) -> None:
+    """One diagram: up, down over it, and in grey what other starts lead to; ``values`` of the paper as dotted lines.
+
+    On that of the exact flow the branches of periodic orbits. Other starts that reached no period are told apart: chaos
+    looks like a transient that is not over. ``words`` say in the legend which values these are.
+    """
+    many, swept = data[f"{key}_starts"], data[key]
+    other, settled = other_motions(many, swept), many["period_number"] > 0
+    for chosen, color, size, name in (
+        (other & ~settled, "#D0D0D0", 1.4, "other starts, no period"),
+        (other & settled, "#8C8C8C", 1.8, "other starts, periodic"),
+    ):
+        if bool(chosen.any()):
+            plot.bifurcation(many.assign(section=many["section"].where(chosen)), ax, y=y, color=color, size=size)
+            ax.get_lines()[-1].set(label=name, zorder=0.3)
+    plot.bifurcation(swept, ax, y=y, size=0.9 if swept.sizes["iterate"] > 100 else 1.1)
+    if key == EXACT.key:
+        draw_branches(ax, data, y=y)
+    mark_values(ax, values, words)
+
+
+def draw_both(canvas: Canvas, data: Datasets, *, values: Mapping[float, str], words: str) -> None:
+    """Draw the velocity at the section, of each flow; ``values`` and ``words`` as in `draw_diagram`."""
+    grid = canvas.subplots(1, 2, sharey=True)
+    for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
+        draw_diagram(ax, data, flow.key, "v", values=values, words=words)
+        ax.set_title(f"({letter}) {flow.title}")
+    only_outer(grid)
+    shared_legend(canvas)
+
+
+def other_motions(many: xr.Dataset, swept: xr.Dataset) -> xr.DataArray:
+    """Of each value and start, whether it leads to section points that the sweeps at this value have not."""
+    parameter = str(swept["maximum"].dims[0])
+    known = swept["section"].stack(point=("direction", "iterate")).transpose(parameter, "point", "state").values
+    found = many["section"].transpose(parameter, "start", "iterate", "state").values
+    scale = np.nanmax(known, axis=(0, 1)) - np.nanmin(known, axis=(0, 1))
+    nearest = np.abs(swept[parameter].values[None, :] - many[parameter].values[:, None]).argmin(axis=1)
+    far = np.zeros(found.shape[:2], dtype=bool)
+    for i, at in enumerate(nearest):
+        there = known[at][np.isfinite(known[at]).all(axis=1)] / scale
+        distance = np.linalg.norm(found[i][:, :, None] / scale - there, axis=-1).min(axis=-1)
+        far[i] = (distance > _OTHER).mean(axis=-1) > _SHARE
+    return many["period_number"].copy(data=far)
+
+
+def mark_values(ax: Axes, values: Mapping[float, str], words: str, foot: bool = False) -> None:
+    """A dotted line with its number at each of these values, at the top or at the foot."""
+    for i, (value, text) in enumerate(values.items()):
+        ax.axvline(value, color="black", linewidth=0.7, linestyle=":", zorder=2.5, label=words if i == 0 else None)
+        ax.annotate(
+            text, (value, 0.0 if foot else 1.0), (-1.5, 3 if foot else -3), xycoords=ax.get_xaxis_transform(),
+            textcoords="offset points", rotation=90, ha="right", va="bottom" if foot else "top", fontsize=small(ax),
+            path_effects=halo(), zorder=6,
+        )  # fmt: skip
+
+
+def mark_grazing(ax: Axes, places: Sequence[float]) -> None:
+    """A short line at the foot for each grazing in closed form, so that it hides no jump that begins there."""
+    for i, place in enumerate(places):
+        ax.plot(
+            [place, place], [0.0, 0.07], color=plot.COLORS["third"], linewidth=2.0, transform=ax.get_xaxis_transform(),
+            zorder=1, label="grazing, closed form" if i == 0 else None, solid_capstyle="butt",
+        )  # fmt: skip
+
+
+def draw_branches(ax: Axes, data: Datasets, *, y: str) -> None:
+    """The branches of a figure in black, where there are any; marks on those of period 1 and 2."""
+    for one in branches_of(data):
+        few = int(one["period_number"]) <= 2
+        draw_branch(ax, one, y=y, special=few, color="black", width=0.6 if few else 0.35, behind=True)
+
+
+def shared_legend(canvas: Canvas, columns: int = 5) -> None:
+    """One legend under all axes in place of their own, so that it hides no branch."""
+    entries: dict[str, Any] = {}
+    for ax in canvas.axes:
+        for handle, words in zip(*ax.get_legend_handles_labels(), strict=True):
+            entries.setdefault(words, handle)
+        if (own := ax.get_legend()) is not None:
+            own.remove()
+    even_dots(canvas.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns))
+
+
+def how(data: Datasets) -> str:
+    """Settings of the sweeps, for a caption."""
+    words = []
+    for flow in FLOWS:
+        swept, many = data[flow.key], data[f"{flow.key}_starts"]
+        parameter = str(swept["maximum"].dims[0])
+        words.append(
+            f"{flow.key}: {swept.sizes[parameter]} values up and down, {swept.sizes['iterate']} section points each "
+            f"after {swept.attrs['transient']} periods; {many.sizes['start']} starts at {many.sizes[parameter]} "
+            f"values, after {many.attrs['transient']} periods"
+        )
+    return "Section at phase 0. " + "; ".join(words) + "."

@@ -1,0 +1,166 @@
+"""Figures 9 and 10: amplitude over the forcing frequency, up and down, with the jumps and the grazing frequencies.
+
+On the virtual rig frequency steps, over the response of the model with the parameters identified.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth import frequency_response, plot
+from nonsmooth.plot import comparison_response
+from nonsmooth.plot.style import small
+from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, branches_of
+from nonsmooth_savi2007.figures.diagrams import mark_grazing, shared_legend
+from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure, only_outer
+from nonsmooth_savi2007.flows import EXACT, FLOWS, Settings
+from nonsmooth_savi2007.grazing import grazing_frequencies
+from nonsmooth_savi2007.laboratory import as_result
+from nonsmooth_savi2007.measure import jumps, measured_periods
+from nonsmooth_savi2007.printed import NUMBERS
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+
+def grazing_of(response: xr.Dataset) -> list[float]:
+    """Closed-form grazing frequencies at the parameters of a response (rad/s): of g - eta where it is smoothed."""
+    parameters = {name: float(response[name]) for name in ("m", "k", "c", "rho", "g")}
+    band = float(response["eta"]) if "eta" in response.coords else 0.0
+    return grazing_frequencies({**parameters, "g": parameters["g"] - band})
+
+
+def _compute(settings: Settings, name: str) -> Datasets:
+    data, (low, high) = {}, BEGINNINGS[name].range
+    for flow in FLOWS:
+        step = settings.of(flow, exact=0.0025, smoothed=0.005, quick=0.02)
+        data[flow.key] = frequency_response(
+            flow.system(**BEGINNINGS[name].parameters), np.linspace(low, high, round((high - low) / step) + 1),
+            transient=settings.of(flow, exact=300, smoothed=150, quick=60), keep=16, max_period=4,
+            progress=settings.progress, **flow.options,
+        )  # fmt: skip
+    return data | branches(name)
+
+
+def _draw(canvas: Canvas, data: Datasets, printed: Mapping[str, float]) -> None:
+    grid = canvas.subplots(1, 2, sharey=True)
+    for ax, flow, letter in zip(grid, FLOWS, "ab", strict=True):
+        response = data[flow.key]
+        found = branches_of(data) if flow is EXACT else []
+        plot.frequency_response(response, *found, ax)
+        _mark(ax, response, printed)
+        ax.set_title(f"({letter}) {flow.title}", y=1.0, pad=14 if printed else 6)
+    only_outer(grid)
+    shared_legend(canvas)
+
+
+def _mark(ax: Axes, response: xr.Dataset, printed: Mapping[str, float]) -> None:
+    """Grazing frequencies, the range of period 2, and the paper's numbers at the upper edge."""
+    mark_grazing(ax, grazing_of(response))
+    omega = response["omega"].values
+    doubled = (response["period_number"] == 2).any("direction").values
+    if doubled.any():
+        ax.fill_between(
+            omega, 0, 1, where=doubled, transform=ax.get_xaxis_transform(), color=plot.COLORS["zone"], alpha=0.25,
+            linewidth=0, zorder=0, label="period 2",
+        )  # fmt: skip
+    mark_printed(ax, printed)
+    ax.margins(y=0.12)
+
+
+def mark_printed(ax: Axes, printed: Mapping[str, float]) -> None:
+    """The paper's numbers at the upper edge."""
+    for i, value in enumerate(printed.values()):
+        ax.plot(
+            value, 1.0, "v", transform=ax.get_xaxis_transform(), color="black", markersize=4, clip_on=False,
+            label="printed in the paper (rad/s)" if i == 0 else None, linestyle="none",
+        )  # fmt: skip
+        ax.annotate(
+            f"{value:.2f}", (value, 1.0), (0, 3.5), xycoords=ax.get_xaxis_transform(), textcoords="offset points",
+            ha="center", fontsize=small(ax),
+        )  # fmt: skip
+
+
+def _caption(data: Datasets, printed: str) -> str:
+    exact, smoothed = data["exact"], data["smoothed"]
+    grazing = " and ".join(f"{omega:.5f}" for omega in grazing_of(exact))
+    return (
+        f"Frequency response for rho = {float(exact['rho']):g} N and g = {1e3 * float(exact['g']):g} mm: half the "
+        "peak-to-peak displacement with rising and falling frequency; arrows: jumps, with their frequencies. "
+        "Branches in (a): periodic orbits of the exact flow, continued from one of them. "
+        f"Closed-form grazing at {grazing} rad/s (green; in (b) of g - eta). Steps of "
+        f"{_step(exact):.4f} rad/s (exact) and {_step(smoothed):.4f} rad/s (smoothed; a shorter transient). {printed}"
+    )
+
+
+def _step(response: xr.Dataset) -> float:
+    return float(np.diff(response["omega"].values).max())
+
+
+def _measure(settings: Settings, number: int) -> Datasets:
+    bench = settings.bench
+    session = bench.record(f"fig{number:02d}", bench.rig.figure(number, **_steps(settings, number)))
+    measured, set_ = bench.measured(session, "response", bench.with_support(session, "response"))
+    return {"compared": bench.compare(measured, set_), "runs": as_result(measured, "response over frequency")}
+
+
+def _steps(settings: Settings, number: int) -> dict[str, Any]:
+    """Steps of the frequency: the rig's own for Fig. 9; for Fig. 10 finer about its small jump; few for a quick run."""
+    from nonsmooth_savi2007.rig.motor import voltage_for
+
+    if settings.quick:
+        omegas, options = np.arange(2.5, 6.6, 0.25), {"duration": 14.0}
+    elif number == 10:
+        parts = ((2.4, 2.6, 0.05), (2.64, 2.78, 0.01), (2.8, 5.4, 0.1), (5.45, 6.65, 0.05), (6.7, 7.3, 0.1))
+        omegas = np.concatenate([np.arange(low, high + step / 2, step) for low, high, step in parts])
+        options = {}
+    else:
+        return {}
+    return {"voltages": [voltage_for(settings.bench.rig, float(omega)) for omega in omegas], **options}
+
+
+def _draw_rig(canvas: Canvas, data: Datasets, printed: Mapping[str, float]) -> None:
+    ax = canvas.subplots()
+    comparison_response(data["compared"], ax)
+    mark_printed(ax, printed)
+    shared_legend(canvas, columns=2)
+
+
+def _caption_rig(data: Datasets) -> str:
+    runs, compared = data["runs"], data["compared"]
+    words = []
+    for direction, word in (("up", "rising"), ("down", "falling")):
+        found = ", ".join(str(jump) for jump in jumps(runs, direction)) or "none"
+        words.append(f"{word}: {found} rad/s")
+    doubled = int(np.count_nonzero(measured_periods(runs)[1] == 2))
+    differences = 100 * np.abs(compared["relative_difference"].values)
+    return (
+        f"Frequency steps on the virtual rig (synthetic), {runs.sizes['run']} runs with rising and falling frequency, "
+        f"over the model's response with the parameters identified, rho = {float(compared['rho']):.4f} N and g = "
+        f"{1e3 * float(compared['g']):.3f} mm. Jumps of the rig, {'; '.join(words)}; {doubled} runs with period 2. "
+        f"Half of the runs lie within {np.nanmedian(differences):.2f} % of the model, nine of ten within "
+        f"{np.nanquantile(differences, 0.9):.1f} %. Diamonds: jumps measured (full) and predicted (open), with their "
+        "difference."
+    )
+
+
+_PRINTED_9 = {key: NUMBERS[key].value for key in ("period 2 near", "jump rising", "jump falling")}
+_SHOWN: tuple[tuple[int, str, dict[str, float], str], ...] = (
+    (9, "Frequency response with a period-2 range", _PRINTED_9, "Triangles: printed in the paper."),
+    (10, "Frequency response with a small jump", {}, "The paper prints no numbers for this figure."),
+)
+
+FIGURES = tuple(
+    Figure(f"fig{number:02d}", number, title, partial(_compute, name=f"fig{number:02d}"),
+           partial(_draw, printed=printed), partial(_caption, printed=words))
+    for number, title, printed, words in _SHOWN
+) + tuple(
+    Figure(f"fig{number:02d}_rig", number, title, partial(_measure, number=number),
+           partial(_draw_rig, printed=printed), _caption_rig, (0.72, 0.6), rig=True)
+    for number, title, printed, _ in _SHOWN
+)  # fmt: skip

@@ -1,0 +1,167 @@
+r"""Calibrations of the drive (Fig. 8): the motor's frequency over its voltage, the force over the crank's length.
+
+A motor turns from an offset on, :math:`\omega = s\,(V - V_0)`: friction in it takes the first volt. The car held still
+feels :math:`k\,d(\varphi)`, whose fundamental is :math:`k a`: a string of length L adds to the mean and to the second
+harmonic only, uneven turning :math:`\epsilon` changes the fundamental by :math:`\epsilon^2/4` and by
+:math:`a\,\epsilon/(4L)` of it, 0.1 % together at worst (:math:`\epsilon` = 0.02, a = 60 mm, L = 0.5 m). A crank's
+length that is counted from a wrong zero shows as an intercept.
+
+Both are straight lines with errors in both axes: what the notebook's voltages and lengths are rounded to is theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nonsmooth.identification import Estimate, Finding
+from nonsmooth.identification.uncertainty import coverage_factor, uniform
+from nonsmooth.recordings.signals.phase import drive_phase
+from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth_savi2007.identification.evidence import Run
+from nonsmooth_savi2007.identification.least_squares import StraightLine, scattered_line
+from nonsmooth_savi2007.identification.steady import harmonics_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def voltage_frequency(runs: Sequence[Run]) -> Finding:
+    r"""The law :math:`\omega = s (V - V_0)` of the motor, from runs with a photogate at several voltages (Fig. 8a).
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Each with ``turns`` and the setting ``voltage`` (V).
+
+    Returns
+    -------
+    Finding
+        The slope s in rad/(s V). ``others``: ``offset`` (V), where the motor begins to turn, and ``intercept``
+        (rad/s). ``covariance`` is that of slope, offset and intercept.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than three different voltages.
+    """
+    volts = np.array([float(run.settings["voltage"]) for run in runs])
+    _enough(volts, "voltages")
+    drives = [drive_phase(run.passages) for run in runs]
+    omega = np.array([drive.omega for drive in drives])
+    error = np.array([drive.omega_error for drive in drives])
+    line, scatter = scattered_line(volts, omega, error)
+    slope, intercept = line.slope, line.intercept
+    offset = -intercept / slope
+    # slope, offset = -intercept / slope, intercept
+    jacobian = np.array([[1.0, 0.0], [intercept / slope**2, -1 / slope], [0.0, 1.0]])
+    covariance = jacobian @ line.covariance @ jacobian.T
+    errors = np.sqrt(np.diag(covariance))
+    notes = [f"the motor turns from {offset:.3f} V on; omega = {slope:.5g} rad/(s V) x (V - {offset:.4g} V)"]
+    notes += _scatter(scatter, error, "rad/s")
+    return Finding(
+        "voltage_frequency", Estimate(slope, float(errors[0]), "rad/(s V)"),
+        "straight line with an offset through the frequencies that the photogate tells (Fig. 8a)",
+        int(sum(len(run.passages) for run in runs)), tuple(run.name for run in runs), tuple(notes),
+        {
+            "offset": Estimate(offset, float(errors[1]), "V"),
+            "intercept": Estimate(intercept, float(errors[2]), "rad/s"),
+        },
+        covariance, _data(volts, omega, np.hypot(error, scatter), line, ("motor voltage", "V"),
+                          ("frequency", "rad/s"), runs), "calibration",
+    )  # fmt: skip
+
+
+def crank_force(runs: Sequence[Run], *, gain_limit: float = 0.01, k: Estimate | None = None) -> Finding:
+    r"""The forcing over the crank's length, :math:`\rho = k a`: its slope is the driven spring's stiffness (Fig. 8b).
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Car held still by the force sensor; each with ``force``, ``turns`` and the setting ``crank_length`` (m).
+    gain_limit : float
+        The sensor's gain lies within 1 +- this, evenly (type B).
+    k : Estimate, optional
+        The stiffness from elsewhere: a note says whether the two agree.
+
+    Returns
+    -------
+    Finding
+        The slope in N/m. ``others``: ``slope_a``, with its type-A uncertainty only, and ``intercept`` (N).
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than three different lengths, or a run is shorter than two turns.
+    """
+    length = np.array([float(run.settings["crank_length"]) for run in runs])
+    _enough(length, "crank lengths")
+    force, error = np.zeros(len(runs)), np.zeros(len(runs))
+    for i, run in enumerate(runs):
+        fitted = harmonics_of(run, np.asarray(run.force["time"].values, dtype=np.float64), run.force)[0]
+        force[i], error[i] = float(fitted.amplitudes[0]), float(fitted.amplitude_errors[0])
+    line, scatter = scattered_line(length, force, error)
+    type_a, half = float(np.sqrt(line.covariance[0, 0])), gain_limit * line.slope
+    total = float(np.hypot(type_a, uniform(half)))
+    notes = [
+        f"type A {type_a:.2g} N/m; type B {uniform(half):.2g} N/m, the sensor's gain within ±{100 * gain_limit:g} %",
+        f"rho = 0.14 N is a crank of {1e3 * (0.14 - line.intercept) / line.slope:.2f} mm",
+    ]
+    if k is not None:
+        off = (line.slope - k.value) / np.hypot(total, k.uncertainty)
+        notes.append(f"k = {k} from elsewhere: {100 * (line.slope / k.value - 1):+.2f} %, {abs(off):.1f} uncertainties")
+    notes += _scatter(scatter, error, "N")
+    return Finding(
+        "crank_force", Estimate(line.slope, total, "N/m", half_width=half),
+        "straight line through the fundamentals of the force on the held car (Fig. 8b)",
+        int(sum(run.force.size for run in runs)), tuple(run.name for run in runs), tuple(notes),
+        {
+            "slope_a": Estimate(line.slope, type_a, "N/m"),
+            "intercept": Estimate(line.intercept, float(np.sqrt(line.covariance[1, 1])), "N"),
+        },
+        data=_data(length, force, np.hypot(error, scatter), line, ("crank length", "m"),
+                   ("forcing amplitude", "N"), runs), plot="calibration",
+    )  # fmt: skip
+
+
+def _enough(settings: FloatArray, what: str) -> None:
+    n = len(np.unique(settings))
+    if n < 3:
+        raise ValueError(f"a calibration needs runs at three different {what} or more, got {n}")
+
+
+def _scatter(scatter: float, error: FloatArray, unit: str) -> list[str]:
+    if scatter <= 2 * float(np.median(error)):
+        return []
+    return [
+        f"the points scatter by {scatter:.2g} {unit} about the line, more than their own errors of "
+        f"{np.median(error):.2g} {unit}; it is taken as common to all"
+    ]
+
+
+def _data(
+    setting: FloatArray, reading: FloatArray, error: FloatArray, line: StraightLine,
+    named: tuple[str, str], read: tuple[str, str], runs: Sequence[Run],
+) -> xr.Dataset:  # fmt: skip
+    import xarray as xr
+
+    low = min(float(setting.min()), 0.0)
+    fine = np.linspace(low, float(setting.max()), 200)
+    rows = np.column_stack([fine, np.ones_like(fine)])
+    reach = coverage_factor() * np.sqrt(np.einsum("ij,jk,ik->i", rows, line.covariance, rows))
+    fitted, errors = line.intercept + line.slope * fine, np.sqrt(np.diag(line.covariance))
+    unit = {"units": read[1], "long_name": read[0]}
+    return xr.Dataset(
+        {
+            "setting": ("run", setting, {"units": named[1], "long_name": named[0]}),
+            "reading": ("run", reading, unit), "reading_error": ("run", error, unit),
+            "fitted": ("setting_fine", fitted, unit), "fitted_low": ("setting_fine", fitted - reach, unit),
+            "fitted_high": ("setting_fine", fitted + reach, unit),
+            "slope": ((), line.slope), "slope_error": ((), errors[0]),
+            "intercept": ((), line.intercept, unit), "intercept_error": ((), errors[1], unit),
+        },
+        {"setting_fine": ("setting_fine", fine, {"units": named[1], "long_name": named[0]})},
+        {"synthetic": "yes" if any(run.synthetic for run in runs) else "no"},
+    )  # fmt: skip

@@ -1,0 +1,136 @@
+"""Checks between findings: where two procedures tell one quantity, whether they agree, and by how much they do not.
+
+Each is a difference over its standard uncertainty. What both share, a mass that is weighed once, is not in it: it
+moves both alike. A difference that chance does not explain
+(``consistency.CHANCE``) is said in a sentence of its own, with where to look.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from nonsmooth.identification import Estimate, Finding
+from nonsmooth.identification.uncertainty import uniform
+from nonsmooth.recordings import Quantity
+from nonsmooth_savi2007.identification.consistency import birge_ratio
+
+
+class Check(NamedTuple):
+    """Two estimates of one quantity, as ``"c: free decay, complex response"``, and what to look at if they differ.
+
+    ``off`` is their difference, the first less the second, over its standard uncertainty.
+    """
+
+    name: str
+    one: Estimate
+    other: Estimate
+    off: float
+    remedy: str
+
+    @property
+    def agrees(self) -> bool:
+        """Return whether chance explains the difference."""
+        return birge_ratio(self.off**2, 1)[1]
+
+
+#: What is compared: its name, finding and which of its others ("" for itself), the same of the other, the mass that
+#: both share, and what to look at.
+PAIRS: Sequence[tuple[str, tuple[str, str], tuple[str, str], str, str]] = (
+    ("omega_0: free decay, complex response", ("omega_0", ""), ("c_frequency_response", "omega_0"), "",
+     "the photogate's times or the springs: were they changed between the procedures?"),
+    ("c: free decay, complex response", ("c_decay", ""), ("c_frequency_response", ""), "mass",
+     "the damper, or friction that is not dry: was anything changed between taps and response?"),
+    ("c: free decay, amplitude over frequency", ("c_decay", ""), ("c_response", ""), "mass",
+     "the damper, or the crank's lengths"),
+    ("friction: free decay, complex response", ("c_decay", "friction"), ("c_frequency_response", "friction"), "mass",
+     "friction that is not dry, or a bearing that was moved"),
+    ("c_s: drop by decrement, drop by fit", ("c_s_drop", ""), ("c_s_drop", "c_s_fit"), "test_mass",
+     "damping of the support that depends on amplitude"),
+    ("c_s: drop, contacts", ("c_s_drop", ""), ("c_s_contact", ""), "",
+     "the support's damping, its mounting, or the mass that was hung on it"),
+    ("c_s: one contact, all contacts", ("c_s_one_contact", ""), ("c_s_contact", ""), "mass",
+     "the record of that piece"),
+)  # fmt: skip
+
+
+def cross_checks(
+    findings: Sequence[Finding], masses: Mapping[str, Quantity], *, gain: Estimate | None = None,
+    gain_limit: float = 0.0, k: Estimate | None = None, gap: Estimate | None = None,
+) -> list[Check]:  # fmt: skip
+    """All checks that these findings allow.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+    masses : mapping of str to Quantity
+        ``mass`` and ``test_mass`` as weighed, by which damping and friction of a motion are scaled.
+    gain, gain_limit : Estimate, float
+        The force sensor's gain as adjusted, and how far from 1 it may be.
+    k : Estimate, optional
+        The stiffness as adjusted, to be compared with that by the crank's force.
+    gap : Estimate, optional
+        The gap at rest by contacts at the setting of the screw at which the graze was sought.
+    """
+    known = {finding.name: finding for finding in findings}
+    found = []
+    for name, first, second, shared, remedy in PAIRS:
+        one, other = _taken(known, *first), _taken(known, *second)
+        if one is not None and other is not None:
+            common = masses[shared].uncertainty / masses[shared].value if shared in masses else 0.0
+            found.append(Check(name, one, other, _off(one, other, common), remedy))
+    if (scale := _taken(known, "c_frequency_response", "drive_scale")) is not None:
+        unit = Estimate(1.0, 0.0)
+        found.append(Check(
+            "drive: complex response over what the crank's length says, 1", scale, unit, _off(scale, unit),
+            "the crank's lengths, or springs that are not equal",
+        ))  # fmt: skip
+    if (seen := _taken(known, "crank_force", "")) is not None and k is not None:
+        found.append(Check("k: crank's force, all others", seen, k, _off(seen, k), "the crank's lengths"))
+    if gain is not None and gain_limit:
+        beyond = float(np.sign(gain.value - 1)) * max(abs(gain.value - 1) - gain_limit, 0.0)
+        found.append(Check(
+            f"gain: force sensor against motions and masses, 1 within ±{100 * gain_limit:g} %", gain,
+            Estimate(1.0, uniform(gain_limit), half_width=gain_limit), _over(beyond, gain.uncertainty**2),
+            "the force sensor's calibration, the mass, or the wheel",
+        ))  # fmt: skip
+    if (graze := _taken(known, "gap_grazing", "at_rest")) is not None and gap is not None:
+        found.append(Check(
+            "gap at rest: graze, contacts", graze, gap, _off(graze, gap),
+            "the screw: was it turned between the two? a string that slipped, or steps that are too coarse",
+        ))  # fmt: skip
+    return found
+
+
+def sentences(checks: Sequence[Check]) -> tuple[list[str], list[str]]:
+    """Agreements in one sentence, and one sentence for each pair that disagrees."""
+    good = [f"{check.name} ({abs(check.off):.1f})" for check in checks if check.agrees]
+    agree = [f"in agreement, with the difference in its uncertainties: {'; '.join(good)}"] if good else []
+    return agree, [
+        f"{check.name} disagree: {check.one} and {check.other}, {abs(check.off):.1f} uncertainties of the difference "
+        f"apart. Look at {check.remedy}"
+        for check in checks if not check.agrees
+    ]  # fmt: skip
+
+
+def _taken(known: Mapping[str, Finding], name: str, other: str) -> Estimate | None:
+    if name not in known:
+        return None
+    return known[name].others.get(other) if other else known[name].estimate
+
+
+def _off(one: Estimate, other: Estimate, common: float = 0.0) -> float:
+    """Difference over its uncertainty, without the relative uncertainty that both share."""
+    if (one.logarithmic or other.logarithmic) and one.value > 0 and other.value > 0:
+        square = one.relative**2 + other.relative**2 - 2 * common**2
+        return _over(float(np.log(one.value / other.value)), square)
+    square = one.uncertainty**2 + other.uncertainty**2 - 2 * common**2 * one.value * other.value
+    return _over(one.value - other.value, square)
+
+
+def _over(difference: float, square: float) -> float:
+    if square <= 0:
+        return float("inf") * difference if difference else 0.0
+    return float(difference / np.sqrt(square))

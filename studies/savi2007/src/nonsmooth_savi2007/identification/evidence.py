@@ -1,0 +1,211 @@
+"""Input of ``identify``: the runs of each procedure as plain arrays in SI units, and the notebook's apparatus."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from nonsmooth import Recording
+from nonsmooth.recordings.session import PROCEDURES, SETTINGS, Quantity, Session, load_session
+from nonsmooth.recordings.signals.checks import take
+from nonsmooth.recordings.signals.displacement import position, resolution
+from nonsmooth.system.names import unknown
+from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth_savi2007.identification.directions import oriented
+
+#: Channels that a procedure cannot do without.
+_NEEDS: Mapping[str, tuple[str, ...]] = {
+    "springs": ("Angle", "Force"), "support": ("Angle", "Force"), "impulse": ("Angle",), "drop": ("Angle",),
+    "response": ("Angle", "Turn"), "voltage": ("Turn",), "crank": ("Force", "Turn"), "grazing": ("Angle", "Turn"),
+    "contact": ("Angle", "Turn"), "rise": ("Angle", "Turn"), "section": ("Angle", "Turn"),
+}  # fmt: skip
+_ANGLES = ("rad", "deg", "°", "rev", "turn", "turns", "degrees", "radians", "rotations", "counts")
+_PASSAGES = 3  # of the photogate: fewer give no frequency and no scatter
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One run: settings, position x (m) and force (N) each over its time (s), times of the photogate (s).
+
+    ``x`` is a DataArray that knows its run and channel; ``time`` and ``positions`` are its arrays. ``backwards``: the
+    photogate's count falls.
+    """
+
+    procedure: str
+    name: str
+    settings: Mapping[str, Any]
+    x: Any = None
+    force: Any = None
+    turns: FloatArray | None = None
+    synthetic: bool = False
+    backwards: bool = False
+
+    @property
+    def time(self) -> FloatArray:
+        """Times of the position (s)."""
+        times: FloatArray = np.asarray(self.x["time"].values, dtype=np.float64)
+        return times
+
+    @property
+    def positions(self) -> FloatArray:
+        """Position (m), as counted."""
+        values: FloatArray = np.asarray(self.x.values, dtype=np.float64)
+        return values
+
+    @property
+    def passages(self) -> FloatArray:
+        """Times at which the photogate saw the crank (s)."""
+        if self.turns is None:
+            raise ValueError(f"{self.label}: has no channel 'Turn'; record the photogate with it")
+        return self.turns
+
+    @property
+    def label(self) -> str:
+        """``response Run #3``."""
+        return f"{self.procedure} {self.name}"
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """All runs by procedure, what is known of the apparatus, and what was turned (`oriented`).
+
+    ``direction`` is -1 where the rotary sensor counts away from the support: positions have the other sign then.
+    """
+
+    runs: Mapping[str, tuple[Run, ...]]
+    apparatus: Mapping[str, Quantity]
+    title: str = ""
+    source: str = ""
+    synthetic: bool = False
+    missing: tuple[str, ...] = field(default=())
+    direction: int = 1
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def resolution(self) -> float:
+        """Length of a count of the rotary sensor (m)."""
+        return resolution(
+            distance_per_turn=self.apparatus["distance_per_turn"].value,
+            counts_per_turn=round(self.apparatus["counts_per_turn"].value),
+        )
+
+    def quantity(self, name: str) -> Quantity:
+        """A number from the notebook.
+
+        Raises
+        ------
+        ValueError
+            If the notebook does not state it.
+        """
+        if name not in self.apparatus:
+            raise ValueError(f"the notebook does not state `{name}`, which is needed; write it under [apparatus]")
+        return self.apparatus[name]
+
+
+def gather(
+    recordings: Session | str | os.PathLike[str] | Mapping[str, Any], *, apparatus: Mapping[str, Any] | None = None,
+    procedures: Sequence[str] | None = None,
+) -> Evidence:  # fmt: skip
+    """Take the channels of all runs out of a session or a mapping of recordings, sensors brought to one direction.
+
+    Parameters
+    ----------
+    recordings : Session, path, or mapping
+        ``{"impulse": recording, "response": [(recording, run, settings), ...]}`` in place of a session; settings may
+        also stand in the attributes of a run.
+    apparatus : mapping, optional
+        What is known, as in a notebook's ``[apparatus]``: numbers, or pairs of value and standard uncertainty.
+        Needed with a mapping; with a session it replaces single entries.
+    procedures : sequence of str, optional
+        Of a session, those whose files are read; all where not given.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A procedure that is not known, a run without a channel or setting that its procedure needs: the message names
+        run and channel. Sensors that count one way in some runs and the other way in others, recordings of springs and
+        support that look swapped.
+    """
+    if isinstance(recordings, str | os.PathLike):
+        recordings = load_session(recordings)
+    taken: dict[str, list[Any]]
+    if isinstance(recordings, Session):
+        known = dict(recordings.apparatus)
+        names = [name for name in recordings.procedures if procedures is None or name in procedures]
+        taken = {name: [tuple(row) for row in recordings.recordings(name)] for name in names}
+        title, source, synthetic = recordings.title, str(recordings.folder), recordings.synthetic
+    elif isinstance(recordings, Mapping):
+        known, title, source, synthetic = {}, "", "recordings in memory", False
+        taken = {str(name): _rows(str(name), given) for name, given in recordings.items()}
+    else:
+        raise TypeError(
+            "recordings must be a session folder, a Session, or a mapping of procedure to recordings, got "
+            f"{type(recordings).__name__}"
+        )
+    for name, value in (apparatus or {}).items():
+        known[name] = value if isinstance(value, Quantity) else Quantity(*np.atleast_1d(value).tolist())
+    for name, default in (("counts_per_turn", 1440.0), ("turn_resolution", 1e-4)):
+        known.setdefault(name, Quantity(default))
+    if "distance_per_turn" not in known:
+        raise ValueError("the apparatus must state `distance_per_turn` (m): the car's travel per turn of the wheel")
+    runs = {}
+    for procedure, rows in taken.items():
+        if procedure not in PROCEDURES:
+            raise ValueError(unknown(procedure, "a procedure", "the experiment", PROCEDURES.keys()))
+        runs[procedure] = tuple(_run(procedure, row[0], row[1], row[2], known) for row in rows)
+    runs, direction, notes = oriented(runs)
+    synthetic = synthetic or any(run.synthetic for rows in runs.values() for run in rows)
+    missing = tuple(p for p in PROCEDURES if p not in runs)
+    return Evidence(runs, known, title, source, synthetic, missing, direction, notes)
+
+
+def _rows(procedure: str, given: Any) -> list[Any]:
+    rows: list[Any] = []
+    for item in [given] if isinstance(given, Recording) else given:
+        if isinstance(item, Recording):
+            for run in item.runs:
+                attrs = item.tree[run].attrs
+                rows.append((item, run, {key: attrs[key] for key in SETTINGS if key in attrs}))
+        else:
+            rows.append(tuple(item))
+    if not rows:
+        raise ValueError(f"there are no recordings of {procedure!r}; leave the procedure out")
+    return rows
+
+
+def _run(
+    procedure: str, recording: Recording, name: str, settings: Mapping[str, Any], known: Mapping[str, Quantity]
+) -> Run:
+    if lacking := [key for key in PROCEDURES[procedure] if key not in settings]:
+        raise ValueError(f"{procedure}, run {name!r} must state {', '.join(lacking)} in its settings")
+    found: dict[str, Any] = {}
+    for channel in ("Angle", "Force", "Turn"):
+        needed = channel in _NEEDS[procedure]
+        if not needed and not _has(recording, name, channel):
+            continue
+        if channel == "Angle":
+            angle = take(recording, channel, name, units=_ANGLES)
+            found["x"] = position(
+                angle,
+                distance_per_turn=known["distance_per_turn"].value,
+                counts_per_turn=round(known["counts_per_turn"].value),
+            )
+        elif channel == "Force":
+            found["force"] = take(recording, channel, name, units=("N",))
+        else:
+            passages = take(recording, channel, name, samples=_PASSAGES)
+            found["turns"] = np.asarray(passages["time"].values, dtype=np.float64)
+            found["backwards"] = bool(np.all(np.diff(np.asarray(passages.values, dtype=np.float64)) < 0))
+    return Run(procedure, name, dict(settings), synthetic=recording.synthetic, **found)
+
+
+def _has(recording: Recording, run: str, channel: str) -> bool:
+    try:
+        recording.channel(channel, run)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,317 @@
+r"""Free decay: natural frequency, viscous damping and dry friction at once, from taps of the car with the motor off.
+
+Between two turning points dry friction only moves the middle of the swing,
+
+.. math::
+
+    \ddot x + b \dot x + \omega_0^2 (x - x_e \pm f / \omega_0^2) = 0,
+
+so that it takes the same length :math:`4 f/\omega_0^2` off the swing in every cycle while viscous damping takes the
+same fraction, and it does not shift the frequency: :math:`\omega_d = \sqrt{\omega_0^2 - b^2/4}` with or without it. A
+single decay therefore tells the two apart by its shape, several of different heights all the better.
+
+The fit is :func:`nonsmooth.fit`'s, over all runs together, from each first turning point to where the car has become
+slow: there the friction law is in doubt (a car that creeps, a belt that gives), and the fit should not hang on it. How
+far the estimate moves when half of that speed is let in is added to the uncertainty: it is that of the law.
+
+References: J.P. Den Hartog, Trans. ASME 53 (1931) 107; B.F. Feeny and J.W. Liang, J. Sound Vib. 195 (1996) 149.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
+from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth_savi2007.identification.consistency import Consistent, consistent
+
+#: Speed (m/s) of the slowest half swing that is used.
+SLOWEST = 0.03
+_NAMES = ("omega_0", "b", "f", "x_e")
+_UNFITTING = 2.0  # residuals of a run over those of the median run, from which the law does not fit it
+
+
+@dataclass(frozen=True, eq=False)
+class DecayFit:
+    r"""Outcome of `free_decay`: :math:`\omega_0`, b = c/m, f = F_C/m, and the place of rest x_e in the sensor's count.
+
+    ``values`` and ``covariance`` are in the order ``omega_0, b, f, x_e``; ``fit`` is what :func:`nonsmooth.fit` found.
+    """
+
+    values: FloatArray
+    covariance: FloatArray
+    runs: tuple[int, ...]
+    spans: tuple[tuple[int, int], ...]
+    fit: ParameterSet
+    notes: tuple[str, ...] = ()
+
+    @property
+    def samples(self) -> int:
+        """Samples that entered."""
+        return int(self.fit.residuals.sizes["sample"])
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of a reading (m)."""
+        return self.fit.extra["x.noise"].value
+
+    def error(self, name: str) -> float:
+        """Standard uncertainty of one of the four."""
+        i = _NAMES.index(name)
+        return float(np.sqrt(self.covariance[i, i]))
+
+    def fitted(self, which: int) -> FloatArray:
+        """Fitted positions of one of the runs (m), in the sensor's count."""
+        data = self.fit.residuals
+        return np.asarray(data["fitted"].values[data["run"].values == which], dtype=np.float64)
+
+    def begins(self, which: int) -> tuple[float, float]:
+        """Position from rest (m) and velocity (m/s) of one of the runs at its first sample."""
+        of = f", {which}" if len(self.runs) > 1 else ""
+        return self.fit.extra[f"x(0){of}"].value, self.fit.extra[f"v_x(0){of}"].value
+
+
+def swing(time: FloatArray, x: FloatArray, *, resolution: float, slowest: float = SLOWEST) -> tuple[int, int]:
+    """First and last+1 sample of a decay that are to be used: from the first turning point to the last fast half swing.
+
+    Raises
+    ------
+    ValueError
+        If the record holds no motion, or less than two half swings of that speed.
+    """
+    rest = float(np.median(x[-max(10, len(x) // 10) :]))
+    away = x - rest
+    steps = np.diff(x)
+    moving = np.flatnonzero(np.abs(steps) > 2.5 * resolution)
+    if len(moving) == 0 or np.max(np.abs(away)) < 20 * resolution:
+        raise ValueError(f"the car moves by {np.max(np.abs(away)) / resolution:.0f} counts only: tap it harder")
+    # before the tap it rests, or is held: the first turning point comes after it has begun to move
+    first = int(moving[0])
+    reach, way = 0.5 * float(np.max(np.abs(away[first:]))), 0.0
+    begin = first
+    for i in range(first, len(steps)):
+        if way * steps[i] < 0 and abs(away[i]) > reach and way * away[i] > 0:
+            begin = i
+            break
+        way = float(np.sign(steps[i])) or way
+    crossings = begin + 1 + np.flatnonzero(np.sign(away[begin + 1 :]) != np.sign(away[begin:-1]))
+    end, fast, wide = begin, 0, 2
+    for i in crossings.tolist():
+        if i + wide >= len(x) or i - wide < begin:
+            continue
+        speed = abs(x[i + wide] - x[i - wide]) / (time[i + wide] - time[i - wide])
+        if speed < slowest:
+            break
+        end, fast = int(i) + 1, fast + 1
+    if fast < 2 or end - begin < 20:
+        raise ValueError(
+            f"only {fast} half swings are faster than {slowest:g} m/s; tap harder, or give a smaller `slowest`"
+        )
+    return begin, end
+
+
+def free_decay(
+    runs: Sequence[tuple[Any, Any]],
+    *,
+    resolution: float,
+    slowest: float = SLOWEST,
+    friction: bool = True,
+    names: Sequence[str] | None = None,
+) -> DecayFit:
+    r"""Fit :math:`\omega_0`, c/m and F_C/m to free decays.
+
+    Parameters
+    ----------
+    runs : sequence of (time, x)
+        Records (s, m), each with one tap and its decay.
+    resolution : float
+        Length of a count (m).
+    slowest : float
+        Speed (m/s) of the slowest half swing that is used.
+    friction : bool
+        False: viscous damping only.
+    names : sequence of str, optional
+        Names of the records for the notes on those that cannot be used.
+
+    Returns
+    -------
+    DecayFit
+        Without the records that disagree with the majority, with a note on each.
+
+    Raises
+    ------
+    ValueError
+        If no record can be used.
+    SolveError
+        If the fit does not settle.
+    """
+    records, notes = _records(runs, resolution, slowest, names)
+    if not records:
+        raise ValueError("no free decay can be used; " + "; ".join(notes))
+    used, agreed, start = _used(friction), None, np.zeros(4)
+    if len(records) > 1:
+        chosen, agreed, said = _agreeing(records, runs, resolution, slowest, friction)
+        records, notes = [records[i] for i in chosen], notes + said
+    if agreed is not None:
+        start[used] = agreed.mean
+    values, covariance, found = _fit(records, friction, resolution, _guess(records) if agreed is None else start)
+    if agreed is not None and not agreed.agree:
+        values[used], covariance[np.ix_(used, used)] = agreed.mean, agreed.covariance + agreed.scatter
+    else:
+        covariance += _doubt(records, runs, resolution, slowest, friction, values)
+    return DecayFit(
+        values, covariance, tuple(r.number for r in records), tuple(r.span for r in records), found, tuple(notes)
+    )
+
+
+class _Record(NamedTuple):
+    """The used part of a record: number of its run, name, first and last+1 sample, times (s) and positions (m)."""
+
+    number: int
+    name: str
+    span: tuple[int, int]
+    time: FloatArray
+    x: FloatArray
+
+
+def _records(
+    runs: Sequence[tuple[Any, Any]], resolution: float, slowest: float, names: Sequence[str] | None
+) -> tuple[list[_Record], list[str]]:
+    """The records that hold a decay, and a sentence on each that does not."""
+    found, notes = [], []
+    for i, (time, x) in enumerate(runs):
+        t, position = np.asarray(time, dtype=np.float64), np.asarray(x, dtype=np.float64)
+        name = f"decay {i + 1}" if names is None else f"run {names[i]!r}, channel 'Angle'"
+        try:
+            begin, end = swing(t, position, resolution=resolution, slowest=slowest)
+        except ValueError as error:
+            notes.append(f"{name}: not used: {error}")
+            continue
+        found.append(_Record(i, name, (begin, end), t[begin:end] - t[begin], position[begin:end]))
+    return found, notes
+
+
+def _used(friction: bool) -> list[int]:
+    """Indices of the parameters that are fitted."""
+    return [0, 1, 2, 3] if friction else [0, 1, 3]
+
+
+@cache
+def _oscillator(friction: bool) -> System:
+    """The free oscillator about its rest, everything over its mass."""
+    dry = {"dry": elements.Coulomb(at="x", friction="f")} if friction else {}
+    known = {"omega_0": (4.5, "rad/s"), "b": (1.0, "1/s")} | ({"f": (0.005, "N/kg")} if friction else {})
+    return mechanical(
+        1.0, "b", lambda p: [[p.omega_0**2]], parameters=known, coordinates={"x": "m"}, elements=dry, name="free decay"
+    )
+
+
+def _fit(
+    records: Sequence[_Record], friction: bool, resolution: float, first: FloatArray
+) -> tuple[FloatArray, FloatArray, ParameterSet]:
+    """The four values, their covariance and the fit; zeros for a friction that is not fitted."""
+    used = _used(friction)
+    names = [_NAMES[i] for i in used[:-1]]
+    system = _oscillator(friction).with_parameters(dict(zip(names, first[used[:-1]].tolist(), strict=True)))
+    found = fit(
+        system, [{"x": (r.time, r.x)} for r in records], [*names, "x.offset"],
+        measured={"x": Sensor(resolution=resolution, offset=float(first[3]))},
+        mode="dry_stick" if friction else None, tries=1, progress=False,
+    )  # fmt: skip
+    values, covariance = np.zeros(4), np.zeros((4, 4))
+    names.append("x.offset")
+    values[used] = [found.estimate(name).value for name in names]
+    covariance[np.ix_(used, used)] = found.full_covariance.sel(parameter=names, other=names)
+    if not np.isfinite(covariance).all():
+        raise SolveError(f"the decays do not determine {', '.join(names)}")
+    return values, covariance, found
+
+
+def _doubt(
+    records: Sequence[_Record], runs: Sequence[tuple[Any, Any]], resolution: float, slowest: float, friction: bool,
+    values: FloatArray,
+) -> FloatArray:  # fmt: skip
+    """Covariance of the law: how far the values move when half of the speed is let in."""
+    slower = _records([runs[r.number] for r in records], resolution, slowest / 2, None)[0]
+    moved = _fit(slower, friction, resolution, values)[0] - values
+    return np.outer(moved, moved)
+
+
+def _agreeing(
+    records: Sequence[_Record], runs: Sequence[tuple[Any, Any]], resolution: float, slowest: float, friction: bool
+) -> tuple[list[int], Consistent | None, list[str]]:
+    """Records that are used, what they agree on where there are several, and a sentence on each that is left out.
+
+    Each is fitted alone. One that the law does not fit (a string that slipped on the wheel, a hand that touched) leaves
+    more than the others; one that it fits may still tell other values.
+    """
+    alone: dict[int, tuple[FloatArray, FloatArray]] = {}
+    left: dict[int, float] = {}
+    first = _guess(records)
+    for i, r in enumerate(records):
+        try:
+            values, covariance, found = _fit([r], friction, resolution, first)
+            alone[i] = values, covariance + _doubt([r], runs, resolution, slowest, friction, values)
+        except SolveError:
+            continue
+        left[i] = found.extra["x.noise"].value
+    said = []
+    typical = float(np.median(list(left.values()))) if left else 1.0
+    good = [i for i, noise in left.items() if noise <= _UNFITTING * typical]
+    if 2 * len(good) <= len(records):
+        return list(range(len(records))), None, [
+            f"{len(records) - len(good)} of {len(records)} decays are not those of the law, and no majority is: "
+            "see whether the string slips on the wheel, and tap again"
+        ]  # fmt: skip
+    for i, r in enumerate(records):
+        if i not in good:
+            by = (
+                "no decay fits it" if i not in left else
+                f"it is {left[i] / typical:.1f} times as far from a decay as the others are "
+                "(root of chi^2)"
+            )  # fmt: skip
+            said.append(f"{r.name}: left out: {by}; see whether the string slipped on the wheel")
+    if len(good) < 2:
+        return good, None, said
+    used = _used(friction)
+    told = [(alone[i][0][used], alone[i][1][np.ix_(used, used)]) for i in good]
+    agreed = consistent([values for values, _ in told], [covariance for _, covariance in told])
+    for i, keep, (values, covariance) in zip(good, agreed.used, told, strict=True):
+        if not keep:
+            off = agreed.off(values, covariance)
+            k = int(np.argmax(np.abs(off)))
+            said.append(
+                f"{records[i].name}: left out: its {_NAMES[used[k]]} is {off[k]:+.1f} combined uncertainties from that "
+                f"of the {np.count_nonzero(agreed.used)} runs that agree; see whether the string slipped on the wheel"
+            )
+    if not agreed.agree:
+        said.append(
+            f"the {len(good)} decays disagree (Birge ratio {agreed.birge:.1f}) and no majority agrees: all are used, "
+            "with the scatter between them as uncertainty; see whether the string slips on the wheel"
+        )
+    return [i for i, keep in zip(good, agreed.used, strict=True) if keep], agreed, said
+
+
+def _guess(records: Sequence[_Record]) -> FloatArray:
+    """From turning points: half a period between them; each swing is q times the one before."""
+    periods, ratios, rests = [], [], []
+    for p in records:
+        rest = float(np.mean(p.x[-20:])) if len(p.x) > 40 else 0.0
+        away = p.x - rest
+        turned = np.flatnonzero(np.sign(away[1:]) != np.sign(away[:-1]))
+        if len(turned) > 1:
+            periods.append(2 * float(np.mean(np.diff(p.time[turned]))))
+            heights = [np.max(np.abs(away[a:b])) for a, b in pairwise(turned)]
+            ratios += [h / g for g, h in pairwise(heights) if g > 0]
+        rests.append(0.0)
+    period = float(np.median(periods)) if periods else 1.4
+    ratio = min(float(np.median(ratios)), 0.99) if ratios else 0.7
+    b = -4 * np.log(ratio) / period  # swing to swing: exp(-b T/4)
+    omega_d = 2 * np.pi / period
+    return np.array([np.sqrt(omega_d**2 + b**2 / 4), b, 0.005, float(np.mean(rests))])

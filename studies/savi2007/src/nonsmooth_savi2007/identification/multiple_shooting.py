@@ -1,0 +1,262 @@
+r"""Gap and contact parameters from records with contact: :func:`nonsmooth.fit` over windows with free starts.
+
+.. math::
+
+    \ddot x + \omega_0^2 (x - x_e) + b\,\dot x + f\,\mathrm{sign}\,\dot x
+        + [\kappa (x - g) + \gamma \dot x]_{\text{contact}} = \tfrac12 \omega_0^2 D(\varphi)
+
+with everything divided by the mass: a motion tells only such ratios. The crank's mean angle is known from the
+photogate: a line through all passages, and for a motor that wanders, straight between two of them;
+:math:`D = a \cos(\varphi + \theta) + D_c \cos 2\varphi + D_s \sin 2\varphi`. What the free decay has told,
+:math:`\omega_0, b, f`, enters as known with its covariance; the crank's length a is known to 0.5 %, while the mark
+:math:`\theta`, the second harmonic (string and ripple) and the place x_e about which the car swings are free in each
+run. The gap comes out in the sensor's own count, and the place of the swing with it, so that their difference, the gap
+*referred to the car's mean position under the drive*, needs no zero.
+
+Each run is fitted alone, and those whose residuals are the sensor's are joined: the information of all of them, with
+that of the decays once. How far the estimate moves with every other turn of the crank alone is added to its uncertainty
+where the motor wanders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
+from nonsmooth.identification import Estimate
+from nonsmooth.recordings.signals.phase import DrivePhase, drive_phase
+from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth_savi2007.identification.evidence import Run
+from nonsmooth_savi2007.identification.free_decay import DecayFit
+
+SHARED = ("omega_0", "b", "f", "kappa", "gamma")
+OWN = ("g", "x_e", "crank", "mark", "cosine_2", "sine_2")  # of each run
+_TURNING = ("omega", "turned")  # of an even drive: its angle is omega t + turned
+_WINDOW = 1.3  # s: about as long as a motion with contact is told by its start
+_LONGEST = 40.0  # s: of a run
+_BEGINS = 2.0  # s within which a run begins, at its farthest from the support
+_FAR = 1.5  # times the sensor's noise: residuals of a run that is not of this law
+
+
+@dataclass(frozen=True, eq=False)
+class ContactFit:
+    """Outcome: ``kappa`` = k_s/m, ``gamma`` = c_s/m, and for each run the gap and the place of the swing.
+
+    ``values`` and ``covariance``: those that are `SHARED`, then per run its `OWN`; ``fits``: each run alone;
+    ``by_turns``: how far the values move with every other turn of the crank; ``excess``: residuals over the sensor's
+    noise; ``left``: a sentence on each run that is left out; ``poor``: whether most runs are not of the law.
+    """
+
+    values: FloatArray
+    covariance: FloatArray
+    runs: tuple[Run, ...]
+    fits: tuple[ParameterSet, ...]
+    by_turns: FloatArray
+    excess: float
+    left: tuple[str, ...] = ()
+    poor: bool = False
+
+    def place(self, run: int, which: int) -> int:
+        """Index of a run's own parameter: 0 gap, 1 place, 2-5 drive."""
+        return len(SHARED) + len(OWN) * run + which
+
+    @property
+    def samples(self) -> int:
+        """Samples that entered."""
+        return int(sum(one.residuals.sizes["sample"] for one in self.fits))
+
+    @property
+    def n_contacts(self) -> int:
+        """Number of contacts in what is fitted."""
+        above = [one.residuals["fitted"].values > self.values[self.place(i, 0)] for i, one in enumerate(self.fits)]
+        return sum(int(np.count_nonzero(np.diff(each.astype(int)) > 0)) for each in above)
+
+    def single(self) -> list[tuple[int, float, float]]:
+        """Run, first and last time (s) of each window with one contact."""
+        found = []
+        for i, one in enumerate(self.fits):
+            data = one.residuals
+            for k in np.unique(data["window"].values):
+                mine = data["window"].values == k
+                above = data["fitted"].values[mine] > self.values[self.place(i, 0)]
+                if np.count_nonzero(np.diff(above.astype(int)) > 0) == 1:
+                    time = data["time"].values[mine]
+                    found.append((i, float(time[0]), float(time[-1])))
+        return found
+
+
+@cache
+def _rig(wanders: bool) -> System:
+    """The car between its springs, with the support; x in the sensor's count.
+
+    The crank turns evenly, so that the model is linear in each mode; where the motor ``wanders`` its angle is an input.
+    """
+
+    def push(t: Any, p: Any) -> Any:
+        angle = p.phi if wanders else p.omega * t + p.turned
+        drive = p.crank * np.cos(angle + p.mark) + p.cosine_2 * np.cos(2 * angle) + p.sine_2 * np.sin(2 * angle)
+        return p.omega_0**2 * (0.5 * drive + p.x_e)
+
+    units = ("rad/s", "1/s", "N/kg", "1/s^2", "1/s", "m", "m", "m", "rad", "m", "m", "rad/s", "rad")
+    names = (*SHARED, *OWN) if wanders else (*SHARED, *OWN, *_TURNING)
+    return mechanical(
+        1.0, "b", lambda p: [[p.omega_0**2]], coordinates={"x": "m"}, forcing={"x": push},
+        inputs={"phi": "rad"} if wanders else None,
+        parameters={name: (1.0, unit) for name, unit in zip(names, units, strict=False)},
+        elements={
+            "dry": elements.Coulomb(at="x", friction="f"),
+            "support": elements.ElasticStop(at="x", position="g", stiffness="kappa", damping="gamma"),
+        }, name="car with support",
+    )  # fmt: skip
+
+
+def known_before(run: Run, decay: DecayFit, mark: float = 0.0, **also: Estimate) -> ParameterSet:
+    """Priors: what the decays, the settings of a run, and ``also`` others by themselves, tell of its motion."""
+    crank, rest = float(run.settings["crank_length"]), float(decay.values[3])
+    values = (*decay.values[:3], float(run.settings["gap"]) + rest, rest, crank, mark, 0.0, 0.0)
+    # the gap as read to 1.5 mm; the crank as set to 0.5 %, a phase of the mark to 0.05 rad, a second harmonic to 3 %
+    covariance = np.diag([0.0, 0.0, 0.0, 1.5e-3, 1e-3, 5e-3 * crank, 0.05, 0.03 * crank, 0.03 * crank]) ** 2
+    covariance[:3, :3] = decay.covariance[:3, :3] + 1e-12 * np.diag(np.diag(decay.covariance)[:3])
+    errors = np.sqrt(np.diag(covariance))
+    rows = zip((*SHARED[:3], *OWN), values, errors, strict=True)
+    beside = np.diag([one.uncertainty**2 for one in also.values()])
+    return ParameterSet(
+        {name: Estimate(float(v), float(e)) for name, v, e in rows} | also,
+        np.block([[covariance, np.zeros((9, len(also)))], [np.zeros((len(also), 9)), beside]]),
+    )
+
+
+def fit_contact(
+    run: Run, drive: DrivePhase, wanders: bool, known: ParameterSet, first: Mapping[str, float], resolution: float,
+    span: tuple[float, float], **options: Any,
+) -> ParameterSet:  # fmt: skip
+    """Fit a run, or its part between two times (s), from first values; ``options`` of :func:`nonsmooth.fit`."""
+    inside = (run.time >= span[0]) & (run.time <= span[1])
+    recorded, set_to = {"x": (run.time[inside], run.positions[inside])}, {}
+    if wanders:
+        at = drive.turn_times
+        at = np.unique(np.r_[span[0] - 0.1, at[(at > span[0]) & (at < span[1])], span[1] + 0.1])
+        recorded["phi"] = at, drive.phase(at)
+    else:
+        set_to = dict(zip(_TURNING, np.polyfit(drive.turn_times, 2 * np.pi * drive.turns, 1).tolist(), strict=True))
+    return fit(
+        _rig(wanders).with_parameters({**first, **set_to}), recorded,
+        dict.fromkeys([*SHARED, *OWN]) | {"gamma": (0.0, None)}, measured={"x": Sensor(resolution=resolution)},
+        priors=known, window=_WINDOW, tries=1, progress=False, mode="dry_stick_support_open", **options,
+    )  # fmt: skip
+
+
+def shoot_contacts(
+    runs: Sequence[Run], decay: DecayFit, *, resolution: float, kappa: float, gamma: float, mark: float = 0.0
+) -> ContactFit:
+    """Fit the runs with contact, and join what they tell.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        With ``x``, ``turns``, and the settings ``crank_length`` and ``gap`` (a first guess).
+    decay : DecayFit
+        What the free decay told.
+    resolution : float
+        Length of a count (m).
+    kappa, gamma : float
+        First guess of k_s/m (1/s^2) and c_s/m (1/s).
+    mark : float
+        About the crank's angle at the photogate (rad), from where it pulls towards the support.
+
+    Raises
+    ------
+    ValueError
+        If no run has a contact.
+    SolveError
+        If no run can be fitted.
+    """
+    rows: list[tuple[Run, ParameterSet, ParameterSet, FloatArray]] = []
+    left, touched = [], [run for run in runs if _touches(run, float(decay.values[3]))]
+    if not touched:
+        raise ValueError("no run shows a contact: the gap and the support cannot be found from them")
+    for run in touched:
+        known, drive, span = known_before(run, decay, mark), drive_phase(run.passages), _span(run)
+        wanders, first = not drive.wander()[1], {"kappa": kappa, "gamma": gamma, **known}
+        try:
+            found = fit_contact(run, drive, wanders, known, first, resolution, span)
+            if _excess(found, decay) > _FAR:
+                found = fit_contact(run, drive, wanders, known, first, resolution, span, leave_out=True)
+        except SolveError as reason:
+            left.append(f"contact {run.name}: left out: {reason}")
+            continue
+        moved = np.zeros(len(SHARED) + len(OWN))
+        if wanders:
+            moved = _values(fit_contact(run, drive.coarser, wanders, known, found, resolution, span)) - _values(found)
+        rows.append((run, found, known, moved))
+    good = [row for row in rows if _excess(row[1], decay) <= _FAR]
+    poor = 2 * len(good) <= len(touched)
+    if not poor:
+        left += [
+            f"contact {row[0].name}: left out: its residuals are {_excess(row[1], decay):.3g} times the sensor's "
+            "noise; look at its crank length, photogate and string"
+            for row in rows if _excess(row[1], decay) > _FAR
+        ]  # fmt: skip
+        rows = good
+    if not rows:
+        raise SolveError("; ".join(left))
+    excess = [_excess(row[1], decay) for row in rows]
+    values, covariance, moved = _joined([row[1:] for row in rows])
+    return ContactFit(
+        values, covariance + np.outer(moved, moved), tuple(row[0] for row in rows), tuple(row[1] for row in rows),
+        moved, float(np.median(excess)), tuple(left), poor,
+    )  # fmt: skip
+
+
+def _touches(run: Run, rest: float) -> bool:
+    """Return whether the car comes near enough to the support: the screw's reading may be off by a millimetre."""
+    gap = float(run.settings["gap"])
+    return float(run.positions.max()) > rest + (gap - 1e-3 if gap < 2e-3 else 0.5 * gap)
+
+
+def _span(run: Run) -> tuple[float, float]:
+    """Part of a run that is fitted: from where the car is farthest from the support."""
+    early = run.time < run.time[0] + _BEGINS
+    begin = float(run.time[int(np.argmin(run.positions[early]))])
+    return begin, min(float(run.time[-1]), begin + _LONGEST)
+
+
+def _excess(found: ParameterSet, decay: DecayFit) -> float:
+    """Residuals over the sensor's noise; infinite where a parameter is not determined."""
+    told = np.isfinite(list(found.uncertainty.values())).all()
+    return found.extra["x.noise"].value / decay.noise if told else np.inf
+
+
+def _values(found: ParameterSet) -> FloatArray:
+    return np.array([found.estimate(name).value for name in (*SHARED, *OWN)])
+
+
+def _joined(rows: Sequence[tuple[ParameterSet, ParameterSet, FloatArray]]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Values, covariance and shift by turns of all runs together: weights add, that of the decays counts once."""
+    s, n = len(SHARED), len(SHARED) + len(OWN) * len(rows)
+    scale, total = np.ones(n), np.zeros((n, n))
+    pull, shift = np.zeros(n), np.zeros(n)
+    for i, (found, known, moved) in enumerate(rows):
+        here = np.r_[range(s), range(s + len(OWN) * i, s + len(OWN) * (i + 1))]
+        names = [*SHARED, *OWN]
+        own = found.full_covariance.sel(parameter=names, other=names).values
+        if not i:
+            scale[:s] = np.sqrt(np.diag(own))[:s]
+        scale[here[s:]] = np.sqrt(np.diag(own))[s:]
+        size = np.outer(scale[here], scale[here])
+        information = np.linalg.inv(own / size)
+        value = _values(found) / scale[here]
+        if i:
+            decays = np.linalg.inv(known.full_covariance.values[:3, :3] / size[:3, :3])
+            information[:3, :3] -= decays
+            pull[:3] += decays @ (value[:3] - [known[name] / scale[k] for k, name in enumerate(SHARED[:3])])
+        total[np.ix_(here, here)] += information
+        pull[here] += information @ value
+        shift[here] += information @ (moved / scale[here])
+    covariance = np.linalg.inv(total)
+    return covariance @ pull * scale, covariance * np.outer(scale, scale), covariance @ shift * scale

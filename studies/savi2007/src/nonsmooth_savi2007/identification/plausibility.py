@@ -1,0 +1,173 @@
+"""Plausibility of a session, before anything is fitted: what no rig on a table can do, whatever its parameters are.
+
+The criteria are ratios of scales between what was recorded and what the notebook states, wide enough for any rig and
+far narrower than a factor of a thousand between m and mm or s and ms. What is finer (a wheel 1.4 % wrong) shows only
+where two procedures tell one quantity: see :mod:`nonsmooth_savi2007.identification.cross_checks`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from nonsmooth.recordings import Quantity
+    from nonsmooth_savi2007.identification.evidence import Evidence, Run
+    from nonsmooth_savi2007.identification.free_decay import DecayFit
+    from nonsmooth_savi2007.identification.steady import Steady
+
+#: Procedures in which the car (or the test mass) moves, and those in which a force changes.
+_MOVES = ("springs", "support", "impulse", "drop", "response", "grazing", "contact", "rise", "section")
+_PULLS = ("springs", "support", "crank")
+FASTEST = 20.0  # m/s: no car on a table goes faster
+LARGEST = 50.0  # times the crank: a car that swings so much further would need a damping ratio of 0.5 %
+SMALLEST = 0.02  # of the crank: the largest amplitude of all steps of a response; far above resonance it is smaller
+REACH = 5.0  # times what the car moves: a support so far away is not met
+RATES = 20.0  # times: sample rates of one sensor in one session
+STATED = 2.0  # times the notebook's sample rate
+STILL = 3.0  # counts: what moves by no more does not move
+
+
+def check_plausible(evidence: Evidence) -> None:
+    """Check channels, clocks and lengths of all runs against each other and against the notebook.
+
+    Raises
+    ------
+    ValueError
+        With one sentence for each thing that cannot be: runs, what was found, what is possible, what to look at.
+    """
+    everything = [run for rows in evidence.runs.values() for run in rows]
+    wrong = [*_constant(everything, evidence.resolution), *_clocks(everything, evidence.apparatus)]
+    # where a channel is constant or a clock wrong, lengths say nothing
+    wrong = wrong or [*_cranks(evidence.runs), *_gaps(evidence.runs)]
+    if wrong:
+        raise ValueError("this session cannot be right: " + "; ".join(wrong))
+
+
+def _constant(runs: Sequence[Run], count: float) -> Iterator[str]:
+    for channel, procedures in (("Angle", _MOVES), ("Force", _PULLS)):
+        dead = []
+        for run in runs:
+            signal = run.x if channel == "Angle" else run.force
+            if run.procedure in procedures and signal is not None and signal.size:
+                values = np.asarray(signal.values, dtype=np.float64)
+                if float(np.nanmax(values) - np.nanmin(values)) <= (STILL * count if channel == "Angle" else 0.0):
+                    dead.append(run.label)
+        if dead:
+            yield (
+                f"channel {channel!r} does not change in {len(dead)} of {len(runs)} runs ({few(dead)}): was the sensor "
+                "connected, and is it the right column? Leave these runs out of the notebook, or name the column"
+            )
+
+
+def _clocks(runs: Sequence[Run], apparatus: Mapping[str, Quantity]) -> Iterator[str]:
+    moving = [run for run in runs if run.x is not None and len(run.time) > 1]
+    rates = np.array([1.0 / float(np.median(np.diff(run.time))) for run in moving])
+    if len(rates) and rates.max() > RATES * rates.min():
+        low, high = moving[int(rates.argmin())], moving[int(rates.argmax())]
+        yield (
+            f"channel 'Angle' has {rates.min():.4g} samples per second in {low.label} and {rates.max():.4g} in "
+            f"{high.label}: the time of one of them is labelled in another unit than it is in (s, ms)"
+        )
+    elif len(rates) and (stated := apparatus.get("sample_rate")) is not None:
+        off = float(np.median(rates)) / stated.value
+        if not 1 / STATED < off < STATED:
+            yield (
+                f"channel 'Angle' has {np.median(rates):.4g} samples per second, the notebook says sample_rate = "
+                f"{stated.value:g} Hz: is the time labelled in another unit than it is in (s, ms)?"
+            )
+    fast = {run.label: speed for run in moving if (speed := _speed(run)) > FASTEST}
+    if fast:
+        yield (
+            f"the car would move at {max(fast.values()):.3g} m/s in {len(fast)} runs ({few(list(fast))}), where "
+            f"{FASTEST:g} m/s is more than any car on a table does: look at the units of time (s, ms) and of channel "
+            "'Angle', and at distance_per_turn (m)"
+        )
+
+
+def _speed(run: Run) -> float:
+    """Root of the mean square velocity (m/s) over a tenth of a second or five samples: the larger hides steps."""
+    time, x = run.time, run.positions
+    lag = min(max(5, round(0.1 / max(float(np.median(np.diff(time))), 1e-12))), len(x) - 1)
+    lag = min(lag, max(5, len(x) // 20))
+    if lag < 1:
+        return 0.0
+    return float(np.sqrt(np.nanmean(((x[lag:] - x[:-lag]) / (time[lag:] - time[:-lag])) ** 2)))
+
+
+def _cranks(runs: Mapping[str, Sequence[Run]]) -> Iterator[str]:
+    for procedure in ("response", "grazing", "contact", "rise", "section"):
+        rows = [run for run in runs.get(procedure, ()) if run.x is not None]
+        if not rows:
+            continue
+        ratio = np.array([0.5 * _travel(run) / _length(run, "crank_length") for run in rows])
+        long = [run.label for run, r in zip(rows, ratio, strict=True) if r < SMALLEST]
+        short = [run.label for run, r in zip(rows, ratio, strict=True) if r > LARGEST]
+        if ratio.max() < SMALLEST or short:
+            worst = rows[int(ratio.argmax())]
+            yield (
+                f"{procedure}: cranks of {_length(worst, 'crank_length'):.4g} m and a car that swings by "
+                f"{0.5e3 * _travel(worst):.3g} mm do not go together ({len(short or long)} of {len(rows)} runs, "
+                f"{few(short or long)}): is crank_length in m, and are the unit of 'Angle' and distance_per_turn right?"
+            )
+
+
+def _gaps(runs: Mapping[str, Sequence[Run]]) -> Iterator[str]:
+    far = []
+    for run in (run for rows in runs.values() for run in rows if "gap" in run.settings and run.x is not None):
+        reach = max(float(np.nanmax(np.abs(run.positions))), _travel(run))
+        if abs(float(run.settings["gap"])) > REACH * reach:
+            far.append((run, reach))
+    if far:
+        run, reach = far[0]
+        yield (
+            f"a gap of {float(run.settings['gap']):.4g} m, and a car that comes no further than {1e3 * reach:.3g} mm, "
+            f"in {len(far)} runs ({few([run.label for run, _ in far])}): is the gap in m?"
+        )
+
+
+def not_driven(seen: Steady, count: float) -> str:
+    """A sentence on steady runs whose motion does not repeat with the crank; empty where all do."""
+    loose = [
+        run.label for run, size, rest in zip(seen.runs, seen.amplitude, seen.rest, strict=True)
+        if _travel(run) > 20 * count and rest > 0.5 * size
+    ]  # fmt: skip
+    if not loose:
+        return ""
+    return (
+        f"the car does not move with the crank in {len(loose)} of {len(seen)} runs of the response ({few(loose)}): "
+        "does channel 'Turn' have one row for each turn, and is the time of both channels in one unit?"
+    )
+
+
+def few(names: Sequence[str]) -> str:
+    """The first three names."""
+    return ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
+
+
+def _travel(run: Run) -> float:
+    """Way from end to end (m), a thousandth of the samples on either side left out."""
+    low, high = np.nanquantile(run.positions, (0.001, 0.999))
+    return float(high - low)
+
+
+def _length(run: Run, name: str) -> float:
+    value = abs(float(run.settings[name]))
+    if not value > 0:
+        raise ValueError(f"{run.label}: {name} = {run.settings[name]!r} must be a positive length in m")
+    return value
+
+
+def slipped_late(taps: Sequence[Run], decay: DecayFit, resolution: float) -> Iterator[str]:
+    """A sentence for each tap that ends farther from rest than friction can hold a car: the string slipped later."""
+    held = float(decay.values[2] / decay.values[0] ** 2) + 2 * resolution
+    for run in (taps[i] for i in decay.runs):
+        off = float(np.median(run.positions[-max(10, len(run.time) // 20) :])) - decay.values[3]
+        if abs(off) > held:
+            yield (
+                f"impulse: run {run.name!r}, channel 'Angle': ends {1e3 * off:+.2f} mm from where the car rests, and "
+                f"friction holds it within ±{1e3 * held:.2f} mm: the string slipped on the wheel after the part that "
+                "is used"
+            )

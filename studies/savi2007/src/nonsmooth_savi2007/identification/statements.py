@@ -1,0 +1,184 @@
+"""Statements of ``identify``: agreement of the procedures, what each parameter rests on, what a model takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from nonsmooth import ParameterSet
+from nonsmooth.identification import Estimate, Finding
+from nonsmooth.system.names import unknown
+from nonsmooth_savi2007.identification.adjustment import Adjusted
+from nonsmooth_savi2007.identification.consistency import birge_ratio
+from nonsmooth_savi2007.identification.evidence import Evidence
+from nonsmooth_savi2007.identification.multiple_shooting import ContactFit
+from nonsmooth_savi2007.identification.referral import Referred
+
+#: What must have been recorded to know a parameter.
+_RESTS_ON = {
+    "m": "the notebook's mass", "k": "impulse (taps) or springs (pulls)", "c": "impulse (taps)",
+    "k_s": "support (pushes), drop or contact", "c_s": "drop or contact", "g": "contact, impulse, and support or drop",
+}  # fmt: skip
+_NEEDED = ("springs", "support", "impulse", "drop", "response", "contact")
+
+
+def agreement(adjusted: Adjusted, evidence: Evidence) -> list[str]:
+    """That the procedures agree, and which were not recorded."""
+    notes = []
+    if np.isfinite(adjusted.birge) and not disagreement(adjusted):
+        notes.append(
+            f"the procedures agree: Birge ratio {adjusted.birge:.2f}, {adjusted.freedom} degree"
+            f"{'s' if adjusted.freedom > 1 else ''} of freedom"
+        )
+    if lacking := [name for name in _NEEDED if name in evidence.missing]:
+        notes.append(f"no recordings of: {', '.join(lacking)}")
+    return notes
+
+
+def disagreement(adjusted: Adjusted) -> str:
+    """A sentence where the procedures disagree by more than chance, else an empty one."""
+    freedom = adjusted.freedom
+    if freedom < 1 or not np.isfinite(adjusted.birge) or birge_ratio(freedom * adjusted.birge**2, freedom)[1]:
+        return ""
+    name, pull = max(adjusted.pulls.items(), key=lambda row: abs(row[1]))
+    return (
+        f"the procedures disagree: Birge ratio {adjusted.birge:.2f}; {name} is off by {pull:+.1f} of its "
+        "uncertainties. Something is not as the notebook says: a crank, a wheel, a mass"
+    )
+
+
+def impossible(adjusted: Adjusted) -> list[str]:
+    """A sentence for each value that no rig has: below zero, or a support softer than the springs."""
+    said = []
+    for name in ("m", "k", "k_s", "c", "c_s"):
+        if name in adjusted.names:
+            found = adjusted.estimate(name)
+            if not np.isfinite([found.value, found.uncertainty]).all() or found.value < -3 * found.uncertainty:
+                said.append(f"{name} = {found} cannot be")
+    if {"k", "k_s"} <= set(adjusted.names) and 0 < adjusted["k_s"] < 2 * adjusted["k"]:
+        said.append(
+            f"the support ({adjusted['k_s']:.4g} N/m) is softer than the car's springs (2k = {2 * adjusted['k']:.4g} "
+            "N/m): are recordings of the car and of the support exchanged?"
+        )
+    return said
+
+
+def identifiability(adjusted: Adjusted, contacts: ContactFit | None, single: Finding | None) -> dict[str, str]:
+    """For each parameter a sentence: what its value rests on and what the records do not say."""
+    moved = "omega_0" in adjusted.labels
+    said = {
+        "m": "weighed; no recording tells it but through the force sensor, whose gain is known to a percent",
+        "k": "from omega_0 and m; the force sensor's slope tells its gain" if moved else
+        "from the force sensor, whose gain is known to a percent only: taps of the car would tell it better",
+        "c": "from the shape of the free decay, together with the dry friction: the rig's own viscous part",
+        "k_s": "from the frequency of the test mass and of contacts; the force sensor's slope but for its gain",
+        "c_s": "from the decay of the drop; a contact lasts 8 samples at 100 Hz and c_s/k_s is 0.5 ms, so no sample "
+        "shows it: a single contact tells it by the speed that it takes",
+        "g": "from where contacts begin, referred to the mean position under the drive",
+    }  # fmt: skip
+    if contacts is not None:
+        relative = float(np.sqrt(contacts.covariance[4, 4]) / abs(contacts.values[4]))
+        said["c_s"] += (
+            f"; {contacts.n_contacts} contacts together know it within a factor {np.exp(1.96 * relative):.4g}"
+        )
+        if single is not None:
+            said["c_s"] += f", one alone: {single.estimate}"
+    return {name: said[name] for name in said if name in adjusted.names or (name == "g" and contacts is not None)}
+
+
+def for_model(found: ParameterSet, model: Any) -> ParameterSet:
+    """The set with only those parameters that the model has; a note says which it has not.
+
+    Raises
+    ------
+    TypeError
+        If it is no model with parameters.
+    ValueError
+        If it has none of them, or one of the same name in another unit.
+    """
+    units = getattr(model, "parameters", None)
+    if units is None:
+        raise TypeError(
+            f"model must be a System, as nonsmooth.models.discontinuous_support() returns one; got {model!r}"
+        )
+    name = getattr(model, "name", "the model")
+    shared = [key for key in found if key in units]
+    if not shared:
+        raise ValueError(
+            f"{name!r} has none of the parameters {', '.join(found)}; identify knows the oscillator with a "
+            "discontinuous support"
+        )
+    for key in shared:
+        unit = str(getattr(units[key], "unit", ""))
+        if unit not in ("", found.estimates[key].unit):
+            raise ValueError(
+                f"the parameter {key!r} of {name!r} is in {unit}, the one identified in {found.estimates[key].unit}: "
+                "they are not the same quantity"
+            )
+    dropped = [key for key in found if key not in units]
+    return found.only(shared, note=f"{name!r} has no parameter {', '.join(dropped)}: kept in extra" if dropped else "")
+
+
+def require(found: ParameterSet, names: Iterable[str]) -> None:
+    """Check that these parameters were identified.
+
+    Raises
+    ------
+    ValueError
+        If one was not: the message says which procedures would tell it, and which were not recorded.
+    """
+    for name in names:
+        if name not in _RESTS_ON:
+            raise ValueError(unknown(name, "a parameter", "identify", _RESTS_ON))
+        if name not in found and name not in found.extra:
+            lacking = next((note for note in found.notes if note.startswith("no recordings of")), "")
+            raise ValueError(f"{name!r} was not identified: it needs {_RESTS_ON[name]}; {lacking or 'see the notes'}")
+
+
+_PARAMETERS = ("m", "k", "k_s", "c", "c_s")
+_BESIDE = ("friction", "gain")
+
+
+def joined(
+    adjusted: Adjusted, gap: Referred | None, *, findings: Sequence[Finding], identifiability: Mapping[str, str],
+    notes: Sequence[str], synthetic: bool, anomalies: Sequence[str] = (),
+) -> ParameterSet:  # fmt: skip
+    """The model's parameters, then what is beside them: rows over the unknowns of the adjustment, and the gap as it is.
+
+    Parameters
+    ----------
+    adjusted : Adjusted
+    gap : Referred, optional
+        With its covariance with the unknowns.
+    findings, identifiability, notes, anomalies, synthetic
+        Of the :class:`ParameterSet`.
+    """
+    size, names = len(adjusted.names), adjusted.names
+    unit = np.eye(size)
+    rows = {name: (adjusted.estimate(name), unit[names.index(name)]) for name in names}
+    if {"m", "k"} <= set(names):
+        omega, row = float(np.sqrt(2 * adjusted["k"] / adjusted["m"])), np.zeros(size)
+        row[names.index("k")], row[names.index("m")] = omega / (2 * adjusted["k"]), -omega / (2 * adjusted["m"])
+        error = float(np.sqrt(row @ adjusted.covariance @ row))
+        rows["omega_0"] = (Estimate(omega, error, "rad/s"), row)
+    inner = [name for name in _PARAMETERS if name in rows]
+    outer = [name for name in (*_BESIDE, "omega_0") if name in rows]
+    jacobian = np.array([rows[name][1] for name in inner + outer]).reshape(-1, size)
+    estimates = {name: rows[name][0] for name in inner}
+    extra = {name: rows[name][0] for name in outer}
+    covariance = jacobian @ adjusted.covariance @ jacobian.T
+    if gap is not None:
+        n = len(inner)
+        cross = gap.cross @ jacobian.T
+        stacked = np.block([[covariance, cross.T], [cross, gap.covariance]])
+        m = len(covariance)
+        order = [*range(n), m, *range(n, m), *range(m + 1, m + 4)]
+        covariance = stacked[np.ix_(order, order)]
+        estimates["g"] = gap.gap
+        extra |= {"gap_at_rest": gap.at_rest, "mean_shift": gap.shift, "rest_position": gap.rest}
+    return ParameterSet(
+        estimates, covariance, extra=extra, findings=findings, identifiability=identifiability, notes=notes,
+        anomalies=anomalies, synthetic=synthetic,
+    )

@@ -1,0 +1,135 @@
+"""Steady runs under the drive: amplitude and phase of the fundamental, mean and largest position, one row per run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from nonsmooth.recordings.signals.harmonics import HarmonicFit
+from nonsmooth.recordings.signals.harmonics import fit as harmonic_fit
+from nonsmooth.recordings.signals.phase import drive_phase
+from nonsmooth_savi2007.arrays import ComplexArray, FloatArray
+from nonsmooth_savi2007.identification.evidence import Run
+
+HARMONICS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Steady:
+    r"""Amplitudes and phases of steady runs, one entry per run.
+
+    Attributes
+    ----------
+    omega, omega_error : array (n,)
+        The drive's frequency (rad/s), from the photogate.
+    crank : array (n,)
+        Length of the crank (m).
+    amplitude, error : array (n,)
+        Of the fundamental (m), and its standard uncertainty.
+    response : complex array (n,)
+        X with :math:`x_1 = \mathrm{Re}\, X e^{i \varphi}`, the crank's mean angle :math:`\varphi` counted from the
+        photogate.
+    mean, mean_error : array (n,)
+        Mean position (m).
+    highest : array (n,)
+        Largest position of mean and harmonics together (m).
+    lean : array (n,)
+        Mean of the velocity's sign: even harmonics let the car go longer one way than the other.
+    rest : array (n,)
+        Standard deviation of what the harmonics leave (m): the sensor's own in free motion, more in contact.
+    """
+
+    runs: tuple[Run, ...]
+    omega: FloatArray
+    omega_error: FloatArray
+    crank: FloatArray
+    amplitude: FloatArray
+    error: FloatArray
+    response: ComplexArray
+    mean: FloatArray
+    mean_error: FloatArray
+    highest: FloatArray
+    rest: FloatArray
+    lean: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    @property
+    def direction(self) -> list[str]:
+        """``up`` for a run that was reached with rising frequency, else ``down``."""
+        return [str(run.settings.get("direction", "up")) for run in self.runs]
+
+    @property
+    def samples(self) -> int:
+        """Samples of all runs."""
+        return int(sum(len(run.time) for run in self.runs))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the runs."""
+        return tuple(run.name for run in self.runs)
+
+    @property
+    def synthetic(self) -> str:
+        """``"yes"`` or ``"no"``, as in the attributes of data for pictures."""
+        return "yes" if any(run.synthetic for run in self.runs) else "no"
+
+    def only(self, chosen: Any) -> Steady:
+        """The rows that are chosen (a mask or indices)."""
+        rows = np.flatnonzero(chosen) if np.asarray(chosen).dtype == bool else np.asarray(chosen, dtype=int)
+        return Steady(tuple(self.runs[i] for i in rows), *(getattr(self, one.name)[rows] for one in fields(self)[1:]))
+
+
+def harmonics_of(run: Run, time: FloatArray, values: Any) -> tuple[HarmonicFit, float, float, float]:
+    """Harmonics of a signal of a run over whole turns; the drive's frequency, its error, and the time of phase 0."""
+    drive = drive_phase(run.passages)
+    whole = int(np.floor((time[-1] - time[0]) / drive.period))
+    if whole < 2:
+        raise ValueError(
+            f"{run.label}: holds {whole} whole turns of the crank; a steady run needs two or more: record longer"
+        )
+    inside = time <= time[0] + whole * drive.period
+    fitted = harmonic_fit(time[inside], values[inside], drive.omega, HARMONICS)
+    # the gate's times to 0.1 ms each: all of them together tell the phase
+    mark = float(np.mean(drive.turn_times - drive.period * drive.turns))
+    return fitted, drive.omega, drive.omega_error, mark
+
+
+def steady(runs: Sequence[Run]) -> Steady:
+    """Fit mean and harmonics to each run over whole turns of the crank.
+
+    Raises
+    ------
+    ValueError
+        If a run lasts for less than two turns, or has no photogate.
+    """
+    rows: list[tuple[Any, ...]] = []
+    turn = np.linspace(0, 2 * np.pi, 720, endpoint=False)
+    for run in runs:
+        fitted, omega, omega_error, mark = harmonics_of(run, run.time, run.x)
+        amplitude = float(fitted.amplitudes[0])
+        response = amplitude * np.exp(1j * (omega * mark - float(fitted.phases[0])))
+        order = np.arange(1, HARMONICS + 1)
+        shape = np.cos(np.multiply.outer(turn, order) - fitted.phases) @ fitted.amplitudes
+        rows.append((
+            omega, omega_error, float(run.settings["crank_length"]), amplitude, float(fitted.amplitude_errors[0]),
+            response, fitted.mean, fitted.mean_error, fitted.mean + float(shape.max()), fitted.residual, _lean(fitted),
+        ))  # fmt: skip
+    columns = [np.array(column) for column in zip(*rows, strict=True)] or [np.zeros(0)] * (len(fields(Steady)) - 1)
+    return Steady(tuple(runs), *columns)
+
+
+def _lean(fitted: HarmonicFit) -> float:
+    """Mean sign of the velocity over a turn, its zeros by interpolation."""
+    turn = np.linspace(0, 2 * np.pi, 721)
+    order = np.arange(1, HARMONICS + 1)
+    v = -np.sin(np.multiply.outer(turn, order) - fitted.phases) @ (order * fitted.amplitudes)
+    before, after = v[:-1], v[1:]
+    # the share of each step in which v is positive
+    step = np.where(before == after, 1.0, np.abs(after - before))
+    part = np.where(before * after < 0, np.maximum(before, after) / step, (before + after > 0).astype(float))
+    return float(2 * np.mean(part) - 1)

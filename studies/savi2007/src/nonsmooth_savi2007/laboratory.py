@@ -1,0 +1,191 @@
+"""The experimental side: one virtual rig with the paper's parameters, its sessions, and what is identified from them.
+
+The rig writes session folders as a lab would, everything labelled synthetic; its truth goes into a file beside them.
+Identification and comparison read the folders only.
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from nonsmooth import __version__
+from nonsmooth.models import discontinuous_support
+from nonsmooth.recordings import RecordingWarning
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth import ParameterSet, Recording, System
+    from nonsmooth.recordings import Session
+    from nonsmooth_savi2007.comparison import GapOffset
+    from nonsmooth_savi2007.rig import VirtualRig
+
+SEED = 0  # of the rig's noise; its parameters are the published ones
+TRUTH = "truth.toml"
+
+#: Shorter procedures for a quick run: fewer taps, frequency steps and records with contact.
+_FEWER = {
+    "impulse": {"velocities": (0.5, -0.35, 0.2)},
+    "response": {"voltages": (3.9, 4.2, 4.4, 4.6, 4.8, 5.1, 5.6)},
+    "contact": {"regimes": ((11.15, 0.039), (9.88, 0.027), (6.0, 0.0165)), "duration": 12.0},
+}  # fmt: skip
+
+_Measured = TypeVar("_Measured")
+
+
+class Laboratory:
+    """A virtual rig and who measures with it.
+
+    Parameters
+    ----------
+    folder : path
+        Holds one session folder for each figure (``fig09``, ...), the one that identification reads
+        (``identification``), and ``truth.toml``.
+    quick : bool
+        Shorter records and fewer steps.
+    procedures : collection of str, optional
+        Those that are recorded for identification; all where not given.
+    """
+
+    def __init__(self, folder: Path, quick: bool = False, procedures: Collection[str] | None = None) -> None:
+        self.folder, self.quick, self.procedures = Path(folder), quick, procedures
+        self.notes: list[str] = []
+        self._kept: dict[str, Any] = {}
+        self.folder.mkdir(parents=True, exist_ok=True)
+
+    @cached_property
+    def rig(self) -> VirtualRig:
+        """The rig of Table 1, with more physics than the model: friction, strings, an uneven motor, sensors."""
+        from nonsmooth_savi2007.rig import VirtualRig
+
+        return VirtualRig.published(SEED)
+
+    @cached_property
+    def identified(self) -> ParameterSet:
+        """The parameters, from the folder ``identification`` alone."""
+        from nonsmooth_savi2007.identification.chain import identify
+
+        with self._noted():
+            return identify(self._identification)
+
+    @cached_property
+    def session(self) -> Session:
+        """The session that identification reads."""
+        from nonsmooth.recordings import load_session
+
+        return load_session(self._identification)
+
+    @cached_property
+    def _identification(self) -> Path:
+        from nonsmooth_savi2007.rig import IDENTIFICATION
+
+        options: dict[str, Any] = _FEWER if self.quick else {}
+        wanted = IDENTIFICATION if self.procedures is None else self.procedures
+        names = [name for name in IDENTIFICATION if name in wanted and not (self.quick and name == "grazing")]
+        return self._write("identification", {name: self.rig.record(name, **options.get(name, {})) for name in names})
+
+    def _write(self, name: str, made: Mapping[str, Recording]) -> Path:
+        from nonsmooth_savi2007.rig.notebook import write_session
+
+        title = f"virtual rig with the published parameters, {name}"
+        return write_session(self.rig, self.folder / name, made, self.folder / TRUTH, title=title)
+
+    def sensors(self) -> xr.Dataset:
+        """Sensors as the files of the session describe them: rate, steps, ranges used."""
+        import numpy as np
+        import xarray as xr
+
+        from nonsmooth.recordings.signals.displacement import found_resolution
+
+        with self._noted():
+            item = self.session.recordings("springs")[0]
+            angle, force = (item.recording.channel(name, item.run) for name in ("Angle", "Force"))
+            volts = [float(one.settings["voltage"]) for one in self.session.recordings("voltage")]
+            pushed = [one.recording.channel("Force", one.run) for one in self.session.recordings("support")]
+            taps = [one.recording.channel("Angle", one.run) for one in self.session.recordings("impulse")]
+        steps = np.diff(angle["time"].values)
+        turning = max(float(np.abs(np.diff(tap.values) / np.diff(tap["time"].values)).max()) for tap in taps)
+        values = {
+            "rate": (1 / float(np.median(steps)), "Hz", "sample rate"),
+            "angle_step": (float(np.degrees(found_resolution(angle))), "deg", "step of the rotary sensor"),
+            "force_step": (float(found_resolution(force)), "N", "step of the force sensor"),
+            "force_used": (max(float(np.abs(one.values).max()) for one in pushed), "N", "largest force recorded"),
+            "turning": (turning / (2 * np.pi), "1/s", "fastest turning of the rotary sensor after a tap"),
+            "volts_low": (min(volts), "V", "lowest motor voltage"), "volts_high": (max(volts), "V", "highest"),
+        }  # fmt: skip
+        columns = {
+            name: ((), value, {"units": unit, "long_name": text}) for name, (value, unit, text) in values.items()
+        }  # fmt: skip
+        return as_result(xr.Dataset(columns), "what the files say of the sensors")
+
+    def record(self, name: str, made: Mapping[str, Recording]) -> Session:
+        """Write recordings, by procedure, into the session folder ``name`` and read it."""
+        from nonsmooth.recordings import load_session
+
+        return load_session(self._write(name, made))
+
+    def with_support(self, session: Session, procedure: str) -> list[str]:
+        """The runs of a procedure in which the support was mounted."""
+        with self._noted():
+            return [item.run for item in session.recordings(procedure) if "gap" in item.settings]
+
+    def measured(
+        self, session: Session, procedure: str, runs: str | Sequence[str] | None = None
+    ) -> tuple[xr.Dataset, dict[str, Any]]:
+        """Arguments of ``compare``: a measurement, and the settings of the model that belong to it."""
+        from nonsmooth_savi2007.comparison import session_measurement
+
+        offset = self._gap_offset
+        with self._noted():
+            return session_measurement(session, procedure, runs, k=self.identified["k"], gap_offset=offset)
+
+    def once(self, name: str, measure: Callable[[], _Measured]) -> _Measured:
+        """Result of ``measure``, measured when first asked for."""
+        if name not in self._kept:
+            self._kept[name] = measure()
+        made: _Measured = self._kept[name]
+        return made
+
+    def compare(self, measured: xr.Dataset, settings: Mapping[str, Any], **options: Any) -> xr.Dataset:
+        """The measurement over the model with the identified parameters."""
+        from nonsmooth import compare
+
+        return compare(measured, self.model, parameters=self.identified, settings=settings, **{"draws": 0, **options})
+
+    @property
+    def model(self) -> System:
+        """The paper's oscillator; the parameters are replaced by those identified."""
+        return discontinuous_support()
+
+    @cached_property
+    def _gap_offset(self) -> GapOffset:
+        """Gap less the screw's reading, from the records with contact, and its uncertainty."""
+        from nonsmooth_savi2007.comparison import gap_offset
+
+        with self._noted():
+            return gap_offset(self.identified, self.session)
+
+    @contextmanager
+    def _noted(self) -> Iterator[None]:
+        """Warnings about recordings are kept for the log; others stay warnings."""
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            yield
+        for item in caught:
+            if issubclass(item.category, RecordingWarning):
+                self.notes.append(str(item.message))
+        for item in caught:
+            if not issubclass(item.category, RecordingWarning):
+                warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
+
+
+def as_result(dataset: xr.Dataset, what: str, verb: str = "rig", *, synthetic: bool = True) -> xr.Dataset:
+    """A dataset that was put together here, with the record that ``nonsmooth.load`` asks for."""
+    record = {"version": __version__, "verb": verb, "what": what, "synthetic": synthetic}
+    return dataset.assign_attrs({"nonsmooth": json.dumps(record)} | ({"synthetic": "yes"} if synthetic else {}))

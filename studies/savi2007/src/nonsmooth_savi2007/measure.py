@@ -1,0 +1,172 @@
+"""Numbers read off the datasets: regimes, the intervals in which they change, jumps, rates of separation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nonsmooth_savi2007.arrays import FloatArray
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+APERIODIC = 0  # no period found up to the longest looked for
+UNSETTLED = -1  # the transient did not decide it
+
+
+def period_word(number: int) -> str:
+    """``period 3``, ``no period``, ``unsettled``."""
+    return {APERIODIC: "no period", UNSETTLED: "unsettled"}.get(number, f"period {number}")
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Something that lies between two neighbouring points of a sweep."""
+
+    low: float
+    high: float
+
+    @property
+    def value(self) -> float:
+        """The middle, the best single number."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def expanded(self) -> float:
+        """Half the width: it lies there for certain."""
+        return 0.5 * (self.high - self.low)
+
+    @property
+    def uncertainty(self) -> float:
+        """The standard uncertainty: of something that lies anywhere in it with the same probability."""
+        return float(self.expanded / np.sqrt(3))
+
+    def __str__(self) -> str:
+        return with_uncertainty(self.value, self.uncertainty)
+
+
+def with_uncertainty(value: float, uncertainty: float) -> str:
+    """``a ± u`` with u the standard uncertainty (GUM), two digits of it; an exact number without."""
+    if not uncertainty > 0:
+        return f"{value:.6g}"
+    digits = max(0, 1 - int(np.floor(np.log10(uncertainty))))
+    return f"{value:.{digits}f} ± {uncertainty:.{digits}f}"
+
+
+def regimes(swept: xr.Dataset, direction: str | None = None) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Parameter values, rising, and the regime at each: the period number, APERIODIC or UNSETTLED."""
+    one = swept if direction is None or "direction" not in swept.dims else swept.sel(direction=direction)
+    values = one[str(one["maximum"].dims[0])].values
+    order = np.argsort(values)
+    return values[order], _regime(one)[order]
+
+
+def status_names(result: xr.Dataset) -> NDArray[np.str_]:
+    """The name of the status at each point, by the result's own attributes."""
+    attrs = result["status"].attrs
+    names = dict(zip(np.atleast_1d(attrs["flag_values"]).tolist(), attrs["flag_meanings"].split(), strict=True))
+    return np.array([names[code] for code in result["status"].values.ravel().tolist()]).reshape(result["status"].shape)
+
+
+def _regime(result: xr.Dataset) -> NDArray[np.int64]:
+    """The period number at each point, UNSETTLED where the transient did not decide it."""
+    settled = np.isin(status_names(result), ("ok", "not_periodic", "not_guaranteed"))
+    return np.where(settled, result["period_number"].values.astype(np.int64), UNSETTLED)
+
+
+def changes(swept: xr.Dataset, first: int, second: int, direction: str | None = None) -> list[Interval]:
+    """Borders between the regimes ``first`` and ``second`` (in either order), with only unsettled points between."""
+    values, regime = regimes(swept, direction)
+    at = np.flatnonzero(regime != UNSETTLED)
+    return [
+        Interval(float(values[i]), float(values[j]))
+        for i, j in pairwise(at)
+        if {int(regime[i]), int(regime[j])} == {first, second} and first != second
+    ]
+
+
+def highest(found: Sequence[Interval]) -> Interval | None:
+    """The last of intervals at rising values, if there is one."""
+    return found[-1] if found else None
+
+
+def lowest(found: Sequence[Interval]) -> Interval | None:
+    """The first of intervals at rising values, if there is one."""
+    return found[0] if found else None
+
+
+def range_of(swept: xr.Dataset, regime_wanted: int, direction: str | None = None) -> tuple[float, float] | None:
+    """Smallest and largest parameter value with a regime; None where it does not occur."""
+    values, regime = regimes(swept, direction)
+    at = np.flatnonzero(regime == regime_wanted)
+    return (float(values[at[0]]), float(values[at[-1]])) if len(at) else None
+
+
+def _sized_jumps(response: xr.Dataset, direction: str) -> list[tuple[float, Interval]]:
+    """The jumps of an amplitude in one direction, computed or read off measured runs: size, and the step that holds it.
+
+    At rising values.
+    """
+    from nonsmooth.identification.compare.jumps import Jump, jumps_in_steps
+
+    if "jump_value" in response:
+        here = response["jump_direction"].values.astype(str) == direction
+        if "jump_variable" in response:
+            here &= response["jump_variable"].values.astype(str) == "x"
+        columns = (response[f"jump_{name}"].values[here].tolist() for name in ("value", "step", "before", "after"))
+        found = [Jump(value, 0.5 * step, *ends) for value, step, *ends in zip(*columns, strict=True)]
+    else:
+        mine = response.isel(run=response["direction"].values.astype(str) == direction)
+        order = np.argsort(mine["omega"].values)[:: 1 if direction == "up" else -1]
+        found = jumps_in_steps(*(mine[name].values[order] for name in ("omega", "amplitude", "amplitude_error")))
+    rows = [(abs(one.after - one.before), Interval(one.value - one.half, one.value + one.half)) for one in found]
+    return sorted(rows, key=lambda row: row[1].low)
+
+
+def jumps(response: xr.Dataset, direction: str) -> list[Interval]:
+    """The steps in which the amplitude jumps in one direction, at rising values."""
+    return [step for _, step in _sized_jumps(response, direction)]
+
+
+def main_jump(response: xr.Dataset, direction: str) -> Interval | None:
+    """The jump above resonance: that with the largest step in amplitude."""
+    found = _sized_jumps(response, direction)
+    return max(found, key=lambda row: row[0])[1] if found else None
+
+
+def small_jump(response: xr.Dataset, direction: str) -> Interval | None:
+    """The smallest of several jumps."""
+    found = _sized_jumps(response, direction)
+    return min(found, key=lambda row: row[0])[1] if len(found) > 1 else None
+
+
+def measured_periods(runs: xr.Dataset, direction: str | None = None) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Frequencies, rising, and the period number measured at each; of one direction or of all runs."""
+    mine = runs if direction is None else runs.isel(run=runs["direction"].values.astype(str) == direction)
+    order = np.argsort(mine["omega"].values, kind="stable")
+    return mine["omega"].values[order], mine["period_number"].values[order].astype(np.int64)
+
+
+def periods_reached(survey: xr.Dataset, value: float) -> dict[int, int]:
+    """Number of starts of a ``survey`` (a sweep from several starts) that end in each regime at one parameter value."""
+    one = survey.sel({str(survey["maximum"].dims[0]): value}, method="nearest")
+    regime = _regime(one)
+    return {int(r): int((regime == r).sum()) for r in np.unique(regime)}
+
+
+def separation_rate(twins: xr.Dataset) -> tuple[float, float]:
+    """Mean growth of ln(distance) per period between each start and its twin, with its standard error.
+
+    The first half of the starts and the second are pairs. A mean over a finite time, not a Lyapunov exponent: it
+    leaves out the first return, in which the distance turns into the growing direction.
+    """
+    points = twins["section"].transpose("start", "iterate", "state").values / [1e-3, 1e-2]
+    half = len(points) // 2
+    distance = np.linalg.norm(points[half:] - points[:half], axis=-1)
+    rates = np.log(distance[:, -1] / distance[:, 0]) / (distance.shape[1] - 1)
+    return float(rates.mean()), float(rates.std(ddof=1) / np.sqrt(half))

@@ -1,0 +1,138 @@
+"""The measurements behind the paper's figures: the settings that it prints, set on the rig.
+
+The paper gives the forcing as a force rho; here it is a crank length rho / k. A gap is set so that it is the paper's
+as seen from the car's mean position under the drive, which string and motor move: the screw reads that much more
+(``referred=False`` sets it at rest). Source: Savi et al. (2007), Figs. 4-18.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth_savi2007.rig import driven
+from nonsmooth_savi2007.rig.driven import Setting, records
+from nonsmooth_savi2007.rig.motor import mean_position, voltage_for
+
+if TYPE_CHECKING:
+    from nonsmooth import Recording
+    from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
+
+#: Settings of the sections: frequency (rad/s), forcing (N), gap (m).
+SECTIONS: dict[int, tuple[tuple[float, float, float], ...]] = {
+    12: tuple((3.69, rho, -0.0045) for rho in (0.29, 0.39, 0.42, 0.46)),
+    13: tuple((11.15, 0.33, g) for g in (-0.0012, 0.0009, 0.0014, 0.0018)),
+    14: tuple((11.15, 0.33, g) for g in (-0.0012, 0.0009, 0.0014, 0.0018)),
+    15: ((11.15, 0.33, 0.0018),),
+    16: ((11.15, 0.33, 0.0018),),
+    17: tuple((omega, 0.23, 0.0036) for omega in np.round(np.arange(8.4, 10.21, 0.05), 2).tolist()),
+    18: tuple((omega, 0.23, 0.0036) for omega in (8.64, 9.55, 9.88)),
+}
+_PERIODS = {15: 1500, 16: 1500, 17: 60}
+#: Where else the car is let go at each setting (m): of motions that coexist, the start at rest shows one.
+RELEASES: dict[int, tuple[float, ...]] = {14: (-0.01, -0.02, -0.03, -0.04)}
+_RISE = (3.69, 0.2, 0.5, -0.0045)  # rad/s, N, N, m
+_RESPONSES = {9: (0.14, 0.02), 10: (0.16, 0.0145)}
+_STEPS = {9: (3.0, 6.6), 10: (2.4, 7.4)}  # rad/s
+#: What each figure needs. Those with the support mounted also need a few runs without it, in ``response``, and taps:
+#: where the car swings about, from which the gap is counted, and where it rests, from which the screw counts.
+FIGURES: dict[int, tuple[str, ...]] = {
+    4: ("springs", "support"), 5: ("impulse",), 6: ("response",), 7: ("drop",), 8: ("voltage", "crank"),
+    9: ("response", "impulse"), 10: ("response", "impulse"), 11: ("rise", "response", "impulse"),
+    **dict.fromkeys(SECTIONS, ("section", "response", "impulse")),
+}  # fmt: skip
+#: Velocities (m/s) of the taps that show where the car rests.
+TAPS = (0.3, -0.3, 0.2)
+
+
+def crank_for(rig: VirtualRig, rho: float) -> float:
+    """The crank length (m) whose force k a is ``rho``, to 0.01 mm."""
+    return round(rho / rig.truth["k"], 5)
+
+
+def screw_for(rig: VirtualRig, gap: float, crank_length: float, *, referred: bool = True) -> float:
+    """The reading of the support's screw (m) at which the gap, from the car's mean position, is ``gap``."""
+    shift = mean_position(rig, crank_length) if referred else 0.0
+    return round(gap + shift - rig.true_gap(0.0), 7)
+
+
+def section(
+    rig: VirtualRig, *, figure: int = 14, periods: int | None = None, referred: bool = True,
+    releases: Sequence[float] | None = None, settle: float = 60.0,
+) -> Recording:  # fmt: skip
+    """Long steady records at the settings of Figs. 12 to 18, ``periods`` turns of the crank each.
+
+    First all settings from rest, then all again for each of ``releases`` (m), the places where the car is let go
+    while the motor runs; for Fig. 14 four of them where not given. ``settle`` seconds pass before a record.
+    """
+    if figure not in SECTIONS:
+        shown = ", ".join(map(str, SECTIONS))
+        raise ValueError(f"figure = {figure!r} shows no sections of steady motion; those are {shown}")
+    n = _PERIODS.get(figure, 200) if periods is None else periods
+    settings = []
+    for place in (None, *(RELEASES.get(figure, ()) if releases is None else releases)):
+        for omega, rho, gap in SECTIONS[figure]:
+            length = crank_for(rig, rho)
+            reading = screw_for(rig, gap, length, referred=referred)
+            remark = f"rho {rho} N, gap {gap} m, omega {omega} rad/s"
+            remark += "" if place is None else f"; the car let go at {1e3 * place:g} mm"
+            notes = (("figure", figure), ("note", remark))
+            duration = n * 2 * np.pi / omega
+            settings.append(Setting(voltage_for(rig, omega), length, reading, duration, notes, place))
+    return records(rig, "section", settings, settle=settle, carry=figure == 17)
+
+
+def rise(
+    rig: VirtualRig, *, crank_length: tuple[float, float] | None = None, voltage: float | None = None,
+    gap: float | None = None, duration: float = 900.0,
+) -> Recording:  # fmt: skip
+    """The slow rise of the forcing of Fig. 11, in ``duration`` seconds; the gap is the screw's reading."""
+    omega, low, high, at_rest = _RISE
+    lengths = (crank_for(rig, low), crank_for(rig, high)) if crank_length is None else crank_length
+    knob = voltage_for(rig, omega) if voltage is None else voltage
+    screw = screw_for(rig, at_rest, 0.0) if gap is None else gap
+    return driven.rise(rig, voltage=knob, crank_length=lengths, gap=screw, duration=duration)
+
+
+def without_support(rig: VirtualRig, number: int) -> list[Setting]:
+    """Runs at the crank lengths of a figure with the support taken away: they show where the car swings about."""
+    if number in _RESPONSES:
+        pairs = {(6.5, crank_for(rig, _RESPONSES[number][0]))}
+    elif number == 11:
+        omega, low, high, _ = _RISE
+        pairs = {(omega, crank_for(rig, rho)) for rho in (low, 0.5 * (low + high), high)}
+    else:
+        pairs = {(SECTIONS[number][0][0], crank_for(rig, rho)) for _, rho, _ in SECTIONS[number]}
+    notes = (("figure", number), ("note", "no support: the place about which the car swings"))
+    return [Setting(voltage_for(rig, omega), length, None, 30.0, notes) for omega, length in sorted(pairs)]
+
+
+def figure(rig: VirtualRig, number: int, **options: Any) -> dict[str, Recording]:
+    """The recordings behind a figure, by procedure; the options are those of its (first) procedure.
+
+    Raises
+    ------
+    ValueError
+        If the figure shows no measurement.
+    """
+    if number not in FIGURES:
+        raise ValueError(f"figure {number!r}: measurements stand behind Figs. {', '.join(map(str, sorted(FIGURES)))}")
+    if number in SECTIONS or number == 11:
+        options = {"figure": number, **options} if number in SECTIONS else options
+        shown = FIGURES[number][0]
+        free = records(rig, "response", without_support(rig, number))
+        return {shown: rig.record(shown, **options), "response": free, "impulse": rig.impulse(velocities=TAPS)}
+    if number == 6:
+        options = {"crank_lengths": (crank_for(rig, 0.14),), **options}
+    if number in _RESPONSES:
+        rho, gap = _RESPONSES[number]
+        length = crank_for(rig, rho)
+        steps: Sequence[float] = np.arange(*_STEPS[number], 0.05).tolist()
+        options = {
+            "crank_lengths": (length,), "gap": screw_for(rig, gap, length), "duration": 20.0,
+            "voltages": [voltage_for(rig, omega) for omega in steps], "after": without_support(rig, number), **options,
+        }  # fmt: skip
+        return {"response": rig.record("response", **options), "impulse": rig.impulse(velocities=TAPS)}
+    return {procedure: rig.record(procedure, **options) for procedure in FIGURES[number]}

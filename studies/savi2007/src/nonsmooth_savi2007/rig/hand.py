@@ -1,0 +1,88 @@
+"""Procedures by hand, motor off and crank centred: pulls of the car and pushes of the support (Fig. 4).
+
+The hand prescribes the motion; the force that the sensor feels is what the rig's equations leave over for it. So the
+force-displacement loop has the width 2 (F_C + c v), and a hand trembles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth_savi2007.rig import sensors
+from nonsmooth_savi2007.rig.physics import friction
+
+if TYPE_CHECKING:
+    from nonsmooth import Recording
+    from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
+
+Run = tuple[str, Mapping[str, Any], Mapping[str, Any]]
+_TREMOR = 1e-4  # m, with the frequencies below in Hz
+_TREMBLING = (1.1, 1.7, 2.6)
+_TURNING = 1.0  # s, that the hand takes to start, to turn, and to stop
+
+
+def springs(rig: VirtualRig, *, reach: float = 0.12, n: int = 6) -> Recording:
+    """Pull the car slowly to ``reach`` (m) and back by the force sensor, to both sides in turn; ``n`` runs: Fig. 4a."""
+    p = rig.named_parameters(crank_length=0.0)
+    limit = p.pretension / p.k
+    if reach * 1.01 > limit:
+        raise ValueError(f"reach = {reach!r} m would slacken a string; stay below {limit:.3f} m")
+    return _by_hand(
+        rig, "springs", (40.0, 60.0), [(-1.0 if i % 2 else 1.0) * reach for i in range(n)], 0.9,
+        lambda x, v, acceleration: p.m * acceleration + 2 * p.k * x + friction(v, p),
+    )  # fmt: skip
+
+
+def support(rig: VirtualRig, *, force: float = 35.0, n: int = 6) -> Recording:
+    """Push the support's spring up to about ``force`` (N) and let it come back; ``n`` runs: Fig. 4b."""
+    k_s, c_s = rig.truth["k_s"], rig.truth["c_s"]
+    return _by_hand(rig, "support", (15.0, 25.0), [force / k_s] * n, 0.85, lambda y, v, _: k_s * y + c_s * v)
+
+
+def _by_hand(
+    rig: VirtualRig, procedure: str, lasting: tuple[float, float], reaches: Sequence[float], least: float,
+    force: Callable[[FloatArray, FloatArray, FloatArray], FloatArray],
+) -> Recording:  # fmt: skip
+    """One run to about each of ``reaches``, from a share ``least`` of it on; ``force`` on position and its rates."""
+    runs: list[Run] = []
+    for i, reach in enumerate(reaches):
+        rng, name = rig.generator(procedure, i), f"Run #{i + 1}"
+        duration = float(rng.uniform(*lasting))
+        far = reach * float(rng.uniform(least, 1.0))
+        time, at = sensors.instants(rig, rng, duration)
+        x, v, acceleration = _hand(rng, at, far, duration)
+        runs.append((name, rig.channels(rng, name, time, x, v, pulled=force(x, v, acceleration)), {}))
+    return rig.recording(procedure, runs)
+
+
+def _hand(
+    rng: np.random.Generator, t: FloatArray, far: float, duration: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Position, velocity and acceleration: to ``far`` and back at an even speed, and a tremor that grows and dies."""
+    pulses = ((0.0, 1.0), ((duration - _TURNING) / 2, -2.0), (duration - _TURNING, 1.0))
+    x, v, a = np.sum([size * _pulse(t - begin) for begin, size in pulses], axis=0)
+    peak = _pulse(np.array([duration / 2]))[0, 0] - 2 * _pulse(np.array([_TURNING / 2]))[0, 0]
+    x, v, a = (far / peak) * x, (far / peak) * v, (far / peak) * a
+    w = np.pi / duration
+    shape, rate, bend = np.sin(w * t) ** 2, w * np.sin(2 * w * t), 2 * w**2 * np.cos(2 * w * t)
+    for frequency in _TREMBLING:
+        q = 2 * np.pi * frequency * float(rng.uniform(0.9, 1.1))
+        phase, size = float(rng.uniform(0, 2 * np.pi)), _TREMOR * float(rng.uniform(0.3, 1.0))
+        s, c = size * np.sin(q * t + phase), size * np.cos(q * t + phase)
+        x = x + shape * s
+        v = v + rate * s + shape * q * c
+        a = a + bend * s + 2 * rate * q * c - shape * q**2 * s
+    return x, v, a
+
+
+def _pulse(t: FloatArray) -> FloatArray:
+    """Way, velocity and acceleration of a start from rest to unit velocity within ``_TURNING`` seconds, smoothly."""
+    tau = np.clip(t / _TURNING, 0.0, 1.0)
+    turn = 2 * np.pi * tau
+    way = _TURNING * (tau**2 / 2 + (np.cos(turn) - 1) / (4 * np.pi**2)) + np.maximum(t - _TURNING, 0.0)
+    inside = (t > 0) & (t < _TURNING)
+    return np.array([way, tau - np.sin(turn) / (2 * np.pi), inside * (1 - np.cos(turn)) / _TURNING])

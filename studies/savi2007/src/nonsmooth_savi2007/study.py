@@ -1,0 +1,175 @@
+"""``reproduce``: compute the figures, write them with their data, and report."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nonsmooth.results.progress import say
+from nonsmooth_savi2007.bench import Bench
+from nonsmooth_savi2007.figures.figure import Figure
+from nonsmooth_savi2007.finished import finish, finished, just_made, refuse_strange
+from nonsmooth_savi2007.flows import Settings
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from nonsmooth_savi2007.claims.claims import Row
+
+PICTURE_DPI = 200
+PARAMETERS = "table1"
+#: Files that hold figures.
+FILES = ("regions", "resonance", "amplitude", "gap", "frequency", "coexisting", "charts", "band", "parameters")
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """Output of :func:`reproduce`: the folder, the figures, the rows of the report, and the time each took."""
+
+    out: Path
+    figures: tuple[Figure, ...]
+    data: dict[str, dict[str, xr.Dataset]]
+    rows: tuple[Row, ...]
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+def figures_of_the_study(full: bool = False) -> tuple[Figure, ...]:
+    """All figures, in the order of the paper, the model's before the rig's; the effect of eta last.
+
+    Those that take long only where ``full`` is asked for.
+    """
+    files = [import_module(f"nonsmooth_savi2007.figures.{name}") for name in FILES]
+    figures = [figure for file in files for figure in file.FIGURES if full or not figure.full]
+    places = {PARAMETERS: 8.5}
+    return tuple(sorted(figures, key=lambda figure: (places.get(figure.name, figure.place), figure.rig)))
+
+
+def reproduce(
+    out: str | Path,
+    figures: Sequence[int | str] | None = None,
+    quick: bool = False,
+    progress: bool = True,
+    full: bool = False,
+) -> Reproduction:
+    """Reproduce the figures of Savi et al. (2007) by model and virtual rig, and check the paper's statements.
+
+    What the paper measured is measured here on a virtual rig with the paper's parameters: a session is recorded, the
+    parameters are identified from its files, and the records are laid over the model with these parameters. All of
+    that is synthetic and says so.
+
+    Parameters
+    ----------
+    out : path
+        Folder to write into, made where missing: ``figNN.pdf``, ``figNN.png``, datasets ``figNN_*.nc``,
+        ``report.md``, ``report.html`` (self-contained), ``claims.json``; the rig's sessions in ``rig``. Figures that
+        an earlier run of the same version finished there with the same settings are used again.
+    figures : list of int or str, optional
+        Numbers of the paper's figures (of model and rig), or names of single ones: ``fig11_rig``, ``table1``,
+        ``eta``, ``basins13``. Nothing else is computed, and the report holds the statements that these figures
+        decide, with those of figures that are there already. All where not given.
+    quick : bool
+        Coarse grids, short transients and records: a first look, whose numbers have wide intervals.
+    full : bool
+        The charts over two parameters too, of a million points each, and finer basins. Finished parts of a chart are
+        kept in ``chartNN_store.zarr``: a run that was interrupted goes on from there.
+    progress : bool
+        Bars and a line per figure, on a terminal.
+
+    Returns
+    -------
+    Reproduction
+
+    Raises
+    ------
+    ValueError
+        A figure that is not one of the study, or a folder that holds other files, or figures of another kind of run.
+    OSError
+        A folder that cannot be written into.
+    RuntimeError
+        If the measurement on the virtual rig failed.
+    """
+    from nonsmooth_savi2007.claims.claims import measure_claims
+    from nonsmooth_savi2007.report.report import REPORTS, write_report
+
+    chosen = _chosen(figures, full)
+    folder = Path(out)
+    _make(folder)
+    settings = Settings(quick=quick, full=full, progress=progress, folder=folder)
+    known = figures_of_the_study(full=True)
+    made = {figure.name: found for figure in known if (found := finished(figure.name, settings)) is not None}
+    missing = [figure for figure in chosen if figure.name not in made]
+    if made:
+        say(f"finished before in {folder}: {', '.join(made)}", progress)
+    if missing:
+        for name in REPORTS:  # a report that stands is of the figures beside it
+            (folder / name).unlink(missing_ok=True)
+    computed = [figure for figure in missing if not figure.rig]
+    measured = [figure for figure in missing if figure.rig]
+    with Bench(folder, measured, quick, full) as bench:
+        for i, figure in enumerate(computed):
+            say(f"[{i + 1}/{len(computed)}] {figure.name}: {figure.title}", progress)
+            begin = time.perf_counter()
+            datasets = figure.compute(settings)
+            seconds = time.perf_counter() - begin
+            finish(figure.name, datasets, seconds, settings)
+            made[figure.name] = datasets, seconds
+            _draw(figure, datasets, folder)
+        names = ", ".join(one.name for one in measured)
+        say(f"waiting for the virtual rig: {names}", progress and bool(measured))
+        bench.wait(lambda line: say(line, progress))
+    made |= {figure.name: just_made(figure.name, settings) for figure in measured}
+    shown = tuple(figure for figure in known if figure.name in made)
+    data = {figure.name: made[figure.name][0] for figure in shown}
+    for figure in shown:
+        if figure in measured or not _drawn(figure, folder):
+            _draw(figure, data[figure.name], folder)
+    rows = measure_claims(data)
+    write_report(folder, shown, data, rows, settings, complete=set(figures_of_the_study(full)) <= set(shown))
+    return Reproduction(folder, shown, data, rows, {name: seconds for name, (_, seconds) in made.items()})
+
+
+def _make(folder: Path) -> None:
+    """Make the folder, and find out before any work whether it can be written into."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OSError(f"{folder} cannot be written into ({error.strerror}): give another folder (--out)") from error
+    refuse_strange(folder, [figure.name for figure in figures_of_the_study(full=True)])
+
+
+def _chosen(wanted: Sequence[int | str] | None, full: bool) -> tuple[Figure, ...]:
+    """The figures with these numbers or names, in the order of the report."""
+    if wanted is None:
+        return figures_of_the_study(full)
+    known = figures_of_the_study(full=True)
+    numbers = sorted({figure.number for figure in known if figure.number is not None})
+    names = [figure.name for figure in known]
+    asked = {str(one) for one in wanted}
+    wrong = sorted(asked - set(names) - {str(number) for number in numbers})
+    if wrong or not asked:
+        raise ValueError(
+            f"figure {', '.join(wrong) or '(none)'}: the paper's figures that are reproduced are "
+            f"{', '.join(map(str, numbers))} (1 is a sketch, 3 a photograph); a single one of model or rig, or one "
+            f"that the paper has not, goes by its name: {', '.join(names)}"
+        )
+    return tuple(figure for figure in known if figure.name in asked or str(figure.number) in asked)
+
+
+def _drawn(figure: Figure, folder: Path) -> bool:
+    return all((folder / f"{figure.name}.{kind}").exists() for kind in ("pdf", "png"))
+
+
+def _draw(figure: Figure, data: dict[str, xr.Dataset], folder: Path) -> None:
+    from nonsmooth.plot import journal, save_figure
+
+    canvas = figure.draw(data)
+    save_figure(canvas, folder / f"{figure.name}.pdf")
+    with journal():
+        canvas.savefig(folder / f"{figure.name}.png", dpi=PICTURE_DPI, metadata={"Software": None})
