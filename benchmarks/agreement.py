@@ -1,8 +1,8 @@
 """Random systems of one to six states, run by one checkout and compared with what another one kept.
 
 `PYTHONPATH=OLD/src python benchmarks/agreement.py old.npz` in one environment, then `PYTHONPATH=src python
-benchmarks/agreement.py new.npz old.npz`: transitions must be the same, and states differ by no more than rounding times
-the growth of a neighbour 1e-14 away.
+benchmarks/agreement.py new.npz old.npz`: crossings must be the same, and times and states differ by no more than rounding
+times the growth of a neighbour 1e-14 away.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def main() -> int:
             found[f"section_{seed}"] = points["section"].values
         except ns.SolveError:  # no six returns
             found[f"section_{seed}"] = np.empty(0)
-        found[f"transitions_{seed}"], found[f"u_{seed}"] = run["crossing_transition"].values, run["u"].values
+        found[f"crossings_{seed}"], found[f"u_{seed}"] = run["crossing_time"].values, run["u"].values
         same = other["u"].shape == run["u"].shape
         apart = float(np.abs(other["u"].values - run["u"].values).max()) if same else np.inf
         found[f"growth_{seed}"] = np.array(max(apart / NEAR, 1.0))
@@ -106,14 +106,14 @@ def main() -> int:
     if len(sys.argv) > 2:
         kept, different, worst = np.load(sys.argv[2]), [], 0.0
         for seed in range(SYSTEMS):
-            same = np.array_equal(found[f"transitions_{seed}"], kept[f"transitions_{seed}"])
-            if not same or found[f"section_{seed}"].shape != kept[f"section_{seed}"].shape:
+            names = [f"{name}_{seed}" for name in ("crossings", "u", "section")]
+            if any(found[name].shape != kept[name].shape for name in names):
                 different.append(seed)
                 continue
-            apart = max(np.abs(found[name] - kept[name]).max(initial=0.0) for name in (f"u_{seed}", f"section_{seed}"))
+            apart = max(np.abs(found[name] - kept[name]).max(initial=0.0) for name in names)
             worst = max(worst, float(apart / kept[f"growth_{seed}"]))
-        print(f"{SYSTEMS - len(different)} of {SYSTEMS} with the same transitions; others: {different}")
-        print(f"largest difference of states over a neighbour's growth: {worst:.2g}")
+        print(f"{SYSTEMS - len(different)} of {SYSTEMS} with the same crossings; others: {different}")
+        print(f"largest difference of crossings, states and section points over a neighbour's growth: {worst:.2g}")
     return 0
 
 
