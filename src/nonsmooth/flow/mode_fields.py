@@ -15,7 +15,6 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.system.derived.patterns import STEP
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derived.assembly import Pattern
     from nonsmooth.system.derived.patterns import Patterns
     from nonsmooth.system.derived.rows import Rows
     from nonsmooth.system.symbolic.traced import Traced
@@ -116,7 +115,8 @@ class _Numbers(ModeField):
     def indicators(
         self, u: FloatArray, values: FloatArray, memory: FloatArray, t: Any = 0.0
     ) -> tuple[FloatArray, FloatArray]:
-        rows = np.nan_to_num(_conditions(self.patterns, self.pattern, values.tobytes()))  # NaN: not asked for
+        rows, _, _ = self.patterns.ways_out(_rows(self.patterns, values.tobytes()), self.pattern)
+        rows = np.nan_to_num(rows)  # NaN: not asked for
         slopes = np.broadcast_to(rows[:, : len(u)], (*np.shape(t), len(rows), len(u)))
         return self._augmented(u, values, t) @ rows.T, slopes
 
@@ -147,7 +147,6 @@ def every_mode(traced: Traced, values: FloatArray) -> range | None:
     for pattern in sorted({*product(*map(range, counts))} - patterns.led):
         if make.may_hold(make.held(pattern), patterns.mode):
             patterns.look_at(rows, pattern)
-            rows.forget()
     return range(len(patterns.visited))
 
 
@@ -166,11 +165,6 @@ def held_places(traced: Traced, mode: int, values: FloatArray) -> tuple[Rows, li
 def _rows(patterns: Patterns, values: bytes, place: int | None = None) -> Rows:
     """The calculus of a system's elements at values of the parameters."""
     return patterns.rows_at(np.frombuffer(values), place)
-
-
-@lru_cache(maxsize=1024)
-def _conditions(patterns: Patterns, pattern: Pattern, values: bytes) -> FloatArray:
-    return patterns.ways_out(_rows(patterns, values), pattern)[0]
 
 
 def _numbers(function: Any, t: Any, u: FloatArray, values: FloatArray, memory: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ as the constants of a model (:mod:`nonsmooth.kernels.tangent.rows`): nothing is 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,6 @@ from nonsmooth.system.derived.patterns import STEP, Change, Patterns
 from nonsmooth.system.derived.rows import Row, Rows
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derived.assembly import Pattern
     from nonsmooth.system.symbolic.traced import Traced
 
 __all__ = ["PatternFlow", "pattern_flow"]
@@ -64,7 +63,7 @@ class PatternFlow(RowsFlow):
 
     def _taken(self, at: Packed, i: int, mode: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         rows = parts([one.row(mode, i).values for one in at.every])
-        return rows, parts([one.flow(mode) for one in at.every]), at.rates
+        return rows, at.field(mode), at.rates
 
 
 def parts(every: Sequence[FloatArray]) -> FloatArray:
@@ -74,38 +73,16 @@ def parts(every: Sequence[FloatArray]) -> FloatArray:
 
 @dataclass
 class Calculus:
-    """Rows at one parameter point, of which those that were looked at are kept."""
+    """Rows at one parameter point."""
 
     patterns: Patterns
     rows: Rows
-    fields: dict[int, FloatArray] = field(default_factory=dict)
-    conditions: dict[tuple[int, int], dict[int, FloatArray]] = field(default_factory=dict)
-    last: int = -1  # the mode whose neighbours' fields the rows keep
-
-    def pattern(self, mode: int) -> Pattern:
-        """The pattern of a mode that is now looked at."""
-        if mode != self.last:
-            self.rows.forget()
-            self.last = mode
-        return self.patterns.visited[mode]
-
-    def flow(self, mode: int) -> FloatArray:
-        """The field of a mode."""
-        if mode not in self.fields:
-            self.fields[mode] = self.rows.flow(self.patterns.mode, self.pattern(mode))[0]
-        return self.fields[mode]
-
-    def of_element(self, mode: int, k: int) -> dict[int, FloatArray]:
-        """The conditions of an element in a mode."""
-        if (mode, k) not in self.conditions:
-            self.conditions[mode, k] = self.patterns.ways_of(self.rows, self.pattern(mode), k)[1]
-        return self.conditions[mode, k]
 
     def row(self, mode: int, slot: int) -> Row:
         """One condition in a mode; those of forces that several share are told by the first of them."""
-        owner = self.patterns.owners[slot]
+        pattern, owner = self.patterns.visited[mode], self.patterns.owners[slot]
         for k in (owner, *range(len(self.rows.parts))):
-            if slot in (found := self.of_element(mode, k)):
+            if slot in (found := self.patterns.ways_of(self.rows, pattern, k)[1]):
                 return Row(found[slot], self.rows.n)
         return Row(np.full(self.rows.field.shape[1], np.nan, dtype=self.rows.field.dtype), self.rows.n)
 
@@ -116,8 +93,8 @@ class Calculus:
         if change.way < 0:
             found: FloatArray = self.rows.impact(change.elements, self.patterns.mode)
             return found
-        ways = self.rows.leaving(change.elements[0], self.patterns.mode, self.pattern(mode))
-        states: FloatArray = ways[change.way].states
+        (k,), pattern = change.elements, self.patterns.visited[mode]
+        states: FloatArray = self.patterns.ways_of(self.rows, pattern, k)[0][change.way].leaving.states
         return states
 
     def rubbed(self, mode: int, change: Change, w: FloatArray) -> FloatArray:
@@ -140,8 +117,16 @@ class Packed:
         self.rates = np.array(rates).reshape(1 + len(places), -1)
         self.wanted: set[int] = set() if last is None else set(last.wanted)
         self.watched: set[int] = set()
+        self.fields: dict[int, FloatArray] = {}
         self.jumps: dict[int, tuple[FloatArray, FloatArray]] = {}
         self.q = NONE
+
+    def field(self, mode: int) -> FloatArray:
+        """The field of a mode, and its derivatives."""
+        if mode not in self.fields:
+            pattern = self.patterns.visited[mode]
+            self.fields[mode] = parts([one.rows.flow(self.patterns.mode, pattern)[0] for one in self.every])
+        return self.fields[mode]
 
     def of_jump(self, k: int, t: float, z: FloatArray) -> FloatArray:
         """The numbers of a transition and of the modes beside it; those of an impact that rubs are of the instant."""
@@ -191,10 +176,10 @@ class Packed:
             place += sum(map(len, some))
 
         for mode in sorted(modes):
-            put(mode, parts([one.flow(mode) for one in self.every]).ravel())
+            put(mode, self.field(mode).ravel())
         for mode in sorted(watched):
             own = self.every[0]
-            put(count + mode, self.patterns.ways_out(own.rows, own.pattern(mode))[0].ravel())
+            put(count + mode, self.patterns.ways_out(own.rows, self.patterns.visited[mode])[0].ravel())
         for k in taken:
             rows, maps = self.jumps[k]
             number = rows.shape[1] // width

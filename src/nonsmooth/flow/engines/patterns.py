@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PatternEngine"]
 
+NEAR = 1e-9  # of the terms of a condition: what is no more may be zero
 MOST = 1024  # patterns for which room is made at first
 SECTION = np.array([(0, 1, 1), (0, -1, 1)], dtype=np.int64)  # the last rows of a transition table
 
@@ -151,10 +152,12 @@ class PatternTables:
         self.leads: list[Lead] = []  # of each transition
         self.lists: list[list[int]] = []  # transitions out of each mode
         self.together: list[int] = []  # the transition of each mode that is asked where several elements meet
+        self.watched: list[FloatArray] = []  # the rows of the conditions of each mode
         self.meets: list[list[int]] = []  # the conditions of each mode that are looked at then
         self.answers: dict[tuple[int, int, tuple[int, ...], str], int] = {}
         self.maps: list[FloatArray] = [self.rows.identity()]
-        self.known_maps: dict[bytes, int] = {self.maps[0].tobytes(): 0}
+        self.known_maps: dict[int, int] = {}  # by the identity of an array, which the rows keep
+        self.made: Any = None  # the maps as kernels take them, as long as none is changed
         self.transitions: IntArray = np.zeros((0, 5), dtype=np.int64)
         self.conditions: IntArray = np.zeros((0, 3), dtype=np.int64)
         self.lengths: list[int] = []  # conditions of each transition
@@ -209,11 +212,23 @@ class PatternTables:
             if found.ends:
                 self.work.tally[STARTS] = -1 - ENDS.index(found.ends)
         else:
-            found = decide(RowNumbers(rows, mode, w, float(self.own.info[here, 0])), pattern)
+            numbers = RowNumbers(rows, mode, w, float(self.own.info[here, 0]))
+            found = decide(numbers, pattern, (), self._concerned(lead, numbers, here))
             taken = self._answer(waits, found)
         if taken < 0 or not found.struck:
             self.work.w[: rows.n] = found.states
         self.work.tally[WAITS] = taken + 1
+
+    def _concerned(self, lead: Lead, numbers: RowNumbers, here: int) -> list[int] | None:
+        """The elements whose groups an instant concerns: of which a condition was met, or is zero; None: all."""
+        if lead.kind == TOGETHER:
+            return None
+        watched = self.watched[here]
+        zero = np.abs(watched @ numbers.w) <= NEAR * (np.abs(watched) @ numbers.size)
+        owners = {self.patterns.owners[slot] for slot in np.flatnonzero(zero)}
+        owners.add(next(k for k, part in enumerate(self.rows.parts) if part.name == lead.element))
+        groups = {self.rows.group[k] for k in owners}
+        return [k for k, group in self.rows.group.items() if group in groups]
 
     def _answer(self, waits: int, found: Outcome) -> int:
         """The transition to which a question has led; it is made where it is new."""
@@ -223,8 +238,7 @@ class PatternTables:
             self.answers[key] = len(self.leads)
             number = 0
             if found.rubbed is not None:
-                number = len(self.maps)
-                self.maps.append(self.maps[0])
+                number = self._keep(self.maps[0])
             elif struck:
                 number = self._map(self.rows.impact(struck, self.patterns.mode))
             contact = int(bool(struck) or self.patterns.number(lead.source) == 0)
@@ -235,11 +249,11 @@ class PatternTables:
             names, kind = found.names or lead.element, found.ends or FOUND
             self.leads.append(Lead(lead.source, found.pattern, names, lead.rows, kind, change))
             self.lengths.append(0)
-            self.form, self.net = self.form._replace(**self._maps()), self._net()
+            self.form, self.net = self.form._replace(**self._maps()[0]), self._net()
         taken = self.answers[key]
         if found.rubbed is not None:  # of the rates that an impact had, of which its impulses depend as no row does
-            self.maps[self.transitions[taken, 3]] = self.rows.rubbed(*found.rubbed)
-            self.form, self.net = self.form._replace(**self._maps()), self._net()
+            self.maps[self.transitions[taken, 3]], self.made = self.rows.rubbed(*found.rubbed), None
+            self.form, self.net = self.form._replace(**self._maps()[0]), self._net()
         return taken
 
     def place(self, pattern: Pattern) -> int:
@@ -275,7 +289,7 @@ class PatternTables:
         self.lists.append([*range(first, len(self.leads) - 1)])
         self.together.append(len(self.leads) - 1)
         self.meets.append(meets)
-        rows.forget()
+        self.watched.append(conditions)
         self.transitions = np.concatenate([self.transitions, np.array(ways, dtype=np.int64).reshape(-1, 5)])
         self.conditions = np.concatenate([self.conditions, np.array(armed, dtype=np.int64).reshape(-1, 3)])
         for t in self.waiting.pop(pattern, []):
@@ -284,12 +298,16 @@ class PatternTables:
         self.net = self._net()
 
     def _map(self, states: FloatArray) -> int:
-        """The number of a map among those of the form; equal ones are kept once."""
-        key = states.tobytes()
-        if key not in self.known_maps:
-            self.known_maps[key] = len(self.maps)
-            self.maps.append(states)
-        return self.known_maps[key]
+        """The number of a map among those of the form; one array is kept once."""
+        if id(states) not in self.known_maps:
+            self.known_maps[id(states)] = self._keep(states)
+        return self.known_maps[id(states)]
+
+    def _keep(self, states: FloatArray) -> int:
+        """Put a map behind the others."""
+        self.maps.append(states)
+        self.made = None
+        return len(self.maps) - 1
 
     def _output_rows(self, forces: dict[int, Any]) -> FloatArray:
         if self.own_outputs is None:
@@ -332,31 +350,33 @@ class PatternTables:
         from nonsmooth.kernels.hybrid.records import Form
 
         n = self.rows.n
-        a, b, c, s = _contiguous(flow[None, None], n)
         return Form(
-            a, b, _turned(c), _turned(s), self.multiples, self.omega, self.period,
-            *_contiguous(conditions[None], n), *_contiguous(outputs[None, :, None], n), **self._maps(),
+            *_turned(flow[None, None], n), self.multiples, self.omega, self.period,
+            *_contiguous(conditions[None], n), *_contiguous(outputs[None, :, None], n), **self._maps()[0],
             lacking=np.zeros((0, n), dtype=np.int64),
         )  # fmt: skip
 
-    def _maps(self) -> dict[str, FloatArray]:
-        """The maps of all transitions, as fields of a form."""
-        a, b, c, s = _contiguous(np.array(self.maps)[None], self.rows.n)
-        return {"ra": a, "rb": b, "rc": _turned(c), "rs": _turned(s)}
+    def _maps(self) -> tuple[dict[str, FloatArray], IntArray]:
+        """The maps of all transitions, as fields of a form; of each how many states it changes, and which."""
+        if self.made is None:
+            every = np.array(self.maps)
+            changed = np.zeros((len(every), 1 + self.rows.n), dtype=np.int64)
+            for m, rows in enumerate((every != every[0]).any(axis=2)):
+                moved = np.flatnonzero(rows)
+                changed[m, 0], changed[m, 1 : len(moved) + 1] = len(moved), moved
+            fields = zip(("ra", "rb", "rc", "rs"), _turned(every[None], self.rows.n), strict=True)
+            self.made = dict(fields), changed
+        found: tuple[dict[str, FloatArray], IntArray] = self.made
+        return found
 
     def _net(self) -> Any:
         """The transition table of the patterns that stand."""
         from nonsmooth.kernels.hybrid.records import Net
 
-        count, n = len(self.leads), self.rows.n
-        changed = np.zeros((len(self.maps), n + 1), dtype=np.int64)
-        for m, states in enumerate(self.maps):
-            moved = np.flatnonzero((states != self.maps[0]).any(axis=1))
-            changed[m, 0], changed[m, 1 : len(moved) + 1] = len(moved), moved
         whole = np.int64
         return Net(
             self.transitions, np.concatenate([self.conditions, SECTION]), np.cumsum([0, *self.lengths], dtype=whole),
-            *_joined(self.lists), np.full(count, -1.0), changed, *_joined(self.meets)[::-1],
+            *_joined(self.lists), np.full(len(self.leads), -1.0), self._maps()[1], *_joined(self.meets)[::-1],
             np.array(self.together, dtype=whole),
         )  # fmt: skip
 
@@ -373,6 +393,8 @@ def _contiguous(rows: FloatArray, n: int) -> tuple[FloatArray, FloatArray, Float
     return a, b, c, s
 
 
-def _turned(waves: FloatArray) -> FloatArray:
-    """With the harmonics before the rows."""
-    return np.ascontiguousarray(np.swapaxes(waves, -1, -2))
+def _turned(rows: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """The same with the harmonics before the rows."""
+    a, b, *waves = _contiguous(rows, n)
+    c, s = (np.ascontiguousarray(np.swapaxes(one, -1, -2)) for one in waves)
+    return a, b, c, s

@@ -29,7 +29,7 @@ def mark_unit(i, ended, crossed, step, form, goal, seen, work):
     n, columns = shape_of(seen)
     tally, memo, T = work.tally, work.memo, form.period[i]
     if frame_has_moved(ended, crossed, form, goal, seen, work) and not crossed:
-        straighten(seen.frame, n, columns, seen.lengths, False, ended, seen.growth[tally[RETURNS]])
+        straighten(seen.frame, n, columns, seen.lengths, False, ended, seen.growth[tally[RETURNS]], seen.scratch)
     if ended:
         tally[RETURNS] += 1
         tally[JUMPS] = 0
@@ -49,6 +49,7 @@ def leave_transitions(jumps, seen, work):
     size = log_determinant(S, n, seen.matrix)
     seen.sums[1] += size
     seen.sums[2] += jumps
-    multiply(S, seen.frame, n, columns, seen.scratch)
-    straighten(seen.frame, n, columns, seen.lengths, size == -inf, False, seen.growth[work.tally[RETURNS]])
+    multiply(S, seen.frame, n, columns, seen.matrix)
+    growth = seen.growth[work.tally[RETURNS]]
+    straighten(seen.frame, n, columns, seen.lengths, size == -inf, False, growth, seen.scratch)
     anchor_frame(seen, work)

@@ -10,16 +10,26 @@ from nonsmooth.kernels.linear.tables import DEGREE, NODES, STATES, states_of, wi
 from nonsmooth.kernels.linear.values import slope_of
 from nonsmooth.kernels.tangent.frame import multiply, saltation
 
+SEGMENTS_APART = 4  # in each of them ratios of lengths change by less than exp(pi): so short are steps
+
 
 @once
 def anchor_frame(seen, work):
-    """Nothing: segments are carried over at once."""
+    """The frame is orthonormal here; segments are carried over at once."""
+    if STATES == 0:
+        seen.sums[4] = 0.0
 
 
 @once
 def frame_has_moved(ended, crossed, form, goal, seen, work):
-    """Every segment moves it."""
-    return True
+    """Every segment moves it; of many states, which are dear to keep apart, ``SEGMENTS_APART`` go together."""
+    moved = True
+    if STATES == 0:
+        seen.sums[4] += 1.0
+        moved = ended or seen.sums[4] >= SEGMENTS_APART
+        if moved:
+            seen.sums[4] = 0.0
+    return moved
 
 
 @inline
@@ -59,7 +69,7 @@ def carry_frame(step, goal, seen, tables, work):
     for r in range(n):
         for c in range(n):
             X[r, c] *= scale[c] / scale[r]
-    multiply(X, seen.frame, n, shape_of(seen)[1], seen.scratch)
+    multiply(X, seen.frame, n, shape_of(seen)[1], seen.matrix)
 
 
 @inline

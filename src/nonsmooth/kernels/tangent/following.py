@@ -60,7 +60,7 @@ def frame_along(follower, mode, t0, tau, guess, unit):
                 Q[i, c] = X[i, c] / scale[i]
                 if not (fabs(Q[i, c]) < inf):
                     return -1.0
-        straighten(Q, n, columns, seen.lengths, False, False, seen.growth[unit])
+        straighten(Q, n, columns, seen.lengths, False, False, seen.growth[unit], seen.scratch)
         done = tau if h >= remaining else done + h
     return -1.0
 

@@ -8,36 +8,57 @@ from math import fabs, inf, log, sqrt
 
 from nonsmooth.kernels.compile.cache import inline
 
+ENOUGH = 0.25  # of the square of a length: where as much is left no part along others is
 SINGULAR = 1e-13  # a pivot below this part of its row's size is that of a matrix without full rank
 
 
 @inline
-def upright(Q, n, c):
-    """Column c of Q without its parts along the columns before, taken out twice; its length."""
-    for _ in range(2 if c > 0 else 0):
-        for d in range(c):
-            dot = 0.0
-            for i in range(n):
-                dot += Q[i, d] * Q[i, c]
-            for i in range(n):
-                Q[i, c] -= dot * Q[i, d]
-    length = 0.0
+def squared(Q, n, c):
+    """The square of the length of column c."""
+    total = 0.0
     for i in range(n):
-        length += Q[i, c] * Q[i, c]
+        total += Q[i, c] * Q[i, c]
+    return total
+
+
+@inline
+def upright(Q, n, c, dots):
+    """Column c of Q without its parts along the columns before, taken out twice where little is left; its length.
+
+    Sums run along the rows, whose numbers lie behind each other (``dots``: scratch)."""
+    length, whole = squared(Q, n, c), c - c % 4
+    for _ in range(2 if c > 0 else 0):
+        before = length
+        for d in range(c):
+            dots[d] = 0.0
+        for i in range(n):
+            for d in range(c):
+                dots[d] += Q[i, c] * Q[i, d]
+        for i in range(n):
+            one, two, three, four = 0.0, 0.0, 0.0, 0.0
+            for d in range(0, whole, 4):
+                one += dots[d] * Q[i, d]
+                two += dots[d + 1] * Q[i, d + 1]
+                three += dots[d + 2] * Q[i, d + 2]
+                four += dots[d + 3] * Q[i, d + 3]
+            for d in range(whole, c):
+                one += dots[d] * Q[i, d]
+            Q[i, c] -= (one + two) + (three + four)
+        length = squared(Q, n, c)
+        if length > ENOUGH * before:
+            break
     return sqrt(length)
 
 
 @inline
-def orthonormal(Q, n, columns, lengths, singular):
-    """Gram-Schmidt on the columns of Q, twice; ``lengths`` are multiplied by what they had become.
+def orthonormal(Q, n, columns, lengths, singular, scratch):
+    """Gram-Schmidt on the columns of Q; ``lengths`` are multiplied by what they had become.
 
     ``singular``: a transition without full rank came before, so that a column may have vanished: its length is zero for
     good, and any direction that is left goes on in its place."""
     for c in range(columns):
-        before = 0.0
-        for i in range(n):
-            before += Q[i, c] * Q[i, c]
-        length = upright(Q, n, c)
+        before = squared(Q, n, c)
+        length = upright(Q, n, c, scratch)
         if (singular and length <= 1e-11 * sqrt(before)) or length == 0.0:
             lengths[c] = 0.0
             best, which = -1.0, 0
@@ -49,7 +70,7 @@ def orthonormal(Q, n, columns, lengths, singular):
                     best, which = rest, i
             for i in range(n):
                 Q[i, c] = 1.0 if i == which else 0.0
-            length = upright(Q, n, c)
+            length = upright(Q, n, c, scratch)
         else:
             lengths[c] *= length
         for i in range(n):
@@ -65,10 +86,10 @@ def put_away(lengths, columns, growth):
 
 
 @inline
-def straighten(Q, n, columns, lengths, singular, ended, growth):
+def straighten(Q, n, columns, lengths, singular, ended, growth, scratch):
     """Make the frame orthonormal; its lengths go to ``growth`` where the unit of time has ended, or before they
     overflow."""
-    orthonormal(Q, n, columns, lengths, singular)
+    orthonormal(Q, n, columns, lengths, singular, scratch)
     away = ended
     for c in range(columns):
         away = away or not (1e-100 < lengths[c] < 1e100)
@@ -77,16 +98,25 @@ def straighten(Q, n, columns, lengths, singular, ended, growth):
 
 
 @inline
-def multiply(X, Q, n, columns, scratch):
-    """Q = X Q, for X in units of the scales."""
-    for c in range(columns):
-        for r in range(n):
-            total = X[r, 0] * Q[0, c]
-            for j in range(1, n):
-                total += X[r, j] * Q[j, c]
-            scratch[r] = total
-        for r in range(n):
-            Q[r, c] = scratch[r]
+def add_product(X, Q, n, columns, A):
+    """A = A + X Q, row by row: what transitions do has few entries."""
+    for r in range(n):
+        for j in range(n):
+            if X[r, j] != 0.0:
+                for c in range(columns):
+                    A[r, c] += X[r, j] * Q[j, c]
+
+
+@inline
+def multiply(X, Q, n, columns, A):
+    """Q = X Q, for X in units of the scales (A: scratch)."""
+    for r in range(n):
+        for c in range(columns):
+            A[r, c] = 0.0
+    add_product(X, Q, n, columns, A)
+    for r in range(n):
+        for c in range(columns):
+            Q[r, c] = A[r, c]
 
 
 @inline
@@ -114,7 +144,7 @@ def log_determinant(S, n, A):
             A[c, j], A[p, j] = A[p, j], A[c, j]
         for i in range(c + 1, n):
             factor = A[i, c] / A[c, c]
-            for j in range(c, n):
+            for j in range(c, n if factor != 0.0 else c):
                 A[i, j] -= factor * A[c, j]
     return total
 
@@ -130,8 +160,7 @@ def saltation(R, R_t, f_minus, f_plus, t_z, n, S, A):
             slip += R[i, j] * f_minus[j]
         for c in range(n):
             A[i, c] = slip * t_z[c]
-            for j in range(n):
-                A[i, c] += R[i, j] * S[j, c]
+    add_product(R, S, n, n, A)
     for i in range(n):
         for c in range(n):
             S[i, c] = A[i, c]

@@ -22,7 +22,7 @@ from nonsmooth.kernels.hybrid.codes import DIVERGED, NO_CONVERGENCE, OK
 from nonsmooth.kernels.hybrid.records import type_of
 from nonsmooth.kernels.series.taylor import fill_powers
 from nonsmooth.kernels.tangent.agreement import fits
-from nonsmooth.kernels.tangent.frame import saltation
+from nonsmooth.kernels.tangent.frame import add_product, saltation
 from nonsmooth.kernels.tangent.segments import Segments
 
 ORDER = 24  # of the series of an orbit's legs
@@ -220,10 +220,8 @@ def march_one(jet, field, mode, t0, tau, equations, work, guess):
         divergence += part
         for i in range(n_u):
             for c in range(n_c):
-                v = X[i, c] if c >= n_u else 0.0
-                for j in range(n_u):
-                    v += X[i, j] * total[j, c]
-                Y[i, c] = v
+                Y[i, c] = X[i, c] if c >= n_u else 0.0
+        add_product(X, total, n_u, n_c, Y)
         for i in range(n_u):
             for c in range(n_c):
                 total[i, c] = Y[i, c]

@@ -16,11 +16,11 @@ them. A child of :class:`Assembler` brings one.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, wraps
 from itertools import combinations
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -31,9 +31,10 @@ from nonsmooth.system.derived.elements import Element, Rubbing
 from nonsmooth.system.derived.elements.element import Condition, Leaving
 from nonsmooth.system.derived.place import Place
 
-__all__ = ["Assembler", "Part", "Pattern", "VaryingError"]
+__all__ = ["Assembler", "Part", "Pattern", "VaryingError", "kept"]
 
 Pattern = tuple[int, ...]  # the phase of each element
+Method = TypeVar("Method", bound=Callable[..., Any])
 DEPENDENT, INDEPENDENT = 1e-13, 1e-7  # what is left of a unit row when those before are taken away
 
 
@@ -46,6 +47,20 @@ class VaryingError(SystemDefinitionError):
             f"elements {names} hold together, and by which sum of forces depends on {of}: take fewer elements, or "
             "numbers in on="
         )
+
+
+def kept(method: Method) -> Method:
+    """A method whose object keeps its answers, by the arguments."""
+
+    @wraps(method)
+    def known(self: Any, *given: Any) -> Any:
+        answers = self.__dict__.setdefault("_kept", {})
+        key = method, given
+        if key not in answers:
+            answers[key] = method(self, *given)
+        return answers[key]
+
+    return cast("Method", known)
 
 
 @dataclass(frozen=True)
@@ -144,6 +159,7 @@ class Assembler(ABC):
 
     # The rules
 
+    @kept
     def approach(self, k: int, mode: str) -> Any:
         """The derivative of an element's place, which no force changes at once."""
         part = self.parts[k]
@@ -158,15 +174,12 @@ class Assembler(ABC):
         """The place of element k in a combination of phases."""
         return Place(self, k, mode, pattern)
 
-    def places(self, mode: str, pattern: Pattern) -> list[Place]:
-        """Those of all elements."""
-        return [Place(self, k, mode, pattern) for k in range(len(self.parts))]
+    def held(self, pattern: Pattern, some: Collection[int] | None = None) -> tuple[int, ...]:
+        """Elements, of all or of some, whose force is that of a constraint."""
+        each = ((k, self.parts[k].element) for k in (range(len(self.parts)) if some is None else some))
+        return tuple(k for k, element in each if element.phases[pattern[k]] in element.held)
 
-    def held(self, pattern: Pattern) -> list[int]:
-        """Elements whose force is that of a constraint."""
-        elements = (part.element for part in self.parts)
-        return [k for k, (e, phase) in enumerate(zip(elements, pattern, strict=True)) if e.phases[phase] in e.held]
-
+    @kept
     def rate(self, k: int, mode: str) -> Any:
         """The rate that a constraint of element k holds at zero."""
         return self.parts[k].element.rate(self.place(k, mode, (0,) * len(self.parts)))
@@ -193,27 +206,21 @@ class Assembler(ABC):
         side = 0 if r is None else self.place(r, mode, pattern).side
         return part if r is None or not side else self.joined(part, self.parts[r], -side * self.constant(r, "friction"))
 
+    @kept
     def coupled(self, i: int, j: int, mode: str) -> bool:
         """Return whether a force of one of two elements changes the rate of the other at once."""
-        key = min(i, j), max(i, j)
-        if key not in self._coupled:
-            one, other = ((self.rate(a, mode), self.parts[b]) for a, b in (key, key[::-1]))
-            apart = self.vanishes(self.across(*one)) and self.vanishes(self.across(*other))
-            self._coupled[key] = not apart or self.rubbing.get(i) == j or self.rubbing.get(j) == i
-        return self._coupled[key]
+        rubs = self.rubbing.get(i) == j or self.rubbing.get(j) == i
+        changes = (self.across(self.rate(a, mode), self.parts[b]) for a, b in ((i, j), (j, i)))
+        return rubs or not all(map(self.vanishes, changes))
 
-    @cached_property
-    def _coupled(self) -> dict[tuple[int, int], bool]:
-        return {}
-
-    def together(self, k: int, mode: str, pattern: Pattern) -> list[int]:
+    def together(self, k: int, mode: str, pattern: Pattern) -> tuple[int, ...]:
         """The element and those of the held ones whose forces depend on its own."""
         found, held = [k], [j for j in self.held(pattern) if j != k]
         for i in found:
             found += [j for j in held if j not in found and self.coupled(i, j, mode)]
-        return sorted(found)
+        return tuple(sorted(found))
 
-    def basis(self, held: Sequence[int], mode: str, pattern: Pattern) -> tuple[list[int], FloatArray]:
+    def basis(self, held: tuple[int, ...], mode: str, pattern: Pattern) -> tuple[list[int], FloatArray]:
         """Held elements whose rates are independent, and the forces of all of them as sums of those."""
         chosen, sums = self._basis(held, mode, pattern, 0)
         for draw in self.draws if len(chosen) < len(held) else ():
@@ -245,16 +252,15 @@ class Assembler(ABC):
         sums = np.linalg.lstsq(ways[chosen].T, ways.T, rcond=None)[0].T
         return [held[i] for i in chosen], np.where(np.abs(sums) < INDEPENDENT * np.abs(sums).max(), 0.0, sums)
 
-    def flow(self, mode: str, pattern: Pattern) -> tuple[Any, dict[int, Any]]:
-        """The field of a combination of phases, and the force of each element in it."""
-        f, forces, held = self.base(mode), {}, self.held(pattern)
-        for here in self.places(mode, pattern):
-            if here.k in held:
-                continue
+    def flow(self, mode: str, pattern: Pattern, some: Collection[int] | None = None) -> tuple[Any, dict[int, Any]]:
+        """The field of a combination of phases, and the force of each element in it; with ``some`` of these alone."""
+        some = range(len(self.parts)) if some is None else some
+        f, forces, held = self.base(mode), {}, self.held(pattern, some)
+        for here in (self.place(k, mode, pattern) for k in some if k not in held):
             forces[here.k] = here.part.element.force(here)
             f = self.moved(f, here.part, forces[here.k])
         if held:
-            chosen, sums = self.basis(held, mode, pattern) if self.asks else (held, np.zeros((0, 0)))
+            chosen, sums = self.basis(held, mode, pattern) if self.asks else (list(held), np.zeros((0, 0)))
             parts = [self.pushing(k, mode, pattern) for k in chosen]
             matrix = self.effects(chosen, mode, parts)
             needed = self.solved(matrix, [-self.along(self.rate(k, mode), f) for k in chosen])
@@ -279,7 +285,7 @@ class Assembler(ABC):
         """The forces (N, elements) in a combination, those that are not unique of least norm within their bounds;
         ``value`` gives a law's (N,) values."""
         held = self.held(pattern)
-        chosen, sums = self.basis(held, mode, pattern) if held else (held, np.zeros((0, 0)))
+        chosen, sums = self.basis(held, mode, pattern) if held else ([], np.zeros((0, 0)))
         if len(chosen) == len(held) or {*held} & {*self.rubbing.values()}:
             return forces
         most = [self.parts[k].element.most(self.place(k, mode, pattern)) for k in held]
@@ -326,16 +332,17 @@ class Assembler(ABC):
             found.append(Leaving(None, [Condition(beyond, 1, names.pop(0))]))
         return found
 
-    def impact(self, some: Sequence[int], mode: str, factor: Any = None) -> Any:
+    @kept
+    def impact(self, some: tuple[int, ...], mode: str, factor: Any = None) -> Any:
         """States behind impulses of several elements that take their rates to -factor times these; without one, by the
         restitution of each, of ~k without any; then those of elements that have the number of all added, which take
         their rates to zero.
 
         Of those that keep their rate at zero, as at rest, the rate is zero before it as well."""
-        still = [k - len(self.parts) for k in some if k >= len(self.parts)]
-        some = [k for k in some if k < len(self.parts)]
+        still = tuple(k - len(self.parts) for k in some if k >= len(self.parts))
+        some = tuple(k for k in some if k < len(self.parts))
         factors = [0 if k < 0 else self.law(k, "restitution") if factor is None else factor for k in some]
-        some = [max(k, ~k) for k in some]
+        some = tuple(max(k, ~k) for k in some)
         wanted = [-(1 + e) * self.rate(k, mode) for k, e in zip(some, factors, strict=True)]
         after = self.identity()
         for k, amount in zip(some, self.solved(self.effects(some, mode), wanted), strict=True):

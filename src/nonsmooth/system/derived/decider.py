@@ -40,7 +40,6 @@ class Decider:
         self.code = SeriesCode(make, {})
         self._lock = threading.Lock()
         self._found: dict[Any, int] = {}
-        self._impacts: dict[tuple[str, tuple[int, ...]], tuple[Any, ...]] = {}
         self._written: Traced | None = None
         self._origin: Decider | None = None
         self.idle: list[set[int]] = []  # of each mode, the conditions of elements that are not asked for in it
@@ -58,7 +57,7 @@ class Decider:
             rows = tuple(Row(numbers[one], sign, strict) for one, sign, strict in signs)
             jumps.append(TracedTransition(here, here, rows, label=name, kind=kind))
             if k >= 0 and self.make.parts[k].element.strikes:
-                reset = self._impact(self.modes[here][0], (k,))
+                reset = tuple(self.make.impact((k,), self.modes[here][0]))
                 jumps.append(TracedTransition(here, here, rows, reset=reset, label=name, kind=FOUND))
         places = {number for name, number in numbers.items() if self.met(name, traced.indicators[number])}
         own = {number for name, number in numbers.items() if name not in self.make.indicators}
@@ -94,7 +93,7 @@ class Decider:
             key, written = (asked, target, struck), self.known()
             if key not in self._found:
                 question, names = written.transitions[asked], written.mode_names
-                reset = self._impact(self.modes[question.source][0], struck) if struck else None
+                reset = tuple(self.make.impact(struck, self.modes[question.source][0])) if struck else None
                 self._found[key] = len(written.transitions)
                 jump = TracedTransition(
                     question.source, target, question.rows, reset=reset, kind=FOUND,
@@ -117,12 +116,6 @@ class Decider:
     def retold(self, asked: int, target: int, struck: Any) -> int:
         """The number of an answer that was told."""
         return self.found(int(asked), int(target), tuple(map(int, struck)))
-
-    def _impact(self, mode: str, struck: tuple[int, ...]) -> tuple[Any, ...]:
-        key = mode, struck
-        if key not in self._impacts:
-            self._impacts[key] = tuple(self.make.impact(struck, mode))
-        return self._impacts[key]
 
     def number(self, mode: str, pattern: Pattern) -> int:
         """The number of a combination of phases."""

@@ -17,7 +17,7 @@ Their numbers are those of :class:`nonsmooth.system.derived.instants.Numbers`, o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -58,13 +58,16 @@ class Outcome:
     names: str = ""
 
 
-def decide(numbers: Numbers, pattern: Pattern, met: Sequence[int] = ()) -> Outcome:
-    """The phases and the states just behind an instant, with the numbers there.
+def decide(
+    numbers: Numbers, pattern: Pattern, met: Sequence[int] = (), some: Collection[int] | None = None
+) -> Outcome:
+    """The phases and the states just behind an instant, with the numbers there; of ``some`` elements alone where no
+    force of the others changes a rate of theirs.
 
     Elastic elements keep their phases. What rests or sticks before the instant is a candidate, and so is each contact
     whose gap and each friction whose slip is zero within ``ZERO`` of its terms, those of its change on the last step
     too; that of the elements ``met`` is, whatever its rounding."""
-    here = _Instant(numbers, pattern, met)
+    here = _Instant(numbers, pattern, met, some)
     contacts = [k for k in here.contacts if here.places[k] <= 0.0]
     approaching = [k for k in contacts if here.speeds[k] < 0.0]
     if not approaching:
@@ -73,7 +76,7 @@ def decide(numbers: Numbers, pattern: Pattern, met: Sequence[int] = ()) -> Outco
         return here.end("not_unique", approaching)
     own = {k: here.restitution(k) for k in contacts}
     if all(-here.speeds[k] < here.creep(k) for k in approaching):
-        still = _Instant(numbers.copy(), pattern, met)
+        still = _Instant(numbers.copy(), pattern, met, some)
         struck = still.strike(contacts, dict.fromkeys(contacts, 0.0))
         found = still.outcome(contacts, struck)
         if all(still.pressed[k] for k in approaching):
@@ -104,10 +107,13 @@ def begun(numbers: Numbers, pattern: Pattern) -> Outcome:
 class _Instant:
     """One instant: what elements are asked there, with what counts as zero."""
 
-    def __init__(self, numbers: Numbers, pattern: Pattern, met: Sequence[int] = ()) -> None:
+    def __init__(
+        self, numbers: Numbers, pattern: Pattern, met: Sequence[int] = (), some: Collection[int] | None = None
+    ) -> None:
         self.numbers, self.make, self.mode, self.pattern = numbers, numbers.make, numbers.mode, pattern
         self.parts = self.make.parts
-        bearing = [k for k, part in enumerate(self.parts) if part.element.held]
+        self.others = [] if some is None else [k for k in range(len(self.parts)) if k not in some]
+        bearing = [k for k, part in enumerate(self.parts) if part.element.held and k not in self.others]
         self.contacts = [k for k in bearing if self.parts[k].element.bears]
         self.frictions = [k for k in bearing if not self.parts[k].element.bears]
         self.rates = {k: self.make.rate(k, self.mode) for k in bearing}
@@ -386,9 +392,13 @@ class _Instant:
     def _ahead(self, candidates: list[int]) -> Ahead:
         """Derivatives of the rates and the bounds of the candidates; of each the static one and the two kinetic ones.
 
-        Others have the forces by their laws."""
-        others = [k for k in range(len(self.parts)) if k not in candidates and not self.holds(k)]
+        Others have the forces by their laws, or those that hold them."""
+        away = {*candidates, *self.others}
+        others = [k for k in range(len(self.parts)) if k not in away and not self.holds(k)]
         forces = [(k, self.parts[k].element.force(self.place(k))) for k in others]
+        if self.others:
+            held = self.make.flow(self.mode, self.pattern)[1]
+            forces += [(k, held[k]) for k in self.others]
         laws: list[Any] = []
         for k in candidates:
             element, here = self.parts[k].element, self.place(k)
@@ -396,5 +406,4 @@ class _Instant:
                 laws += [0.0, 0.0, 0.0]
             else:
                 laws += [element.most(here), *(element.force(here.put(side)) for side in element.sides)]
-        pattern = tuple(0 if k in candidates else phase for k, phase in enumerate(self.pattern))
-        return self.numbers.ahead(candidates, pattern, forces, laws)
+        return self.numbers.ahead(candidates, forces, laws)

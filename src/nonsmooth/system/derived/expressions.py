@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -12,7 +12,7 @@ import sympy as sp
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError, shortened
-from nonsmooth.system.derived.assembly import INDEPENDENT, Assembler, Part, Pattern
+from nonsmooth.system.derived.assembly import INDEPENDENT, Assembler, Part, Pattern, kept
 from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.derived.elements.element import Condition, Law
 from nonsmooth.system.names import unknown
@@ -37,12 +37,6 @@ class Expressions(Assembler):
         self.parts = [self._part(name, element) for name, element in elements.items()]
         self.indicators: dict[str, sp.Expr] = {}
         self._known: dict[tuple[str, sp.Expr], str] = {}
-        self._laws: dict[tuple[int, str, int | None], sp.Expr] = {}
-        self._approaches: dict[tuple[int, str], sp.Expr] = {}
-        self._slopes: dict[tuple[sp.Expr, int], FloatArray] = {}
-        self._drawn: dict[int, dict[sp.Basic, sp.Float]] = {}
-        self._may_hold: dict[tuple[str, tuple[int, ...]], bool] = {}
-        self._flows: dict[tuple[str, Pattern], tuple[list[sp.Expr], dict[int, sp.Expr]]] = {}
 
     # What the user gave
 
@@ -72,17 +66,13 @@ class Expressions(Assembler):
         own = getattr(element, element.kinematics)
         return Part(name, element, direction, self._call(own, f"{element.kinematics} of {what}"))
 
+    @kept
     def law(self, k: int, name: str, side: int | None = None) -> sp.Expr:
-        key = k, name, side
-        if key not in self._laws:
-            part = self.parts[k]
-            given, what = getattr(part.element, name), f"{name} of element {part.name!r}"
-            if side is not None and callable(given) and _arguments(given) == 2:
-                of = Scalar(side * part.where), self.symbols.parameters()
-                self._laws[key] = call_scalar(given, of, what)
-            else:
-                self._laws[key] = self._given(given, what)
-        return self._laws[key]
+        part = self.parts[k]
+        given, what = getattr(part.element, name), f"{name} of element {part.name!r}"
+        if side is not None and callable(given) and _arguments(given) == 2:
+            return call_scalar(given, (Scalar(side * part.where), self.symbols.parameters()), what)
+        return self._given(given, what)
 
     @property
     def names(self) -> list[str]:
@@ -156,46 +146,37 @@ class Expressions(Assembler):
     def tidy(self, states: Sequence[sp.Expr]) -> list[sp.Expr]:
         return [sp.expand(sp.cancel(entry)) for entry in states]
 
-    def approach(self, k: int, mode: str) -> sp.Expr:
-        key = k, mode
-        if key not in self._approaches:
-            self._approaches[key] = super().approach(k, mode)
-        return self._approaches[key]
+    @kept
+    def flow(
+        self, mode: str, pattern: Pattern, some: Collection[int] | None = None
+    ) -> tuple[list[sp.Expr], dict[int, sp.Expr]]:
+        field, forces = super().flow(mode, pattern, some)
+        return [sp.expand(entry) for entry in field], {k: sp.expand(force) for k, force in forces.items()}
 
-    def flow(self, mode: str, pattern: Pattern) -> tuple[list[sp.Expr], dict[int, sp.Expr]]:
-        key = mode, pattern
-        if key not in self._flows:
-            field, forces = super().flow(mode, pattern)
-            expanded = {k: sp.expand(force) for k, force in forces.items()}
-            self._flows[key] = [sp.expand(entry) for entry in field], expanded
-        return self._flows[key]
-
+    @kept
     def slopes(self, expression: sp.Expr, draw: int = 0) -> FloatArray:
-        key = expression, draw
-        if key not in self._slopes:
-            self._slopes[key] = self._numbers([sp.diff(expression, symbol) for symbol in self.u], draw)
-        return self._slopes[key]
+        return self._numbers([sp.diff(expression, symbol) for symbol in self.u], draw)
 
     def pushes(self, part: Part, draw: int = 0) -> FloatArray:
         return self._numbers([part.direction.get(i, sp.Integer(0)) for i in range(len(self.u))], draw)
 
     def _numbers(self, expressions: Sequence[Any], draw: int) -> FloatArray:
         """Their values in a state drawn at random; from ``OTHER`` on at parameters drawn at random too."""
-        if draw not in self._drawn:
-            at, rng = dict(self.values), np.random.default_rng(draw)
-            for symbol in [self.symbols.t, *self.u, *self.symbols.m.values(), *(at if draw >= OTHER else ())]:
-                at[symbol] = rng.uniform(0.5, 1.5)
-            self._drawn[draw] = {symbol: sp.Float(value) for symbol, value in at.items()}
-        return np.array([float(sp.sympify(one).xreplace(self._drawn[draw])) for one in expressions])
+        return np.array([float(sp.sympify(one).xreplace(self._drawn(draw))) for one in expressions])
 
-    def may_hold(self, some: Sequence[int], mode: str) -> bool:
+    @kept
+    def _drawn(self, draw: int) -> dict[sp.Basic, sp.Float]:
+        at, rng = dict(self.values), np.random.default_rng(draw)
+        for symbol in [self.symbols.t, *self.u, *self.symbols.m.values(), *(at if draw >= OTHER else ())]:
+            at[symbol] = rng.uniform(0.5, 1.5)
+        return {symbol: sp.Float(value) for symbol, value in at.items()}
+
+    @kept
+    def may_hold(self, some: tuple[int, ...], mode: str) -> bool:
         """Return whether some elements can be held at once."""
-        key = mode, tuple(some)
-        if key not in self._may_hold:
-            rates = [self.rate(k, mode) for k in some]
-            gaps = [self.parts[k].where for k in some if self.parts[k].element.bears]
-            self._may_hold[key] = self._vanish_together(rates, OTHER) and self._vanish_together(gaps, 2)
-        return self._may_hold[key]
+        rates = [self.rate(k, mode) for k in some]
+        gaps = [self.parts[k].where for k in some if self.parts[k].element.bears]
+        return self._vanish_together(rates, OTHER) and self._vanish_together(gaps, 2)
 
     def _vanish_together(self, expressions: Sequence[sp.Expr], draw: int) -> bool:
         """Return whether expressions may be zero at once: not where a sum of them is a number other than zero, as far
@@ -236,7 +217,8 @@ class Expressions(Assembler):
     def ranges(self, mode: str) -> list[tuple[sp.Expr, str]]:
         """Expressions of the parameters that must not be negative, each with the sentence for where it is."""
         known = set(self.symbols.p.values())
-        every = [row for here in self.places(mode, (0,) * len(self.parts)) for row in here.element.ranges(here)]
+        places = (self.place(k, mode, (0,) * len(self.parts)) for k in range(len(self.parts)))
+        every = [row for here in places for row in here.element.ranges(here)]
         return [(e, text) for e, text in every if e.free_symbols and e.free_symbols <= known]
 
     def condition(self, rows: Sequence[Condition], owner: str) -> str:

@@ -19,9 +19,10 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.system.derived.assembly import kept
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derived.assembly import Assembler, Pattern
+    from nonsmooth.system.derived.assembly import Assembler
     from nonsmooth.system.derived.expressions import Expressions
     from nonsmooth.system.derived.rows import Rows
 
@@ -81,9 +82,9 @@ class Numbers(ABC):
         """Change the states."""
 
     @abstractmethod
-    def ahead(self, some: Sequence[int], pattern: Pattern, forces: Sequence[tuple[int, Any]], laws: Any) -> Ahead:
+    def ahead(self, some: Sequence[int], forces: Sequence[tuple[int, Any]], laws: Any) -> Ahead:
         """The derivatives of the rates of some elements and of ``laws`` behind the instant, where others have
-        ``forces`` by their laws in a combination of phases."""
+        ``forces`` by their laws."""
 
 
 class RowNumbers(Numbers):
@@ -129,7 +130,7 @@ class RowNumbers(Numbers):
     def shift(self, change: FloatArray) -> None:
         self.u += change
 
-    def ahead(self, some: Sequence[int], pattern: Pattern, forces: Sequence[tuple[int, Any]], laws: Any) -> Ahead:
+    def ahead(self, some: Sequence[int], forces: Sequence[tuple[int, Any]], laws: Any) -> Ahead:
         return _RowsAhead(self, some, forces, laws)
 
 
@@ -175,58 +176,44 @@ class SeriesCode:
         self.own: dict[sp.Basic, str] = {
             **self.names, symbols.t: "t", **{s: f"x{i}" for i, s in enumerate(make.u)},
         }  # fmt: skip
-        self._values: dict[Any, Any] = {}
-        self._slopes: dict[Any, list[sp.Expr]] = {}
-        self._effects: dict[tuple[str, int, int], sp.Expr] = {}
-        self._steps: dict[Any, tuple[Any, Any]] = {}
 
+    @kept
     def value(self, expression: sp.Expr) -> Any:
         """The code of one expression."""
         from nonsmooth.system.symbolic.printing import Printer
 
-        if expression not in self._values:
-            self._values[expression] = compile(
-                Printer(self.own)(expression.xreplace(self.changes)), "<instant>", "eval"
-            )  # fmt: skip
-        return self._values[expression]
+        return compile(Printer(self.own)(expression.xreplace(self.changes)), "<instant>", "eval")
 
+    @kept
     def slopes(self, expression: sp.Expr) -> list[sp.Expr]:
         """Its derivatives in the states."""
-        if expression not in self._slopes:
-            self._slopes[expression] = [sp.diff(expression, symbol) for symbol in self.make.u]
-        return self._slopes[expression]
+        return [sp.diff(expression, symbol) for symbol in self.make.u]
 
+    @kept
     def effect(self, mode: str, i: int, j: int) -> sp.Expr:
         """The change of the derivative of the rate of element i by a unit force of element j."""
-        key = mode, i, j
-        if key not in self._effects:
-            self._effects[key] = self.make.across(self.make.rate(i, mode), self.make.parts[j])
-        return self._effects[key]
+        return self.make.across(self.make.rate(i, mode), self.make.parts[j])
 
+    @kept
     def steps(
-        self, mode: str, some: Sequence[int], pattern: Pattern, forces: Sequence[tuple[int, Any]], laws: Sequence[Any]
-    ) -> tuple[Any, Any]:
+        self, mode: str, some: tuple[int, ...], forces: tuple[tuple[int, Any], ...], laws: tuple[Any, ...]
+    ) -> tuple[Any, ...]:
         """Code that writes the coefficients 0, and that of the next ones: of the states, then of the forces of some
         elements, which are inputs, then of the derivatives of their rates, then of the laws."""
         from nonsmooth.system.codegen.jet import jet_steps
 
-        key = mode, tuple(some), pattern, tuple(laws)
-        if key not in self._steps:
-            make = self.make
-            field = make.base(mode)
-            inputs = [sp.Symbol(f"force_{k}", real=True) for k in some]
-            for k, law in [*forces, *zip(some, inputs, strict=True)]:
-                field = make.moved(field, make.parts[k], law)
-            rates = [make.along(make.rate(k, mode), field) for k in some]
-            first, following = jet_steps(
-                make.symbols.t, (*make.u, *inputs), self.names,
-                [*(e.xreplace(self.changes) for e in field), *([sp.S.Zero] * len(inputs))],
-                [sp.sympify(e).xreplace(self.changes) for e in (*rates, *laws)],
-            )  # fmt: skip
-            self._steps[key] = (
-                compile("\n".join(first), "<instant>", "exec"), compile("\n".join(following), "<instant>", "exec"),
-            )  # fmt: skip
-        return self._steps[key]
+        make = self.make
+        field = make.base(mode)
+        inputs = [sp.Symbol(f"force_{k}", real=True) for k in some]
+        for k, law in [*forces, *zip(some, inputs, strict=True)]:
+            field = make.moved(field, make.parts[k], law)
+        rates = [make.along(make.rate(k, mode), field) for k in some]
+        first, following = jet_steps(
+            make.symbols.t, (*make.u, *inputs), self.names,
+            [*(e.xreplace(self.changes) for e in field), *([sp.S.Zero] * len(inputs))],
+            [sp.sympify(e).xreplace(self.changes) for e in (*rates, *laws)],
+        )  # fmt: skip
+        return tuple(compile("\n".join(lines), "<instant>", "exec") for lines in (first, following))
 
 
 class SeriesNumbers(Numbers):
@@ -288,8 +275,9 @@ class SeriesNumbers(Numbers):
         self.u, self.known = self.u + change, {}
         self.lanes = self._lanes()
 
-    def ahead(self, some: Sequence[int], pattern: Pattern, forces: Sequence[tuple[int, Any]], laws: Any) -> Ahead:
-        return _SeriesAhead(self, self.code.steps(self.mode, some, pattern, forces, laws), len(some), len(laws))
+    def ahead(self, some: Sequence[int], forces: Sequence[tuple[int, Any]], laws: Any) -> Ahead:
+        steps = self.code.steps(self.mode, tuple(some), tuple(forces), tuple(laws))
+        return _SeriesAhead(self, steps, len(some), len(laws))
 
 
 class _SeriesAhead(Ahead):

@@ -138,6 +138,10 @@ class Patterns:
     def ways_of(self, rows: Rows, pattern: Pattern, k: int) -> tuple[list[Out], dict[int, FloatArray], list[int]]:
         """The ways of an element out of its phase in a pattern, the rows of its conditions by their numbers, and those
         at which it meets what it may be held by."""
+        key = k, rows.phases(k, pattern)
+        if key in rows.ways:
+            found: tuple[list[Out], dict[int, FloatArray], list[int]] = rows.ways[key]
+            return found
         name, conditions = rows.parts[k].name, {}
 
         def armed(one: Any) -> int:
@@ -152,7 +156,8 @@ class Patterns:
         ]
         here = rows.place(k, self.mode, pattern)
         ways = here.element.meeting(here) if here.phase not in here.element.held else []
-        return outs, conditions, [armed(way[0]) for way in ways]
+        rows.ways[key] = outs, conditions, [armed(way[0]) for way in ways]
+        return outs, conditions, rows.ways[key][2]
 
     def ways_out(self, rows: Rows, pattern: Pattern) -> tuple[FloatArray, list[Out], list[int]]:
         """The rows (conditions, M) of a pattern, NaN where one is not asked for; the ways out; the conditions at which
@@ -248,7 +253,7 @@ class Patterns:
         tables = self.form.evaluate(point)
         if place is None:
             return Rows(self, tables, 0)
-        slopes = self.form.slopes(point, place)
+        slopes = self.form.evaluate(point, place)
         both = {one.name: getattr(tables, one.name) + 1j * STEP * getattr(slopes, one.name) for one in fields(tables)}
         return Rows(self, replace(tables, **both), 0)
 
@@ -333,7 +338,6 @@ class Patterns:
                 if isinstance(force, Row):
                     found[here, k] = w[here] @ force.values
             found[here] = rows.shared(self.mode, pattern, found[here], partial(_values, w[here]))
-            rows.forget()
         return found
 
 

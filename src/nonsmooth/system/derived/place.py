@@ -85,7 +85,7 @@ class Place:
 
     def struck(self, factor: Any) -> Any:
         """States behind an impulse of the element that takes its rate to -factor times it."""
-        return self.make.impact([self.k], self.mode, factor)
+        return self.make.impact((self.k,), self.mode, factor)
 
     def behind(self, expression: Any, states: Any) -> Any:
         """An expression behind an impulse, by the states before it."""

@@ -7,9 +7,10 @@ small linear system.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import cached_property
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, SystemDefinitionError
 from nonsmooth.system.codegen.linear import put_together
-from nonsmooth.system.derived.assembly import Assembler, Part, Pattern, VaryingError
+from nonsmooth.system.derived.assembly import Assembler, Part, Pattern, VaryingError, kept
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearTables
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Row", "Rows"]
 
 ROUNDING = 1e-12  # of the terms of a sum: below it the sum is zero
+ROOM = 2_000_000  # numbers of fields that are kept
 
 
 class Row:
@@ -94,10 +96,9 @@ class Rows(Assembler):
         self._every, self._at = every, patterns.at
         self.parts = [self._part(k, name, patterns) for k, name in enumerate(patterns.elements)]
         self.known: dict[Any, Any] = {}  # of what elements decide together
-        self._bases: dict[Any, tuple[list[int], FloatArray]] = {}
-        self._approaches: dict[int, Row] = {}
-        self._rates: dict[int, Row] = {}
-        self._flows: dict[Pattern, tuple[FloatArray, dict[int, Any]]] = {}
+        self.ways: dict[tuple[int, Any], Any] = {}  # out of its phase, of each element in a combination of its group
+        self._flows: dict[tuple[int, Any], tuple[FloatArray, dict[int, Any]]] = {}
+        self._room = ROOM
 
     def augmented(self, u: FloatArray, time: float) -> FloatArray:
         """w of states at a time."""
@@ -125,6 +126,7 @@ class Rows(Assembler):
     def base(self, mode: str) -> FloatArray:
         return self.field
 
+    @kept
     def law(self, k: int, name: str, side: int | None = None) -> Row:
         return Row(self._every[self._at[k, name, side]], self.n)
 
@@ -155,13 +157,12 @@ class Rows(Assembler):
         total = terms.sum(axis=-1)
         return np.where(np.abs(total) > ROUNDING * np.abs(terms).sum(axis=-1), total, 0.0)
 
-    def basis(self, held: Sequence[int], mode: str, pattern: Pattern) -> tuple[list[int], FloatArray]:
-        key = tuple(held), tuple(pattern[r] for r in self.rubbing.values())
-        if key not in self._bases:
-            self._bases[key] = chosen, sums = super().basis(held, mode, pattern)
-            if len(chosen) < len(held) and self.field.dtype == complex:
-                self._refuse_varying(chosen, held, sums, pattern)
-        return self._bases[key]
+    @kept
+    def basis(self, held: tuple[int, ...], mode: str, pattern: Pattern) -> tuple[list[int], FloatArray]:
+        chosen, sums = super().basis(held, mode, pattern)
+        if len(chosen) < len(held) and self.field.dtype == complex:
+            self._refuse_varying(chosen, held, sums, pattern)
+        return chosen, sums
 
     def _refuse_varying(self, chosen: list[int], held: Sequence[int], sums: FloatArray, pattern: Pattern) -> None:
         """Raise where the sums of forces that hold together depend on the parameter of the derivatives."""
@@ -227,16 +228,6 @@ class Rows(Assembler):
     def size(self, expression: Row) -> float:
         return float(max(self.scale[expression.values[: self.n] != 0], default=1.0))
 
-    def approach(self, k: int, mode: str) -> Row:
-        if k not in self._approaches:
-            self._approaches[k] = super().approach(k, mode)
-        return self._approaches[k]
-
-    def rate(self, k: int, mode: str) -> Row:
-        if k not in self._rates:
-            self._rates[k] = super().rate(k, mode)
-        return self._rates[k]
-
     @cached_property
     def changes(self) -> FloatArray:
         """Changes of the derivatives of the rates of all that may hold by unit forces of each of them."""
@@ -245,17 +236,50 @@ class Rows(Assembler):
         found[np.ix_(bearing, bearing)] = self.effects(bearing, self.mode)
         return found
 
-    def flow(self, mode: str, pattern: Pattern) -> tuple[FloatArray, dict[int, Any]]:
-        if pattern not in self._flows:
-            self._flows[pattern] = super().flow(mode, pattern)
-        return self._flows[pattern]
+    @cached_property
+    def groups(self) -> list[tuple[list[int], Callable[[Pattern], Any], Any]]:
+        """The elements apart by whose forces change whose rates: what one does depends on the phases of its group
+        alone. Of each group the elements, what takes their phases from a pattern, and the states that they act on."""
+        from scipy.sparse.csgraph import connected_components
+
+        acts = np.array([part.direction != 0.0 for part in self.parts])
+        felt = acts.copy()
+        for k, part in enumerate(self.parts):
+            if part.element.held:
+                felt[k] |= self.rate(k, self.mode).values[: self.n] != 0.0
+        speaks = np.array([[other.name in vars(part.element).values() for other in self.parts] for part in self.parts])
+        number, labels = connected_components(felt @ acts.T | speaks, directed=False)
+        groups = [np.flatnonzero(labels == g).tolist() for g in range(number)]
+        return [(some, itemgetter(*some), np.flatnonzero(acts[some].any(axis=0))) for some in groups]
+
+    @cached_property
+    def group(self) -> dict[int, int]:
+        """The number of each element's group."""
+        return {k: g for g, (some, *_) in enumerate(self.groups) for k in some}
+
+    def phases(self, k: int, pattern: Pattern) -> Any:
+        """Those of an element's group."""
+        return self.groups[self.group[k]][1](pattern)
+
+    def flow(
+        self, mode: str, pattern: Pattern, some: Collection[int] | None = None
+    ) -> tuple[FloatArray, dict[int, Any]]:
+        f, forces = self.field.copy(), dict[int, Any]()
+        for own, phases, states in self.groups:
+            key = own[0], phases(pattern)
+            if key not in self._flows:
+                field, found = super().flow(mode, pattern, own)
+                self._room -= len(states) * len(field[0])
+                if self._room < 0:
+                    self._flows.clear()
+                    self._room = ROOM
+                self._flows[key] = field[states], found
+            f[states] = self._flows[key][0]
+            forces |= self._flows[key][1]
+        return f, {k: forces[k] for k in sorted(forces)}
 
     def rubbed(self, some: Sequence[int], slopes: FloatArray) -> FloatArray:
         """The map of an impact by the derivatives of its impulses in the rates of some elements."""
         ways = np.array([self.parts[k].direction for k in some]).T
         found: FloatArray = self.identity() + ways @ slopes @ np.array([self.rate(k, self.mode).values for k in some])
         return found
-
-    def forget(self) -> None:
-        """Let go of the fields that were kept for one pattern's neighbours."""
-        self._flows.clear()
