@@ -5,7 +5,7 @@ import pytest
 
 import nonsmooth as ns
 
-CONTROLLED = {"rate": 50.0, "resolution": 5.48e-5, "jitter": 5e-5}  # a rotary sensor of 1440 counts on a wheel of 78.9 mm
+CONTROLLED = {"rate": 50.0, "resolution": 5.48e-5, "jitter": 5e-5}  # 1440 counts on a wheel of 78.9 mm
 
 
 @pytest.fixture(scope="module")

@@ -78,7 +78,7 @@ def test_exactly_these_attractors_from_200_starts_in_20_seeds(seeds: range) -> N
 
 
 def test_a_rare_attractor_is_met_as_often_as_predicted() -> None:
-    """A cycle of period 6 that holds 1-2 % of the box: the starts predicted for 99 % meet it in 7 of 8 seeds and more."""
+    """A cycle of period 6 that holds 1-2 % of the box: the starts predicted for 99 % meet it in 7 of 8 seeds."""
     system = ns.models.discontinuous_support(omega=11.15, rho=0.33)
     box = {"x": (-0.02, 0.02), "v": (-0.2, 0.2)}
     first = basin_fractions(system, "g", [0.001375], n_starts=2000, box=box, seed=1000, progress=False)

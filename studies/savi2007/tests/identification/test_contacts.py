@@ -98,8 +98,8 @@ def test_a_motor_that_wanders_is_in_the_uncertainty():
     for i in range(2):
         gap = found.place(i, 0)
         assert abs(found.values[gap] - GAP) < 3 * error[gap]
-    # how far a line over two turns is off adds to what the residuals show
-    assert np.max(np.abs(found.by_turns) / error) > 0.2
+    # how far a line over two turns is off adds to what the residuals show: here it is most of it, and never more
+    assert 0.5 < np.max(np.abs(found.by_turns) / error) < 1.0
 
 
 def told(values, errors, readings):
