@@ -6,6 +6,7 @@ the documentation of NumPy and others need their inventories, so they are made o
 
 import os
 import re
+import sys
 from importlib import metadata
 from typing import Any
 
@@ -39,9 +40,16 @@ templates_path: list[str] = []
 
 myst_enable_extensions = ["amsmath", "dollarmath", "deflist", "colon_fence", "substitution"]
 myst_heading_anchors = 3
-# The table of statuses is written from the one place that defines them.
-_rows = [f"| `{status.name}` | {status.happened} | {status.remedy} |" for status in STATUSES]
-myst_substitutions = {"statuses": "\n".join(["| name | what happened | what to do |", "|---|---|---|", *_rows])}
+# Tables that are written from the one place that defines what they hold.
+sys.path.insert(0, os.path.dirname(__file__))
+import doors  # noqa: E402
+
+_statuses = [[f"`{status.name}`", status.happened, status.remedy] for status in STATUSES]
+myst_substitutions = {
+    "statuses": doors.table(["name", "what happened", "what to do"], _statuses),
+    "options": doors.options(),
+    "refusals": doors.refusals(),
+}
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"

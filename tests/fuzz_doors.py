@@ -39,6 +39,10 @@ def bases() -> dict[str, tuple[Any, ...]]:
     valve = ns.models.relief_valve(q=9.0)
     run = ns.simulate(s, periods=4, start={"x": 0.01})
     orbit = ns.find_orbit(s, progress=False)
+    branch = ns.continue_orbit(orbit, "omega", (4.9, 5.9))
+    lost = branch.isel(point=int(branch["special_point"][:2].mean()))  # between its two folds
+    saddle = ns.find_orbit(s.with_parameters(omega=float(lost["omega"])), start=lost["section"].values,
+                           period_number=1, transient=0, progress=False)  # fmt: skip
     points = ns.poincare(s, n=300)["section"].values
     free = ns.mechanical(1.0, 0.2, "k", parameters={"k": 4.0}, coordinates=["q"])
     record = {"q": (np.arange(0, 5, 0.05), np.exp(-0.1 * np.arange(0, 5, 0.05)) * np.cos(2 * np.arange(0, 5, 0.05)))}
@@ -68,7 +72,8 @@ def bases() -> dict[str, tuple[Any, ...]]:
             {"system": s, "parameter": "omega", "range": (4.9, 5.0), "n": 3, "transient": 10, "points": 3, "depth": 0,
              "budget": 5.0, "progress": False},
         ),
-        "manifolds": ({"orbit": orbit, "length": 0.5},),
+        "manifolds": ({"orbit": saddle, "length": 0.5},),
+        "special_points": ({"branch": branch},),
         "smoothing_report": ({"system": s, "etas": [1e-3], "transient": 5, "progress": False},),
         "fit": ({"system": free, "recording": record, "parameters": ["k"], "tries": 1, "progress": False},),
         "select_model": (
@@ -78,6 +83,10 @@ def bases() -> dict[str, tuple[Any, ...]]:
         "plan_experiment": (
             {"system": free, "runs": {"a": {"duration": 2.0, "samples": 20, "start": {"q": 1.0}}}, "parameters": ["k"],
              "measured": {"q": ns.Sensor(noise=1e-3)}},
+        ),
+        "propagate": (
+            {"found": {}, "verb": ns.sweep, "start": s, "parameter": "rho", "values": [0.14], "draws": 2,
+             "settings": {"g": (0.02, 1e-4)}, **few},
         ),
         "compare": ({"measured": ns.sweep(s, "omega", [5.0], keep=40, progress=False).isel(omega=0), "theory": s,
                      "noise": [1e-4, 1e-3], "transient": 10, "draws": 0, "splits": 20},),
@@ -103,7 +112,8 @@ def judged(error: BaseException) -> str:
     """Empty for an error that is ours; else the library's own, and where it was raised."""
     ours = (ValueError, TypeError, ns.SolveError, MemoryError, ImportError, RuntimeError)
     last = traceback.extract_tb(error.__traceback__)[-1]
-    if isinstance(error, ours) and last.filename.startswith(SOURCE) and len(str(error)) > 12:
+    said = str(last.line).startswith("raise") and len(str(error)) > 12  # else Python's own words
+    if isinstance(error, ours) and last.filename.startswith(SOURCE) and said:
         return ""
     return f"{type(error).__name__}: {str(error)[:150]} ({Path(last.filename).name}:{last.lineno})"
 
@@ -120,7 +130,9 @@ def main() -> None:
         if wanted and verb not in wanted:
             continue
         call, count, slowest = getattr(ns, verb), Counter[str](), 0.0
-        names = list(inspect.signature(call).parameters)
+        items = inspect.signature(call).parameters.values()
+        names = [item.name for item in items if item.kind not in (item.VAR_POSITIONAL, item.VAR_KEYWORD)]
+        by_place = [item.name for item in items if item.kind is item.POSITIONAL_ONLY]
         for _ in range(many):
             some = rng.choice(names, 1 + int(rng.random() < 0.3))
             changed = {str(name): ODD[rng.integers(len(ODD))] for name in some}
@@ -130,7 +142,7 @@ def main() -> None:
             try:
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore")
-                    call(**asked)
+                    call(*(asked.pop(name) for name in by_place), **asked)
                 count["ran"] += 1
             except KeyboardInterrupt:
                 count["cancelled by its progress"] += 1

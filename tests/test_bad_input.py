@@ -243,7 +243,7 @@ SWEEP = {
     "transient": ("rho", VALUES, {"transient": -1}, ValueError, r"transient = -1 must be a whole number, at least 0"),
     "transient NaN": ("rho", VALUES, {"transient": math.nan}, ValueError, r"transient must be finite"),
     "keep": ("rho", VALUES, {"keep": 1}, ValueError, r"keep = 1 must be a whole number, at least 2"),
-    "keep as text": ("rho", VALUES, {"keep": "all"}, TypeError, r"keep must be a real number, not 'all'"),
+    "keep as text": ("rho", VALUES, {"keep": "all"}, TypeError, r"keep must be a whole number, not 'all'"),
     "max_period": ("rho", VALUES, {"max_period": 0}, ValueError, r"max_period = 0 .*at least 1"),
     "max_period beyond keep": (
         "rho",
@@ -311,7 +311,7 @@ OTHERS: dict[str, tuple[Callable, type[Exception], str]] = {
     "phase as text": (lambda s, v: ns.Stroboscopic("half"), TypeError, r"phase must be a real number"),
     "side": (lambda s, v: ns.Poincare("gap", side="left"), ValueError, r"allowed: 'after', 'before'"),
     "every": (lambda s, v: ns.Poincare("gap", every=0), ValueError, r"every = 0 .*at least 1"),
-    "every as text": (lambda s, v: ns.Poincare("gap", every="2"), TypeError, r"every must be a real number"),
+    "every as text": (lambda s, v: ns.Poincare("gap", every="2"), TypeError, r"every must be a whole number"),
     "rising": (
         lambda s, v: ns.Poincare("gap", rising="up"),
         TypeError,
@@ -428,9 +428,9 @@ def test_ctrl_c_in_a_long_sweep(tmp_path: Path) -> None:
     code = (
         "import signal, nonsmooth.diagrams.sweep as s\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a job in the background inherits "ignore"
-        "run = s.run_pieces\n"
+        "run = s.over_items\n"
         "def told(*a):\n    print('running', flush=True)\n    return run(*a)\n"
-        "s.run_pieces = told\n"
+        "s.over_items = told\n"
         "from nonsmooth.cli.main import main\n"
         f"for path in {list(map(str, before))!r}:\n    print(main(['run', path]), flush=True)"
     )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.util
 import inspect
+import re
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
@@ -16,20 +18,16 @@ import nonsmooth as ns
 from nonsmooth.system.arguments import declared
 from nonsmooth.system.kinds import Limit
 
-SOURCE = Path(ns.__file__).parent
 #: Verbs whose arguments are read by themselves: they take any names, or what is no option.
 OTHERS = {"animate", "explore", "identify", "load", "load_recording", "save", "system_of", "where"}
 WORDS = ("must be", "allowed:", "takes an ns.System", "give its two ends", "real number", "finite")
 
 
-def doors() -> dict[str, Any]:
-    """Whatever is public and checked, by name: verbs, and classes by their constructors."""
-    found = {name: getattr(ns, name) for name in ns.__all__}
-    calls = {name: one.__init__ if isinstance(one, type) else one for name, one in found.items()}
-    return {name: call.door for name, call in calls.items() if hasattr(call, "door") and call.door.readers}
-
-
-DOORS = doors()
+spec = importlib.util.spec_from_file_location("doors", Path(__file__).parents[1] / "docs" / "doors.py")
+assert spec is not None and spec.loader is not None
+tables = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(tables)
+DOORS: dict[str, Any] = tables.DOORS
 
 
 def wrong(kind: Any) -> list[Any]:
@@ -65,31 +63,34 @@ def cases() -> list[tuple[str, str, Any]]:
     return [(verb, name, value) for verb, name, kind in kinds for value in wrong(kind)]
 
 
-def refused(verb: str, **given: Any) -> Exception:
-    """The error of a call with an argument, and with placeholders for all that it needs behind it."""
-    items = DOORS[verb].items.values()
-    needed = [one.name for one in items if one.default is one.empty and one.name not in ("self", *given)]
-    with pytest.raises((TypeError, ValueError)) as caught:
-        getattr(ns, verb)(**given, **dict.fromkeys(needed, object()))
-    return caught.value
-
-
 @pytest.mark.parametrize("verb", DOORS)
 def test_what_a_declaration_does_not_allow_is_refused_in_a_sentence(verb: str) -> None:
     """It names the option, and says what is allowed; nothing is computed before."""
     tried = [(name, value) for which, name, value in cases() if which == verb]
     assert tried or not any(wrong(kind) for kind in DOORS[verb].kinds.values())
     for name, value in tried:
-        said = str(refused(verb, **{name: value}))
+        said = str(tables.answer(verb, **{name: value}))
         assert name in said.lower() and any(word in said for word in WORDS), (name, value, said)
 
 
 @pytest.mark.parametrize("verb", DOORS)
 def test_a_misspelt_name_is_answered_with_the_nearest(verb: str) -> None:
-    for name in DOORS[verb].items:
-        if name not in ("self", "system"):
-            said = str(refused(verb, **{f"{name}_": 1}))
+    for name in DOORS[verb].kinds:
+        if name != "system":
+            said = str(tables.answer(verb, **{f"{name}_": 1}))
             assert f"`{name}_` is not an option of" in said and f"nearest: {name}" in said, said
+
+
+def test_the_tables_name_every_option_and_hold_sentences_of_ours() -> None:
+    rows = [row.split(" | ") for row in tables.options().splitlines()[2:]]
+    found = {(name[3:-1], verb) for name, *_, verbs in rows for verb in re.findall(r"~nonsmooth\.(\w+)", verbs)}
+    assert found == {(name, verb) for verb, door in DOORS.items() for name in door.kinds}
+    assert all(allowed.strip() for _, allowed, *_ in rows)
+    rows = [row.split(" | ") for row in tables.refusals().splitlines()[2:]]
+    assert len({verb for verb, *_ in rows if "nonsmooth" in verb}) == len(DOORS) and len(rows) > 2 * len(DOORS)
+    for _, given, said in rows:
+        name = given[1 : given.index("=")]
+        assert name in said and any(word in said for word in (*WORDS, "is not an option of")), said
 
 
 def test_switches_and_numbers_are_read_alike_everywhere() -> None:
@@ -111,7 +112,7 @@ def test_switches_and_numbers_are_read_alike_everywhere() -> None:
 
 def test_every_verb_has_a_door() -> None:
     calls = {name for name in ns.__all__ if inspect.isfunction(getattr(ns, name))}
-    assert calls - DOORS.keys() <= OTHERS | {"compare", "mechanical", "propagate", "special_points"}
+    assert calls - DOORS.keys() <= OTHERS | {"mechanical"}
 
 
 def test_signature_and_help_show_all_that_is_taken() -> None:
@@ -121,7 +122,7 @@ def test_signature_and_help_show_all_that_is_taken() -> None:
         assert {*shown} == {name for name in door.items if name != "self"}, verb
         for name in door.shared:
             assert name in (call.__doc__ or "") and shown[name].default is not inspect.Parameter.empty, (verb, name)
-        assert {*declared(call)} == {*shown}
+        assert {*declared(call)} == {*door.named}
     assert inspect.signature(ns.sweep).parameters["keep"].default == 100
     assert "A Zarr store for finished chunks" in ns.chart.__doc__
 

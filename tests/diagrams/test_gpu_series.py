@@ -29,7 +29,7 @@ import functools, gc, json, sys
 import numba.cuda
 import nonsmooth as ns
 from gpu_series_systems import filtered, two_wells
-from nonsmooth.flow.engines.devices import engine_on
+from nonsmooth.flow.engines.devices import engine_on_gpu
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.engines.series_cuda import module_of
 from nonsmooth.kernels.cuda.ptx import ptx_of_module
@@ -40,7 +40,7 @@ optimised = name.removesuffix(", typed") == name
 name = name.removesuffix(", typed")
 numba.cuda.compile = functools.partial(numba.cuda.compile, opt=optimised)
 system = {"valve": ns.models.relief_valve, "two wells": two_wells, "filtered": filtered}[name]()
-engine = engine_on("cuda", engine_for(system, "auto" if name == "filtered" else "taylor", None, None), None)
+engine = engine_on_gpu(engine_for(system, "auto" if name == "filtered" else "taylor", None, None), None)
 module = module_of(engine, engine.prepare(system.parameter_vector()[None, :]))
 texts = [ptx_of_module(module, entry, signature) for entry, signature in signatures.items()]
 print(json.dumps([[text.count(".visible .entry"), ".target sm_90" in text] for text in texts]))

@@ -18,7 +18,7 @@ from nonsmooth.attractors.mapper import Mapper
 from nonsmooth.attractors.settle_cuda import separate_on_gpu, settle_on_gpu
 from nonsmooth.attractors.settled import ROUNDED, Settled, least_sizes, usable
 from nonsmooth.attractors.trace import Trace, mode_at
-from nonsmooth.flow.engines.devices import engine_on, on_gpu
+from nonsmooth.flow.engines.devices import engine_on_gpu, on_gpu
 from nonsmooth.flow.engines.engine import FloatArray, Section, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import RTOL, engine_for
@@ -262,8 +262,10 @@ def settler_for(
     plan = section_plan(system, options["section"])[1]
     longest = longest_period(options["keep"], options["max_period"])
     solver, device = solver_of(options), options["device"]
-    engine = engine_on(device, engine_for(system, **solver), plan)
-    on_gpu(device, verb, engine, plan, carried=carried)
+    engine = engine_for(system, **solver)
+    if device == "cuda":
+        engine = engine_on_gpu(engine, plan)
+        on_gpu(device, verb, engine, plan, carried=carried)
     given = {"solver": solver, "device": device} | changes
     return Settler(system, engine, plan, options["transient"], options["keep"], longest, **given)
 

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from nonsmooth.system.arguments import checked
+
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["special_points"]
 
+
+@checked
 def special_points(branch: Any) -> xr.Dataset:
     """Return the special points of a branch as a table of their own.
 

@@ -84,7 +84,7 @@ def lyapunov(
         Length in forcing periods (10 000 where neither is given), or in time: needed where there is no period.
     transient : float, optional
         Passed over before, in the same unit: 500 periods, or a twentieth of the duration.
-    start, mode
+    start, mode : state, str, optional
         First state and mode, as in :func:`nonsmooth.simulate`.
     device : {"cpu", "cuda"}
         ``"cuda"`` runs a sweep with ``direction=None`` on an NVIDIA GPU, one point per thread, for

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import threading
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -11,10 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
 import numpy as np
 
+from nonsmooth.attractors.settled import usable
 from nonsmooth.attractors.settler import Settler, settler_for
 from nonsmooth.attractors.standing import standing_in_sweep
+from nonsmooth.campaign.threads import cores, over_items
 from nonsmooth.diagrams.density import bin_edges, coarse_values, given_ranges
-from nonsmooth.diagrams.sweep_pieces import Report, Slot, ended, largest_of, pieces_of, run_on_gpu, run_pieces
+from nonsmooth.diagrams.sweep_pieces import Slot, pieces_of, run_on_gpu
 from nonsmooth.flow.arguments import swept_values
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.methods import warn_if_coarse
@@ -24,6 +27,8 @@ from nonsmooth.flow.options import Settling, Varied, as_called, workers_of
 from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.results.memory import room_for
+from nonsmooth.results.progress import Progress
+from nonsmooth.results.progress import progress as progress_bar
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import Range, at_least
 
@@ -155,9 +160,8 @@ def sweep(
     if gpu:
         run_on_gpu(points, starts, work.slots, options["progress"], parameter)
     else:
-        pieces = pieces_of(work.directions, len(starts), numbers)
-        run_pieces(work.marching(), pieces, threads, options["progress"], parameter)
-    largest = largest_of(starts, work.slots.values(), extremes)
+        work.run(threads, options["progress"])
+    largest = work.largest(extremes)
     warn_if_coarse(system, settler.engine, largest)
     warn_if_small(system, largest)
     squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
@@ -204,19 +208,33 @@ class _Sweep:
         both = product(range(len(self.directions)), range(len(self.starts)))
         return {key: Slot(self.settler, self.points, self.edges, self.measured) for key in both}
 
-    def marching(self) -> Callable[[tuple[int, int], Sequence[int], Report], None]:
-        """The march of one slot along some of the points; compiled before threads ask for it."""
-        self.settler.load()
-        tables = self.settler.engine.prepare(self.points)
+    def run(self, threads: int | None, progress: Progress) -> None:
+        """All points on threads (the kernels release the lock); Ctrl-C stops them after their present point."""
+        self.settler.load()  # before threads ask for it
+        tables, stop = self.settler.engine.prepare(self.points), threading.Event()
+        pieces = pieces_of(self.directions, len(self.starts), self.numbers)
 
-        def march(slot: tuple[int, int], order: Sequence[int], report: Report) -> None:
-            d, k = slot
-            self.slots[slot].march(tables, order, self.starts[k], self.directions[d] != "none", report)
+        def march(piece: tuple[tuple[int, int], list[int]]) -> None:
+            (d, k), order = piece
+            self.slots[d, k].march(tables, order, self.starts[k], self.directions[d] != "none", advance, stop)
 
-        return march
+        total = len(self.slots) * len(self.points)
+        with progress_bar(total, f"sweep over {self.parameter}", progress) as advance:
+            over_items(pieces, march, lambda *_: None, min(threads or cores(), len(pieces)), stop)
 
-    def gather(self, read: Callable[[Slot], Any]) -> np.ndarray:
-        """Arrays of all slots, over direction and start."""
+    def largest(self, extremes: bool) -> FloatArray:
+        """The largest size of each state, of the starts and of all runs that came to their end; without their extremes
+        that of their section points."""
+        n, sizes = self.starts.shape[1], [np.abs(self.starts)]
+        for slot in self.slots.values():
+            kept, there = slot.kept, usable(slot.status)
+            ends = (kept.high[:, :n], kept.low[:, :n]) if extremes else (np.abs(kept.section).max(axis=1),)
+            sizes += [np.abs(end[there]) for end in ends]
+        return np.nan_to_num(np.vstack(sizes)).max(axis=0)
+
+    def gather(self, name: str) -> np.ndarray:
+        """An array of all slots, over direction and start."""
+        read = attrgetter(name)
         every = range(len(self.starts))
         return np.stack([np.stack([read(self.slots[d, k]) for k in every]) for d in range(len(self.directions))])
 
@@ -227,44 +245,44 @@ class _Sweep:
         from nonsmooth.results.schema import sweep as build
 
         gather, settler, system = self.gather, self.settler, self.settler.system
-        failed = gather(lambda slot: ~ended(slot))
-        sides = armed_signs(system)
+        failed = ~usable(gather("status"))
 
         def whole(values: np.ndarray) -> np.ndarray:
             """NaN where the point failed: the kernel's buffers hold what it had by then."""
             return np.where(failed.reshape(failed.shape + (1,) * (values.ndim - 3)), np.nan, values)
 
         arrays: dict[str, Any] = {
-            "crossings_per_period": whole(gather(lambda s: s.kept.crossings) / float(settler.keep)),
-            "contacts_per_period": whole(gather(lambda s: s.kept.contacts) / float(settler.keep)),
-            "status": gather(lambda s: s.status),
+            "crossings_per_period": whole(gather("kept.crossings") / float(settler.keep)),
+            "contacts_per_period": whole(gather("kept.contacts") / float(settler.keep)),
+            "status": gather("status"),
         }
         if self.edges is None:
-            arrays["section"] = whole(gather(lambda s: s.kept.section))
+            arrays["section"] = whole(gather("kept.section"))
         else:
-            arrays["density"] = gather(attrgetter("counter.counts"))
-            arrays["outside"] = gather(attrgetter("counter.outside"))
+            arrays["density"] = gather("counter.counts")
+            arrays["outside"] = gather("counter.outside")
         if asked["judge"]:
-            arrays["period_number"] = gather(lambda s: s.period_number)
-            arrays["residual"] = gather(lambda s: s.residual)
+            arrays["period_number"] = gather("period_number")
+            arrays["residual"] = gather("residual")
         if asked["extremes"]:
-            arrays["maximum"] = whole(gather(lambda s: s.extremes()[0]))
-            arrays["minimum"] = whole(gather(lambda s: s.extremes()[3]))
-            arrays["clearance"] = whole(gather(lambda s: np.where(sides > 0, -s.extremes()[1], s.extremes()[4])))
-            if system.outputs and self.slots[0, 0].extremes()[2].shape[-1] == len(system.outputs):
-                arrays["output_maximum"] = whole(gather(lambda s: s.extremes()[2]))
-                arrays["output_minimum"] = whole(gather(lambda s: s.extremes()[5]))
+            n, n_i = len(system.states), len(system.indicators)
+            high, low = (np.split(whole(gather(f"kept.{end}")), [n, n + n_i], axis=-1) for end in ("high", "low"))
+            arrays["maximum"], arrays["minimum"] = high[0], low[0]
+            arrays["clearance"] = np.where(armed_signs(system) > 0, -high[1], low[1])
+            if system.outputs and high[2].shape[-1] == len(system.outputs):
+                arrays["output_maximum"], arrays["output_minimum"] = high[2], low[2]
         if asked["judge"] and self.edges is None:
-            arrays |= standing_in_sweep(settler, self.points, arrays, gather(lambda s: s.kept.section[:, 0]))
-        def of_load(name: str) -> np.ndarray:
-            return gather(lambda s: s.loads[name])
-
+            arrays |= standing_in_sweep(settler, self.points, arrays, gather("kept.section")[..., 0, :])
+        loaded = gather("loads")  # by name
+        loads = {
+            name: (np.array([[one[name] for one in row] for row in loaded]), *words)
+            for name, words in self.measured.items()
+        }
         labels = labels_of(system)
         record = provenance(labels, "sweep", asked, method=settler.engine.name)
         return build(
             labels, record, self.parameter, self.numbers, arrays, directions=self.directions,
-            starts=self.starts, squeeze=squeeze, edges=self.edges,
-            loads={name: (of_load(name), *words) for name, words in self.measured.items()},
+            starts=self.starts, squeeze=squeeze, edges=self.edges, loads=loads,
         )  # fmt: skip
 
 

@@ -69,10 +69,10 @@ class _Axis:
 class Panel:
     """A figure with zoom, axes that have units, and ranges that the page sets."""
 
-    def __init__(self, name: str, tools: str = "pan,box_zoom,wheel_zoom,reset", **options: Any) -> None:
+    def __init__(self, name: str, **options: Any) -> None:
         self.plot: Any = figure(
-            name=name, tools=tools, toolbar_location="right", sizing_mode="stretch_both", min_border=4,
-            x_range=Range1d(0, 1), y_range=Range1d(0, 1), **options,
+            name=name, tools="pan,box_zoom,wheel_zoom,reset", toolbar_location="right", sizing_mode="stretch_both",
+            min_border=4, x_range=Range1d(0, 1), y_range=Range1d(0, 1), **options,
         )  # fmt: skip
         self.plot.toolbar.logo = None
         self.plot.toolbar.autohide = True

@@ -177,14 +177,14 @@ def matched(recorded: Recorded, system: System, run: str = "") -> Setup:
     return Setup(run, shown, turns, float(begin), float(end))
 
 
-def samples_of(recorded: Recorded, setup: Setup, most: int = _MOST) -> Samples | None:
-    """The piece in use, in the states' units; at most ``most`` samples, the last ones. None where no state is shown."""
+def samples_of(recorded: Recorded, setup: Setup) -> Samples | None:
+    """The piece in use, in the states' units; at most the last ``_MOST`` samples. None where no state is shown."""
     channels = recorded.runs[setup.run]
     if not setup.channels or recorded.axis != "time":
         return None
     clocks = {state: channels[name].time for state, name in setup.channels.items()}
     every = np.unique(np.concatenate(list(clocks.values())))
-    time = every[(every >= setup.begin) & (every <= setup.end)][-most:]
+    time = every[(every >= setup.begin) & (every <= setup.end)][-_MOST:]
     columns = {}
     for state, name in setup.channels.items():
         column = np.full(len(time), np.nan)

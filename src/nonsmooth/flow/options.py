@@ -155,7 +155,7 @@ def as_called(arguments: Mapping[str, Any]) -> dict[str, Any]:
     and what the result does not depend on."""
     own = {name: value for name, value in arguments.items() if name not in ("system", "options")}
     record = {**own, **arguments.get("options", {})}
-    if "start" in record:
+    if record.get("start") is not None:
         record["start"] = plain_start(arguments["system"], record["start"])
     if "section" in record and (record["section"] is not None or arguments["system"].period() is not None):
         record["section"] = section_plan(arguments["system"], record["section"])[0]

@@ -220,11 +220,11 @@ def sensitivity(
     periods, duration : float
         Length of the run, one of the two. After ``periods`` the end is taken at fixed phase, so that P has the part
         that comes from dT/dp; after a ``duration``, at fixed time.
-    start, mode
+    start, mode : state, str, optional
         As in :func:`nonsmooth.simulate`.
     parameters : sequence of str
         Parameters in which to differentiate; the delay of an input is one.
-    inputs
+    inputs : mapping, optional
         As in :func:`nonsmooth.simulate`.
 
     Returns

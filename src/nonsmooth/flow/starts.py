@@ -93,7 +93,7 @@ def _is_list(start: Any) -> bool:
 
 def plain_start(system: System, start: Any) -> Any:
     """``start`` as data that a result can record: arrays and results as lists of numbers."""
-    if start is None or (isinstance(start, Mapping) and not hasattr(start, "data_vars")):
+    if isinstance(start, Mapping) and not hasattr(start, "data_vars"):
         return start  # as it was named
     states = start_states(system, start)[:, : len(system.states) - 2 * len(system.inputs)]
     return states[0].tolist() if is_one_start(start) else states.tolist()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, TypedDict
 
 from nonsmooth.flow.options import Solver
@@ -46,7 +47,7 @@ class Recorded(TypedDict, total=False):
         See :func:`nonsmooth.sweep`.
     """
 
-    measured: Any
+    measured: Mapping[str, Any] | Sequence[str] | str | None
     settings: Any
     runs: Any
     time: Annotated[str, Default("time")]

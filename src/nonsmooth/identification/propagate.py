@@ -5,19 +5,21 @@ from __future__ import annotations
 import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.errors import Interrupted, SolveError, shortened
-from nonsmooth.flow.arguments import real_number, whole_number, yes_or_no
 from nonsmooth.identification.compare.draws import Setting, draw_systems, nominal, read_settings
 from nonsmooth.identification.gathered import Gathered, matched
 from nonsmooth.results.labels import labelled
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as watched
+from nonsmooth.system.arguments import checked, declared
+from nonsmooth.system.kinds import at_least, real_number
+from nonsmooth.system.names import unknown
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
@@ -26,16 +28,21 @@ if TYPE_CHECKING:
 COARSE = 0.02  # the largest step of draws' branches: values between points lie on a cubic
 
 
+@checked
 def propagate(
-    found: Any,
-    verb: Callable[..., Any],
-    start: Any,
+    found: Annotated[Mapping[str, Any], "such as ns.fit returns, or values by name"],
+    verb: Annotated[Callable[..., Any], "a function such as ns.sweep"],
+    start: Annotated[
+        System | Orbit,
+        "as its first argument the verb takes a System or an Orbit; for anything else give a function of a System: "
+        "lambda s: ns.continue_orbit(ns.find_orbit(s), 'omega', (3, 5))",
+    ],
     /,
     *args: Any,
-    draws: int = 200,
-    seed: int = 0,
+    draws: Annotated[int, at_least(0)] = 200,
+    seed: Annotated[int, at_least(0)] = 0,
     settings: Mapping[str, Any] | None = None,
-    bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
+    bounds: Mapping[str, Any] | None = None,
     quantiles: Sequence[float] = (0.025, 0.5, 0.975),
     first_order: bool = False,
     progress: Progress = True,
@@ -119,19 +126,17 @@ def propagate(
     >>> bool(np.allclose(amplitude, np.quantile(band["drawn_F"], [0.025, 0.5, 0.975]) / np.hypot(3.0, 0.2)))
     True
     """
-    count, many = whole_number(draws, "draws", 0), whole_number(seed, "seed", 0)
-    linear = yes_or_no(first_order, "first_order")
     call, edges = _Call(verb, start, args, options), _probabilities(quantiles)
-    if count < 2 and not linear:
-        raise ValueError(f"draws = {count}: a band takes two and more, and some 200 to show its edges")
+    if draws < 2 and not first_order:
+        raise ValueError(f"draws = {draws}: a band takes two and more, and some 200 to show its edges")
     known = read_settings(settings, call.system)
     base = nominal(call.system, found, known)
     centre = call(base, coarse=False)
-    systems, drawn = draw_systems(call.system, found, known, count, many, bounds)
+    systems, drawn = draw_systems(call.system, found, known, draws, seed, bounds)
     gathered = Gathered(centre)
-    linear_part = to_first_order(centre, found, known, base, call) if linear else {}
+    linear_part = to_first_order(centre, found, known, base, call) if first_order else {}
     try:
-        with watched(count, "propagate", progress) as advance:
+        with watched(draws, "propagate", progress) as advance:
             for one in systems:
                 try:
                     gathered.add(call(one, coarse=True))
@@ -139,11 +144,11 @@ def propagate(
                     gathered.fail(str(error))
                 advance()
     except KeyboardInterrupt as error:
-        said = f"stopped after {len(gathered.rows)} of {count} draws; what they gave is the exception's result"
-        raise Interrupted(said, gathered.banded(edges, linear_part, drawn, base, many)) from error
+        said = f"stopped after {len(gathered.rows)} of {draws} draws; what they gave is the exception's result"
+        raise Interrupted(said, gathered.banded(edges, linear_part, drawn, base, seed)) from error
     if systems and len(gathered.failures) == len(systems):
-        raise SolveError(f"the verb failed for all {count} draws: {gathered.failures[0]}", status="no_convergence")
-    return gathered.banded(edges, linear_part, drawn, base, many)
+        raise SolveError(f"the verb failed for all {draws} draws: {gathered.failures[0]}", status="no_convergence")
+    return gathered.banded(edges, linear_part, drawn, base, seed)
 
 
 def _probabilities(quantiles: Sequence[float]) -> list[float]:
@@ -158,19 +163,14 @@ class _Call:
 
     def __init__(self, verb: Callable[..., Any], start: Any, args: tuple[Any, ...], options: dict[str, Any]) -> None:
         self.system = start.system if isinstance(start, Orbit) else start
-        if not isinstance(self.system, System):
-            raise TypeError(
-                f"propagate takes a System or an Orbit as the verb's first argument, not {type(start).__name__}; for "
-                "anything else give a function of a System: "
-                "lambda s: ns.continue_orbit(ns.find_orbit(s), 'omega', (3, 5))"
-            )
-        if not callable(verb):
-            raise TypeError(f"verb = {shortened(verb)}: a function such as ns.sweep")
         self.verb, self.start, self.args, self.options = verb, start, args, dict(options)
         try:
             takes = set(inspect.signature(verb).parameters)
         except (TypeError, ValueError):
             takes = set()
+        for name in options.keys() - takes if hasattr(verb, "door") else ():
+            known = takes | declared(propagate).keys()
+            raise TypeError(unknown(name, "an option", f"propagate, nor of {verb.__name__}", known))
         self.coarse = {"step": max(COARSE, self.options.get("step", 0.05))} if {"step", "virtual"} <= takes else {}
         if "progress" in takes:
             self.options.setdefault("progress", False)

@@ -72,7 +72,7 @@ def provenance(
                 "text": labels.text,
                 "parameters": {name: quantity.value for name, quantity in labels.parameters.items()},
             },
-            "options": options_as_data(options),
+            "options": options,
             "method": method,
             "seed": seed,
             "created": datetime.now(UTC).isoformat(timespec="seconds") if date else None,

@@ -80,12 +80,6 @@ def typed(column: Column, values: Any) -> NDArray[Any]:
 def attributes(labels: Labels, column: Column) -> dict[str, Any]:
     """Long name, unit and table of words of a column."""
     words = {"long_name": column.words.replace("forcing period", labels.turn)}
-    meanings: Mapping[str, Sequence[str]] = {
-        "mode": labels.modes,
-        "transition": labels.transition_labels,
-        "indicator": labels.indicators,
-        "equilibrium": EQUILIBRIA,
-    }
     match column.rule:
         case "status":
             return status_attributes()
@@ -93,8 +87,11 @@ def attributes(labels: Labels, column: Column) -> dict[str, Any]:
             return words | {"units": labels.time_unit}
         case "rate":
             return words | {"units": "1" if labels.time_unit == "1" else f"1/{labels.time_unit}"}
-        case rule if rule in meanings:
-            return words | flag_attributes(meanings[rule], dtype=_TYPES[rule])
+        case "equilibrium":
+            return words | flag_attributes(EQUILIBRIA)
+        case "mode" | "indicator" | "transition" as rule:
+            named = {"mode": "modes", "indicator": "indicators", "transition": "transition_labels"}[rule]
+            return words | flag_attributes(getattr(labels, named), dtype=_TYPES[rule])
     return words
 
 

@@ -66,7 +66,7 @@ def smoothing_report(
     orbit : Orbit, optional
         The event-driven orbit, of ``find_orbit``, stable or not; found from ``start`` where not given. Where the motion
         from there is not periodic only exponents and attractors are compared.
-    start : optional
+    start : state, optional
         As in :func:`nonsmooth.simulate`.
     transient : int
         Periods (autonomous systems: rounds) that a smoothed system runs before Newton's method; none from an unstable

@@ -74,13 +74,15 @@ def checked(function: Any = None, *, of: Verb | None = None, read: bool = True, 
 
         @wraps(function)
         def called(*given: Any, **named: Any) -> Any:
-            if read:
+            if door.by_name:
                 return function(**door.read(given, named))
-            door.fit(given, named)
-            return function(*given, **named)
+            bound = door.fit(given, named)
+            for name in bound.arguments.keys() & door.readers.keys():
+                bound.arguments[name] = door.readers[name](bound.arguments[name], name)
+            return function(*bound.args, **bound.kwargs)
 
         if not read:
-            door.readers = {}
+            door.readers, door.by_name = {}, False
 
         called.__doc__ = door.documentation()
         called.__signature__, called.door = door.signature, door  # type: ignore[attr-defined]
@@ -112,13 +114,16 @@ class _Door:
             added = {item.name: item.replace(kind=item.KEYWORD_ONLY) for item in others}
             self.items |= {name: item for name, item in added.items() if name in self.shared}
         self.signature = own.replace(parameters=[*self.items.values()])
+        more = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
+        self.named = {name: item for name, item in self.items.items() if name != "self" and item.kind not in more}
         self.needed = {name for name, item in self.items.items() if item.default is _NEEDED}
+        self.by_name = all(one.kind in (one.POSITIONAL_OR_KEYWORD, one.KEYWORD_ONLY) for one in self.items.values())
         self.first = [name for name, item in self.items.items() if item.kind is item.POSITIONAL_OR_KEYWORD]
 
-    def fit(self, given: tuple[Any, ...], named: Mapping[str, Any]) -> None:
-        """TypeError for a call that does not fit the signature."""
+    def fit(self, given: tuple[Any, ...], named: Mapping[str, Any]) -> inspect.BoundArguments:
+        """The arguments by name; TypeError for a call that does not fit the signature."""
         try:
-            self.signature.bind(*given, **named)
+            return self.signature.bind(*given, **named)
         except TypeError as error:
             raise TypeError(self.misfit(given, named, str(error))) from None
 
@@ -138,7 +143,7 @@ class _Door:
         shared = get_type_hints(self.group, include_extras=True) if self.group else {}
         if self.behind:
             shared = {name: self.behind.kinds[name] for name in self.shared}
-        own = {name: item.annotation for name, item in self.items.items() if name not in shared and name != "self"}
+        own = {name: item.annotation for name, item in self.named.items() if name not in shared}
         return {name: _evaluated(annotation, self.function) for name, annotation in own.items()} | shared
 
     @cached_property
@@ -151,10 +156,10 @@ class _Door:
 
     def misfit(self, given: tuple[Any, ...], named: Mapping[str, Any], error: str) -> str:
         """The sentence for a call that does not fit the signature."""
-        items = {name: item for name, item in self.items.items() if name != "self"}
-        given = given[len(self.items) - len(items) :]
+        items = self.named
+        given = given["self" in self.items :]
         options = [name for name, item in items.items() if item.kind is item.KEYWORD_ONLY]
-        first = [name for name, item in items.items() if item.kind is not item.VAR_KEYWORD and name not in options]
+        first = [name for name in items if name not in options]
         usage = f"{self.verb}({', '.join([*first, *(f'{name}=' for name in options or ['name'])])})"
         if len(given) > len(first):
             count = f"{len(first) or 'no'} argument{'s' * (len(first) != 1)}"
@@ -194,10 +199,9 @@ class _Door:
 _PARAMETERS = re.compile(r"^Parameters\n-+\n(?:(?!\n+\w[\w ]*\n-{3,}).)*", re.MULTILINE | re.DOTALL)
 
 
-def declared(function: Verb) -> dict[str, Any]:
+def declared(verb: Any) -> dict[str, Any]:
     """The values that each argument of a verb, or of a class, may have, as declared."""
-    door = getattr(getattr(function, "__init__") if isinstance(function, type) else function, "door", None)  # noqa: B009
-    return get_type_hints(function, include_extras=True) if door is None else dict(door.kinds)
+    return dict((vars(verb)["__init__"] if isinstance(verb, type) else verb).door.kinds)
 
 
 def entries(doc: str | None) -> dict[tuple[str, ...], tuple[str, list[str]]]:

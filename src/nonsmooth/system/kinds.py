@@ -8,6 +8,7 @@
 ``rtol: float | None = None``                   that, or None
 ``range: Range``                                two ends, (low, high)
 ``box: Mapping[str, float]``                    by name; what it holds is read too
+``per_run: Sequence[str]``                      a list, likewise
 ``orbit: Orbit``                                one of a class
 ``name: Annotated[str, "its name in quotes"]``  with what to do, for the sentence
 ``start: Any``                                  not read here
@@ -19,6 +20,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from os import PathLike
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -28,7 +31,8 @@ from nonsmooth.errors import shortened
 from nonsmooth.system.parameter import finite_number as real_number
 
 __all__ = [
-    "Default", "Limit", "Range", "above", "at_least", "reader_of", "real_number", "whole_number", "yes_or_no",
+    "Default", "Limit", "Range", "above", "at_least", "in_words", "reader_of", "real_number", "whole_number",
+    "yes_or_no",
 ]  # fmt: skip
 
 Reader = Callable[[Any, str], Any]  # (what was given, the name of the argument) -> what the verb gets
@@ -109,22 +113,28 @@ def reader_of(what: Any) -> Reader:
     if origin is tuple:
         return _two_numbers
     if origin is Mapping and parts[1] is not Any:
-        return lambda value, name: _mapping(value, name, reader_of(parts[1]))
+        return partial(_mapping, reader=reader_of(parts[1]))
+    if origin is Sequence:
+        return partial(_sequence, reader=reader_of(parts[0]), words=in_words(what))
     if origin is Literal:
-        return lambda value, name: _chosen(value, name, parts)
+        return partial(_chosen, choices=parts)
     if what is bool:
         return yes_or_no
     if what in (int, float):
         return _number(what, Limit(-math.inf if what is float else -_MOST))
     kind = origin or what
-    if kind in (Any, Sequence) or getattr(kind, "_is_protocol", False) or not isinstance(kind, type):
+    if kind is Any or getattr(kind, "_is_protocol", False) or not isinstance(kind, type):
         return lambda value, name: value
-    return lambda value, name: _instance(value, name, kind, what)
+    return partial(_instance, kind=kind, words=in_words(what))
 
 
 def _number(kind: type, limit: Limit) -> Reader:
+    words = in_words(kind)
+
     def read(value: Any, name: str) -> Any:
-        number = whole_number(value, name, int(limit.low)) if kind is int else real_number(value, name)
+        number = real_number(value, name, words)
+        if kind is int:
+            number = whole_number(value, name, int(limit.low))
         if not limit.holds(number):
             raise ValueError(f"{name} = {shortened(value)} must be {limit.words}")
         return value if type(value) is int else number
@@ -133,7 +143,7 @@ def _number(kind: type, limit: Limit) -> Reader:
 
 
 def _two_numbers(value: Any, name: str) -> tuple[float, float]:
-    if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
+    if not isinstance(value, list | tuple | np.ndarray) or getattr(value, "shape", None) == () or len(value) != 2:
         raise ValueError(f"{name} = {shortened(value)}: give its two ends, (low, high)")
     low, high = (real_number(end, f"an end of {name}") for end in value)
     return low, high
@@ -147,7 +157,13 @@ def _rising(value: Any, name: str) -> tuple[float, float]:
 
 
 def _mapping(value: Any, name: str, reader: Reader) -> dict[Any, Any]:
-    return {key: reader(one, f"{name}[{key!r}]") for key, one in _instance(value, name, Mapping, Mapping).items()}
+    return {key: reader(one, f"{name}[{key!r}]") for key, one in _instance(value, name, Mapping, "a mapping").items()}
+
+
+def _sequence(value: Any, name: str, reader: Reader, words: str) -> Sequence[Any]:
+    if isinstance(value, str | bytes) or not np.iterable(value):
+        raise TypeError(f"{name} must be {words}, not {shortened(value)}")
+    return [reader(one, f"an entry of {name}") for one in value]
 
 
 def _hinted(reader: Reader, hint: str) -> Reader:
@@ -162,20 +178,20 @@ def _hinted(reader: Reader, hint: str) -> Reader:
 
 def _one_of(kinds: list[Any]) -> Reader:
     """The first that takes the value; a number is no bool here."""
-    readers = [reader_of(kind) for kind in kinds]
+    readers = {kind: reader_of(kind) for kind in kinds}
 
     def read(value: Any, name: str) -> Any:
-        wrong: Exception = TypeError(f"{name} must be {' or '.join(map(_words, kinds))}, not {shortened(value)}")
-        for kind, reader in zip(kinds, readers, strict=True):
+        beyond = None
+        for kind, reader in readers.items():
             if kind is bool and not isinstance(value, bool | np.bool_):
                 continue
             try:
                 return reader(value, name)
             except ValueError as error:  # of this kind, but beyond its limits
-                wrong = wrong if isinstance(wrong, ValueError) else error
+                beyond = beyond or error
             except TypeError:
                 pass
-        raise wrong
+        raise beyond or TypeError(f"{name} must be {' or '.join(map(in_words, kinds))}, not {shortened(value)}")
 
     return read
 
@@ -186,19 +202,28 @@ def _chosen(value: Any, name: str, choices: tuple[Any, ...]) -> Any:
     return value
 
 
-def _instance(value: Any, name: str, kind: type, what: Any) -> Any:
+def _instance(value: Any, name: str, kind: type, words: str) -> Any:
     if not isinstance(value, kind):
-        raise TypeError(f"{name} must be {_words(what)}, not {shortened(value)}")
+        raise TypeError(f"{name} must be {words}, not {shortened(value)}")
     return value
 
 
-def _words(what: Any) -> str:
-    """Name in words what an annotation allows."""
-    kind = get_origin(what) or what
-    if kind is Annotated:
-        return _words(get_args(what)[0])
+def in_words(what: Any) -> str:
+    """The values that an annotation allows; empty where anything is."""
+    origin, parts = get_origin(what), get_args(what)
+    if origin is Annotated:
+        limits = [f" ({mark.words})" for mark in parts if isinstance(mark, Limit)]
+        return "".join([in_words(parts[0]), *limits, *([" (low, high)"] if "rising" in parts else [])])
+    if origin in (Union, UnionType):
+        return " or ".join(map(in_words, parts))
+    if origin is Literal:
+        return ", ".join(map(repr, parts))
+    if origin in (Mapping, Sequence):
+        held = in_words(parts[-1])
+        return {Mapping: "a mapping", Sequence: "a list"}[origin] + (f" of {held}" if held else "")
     known: dict[Any, str] = {
         bool: "True, False", int: "a whole number", float: "a real number", str: "text", Mapping: "a mapping",
-        Callable: "a function",
+        Callable: "a function", PathLike: "a path", tuple: "two numbers", NoneType: "None", Any: "",
     }  # fmt: skip
-    return known.get(kind) or f"ns.{kind.__name__}(...)"
+    kind = origin or what
+    return known.get(kind, f"ns.{kind.__name__}(...)")

@@ -38,10 +38,10 @@ def latex_name(name: str) -> str:
     return f"{stem}_{{{below}}}" if below else stem
 
 
-def finite_number(value: Any, what: str) -> float:
+def finite_number(value: Any, what: str, kind: str = "a real number") -> float:
     """Return ``value`` as a float, or raise: TypeError for what is no real number, ValueError for NaN and inf."""
     if isinstance(value, bool) or not (isinstance(value, Real) or (hasattr(value, "__float__") and _scalar(value))):
-        raise TypeError(f"{what} must be a real number, not {shortened(value)}")
+        raise TypeError(f"{what} must be {kind}, not {shortened(value)}")
     try:
         number = float(value)
     except OverflowError:  # a whole number of hundreds of digits

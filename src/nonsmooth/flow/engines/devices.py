@@ -13,7 +13,7 @@ from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.patterns import PatternEngine
 from nonsmooth.flow.engines.series import SeriesEngine
 
-__all__ = ["BATCH", "batch_size", "engine_on", "gpu_name", "on_gpu"]
+__all__ = ["BATCH", "batch_size", "engine_on_gpu", "gpu_name", "on_gpu"]
 
 BATCH = 65536  # trajectories of one chunk of work on a GPU
 SERIES = ("taylor",)  # methods of the series kernels that a GPU runs
@@ -43,20 +43,19 @@ def _simulated() -> bool:
     return os.environ.get("NUMBA_ENABLE_CUDASIM", "0") not in ("", "0")
 
 
-def engine_on(device: Any, engine: Engine, plan: Section | None) -> Engine:
-    """The engine for a device.
+def engine_on_gpu(engine: Engine, plan: Section | None) -> Engine:
+    """The engine that runs a system on a GPU.
 
     The planar kernels of a GPU know two states and stroboscopic sections only: else the same flow goes there by the
     series kernels."""
     decides = engine.traced.decider is not None
-    if device == "cuda" and (decides or isinstance(engine, PatternEngine)):
+    if decides or isinstance(engine, PatternEngine):
         raise ValueError(
             "what contacts and frictions decide together, and modes that are made when they are visited, are found by "
             'the processor: leave out device="cuda"'
         )
-    if device != "cuda" or not isinstance(engine, LinearEngine):
-        return engine
-    if isinstance(engine, PlanarEngine) and (plan is None or plan.indicator < 0):
+    planar = isinstance(engine, PlanarEngine) and (plan is None or plan.indicator < 0)
+    if planar or not isinstance(engine, LinearEngine):
         return engine
     from nonsmooth.flow.engines.methods import SHARPEST
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nonsmooth.arrays import FloatArray
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 
-__all__ = ["Changes", "Kept", "Log", "Section", "State"]
+__all__ = ["NO_CHANGES", "Changes", "Kept", "Log", "Section", "State"]
 
 IntArray = NDArray[np.int64]
 
@@ -63,6 +63,9 @@ class Changes(NamedTuple):
     times: FloatArray
     values: FloatArray
     first: int
+
+
+NO_CHANGES = Changes(np.zeros(0), np.zeros((0, 0)), 0)
 
 
 @dataclass

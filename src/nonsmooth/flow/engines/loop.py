@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import Changes, FloatArray, Kept, Log, Section, State
+from nonsmooth.flow.engines.engine import NO_CHANGES, Changes, FloatArray, Kept, Log, Section, State
 from nonsmooth.flow.engines.march import March
 from nonsmooth.kernels.hybrid import codes, places
 from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, FIRED, MODE, RESET, STARTS, TIME, TOUCHES, WAITS
@@ -144,10 +144,6 @@ class Engine(ABC):
         return 0.0
 
     @cached_property
-    def _unchanged(self) -> Changes:
-        return Changes(np.zeros(0), np.zeros((0, 0)), 0)
-
-    @cached_property
     def phases(self) -> Callable[[Any], FloatArray] | None:
         """``Net.at`` as a function of the parameters; None where no phase depends on them."""
         return varying_phases(self.traced)
@@ -250,7 +246,7 @@ class Engine(ABC):
         sampled = _samples(samples, n_u, n_m) if n else self._none[0]
         crossings, touches = Engine.room(self, tables) if room is None else room
         spare, march = self.touches_of_a_leg(), self.march()
-        given = self._unchanged if changes is None else changes
+        given = NO_CHANGES if changes is None else changes
         state.counters[1] = int(state.settled)
         march.logged(state, float(until))
         march.log.put(records.Log(*(*sampled, *crossings, *touches, spare, *given)))

@@ -83,7 +83,8 @@ def engine_for(
             f"{system.name!r} has linear modes, but {_beyond(system, form, expert)}: such a system runs by Taylor "
             f'series at rtol = {SHARPEST:g}, as exactly; leave method out, or use method="taylor"'
         )
-    if form is not None and rtol is None and step is None and method == "auto" and not system.is_smoothed:
+    free = method == "auto" and rtol is None and step is None and order is None
+    if form is not None and free and not system.is_smoothed:
         tolerance = SHARPEST  # what has linear modes is exact, whatever its indicators
     name = "taylor" if method == "auto" else method
     from nonsmooth.flow.engines.series import SeriesEngine

@@ -20,7 +20,6 @@ from nonsmooth.system.names import unknown
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.identification.parameter_set import ParameterSet
     from nonsmooth.system.system import System
 
 DRAWS = 60
@@ -39,7 +38,7 @@ def compare(
     *,
     channels: Any = None,
     run: str | None = None,
-    parameters: ParameterSet | Mapping[str, float] | None = None,
+    parameters: Mapping[str, Any] | None = None,
     settings: Mapping[str, Any] | None = None,
     noise: Any = None,
     parameter: str | None = None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
@@ -35,7 +35,7 @@ _MORE = 3  # guesses that are looked at, for each that is fitted
 def fit(
     system: System,
     recording: Any,
-    parameters: Any,
+    parameters: Mapping[str, Any] | Sequence[str] | str,
     *,
     start: Any = None,
     mode: Any = None,

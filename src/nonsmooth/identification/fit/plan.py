@@ -32,7 +32,7 @@ def plan_experiment(
     runs: Mapping[str, Mapping[str, Any]],
     parameters: Sequence[str],
     *,
-    measured: Any,
+    measured: Mapping[str, Any] | Sequence[str] | str,
     **options: Unpack[Known],
 ) -> xr.Dataset:
     r"""Return the information of candidate runs about parameters, and the order in which to make them.

@@ -44,7 +44,7 @@ def select_model(
     ----------
     models : mapping of str to (System, parameters)
         The systems to compare, each with what is to be found of it, as :func:`nonsmooth.fit` takes it.
-    recording
+    recording : Recording, Dataset, DataFrame, mapping or list of these
         See :func:`nonsmooth.fit`; the measured states or outputs are those of every system.
     folds : int
         How many times a part is held out.

@@ -80,24 +80,17 @@ class LinearForm:
     _code: _TablesCode = field(repr=False, compare=False)
     _fills: dict[Any, Callable[..., None]] = field(default_factory=dict, repr=False, compare=False)
 
-    def evaluate(self, points: FloatArray) -> LinearTables:
-        """Evaluate all matrices.
+    def evaluate(self, points: FloatArray, place: int | None = None) -> LinearTables:
+        """All matrices at points (P, n_parameters), not finite where a formula is not (a division by a zero parameter).
 
-        Parameters
-        ----------
-        points : array (P, n_parameters)
-            Values of the parameters, in the system's order.
-
-        Returns
-        -------
-        LinearTables
-            C-contiguous arrays of doubles; not finite where a formula is not (a division by a zero parameter).
-        """
-        return self._filled(points, None)
-
-    def slopes(self, points: FloatArray, place: int) -> LinearTables:
-        """The derivatives of all entries in one parameter, at fixed states and time (``omega``: of the frequency)."""
-        return self._filled(points, place)
+        With ``place`` the derivatives of all entries in that parameter, at fixed states and time (``omega``: of the
+        frequency)."""
+        points = np.asarray(points, dtype=np.float64)
+        shapes = self._code.shapes(len(self.multiples))
+        tables = {name: np.zeros((len(points), *shape)) for name, shape in shapes.items()}
+        with np.errstate(all="ignore"):
+            self._filler(place, tuple(tables))(np.ascontiguousarray(points.T), **tables)
+        return LinearTables(**tables)
 
     def fill(self, values: FloatArray, place: int | None, tables: dict[str, FloatArray], again: bool = False) -> None:
         """Write the entries that are not zero, or their derivatives in one parameter, into tables for one point.
@@ -112,14 +105,6 @@ class LinearForm:
             exec(compile(self._code.source(self.multiples, place, names, again), "<linear form>", "exec"), namespace)
             self._fills[place, names, again] = namespace["fill"]
         return self._fills[place, names, again]
-
-    def _filled(self, points: FloatArray, place: int | None) -> LinearTables:
-        points = np.asarray(points, dtype=np.float64)
-        shapes = self._code.shapes(len(self.multiples))
-        tables = {name: np.zeros((len(points), *shape)) for name, shape in shapes.items()}
-        with np.errstate(all="ignore"):
-            self._filler(place, tuple(tables))(np.ascontiguousarray(points.T), **tables)
-        return LinearTables(**tables)
 
 
 def apart(rows: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

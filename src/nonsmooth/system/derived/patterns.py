@@ -253,7 +253,7 @@ class Patterns:
         tables = self.form.evaluate(point)
         if place is None:
             return Rows(self, tables, 0)
-        slopes = self.form.slopes(point, place)
+        slopes = self.form.evaluate(point, place)
         both = {one.name: getattr(tables, one.name) + 1j * STEP * getattr(slopes, one.name) for one in fields(tables)}
         return Rows(self, replace(tables, **both), 0)
 

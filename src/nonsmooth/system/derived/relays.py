@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, ClassVar
+from typing import Any
 
 import sympy as sp
 
@@ -36,7 +36,7 @@ Signs = tuple[int, ...]
 class SecondOrderRelay(PreloadedSpring):
     """A relay whose force acts on the second derivative of its indicator; entered only as slowly as a contact rests."""
 
-    slow: ClassVar[float] = CREEP
+    slow = CREEP
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -47,14 +47,14 @@ class Coulomb(Element):
     static: Law | None = None
     normal: Law | None = None
 
-    kinematics: ClassVar[str] = "speed"
-    phases: ClassVar[tuple[str, ...]] = ("stick", "forward", "back")
-    laws: ClassVar[tuple[str, ...]] = ("friction", "static", "normal")
-    conditions: ClassVar[tuple[str, ...]] = (
+    kinematics = "speed"
+    phases = ("stick", "forward", "back")
+    laws = ("friction", "static", "normal")
+    conditions = (
         "speed", "speed_above", "speed_below", "over", "under", "turned_forward", "turned_back",
     )  # fmt: skip
-    held: ClassVar[tuple[str, ...]] = ("stick",)
-    sides: ClassVar[tuple[str, str]] = ("forward", "back")
+    held = ("stick",)
+    sides = ("forward", "back")
 
     def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
         return v - law(self.belt)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,10 +36,10 @@ class ElasticStop(Contact):
     damping: Law = 0.0
     pulls: bool = False
 
-    phases: ClassVar[tuple[str, ...]] = ("open", "contact")
-    laws: ClassVar[tuple[str, ...]] = ("stiffness", "damping")
-    conditions: ClassVar[tuple[str, ...]] = ("gap", "push")
-    presses: ClassVar[bool] = True
+    phases = ("open", "contact")
+    laws = ("stiffness", "damping")
+    conditions = ("gap", "push")
+    presses = True
 
     def force(self, here: Place) -> Any:
         return 0 if here.phase == "open" else -here.law("stiffness") * here.where + damped(here)
@@ -60,7 +60,7 @@ class Displaced(Element):
 
     displacement: Callable[..., Any] | None = None
 
-    kinematics: ClassVar[str] = "displacement"
+    kinematics = "displacement"
 
     def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
         return q
@@ -83,9 +83,9 @@ class Backlash(Displaced):
     stiffness: Law = 0.0
     damping: Law = 0.0
 
-    phases: ClassVar[tuple[str, ...]] = ("free", "above", "below")
-    laws: ClassVar[tuple[str, ...]] = ("half_width", "stiffness", "damping")
-    conditions: ClassVar[tuple[str, ...]] = ("upper", "lower")
+    phases = ("free", "above", "below")
+    laws = ("half_width", "stiffness", "damping")
+    conditions = ("upper", "lower")
 
     def force(self, here: Place) -> Any:
         if here.phase == "free":
@@ -122,11 +122,11 @@ class PreloadedSpring(Displaced):
     preload: Law = 0.0
     stiffness: Law = 0.0
 
-    phases: ClassVar[tuple[str, ...]] = ("above", "below", "held")
-    laws: ClassVar[tuple[str, ...]] = ("preload", "stiffness")
-    conditions: ClassVar[tuple[str, ...]] = ("over", "under", "side", "fast", "beyond")
-    held: ClassVar[tuple[str, ...]] = ("held",)
-    sides: ClassVar[tuple[str, str]] = ("above", "below")
+    phases = ("above", "below", "held")
+    laws = ("preload", "stiffness")
+    conditions = ("over", "under", "side", "fast", "beyond")
+    held = ("held",)
+    sides = ("above", "below")
 
     def force(self, here: Place) -> Any:
         side = 1 if here.phase == "above" else -1

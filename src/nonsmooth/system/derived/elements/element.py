@@ -149,7 +149,7 @@ class Contact(Element):
     position: Law = 0.0
     side: int = 1
 
-    kinematics: ClassVar[str] = "gap"
+    kinematics = "gap"
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,12 +30,12 @@ class Rubbing(Element):
     belt: Law = 0.0
     friction: Law = 0.0
 
-    kinematics: ClassVar[str] = "speed"
-    phases: ClassVar[tuple[str, ...]] = ("free", "stick", "forward", "back")
-    laws: ClassVar[tuple[str, ...]] = ("friction",)
-    conditions: ClassVar[tuple[str, ...]] = ("speed", "over", "under")
-    held: ClassVar[tuple[str, ...]] = ("stick",)
-    sides: ClassVar[tuple[str, str]] = ("forward", "back")
+    kinematics = "speed"
+    phases = ("free", "stick", "forward", "back")
+    laws = ("friction",)
+    conditions = ("speed", "over", "under")
+    held = ("stick",)
+    sides = ("forward", "back")
 
     def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
         return v - law(self.belt)

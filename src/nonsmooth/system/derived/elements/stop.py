@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.elements.element import CREEP, SMALL, Condition, Contact, Element, Law, Leaving
@@ -71,12 +71,12 @@ class Stop(Contact):
     on_tangent: Mapping[str, Law] | None = None
     belt: Law = 0.0
 
-    phases: ClassVar[tuple[str, ...]] = ("open", "rest")
-    laws: ClassVar[tuple[str, ...]] = ("restitution",)
-    conditions: ClassVar[tuple[str, ...]] = ("gap", "closing", "opens", "slow", "off", "beyond")
-    held: ClassVar[tuple[str, ...]] = ("rest",)
-    strikes: ClassVar[bool] = True
-    bears: ClassVar[bool] = True
+    phases = ("open", "rest")
+    laws = ("restitution",)
+    conditions = ("gap", "closing", "opens", "slow", "off", "beyond")
+    held = ("rest",)
+    strikes = True
+    bears = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

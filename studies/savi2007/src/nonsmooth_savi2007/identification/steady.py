@@ -73,11 +73,6 @@ class Steady:
         """Names of the runs."""
         return tuple(run.name for run in self.runs)
 
-    @property
-    def synthetic(self) -> str:
-        """``"yes"`` or ``"no"``, as in the attributes of data for pictures."""
-        return "yes" if any(run.synthetic for run in self.runs) else "no"
-
     def only(self, chosen: Any) -> Steady:
         """The rows that are chosen (a mask or indices)."""
         rows = np.flatnonzero(chosen) if np.asarray(chosen).dtype == bool else np.asarray(chosen, dtype=int)
