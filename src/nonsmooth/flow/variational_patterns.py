@@ -8,7 +8,6 @@ as the constants of a model (:mod:`nonsmooth.kernels.tangent.rows`): nothing is 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +18,7 @@ from nonsmooth.flow.variational_rows import NONE, SIZES, RowsFlow
 from nonsmooth.system.derived.deciding import decide
 from nonsmooth.system.derived.instants import RowNumbers
 from nonsmooth.system.derived.patterns import STEP, Change, Patterns
-from nonsmooth.system.derived.rows import Row, Rows
+from nonsmooth.system.derived.rows import Rows
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
@@ -62,46 +61,13 @@ class PatternFlow(RowsFlow):
         return NONE, self.scratch()._replace(q=self.kept(values).of_jump(k, t, z))
 
     def _taken(self, at: Packed, i: int, mode: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        rows = parts([one.row(mode, i).values for one in at.every])
+        rows = parts([at.row(one, mode, i) for one in at.every])
         return rows, at.field(mode), at.rates
 
 
 def parts(every: Sequence[FloatArray]) -> FloatArray:
     """Numbers, and their derivatives, which the imaginary parts of others carry."""
     return np.array([every[0], *(np.imag(one) / STEP for one in every[1:])])
-
-
-@dataclass
-class Calculus:
-    """Rows at one parameter point."""
-
-    patterns: Patterns
-    rows: Rows
-
-    def row(self, mode: int, slot: int) -> Row:
-        """One condition in a mode; those of forces that several share are told by the first of them."""
-        pattern, owner = self.patterns.visited[mode], self.patterns.owners[slot]
-        for k in (owner, *range(len(self.rows.parts))):
-            if slot in (found := self.patterns.ways_of(self.rows, pattern, k)[1]):
-                return Row(found[slot], self.rows.n)
-        return Row(np.full(self.rows.field.shape[1], np.nan, dtype=self.rows.field.dtype), self.rows.n)
-
-    def map(self, mode: int, change: Change | None) -> FloatArray:
-        """The map of the states by a transition, but for an impact that rubs."""
-        if change is None:
-            return self.rows.identity()
-        if change.way < 0:
-            found: FloatArray = self.rows.impact(change.elements, self.patterns.mode)
-            return found
-        (k,), pattern = change.elements, self.patterns.visited[mode]
-        states: FloatArray = self.patterns.ways_of(self.rows, pattern, k)[0][change.way].leaving.states
-        return states
-
-    def rubbed(self, mode: int, change: Change, w: FloatArray) -> FloatArray:
-        """The map of an impact that rubs at an instant: its impulses are homogeneous functions of the rates."""
-        numbers = RowNumbers(self.rows, self.patterns.mode, w.copy())
-        found = decide(numbers, self.patterns.visited[mode], change.elements).rubbed
-        return self.rows.identity() if found is None else self.rows.rubbed(*found)
 
 
 class Packed:
@@ -111,9 +77,9 @@ class Packed:
         self, patterns: Patterns, traced: Traced, values: FloatArray, places: tuple[int, ...], last: Packed | None
     ) -> None:
         self.patterns, self.traced, self.values, self.places = patterns, traced, values, places
-        self.every = [Calculus(patterns, patterns.rows_at(values, place)) for place in (None, *places)]
-        self.n = self.every[0].rows.n
-        rates = [self.every[0].rows.rates, *(one.rows.rates.imag / STEP for one in self.every[1:])]
+        self.every = [patterns.rows_at(values, place) for place in (None, *places)]
+        self.n = self.every[0].n
+        rates = [self.every[0].rates, *(one.rates.imag / STEP for one in self.every[1:])]
         self.rates = np.array(rates).reshape(1 + len(places), -1)
         self.wanted: set[int] = set() if last is None else set(last.wanted)
         self.watched: set[int] = set()
@@ -125,14 +91,14 @@ class Packed:
         """The field of a mode, and its derivatives."""
         if mode not in self.fields:
             pattern = self.patterns.visited[mode]
-            self.fields[mode] = parts([one.rows.flow(self.patterns.mode, pattern)[0] for one in self.every])
+            self.fields[mode] = parts([one.flow(self.patterns.mode, pattern)[0] for one in self.every])
         return self.fields[mode]
 
     def of_jump(self, k: int, t: float, z: FloatArray) -> FloatArray:
         """The numbers of a transition and of the modes beside it; those of an impact that rubs are of the instant."""
         jump, change = self.traced.transitions[k], self.patterns.changes[k]
         if k not in self.jumps or (change is not None and change.rubs):
-            rows = [np.array([one.row(jump.source, row.indicator).values for row in jump.rows]) for one in self.every]
+            rows = [np.array([self.row(one, jump.source, row.indicator) for row in jump.rows]) for one in self.every]
             self.jumps[k] = parts(rows).reshape(len(self.every), -1), self._map(k, t, z)
         return self._array({jump.source, jump.target}, (), (k,))
 
@@ -150,17 +116,42 @@ class Packed:
         """The map of a transition, and its derivatives in the active parameters."""
         mode, change = self.traced.transitions[k].source, self.patterns.changes[k]
         if change is None or not change.rubs:
-            return parts([one.map(mode, change) for one in self.every])
-        w, maps = self.every[0].rows.augmented(z, t), []
+            return parts([self._states(one, mode, change) for one in self.every])
+        w, maps = self.every[0].augmented(z, t), []
         for place in self.places:
             by = OFF * max(abs(self.values[place]), OFF)
             sides = []
             for side in (by, -by):
                 values = self.values.copy()
                 values[place] += side
-                sides.append(Calculus(self.patterns, self.patterns.rows_at(values)).rubbed(mode, change, w))
+                sides.append(self._rubbed(self.patterns.rows_at(values), mode, change, w))
             maps.append((sides[0] - sides[1]) / (2 * by))
-        return np.array([self.every[0].rubbed(mode, change, w), *maps])
+        return np.array([self._rubbed(self.every[0], mode, change, w), *maps])
+
+    def row(self, rows: Rows, mode: int, slot: int) -> FloatArray:
+        """One condition in a mode; those of forces that several share are told by the first of them."""
+        pattern, owner = self.patterns.visited[mode], self.patterns.owners[slot]
+        for k in (owner, *range(len(rows.parts))):
+            if slot in (found := self.patterns.ways_of(rows, pattern, k)[1]):
+                return found[slot]
+        return np.full(rows.field.shape[1], np.nan, dtype=rows.field.dtype)
+
+    def _states(self, rows: Rows, mode: int, change: Change | None) -> FloatArray:
+        """The map of the states by a transition, but for an impact that rubs."""
+        if change is None:
+            return rows.identity()
+        if change.way < 0:
+            found: FloatArray = rows.impact(change.elements, self.patterns.mode)
+            return found
+        (k,), pattern = change.elements, self.patterns.visited[mode]
+        states: FloatArray = self.patterns.ways_of(rows, pattern, k)[0][change.way].leaving.states
+        return states
+
+    def _rubbed(self, rows: Rows, mode: int, change: Change, w: FloatArray) -> FloatArray:
+        """The map of an impact that rubs at an instant: its impulses are homogeneous functions of the rates."""
+        numbers = RowNumbers(rows, self.patterns.mode, w.copy())
+        found = decide(numbers, self.patterns.visited[mode], change.elements).rubbed
+        return rows.identity() if found is None else rows.rubbed(*found)
 
     def _array(self, modes: Iterable[int], watched: Iterable[int], taken: Iterable[int]) -> FloatArray:
         count, width = len(self.traced.mode_names), self.n + 1 + 2 * self.rates.shape[1]
@@ -178,8 +169,7 @@ class Packed:
         for mode in sorted(modes):
             put(mode, self.field(mode).ravel())
         for mode in sorted(watched):
-            own = self.every[0]
-            put(count + mode, self.patterns.ways_out(own.rows, self.patterns.visited[mode])[0].ravel())
+            put(count + mode, self.patterns.ways_out(self.every[0], self.patterns.visited[mode])[0].ravel())
         for k in taken:
             rows, maps = self.jumps[k]
             number = rows.shape[1] // width
