@@ -127,15 +127,18 @@ def test_an_impact_that_vanishes_is_a_graze_from_either_side() -> None:
         assert table[name].values == pytest.approx(tables[0][name].values, abs=1e-8)
 
 
-@pytest.mark.parametrize("amplitude", [0.74, 0.79, 1.7])
+@pytest.mark.parametrize("amplitude", [0.3, 0.74, 0.79, 1.7, 1.979308279994206])
 def test_from_a_small_orbit_to_a_large_one(amplitude: float) -> None:
-    """Motion dies out where the relay equals the forcing; steps are measured by the orbit that has grown."""
+    """Motion dies out where the relay equals the forcing; steps are measured by the orbit that has grown.
+
+    At rest the forcing is largest just at the section, and half way round."""
     system, name, limits, _ = templates.relay(np.random.default_rng([1, 5]))
     here = system.with_parameters({name: amplitude})
     branch = ns.continue_orbit(ns.find_orbit(here, progress=False), name, limits, points=400)
     assert branch[name].values[[0, -1]] == pytest.approx(limits, abs=1e-12)
     special = ns.special_points(branch)
     assert special["sliding"].values.tolist() == ["adding_sliding", "crossing_sliding"]
+    assert special["kind"].values.tolist() == ["grazing", "corner"]
     assert special[name].values[0] == pytest.approx(system.values["F"], abs=1e-9)
 
 
@@ -150,3 +153,25 @@ def test_a_slow_impact_is_the_same_impact() -> None:
     for kind in ("grazing", "fold", "flip"):
         values = np.sort(special[name].values[special["kind"].values == kind])
         assert np.diff(values).min() > 1e-9, kind
+
+
+@pytest.mark.parametrize("begun", [-0.05, 0.05])
+def test_a_flip_right_behind_a_corner(begun: float) -> None:
+    """x -> l x + mu - d sqrt(x) for x > 0: the multiplier l - d / (2 sqrt(x)) is -1 at sqrt(x) = d / (2 (1 + l)).
+
+    The first orbit found behind the border lies beyond that flip, and the map has no values on the other side."""
+    lam, d = 0.15, 3e-4
+    slight = ns.Map(
+        states=["x"], parameters={"mu": begun, "d": d},
+        branches=[
+            ns.Branch(lambda u, p: (lam * u.x + p.mu,), when="x < 0"),
+            ns.Branch(lambda u, p: (lam * u.x + p.mu - p.d * np.sqrt(u.x),), when="x > 0"),
+        ],
+    )  # fmt: skip
+    root = (np.sqrt(d * d + 4 * (1 - lam) * abs(begun)) - d) / (2 * (1 - lam))
+    start = begun / (1 - lam) if begun < 0 else root**2
+    orbit = ns.find_orbit(slight, start=[float(start)], period_number=1, transient=0, progress=False)
+    special = ns.special_points(ns.continue_orbit(orbit, "mu", (-5.0, 5.0), points=400))
+    at = d / (2 * (1 + lam))
+    assert special["kind"].values.tolist() == ["corner", "flip"]
+    assert special["mu"].values == pytest.approx([0.0, (1 - lam) * at**2 + d * at], abs=1e-11)

@@ -49,7 +49,7 @@ SMALL = 2e-3  # of the first orbit's size: a cycle this small is about to vanish
 FARTHEST = 0.1  # along the branch: the end of a signature is not looked for from farther behind it
 WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
 AHEAD = 1e-6  # of the range
-NEARER = 3  # times a tenth of the distance from the boundary: what lies between it and the first orbit behind it
+NEARER = 12  # steps back to a boundary from the first orbit behind it
 WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
@@ -216,16 +216,24 @@ class AlongOrbits(Policy):
         return beyond
 
     def _watch_between(self, found: March, point: OrbitPoint, first: OrbitPoint) -> None:
-        """List the special points between a boundary and the first orbit behind it, by orbits that come nearer."""
+        """List the special points between a boundary and the first orbit behind it, by steps back to it."""
         met: list[Met] = []
-        b = first.turned()
-        for _ in range(NEARER):
-            a, b = b, b.curve.at_parameter(b.Y, point.value + 0.1 * (b.value - point.value))
-            if b is None or b.virtual:
-                break
-            b = b if b.tangent @ a.tangent > 0.0 else b.turned()
-            step = Step(a, b, tuple([kind.number(one) for kind in self.kinds] for one in (a, b)), ([], []))
+        ds = _as_far(point, first)
+        b, numbers = first.turned(), [kind.number(first.turned()) for kind in self.kinds]
+        for _ in range(NEARER if ds else 0):
+            new = b.curve.step(b, ds)
+            if new is None:  # no values beyond the boundary
+                ds *= 0.25
+                continue
+            now = [kind.number(new) for kind in self.kinds]
+            step = Step(b, new, (numbers, now), (b.curve.margins(b), b.curve.margins(new)), True)
+            ends = first_met(step, BOUNDARIES)
+            if ends:
+                step.ends("change", ends[0].s, ends[0].point)
             met += special_on(step, self.kinds)
+            if ends != []:
+                break
+            b, numbers = new, now
         for one in reversed(met):
             found.mark(one.name, one.point.turned())
 
@@ -320,11 +328,16 @@ def mark(found: March, met: list[Met], beyond: OrbitPoint | None, name: str = ""
     return name
 
 
+def _as_far(point: OrbitPoint, first: OrbitPoint) -> float:
+    """A step from the first orbit of a new signature to beyond the place ``point`` where the old one ends; 0: none."""
+    away, steep = abs(first.value - point.value) / first.curve.width, abs(first.rise)
+    return 2.0 * away / steep if steep * FARTHEST > away else 0.0
+
+
 def _from_behind(point: OrbitPoint, first: OrbitPoint) -> Met | None:
     """The end of the new signature seen from its first orbit: the place at which the old one ends."""
-    fresh, back = first.curve, first.turned()
-    away, steep = abs(first.value - point.value) / fresh.width, abs(first.rise)
-    new = fresh.step(back, 2.0 * away / steep) if steep * FARTHEST > away else None
+    fresh, back, ds = first.curve, first.turned(), _as_far(point, first)
+    new = fresh.step(back, ds) if ds else None
     if new is None:
         return None
     met = first_met(Step(back, new, ([], []), (fresh.margins(back), fresh.margins(new)), True), BOUNDARIES)
