@@ -1,8 +1,8 @@
 """Random systems of one to six states, run by one checkout and compared with what another one kept.
 
 `PYTHONPATH=OLD/src python benchmarks/agreement.py old.npz` in one environment, then `PYTHONPATH=src python
-benchmarks/agreement.py new.npz old.npz`: the same crossings, at times and with states that differ by no more than rounding
-times the growth of a neighbour 1e-14 away.
+benchmarks/agreement.py new.npz old.npz`: the same crossings, at times and with states that differ by no more than
+rounding times the growth of a neighbour 1e-14 away.
 """
 
 from __future__ import annotations

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import IntArray
     from nonsmooth.system.system import System
 
-__all__ = ["basin_fractions"]
-
 
 @checked
 def basin_fractions(

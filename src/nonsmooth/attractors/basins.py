@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import FloatArray, IntArray
     from nonsmooth.system.system import System
 
-__all__ = ["basins", "by_share", "failed", "settler_of"]
-
 
 @checked
 def basins(

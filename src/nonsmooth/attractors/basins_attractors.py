@@ -22,8 +22,6 @@ from nonsmooth.attractors.standing import label_standing
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.kernels.hybrid import codes
 
-__all__ = ["DIVERGED", "NOT_CONVERGED", "Attractor", "Patience", "find_attractors"]
-
 NOT_CONVERGED, DIVERGED = -1, -2  # labels of starts without an attractor
 SAME = 1e-5  # of the motion's size: runs that end this near to a cycle's point are on it
 STILL = (codes.NOT_PERIODIC, codes.SLOW)

@@ -18,8 +18,6 @@ from nonsmooth.attractors.trace import Trace
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.kernels.hybrid import codes
 
-__all__ = ["Search", "among"]
-
 MOSTLY = 0.95
 NEARLY_THERE = 0.02  # of the section's extent: points nearer than this have come back
 SPREAD = 3.0  # and those nearer than this many times the distance that nearly all points keep from each other

@@ -11,8 +11,6 @@ from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.flow.equilibrium_sets import EquilibriumSet
 from nonsmooth.results.labels import kind_of
 
-__all__ = ["Attractor", "Patience"]
-
 
 @dataclass(frozen=True)
 class Patience:

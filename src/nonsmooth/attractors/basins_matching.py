@@ -17,8 +17,6 @@ from nonsmooth.attractors.basins_attractors import Attractor, Patience, find_att
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.flow.engines.engine import FloatArray
 
-__all__ = ["distance", "numbered"]
-
 CLOSE = 0.1  # of the motion's size: attractors nearer than this are one, where a carried run does not tell
 
 

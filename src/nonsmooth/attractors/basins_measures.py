@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 
-__all__ = ["basin_entropy", "boundary_dimension", "minimal_shock", "share_errors", "starts_needed", "uncertain_part"]
-
 BOX = 5  # points along a box of the entropy, as in its definition's examples
 
 

@@ -9,8 +9,6 @@ import numpy as np
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 
-__all__ = ["Cycle", "confirmed_cycle", "exponent_on"]
-
 MOST = 8  # Newton steps
 STEP = 1e-5  # of the differences that give the map's derivative, in units of the motion's size
 ROUNDING = 1e-8  # multipliers below this, or as near to 1, are differences of rounding errors

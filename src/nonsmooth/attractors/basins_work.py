@@ -13,8 +13,6 @@ from nonsmooth.attractors.settler import Settler
 from nonsmooth.campaign.work import CHUNK, Column
 from nonsmooth.flow.engines.engine import FloatArray
 
-__all__ = ["StartsWork", "settled_from"]
-
 
 @dataclass(frozen=True)
 class StartsWork:

@@ -8,8 +8,6 @@ from nonsmooth.attractors.settled import ROUNDED
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.kernels.hybrid import codes
 
-__all__ = ["rates", "separation_sizes"]
-
 USUAL = 1.5  # powers of ten: a motion this near to its scale is taken to have that size
 SLENDER = 1e-6  # a state whose motion is smaller than this, beside the largest of the others, is at rest
 RESTING = 1e-9  # in units of the scales: a motion that has come to rest in all states

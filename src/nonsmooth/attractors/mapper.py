@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from nonsmooth.attractors.settler import Settler
     from nonsmooth.kernels.judging.settle import Rules
 
-__all__ = ["Mapper"]
-
 
 class Mapper:
     """Jobs of one thread, run one after the other: each from its place (see ``trace``) at its parameter point.

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from nonsmooth.attractors.settler import Settler
     from nonsmooth.kernels.judging.settle import Rules
 
-__all__ = ["separate_on_gpu", "settle_on_gpu", "sweep_on_gpu"]
-
 
 class Rounds:
     """J jobs on a GPU, as they are settled under some rules.

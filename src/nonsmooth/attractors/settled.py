@@ -17,8 +17,6 @@ from nonsmooth.kernels.hybrid import codes
 if TYPE_CHECKING:
     from nonsmooth.kernels.judging.settle import Jobs
 
-__all__ = ["ROUNDED", "Settled", "least_sizes", "usable"]
-
 ROUNDED = 1e-4  # of a state's value: what is smaller cannot be told from rounding where returns are to be nil
 
 USABLE = (codes.OK, codes.SLOW, codes.NOT_PERIODIC, codes.NOT_GUARANTEED)

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from nonsmooth.kernels.judging.settle import Rules
     from nonsmooth.system.system import System
 
-__all__ = ["ATTEMPTS", "FIRST_LOOK", "Settler", "settler_for"]
-
 TOLERANCE = 1e-9  # of a return, in units of the motion's size
 ATTEMPTS = 3  # further transients for a point that is still settling: of 1, 2 and 4 times the first
 DIFFERENCE = 1e-6  # finite differences of the return map, in units of the motion's size

@@ -21,8 +21,6 @@ from nonsmooth.kernels.hybrid import codes
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["label_standing", "standing_in_sweep"]
-
 STANDS = 1e2  # tolerances of a return: a run that moves less, and ends as near to an equilibrium, stands there
 CREEPS = 1e-5  # of the scales: the same of one that creeps towards the end of a set, ever more slowly
 TRIES = 20  # states of a nonlinear system beside which equilibria are looked for in vain

@@ -18,8 +18,6 @@ from nonsmooth.system.phases import phases, varying_phases
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Trace", "mode_at"]
-
 
 @dataclass(frozen=True)
 class Trace:

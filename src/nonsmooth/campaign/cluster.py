@@ -16,8 +16,6 @@ from nonsmooth.campaign.store import ChunkStore
 from nonsmooth.campaign.work import Work
 from nonsmooth.errors import not_installed
 
-__all__ = ["MISSING", "compute_chunk", "connect", "on_cluster"]
-
 MISSING = f"a cluster needs {not_installed('distributed', 'cluster')}"
 AHEAD = 2  # chunks that wait at each thread of the cluster
 ANSWER = 60  # seconds to wait for a scheduler

@@ -10,8 +10,6 @@ from typing import Any
 
 from nonsmooth.campaign.work import Work
 
-__all__ = ["described", "difference"]
-
 ROOMS = ("kernels", "system", "flow", "attractors", "diagrams")  # whose text decides what a chunk holds
 
 

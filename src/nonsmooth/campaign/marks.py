@@ -10,8 +10,6 @@ from typing import Any
 
 from nonsmooth.results.content import sealed
 
-__all__ = ["mark_in", "marks_of", "started"]
-
 
 def marks_of(path: Path) -> Iterator[dict[str, Any]]:
     """The marks of a store's finished chunks."""

@@ -14,8 +14,6 @@ from nonsmooth.campaign.threads import cores
 from nonsmooth.campaign.work import Work
 from nonsmooth.errors import not_installed
 
-__all__ = ["GOLDEN", "Plan", "duration", "plan"]
-
 SECONDS = 5.0  # of sampling
 LEAST = 8  # chunks, where there are so many
 PATIENCE = 4  # times the seconds, on a machine that is busy otherwise

@@ -8,8 +8,6 @@ import time
 from collections.abc import Callable
 from functools import cache
 
-__all__ = ["clock", "cpu_type", "gpu_type", "processor_type"]
-
 
 def processor_type(device: str) -> str:
     """The type of this machine's processor, or that of its GPU with ``device="cuda"``."""

@@ -13,8 +13,6 @@ from nonsmooth.campaign.work import Work, check_room, empty_columns
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 
-__all__ = ["run"]
-
 
 def run(
     work: Work, *, threads: int | None = None, progress: Progress = True, label: str = "", store: Any = None,

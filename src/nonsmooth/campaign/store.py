@@ -39,8 +39,6 @@ from nonsmooth.results.content import digest, seal, sealed
 from nonsmooth.results.store import needs_zarr
 from nonsmooth.results.whole import beside, told, write_whole
 
-__all__ = ["ChunkStore", "describe_store", "open_store", "stored_bytes"]
-
 ATTRIBUTE = "nonsmooth_campaign"
 ANEW = "give another name, and compute it anew there"
 KEPT = "finished chunks are whole, run it again to go on"

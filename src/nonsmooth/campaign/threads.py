@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from nonsmooth.campaign.work import Work
 from nonsmooth.kernels.hybrid.stopping import obey
 
-__all__ = ["cores", "on_threads", "over_items"]
-
 T = TypeVar("T")
 R = TypeVar("R")
 

@@ -14,8 +14,6 @@ from nonsmooth.results.memory import room_for
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["CHUNK", "STORED", "Column", "Work", "check_room", "empty_columns", "inputs"]
-
 CHUNK = 256  # runs of one chunk, at least: a tenth of a second
 STORED = 4096  # and of one that is kept in a store or sent to a cluster: a second
 LISTED = 40  # bytes of a chunk's number in a list

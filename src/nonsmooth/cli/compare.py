@@ -16,8 +16,6 @@ from nonsmooth.system.names import unknown
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["add"]
-
 _TABLES: dict[str, Any] = {
     "system": SYSTEM, "identified": {"data": TEXT, "session": TEXT},
     "measured": {

@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["add", "completion"]
-
 _NAME = "nonsmooth"
 
 

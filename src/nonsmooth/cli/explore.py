@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-__all__ = ["add"]
-
 
 def add(commands: Any) -> None:
     """Declare the sub-command."""

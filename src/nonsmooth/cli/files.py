@@ -16,11 +16,6 @@ from nonsmooth.system.names import check_keys
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "ANY", "LENGTH", "NAMES", "QUANTITIES", "TEXT", "keep", "read_tables", "with_folder", "without_screen",
-    "write",
-]  # fmt: skip
-
 #: What a value must be: a check, and words.
 Kind = tuple[Callable[[Any], bool], str]
 ANY: Kind = lambda value: True, "anything"

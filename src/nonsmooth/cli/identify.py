@@ -12,8 +12,6 @@ from typing import Any
 from nonsmooth.cli.files import LENGTH, NAMES, QUANTITIES, TEXT, keep, read_tables, with_folder, without_screen
 from nonsmooth.system.names import check_keys, unknown
 
-__all__ = ["add"]
-
 _TABLES = {
     "identify": {
         "session": TEXT, "model": TEXT, "parameters": NAMES, "crank_length": LENGTH, "apparatus": QUANTITIES,

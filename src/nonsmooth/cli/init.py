@@ -13,8 +13,6 @@ from typing import Any
 from nonsmooth.cli.files import with_folder
 from nonsmooth.cli.verb_options import VERBS, Option, options_of
 
-__all__ = ["add", "study_text"]
-
 _WIDTH = 100
 
 

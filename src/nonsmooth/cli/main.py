@@ -19,8 +19,6 @@ from nonsmooth.cli.terminal import printable
 from nonsmooth.errors import SolveError, shortened
 from nonsmooth.system.names import unknown
 
-__all__ = ["main", "parser"]
-
 _COMMANDS = (init, run, plan, show, explore, models, identify, compare, reproduce, rig, schema, completion)
 #: What a user can have caused and mend; anything else is a fault of the package.
 _USER_ERRORS = (ValueError, TypeError, OSError, MemoryError, SolveError, ImportError)

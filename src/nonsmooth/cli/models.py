@@ -6,8 +6,6 @@ import argparse
 import re
 from typing import Any
 
-__all__ = ["add"]
-
 
 def add(commands: Any) -> None:
     """Declare the sub-command."""

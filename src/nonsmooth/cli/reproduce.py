@@ -9,8 +9,6 @@ from typing import Any
 
 from nonsmooth.cli.files import without_screen
 
-__all__ = ["add"]
-
 
 def add(commands: Any) -> None:
     """Declare the sub-command."""

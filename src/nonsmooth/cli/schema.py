@@ -15,8 +15,6 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from nonsmooth.cli.files import with_folder
 from nonsmooth.cli.verb_options import VERBS, Option, options_of
 
-__all__ = ["add", "study_schema"]
-
 _TYPES: dict[str, dict[str, Any]] = {
     "bool": {"type": "boolean"}, "int": {"type": "integer"}, "float": {"type": "number"}, "str": {"type": "string"},
     "Stroboscopic": {"$ref": "#/definitions/stroboscopic"}, "Poincare": {"$ref": "#/definitions/poincare"},

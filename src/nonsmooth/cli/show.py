@@ -12,8 +12,6 @@ from nonsmooth.cli.terminal import one_line, printable
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["add", "progress_of", "summary"]
-
 
 def add(commands: Any) -> None:
     """Declare the sub-command."""

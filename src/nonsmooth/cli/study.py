@@ -25,8 +25,6 @@ from nonsmooth.system.names import check_keys, unknown
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["OUTPUT", "SYSTEM", "Study", "load_model", "named_model", "read_study", "system_of"]
-
 SYSTEM = {"model": TEXT, "text": TEXT, "parameters": ANY, "smoothed": ANY}
 _FORMATS = (".pdf", ".png", ".svg", ".eps", ".ps", ".pgf", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 #: Keys of the table [output], with the endings that a name may have.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["one_line", "printable"]
-
 
 def printable(text: str) -> str:
     """The text with its lines and tabs; any other character that is not printed stands as its escape (``\\x1b``)."""

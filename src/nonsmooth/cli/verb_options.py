@@ -11,8 +11,6 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["VERBS", "Option", "options_of"]
-
 VERBS = ("simulate", "sweep", "frequency_response", "poincare", "chart", "basins", "basin_fractions")
 #: Arguments of verbs that belong to the command line, or that a file cannot hold.
 _NOT_IN_FILES = ("system", "inputs", "progress", "client", "store")  # `inputs` are arrays

@@ -10,8 +10,6 @@ from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.kinds import at_least
 from nonsmooth.system.system import System
 
-__all__ = ["LargestStep", "allowed_range", "limits"]
-
 GRID = 65
 INSIDE = 1e-3  # of the range: the equations are singular at the edge itself
 

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["bifurcation_diagram"]
-
 SAME = 1e-8  # of the range: special points nearer than this are one
 ON_BRANCH = 0.02  # of a branch's size: a point of the sweep nearer to it than this lies on it
 

@@ -24,8 +24,6 @@ from nonsmooth.system.system import System
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["continue_curve"]
-
 
 @checked
 def continue_curve(

@@ -23,8 +23,6 @@ from nonsmooth.system.system import System
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["continue_equilibrium"]
-
 
 @checked
 def continue_equilibrium(

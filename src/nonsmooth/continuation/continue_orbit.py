@@ -20,8 +20,6 @@ from nonsmooth.system.kinds import Range, at_least
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["continue_orbit"]
-
 
 @checked
 def continue_orbit(

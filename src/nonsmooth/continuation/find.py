@@ -42,8 +42,6 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import State
     from nonsmooth.system.system import System
 
-__all__ = ["find_orbit"]
-
 GOOD = (codes.OK, codes.NOT_GUARANTEED)
 MOST, CONVERGED = 30, 1e-12  # iterations, the last step in scaled unknowns
 RTOL = 1e-12  # of the runs from which orbits are read, where the flow is not exact

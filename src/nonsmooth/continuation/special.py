@@ -9,8 +9,6 @@ from nonsmooth.system.arguments import checked
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["special_points"]
-
 
 @checked
 def special_points(branch: Any) -> xr.Dataset:

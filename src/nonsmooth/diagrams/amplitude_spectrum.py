@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engines.loop import Engine
     from nonsmooth.system.system import System
 
-__all__ = ["amplitude_spectrum"]
-
 CLOSED = 1e-7  # of the motion's range: what a period may leave open
 KEPT = 100  # section points by which a motion is judged
 PATIENCE = (1, 2, 4, 8)  # transients tried until the record closes

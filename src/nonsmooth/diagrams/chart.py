@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import FloatArray
     from nonsmooth.system.system import System
 
-__all__ = ["PlannedChart", "chart", "plan_chart"]
-
 EXPONENT_RETURNS = 1000
 
 

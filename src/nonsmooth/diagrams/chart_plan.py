@@ -17,8 +17,6 @@ from nonsmooth.diagrams.chart_work import ChartWork
 from nonsmooth.flow.engines.devices import batch_size, gpu_name
 from nonsmooth.flow.engines.engine import IntArray
 
-__all__ = ["GpuPlan", "plan_on_gpu"]
-
 BLOCK = 64  # neighbouring points that stay together
 POINTS = 16  # of each carried row
 

@@ -27,8 +27,6 @@ from nonsmooth.flow.engines.engine import IntArray
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 
-__all__ = ["labels_of_points", "refined"]
-
 LEAST_POINTS = 4  # computed whatever the part
 LARGEST_PART = 0.25  # of the points, where no number is given
 FOR_THE_GRID = 1 / 3  # of the budget, at most, for the coarse grid

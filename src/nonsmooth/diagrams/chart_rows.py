@@ -15,8 +15,6 @@ from nonsmooth.attractors.settler import Settler
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.kernels.hybrid import codes
 
-__all__ = ["along_rows", "side_by_side"]
-
 
 def along_rows(settler: Settler, points: FloatArray, length: int, starts: FloatArray) -> Settled:
     """Each row of ``length`` points from each start, the state carried along it.

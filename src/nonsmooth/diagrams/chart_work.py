@@ -15,8 +15,6 @@ from nonsmooth.diagrams.chart_rows import along_rows
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.kernels.hybrid import codes
 
-__all__ = ["ChartWork", "attractors_among"]
-
 SIDE_BY_SIDE = 1 << 21  # places of one chunk of carried rows on a GPU, at most: a gigabyte while it is computed
 SAME = 1e-6  # extremes that agree to this part of the motion's size belong to one attractor
 POINT = 1e-5  # and section points that agree to this part

@@ -26,8 +26,6 @@ from nonsmooth.system.kinds import Range, at_least
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["correlation_dimension"]
-
 PER_DECADE = 12
 SPREAD = 0.06  # of the slope: a range is a scaling range where the slope's standard deviation stays below this
 PAIRS = 200  # fewer close pairs than these make a slope of noise

@@ -15,8 +15,6 @@ from nonsmooth.flow.engines.engine import FloatArray, IntArray
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Counter", "bin_edges", "coarse_values", "given_ranges"]
-
 COARSE = 48  # parameter values of the run that finds the ranges
 MARGIN = 0.05  # of the range found, added on either side
 

@@ -24,7 +24,6 @@ from nonsmooth.diagrams.spectrum import (
     batch_ends,
     evaluated,
     failed_spectrum,
-    kaplan_yorke,
     spectrum_along,
 )
 from nonsmooth.flow.arguments import swept_values, whole_number
@@ -48,8 +47,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.flow.engines.loop import Engine
     from nonsmooth.system.system import System
-
-__all__ = ["kaplan_yorke", "lyapunov"]
 
 UNITS = 4096  # pieces into which a duration is cut
 

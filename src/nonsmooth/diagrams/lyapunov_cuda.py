@@ -12,8 +12,6 @@ from nonsmooth.flow.engines.launches import States
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.linear_cuda import PlanarOnGpu
 
-__all__ = ["growth_on_gpu"]
-
 
 def growth_on_gpu(
     engine: PlanarEngine, points: FloatArray, start: FloatArray, mode: int, scale: FloatArray, align: int, wait: int,

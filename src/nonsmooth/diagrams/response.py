@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["frequency_response", "jumps_in"]
-
 STEEPER = 5.0  # a jump's step in amplitude exceeds both neighbouring steps by this factor
 LEAST = 5e-3  # and this fraction of the amplitude
 

@@ -18,9 +18,6 @@ from nonsmooth.kernels.hybrid import codes
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["ALIGN", "BATCHES", "GOOD", "Spectrum", "at_rest", "batch_ends", "evaluated", "failed_spectrum",
-           "kaplan_yorke", "spectrum_along"]  # fmt: skip
-
 BATCHES = 32
 ALIGN = 100  # units of the transient in which the frame turns into the directions of growth
 INDEPENDENT = 1e-7  # of the largest singular value of constraints

@@ -37,8 +37,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["DIRECTIONS", "sweep"]
-
 DIRECTIONS: dict[str | None, tuple[str, ...]] = {
     "up": ("up",), "down": ("down",), "both": ("up", "down"), None: ("none",),
 }  # fmt: skip

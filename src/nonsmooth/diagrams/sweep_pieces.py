@@ -17,8 +17,6 @@ from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 
-__all__ = ["Slot", "pieces_of", "run_on_gpu"]
-
 PIECE = 16  # points of one piece of independent work
 
 

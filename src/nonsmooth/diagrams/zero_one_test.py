@@ -28,8 +28,6 @@ from nonsmooth.system.kinds import at_least
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["zero_one_test"]
-
 LEAST = 100
 
 

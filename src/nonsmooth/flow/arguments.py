@@ -8,15 +8,10 @@ import numpy as np
 
 from nonsmooth.errors import shortened
 from nonsmooth.flow.engines.engine import FloatArray
-from nonsmooth.system.arguments import check_system
-from nonsmooth.system.kinds import real_number, whole_number, yes_or_no
+from nonsmooth.system.kinds import real_number
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
-
-__all__ = [
-    "check_system", "ends", "float_array", "real_number", "swept_values", "whole_number", "yes_or_no",
-]  # fmt: skip
 
 
 def ends(pair: Any, name: str) -> tuple[float, float]:

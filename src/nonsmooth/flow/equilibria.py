@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
 
-__all__ = ["AT_REST", "ROUNDING", "Equilibrium", "equilibrium_at", "refuse_resting", "sorted_eigenvalues"]
-
 AT_REST = 1e-7  # of a state's size: nearer to an equilibrium than this is at it
 ROUNDING = 1e-14  # and nearer than this nothing but rounding leads away
 VANISHING = 1e-9  # of an eigenvalue's size, of an indicator's: zero

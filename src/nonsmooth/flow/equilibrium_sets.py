@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["EquilibriumSet", "equilibrium_sets", "modes_of_sets"]
-
 FREE = 1e-9  # a singular value as small as this, beside the largest, leaves its direction free
 MOST = 20  # linear problems, each beside the solution of the one before
 TIMES = 64  # of a forcing period, at which conditions are asked

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import TracedTransition
     from nonsmooth.system.system import System
 
-__all__ = ["refuse_beyond_stops", "solve_error", "wrong_way"]
-
 BEYOND_STOP = (
     "the start lies beyond a stop: a transition with a reset holds there already; "
     "start on the admissible side of its indicator"

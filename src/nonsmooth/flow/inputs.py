@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from nonsmooth.flow.variational import VariationalFlow
     from nonsmooth.system.system import System
 
-__all__ = ["Course", "Driven", "Input", "driven"]
-
-
 
 @checked
 @dataclass(frozen=True, eq=False)

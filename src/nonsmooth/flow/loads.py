@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.description import Description
     from nonsmooth.system.system import System
 
-__all__ = ["Meter", "Quantities", "checked_loads", "meter_of"]
-
 ZERO = 1e-11  # of the largest value of a speed on the motion: a smaller change is no impact
 CLOSED = 1e-7  # of the largest states of a gap: below it a contact is closed
 ALONE = 1e-6  # of a change of speeds: what impulses leave of it; more is a reset of another kind

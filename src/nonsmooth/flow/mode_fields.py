@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.rows import Rows
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["MOST", "ModeField", "arguments", "every_mode", "held_places", "mode_field"]
-
 MOST = 4096  # modes that are made so that all of them can be looked at
 
 

@@ -10,12 +10,6 @@ from nonsmooth.flow.starts import plain_start
 from nonsmooth.results.progress import Progress
 from nonsmooth.system.kinds import Default, above, at_least
 
-__all__ = [
-    "LONGEST_RUN", "Campaign", "Length", "Settling", "Solver", "Varied", "Work", "as_called", "kept_of",
-    "longest_period", "solver_of", "workers_of",
-]  # fmt: skip
-
-
 LONGEST_RUN = 1e12  # periods, or units of time: what is longer does not end
 #: Of a run, in periods or in time.
 Length = Annotated[float, above(0, LONGEST_RUN), "it is the length of a run"]

@@ -13,8 +13,6 @@ from nonsmooth.flow.engines.engine import FloatArray
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["output_values"]
-
 
 def output_values(
     traced: Traced, parameters: FloatArray, time: FloatArray, u: FloatArray, memory: FloatArray, mode: Any

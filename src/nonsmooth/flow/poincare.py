@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["poincare", "result_status"]
-
 
 def result_status(code: int) -> int:
     """The status of a result for a kernel's code: a start beyond a stop is a point that did not converge."""

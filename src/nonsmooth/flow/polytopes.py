@@ -12,8 +12,6 @@ from nonsmooth.arrays import FloatArray
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["TOUCHING", "Extreme", "Polytope", "best"]
-
 TOUCHING = 1e-8  # of the states' scales: polytopes nearer than this are one set
 
 

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
 
-__all__ = ["values_along", "with_ramps"]
-
 WATCHED = 101  # values of a linear ramp that are checked to be allowed
 
 

@@ -28,8 +28,6 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 
-__all__ = ["Jump", "Touch", "chained"]
-
 
 @dataclass(slots=True)
 class Jump:

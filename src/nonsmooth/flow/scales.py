@@ -12,8 +12,6 @@ from nonsmooth.arrays import FloatArray
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["LEAST", "warn_if_slow", "warn_if_small"]
-
 LEAST = 1e-3  # the least size of a motion, in units of the states' scales
 RESTING = 5e-7  # in the same units: a smaller state is rounding beside a motion
 NOTHING = 1e-15  # and where nothing moves more

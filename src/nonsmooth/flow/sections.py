@@ -16,8 +16,6 @@ from nonsmooth.system.kinds import above, at_least
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Poincare", "Stroboscopic", "section_plan"]
-
 
 @checked
 @dataclass(frozen=True)

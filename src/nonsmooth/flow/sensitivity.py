@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["Variation", "apart", "jump_between", "sensitivity", "settled", "variation"]
-
 CHANGE = -1  # of inputs, among transitions
 RTOL = 1e-15  # where the flow is not exact
 

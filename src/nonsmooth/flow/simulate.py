@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.system import System
 
-__all__ = ["check_complete", "run_length", "simulate"]
-
 SAMPLES_PER_PERIOD = 256
 SAMPLES = 4096
 MOST_STEPS = 1e9  # an hour and more

@@ -28,8 +28,6 @@ from nonsmooth.kernels.hybrid.places import UNBROKEN
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["Frame", "Growth"]
-
 FINER = 0.1  # of the engine's tolerance: a step of the frame
 FINEST = 1e-11  # and no coarser than this
 

@@ -18,8 +18,6 @@ from nonsmooth.system.names import unknown
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["first_state", "is_one_start", "plain_start", "random_starts", "start_states"]
-
 
 @checked
 def random_starts(

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
 
-__all__ = ["Jump", "Segments", "Touch", "VariationalFlow"]
-
 
 class VariationalFlow:
     """Segments and jumps of one system's equations, with derivatives in the ``active`` parameters.

@@ -23,8 +23,6 @@ from nonsmooth.system.derived.rows import Rows
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["PatternFlow", "pattern_flow"]
-
 OFF = 1e-5  # of a parameter, for the differences by which an impact with friction depends on it
 
 

@@ -22,8 +22,6 @@ from nonsmooth.system.codegen.linear import apart, linear_form
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["NONE", "SIZES", "LinearFlow", "RowsFlow"]
-
 NONE = np.zeros(0)
 KEPT = 4  # parameter points whose rows are kept by a thread
 SIZES = 6  # numbers at the head

@@ -17,8 +17,6 @@ from nonsmooth.system.derived.elements import Backlash
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["bilinear_oscillator"]
-
 
 def _base(t: Any, p: Any) -> Any:
     return -p.A * p.omega**2 * np.cos(p.omega * t)

@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from nonsmooth.system.derived.maps import Map
 
-__all__ = ["border_collision"]
-
 
 def _left(u: Any, p: Any) -> Any:
     return p.tau_l * u.x + u.y + p.mu, -p.delta_l * u.x

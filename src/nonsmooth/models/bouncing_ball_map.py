@@ -15,8 +15,6 @@ import numpy as np
 if TYPE_CHECKING:
     from nonsmooth.system.derived.maps import Map
 
-__all__ = ["bouncing_ball_map"]
-
 
 def _bounce(u: Any, p: Any) -> Any:
     landing = u.theta + u.v

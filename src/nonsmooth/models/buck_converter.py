@@ -14,8 +14,6 @@ from nonsmooth.system.transition import Transition
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["buck_converter"]
-
 
 def _closed(t: Any, u: Any, p: Any) -> Any:
     return (u.i - u.v / p.R) / p.C, (p.V_in - u.v) / p.L, (p.V_high - p.V_low) / p.T

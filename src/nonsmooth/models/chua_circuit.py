@@ -15,8 +15,6 @@ from nonsmooth.system.derived.elements import Backlash
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["chua_circuit"]
-
 
 def _inner(t: Any, u: Any, p: Any) -> Any:
     x, y, z = u

@@ -20,8 +20,6 @@ from nonsmooth.system.transition import Transition
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["discontinuous_support"]
-
 
 def _free(t: Any, u: Any, p: Any) -> Any:  # Eq. 7a
     x, v = u

@@ -17,8 +17,6 @@ from nonsmooth.system.derived.elements import Stop
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["double_impact_oscillator"]
-
 
 def _force(t: Any, p: Any) -> Any:
     return np.cos(p.omega * t)

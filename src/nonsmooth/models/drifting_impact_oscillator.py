@@ -17,8 +17,6 @@ from nonsmooth.system.transition import Transition
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["drifting_impact_oscillator"]
-
 
 def _drive(t: Any, p: Any) -> Any:
     return p.a * np.cos(p.omega * t) + p.b

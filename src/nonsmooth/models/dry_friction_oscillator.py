@@ -19,8 +19,6 @@ from nonsmooth.system.transition import Surface
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["dry_friction_oscillator"]
-
 
 def _others(t: Any, u: Any, p: Any) -> Any:
     """All forces but friction."""

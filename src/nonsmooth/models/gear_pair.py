@@ -16,8 +16,6 @@ from nonsmooth.system.derived.elements import Backlash
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["gear_pair"]
-
 
 def _load(t: Any, p: Any) -> Any:
     return p.F_m + p.F_a * p.omega**2 * np.cos(p.omega * t)

@@ -17,8 +17,6 @@ from nonsmooth.system.derived.elements import Stop
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["impact_damper"]
-
 
 def _masses(p: Any) -> Any:
     return [[1.0, 0.0], [0.0, p.mu]]

@@ -16,8 +16,6 @@ from nonsmooth.system.derived.elements import Stop
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["impact_duffing"]
-
 
 def _motion(t: Any, u: Any, p: Any) -> Any:
     x1, x2, v1, v2 = u

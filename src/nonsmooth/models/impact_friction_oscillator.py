@@ -15,8 +15,6 @@ from nonsmooth.system.derived.elements import Coulomb, Stop
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["impact_friction_oscillator"]
-
 
 def _force(t: Any, p: Any) -> Any:
     return np.cos(p.omega * t)

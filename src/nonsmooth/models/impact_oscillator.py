@@ -18,8 +18,6 @@ from nonsmooth.system.transition import Transition
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["impact_oscillator"]
-
 
 def _motion(t: Any, u: Any, p: Any) -> Any:
     x, v = u

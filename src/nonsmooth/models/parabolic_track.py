@@ -16,8 +16,6 @@ from nonsmooth.system.derived.elements import Stop
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["parabolic_track"]
-
 
 def _cart(t: Any, u: Any, p: Any) -> Any:
     x, v = u

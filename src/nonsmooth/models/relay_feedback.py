@@ -13,8 +13,6 @@ from nonsmooth.system.transition import Surface
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["relay_feedback"]
-
 
 def _plant(sign: int) -> Any:
     def field(t: Any, u: Any, p: Any) -> Any:

@@ -17,8 +17,6 @@ from nonsmooth.system.transition import Transition
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["relief_valve"]
-
 
 def _open(t: Any, u: Any, p: Any) -> Any:
     y1, y2, y3 = u

@@ -18,8 +18,6 @@ from nonsmooth.system.derived.elements import ElasticStop
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["rubbing_rotor"]
-
 
 def _disc(t: Any, u: Any, p: Any) -> Any:
     x, y, v_x, v_y = u

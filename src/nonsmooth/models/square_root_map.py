@@ -21,8 +21,6 @@ import numpy as np
 if TYPE_CHECKING:
     from nonsmooth.system.derived.maps import Map
 
-__all__ = ["square_root_map"]
-
 
 def _free(u: Any, p: Any) -> Any:
     return (p.lam * u.x + p.mu,)

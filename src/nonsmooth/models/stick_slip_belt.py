@@ -16,8 +16,6 @@ from nonsmooth.system.transition import Surface
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["stick_slip_belt"]
-
 
 def _dragged(t: Any, u: Any, p: Any) -> Any:
     x, v = u

@@ -15,8 +15,6 @@ from nonsmooth.system.derived.elements import Coulomb
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["stribeck_oscillator"]
-
 
 def _force(t: Any, p: Any) -> Any:
     return p.u_0 * np.cos(p.omega * t)

@@ -19,8 +19,6 @@ from nonsmooth.errors import shortened
 from nonsmooth.system.kinds import Default, Reader, reader_of
 from nonsmooth.system.names import unknown
 
-__all__ = ["check_system", "checked", "declared", "entries"]
-
 Verb = Callable[..., Any]
 F = TypeVar("F", bound=Verb)
 

@@ -8,8 +8,6 @@ from collections.abc import Sequence
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.names import unknown
 
-__all__ = ["GRAMMAR", "condition_text", "read_condition"]
-
 GRAMMAR = "<indicator> > 0  or  <indicator> < 0,  joined by 'and'"
 _SIGN = re.compile(r"\s*([A-Za-z_]\w*)\s*([<>])(=?)\s*0(?:\.0*)?\s*\Z")
 

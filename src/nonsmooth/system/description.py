@@ -37,8 +37,6 @@ from nonsmooth.system.transition import Surface, Transition
 if TYPE_CHECKING:
     from nonsmooth.system.derived.loads import Loads
 
-__all__ = ["Description", "describe"]
-
 IMPACTS = ("simultaneous", "sequential")
 
 

@@ -18,8 +18,6 @@ from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
 from nonsmooth.system.symbolic.tracing import Known, Symbols, call_scalar, call_vector, refuse_corners
 from nonsmooth.system.transition import Surface, Transition
 
-__all__ = ["TracedBand", "TracedSurface", "sliding_mode", "trace_band", "trace_surface", "trace_system"]
-
 
 @dataclass(frozen=True)
 class TracedSurface:

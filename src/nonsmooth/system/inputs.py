@@ -15,8 +15,6 @@ from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.mode import Mode
 from nonsmooth.system.transition import Surface, Transition
 
-__all__ = ["RATE", "input_states", "with_inputs"]
-
 RATE = "_rate"
 
 

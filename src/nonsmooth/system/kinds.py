@@ -30,11 +30,6 @@ import numpy as np
 from nonsmooth.errors import shortened
 from nonsmooth.system.parameter import finite_number as real_number
 
-__all__ = [
-    "Default", "Limit", "Range", "above", "at_least", "in_words", "reader_of", "real_number", "whole_number",
-    "yes_or_no",
-]  # fmt: skip
-
 Reader = Callable[[Any, str], Any]  # (what was given, the name of the argument) -> what the verb gets
 
 _MOST = 2**53  # whole numbers up to here are exact in floating point

@@ -8,8 +8,6 @@ from typing import Any
 
 from nonsmooth.errors import SystemDefinitionError
 
-__all__ = ["Band", "Mode"]
-
 
 @dataclass(frozen=True)
 class Mode:

@@ -13,8 +13,6 @@ from collections.abc import Iterable, Mapping
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 
-__all__ = ["RESERVED", "check_keys", "check_names", "nearest", "unknown"]
-
 RESERVED = frozenset(
     [
         # dims of results

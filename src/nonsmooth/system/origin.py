@@ -8,8 +8,6 @@ import numpy as np
 
 from nonsmooth.system.system import System
 
-__all__ = ["recorded_system", "system_of"]
-
 
 def system_of(result: Any) -> System:
     """Return the system that a result was computed with, at the result's parameters.

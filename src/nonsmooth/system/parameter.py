@@ -9,8 +9,6 @@ from typing import Any
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 
-__all__ = ["Parameter", "finite_number", "latex_name"]
-
 _GREEK = frozenset(
     [
         "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda", "mu", "nu",

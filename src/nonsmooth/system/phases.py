@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["phase_slopes", "phases", "varying_phases"]
-
 
 def phases(traced: Traced) -> NDArray[np.float64]:
     """One for each transition: -1 where it has a condition, 0 where the phase depends on the parameters."""

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
     from nonsmooth.system.system import System
 
-__all__ = ["latex", "page", "table"]
-
 
 def _plain(traced: Traced) -> dict[sp.Symbol, str]:
     names = {traced.t: "t"}

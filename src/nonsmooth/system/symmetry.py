@@ -20,8 +20,6 @@ from nonsmooth.system.symbolic.tracing import call_vector
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.tracing import Symbols
 
-__all__ = ["Symmetry", "trace_symmetry"]
-
 
 @dataclass(frozen=True)
 class Symmetry:

@@ -23,8 +23,6 @@ from nonsmooth.system.transition import Surface, Transition
 from nonsmooth.system.values import changed_values, no_attribute, parameter_rows, smoothed_values
 from nonsmooth.system.variant import SHARP, Variant, variant_of
 
-__all__ = ["System"]
-
 
 class System:
     r"""A piecewise-smooth dynamical system: smooth in each of its modes, switching between them.

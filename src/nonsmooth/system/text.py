@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.loads import Load, Loads
     from nonsmooth.system.system import System
 
-__all__ = ["read_system", "write_system"]
-
 _FORMAT = "nonsmooth system"
 _VERSION = 1
 _SAID = 1000  # characters of what is wrong with a text

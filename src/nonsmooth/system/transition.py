@@ -9,8 +9,6 @@ from typing import Any
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.parameter import finite_number
 
-__all__ = ["Surface", "Transition"]
-
 
 @dataclass(frozen=True)
 class Transition:

@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
 
-__all__ = ["Unit", "product", "read_unit", "unit_of", "write_unit"]
-
 Unit = dict[str, float]
 
 _DERIVED: dict[str, Unit] = {

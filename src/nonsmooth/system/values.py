@@ -13,8 +13,6 @@ from nonsmooth.system.names import nearest, unknown
 from nonsmooth.system.parameter import finite_number
 from nonsmooth.system.variant import ETA_PER_INDICATOR, ONE_ETA, SHARP, Variant, variant_of
 
-__all__ = ["changed_values", "no_attribute", "parameter_rows", "smoothed_values"]
-
 
 def changed_values(
     variant: Variant, values: Mapping[str, float], name: str, given: Any, named: Mapping[str, float]

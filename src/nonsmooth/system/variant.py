@@ -14,8 +14,6 @@ from nonsmooth.system.symbolic.derivatives import Derivatives
 from nonsmooth.system.symbolic.domain import Domain
 from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["ETA_PER_INDICATOR", "ONE_ETA", "SHARP", "Variant", "variant_of"]
-
 SHARP, ONE_ETA, ETA_PER_INDICATOR = "sharp", "one eta", "eta per indicator"
 
 

@@ -17,8 +17,6 @@ from nonsmooth.system.names import unknown
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["coordinates_of", "dataset_of", "quantities_of", "quantity", "rows_of"]
-
 #: Dims whose entries are columns of a table, not rows.
 _SPREAD = ("state", "indicator", "multiplier", "eigenvalue", "exponent", "harmonic", "memory", "component")
 _FIRST = ("time", "point", "special", "frequency")  # dims of rows where a result has them

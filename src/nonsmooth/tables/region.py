@@ -20,8 +20,6 @@ from nonsmooth.tables.quantities import dataset_of, quantities_of, quantity
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["region"]
-
 _LONGEST = 2000  # characters of a condition
 _COMPARE: dict[Any, Callable[[Any, Any], Any]] = {
     sp.StrictLessThan: operator.lt, sp.LessThan: operator.le, sp.StrictGreaterThan: operator.gt,

@@ -16,8 +16,6 @@ from nonsmooth.system.origin import recorded_system
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["once", "sampled"]
-
 _SAME = 1e-6  # of the largest value of a state: the motion computed anew is that of the run
 
 

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-__all__ = ["table"]
-
 _WRITERS = {".csv": "", ".xlsx": "openpyxl", ".parquet": "pyarrow"}
 _BESIDE = ("segment", "start_state", "provenance")
 

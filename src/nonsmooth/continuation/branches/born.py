@@ -12,8 +12,6 @@ from nonsmooth.continuation.problems.signature import Round, Signature, Visit
 from nonsmooth.flow.mode_fields import ModeField, mode_field
 from nonsmooth.system.system import System
 
-__all__ = ["first_cycle"]
-
 ANGLES = 720
 LARGEST = 1e6  # of the states' scales
 SMALL = 1e-2  # amplitude of the first cycle, in units of the states' scales

@@ -26,8 +26,6 @@ from nonsmooth.system.system import System
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Asked", "Following", "Start", "both_ways", "curve_of", "dataset", "resumed_at"]
-
 ZERO = 1e-6  # of the numbers beside it: the first point is a special one
 
 #: A point to march on from along its tangent, or a march that has ended.

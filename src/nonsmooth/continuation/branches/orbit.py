@@ -23,8 +23,6 @@ from nonsmooth.system.system import System
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Orbit", "orbit_of"]
-
 RTOL = 1e-13  # of the trajectory, where the flow is not exact
 AT_SECTION = 1e-14  # of the period: a transition nearer to the section than rounding tells
 

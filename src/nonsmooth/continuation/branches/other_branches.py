@@ -21,8 +21,6 @@ from nonsmooth.errors import SolveError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["SWITCHES", "born", "straight_on", "switched"]
-
 SWITCHES = ("flip", "pitchfork", "transcritical", "branch_point")
 AWAY = (1e-3, 3e-3, 3e-4, 1e-2, 1e-4)  # from a crossing of branches
 

@@ -25,11 +25,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.results.branches import Column
 
-__all__ = [
-    "fields_of", "hopf_row", "layout_attributes", "layouts_of", "marks_of", "one_row", "read_branch", "recorded",
-    "special_row", "undamaged",
-]  # fmt: skip
-
 
 @contextmanager
 def undamaged(what: str) -> Iterator[None]:

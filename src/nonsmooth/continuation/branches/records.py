@@ -15,8 +15,6 @@ from nonsmooth.continuation.problems.equilibrium import Rest
 from nonsmooth.continuation.problems.multipliers import stable_by
 from nonsmooth.continuation.problems.signature import Signature
 
-__all__ = ["BranchRecord", "PointRecord", "RestRecord", "SpecialRecord", "record_of"]
-
 
 @dataclass
 class PointRecord:

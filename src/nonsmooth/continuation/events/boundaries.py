@@ -11,8 +11,6 @@ from nonsmooth.continuation.events.change import Change, by_others, gained, inse
 from nonsmooth.continuation.march.event import Event, Step, first_beyond
 from nonsmooth.continuation.problems.signature import AT_ONCE
 
-__all__ = ["BOUNDARIES", "Boundary", "Crossed", "Unseen"]
-
 ENDS = 1e-4  # of the period: a maximum as near to a crossing belongs to it
 NO_SPEED = 1e-3  # of the steepest crossing: slower than this is a touch
 UNSEEN = 1e-10  # along the branch: as near as an event is located that only simulations show

@@ -19,11 +19,6 @@ from nonsmooth.continuation.problems.signature import AT_ONCE, Round, Signature,
 from nonsmooth.continuation.problems.visits import anchored, led
 from nonsmooth.system.symbolic.traced import ASKED, FOUND, Traced
 
-__all__ = [
-    "Change", "Common", "by_others", "common_orbit", "gained", "inserted", "is_tolerance",
-    "past_the_section", "rest_after", "without",
-]  # fmt: skip
-
 BEFORE_REST = 1e-4  # of the period: flights after an impact as slow as impacts are followed are shorter
 TOLERANCE = 1e-5  # of an indicator's size: a band as narrow as this stands for no width
 

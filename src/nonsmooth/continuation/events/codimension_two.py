@@ -32,8 +32,6 @@ from nonsmooth.continuation.problems.multipliers import product_of_pairs, withou
 from nonsmooth.continuation.problems.normal_form import flip_coefficient, torus_coefficient
 from nonsmooth.continuation.problems.orbits import OrbitPoint
 
-__all__ = ["KINDS", "AlongCurve"]
-
 PAIR = 1e-6  # imaginary part of a complex pair
 NOISE = 1e-6  # a coefficient that stays below this balance vanishes all along (an area-preserving map)
 DOUBLE = 1e-5  # two multipliers nearer to -1 than this: rounding decides on the coefficient, which has a pole there

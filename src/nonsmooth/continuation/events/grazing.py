@@ -26,8 +26,6 @@ from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.continuation.problems.signature import AT_ONCE, Round
 from nonsmooth.continuation.problems.visits import led
 
-__all__ = ["both_sides", "graze"]
-
 ASIDE = 1e-6  # of the period: the touch is looked at from this far before and behind
 
 

@@ -21,8 +21,6 @@ from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.signature import Round
 from nonsmooth.continuation.searches.settled import touching
 
-__all__ = ["beside"]
-
 ASIDE = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # of the range: how far beyond the boundary orbits are looked for
 NEARER = 0.1  # once more at this part of it: an orbit that the branch goes on with comes nearer
 SHRINKS = 0.5  # by at least this factor (a square root: 0.32)
@@ -43,8 +41,9 @@ def beside(
 ) -> OrbitPoint | None:
     """The orbit with which a branch goes on at ``point``, where its signature ends, on a curve of its own.
 
-    ``contacts`` are those that may begin or end there, ``passed`` the points of the branch so far. Its tangent leads away from there. None where there is none, or
-    no simulated round shows it."""
+    ``contacts`` are those that may begin or end there, ``passed`` the points of the branch so far. Its tangent leads
+    away from there. None where there is none, or no simulated round shows it.
+    """
     common = [end for change in contacts if (end := common_orbit(change)) is not None]
     forward = float(np.sign(point.tangent[-1])) or 1.0
     nearest: dict[float, list[float]] = {forward: [], -forward: []}  # of those found, at each distance

@@ -12,8 +12,6 @@ from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Name,
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.equilibrium import FREE, Rest, equilibria_near, goes_on
 
-__all__ = ["AlongEquilibria", "beyond"]
-
 BEYOND = 1e-6  # along the branch: the first equilibrium behind a boundary
 NEAR = 1e-4  # of the states' scales: equilibria so little behind a boundary are as near
 LOCATED = 1e-9  # of a step: the place where two sets touch

@@ -32,7 +32,18 @@ from nonsmooth.continuation.events.change import (
 from nonsmooth.continuation.events.grazing import graze
 from nonsmooth.continuation.events.neighbours import beside
 from nonsmooth.continuation.events.sliding import TOUCHES, sliding_bifurcation
-from nonsmooth.continuation.march.event import BESIDE, LARGEST, Crossing, Event, Fold, Met, Name, Step, first_met, special_on
+from nonsmooth.continuation.march.event import (
+    BESIDE,
+    LARGEST,
+    Crossing,
+    Event,
+    Fold,
+    Met,
+    Name,
+    Step,
+    first_met,
+    special_on,
+)
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.equilibrium import Equilibria
 from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
@@ -40,8 +51,6 @@ from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.primitive import is_doubled
 from nonsmooth.continuation.problems.shooting import Shooting
 from nonsmooth.errors import SystemDefinitionError
-
-__all__ = ["ENDINGS", "AlongOrbits"]
 
 POLE = 1e-2  # of a multiplier from 1 or -1: farther off it is no fold, no flip, but a contact of no length
 NOTHING = 2e-2  # of the first orbit's size: a fold there is the cycle's birth

@@ -22,8 +22,6 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.orbits import OrbitPoint
 
-__all__ = ["TOUCHES", "sliding_bifurcation"]
-
 TOUCHES = ("grazing_sliding", "adding_sliding")  # motion is tangent to a surface or an edge; else a crossing moves over
 NOTHING = 1e-9  # of a derivative: zero
 

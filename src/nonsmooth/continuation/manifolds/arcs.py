@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 
-__all__ = ["BEGIN", "Arc"]
-
 Step = Callable[[FloatArray, FloatArray], FloatArray]  # (points, guesses) -> images or preimages
 View = Callable[[FloatArray], FloatArray]
 BEGIN = 9  # points of the first segment

@@ -43,8 +43,6 @@ from nonsmooth.system.kinds import above, at_least
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ENDS", "manifolds"]
-
 ENDS = {
     "length": "The length asked for was reached.",
     "closed": "The manifold ends: its images no longer grow (it runs into another orbit).",

@@ -19,8 +19,6 @@ from nonsmooth.kernels.hybrid import codes
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
-__all__ = ["SectionMap"]
-
 RTOL = 1e-12  # where the flow is not exact
 CHUNK = 128
 STEP = 1e-7  # of the differences, in scaled states

@@ -17,11 +17,6 @@ import numpy as np
 from nonsmooth.continuation.problems.curve import Point, branch_point, tangents
 from nonsmooth.continuation.problems.solve import determinant
 
-__all__ = [
-    "BESIDE", "LARGEST", "Crossing", "Event", "Fold", "Met", "Name", "Step", "first_beyond", "first_met", "locate",
-    "special_on",
-]  # fmt: skip
-
 BEGUN = 1e-6
 ROUNDING = 1e-13  # of the numbers at both ends: smaller than this is zero, however short the step
 PLACE = 1e-11  # of a step: a bracket narrower than this is noise of solved points

@@ -13,8 +13,6 @@ from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.march.event import Event, Met, Step, first_met, special_on
 from nonsmooth.continuation.problems.curve import Place, Point, passing
 
-__all__ = ["INTERRUPTED", "Limits", "March", "Policy", "Row", "SpecialRecord", "march"]
-
 INTERRUPTED = "Interrupted: what was found until then stands"
 FIRST = 1e-3  # step
 LEAST_STEP = 1e-9

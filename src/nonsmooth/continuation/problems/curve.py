@@ -18,8 +18,6 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.solve import Factored, solve
 from nonsmooth.errors import SystemDefinitionError
 
-__all__ = ["Curve", "Place", "Point", "branch_point", "passing", "tangents"]
-
 DONE = 1e-9  # a step this small is followed by one of its square
 FARTHEST = 2.5  # times the last step: a cubic is not trusted beyond
 SMALL = 1e-6  # residual of a first guess that a small step alone makes a solution

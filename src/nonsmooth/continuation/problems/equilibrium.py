@@ -16,8 +16,6 @@ from nonsmooth.flow.mode_fields import mode_field
 from nonsmooth.flow.polytopes import Extreme
 from nonsmooth.system.system import System
 
-__all__ = ["FREE", "Equilibria", "Rest", "equilibria_near", "goes_on"]
-
 EDGE = 1e-12  # of an indicator's size: zero
 CLOSE = 1e-11
 FREE = 1e-9  # a singular value as small as this leaves its direction free

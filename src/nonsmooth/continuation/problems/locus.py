@@ -25,8 +25,6 @@ from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
 from nonsmooth.continuation.problems.solve import determinant
 
-__all__ = ["Locus"]
-
 STEP = 1e-6  # of central differences, in scaled unknowns
 KEPT = 1e-3  # in scaled unknowns: so far the gradient of psi serves Newton's method
 CLOSE = 2e-12

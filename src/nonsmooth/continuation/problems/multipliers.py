@@ -13,10 +13,6 @@ import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 
-__all__ = [
-    "EDGE", "multipliers_of", "nearest_to_one", "product_of_pairs", "stability", "stable_by", "without_own",
-]  # fmt: skip
-
 EDGE = 1e-9  # a modulus within this of 1 counts as neither
 NEUTRAL = 1e-6  # an unstable multiplier nearer to the unit circle than this is called neutral: no damping, a family
 

@@ -28,8 +28,6 @@ from nonsmooth.continuation.problems.solve import solve
 if TYPE_CHECKING:
     from nonsmooth.continuation.problems.shooting import Shooting, Solved
 
-__all__ = ["flip_coefficient", "torus_coefficient"]
-
 STEP = 1e-2  # of the orbit's size
 SHRINKS, AGREED = 5, 1e-5
 ROUNDS = 12

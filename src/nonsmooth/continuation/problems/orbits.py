@@ -21,8 +21,6 @@ from nonsmooth.system.system import System
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["OrbitPoint", "Orbits", "size_of"]
-
 GROWN = 2.0  # times its size: the motion is measured anew
 
 

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from nonsmooth.continuation.problems.shooting import Shooting, Solved
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["Path", "Walk"]
-
 ORDER = 20
 RTOL = 1e-15
 ROUNDING = 1e-13  # of an indicator's size

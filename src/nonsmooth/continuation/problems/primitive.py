@@ -15,8 +15,6 @@ from nonsmooth.continuation.problems.shooting import Shooting, Solved
 from nonsmooth.continuation.problems.signature import Round, Signature
 from nonsmooth.continuation.problems.visits import led
 
-__all__ = ["is_doubled", "primitive"]
-
 SAME = 1e-8  # of the size: states nearer than this are one state
 DOUBLED = 1e-4  # beside a flip the doubled orbit differs from the other one by a square root
 LONGEST = 64  # rounds looked for where neither the period number nor the transitions tell how many there may be

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import Log
     from nonsmooth.flow.engines.loop import Engine
 
-__all__ = ["Rounds"]
-
 RTOL = 1e-13  # where the flow is not exact
 ROUNDING = 1e-14  # of the period
 SHORT = 1e-6  # of the period: as soon after an impact follows the next one shortly before rest

@@ -30,8 +30,6 @@ from nonsmooth.flow.saltation import chained
 from nonsmooth.flow.variational import Jump, Segments, VariationalFlow
 from nonsmooth.system.system import System
 
-__all__ = ["Shooting", "Solved", "plane_across"]
-
 ROUNDING = 1e-16  # of the period
 SHORT = (0.0, 1e-6, 1e-2)  # of the period, by order: of a shorter visit the mean is taken in place of the quotient
 ON = 1e-6  # of an indicator's size: a state as near to a surface is on it

@@ -17,8 +17,6 @@ from nonsmooth.arrays import FloatArray
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["AT_ONCE", "SECTION", "Round", "Signature", "Visit"]
-
 SECTION = -1
 AT_ONCE = -2  # a row: the condition holds already where the transition before has led
 

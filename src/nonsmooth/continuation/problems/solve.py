@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 
-__all__ = ["Factored", "determinant", "solve"]
-
 LARGE = 64  # unknowns; beyond, the blocks of the visits fill a small part of the matrix
 
 

@@ -9,8 +9,6 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.variational import VariationalFlow
 
-__all__ = ["coincide", "mean_along", "one_surface"]
-
 SAME = 1e-12  # of their sizes: gradients and values of one surface
 NODES = 6
 

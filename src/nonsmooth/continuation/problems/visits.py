@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import Log
     from nonsmooth.flow.variational import Jump, VariationalFlow
 
-__all__ = ["anchored", "led", "round_of", "visits_of"]
-
 ROUNDING = 1e-13  # of an indicator's size
 BEHIND = 1e-9  # of an indicator's size: nearer to a boundary than this is on it
 

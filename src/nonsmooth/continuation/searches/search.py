@@ -13,8 +13,6 @@ from nonsmooth.kernels import before_compiling
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 
-__all__ = ["Search", "search_within"]
-
 
 class Search:
     """Seconds of a processor that this thread has spent, compiling apart; :meth:`look` counts them and ends the search.

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from nonsmooth.flow.engines.loop import Engine
     from nonsmooth.system.system import System
 
-__all__ = ["CLOSED", "NEAR", "Guess", "autonomous_guesses", "forced_guesses", "settle_forced", "touching"]
-
 CHOICE = 6  # candidates tried: period numbers, or returning points for a given one
 CLOSED = 1e-8  # a return nearer than this has closed: the shortest such period comes first
 TOUCH = 1e-6  # of the period, of the motion's size: a contact as short, an impact as weak as this may be a touch

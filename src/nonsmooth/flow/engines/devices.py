@@ -13,8 +13,6 @@ from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.patterns import PatternEngine
 from nonsmooth.flow.engines.series import SeriesEngine
 
-__all__ = ["BATCH", "batch_size", "engine_on_gpu", "gpu_name", "on_gpu"]
-
 BATCH = 65536  # trajectories of one chunk of work on a GPU
 SERIES = ("taylor",)  # methods of the series kernels that a GPU runs
 PER_MULTIPROCESSOR = 512  # of one launch: twice what its registers hold, so that a small GPU is not busy for long

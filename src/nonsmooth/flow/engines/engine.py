@@ -9,9 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.kernels.hybrid.kept import Kept, Section
-
-__all__ = ["NO_CHANGES", "Changes", "Kept", "Log", "Section", "State"]
 
 IntArray = NDArray[np.int64]
 

@@ -11,8 +11,6 @@ import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept
 
-__all__ = ["OnGpu", "States", "batches"]
-
 
 @dataclass
 class States:

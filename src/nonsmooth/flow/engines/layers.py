@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["Layers", "layers"]
-
 # A term of degree d grows like exp(d r) where the states grow like exp(r); its series shows that from the order d r on,
 # and r stays below 1.5 on a step of any order used here (the last term would not be small otherwise).
 LOW_DEGREE = 4

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearForm
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["LinearEngine", "PlanarEngine", "is_linear"]
-
 LARGEST = 64e6  # bytes of the tables of all modes
 
 

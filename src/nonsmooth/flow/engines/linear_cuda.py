@@ -13,8 +13,6 @@ from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.loop import DIVERGENCE
 from nonsmooth.kernels.hybrid import codes
 
-__all__ = ["SLICE", "PlanarOnGpu"]
-
 SLICE = 256  # section returns of one launch, at most: below a second also on a small GPU
 
 

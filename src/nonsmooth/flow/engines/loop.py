@@ -28,8 +28,6 @@ from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, OWN, TOG
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
-__all__ = ["DIVERGENCE", "Engine", "at_pause", "end_if_not_wanted", "pack_net"]
-
 DIVERGENCE = 1e9  # in units of a state's scale
 KINDS = {ALONE: places.ALONE, OWN: places.OWN, ASKS_BEHIND: places.ASKS_BEHIND}  # place 4 of ``Net.transitions``
 #: Called by the thread of a run whenever it pauses.

@@ -10,8 +10,6 @@ import numpy as np
 from nonsmooth.flow.engines.engine import FloatArray, Kept, Section, State
 from nonsmooth.kernels.hybrid.places import GROW, LOGGED, RETURNS_OF_SECTION
 
-__all__ = ["March"]
-
 PATIENCE = 50_000  # steps of a run between two looks whether somebody wants to stop it: seconds of the slowest
 _NO_STARTS = np.zeros((0, 0))
 

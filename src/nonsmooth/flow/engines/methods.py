@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
 
-__all__ = ["RTOL", "engine_for", "warn_if_coarse"]
-
 RTOL = 1e-9
 SHARPEST = 1e-15  # the relative tolerance of a Taylor series for linear modes beyond the exact flow's kernels
 

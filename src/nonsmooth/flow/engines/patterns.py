@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.patterns import Patterns
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["PatternEngine"]
-
 NEAR = 1e-9  # of the terms of a condition: what is no more may be zero
 MOST = 1024  # patterns for which room is made at first
 SECTION = np.array([(0, 1, 1), (0, -1, 1)], dtype=np.int64)  # the last rows of a transition table

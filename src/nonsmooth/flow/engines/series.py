@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.codegen.generate import CompiledModel
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["SeriesEngine", "order_for"]
-
 
 def order_for(rtol: float, fixed_step: bool = False) -> int:
     """Order of the Taylor series for a tolerance: p = ceil(1 - ln(rtol) / 2) (Jorba and Zou 2005), and 3 more; 4 to 22.

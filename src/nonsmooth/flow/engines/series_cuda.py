@@ -13,8 +13,6 @@ from nonsmooth.flow.engines.series_tables import Tables
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.series.places import METHODS
 
-__all__ = ["PART", "STEPS", "SeriesOnGpu", "module_of"]
-
 STEPS = 1024  # of one launch, at most: below a second also on a small GPU
 PART = 0.75  # of ``devices.batch_size`` in one launch: what the registers hold by the compiler's choice (168 of each)
 

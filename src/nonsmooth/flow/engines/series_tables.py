@@ -13,8 +13,6 @@ from nonsmooth.flow.engines.engine import FloatArray
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["Tables", "periods", "work_of"]
-
 
 @dataclass(frozen=True)
 class Tables:

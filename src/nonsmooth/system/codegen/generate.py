@@ -19,11 +19,6 @@ from nonsmooth.system.codegen.jet import jet_code
 from nonsmooth.system.symbolic.printing import Printer, assignments
 from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = [
-    "MOST_MODELS", "SIGNATURES", "CompiledModel", "compile_model", "constants_of", "function_of", "model_source",
-    "scalar_code", "unpacked",
-]  # fmt: skip
-
 MOST_MODELS = 32  # whose code is kept though nobody uses it: a third of a MB each
 # mode, [order,] t, u, q and what is written; q holds the parameters, then the memory.
 SIGNATURES = {

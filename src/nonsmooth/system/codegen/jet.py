@@ -16,8 +16,6 @@ from nonsmooth.system.codegen.recurrences import Sum
 from nonsmooth.system.codegen.series import CornerError, Linear, Series
 from nonsmooth.system.symbolic.printing import Printer
 
-__all__ = ["JetCode", "jet_code", "jet_steps"]
-
 
 @dataclass(frozen=True)
 class JetCode:

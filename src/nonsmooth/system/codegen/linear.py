@@ -22,8 +22,6 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.system.symbolic.printing import Printer, assignments
 from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
-__all__ = ["LinearForm", "LinearTables", "apart", "linear_form", "put_together"]
-
 Terms = dict[Hashable, Expr]  # "1", "t", ("u", i), ("cos", k) or ("sin", k) -> coefficient in the parameters
 
 

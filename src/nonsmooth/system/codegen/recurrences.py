@@ -14,8 +14,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["Node", "Sum"]
-
 Sum = tuple[str, int, int]  # (weight, x, y): the sum over 0 < j < k of weight * x_j * y_(k-j)
 
 

@@ -18,8 +18,6 @@ from nonsmooth.system.codegen import recurrences
 from nonsmooth.system.codegen.recurrences import Node
 from nonsmooth.system.symbolic.printing import Printer, assignments, is_corner
 
-__all__ = ["CornerError", "Linear", "Series"]
-
 ZERO, ONE = sympy.S.Zero, sympy.S.One
 
 

@@ -23,8 +23,6 @@ from nonsmooth.system.codegen.generate import MOST_MODELS, SIGNATURES, constants
 from nonsmooth.system.codegen.jet import jet_code
 from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
-__all__ = ["VariationalModel", "touch_function", "variational_model"]
-
 ZERO, CONSTANT, VARYING = 0, 1, 2
 FOUR = 4  # columns in a vector (``kernels.lanes``)
 _JET = SIGNATURES["jet"][:-1] + ", f8[:,:,::1])"

@@ -9,8 +9,6 @@ import sympy as sp
 
 from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
 
-__all__ = ["Additions"]
-
 
 class Additions:
     """A system as lists that grow; its own transitions are left out."""

@@ -31,8 +31,6 @@ from nonsmooth.system.derived.elements import Element, Rubbing
 from nonsmooth.system.derived.elements.element import Condition, Leaving
 from nonsmooth.system.derived.place import Place
 
-__all__ = ["Assembler", "Part", "Pattern", "VaryingError", "kept"]
-
 Pattern = tuple[int, ...]  # the phase of each element
 Method = TypeVar("Method", bound=Callable[..., Any])
 DEPENDENT, INDEPENDENT = 1e-13, 1e-7  # what is left of a unit row when those before are taken away

@@ -8,8 +8,6 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.kernels import convex
 
-__all__ = ["is_symmetric", "least", "least_within"]
-
 
 def least(G: FloatArray, a: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """Minimise 1/2 x' G x + a' x between bounds, for G not negative and symmetric by factors (:mod:`.convex`)."""

@@ -27,8 +27,6 @@ from nonsmooth.system.transition import Surface, Transition
 if TYPE_CHECKING:
     from nonsmooth.system.derived.patterns import Patterns
 
-__all__ = ["assembled", "element_names"]
-
 MOST = 256  # modes that are written out
 
 

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.expressions import Expressions
     from nonsmooth.system.derived.patterns import Patterns
 
-__all__ = ["Decider"]
-
 
 class Decider:
     """Questions and answers of one system.

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.instants import Ahead, Numbers
     from nonsmooth.system.derived.place import Place
 
-__all__ = ["Outcome", "begun", "decide"]
-
 ZERO = 1e-11  # of the sum of the terms of a row: what is smaller is zero
 ROUNDS = 10_000  # of impacts one after the other
 ORDERS = 24  # derivatives that are looked at where all before are zero

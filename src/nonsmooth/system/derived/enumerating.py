@@ -18,8 +18,6 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 
-__all__ = ["Candidates", "moving_by_trial"]
-
 MOST = 4096  # combinations that are tried
 ZERO = 1e-11  # of the sum of the terms
 SAME = 1e-9  # of the sizes of rates: two motions that differ by less are one

@@ -19,8 +19,6 @@ from nonsmooth.system.names import unknown
 from nonsmooth.system.symbolic.scalar import Scalar, to_expression
 from nonsmooth.system.symbolic.tracing import Symbols, call_scalar
 
-__all__ = ["SPEED", "Expressions"]
-
 OTHER = 8  # draws from here on have other parameters too
 SPEED = sp.Symbol("speed_", real=True)  # in a law of it
 

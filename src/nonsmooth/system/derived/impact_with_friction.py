@@ -16,8 +16,6 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 
-__all__ = ["stronge"]
-
 Least = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
 TURNS = 1000  # pieces of one impact, at most
 TINY = 1e-40  # of the rates: steps of derivatives, in the imaginary part

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.expressions import Expressions
     from nonsmooth.system.derived.rows import Rows
 
-__all__ = ["Ahead", "Numbers", "RowNumbers", "SeriesCode", "SeriesNumbers"]
-
 ROUNDING = 1e-12  # of the terms of an effect: below it there is none
 OFF = 1e-7  # of numbers, to see their sizes
 

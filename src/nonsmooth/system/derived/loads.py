@@ -22,8 +22,6 @@ from nonsmooth.system.derived.expressions import SPEED, Expressions
 from nonsmooth.system.symbolic.expressions import write_expression
 from nonsmooth.system.units import Unit, product, read_unit, unit_of, write_unit
 
-__all__ = ["Load", "Loads", "loads_of"]
-
 
 @dataclass(frozen=True, eq=False)
 class Load:

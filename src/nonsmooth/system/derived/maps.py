@@ -21,8 +21,6 @@ from nonsmooth.system.condition import condition_text, read_condition
 from nonsmooth.system.system import System
 from nonsmooth.system.transition import Transition
 
-__all__ = ["Branch", "Map"]
-
 HOLD, CHOOSE = "hold", "choose"
 ESCAPED = 1e300  # a state beyond every limit: the run ends as diverged
 MOST_BORDERS = 10

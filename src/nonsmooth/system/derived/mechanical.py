@@ -20,8 +20,6 @@ from nonsmooth.system.symbolic.tracing import Symbols
 from nonsmooth.system.system import System
 from nonsmooth.system.units import product, read_unit, unit_of, write_unit
 
-__all__ = ["mechanical"]
-
 
 @checked(read=False)
 def mechanical(

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.elements.element import Leaving
     from nonsmooth.system.derived.expressions import Expressions
 
-__all__ = ["STEP", "Change", "Lead", "Patterns"]
-
 STEP = 1e-30  # of the imaginary parts that carry derivatives: its square is nothing
 
 Armed = tuple[tuple[int, int, int], ...]  # indicator, sign, strict of each condition

@@ -9,8 +9,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
     from nonsmooth.system.derived.elements import Element
 
-__all__ = ["Place"]
-
 
 @dataclass(frozen=True)
 class Place:

@@ -26,8 +26,6 @@ from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.tracing import Symbols, call_scalar, call_vector
 from nonsmooth.system.transition import Surface
 
-__all__ = ["Relays", "relays_of"]
-
 Field = tuple[sp.Expr, ...]
 Signs = tuple[int, ...]
 

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearTables
     from nonsmooth.system.derived.patterns import Patterns
 
-__all__ = ["Row", "Rows"]
-
 ROUNDING = 1e-12  # of the terms of a sum: below it the sum is zero
 ROOM = 2_000_000  # numbers of fields that are kept
 

@@ -40,8 +40,6 @@ from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.symbolic.scalar import as_written
 from nonsmooth.system.symbolic.traced import NOT_UNIQUE, Row, Traced, TracedTransition
 
-__all__ = ["repelled", "slide"]
-
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
 

@@ -32,8 +32,6 @@ from nonsmooth.system.description import Description
 from nonsmooth.system.equations import TracedBand
 from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
 
-__all__ = ["BANDS", "Smoothed", "smooth", "smoothed_indicators"]
-
 BANDS = ("linear", "tanh", "arctan")
 REACH = 19  # half widths beyond which tanh is 1 to rounding
 

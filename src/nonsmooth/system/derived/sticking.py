@@ -10,8 +10,6 @@ import sympy as sp
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.symbolic.traced import ALONE, Row, Traced, TracedTransition
 
-__all__ = ["without_sticking"]
-
 LEVEL = 1e-9  # of 1: by how much a static friction may differ from the kinetic one, given as another number
 
 

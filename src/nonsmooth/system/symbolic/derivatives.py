@@ -16,8 +16,6 @@ import sympy as sp
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["Derivatives"]
-
 Vector = tuple[sp.Expr, ...]
 Matrix = tuple[Vector, ...]
 

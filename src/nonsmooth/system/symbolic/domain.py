@@ -18,8 +18,6 @@ from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.symbolic.period import timed_expressions
 from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["Domain"]
-
 
 class _Rule:
     """One expression of the parameters and what it must be."""

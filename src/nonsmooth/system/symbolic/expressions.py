@@ -17,8 +17,6 @@ import sympy as sp
 from nonsmooth.errors import shortened
 from nonsmooth.system.symbolic.scalar import to_expression
 
-__all__ = ["read_expression", "write_expression"]
-
 _NAMES: dict[Any, str] = {
     sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.asin: "arcsin", sp.acos: "arccos", sp.atan: "arctan",
     sp.atan2: "arctan2", sp.sinh: "sinh", sp.cosh: "cosh", sp.tanh: "tanh", sp.asinh: "arcsinh",

@@ -15,8 +15,6 @@ import sympy as sp
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.symbolic.traced import Traced
 
-__all__ = ["check_period", "forcing_period", "timed_expressions"]
-
 
 def timed_expressions(traced: Traced) -> dict[str, sp.Expr]:
     """All expressions in which the time may occur, each with what it is."""

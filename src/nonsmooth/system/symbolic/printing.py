@@ -17,8 +17,6 @@ from sympy.logic.boolalg import Boolean, BooleanFalse, BooleanTrue
 
 from nonsmooth.errors import SystemDefinitionError
 
-__all__ = ["FUNCTIONS", "Printer", "assignments", "is_corner"]
-
 # Function -> its name in ``math``, and in NumPy where that differs.
 FUNCTIONS: dict[type, tuple[str, str]] = {
     sympy.sin: ("sin", "sin"),

@@ -17,8 +17,6 @@ import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 
-__all__ = ["Condition", "Scalar", "as_written", "exact", "to_expression", "where"]
-
 _DECISION = (
     "`{}` cannot be decided while the function is traced: a Python `if`, `max()`, `min()`, `np.where` on a state or "
     "the time hides a switch. Make it two modes with a transition between them; on parameters, in outputs and in "

@@ -15,11 +15,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.decider import Decider
     from nonsmooth.system.derived.patterns import Patterns
 
-__all__ = [
-    "ALONE", "ASKED", "ASKS_BEHIND", "ENDS", "FOUND", "NOT_UNIQUE", "OWN", "TOGETHER", "Row", "Traced",
-    "TracedTransition",
-]  # fmt: skip
-
 ALONE, ASKED, TOGETHER, FOUND = "alone", "asked", "together", "found"  # kinds of transitions of elements
 ENDS = ("not_unique", "no_motion")  # of a question without an answer, in the order of their statuses' codes
 OWN, ASKS_BEHIND = "own", "asks behind"  # of the system's own beside elements that are asked

@@ -14,8 +14,6 @@ from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.names import unknown
 from nonsmooth.system.symbolic.scalar import Scalar, as_written, exact, to_expression
 
-__all__ = ["Known", "Parameters", "States", "Symbols", "call_scalar", "call_vector", "refuse_corners"]
-
 # What no method can see inside a mode: the derivative jumps and nothing says where.
 _CORNERS = (sp.Abs, sp.sign, sp.Max, sp.Min, sp.Piecewise, sp.floor, sp.ceiling, sp.Heaviside)
 

@@ -14,8 +14,6 @@ from nonsmooth.system.derived.elements.element import CREEP, SMALL, Condition, E
 if TYPE_CHECKING:
     from nonsmooth.system.derived.place import Place
 
-__all__ = ["Coulomb"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Coulomb(Element):

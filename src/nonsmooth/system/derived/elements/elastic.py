@@ -13,8 +13,6 @@ from nonsmooth.system.derived.elements.element import SMALL, Condition, Contact,
 if TYPE_CHECKING:
     from nonsmooth.system.derived.place import Place
 
-__all__ = ["Backlash", "ElasticStop", "PreloadedSpring"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class ElasticStop(Contact):

@@ -18,8 +18,6 @@ from nonsmooth.errors import SystemDefinitionError, shortened
 if TYPE_CHECKING:
     from nonsmooth.system.derived.place import Place
 
-__all__ = ["CREEP", "SLOW", "SMALL", "Condition", "Contact", "Element", "Law", "Leaving"]
-
 SMALL = 1e-4  # of the states' scale: what a rate or a gap that is held at zero may be off where a run begins
 CREEP = 1e-7  # of the same: the speed of approach below which impacts are not followed
 SLOW = 1e-5  # of the same: the speed at which a preloaded spring still takes hold

@@ -13,8 +13,6 @@ from nonsmooth.system.derived.elements.element import Condition, Element, Law, L
 if TYPE_CHECKING:
     from nonsmooth.system.derived.place import Place
 
-__all__ = ["RUBS", "Rubbing"]
-
 RUBS = "_friction"  # ends its name, behind that of the stop
 
 

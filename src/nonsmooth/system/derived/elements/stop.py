@@ -13,8 +13,6 @@ from nonsmooth.system.derived.elements.rubbing import RUBS, Rubbing
 if TYPE_CHECKING:
     from nonsmooth.system.derived.place import Place
 
-__all__ = ["Stop"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Stop(Contact):
