@@ -11,7 +11,7 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
-from nonsmooth.diagrams.lyapunov import kaplan_yorke
+from nonsmooth.diagrams.spectrum import kaplan_yorke
 from nonsmooth.elements import Coulomb, Stop
 
 DEFECT = 1e-10

@@ -7,10 +7,11 @@ import pytest
 from random_systems import Template, draw, growing
 
 import nonsmooth as ns
-from nonsmooth.flow.engines.engine import Section, State
+from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.linear import LinearEngine, PlanarEngine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.engines.series import SeriesEngine
+from nonsmooth.kernels.hybrid.kept import Section
 
 
 def yielding() -> Template:

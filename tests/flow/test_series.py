@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engines.engine import Kept, Log, Section, State
+from nonsmooth.flow.engines.engine import Log, State
 from nonsmooth.flow.engines.series import SeriesEngine, order_for
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.system.mode import Mode
 from nonsmooth.system.system import System
 from nonsmooth.system.transition import Transition

@@ -10,6 +10,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.elements import Coulomb, ElasticStop, Stop
+from nonsmooth.flow.engines.patterns import PatternTables
 from nonsmooth.system.derived import combinations
 
 LAW = {"w": 0.3, "mu": 0.3}  # impacts, rest, slip and stick in each period
@@ -121,3 +122,39 @@ def test_what_cannot_be_done_with_patterns_is_refused(both: tuple[ns.System, ns.
             states=["x", "v"], parameters={}, modes={"a": lambda t, u, p: (u.v, -u.x)},
             indicators={"middle": lambda t, u, p: u.x}, elements=[Stop(gap=lambda t, u, p: 1 - u.x, on={"v": -1.0})],
         )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_instant_asks_the_elements_that_it_concerns(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Six masses in a row with contacts of their own: the same crossings to the last bit as where all are asked."""
+    rng = np.random.default_rng(seed)
+    stiffness = 2.0 * np.eye(6) - np.eye(6, k=1) - np.eye(6, k=-1)
+    elements: dict[str, Any] = {}
+    for i in range(1, 7):
+        if rng.random() < 0.6:
+            elements[f"rub{i}"] = Coulomb(at=f"q{i}", friction=rng.uniform(0.02, 0.1), static=rng.uniform(0.1, 0.2))
+        if rng.random() < 0.7:
+            elements[f"wall{i}"] = Stop(at=f"q{i}", position=rng.uniform(0.05, 0.3), restitution=rng.uniform(0.0, 0.6))
+
+    def row() -> ns.System:
+        return ns.mechanical(
+            np.eye(6), 0.1 * stiffness, stiffness, parameters={"w": 0.6},
+            forcing={f"q{i}": lambda t, p: np.cos(p.w * t) for i in (1, 4)}, elements=elements,
+        )  # fmt: skip
+
+    monkeypatch.setattr(combinations, "MOST", 0)
+    asked: list[bool] = []
+    concerned = PatternTables._concerned
+
+    def counted(*arguments: Any) -> Any:
+        found = concerned(*arguments)
+        asked.append(found is not None and len(found) < len(elements))
+        return found
+
+    monkeypatch.setattr(PatternTables, "_concerned", counted)
+    some = ns.simulate(row(), periods=8, samples=9)
+    monkeypatch.setattr(PatternTables, "_concerned", lambda *arguments: None)
+    every = ns.simulate(row(), periods=8, samples=9)
+    assert sum(asked) > 20
+    np.testing.assert_array_equal(some["crossing_time"].values, every["crossing_time"].values)
+    np.testing.assert_array_equal(some["u"].values, every["u"].values)

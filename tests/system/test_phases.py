@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engines.engine import Section, State
+from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.kernels.hybrid.kept import Section
 
 
 def heater(duty: float = 0.3, **more: float) -> ns.System:

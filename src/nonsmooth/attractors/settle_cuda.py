@@ -14,7 +14,7 @@ import numpy as np
 
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.flow.engines.devices import batch_size
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Section
+from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.flow.engines.launches import States, batches
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.linear_cuda import SLICE, PlanarOnGpu
@@ -22,6 +22,7 @@ from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.series import SeriesEngine
 from nonsmooth.flow.engines.series_cuda import PART, SeriesOnGpu
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.kept import Kept, Section
 
 if TYPE_CHECKING:
     from nonsmooth.attractors.settler import Settler

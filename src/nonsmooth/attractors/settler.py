@@ -19,7 +19,7 @@ from nonsmooth.attractors.settle_cuda import separate_on_gpu, settle_on_gpu
 from nonsmooth.attractors.settled import ROUNDED, Settled, least_sizes, usable
 from nonsmooth.attractors.trace import Trace, mode_at
 from nonsmooth.flow.engines.devices import engine_on_gpu, on_gpu
-from nonsmooth.flow.engines.engine import FloatArray, Section, State
+from nonsmooth.flow.engines.engine import FloatArray, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import RTOL, engine_for
 from nonsmooth.flow.loads import meter_of
@@ -27,6 +27,7 @@ from nonsmooth.flow.options import Settling, Solver, longest_period, solver_of
 from nonsmooth.flow.scales import LEAST
 from nonsmooth.flow.sections import section_plan
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.kept import Section
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.phases import varying_phases
 

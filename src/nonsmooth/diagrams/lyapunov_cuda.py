@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.flow.engines.devices import batch_size
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, Section
+from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.flow.engines.launches import States
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.linear_cuda import PlanarOnGpu
+from nonsmooth.kernels.hybrid.kept import Section
 
 
 def growth_on_gpu(

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.flow.engines.engine import FloatArray, Section, State
+from nonsmooth.flow.engines.engine import FloatArray, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.equilibria import Equilibrium, equilibrium_at
 from nonsmooth.flow.loads import meter_of
 from nonsmooth.flow.spectrum import Frame
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.kept import Section
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

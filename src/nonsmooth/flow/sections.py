@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from nonsmooth.errors import shortened
-from nonsmooth.flow.engines.engine import Section
+from nonsmooth.kernels.hybrid.kept import Section
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import above, at_least
 

@@ -19,7 +19,8 @@ from typing import Any, TypedDict
 
 from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.errors import DataFileError, not_installed
-from nonsmooth.flow.arguments import real_number, whole_number
+from nonsmooth.flow.arguments import real_number
+from nonsmooth.system.kinds import whole_number
 from nonsmooth.system.names import check_keys
 
 MAX_FILE_BYTES = 1 << 30  # read whole into memory, so that the hash is that of what was read

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.flow.engines.engine import Section, State
+from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.kept import Section
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

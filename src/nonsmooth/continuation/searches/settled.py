@@ -17,11 +17,12 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.signature import Round, Signature, Visit
 from nonsmooth.continuation.problems.visits import anchored, round_of
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.engines.engine import IntArray, Log, Section, State
+from nonsmooth.flow.engines.engine import IntArray, Log, State
 from nonsmooth.flow.equilibria import AT_REST, ROUNDING, equilibrium_at
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.kept import Section
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.searches.search import Search

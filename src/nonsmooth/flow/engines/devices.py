@@ -7,11 +7,11 @@ import os
 from typing import Any
 
 from nonsmooth.errors import not_installed
-from nonsmooth.flow.engines.engine import Section
 from nonsmooth.flow.engines.linear import LinearEngine, PlanarEngine
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.patterns import PatternEngine
 from nonsmooth.flow.engines.series import SeriesEngine
+from nonsmooth.kernels.hybrid.kept import Section
 
 BATCH = 65536  # trajectories of one chunk of work on a GPU
 SERIES = ("taylor",)  # methods of the series kernels that a GPU runs

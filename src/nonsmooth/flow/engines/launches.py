@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept
+from nonsmooth.flow.engines.engine import FloatArray, IntArray
+from nonsmooth.kernels.hybrid.kept import Kept
 
 
 @dataclass

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Section
+from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.flow.engines.launches import OnGpu, States
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.loop import DIVERGENCE
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.kept import Kept, Section
 
 SLICE = 256  # section returns of one launch, at most: below a second also on a small GPU
 

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import NO_CHANGES, Changes, FloatArray, Kept, Log, Section, State
+from nonsmooth.flow.engines.engine import NO_CHANGES, Changes, FloatArray, Log, State
 from nonsmooth.flow.engines.march import March
 from nonsmooth.kernels.hybrid import codes, places
+from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, FIRED, MODE, RESET, STARTS, TIME, TOUCHES, WAITS
 from nonsmooth.kernels.hybrid.stopping import flag
 from nonsmooth.results.memory import room_for

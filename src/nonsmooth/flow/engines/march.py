@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, Kept, Section, State
+from nonsmooth.flow.engines.engine import FloatArray, State
+from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.hybrid.places import GROW, LOGGED, RETURNS_OF_SECTION
 
 PATIENCE = 50_000  # steps of a run between two looks whether somebody wants to stop it: seconds of the slowest

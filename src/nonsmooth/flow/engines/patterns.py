@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import Changes, FloatArray, IntArray, Kept, Log, Section, State
+from nonsmooth.flow.engines.engine import Changes, FloatArray, IntArray, Log, State
 from nonsmooth.flow.engines.linear import table_bytes
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.march import March
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.hybrid.places import DEAD_END, MODE, RESET, STARTS, TIME, WAITS
 from nonsmooth.results.memory import free_memory, room_for
 from nonsmooth.system.codegen.linear import apart, put_together

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, Kept, Section
+from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.flow.engines.launches import OnGpu, States
 from nonsmooth.flow.engines.series import SeriesEngine
 from nonsmooth.flow.engines.series_tables import Tables
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.series.places import METHODS
 
 STEPS = 1024  # of one launch, at most: below a second also on a small GPU

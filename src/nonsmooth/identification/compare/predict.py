@@ -12,7 +12,7 @@ from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.attractors.mapper import Mapper
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.attractors.settler import Settler
-from nonsmooth.flow.engines.engine import Kept, Section, State
+from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.options import longest_period
@@ -23,6 +23,7 @@ from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.orbits import fold, mean_orbit
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.results.statuses import by_code
 
 if TYPE_CHECKING:
