@@ -202,8 +202,8 @@ FACTS: dict[str, Callable[[Any, dict[str, Any]], bool]] = {
 
 
 def verbs() -> set[str]:
-    """Names of the functions that the package exports."""
-    return {name for name in ns.__all__ if name.islower() and callable(getattr(ns, name))}
+    """Names of the functions that the package exports, and of the one that its study brings."""
+    return {"identify"} | {name for name in ns.__all__ if name.islower() and callable(getattr(ns, name))}
 
 
 def main() -> int:

@@ -250,7 +250,7 @@ def sensitivity(
     asked = as_called(locals())
     drive = driven(system, inputs)
     course = None if drive is None else drive.at(system.values)
-    names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
+    names = tuple(parameters)
     flow = VariationalFlow.of(system, names)
     _, length = run_length(system, periods, duration, system.period())
     found, log = variation(system, flow, first_state(system, start, mode), length, course)

@@ -110,7 +110,7 @@ def reader_of(what: Any) -> Reader:
     if origin is Mapping and parts[1] is not Any:
         return partial(_mapping, reader=reader_of(parts[1]))
     if origin is Sequence:
-        return partial(_sequence, reader=reader_of(parts[0]), words=in_words(what))
+        return partial(_sequence, reader=reader_of(parts[0]), words=in_words(what), names=parts[0] is str)
     if origin is Literal:
         return partial(_chosen, choices=parts)
     if what is bool:
@@ -155,7 +155,9 @@ def _mapping(value: Any, name: str, reader: Reader) -> dict[Any, Any]:
     return {key: reader(one, f"{name}[{key!r}]") for key, one in _instance(value, name, Mapping, "a mapping").items()}
 
 
-def _sequence(value: Any, name: str, reader: Reader, words: str) -> Sequence[Any]:
+def _sequence(value: Any, name: str, reader: Reader, words: str, names: bool) -> Sequence[Any]:
+    if names and isinstance(value, str):  # one name is a list of one
+        return [value]
     if isinstance(value, str | bytes) or not np.iterable(value):
         raise TypeError(f"{name} must be {words}, not {shortened(value)}")
     return [reader(one, f"an entry of {name}") for one in value]

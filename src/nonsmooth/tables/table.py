@@ -95,7 +95,7 @@ def table(
     varied = {name: one for name, one in coordinates_of(data, rows).items() if name not in _BESIDE}
     if (along := data.attrs.get("parameter")) in known:  # of special points
         varied[along] = known[along]
-    names = [name for name in known if name not in varied] if columns is None else _asked(columns)
+    names = [name for name in known if name not in varied] if columns is None else list(columns)
     found = varied | {name: quantity(data, name, known) for name in names}
     frame = pd.DataFrame(_columns(data, rows, found, units))
     if rows == ("parameter",) and "units" in (record := _record(data)):
@@ -104,12 +104,6 @@ def table(
     if target is not None:
         _write(frame, target)
     return frame
-
-
-def _asked(columns: Any) -> list[str]:
-    if isinstance(columns, str):
-        raise TypeError(f"columns is a list of names: [{columns!r}]")
-    return list(columns)
 
 
 def _columns(

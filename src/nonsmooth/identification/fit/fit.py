@@ -154,8 +154,8 @@ def fit(
     )  # fmt: skip
 
 
-def _profiles(problem: Windows, given: str | Sequence[str]) -> list[str]:
-    names = [given] if isinstance(given, str) else list(given)
+def _profiles(problem: Windows, given: Sequence[str]) -> list[str]:
+    names = list(given)
     for name in names:
         if name not in problem.unknowns.names:
             raise ValueError(f"profile: {unknown(name, 'an unknown', 'this fit', list(problem.unknowns.names))}")

@@ -94,7 +94,7 @@ def read_unknowns(
         raise ValueError(f"the phase of {system.name!r} cannot be found: it has no forcing period; leave 'phase' out")
     active = tuple(name for name in given if name in system.values)
     of_sensors = tuple((q, what) for name in given if "." in name for q, what in [name.split(".", 1)])
-    own = [per_run] if isinstance(per_run, str) else list(per_run)
+    own = list(per_run)
     for name in own:
         if name not in given:
             raise ValueError(f"per_run: {unknown(name, 'an unknown', 'this fit', dict.fromkeys(given, ''))}")
