@@ -172,7 +172,10 @@ class Meter:
         closed = gap <= CLOSED * np.array([size[some].max(initial=0.0) for some in self.places])
         jumps = (np.abs(change) > ZERO * size).any(axis=1)
         impulses = np.zeros(gap.shape)
-        for c in np.flatnonzero(jumps & closed.any(axis=1)):
+        lone = jumps & (closed.sum(axis=1) == 1) & ~closed[:, self.rubs].any(axis=1)
+        at, which = np.nonzero(closed & lone[:, None])
+        impulses[at, which] = _single(D[at, which], change[at])
+        for c in np.flatnonzero(jumps & closed.any(axis=1) & ~lone):
             some = np.flatnonzero(closed[c])
             rubs = some[self.rubs[some]]
             found = _least(np.concatenate([D[c, some], -D[c, rubs]]).T, change[c])  # a friction's has either sign
@@ -294,20 +297,24 @@ def _highest(values: FloatArray, back: FloatArray) -> list[float]:
     return found
 
 
+def _single(D: FloatArray, change: FloatArray) -> FloatArray:
+    """The impulses of one contact each, at many instants; zeros where the change of states is not along its own."""
+    impulses = np.maximum((D * change).sum(axis=1) / np.maximum((D * D).sum(axis=1), 1e-300), 0.0)
+    left = np.abs(change - impulses[:, None] * D).max(axis=1, initial=0.0)
+    return np.where(left <= ALONE * np.abs(change).max(axis=1, initial=0.0), impulses, 0.0)
+
+
 def _least(D: FloatArray, change: FloatArray) -> FloatArray:
     """The impulses, not negative and of least norm, that make a change of states; zeros where none do."""
     from scipy.optimize import nnls
 
-    if D.shape[1] == 1:
-        impulses = np.maximum(D.T @ change / np.maximum((D * D).sum(axis=0), 1e-300), 0.0)
-    else:
-        size = np.abs(D).max()
-        impulses = nnls(np.vstack([D, 1e-7 * size * np.eye(D.shape[1])]), np.append(change, np.zeros(D.shape[1])))[0]
-        bearing = impulses > 1e-6 * impulses.max(initial=0.0)
-        exact = np.linalg.lstsq(D[:, bearing], change, rcond=1e-10)[0]
-        if (exact >= 0.0).all():
-            impulses = np.where(bearing, 0.0, impulses)
-            impulses[bearing] = exact
+    size = np.abs(D).max()
+    impulses = nnls(np.vstack([D, 1e-7 * size * np.eye(D.shape[1])]), np.append(change, np.zeros(D.shape[1])))[0]
+    bearing = impulses > 1e-6 * impulses.max(initial=0.0)
+    exact = np.linalg.lstsq(D[:, bearing], change, rcond=1e-10)[0]
+    if (exact >= 0.0).all():
+        impulses = np.where(bearing, 0.0, impulses)
+        impulses[bearing] = exact
     left = np.abs(change - D @ impulses).max()
     return impulses if left <= ALONE * np.abs(change).max() else np.zeros(D.shape[1])
 
