@@ -91,7 +91,7 @@ class Engine(ABC):
         """Tables and row under which point i is run; the state's mode gets the number that it has there."""
         return tables, i
 
-    def leave(self, here: Any, state: State) -> None:  # noqa: B027
+    def leave(self, here: Any, state: State) -> None:  # noqa: B027  most engines number modes as the system does
         """The reverse of :meth:`enter`, for a state."""
 
     def go_on(self, tables: Any, march: March, system: Any) -> bool:
@@ -131,7 +131,7 @@ class Engine(ABC):
         work.tally[WAITS] = taken + 1
         return taken
 
-    def renew(self) -> None:  # noqa: B027
+    def renew(self) -> None:  # noqa: B027  most engines hold nothing of this kind
         """Let go of what depends on the transitions, of which there are more now."""
 
     def memory_in(self, work: Any) -> FloatArray:

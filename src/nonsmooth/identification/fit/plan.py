@@ -111,16 +111,14 @@ def plan_experiment(
     names: list[str] = []
     found, precision, theta = [], np.zeros((0, 0)), np.zeros(0)
     for name, run in runs.items():
-        for key in run:
-            if key not in _OF_A_RUN:
-                raise ValueError(f"runs[{name!r}]: {unknown(key, 'a property', 'a run', dict.fromkeys(_OF_A_RUN, ''))}")
+        for key in sorted(run.keys() - {*_OF_A_RUN}):
+            raise ValueError(f"runs[{name!r}]: {unknown(key, 'a property', 'a run', _OF_A_RUN)}")
         names, told, precision, theta = _information(system, str(name), run, parameters, sensors, noise, options)
         found.append(told)
     alone = np.array([_uncertainties(one + precision) for one in found])
     size = np.where(theta != 0, np.abs(theta), 1.0)
     order, totals = _ordered(found, precision, size)
-    labels = np.array(list(map(str, runs)), dtype=object)
-    units = np.array(_units(system, names), dtype=object)
+    labels, units = (np.array([*map(str, each)], dtype=object) for each in (runs, _units(system, names)))
     return xr.Dataset(
         {
             "uncertainty": labelled(("run", "parameter"), alone, "standard uncertainty by this run"),
@@ -129,9 +127,7 @@ def plan_experiment(
                 [_log_det(one + precision, size) for one in found],
                 "log det of the information, in units of the parameters' values",
             ),
-            "best": labelled(
-                "parameter", labels[np.argmin(alone, axis=0)].astype(str), "run with the least uncertainty"
-            ),
+            "best": labelled("parameter", labels[alone.argmin(axis=0)].astype(str), "run with the least uncertainty"),
             "information": labelled(("run", "parameter", "other"), np.array(found), "Fisher information"),
             "order": labelled("step", labels[order].astype(str), "run that adds most to the determinant"),
             "uncertainty_after": labelled(
