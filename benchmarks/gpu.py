@@ -149,7 +149,7 @@ def one_launch(plane: str, side: int, returns: int = 256) -> float:
 def timed(flops: dict[str, Any]) -> list[str]:
     name, most = peak()
     lines = [
-        f"## Speed on {name}, FP64 peak {most / 1e12:.1f} TFLOP/s by its clock and units", "",
+        f"On {name}, FP64 peak {most / 1e12:.1f} TFLOP/s by its clock and units:", "",
         "| plane | points | periods/s of one launch | of the peak | chart of every period: s, periods/s |"
         " chart stopping early: s, points/s |",
         "|---|---|---|---|---|---|",
@@ -189,9 +189,9 @@ def parts(options: argparse.Namespace) -> Iterator[list[str]]:
     yield ["## Against the processor", ""]
     for plane in PLANES:
         yield compared(plane, options.side)
-    yield ["", *timed(flops)]
-    yield ["## The relief valve", "", *gpu_valve.compared()]
-    yield gpu_valve.timed(valve, peak()[1])
+    yield gpu_valve.compared()
+    yield ["## Speed", "", *gpu_valve.timed(valve, peak()[1])]
+    yield timed(flops)
 
 
 def main() -> int:

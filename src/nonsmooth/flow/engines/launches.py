@@ -64,10 +64,8 @@ class OnGpu:
 
     def launch(self, entry: Any, jobs: IntArray, *arguments: Any) -> None:
         """One thread for each job, in blocks of ``threads``; waits for nothing."""
-        from numba.core.errors import NumbaPerformanceWarning
-
-        with warnings.catch_warnings():  # a few threads on a large GPU: Numba warns of it
-            warnings.simplefilter("ignore", NumbaPerformanceWarning)
+        with warnings.catch_warnings():  # a few threads on a large GPU: Numba warns of it, in a class of its own
+            warnings.filterwarnings("ignore", message=".*low occupancy")
             configured = entry[-(-len(jobs) // self.threads), self.threads]
         configured(self.cuda.to_device(jobs), *arguments)
 
