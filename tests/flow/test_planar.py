@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 from linear_flow import LinearFlow
 
 import nonsmooth as ns
@@ -284,6 +285,28 @@ def test_touches_of_a_damped_free_motion(method: str) -> None:
     assert np.max(np.abs(run["touch_time"] - t)) < 1e-7
     assert np.max(np.abs(run["touch_clearance"] - (g - np.exp(-a * t)))) < (5e-12 if method == "rkf45" else 1e-12)
     assert np.max(np.abs(run["touch_u"].sel(state="x") - np.exp(-a * t))) < (5e-12 if method == "rkf45" else 1e-12)
+
+
+@pytest.mark.parametrize("method", ["exact", "taylor"])
+def test_touches_of_a_friction_are_where_its_limit_is_nearly_reached(method: str) -> None:
+    """Held by friction under F cos w t the limit mu is missed by mu - F at each t = pi k / w, by either sign in turn;
+    with F > mu it slips and sticks again, and where it slips nothing is merely touched."""
+
+    def run(F: float) -> xr.Dataset:
+        system = ns.mechanical(
+            1.0, 0.1, 1.0, parameters={"F": F, "w": 0.5}, forcing={"q": lambda t, p: p.F * np.cos(p.w * t)},
+            elements={"rub": ns.elements.Coulomb(at="q", friction=0.6)},
+        )  # fmt: skip
+        return ns.simulate(system, duration=60.0, start={"q": 0.0}, method=method, **METHODS[method])
+
+    held = run(0.59)
+    assert held["crossing_time"].size == 0
+    np.testing.assert_allclose(held["touch_time"], 2 * np.pi * np.arange(1, 10), atol=1e-6)
+    np.testing.assert_allclose(held["touch_clearance"], 0.01, atol=1e-10)
+    assert (np.diff(held["touch_indicator"]) != 0).all()
+    slips = run(1.0)
+    assert slips["crossing_time"].size > 15
+    assert slips["touch_time"].size == 0
 
 
 def test_an_impact_that_meets_the_end_of_a_step_every_period_is_no_chatter():

@@ -259,7 +259,8 @@ class Engine(ABC):
         tally = system[3].tally
         n_c, n_t = tally[CROSSINGS], tally[TOUCHES]
         times, transitions, before, after, memory = [part[:n_c].copy() for part in crossings] if n_c else self._none[1]
-        touch_times, indicators, touch_u, clearances = [part[:n_t].copy() for part in touches] if n_t else self._none[2]
+        by_time = np.argsort(touches[0][:n_t], kind="stable")  # those of a segment come by condition
+        touch_times, indicators, touch_u, clearances = [part[by_time] for part in touches] if n_t else self._none[2]
         _, sample_u, sample_memory, sample_mode, sample_segment = sampled
         if self._some_lacking:
             lacking, jumps = self.lacking == 1, self.traced.transitions

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from numba import types
 
+from nonsmooth.kernels.compile.cache import device
 from nonsmooth.kernels.hybrid.kept import Kept
 
 _i, _f = types.int64, types.float64
@@ -75,6 +76,16 @@ class Net(NamedTuple):
     meets: Any  # (functionals) that are asked for together with others where they vanish, those of each mode in turn
     meets_start: Any  # (modes + 1,)
     together: Any  # (modes,) the transition that is asked then, or -1
+
+
+@device
+def asked_before(net, mode, j, f, sign):
+    """Return whether a transition of the mode before the j-th in its list has this condition too."""
+    found = False
+    for k in range(net.mode_start[mode], j):
+        for r in range(net.row_start[net.mode_list[k]], net.row_start[net.mode_list[k] + 1]):
+            found = found or (net.rows[r, 0] == f and net.rows[r, 1] == sign)
+    return found
 
 
 class Work(NamedTuple):

@@ -6,15 +6,15 @@ from nonsmooth.kernels.compile.cache import device, inline, once
 from nonsmooth.kernels.hybrid.places import LONGEST_STEP, MODE, TIME
 from nonsmooth.kernels.linear.sums import at, dot
 from nonsmooth.kernels.linear.tables import STATES, sizes_at, states_of, width_of
-from nonsmooth.kernels.linear.values import EPS, rounding, slope_of, value_of
+from nonsmooth.kernels.linear.values import EPS, noise, rounding, slope_of, value_of
 
 TOGETHER = 1e-11 / (16.0 * EPS)  # in units of rounding: of one instant
 
 
-@device
-def flat(tables, mode, f, work):
+@inline
+def flat(tables, mode, f, w, work):
     """Return whether the slope of functional f is zero within rounding at w, and of the step that led there."""
-    n, m, w = states_of(tables.field), width_of(tables.field), work.w
+    n, m = states_of(tables.field), width_of(tables.field)
     slope = fabs(slope_of(tables, mode, f, w))
     near = rounding(tables, mode, f, m, w)
     if slope > near and slope < 1e-9:
@@ -47,10 +47,10 @@ def vanishing(tables, mode, f, w):
 
 
 @inline
-def mark_zeros(tables, work, mode):
+def mark_zeros(tables, work, mode, fired):
     """Of each indicator, how many of its value, slope and further derivatives vanish within rounding at w.
 
-    Two where a stick ends, three where a contact lifts off: what is rounding there must not decide. At a crossing w
+    The value of ``fired`` does (-1: of none is that known). Two where a stick ends, three where a contact lifts off: what is rounding there must not decide. At a crossing w
     carries the rounding of the step that led there: it decides where an indicator has no constant part, such as that of
     a stop at x = 0."""
     n, m = states_of(tables.field), width_of(tables.field)
@@ -62,15 +62,13 @@ def mark_zeros(tables, work, mode):
         largest = max(largest, fabs(w[r]))
     most = 17.0 * EPS * largest  # noise is below this with every state as large as the largest
     for f in range(zero.shape[0]):
-        zero[f] = 0
-        if fun[mode, f, sizes] < 0.0:  # not asked for in this mode
-            continue
-        value = fabs(value_of(tables, mode, f, w))
-        if not value <= most * (fun[mode, f, sizes] + 0.25 * step * fun[mode, f, sizes + 1]):
-            continue
-        if value <= rounding(tables, mode, f, 0, w) + 0.25 * step * rounding(tables, mode, f, m, w):
-            zero[f] = 1
-        if zero[f] != 0 and flat(tables, mode, f, work):
+        zero[f] = 1 if f == fired else 0
+        if zero[f] == 0 and fun[mode, f, sizes] >= 0.0:  # else it is not asked for in this mode
+            value = fabs(value_of(tables, mode, f, w))
+            if value <= most * (fun[mode, f, sizes] + 0.25 * step * fun[mode, f, sizes + 1]):
+                if value <= noise(tables, mode, f, step, w):
+                    zero[f] = 1
+        if zero[f] != 0 and flat(tables, mode, f, w, work):
             zero[f], _ = vanishing(tables, mode, f, w)
 
 
@@ -80,7 +78,7 @@ def sign_after(tables, work, mode, f):
     w, zero = work.w, work.zero
     if f >= zero.shape[0] or zero[f] == 0:
         return 1 if value_of(tables, mode, f, w) > 0.0 else -1
-    if not flat(tables, mode, f, work):
+    if zero[f] == 1:
         return 1 if slope_of(tables, mode, f, w) > 0.0 else -1
     _, sign = vanishing(tables, mode, f, w)
     return sign
@@ -105,12 +103,11 @@ def holds(t, mode, tables, net, work):
 def meets_another(mode, fired, own, net, tables, work):
     """Return whether a functional vanishes at the present instant that is asked for with others, but for the one that
     fired and that of the transition which is to be taken (``own``)."""
-    found, w, m, step = False, work.w, width_of(tables.field), tables.info[mode, 0]
+    found, w, step = False, work.w, tables.info[mode, 0]
     for k in range(net.meets_start[mode], net.meets_start[mode + 1]):
         f = net.meets[k]
         if f != fired and f != own:
-            near = rounding(tables, mode, f, 0, w) + 0.25 * step * rounding(tables, mode, f, m, w)
-            if fabs(value_of(tables, mode, f, w)) <= TOGETHER * near:
+            if fabs(value_of(tables, mode, f, w)) <= TOGETHER * noise(tables, mode, f, step, w):
                 found = True
                 break
     return found
@@ -128,7 +125,7 @@ def lies_beyond(t, form, net, work):
 @inline
 def look(i, form, tables, work, mode):
     """Prepare to judge the conditions just after the present instant."""
-    mark_zeros(tables, work, mode)
+    mark_zeros(tables, work, mode, -1)
 
 
 @inline
@@ -167,7 +164,7 @@ def take(i, t, fired, form, tables, net, work):
 
     What has crossed is zero, also behind a reset that leaves it where it was; not in a mode where it is another
     quantity. ``work.wp`` keeps w just before."""
-    w, wp, zero = work.w, work.wp, work.zero
+    w, wp = work.w, work.wp
     for j in range(width_of(tables.field)):
         wp[j] = w[j]
     mode, changes = net.transitions[t, 0], net.transitions[t, 1] != 0
@@ -176,9 +173,5 @@ def take(i, t, fired, form, tables, net, work):
         apply_map(i, t, form, net, tables, work)
     if fired >= 0 and fabs(value_of(tables, mode, fired, w)) > 2.0 * off:
         fired = -1
-    mark_zeros(tables, work, mode)
-    if fired >= 0:
-        zero[fired] = 1
-        if flat(tables, mode, fired, work):
-            zero[fired], _ = vanishing(tables, mode, fired, w)
+    mark_zeros(tables, work, mode, fired)
     return mode

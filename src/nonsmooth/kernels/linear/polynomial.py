@@ -79,11 +79,16 @@ def bracketed(scr, row, order, lo, hi):
 def critical_points(scr, row, lo, hi, out):
     """Zeros of the polynomial's slope in (lo, hi), increasing; at most two per sign of its third derivative, which
     is taken to keep its sign over such a short piece."""
-    d0 = curvature_at(scr, row, lo)
-    d1 = curvature_at(scr, row, hi)
+    d0, d1 = curvature_at(scr, row, lo), curvature_at(scr, row, hi)
+    s0, s1 = slope_at(scr, row, lo), slope_at(scr, row, hi)
     pieces = 1
     middle = hi
-    if (d0 < 0.0 and d1 > 0.0) or (d0 > 0.0 and d1 < 0.0):
+    if s0 * s1 >= 0.0:
+        if not ((d0 < 0.0 and d1 > 0.0) or (d0 > 0.0 and d1 < 0.0)):
+            return 0
+        meet = s0 + d0 * (s1 - s0 - d1 * (hi - lo)) / (d0 - d1)  # the slope goes no further than its tangents
+        if meet * s0 > 0.0 and meet * s1 > 0.0:
+            return 0
         middle = bracketed(scr, row, 2, lo, hi)
         pieces = 2
     n = 0
@@ -138,6 +143,16 @@ def classify(g0, s0, g1, s1, h, bound):
     elif c1 >= 0.0 and c2 - wide >= 0.0 and c3 >= 0.0 and g1 >= 0.0:
         kind = ALWAYS
     return kind
+
+
+@inline
+def monotone(g0, s0, g1, s1, h, bound):
+    """Return whether g certainly rises, or falls, all along a piece of length h.
+
+    The slope of the Hermite cubic is off by at most sqrt(3) K h^3 / 216 (Birkhoff and Priver, 1967)."""
+    middle = 3.0 * (g1 - g0) / h - s0 - s1
+    wide = 0.00801876 * bound * h * h * h
+    return min(min(s0, s1), middle) > wide or max(max(s0, s1), middle) < -wide
 
 
 @inline

@@ -104,6 +104,12 @@ def rounding(tables, mode, f, first, w):
 
 
 @inline
+def noise(tables, mode, f, step, w):
+    """Below this functional f is zero at w within rounding, and that of the step which led there."""
+    return rounding(tables, mode, f, 0, w) + 0.25 * step * rounding(tables, mode, f, width_of(tables.field), w)
+
+
+@inline
 def to_node(tables, row, mode, node, w, out):
     """w at a node of the step, from w at its start."""
     rot, prop, n, m = tables.rot, tables.prop, states_of(tables.field), width_of(tables.field)

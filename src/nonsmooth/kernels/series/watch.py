@@ -3,6 +3,7 @@
 import nonsmooth.kernels.series.places as place
 from nonsmooth.kernels.compile.cache import once
 from nonsmooth.kernels.hybrid.places import DONE, MODE, TOUCHES
+from nonsmooth.kernels.hybrid.records import asked_before
 from nonsmooth.kernels.series.crossing import NOISE
 from nonsmooth.kernels.series.generated import values_of
 from nonsmooth.kernels.series.polynomial import (
@@ -86,15 +87,10 @@ def log_touches(step, form, net, log, tables, work):
     a, d, stack, found, u, scale = work.a, work.d, work.stack, work.found, work.dense, work.scale
     m = degree_of(form)
     mode, t, h, count = work.tally[MODE], work.memo[DONE], work.memo[place.PART], work.tally[TOUCHES]
-    begin = net.mode_start[mode]
-    for j in range(begin, net.mode_start[mode + 1]):
+    for j in range(net.mode_start[mode], net.mode_start[mode + 1]):
         for r in range(net.row_start[net.mode_list[j]], net.row_start[net.mode_list[j] + 1]):
             i, sign = rows[r, 0], rows[r, 1]
-            known = False  # the same row may stand in several transitions
-            for jj in range(begin, j):
-                for rr in range(net.row_start[net.mode_list[jj]], net.row_start[net.mode_list[jj] + 1]):
-                    known = known or (rows[rr, 0] == i and rows[rr, 1] == sign)
-            if known:
+            if asked_before(net, mode, j, i, sign):
                 continue
             mr = load(C, n + i, float(sign), m, powers, a)
             cursor, before, begun = 0.0, rise[r], False
