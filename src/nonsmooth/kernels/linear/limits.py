@@ -50,9 +50,9 @@ def vanishing(tables, mode, f, w):
 def mark_zeros(tables, work, mode, fired):
     """Of each indicator, how many of its value, slope and further derivatives vanish within rounding at w.
 
-    The value of ``fired`` does (-1: of none is that known). Two where a stick ends, three where a contact lifts off: what is rounding there must not decide. At a crossing w
-    carries the rounding of the step that led there: it decides where an indicator has no constant part, such as that of
-    a stop at x = 0."""
+    The value of ``fired`` does (-1: of none is that known). Two where a stick ends, three where a contact lifts off:
+    what is rounding there must not decide. At a crossing w carries the rounding of the step that led there: it decides
+    where an indicator has no constant part, such as that of a stop at x = 0."""
     n, m = states_of(tables.field), width_of(tables.field)
     w, zero, fun, memo, sizes = work.w, work.zero, tables.fun, work.memo, sizes_at(n, m)
     step = max(memo[LONGEST_STEP], tables.info[mode, 0])
