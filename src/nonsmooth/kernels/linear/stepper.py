@@ -87,8 +87,10 @@ def next_stop(i, form, net, section, goal, work):
 
 
 @inline
-def blocked(tables, work, mode, rows, lo, hi, h, w1):
-    """Return the first of the rows lo..hi that certainly stays <= 0 for a time h, behind which w is w1; -1: none."""
+def blocked(tables, work, mode, rows, lo, hi, h, w1, root):
+    """Return the first of the rows lo..hi that certainly stays <= 0 for a time h, behind which w is w1; -1: none.
+
+    The functional ``root`` is zero there (-1: of none is that known)."""
     w, zero = work.w, work.zero
     found = -1
     for r in range(lo, hi):
@@ -101,6 +103,8 @@ def blocked(tables, work, mode, rows, lo, hi, h, w1):
             g0 = 0.0
             if zero[f] >= 2:
                 s0 = 0.0
+        if f == root:
+            g1 = 0.0
         if classify(g0, s0, g1, s1, h, bound_at(tables, work.row, mode, f, w)) == NEVER:
             found = r
             break
@@ -121,7 +125,7 @@ def first_open(tables, net, work, mode):
         lo, hi = net.row_start[net.mode_list[k]], net.row_start[net.mode_list[k] + 1]
         if begins_with(net.rows, lo, hi, low):
             continue
-        low = blocked(tables, work, mode, net.rows, lo, hi, tables.info[mode, 0], work.w1)
+        low = blocked(tables, work, mode, net.rows, lo, hi, tables.info[mode, 0], work.w1, -1)
         if low < 0:
             place = k - net.mode_start[mode]
             break
@@ -222,7 +226,7 @@ def leg(i, form, net, section, goal, tables, work, r_max, ready, first):
         if fired >= 0 or crossed != 0:  # what counts still must happen before
             if begins_with(rows, lo, hi, low):
                 continue
-            low = blocked(tables, work, mode, rows, lo, hi, best, end)
+            low = blocked(tables, work, mode, rows, lo, hi, best, end, functional)
             if low >= 0:
                 continue
         tau = search(tables, work, mode, rows, lo, hi, sense * found[SIDE] > 0, best)
