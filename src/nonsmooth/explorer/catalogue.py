@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING
 
 from nonsmooth import models
@@ -18,12 +19,13 @@ PAPER = "discontinuous_support"
 GIVEN = "given"  # the name of a model of one's own
 
 
-def presets_of(state: State) -> dict[str, State]:
+@cache
+def presets_of(model: str) -> Mapping[str, State]:
     """Named views of a model, by the studies that are installed: the figures of the paper for its oscillator."""
-    views = {name: view for one in installed() for name, view in study(one, "views").VIEWS.get(state.model, {}).items()}
+    views = {name: view for one in installed() for name, view in study(one, "views").VIEWS.get(model, {}).items()}
     if not views:
         return {}
-    base = first_state(state.model, getattr(models, state.model)())  # whatever the page shows now
+    base = first_state(model, getattr(models, model)())  # whatever the page shows now
     found = {}
     for name, given in views.items():
         values = {key: value for key, value in given.items() if key in base.values}
@@ -119,5 +121,5 @@ class Catalogue:
         name = next((value for key, value in pairs if key == "model"), default)
         state = self.first_state(name)
         if name == PAPER and not pairs:
-            state = presets_of(state).get("Fig. 11", state)
+            state = presets_of(state.model).get("Fig. 11", state)
         return from_query(pairs, state, list(self.system(name).states))

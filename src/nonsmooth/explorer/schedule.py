@@ -149,6 +149,8 @@ class Schedule:
             self._failed.pop(running.view, None)
             if warned:
                 self._said[running.view] = running.key, warned[0]
+            self.page.sheet.keep(running, found)
+            self.go_on()  # the worker computes while this is drawn
             self.page.sheet.show(running, found)
         self.go_on()
 

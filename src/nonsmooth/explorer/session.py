@@ -221,7 +221,7 @@ class Session:
         self.past.put(self.catalogue.first_state(value))
 
     def _preset(self, name: str, value: Any) -> None:
-        known = presets_of(self.state)
+        known = presets_of(self.state.model)
         if value not in known:
             raise ValueError(f"{str(value)[:40]!r} is no figure of this model; there are: {', '.join(known)}")
         self.past.put(known[value])

@@ -54,8 +54,14 @@ class Sheet:
         for view in self.views.values():
             view.paint(dark)
 
+    def keep(self, request: Asked, found: Mapping[str, Any]) -> None:
+        """Keep an answer, which what is asked for next may follow from, where the page still shows what it is of."""
+        view = self.views[ORDER[request.view]]
+        if not view.depends(request.of, self.page.subject):
+            view.results.update(found)
+
     def show(self, request: Asked, found: Mapping[str, Any]) -> None:
-        """Draw an answer, where the page still shows what it is of."""
+        """Draw an answer, likewise."""
         view = self.views[ORDER[request.view]]
         if not view.depends(request.of, self.page.subject):
             view.show(json.loads(request.key), found)
@@ -122,7 +128,7 @@ class Sheet:
         states = [{"name": name, "html": html_of(symbols[name]), "unit": unit} for name, unit in system.states.items()]
         return {
             "models": {name: "your system" if name == GIVEN else name.replace("_", " ") for name in models},
-            "presets": list(presets_of(state)),
+            "presets": list(presets_of(state.model)),
             "parameters": rows,
             "states": states,
             "choices": {name: list(words.items()) for name, words in choices.items()},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from functools import lru_cache
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,11 +22,13 @@ _LONGEST = 12  # of the equations' modes that are shown
 
 def _short(part: Any) -> Any:
     """A part as JSON holds it: numbers with two digits behind the point, breaks of a line as None, plain words."""
+    if isinstance(part, np.ndarray):
+        return [_short(one) for one in part.tolist()]
+    if isinstance(part, tuple | list):
+        return [_short(one) for one in part]
     if isinstance(part, str):
         return _plain(part) if part.startswith("$") else part
-    if isinstance(part, tuple) or np.ndim(part):
-        return [_short(one) for one in part]
-    return part if isinstance(part, bool) else round(float(part), 2) if np.isfinite(part) else None
+    return part if isinstance(part, bool) else round(float(part), 2) if isfinite(part) else None
 
 
 def _plain(latex: str) -> str:
@@ -44,12 +47,12 @@ def moving(system: System, run: Any) -> dict[str, Any] | None:
     if made is None or not np.isfinite(run["u"].values).all():
         return None
     sketch, parts = made
-    drawn = [[_short(part) for part in parts(k)] for k in range(run.sizes["time"])]
-    still = set.intersection(*({json.dumps(part) for part in one} for one in drawn))
+    drawn = [[(json.dumps(part), part) for part in map(_short, parts(k))] for k in range(run.sizes["time"])]
+    still = set.intersection(*({text for text, _ in one} for one in drawn))
     return {
         "paper": [sketch.left - 0.1, sketch.right + 0.1, sketch.bottom, sketch.top],
-        "still": [part for part in drawn[0] if json.dumps(part) in still],
-        "frames": [[part for part in one if json.dumps(part) not in still] for one in drawn],
+        "still": [part for text, part in drawn[0] if text in still],
+        "frames": [[part for text, part in one if text not in still] for one in drawn],
     }
 
 

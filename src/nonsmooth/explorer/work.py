@@ -116,15 +116,26 @@ def periods_shown(period: int) -> int:
 
 
 def _section(job: Job) -> dict[str, Any]:
-    """Section points of the motion from a start, at a phase."""
+    """Section points of the motion from a start, at a phase, and which of the last are apart."""
     from nonsmooth.flow.engines.methods import engine_for
 
     job.heard(0.0)
     exact = engine_for(job.system, **job.options).name == "exact"
-    return {"section": ns.poincare(
+    found = ns.poincare(
         job.system, section=job.section(job["phase"]), n=_POINTS if exact else _POINTS // 5,
         transient=job["transient"], start=job["start"], **job.options,
-    )}  # fmt: skip
+    )  # fmt: skip
+    return {"section": found, "apart": distinct(found["section"].values)}
+
+
+def distinct(points: Any) -> Any:
+    """Marks of the points among the last 256 that differ from those before them by 1e-5 of their size or more."""
+    last = points[-256:]
+    close = 1e-5 * np.maximum(np.ptp(last, axis=0), np.abs(last).max(axis=0))
+    apart = np.ones(len(last), dtype=bool)
+    for k in range(1, len(last)):
+        apart[k] = not (np.abs(last[:k][apart[:k]] - last[k]) <= close).all(axis=1).any()
+    return apart
 
 
 def _sketch(job: Job) -> dict[str, Any]:

@@ -39,7 +39,8 @@ class _Curves(View):
         pieces = pieces_by_mode(np.nan_to_num(mode, nan=-1).astype(int), *cut)
         for k, source in enumerate(self.sources):
             x, y = pieces[k] if k < len(pieces) else ([], [])
-            source.data = {"x": x, "y": y}
+            if len(x) or len(source.data["x"]):  # each change is a message of its own
+                source.data = {"x": x, "y": y}
 
 
 class Portrait(_Curves):
@@ -168,9 +169,8 @@ class Section(View):
         """Draw the points: a few as large dots on the whole orbit, so that they move in it with the phase."""
         if "section" not in self.results:
             return
-        every, names = self.results["section"]["section"], (self.state.x, self.state.y)
-        points = every.sel(state=list(names)).values
-        apart = distinct(every.values)
+        names, apart = (self.state.x, self.state.y), self.results["apart"]
+        points = self.results["section"]["section"].sel(state=list(names)).values
         points = points[-len(apart) :][apart] if apart.sum() <= MOST else points
         few = len(points) <= MOST
         self.points.data = dict(zip("xy", points.T, strict=True))
@@ -225,7 +225,7 @@ class Readout(View):
         if status not in ("ok", "not_periodic"):
             fields.append(("status", status.replace("_", " ")))
         if section is not None:
-            n = int(distinct(section["section"].values).sum())
+            n = int(results["apart"].sum())
             fields.append(("section points", str(n) if n <= MOST else f"{section.sizes['iterate']}, no two alike"))
         contacts = float(judged["contacts_per_period"].values[0])
         if np.isfinite(contacts):
@@ -246,13 +246,3 @@ class Readout(View):
         """Tell nothing."""
         super().clear()
         self.page.tell("readout", [])
-
-
-def distinct(points: Any) -> Any:
-    """Marks of the points among the last 256 that differ from those before them by 1e-5 of their size or more."""
-    last = points[-256:]
-    close = 1e-5 * np.maximum(np.ptp(last, axis=0), np.abs(last).max(axis=0))
-    apart = np.ones(len(last), dtype=bool)
-    for k in range(1, len(last)):
-        apart[k] = not (np.abs(last[:k][apart[:k]] - last[k]) <= close).all(axis=1).any()
-    return apart
