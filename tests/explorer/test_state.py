@@ -69,8 +69,9 @@ def test_every_model_has_a_first_view_and_the_paper_all_its_figures() -> None:
         for parameter, value in state.values.items():
             low, high = slider_range(value)
             assert low <= value <= high, parameter
-    assert {name.split()[1] for name in presets_of(FIRST.model)} == {"9", "10", "11", "12", "13", "14", "15", "17", "18"}
-    figure = presets_of(FIRST.model)["Fig. 13"]
+    presets = presets_of(FIRST.model)
+    assert {name.split()[1] for name in presets} == {"9", "10", "11", "12", "13", "14", "15", "17", "18"}
+    figure = presets["Fig. 13"]
     assert (figure.values["omega"], figure.values["rho"], figure.over) == (11.15, 0.33, "g")
 
 
