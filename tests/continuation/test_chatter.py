@@ -68,3 +68,20 @@ def test_impacts_as_slow_as_they_are_followed() -> None:
 def test_two_impacts_pass_the_section_in_one_step() -> None:
     """Behind the first one the search for the second one began at its zero, and ended there again and again."""
     followed("two_stops", 2, 0.57, 0.6, w=0.59)
+
+
+def test_the_number_of_impacts_before_rest_is_no_event() -> None:
+    """What follows rest knows nothing of the restitution: over the whole range the mass rests at the section, the
+    extremes are the same, and only the impacts on the way become more. No special point, and no way back."""
+    system = ns.mechanical(
+        1.0, 0.1, 1.0, parameters={"w": 0.4, "r": 0.5}, forcing={"q": lambda t, p: np.cos(p.w * t)},
+        elements={"stop": ns.elements.Stop(at="q", position=0.3, restitution="r", creep=1e-7)},
+    )  # fmt: skip
+    branch = ns.continue_orbit(ns.find_orbit(system, progress=False), "r", (0.45, 0.58))
+    assert endings(branch) == ["range", "range"]
+    assert branch.sizes["special"] == 0
+    assert (np.diff(branch["r"]) > 0.0).all()
+    np.testing.assert_allclose(branch["section"], [[0.3, 0.0]] * branch.sizes["point"], atol=1e-12)
+    assert np.ptp(branch["minimum"].sel(state="q")) < 1e-12
+    few, many = (ns.simulate(system.with_parameters(r=r), periods=1, transient=20) for r in (0.45, 0.58))
+    assert many.sizes["crossing"] > few.sizes["crossing"] + 5
