@@ -80,8 +80,8 @@ def test_the_number_of_impacts_before_rest_is_no_event() -> None:
     branch = ns.continue_orbit(ns.find_orbit(system, progress=False), "r", (0.45, 0.58))
     assert endings(branch) == ["range", "range"]
     assert branch.sizes["special"] == 0
-    assert (np.diff(branch["r"]) > 0.0).all()
+    assert (np.diff(branch["r"].values) > 0.0).all()
     np.testing.assert_allclose(branch["section"], [[0.3, 0.0]] * branch.sizes["point"], atol=1e-12)
-    assert np.ptp(branch["minimum"].sel(state="q")) < 1e-12
+    assert np.ptp(branch["minimum"].sel(state="q").values) < 1e-12
     few, many = (ns.simulate(system.with_parameters(r=r), periods=1, transient=20) for r in (0.45, 0.58))
     assert many.sizes["crossing"] > few.sizes["crossing"] + 5
