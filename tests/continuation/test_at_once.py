@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from brute_force import misses
+from test_random_branches import endings
 
 import nonsmooth as ns
 
@@ -94,3 +96,17 @@ def test_an_impact_in_two_steps_is_that_in_one() -> None:
     assert found["A"].values == pytest.approx(known["A"].values, abs=1e-10)
     assert float(found["A"][0]) == pytest.approx(0.1, abs=1e-10)
     assert found["grazing"].values[0] == known["grazing"].values[0] == "non_smooth_fold"
+
+
+def test_transitions_of_one_instant_pass_the_section_together() -> None:
+    """An impact behind which friction turns at once meets the section as w is varied: the round begins behind both.
+
+    The orbits are those of simulations, through both ends of the range."""
+    system = ns.mechanical(
+        1.0, 0.1, 1.0, parameters={"w": 0.8}, forcing={"q": lambda t, p: np.cos(p.w * t)},
+        elements={"rub": ns.elements.Coulomb(at="q", friction=0.2),
+                  "stop": ns.elements.Stop(at="q", position=0.5, restitution=0.5)},
+    )  # fmt: skip
+    branch = ns.continue_orbit(ns.find_orbit(system, transient=300, progress=False), "w", (0.64, 1.0))
+    assert endings(branch) == ["range", "range"]
+    assert misses(system, branch, "w") < 1e-9

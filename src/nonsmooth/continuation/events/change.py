@@ -143,13 +143,15 @@ def past_the_section(point: OrbitPoint) -> OrbitPoint | None:
     shooting, values = point.shooting, point.values
     once = point.once
     visits, times, end = once.signature.visits, once.times, once.period
+    at_once = [visit.row == AT_ONCE for visit in visits]  # all of one instant pass together
     if int(point.path.tau.argmin()) == 0:
-        z = led(shooting.flow, values, visits[1].mode, times[0], -times[0], once.states[1])
-        moved = once.begun(1, 0.0, z)
+        i = at_once.index(False, 1)
+        z = led(shooting.flow, values, visits[i].mode, times[i - 1], -times[i - 1], once.states[i])
+        moved = once.begun(i, 0.0, z)
     else:  # the state at the section lies before that crossing now
-        before = point.solved.segments.z[-2]
-        z = led(shooting.flow, values, visits[-2].mode, times[-1], end - times[-1], before)
-        moved = once.begun(len(times) - 1, end, z)
+        i = max(k for k in range(len(times)) if not at_once[k])
+        z = led(shooting.flow, values, visits[i].mode, times[i], end - times[i], point.solved.segments.z[i])
+        moved = once.begun(i, end, z)
     fresh, X = point.curve.around(moved, point.X[-1:])
     first = fresh.nearest(X / fresh.scale, point.value)
     if first is None:
