@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.elements import Coulomb, Stop
@@ -67,3 +68,25 @@ def test_a_branch_is_that_of_a_sweep() -> None:
     for i in some:
         run = ns.simulate(rig().with_parameters({"F": loads[i]}), periods=1, transient=40, samples=2)
         assert branch["section"].values[i] == pytest.approx(run["u"].values[0], abs=1e-8)
+
+
+def test_frictions_of_one_coordinate_are_their_sum() -> None:
+    """Two or three frictions on a mass turn at one instant: orbit, multipliers and branch are those of one friction."""
+
+    def branch(*friction: float) -> xr.Dataset:
+        rubs = {f"rub{k}": ns.elements.Coulomb(at="q2", friction=mu) for k, mu in enumerate(friction)}
+        system = ns.mechanical(
+            np.eye(2), 0.1 * np.eye(2), [[2.0, -1.0], [-1.0, 2.0]], parameters={"F": 1.0, "w": 1.03},
+            forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
+            elements={**rubs, "other": ns.elements.Coulomb(at="q1", friction=0.29)},
+        )  # fmt: skip
+        return ns.continue_orbit(ns.find_orbit(system, transient=300, progress=False), "w", (0.8, 1.3))
+
+    one = branch(0.34)
+    for friction in ((0.25, 0.09), (0.1, 0.1, 0.14)):
+        several = branch(*friction)
+        assert several.sizes["special"] == one.sizes["special"] == 0
+        assert several["ended_because"].values.tolist() == one["ended_because"].values.tolist()
+        np.testing.assert_allclose(several["w"], one["w"], rtol=0, atol=1e-9)
+        for name in ("section", "maximum", "minimum", "floquet_multipliers"):
+            np.testing.assert_allclose(several[name].values, one[name].values, rtol=0, atol=1e-8, err_msg=name)

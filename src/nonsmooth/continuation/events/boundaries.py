@@ -207,7 +207,7 @@ class Unseen(Boundary):
 
     def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator of the first transition that the signature beyond has more often."""
-        return gained(point, beyond)
+        return -1 if beyond is None else gained(point, beyond)
 
 
 #: In the order of ``Path.margins``: what explains the others first.

@@ -96,8 +96,9 @@ class Walk:
                 own = set(jumps[k].rows)
                 self.elsewhere[i, k] = False
                 self.elsewhere[i, k:] &= np.array([not (jump.rows and set(jump.rows) <= own) for jump in jumps[k:]])
-            if traced.asks and r >= 0:  # what several decide fires with what one does
-                self.elsewhere[i] &= [all(one.indicator != self.net.rows[r, 0] for one in jump.rows) for jump in jumps]
+            if traced.asks and r >= 0:  # what several decide fires with what one does, of its own or of their condition
+                fired = traced.indicators[self.net.rows[r, 0]]
+                self.elsewhere[i] &= [all(traced.indicators[one.indicator] != fired for one in j.rows) for j in jumps]
         self.conditional = np.flatnonzero(self.fired_row[:-1] >= 0)
         self.at_once = np.array([*shooting.at_once, False], dtype=bool)  # visits of no length
         fixed = [shooting.forced]
@@ -118,7 +119,9 @@ class Walk:
             if self.at_once[i]:
                 self.elsewhere[i, self.fired[i] :] = False
         self.inside = self.conditional, self.fired[self.conditional]
-        self.alone = np.array(shooting.alone, dtype=bool)[self.conditional]  # no corner to watch
+        # No corner to watch: the other rows vanish with it, or belong to what stands in the table for an answer.
+        answers = [jumps[k].rows != jumps[v.transition].rows for k, v in zip(self.fired, visits, strict=True)]
+        self.alone = (np.array([*shooting.alone, False]) | answers)[self.conditional]
         self.instants = np.flatnonzero(self.at_once)
         self.every = np.arange(m)
 
