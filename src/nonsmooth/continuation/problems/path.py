@@ -120,8 +120,8 @@ class Walk:
                 self.elsewhere[i, self.fired[i] :] = False
         self.inside = self.conditional, self.fired[self.conditional]
         # No corner to watch: the other rows vanish with it, or belong to what stands in the table for an answer.
-        answers = [jumps[k].rows != jumps[v.transition].rows for k, v in zip(self.fired, visits, strict=True)]
-        self.alone = (np.array([*shooting.alone, False]) | answers)[self.conditional]
+        answers = [jumps[self.fired[i]].rows != jumps[visits[i].transition].rows for i in self.conditional]
+        self.alone = np.array(shooting.alone, dtype=bool)[self.conditional] | np.array(answers, dtype=bool)
         self.instants = np.flatnonzero(self.at_once)
         self.every = np.arange(m)
 
