@@ -9,7 +9,6 @@ import numpy as np
 
 from nonsmooth.continuation.events.change import Change, by_others, gained, inserted, is_tolerance, rest_after, without
 from nonsmooth.continuation.march.event import Event, Step, first_beyond
-from nonsmooth.continuation.problems.signature import AT_ONCE
 
 ENDS = 1e-4  # of the period: a maximum as near to a crossing belongs to it
 NO_SPEED = 1e-3  # of the steepest crossing: slower than this is a touch
@@ -99,7 +98,7 @@ class Short(Crossed):
             return []
         slope = slopes[point.curve.walk.conditional.tolist().index(i - 1)]
         slow = slope < NO_SPEED * max(float(np.abs(slopes).max()), 1e-300) or len(slopes) < 3
-        return [without(point, i - 1, 2)] if slow else []
+        return without(point, i - 1, 2) if slow else []
 
     def visit(self, point: Any) -> int:
         """The visit itself."""
@@ -113,10 +112,7 @@ class Slow(Crossed):
 
     def contacts(self, point: Any) -> list[Change]:
         """The orbit without an impact of no speed."""
-        visits, i, count = point.signature.visits, self.visit(point), 1
-        while visits[i + count].row == AT_ONCE:  # an impact made of several transitions
-            count += 1
-        return [without(point, i, count)] if visits[i + count].mode == visits[i].mode else []
+        return without(point, self.visit(point), 1)
 
     def visit(self, point: Any) -> int:
         """The visit before the slowest crossing."""
@@ -132,7 +128,7 @@ class Own(Crossed):
         if not is_tolerance(point, surface):
             return []
         found, count = by_others(point, i, surface), rest_after(point, i)
-        return found if count == 0 else [*found, without(point, i, count or 1)]
+        return found if count == 0 else [*found, *without(point, i, count or 1)]
 
     def visit(self, point: Any) -> int:
         """The visit before the crossing with the least other row."""

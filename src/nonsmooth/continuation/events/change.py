@@ -85,12 +85,17 @@ def _answers(traced: Traced, k: int) -> list[int]:
     ]  # fmt: skip
 
 
-def without(point: OrbitPoint, place: int, count: int) -> Change:
-    """The orbit without ``count`` visits that have no length, from ``place`` on."""
+def without(point: OrbitPoint, place: int, count: int) -> list[Change]:
+    """The orbit without ``count`` visits that have no length, from ``place`` on, and what happens at once behind them;
+    none where that leads to another mode."""
     contact = point.once
-    visit = contact.signature.visits[place]
-    indicator = point.shooting.system.traced.transitions[visit.transition].rows[visit.row].indicator
-    return Change(point, contact, contact.without(place, count), place, count, indicator, False)
+    visits = contact.signature.visits
+    while visits[place + count].row == AT_ONCE:
+        count += 1
+    if visits[place + count].mode != visits[place].mode:
+        return []
+    indicator = point.shooting.system.traced.transitions[visits[place].transition].rows[visits[place].row].indicator
+    return [Change(point, contact, contact.without(place, count), place, count, indicator, False)]
 
 
 def rest_after(point: OrbitPoint, place: int) -> int | None:

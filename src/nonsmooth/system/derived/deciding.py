@@ -115,7 +115,7 @@ class _Instant:
         self.contacts = [k for k in bearing if self.parts[k].element.bears]
         self.frictions = [k for k in bearing if not self.parts[k].element.bears]
         self.rates = {k: self.make.rate(k, self.mode) for k in bearing}
-        still = {k for k in bearing if self.holds(k) and self._is_still(k)}
+        self.still = still = {k for k in bearing if self.holds(k) and self._is_still(k)}
         zero = {k for k in met if self.parts[k].where is self.rates[k]} | still
         self.speeds = {k: 0.0 if k in zero else self.number(self.rates[k]) for k in bearing}
         self.places = {k: 0.0 if k in still or k in met else self.number(self.parts[k].where) for k in bearing}
@@ -264,12 +264,13 @@ class _Instant:
         return element.lies(self.places[k], self.speeds[k], slow)
 
     def _stilled(self, speeds: dict[int, float], slow: list[int]) -> dict[int, float]:
-        """The rates behind impulses of some elements that take theirs to zero."""
+        """The rates behind impulses of some elements that take theirs to zero, and of those that hold, which hold on."""
         if not slow:
             return speeds
-        off = -np.array([speeds[k] for k in slow])
-        amounts = np.linalg.lstsq(self.numbers.effects(slow, slow), off, rcond=1e-10)[0]
-        return self._behind(speeds, slow, amounts) | dict.fromkeys(slow, 0.0)
+        some = [*slow, *(k for k in speeds if k in self.still and k not in slow and speeds[k] == 0.0)]
+        off = -np.array([speeds[k] for k in some])
+        amounts = np.linalg.lstsq(self.numbers.effects(some, some), off, rcond=1e-10)[0]
+        return self._behind(speeds, some, amounts) | dict.fromkeys(some, 0.0)
 
     def _behind(self, speeds: dict[int, float], some: list[int], impulses: FloatArray) -> dict[int, float]:
         """All rates behind impulses of some elements, 0 where they are rounding."""
