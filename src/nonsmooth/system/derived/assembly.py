@@ -106,9 +106,10 @@ class Assembler(ABC):
         """One map of the states behind another."""
 
     @abstractmethod
-    def holding(self, vector: Any, rate: Any, value: Any, states: bool = False) -> Any:
+    def holding(self, vector: Any, rate: Any, value: Any, known: set[int], states: bool = False) -> Any:
         """A field, or ``states``, with the derivative of a rate, or the rate itself, as ``value``, without rounding,
-        where the rate is that of a state and constant in time: else what is left of large forces moves what rests."""
+        where the rate is constant in time and of all its states but one the entries are ``known`` so: then that one is
+        too. Else what is left of large forces moves what rests."""
 
     @abstractmethod
     def joined(self, part: Part, other: Part, share: Any) -> Part:
@@ -265,8 +266,9 @@ class Assembler(ABC):
             pulls = [self.parts[k].element.pull(self.place(k, mode, pattern)) for k in chosen]
             for part, force, extra in zip(parts, needed, self.solved(matrix, pulls), strict=True):
                 f = self.moved(f, part, force + extra)
-            for k, pull in zip(chosen, pulls, strict=True):
-                f = self.holding(f, self.rate(k, mode), pull)
+            known: set[int] = set()
+            for k, pull in [*zip(chosen, pulls, strict=True)] * len(chosen):
+                f = self.holding(f, self.rate(k, mode), pull, known)
             if len(chosen) == len(held):
                 forces |= dict(zip(held, needed, strict=True))
             else:
@@ -345,8 +347,9 @@ class Assembler(ABC):
         after = self.identity()
         for k, amount in zip(some, self.solved(self.effects(some, mode), wanted), strict=True):
             after = self.moved(after, self.parts[k], amount)
-        for k, e in zip(some, factors, strict=True):
-            after = self.holding(after, self.rate(k, mode), -e * self.rate(k, mode), states=True)
+        known: set[int] = set()
+        for k, e in [*zip(some, factors, strict=True)] * len(some):
+            after = self.holding(after, self.rate(k, mode), -e * self.rate(k, mode), known, states=True)
         return self.tidy(self.mapped(self.impact(still, mode, 0), after) if still else after)
 
     def leaving(self, k: int, mode: str, pattern: Pattern) -> list[Leaving]:

@@ -251,7 +251,8 @@ class _Instant:
             element = self.parts[k].element
             self.put(k, element.held[0] if state == HELD else element.sides[state < 0] if state else element.phases[0])
         self.pressed = {k: states.get(k) == HELD for k in self.contacts}
-        self._set_to_zero([self.parts[k].where for k in candidates if self.pressed.get(k)], None)
+        at = {k for k in self.frictions if self.places[k] == 0.0 and self.parts[k].where is not self.rates[k]}
+        self._set_to_zero([self.parts[k].where for k in candidates if self.pressed.get(k) or k in at], None)
         self._set_to_zero([self.rates[k] for k in candidates], candidates)
         if struck and slow:
             struck += tuple(len(self.parts) + k for k in self._independent([*slow, *candidates]))
@@ -264,7 +265,7 @@ class _Instant:
         return element.lies(self.places[k], self.speeds[k], slow)
 
     def _stilled(self, speeds: dict[int, float], slow: list[int]) -> dict[int, float]:
-        """The rates behind impulses of some elements that take theirs to zero, and of those that hold, which hold on."""
+        """The rates behind impulses that take those of some elements to zero; what holds holds on."""
         if not slow:
             return speeds
         some = [*slow, *(k for k in speeds if k in self.still and k not in slow and speeds[k] == 0.0)]

@@ -105,14 +105,19 @@ class Expressions(Assembler):
     def moved(self, vector: Sequence[sp.Expr], part: Part, amount: sp.Expr) -> list[sp.Expr]:
         return [entry + part.direction.get(i, 0) * amount for i, entry in enumerate(vector)]
 
-    def holding(self, vector: list[sp.Expr], rate: sp.Expr, value: sp.Expr, states: bool = False) -> list[sp.Expr]:
+    def holding(
+        self, vector: list[sp.Expr], rate: sp.Expr, value: sp.Expr, known: set[int], states: bool = False
+    ) -> list[sp.Expr]:
         slopes = [sp.diff(rate, symbol) for symbol in self.u]
-        some = [i for i, slope in enumerate(slopes) if slope != 0]
-        if len(some) != 1 or not slopes[some[0]].is_number or sp.diff(rate, self.symbols.t) != 0:
+        some = [i for i, slope in enumerate(slopes) if slope != 0 and i not in known]
+        constant = all(slope.is_number for slope in slopes) and sp.diff(rate, self.symbols.t) == 0
+        if len(some) != 1 or not constant:
             return vector
         (i,) = some
-        own = sp.expand(rate - slopes[i] * self.u[i]) if states else 0
-        return [*vector[:i], sp.expand((value - own) / slopes[i]), *vector[i + 1 :]]
+        known.add(i)
+        own = rate - sp.Add(*map(sp.Mul, slopes, self.u)) if states else 0
+        others = sp.Add(*[slope * entry for j, (slope, entry) in enumerate(zip(slopes, vector, strict=True)) if j != i])
+        return [*vector[:i], sp.expand((value - own - others) / slopes[i]), *vector[i + 1 :]]
 
     def joined(self, part: Part, other: Part, share: Any) -> Part:
         both = {*part.direction, *other.direction}

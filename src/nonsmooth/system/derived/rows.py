@@ -177,12 +177,16 @@ class Rows(Assembler):
     def moved(self, vector: FloatArray, part: Part, amount: Any) -> FloatArray:
         return vector + np.outer(part.direction, amount.values) if isinstance(amount, Row) else vector
 
-    def holding(self, vector: FloatArray, rate: Row, value: Any, states: bool = False) -> FloatArray:
-        some, waves = np.flatnonzero(rate.values[: self.n]), rate.values[self.n + 1 :]
+    def holding(
+        self, vector: FloatArray, rate: Row, value: Any, known: set[int], states: bool = False
+    ) -> FloatArray:
+        slopes, waves = rate.values[: self.n], rate.values[self.n + 1 :]
+        some = [i for i in np.flatnonzero(slopes).tolist() if i not in known]
         if len(some) == 1 and not waves.any():
-            vector, slope = vector.copy(), rate.values[some[0]]
-            vector[some[0]] = value.values / slope if isinstance(value, Row) else 0.0
-            vector[some[0], self.n] -= rate.values[self.n] / slope if states else 0.0
+            vector, i, others = vector.copy(), some[0], np.where(np.arange(self.n) == some[0], 0.0, slopes)
+            vector[i] = ((value.values if isinstance(value, Row) else 0.0) - others @ vector) / slopes[i]
+            vector[i, self.n] -= rate.values[self.n] / slopes[i] if states else 0.0
+            known.add(i)
         return vector
 
     def joined(self, part: Part, other: Part, share: Any) -> Part:
