@@ -71,7 +71,7 @@ def test_two_impacts_pass_the_section_in_one_step() -> None:
 
 
 def test_the_number_of_impacts_before_rest_is_no_event() -> None:
-    """What follows rest knows nothing of the restitution: over the whole range the mass rests at the section, the
+    """Motion behind rest knows nothing of the restitution: over the whole range the mass rests at the section, the
     extremes are the same, and only the impacts on the way become more. No special point, and no way back."""
     system = ns.mechanical(
         1.0, 0.1, 1.0, parameters={"w": 0.4, "r": 0.5}, forcing={"q": lambda t, p: np.cos(p.w * t)},
