@@ -39,7 +39,8 @@ class _Curves(View):
         pieces = pieces_by_mode(np.nan_to_num(mode, nan=-1).astype(int), *cut)
         for k, source in enumerate(self.sources):
             x, y = pieces[k] if k < len(pieces) else ([], [])
-            if len(x) or len(source.data["x"]):  # each change is a message of its own
+            before: Any = source.data["x"]
+            if len(x) or len(before):  # each change is a message of its own
                 source.data = {"x": x, "y": y}
 
 
