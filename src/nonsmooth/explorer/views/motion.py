@@ -38,9 +38,9 @@ class _Curves(View):
         mode, *cut = with_gaps(run, run["mode"].values.astype(float), xs, ys)
         pieces = pieces_by_mode(np.nan_to_num(mode, nan=-1).astype(int), *cut)
         for k, source in enumerate(self.sources):
-            x, y = pieces[k] if k < len(pieces) else ([], [])
+            x, y = pieces[k] if k < len(pieces) else (np.empty(0), np.empty(0))
             before: Any = source.data["x"]
-            if len(x) or len(before):  # each change is a message of its own
+            if x.size or len(before):  # each change is a message of its own
                 source.data = {"x": x, "y": y}
 
 
