@@ -111,6 +111,16 @@ class Assembler(ABC):
         where the rate is constant in time and of all its states but one the entries are ``known`` so: then that one is
         too. Else what is left of large forces moves what rests."""
 
+    def held_exactly(self, vector: Any, rates: list[tuple[Any, Any]], states: bool = False) -> Any:
+        """A field or states with several rates and their values (:meth:`holding`), as far as one leads to the next."""
+        known: set[int] = set()
+        before = -1
+        while before < len(known):
+            before = len(known)
+            for rate, value in rates:
+                vector = self.holding(vector, rate, value, known, states)
+        return vector
+
     @abstractmethod
     def joined(self, part: Part, other: Part, share: Any) -> Part:
         """An element whose force brings ``share`` of it along as the force of another."""
@@ -266,9 +276,7 @@ class Assembler(ABC):
             pulls = [self.parts[k].element.pull(self.place(k, mode, pattern)) for k in chosen]
             for part, force, extra in zip(parts, needed, self.solved(matrix, pulls), strict=True):
                 f = self.moved(f, part, force + extra)
-            known: set[int] = set()
-            for k, pull in [*zip(chosen, pulls, strict=True)] * len(chosen):
-                f = self.holding(f, self.rate(k, mode), pull, known)
+            f = self.held_exactly(f, [(self.rate(k, mode), pull) for k, pull in zip(chosen, pulls, strict=True)])
             if len(chosen) == len(held):
                 forces |= dict(zip(held, needed, strict=True))
             else:
@@ -347,9 +355,8 @@ class Assembler(ABC):
         after = self.identity()
         for k, amount in zip(some, self.solved(self.effects(some, mode), wanted), strict=True):
             after = self.moved(after, self.parts[k], amount)
-        known: set[int] = set()
-        for k, e in [*zip(some, factors, strict=True)] * len(some):
-            after = self.holding(after, self.rate(k, mode), -e * self.rate(k, mode), known, states=True)
+        rates = [(self.rate(k, mode), -e * self.rate(k, mode)) for k, e in zip(some, factors, strict=True)]
+        after = self.held_exactly(after, rates, states=True)
         return self.tidy(self.mapped(self.impact(still, mode, 0), after) if still else after)
 
     def leaving(self, k: int, mode: str, pattern: Pattern) -> list[Leaving]:
