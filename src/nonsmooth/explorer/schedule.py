@@ -67,14 +67,18 @@ class Schedule:
             self.worker.close()
 
     def go_on(self) -> None:
-        """Ask for what is missing, the quick first; cancel what nobody waits for any more."""
+        """Ask for what is missing; say so where nothing is."""
+        if not self.ask():
+            self.page.tell("busy", {"view": ""})
+
+    def ask(self) -> bool:
+        """Ask for what is missing, the quick first; cancel what nobody waits for any more. False: nothing is."""
         if self.worker is None:
-            return
+            return True
         if self._vain == _VAIN:
             self.page.notes["page"] = _NOT_STARTED
             self.page.tell("notes", self.page.notes)
-            self.page.tell("busy", {"view": ""})
-            return
+            return False
         wanted = {view: (spec, key_of(spec)) for view, spec in self.page.wanted().items()}
         self._tell_notes({view: key for view, (_, key) in wanted.items()})
         missing = [
@@ -90,16 +94,16 @@ class Schedule:
             if (stale or overtaken) and not quick and running.cancelled is None:
                 running.cancelled = now
                 self.worker.cancel(running.number)
-            return
+            return True
         if not missing:
-            self.page.tell("busy", {"view": ""})
-            return
+            return False
         view = missing[0]
         self._count += 1
         self._running = Asked(self._count, view, wanted[view][1], self.page.subject, now)
         self.worker.ask(self._count, wanted[view][0])
         starting = not self.done and not self._failed
         self.page.tell("busy", {"view": view, "fraction": 0, "long": starting or view not in QUICK})
+        return True
 
     def _tell_notes(self, wanted: Mapping[str, str]) -> None:
         """A sentence on a request is shown as long as that request is the one of the page."""
@@ -150,7 +154,7 @@ class Schedule:
             if warned:
                 self._said[running.view] = running.key, warned[0]
             self.page.sheet.keep(running, found)
-            self.go_on()  # the worker computes while this is drawn
+            self.ask()  # the worker computes while this is drawn
             self.page.sheet.show(running, found)
         self.go_on()
 
