@@ -153,9 +153,9 @@ class Schedule:
             self._failed.pop(running.view, None)
             if warned:
                 self._said[running.view] = running.key, warned[0]
-            self.page.sheet.keep(running, found)
-            self.ask()  # the worker computes while this is drawn
-            self.page.sheet.show(running, found)
+            if self.page.sheet.keep(running, found):
+                self.ask()  # the worker computes while this is drawn
+                self.page.sheet.show(running, found)
         self.go_on()
 
     def _restart(self, code: int) -> None:

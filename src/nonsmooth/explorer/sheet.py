@@ -54,19 +54,19 @@ class Sheet:
         for view in self.views.values():
             view.paint(dark)
 
-    def keep(self, request: Asked, found: Mapping[str, Any]) -> None:
-        """Keep an answer, which what is asked for next may follow from, where the page still shows what it is of."""
+    def keep(self, request: Asked, found: Mapping[str, Any]) -> bool:
+        """Keep an answer, from which the next request may follow; False where the page shows something else now."""
         view = self.views[ORDER[request.view]]
-        if not view.depends(request.of, self.page.subject):
+        kept = not view.depends(request.of, self.page.subject)
+        if kept:
             view.results.update(found)
+        return kept
 
     def show(self, request: Asked, found: Mapping[str, Any]) -> None:
-        """Draw an answer, likewise."""
-        view = self.views[ORDER[request.view]]
-        if not view.depends(request.of, self.page.subject):
-            view.show(json.loads(request.key), found)
-            self.views["readout"].redraw()
-            self.page.tell_ui()
+        """Draw an answer that was kept."""
+        self.views[ORDER[request.view]].show(json.loads(request.key), found)
+        self.views["readout"].redraw()
+        self.page.tell_ui()
 
     def forget(self, stage: str) -> None:
         """Take back what is said of a motion that could not be computed; its note says why."""

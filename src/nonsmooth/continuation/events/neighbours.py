@@ -32,7 +32,7 @@ POWERS = (2.0, 1.0, 0.5)  # of the distance in the parameter: how far from it, b
 ROUNDS = 6  # signatures tried in a row
 STEEP = 1e-3  # of a tangent: its parameter
 BACK = 1e-3  # of its distance: an orbit nearer than this to the branch that has come here is on it
-SOLVED = 1e-12  # of an orbit's size: what extremes know no better
+ROUNDING = 1e-12  # of an orbit's size: extremes of two orbits as near as this are the same
 SAME = 1e-9  # in scaled unknowns: two solutions as near as this are one
 AGAIN = 3  # times that Newton's method is begun with one signature
 
@@ -130,7 +130,7 @@ def _leads_back(point: OrbitPoint, found: OrbitPoint) -> bool:
     if (found.value - point.value) * point.rise > 0.0:
         return False
     own = point.curve.at_parameter(point.Y, found.value)
-    return own is not None and _apart(own, found) < BACK * _apart(point, found) + SOLVED
+    return own is not None and _apart(own, found) < BACK * _apart(point, found) + ROUNDING
 
 
 def _came_by(found: OrbitPoint, passed: Sequence[OrbitPoint]) -> bool:

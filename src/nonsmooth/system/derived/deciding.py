@@ -25,17 +25,13 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.system.derived.bounded import is_symmetric, least
-from nonsmooth.system.derived.elements.element import CREEP, SMALL
 from nonsmooth.system.derived.enumerating import HELD, Candidates, moving_by_trial
-from nonsmooth.system.derived.impact_with_friction import stronge
+from nonsmooth.system.derived.impacts import ZERO, Instant
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern
     from nonsmooth.system.derived.instants import Ahead, Numbers
-    from nonsmooth.system.derived.place import Place
 
-ZERO = 1e-11  # of the sum of the terms of a row: what is smaller is zero
-ROUNDS = 10_000  # of impacts one after the other
 ORDERS = 24  # derivatives that are looked at where all before are zero
 
 
@@ -72,7 +68,7 @@ def decide(
         return here.outcome(contacts, ())
     if len(approaching) > 1 and any(k in here.make.rubbing for k in approaching):
         return here.end("not_unique", approaching)
-    own = {k: here.restitution(k) for k in contacts}
+    own = {k: here.law(k, "restitution") for k in contacts}
     if all(-here.speeds[k] < here.creep(k) for k in approaching):
         still = _Instant(numbers.copy(), pattern, met, some)
         struck = still.strike(contacts, dict.fromkeys(contacts, 0.0))
@@ -102,135 +98,13 @@ def begun(numbers: Numbers, pattern: Pattern) -> Outcome:
     return decide(numbers, here.pattern)
 
 
-class _Instant:
-    """One instant: what elements are asked there, with what counts as zero."""
-
-    def __init__(
-        self, numbers: Numbers, pattern: Pattern, met: Sequence[int] = (), some: Collection[int] | None = None
-    ) -> None:
-        self.numbers, self.make, self.mode, self.pattern = numbers, numbers.make, numbers.mode, pattern
-        self.parts = self.make.parts
-        self.others = [] if some is None else [k for k in range(len(self.parts)) if k not in some]
-        bearing = [k for k, part in enumerate(self.parts) if part.element.held and k not in self.others]
-        self.contacts = [k for k in bearing if self.parts[k].element.bears]
-        self.frictions = [k for k in bearing if not self.parts[k].element.bears]
-        self.rates = {k: self.make.rate(k, self.mode) for k in bearing}
-        self.still = still = {k for k in bearing if self.holds(k) and self._is_still(k)}
-        zero = {k for k in met if self.parts[k].where is self.rates[k]} | still
-        self.speeds = {k: 0.0 if k in zero else self.number(self.rates[k]) for k in bearing}
-        self.places = {k: 0.0 if k in still or k in met else self.number(self.parts[k].where) for k in bearing}
-        self.pressed: dict[int, bool] = {}
-        self.stops = {r: k for k, r in self.make.rubbing.items()}
-        self.rubbed: tuple[tuple[int, ...], FloatArray] | None = None
-        self.ends = ""
-
-    def _is_still(self, k: int) -> bool:
-        """Return whether what is held has stayed where it was: a reset of the system's own may have moved it."""
-        both = (self.rates[k], self.parts[k].where)
-        return all(abs(self.numbers.value(one)) <= SMALL * float(self.make.size(one)) for one in both)
-
-    def number(self, expression: Any) -> float:
-        """The value of an expression, 0 where it is rounding."""
-        total = self.numbers.value(expression)
-        return total if abs(total) > ZERO * self.numbers.terms(expression) else 0.0
-
-    def place(self, k: int) -> Place:
-        return self.make.place(k, self.mode, self.pattern)
-
-    def holds(self, k: int) -> bool:
-        return self.place(k).phase in self.parts[k].element.held
-
-    def put(self, k: int, phase: str) -> None:
-        self.pattern = self.place(k).put(phase).pattern
-
-    def _may_rest(self, k: int) -> bool:
-        element = self.parts[k].element
-        return element.held[0] in element.phases
-
-    def restitution(self, k: int) -> float:
-        return self.numbers.value(self.place(k).law("restitution"))
-
-    def creep(self, k: int) -> float:
-        """The speed of approach below which impacts are not followed."""
-        given = getattr(self.parts[k].element, "creep", None)
-        return float(given) if given is not None else CREEP * float(self.make.size(self.rates[k]))
+class _Instant(Instant):
+    """What holds and what lets go there."""
 
     def end(self, status: str, elements: Sequence[int]) -> Outcome:
         """The run ends here."""
         names = ", ".join(repr(self.parts[k].name) for k in sorted(elements))
         return Outcome(self.pattern, self.numbers.u.copy(), ends=status, names=names)
-
-    def strike(self, contacts: list[int], restitution: dict[int, float]) -> tuple[int, ...]:
-        """The impact of all contacts that are closed; returns those that bore an impulse (see :class:`Outcome`)."""
-        rubs = [k for k in contacts if self.speeds[k] < 0.0 and k in self.make.rubbing]
-        if rubs:
-            return self._rub(rubs[0], contacts, restitution[rubs[0]])
-        if self.make.sequential and len(contacts) > 1:
-            return self._in_sequence(contacts, restitution)
-        before = np.array([self.speeds[k] for k in contacts])
-        given_back = np.array([restitution[k] if self.speeds[k] < 0.0 else 0.0 for k in contacts])
-        G = self.numbers.effects(contacts, contacts)
-        size = len(contacts)
-        impulses = least(G, before * (1.0 + given_back), np.zeros(size), np.full(size, np.inf))
-        bore = {k: e for k, e, impulse in zip(contacts, given_back, impulses, strict=True) if impulse > 0.0}
-        self._struck(contacts, impulses, {k: max(0.0, -e * self.speeds[k]) for k, e in bore.items()})
-        return tuple(k if e == self.restitution(k) else ~k for k, e in bore.items())
-
-    def _rub(self, k: int, contacts: list[int], restitution: float) -> tuple[int, ...]:
-        """The impact of one contact that rubs, the others that are closed without friction."""
-        r = self.make.rubbing[k]
-        some = [k, r, *(j for j in contacts if j != k)]
-        rates = np.array([self.speeds[j] for j in some])
-        found = stronge(self.numbers.effects(some, some), rates, restitution, self.share(r), least)
-        if found is None:
-            self.ends = "no_motion"
-            return ()
-        impulses, slopes, after = found
-        self._struck(some, impulses, dict(zip(some, map(float, after), strict=True)))
-        self.rubbed = tuple(some), slopes
-        return (k,)
-
-    def _struck(self, some: list[int], impulses: FloatArray, after: dict[int, float]) -> None:
-        """Put in the impulses of some elements; of those ``after`` the rates behind them are known."""
-        self.speeds = self._behind(self.speeds, some, impulses) | after
-        for j, impulse in zip(some, impulses, strict=True):
-            self.numbers.shift(self.numbers.direction(j) * impulse)
-
-    def _in_sequence(self, contacts: list[int], restitution: dict[int, float]) -> tuple[int, ...]:
-        """Impacts one after the other, the fastest approach first, those of one speed at once; a plastic one of all
-        contacts ends them where no approach is faster than rest."""
-        G, count = self.numbers.effects(contacts, contacts), len(contacts)
-        v, e = np.array([self.speeds[k] for k in contacts]), np.array([restitution[k] for k in contacts])
-        rest = np.array([self.creep(k) for k in contacts])
-        impulses, slopes, rates = np.zeros(count), np.zeros((count, count)), np.eye(count)  # of the rates at first
-        for _ in range(ROUNDS):
-            last = bool((-v <= rest).all())
-            some = list(range(count)) if last else [i for i in range(count) if v[i] <= v.min() * (1 - ZERO)]
-            factor = np.where(v[some] < 0.0, 1.0 if last else 1.0 + e[some], 1.0)
-            found = least(G[np.ix_(some, some)], v[some] * factor, np.zeros(len(some)), np.full(len(some), np.inf))
-            bearing = [i for i, impulse in zip(some, found, strict=True) if impulse > 0.0]
-            if bearing:
-                inverse = np.linalg.pinv(G[np.ix_(bearing, bearing)], rcond=1e-10)
-                back = np.array([0.0 if last else e[i] for i in bearing])
-                change = -inverse @ ((1.0 + back)[:, None] * rates[bearing])
-                slopes[bearing] += change
-                impulses[bearing] += found[[some.index(i) for i in bearing]]
-                after = -back * v[bearing]
-                v, rates = v + G[:, bearing] @ found[[some.index(i) for i in bearing]], rates + G[:, bearing] @ change
-                v[bearing] = after
-            if last:
-                break
-        else:
-            self.ends = "no_motion"
-            return ()
-        v = np.where(np.abs(v) <= ZERO * np.abs(G) @ impulses, 0.0, v)
-        self._struck(contacts, impulses, dict(zip(contacts, map(float, v), strict=True)))
-        self.rubbed = tuple(contacts), slopes
-        return tuple(k for k, impulse in zip(contacts, impulses, strict=True) if impulse > 0.0)
-
-    def share(self, r: int) -> float:
-        """The coefficient of friction of a contact."""
-        return self.numbers.value(self.place(r).law("friction"))
 
     def outcome(self, contacts: list[int], struck: tuple[int, ...]) -> Outcome:
         """Those that hold and those that let go, with the rates as they are now.
@@ -273,17 +147,10 @@ class _Instant:
         amounts = np.linalg.lstsq(self.numbers.effects(some, some), off, rcond=1e-10)[0]
         return self._behind(speeds, some, amounts) | dict.fromkeys(some, 0.0)
 
-    def _behind(self, speeds: dict[int, float], some: list[int], impulses: FloatArray) -> dict[int, float]:
-        """All rates behind impulses of some elements, 0 where they are rounding."""
-        found = {}
-        for k, effects in zip(speeds, self.numbers.effects(list(speeds), some), strict=True):
-            total, terms = speeds[k] + effects @ impulses, abs(speeds[k]) + np.abs(effects) @ np.abs(impulses)
-            found[k] = float(total) if abs(total) > ZERO * terms else 0.0
-        return found
-
     def _candidates(self, contacts: list[int], slow: list[int]) -> tuple[list[int], dict[int, int]]:
         """Those that may hold, and the sides of frictions that slip at contacts that may; others get their phases."""
-        candidates = [k for k in contacts if self.speeds[k] == 0.0 and self._may_rest(k)]
+        may_rest = [k for k in contacts if self.parts[k].element.held[0] in self.parts[k].element.phases]
+        candidates = [k for k in may_rest if self.speeds[k] == 0.0]
         slips: dict[int, int] = {}
         for k in self.contacts:
             self.put(k, "open")
@@ -337,7 +204,7 @@ class _Instant:
         while True:
             if tried:
                 rubbing = {k: self.make.rubbing[k] for k in candidates if k in self.make.rubbing}
-                shares = {r: self.share(r) for r in rubbing.values()}
+                shares = {r: self.law(r, "friction") for r in rubbing.values()}
                 held = {*self.contacts} & {*candidates}
                 who = Candidates(every, held, rubbing, shares, slips, kinetic, self.numbers.known)
                 states, self.ends = moving_by_trial(who, G, lambda: self._ahead(every))

@@ -110,8 +110,7 @@ class Expressions(Assembler):
     ) -> list[sp.Expr]:
         slopes = [sp.diff(rate, symbol) for symbol in self.u]
         some = [i for i, slope in enumerate(slopes) if slope != 0 and i not in known]
-        constant = all(slope.is_number for slope in slopes) and sp.diff(rate, self.symbols.t) == 0
-        if len(some) != 1 or not constant:
+        if len(some) != 1 or sp.diff(rate, self.symbols.t) != 0 or not all(slope.is_number for slope in slopes):
             return vector
         (i,) = some
         known.add(i)

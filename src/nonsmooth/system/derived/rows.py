@@ -183,8 +183,9 @@ class Rows(Assembler):
         slopes, waves = rate.values[: self.n], rate.values[self.n + 1 :]
         some = [i for i in np.flatnonzero(slopes).tolist() if i not in known]
         if len(some) == 1 and not waves.any():
-            vector, i, others = vector.copy(), some[0], np.where(np.arange(self.n) == some[0], 0.0, slopes)
-            vector[i] = ((value.values if isinstance(value, Row) else 0.0) - others @ vector) / slopes[i]
+            vector, i = vector.copy(), some[0]
+            vector[i] = 0.0
+            vector[i] = ((value.values if isinstance(value, Row) else 0.0) - slopes @ vector) / slopes[i]
             vector[i, self.n] -= rate.values[self.n] / slopes[i] if states else 0.0
             known.add(i)
         return vector
