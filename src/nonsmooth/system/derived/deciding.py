@@ -99,7 +99,7 @@ def begun(numbers: Numbers, pattern: Pattern) -> Outcome:
 
 
 class _Instant(Instant):
-    """What holds and what lets go there."""
+    """One instant with the contacts that hold there and those that let go."""
 
     def end(self, status: str, elements: Sequence[int]) -> Outcome:
         """The run ends here."""
