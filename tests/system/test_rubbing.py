@@ -162,6 +162,29 @@ class TestSliding:
         assert (one.period_number == 1).all()
         np.testing.assert_array_equal(one.section, two.section)
 
+    @pytest.mark.parametrize(("friction", "speed"), [(0.5, 1.0), (0.3, -2.0)])
+    @pytest.mark.parametrize("blocks", [1, 3])
+    def test_blocks_that_nothing_but_friction_stops(self, friction, speed, blocks):
+        """No other force gives the speed a size by which what is left of it where the slip ends is rounding; springs
+        between them that are not stretched, all at one instant, neither."""
+        n = 2 * blocks
+        chain = np.kron(np.diag(np.ones(blocks)), np.zeros((2, 2)))
+        for i in range(blocks - 1):
+            chain[2 * i : 2 * i + 3 : 2, 2 * i : 2 * i + 3 : 2] += [[1.0, -1.0], [-1.0, 1.0]]
+        sliding = ns.mechanical(
+            np.eye(n), 0 * np.eye(n), chain, parameters={},
+            coordinates=[f"{axis}{i}" for i in range(blocks) for axis in "xy"],
+            forcing={f"y{i}": lambda t, p: -G for i in range(blocks)},
+            elements={
+                f"s{i}": E.Stop(at=f"y{i}", side=-1, friction=friction, tangent=f"x{i}") for i in range(blocks)
+            },
+        )  # fmt: skip
+        run = ns.simulate(sliding, duration=2.0, start={f"v_x{i}": speed for i in range(blocks)})
+        ends, distance = abs(speed) / (friction * G), speed * abs(speed) / (2 * friction * G)
+        assert run.crossing_time.values == pytest.approx(ends, abs=1e-14)
+        assert run.u.values[-1, 0:n:2] == pytest.approx([distance] * blocks, abs=1e-14)
+        assert not run.u.values[-1, 1:n:2].any() and not run.u.values[-1, n:].any()
+
 
 class TestVerbs:
     """Verbs over a contact that rubs, beside dry friction of the same force."""
@@ -214,6 +237,32 @@ class TestParadox:
         with pytest.raises(SolveError, match="Painleve") as caught:
             ns.simulate(self.rod(press), duration=1.0, start={"vx": 1.0})
         assert caught.value.status == status
+
+    @pytest.mark.parametrize(("angle", "inside"), [(50.6415982, 1.0), (73.0484695, -1.0)])
+    @pytest.mark.parametrize("length", [0.3, 2.0])
+    def test_a_thin_rod_jams_between_two_angles(self, angle, inside, length):
+        """Mass 1, mu = 1.5: no contact force keeps a tip that slips forward on the floor where
+        1 + 3 cos^2 a < 3 mu sin a cos a, whatever the length; a hair outside it is braked, to rest before long."""
+        slopes, friction, inertia = np.array([1e-4, -1e-4]) * inside, 1.5, length**2 / 12
+        for turn, status in zip(slopes, ("no_motion", ""), strict=True):
+            a = np.radians(angle + turn)
+            arm = length / 2 * np.array([np.sin(a), np.cos(a)])  # of the tip's forces, along and across the floor
+            G = np.eye(2) + np.outer(arm, arm) / inertia
+            rod = ns.System(
+                states=["x", "y", "vx", "vy"], parameters={}, modes={"all": lambda t, u, p: (u.vx, u.vy, 0.0, -1.0)},
+                elements={"tip": E.Stop(
+                    gap=lambda t, u, p: u.y, on={"vy": G[1, 1], "vx": G[0, 1]}, friction=friction,
+                    tangent=lambda t, u, p: u.vx, on_tangent={"vx": G[0, 0], "vy": G[0, 1]},
+                )},
+            )  # fmt: skip
+            if status:
+                with pytest.raises(SolveError, match="Painleve") as caught:
+                    ns.simulate(rod, duration=1.0, start={"vx": 1.0})
+                assert caught.value.status == status
+            else:
+                run = ns.simulate(rod, duration=1.0, start={"vx": 1.0})
+                brake = (friction * G[0, 0] - G[0, 1]) / (G[1, 1] - friction * G[0, 1])
+                assert float(run.crossing_time[0]) == pytest.approx(1 / brake, rel=1e-8)
 
     def test_two_contacts_that_close_at_once_of_which_one_rubs(self):
         cup = ns.mechanical(

@@ -72,7 +72,7 @@ def double_impact_oscillator(**parameters: float) -> System:
             "left": Stop(at="x", position=_left, side=-1, restitution="e"),
         },
         symmetry=(_mirror, 0.5, {
-            "right_rest_left_open": "right_open_left_rest", "right_open_left_rest": "right_rest_left_open",
+            "left_open_right_rest": "left_rest_right_open", "left_rest_right_open": "left_open_right_rest",
         }),
     )  # fmt: skip
     return system.with_parameters(parameters) if parameters else system

@@ -15,7 +15,7 @@ from typing import Any, Generic, Self, TypeVar, cast
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.problems.solve import Factored, solve
+from nonsmooth.continuation.problems.solve import Factored, null_vectors, solve
 from nonsmooth.errors import SystemDefinitionError
 
 DONE = 1e-9  # a step this small is followed by one of its square
@@ -219,9 +219,7 @@ class Curve(ABC, Generic[P]):
 
     def null_vectors(self, solved: Any, tolerance: float = 1e-7) -> FloatArray:
         """Orthonormal vectors (k, n) that the scaled Jacobian takes to zero."""
-        _, values, right = np.linalg.svd(self.jacobian(solved))
-        rank = int((values > tolerance * values[0]).sum())
-        return np.asarray(right[rank:])
+        return null_vectors(self.jacobian(solved), tolerance)
 
     def point(self, solved: Any, Y: FloatArray, border: FloatArray, iterations: int = 0) -> P | None:
         """A solved point with its tangent along ``border``."""

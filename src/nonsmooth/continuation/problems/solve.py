@@ -23,6 +23,31 @@ def determinant(matrix: FloatArray) -> tuple[float, float]:
         return 0.0, -np.inf
 
 
+def null_vectors(matrix: FloatArray, tolerance: float) -> FloatArray:
+    """Orthonormal vectors (k, n) that a matrix (m, n) takes to zero, up to a part of its largest singular value.
+
+    Of a large matrix three at most, the last the nearest to zero: by inverse iteration on
+    :math:`J^T J + \\delta^2`, as the least squares that it stands for, whose matrix is as sparse as J.
+    """
+    if len(matrix) <= LARGE:
+        _, values, right = np.linalg.svd(matrix)
+        return np.asarray(right[int((values > tolerance * values[0]).sum()) :])
+    from scipy.sparse import bmat, csc_matrix, identity
+    from scipy.sparse.linalg import splu, svds
+
+    m, n = matrix.shape
+    J = csc_matrix(matrix)
+    largest = float(svds(J, 1, return_singular_vectors=False, random_state=1)[0])
+    shift = 0.1 * tolerance * largest
+    factored = splu(bmat([[shift * identity(m), J], [J.T, -shift * identity(n)]], format="csc"))
+    found = np.random.default_rng(1).normal(size=(n, 3))
+    for _ in range(4):
+        found = factored.solve(np.vstack((np.zeros((m, 3)), np.linalg.qr(found)[0])))[m:]
+    found = np.linalg.qr(found)[0]
+    _, values, right = np.linalg.svd(J @ found)
+    return np.asarray((found @ right.T).T[values <= tolerance * largest])
+
+
 class Factored:
     """An LU factorisation: solutions, and the sign and the logarithm of the determinant.
 

@@ -20,7 +20,7 @@ from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.march import March
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept, Section
-from nonsmooth.kernels.hybrid.places import DEAD_END, MODE, RESET, STARTS, TIME, WAITS
+from nonsmooth.kernels.hybrid.places import DEAD_END, FIRED, MODE, RESET, STARTS, TIME, WAITS
 from nonsmooth.results.memory import free_memory, room_for
 from nonsmooth.system.codegen.linear import apart, put_together
 from nonsmooth.system.derived.deciding import Outcome, begun, decide
@@ -211,12 +211,19 @@ class PatternTables:
             if found.ends:
                 self.work.tally[STARTS] = -1 - ENDS.index(found.ends)
         else:
-            numbers = RowNumbers(rows, mode, w, float(self.own.info[here, 0]))
-            found = decide(numbers, pattern, (), self._concerned(lead, numbers, here))
+            numbers = RowNumbers(rows, mode, w, float(self.own.info[here, 0]), pattern)
+            found = decide(numbers, pattern, self._met(here), self._concerned(lead, numbers, here))
             taken = self._answer(waits, found)
         if taken < 0 or not found.struck:
             self.work.w[: rows.n] = found.states
         self.work.tally[WAITS] = taken + 1
+
+    def _met(self, here: int) -> list[int]:
+        """The elements whose place was met."""
+        fired = int(self.work.tally[FIRED])
+        row = self.watched[here][fired] if fired >= 0 else np.nan
+        held = ((k, part.where.values) for k, part in enumerate(self.rows.parts) if part.element.held)
+        return [k for k, where in held if np.array_equal(row, where) or np.array_equal(row, -where)]
 
     def _concerned(self, lead: Lead, numbers: RowNumbers, here: int) -> list[int] | None:
         """The elements whose groups an instant concerns: of which a condition was met, or is zero; None: all."""

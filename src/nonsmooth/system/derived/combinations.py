@@ -6,6 +6,7 @@ the system without a line for elements.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations, product
@@ -30,11 +31,19 @@ if TYPE_CHECKING:
 MOST = 256  # modes that are written out
 
 
+def _natural(item: tuple[Any, Any]) -> list[Any]:
+    """The order of names in which s2 comes before s10."""
+    return [int(word) if word.isdigit() else word for word in re.split(r"([0-9]+)", str(item[0]))]
+
+
 def element_names(elements: Any) -> dict[str, Element]:
-    """Elements by name; those of a list are called after their kind."""
+    """Elements by name, in the order of the names: no digit of a result depends on the order in which they are given.
+
+    Those of a list are called after their kind.
+    """
     if isinstance(elements, Mapping):
         found: dict[str, Element] = {}
-        for name, element in elements.items():
+        for name, element in sorted(elements.items(), key=_natural):
             found |= element.parts(name) if isinstance(element, Element) else {name: element}
         return found
     if isinstance(elements, (str, Element)) or not isinstance(elements, Sequence):

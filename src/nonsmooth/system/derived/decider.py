@@ -136,7 +136,10 @@ class Decider:
         states change as from step to step."""
         if self.rows is None:
             return lambda mode, time, u, memory, step: SeriesNumbers(
-                self.code, self.modes[mode][0], time, u, np.concatenate([values, memory]), step
-            )
+                self.code, self.modes[mode][0], time, u, np.concatenate([values, memory]), step,
+                self.known().fields[mode],
+            )  # fmt: skip
         rows = self.rows.rows(self.rows.form.evaluate(values[None, :]), 0)
-        return lambda mode, time, u, memory, step: RowNumbers(rows, rows.mode, rows.augmented(u, time), step)
+        return lambda mode, time, u, memory, step: RowNumbers(
+            rows, rows.mode, rows.augmented(u, time), step, self.modes[mode][1]
+        )

@@ -22,7 +22,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.system.derived.assembly import kept
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derived.assembly import Assembler
+    from nonsmooth.system.derived.assembly import Assembler, Pattern
     from nonsmooth.system.derived.expressions import Expressions
     from nonsmooth.system.derived.rows import Rows
 
@@ -88,12 +88,13 @@ class Numbers(ABC):
 class RowNumbers(Numbers):
     """Numbers of an affine system."""
 
-    def __init__(self, rows: Rows, mode: str, w: FloatArray, step: float = 0.0) -> None:
+    def __init__(self, rows: Rows, mode: str, w: FloatArray, step: float = 0.0, pattern: Pattern | None = None) -> None:
         self.make, self.rows, self.mode, self.w, self.known = rows, rows, mode, w, rows.known
         self.u = w[: rows.n]
         self.size = np.abs(w)
         self.size[rows.n :] = 1.0  # a sine that is zero has the rounding of its phase
-        self.size[: rows.n] += 0.25 * step * np.abs(rows.base(mode)) @ self.size
+        if pattern is not None:
+            self.size[: rows.n] += 0.25 * step * np.abs(rows.flow(mode, pattern)[0]) @ self.size
 
     def copy(self) -> RowNumbers:
         found = RowNumbers(self.rows, self.mode, self.w.copy())
@@ -221,14 +222,15 @@ class SeriesNumbers(Numbers):
     that changes is their size, of which rounding is a small part."""
 
     def __init__(
-        self, code: SeriesCode, mode: str, t: float, u: FloatArray, constants: FloatArray, step: float = 0.0
-    ) -> None:
+        self, code: SeriesCode, mode: str, t: float, u: FloatArray, constants: FloatArray, step: float = 0.0,
+        field: Sequence[Any] = (),
+    ) -> None:  # fmt: skip
         self.make, self.code, self.mode, self.u, self.size = code.make, code, mode, u.copy(), np.abs(u)
         self.constants = np.array([t, *constants])
         self.known = {}
         self.lanes = self._lanes()
         if step:
-            self.size = self.size + 0.25 * step * np.abs([self.value(e) for e in code.make.base(mode)])
+            self.size = self.size + 0.25 * step * np.abs([self.value(e) for e in field])
             self.lanes = self._lanes()
 
     def _lanes(self) -> list[dict[str, Any]]:
