@@ -32,20 +32,18 @@ def null_vectors(matrix: FloatArray, tolerance: float) -> FloatArray:
     if len(matrix) <= LARGE:
         _, values, right = np.linalg.svd(matrix)
         return np.asarray(right[int((values > tolerance * values[0]).sum()) :])
-    from scipy.sparse import bmat, csc_matrix, identity
-    from scipy.sparse.linalg import splu, svds
+    from scipy.sparse import bmat, eye_array
+    from scipy.sparse.linalg import splu
 
     m, n = matrix.shape
-    J = csc_matrix(matrix)
-    largest = float(svds(J, 1, return_singular_vectors=False, random_state=1)[0])
-    shift = 0.1 * tolerance * largest
-    factored = splu(bmat([[shift * identity(m), J], [J.T, -shift * identity(n)]], format="csc"))
+    small = tolerance * float(np.linalg.norm(matrix)) / np.sqrt(n)
+    delta = 0.1 * small
+    factored = splu(bmat([[delta * eye_array(m), matrix], [matrix.T, -delta * eye_array(n)]], format="csc"))
     found = np.random.default_rng(1).normal(size=(n, 3))
     for _ in range(4):
-        found = factored.solve(np.vstack((np.zeros((m, 3)), np.linalg.qr(found)[0])))[m:]
-    found = np.linalg.qr(found)[0]
-    _, values, right = np.linalg.svd(J @ found)
-    return np.asarray((found @ right.T).T[values <= tolerance * largest])
+        found = np.linalg.qr(factored.solve(np.vstack([np.zeros((m, 3)), found]))[m:])[0]
+    _, values, right = np.linalg.svd(matrix @ found)
+    return np.asarray((found @ right.T).T[values < small])
 
 
 class Factored:

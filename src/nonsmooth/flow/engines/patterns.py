@@ -221,9 +221,8 @@ class PatternTables:
     def _met(self, here: int) -> list[int]:
         """The elements whose place was met."""
         fired = int(self.work.tally[FIRED])
-        row = self.watched[here][fired] if fired >= 0 else np.nan
-        held = ((k, part.where.values) for k, part in enumerate(self.rows.parts) if part.element.held)
-        return [k for k, where in held if np.array_equal(row, where) or np.array_equal(row, -where)]
+        rows = [] if fired < 0 else [self.watched[here][fired], -self.watched[here][fired]]
+        return [k for k, one in enumerate(self.rows.parts) if any(np.array_equal(one.where.values, row) for row in rows)]
 
     def _concerned(self, lead: Lead, numbers: RowNumbers, here: int) -> list[int] | None:
         """The elements whose groups an instant concerns: of which a condition was met, or is zero; None: all."""

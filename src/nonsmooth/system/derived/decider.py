@@ -129,7 +129,7 @@ class Decider:
         """The elements whose place is an indicator that was made for them, by its name and expression."""
         if name not in self.make.indicators:
             return []
-        return [k for k, part in enumerate(self.make.parts) if part.element.held and part.where in (where, -where)]
+        return [k for k, part in enumerate(self.make.parts) if part.where in (where, -where)]
 
     def at_point(self, values: FloatArray) -> Callable[[int, float, FloatArray, FloatArray, float], Numbers]:
         """The numbers at an instant, of one parameter point: by the mode, the time, states, memory, and a time in which

@@ -38,7 +38,7 @@ class Instant:
         self.frictions = [k for k in bearing if not self.parts[k].element.bears]
         self.rates = {k: self.make.rate(k, self.mode) for k in bearing}
         self.still = still = {k for k in bearing if self.holds(k) and self._is_still(k)}
-        zero = {k for k in met if self.parts[k].where is self.rates[k]} | still
+        zero = {k for k in bearing if k in met and self.parts[k].where is self.rates[k]} | still
         self.speeds = {k: 0.0 if k in zero else self.number(self.rates[k]) for k in bearing}
         self.places = {k: 0.0 if k in still or k in met else self.number(self.parts[k].where) for k in bearing}
         self.pressed: dict[int, bool] = {}
