@@ -2,7 +2,7 @@
 
 ``python tests/independent/contact_campaign.py FIRST LAST [--stacks] [--reference]``: seeds FIRST to LAST - 1, six
 periods, 60 instants per period. Compared up to the instant where the reference and the reference with start and
-forcing 1e-14 off separate.
+forcing 1e-14 off separate. ``--stepping``: positions of two periods beside Moreau's time stepping at two steps.
 """
 
 from __future__ import annotations
@@ -25,11 +25,13 @@ sys.path.insert(0, str(Path(__file__).parent))
 from contact_draws import REST_SPEED, Draw, as_nonsmooth, random_contact_stack, random_contact_system
 from contact_elements import Array
 from contact_reference import simulate
+from contact_time_stepping import time_stepping
 
 PERIODS, INSTANTS = 6, 60
 AGREE, DIFFERENT = 1e-9, 1e-7
 EVENTS = 6000
 LIMIT = 150  # seconds for one system
+STEPS = 1e-5, 5e-6  # of the time stepping
 
 
 def reference(draw: Draw, times: Array) -> tuple[Array, int, str, int]:
@@ -112,6 +114,35 @@ def one(seed: int, only_reference: bool = False, stacks: bool = False) -> dict[s
     return row
 
 
+def stepped(seed: int) -> dict[str, Any]:
+    """Largest differences of positions from those of a time stepping, of a period at each of two steps."""
+    draw, n = random_contact_system(seed), PERIODS * INSTANTS // 3
+    times = np.linspace(0, 2 * draw.period, n + 1)
+    u, q = apart(draw, times), len(draw.q)
+    row: dict[str, Any] = {"seed": seed, "elements": draw.words()}
+    if isinstance(u, str):
+        return row | {"refused": u[:160].replace("\n", " ")}
+    every = [round(times[1] / step) for step in STEPS]
+    found = [time_stepping(draw.system, draw.q, draw.v, times[1], n, number)[:, :q] for number in every]
+    return row | {"errors": [float(np.abs(one - u[:, :q]).max()) for one in found]}
+
+
+def table_of_steps(rows: list[dict[str, Any]]) -> str:
+    """Return the summary of the comparison with a time stepping."""
+    errors = np.array([r["errors"] for r in rows if "errors" in r])
+    coarse, fine = errors.T
+    moving = fine > 1e-9  # the others stand still, or move as the scheme does exactly
+    lines = [
+        f"seeds {len(rows)}, refused {len(rows) - len(errors)}, steps {STEPS}",
+        f"errors at the smaller step: median {np.median(fine):.1e}, under 2e-3 {np.count_nonzero(fine < 2e-3)}",
+        f"ratio of the errors: median {np.median(coarse[moving] / fine[moving]):.3f} of {np.count_nonzero(moving)}",
+    ]
+    for r in rows:
+        if "errors" not in r or r["errors"][1] >= 2e-3:
+            lines.append(f"  {r['seed']:5d}  {r.get('errors', r.get('refused'))}  {r['elements']}")
+    return "\n".join(lines)
+
+
 def table(rows: list[dict[str, Any]]) -> str:
     """Return the summary of all rows."""
     ran = [r for r in rows if "difference" in r]
@@ -138,6 +169,7 @@ if __name__ == "__main__":
     parser.add_argument("last", type=int)
     parser.add_argument("--reference", action="store_true", help="run the reference alone")
     parser.add_argument("--stacks", action="store_true", help="masses on each other instead of mixed systems")
+    parser.add_argument("--stepping", action="store_true", help="beside Moreau's time stepping instead")
     parser.add_argument("--rows", help="file of one JSON object per seed; seeds that stand in it are not run again")
     arguments = parser.parse_args()
     store = Path(arguments.rows) if arguments.rows else None
@@ -146,8 +178,9 @@ if __name__ == "__main__":
     rows = [json.loads(line) for line in store.read_text().splitlines()] if store and store.exists() else []
     rows = [r for r in rows if arguments.first <= r["seed"] < arguments.last]
     for seed in sorted(set(range(arguments.first, arguments.last)) - {r["seed"] for r in rows}):
-        rows.append(one(seed, arguments.reference, arguments.stacks))
+        rows.append(stepped(seed) if arguments.stepping else one(seed, arguments.reference, arguments.stacks))
         if store:
             with store.open("a") as file:
                 file.write(json.dumps(rows[-1]) + "\n")
-    print(table(sorted(rows, key=lambda r: r["seed"])))
+    rows.sort(key=lambda r: r["seed"])
+    print(table_of_steps(rows) if arguments.stepping else table(rows))

@@ -222,7 +222,8 @@ class PatternTables:
         """The elements whose place was met."""
         fired = int(self.work.tally[FIRED])
         rows = [] if fired < 0 else [self.watched[here][fired], -self.watched[here][fired]]
-        return [k for k, one in enumerate(self.rows.parts) if any(np.array_equal(one.where.values, row) for row in rows)]
+        places = [part.where.values for part in self.rows.parts]
+        return [k for k, place in enumerate(places) if any(np.array_equal(place, row) for row in rows)]
 
     def _concerned(self, lead: Lead, numbers: RowNumbers, here: int) -> list[int] | None:
         """The elements whose groups an instant concerns: of which a condition was met, or is zero; None: all."""
