@@ -157,24 +157,26 @@ def _followed(
         for k, i in at.items():
             if k not in who.contacts and k not in who.shares and abs(states.get(k, 0)) == 1:
                 forces[i] = bounds[3 * i + (1 if states[k] > 0 else 2)]
+        terms = np.abs(forces)
         if rows:
+            terms += np.abs(push) @ (np.abs(inverse) @ (sizes + np.abs(G) @ terms)[rows])
             forces -= push @ (inverse @ (free + G @ forces)[rows])
         a = free + G @ forces
-        size = sizes + np.abs(G) @ np.abs(forces)
+        size = sizes + np.abs(G) @ terms
         if (np.abs(a[rows]) > SAME * size[rows]).any():
             return None  # dependent rates that cannot all be held
         a[rows] = 0.0
         found.append((a, size))
+        off = ZERO * (terms + size / np.maximum(np.abs(np.diag(G)), 1e-300))  # to which forces are known
         for k, s in list(pending):
             i, state = at[k], states[k]
-            rounding = ZERO * size[i]
+            rounding = off[i] if state == HELD else ZERO * size[i]
             if state == HELD:
-                rounding = ZERO * (abs(forces[i]) + size[i] / max(abs(G[i, i]), 1e-300))
                 if k in who.contacts:
                     value = forces[i]
                 elif k in who.shares:
-                    normal = who.shares[k] * forces[at[next(j for j, r in who.rubbing.items() if r == k)]]
-                    value, rounding = normal - s * forces[i], rounding + ZERO * abs(normal)
+                    share, normal = who.shares[k], at[next(j for j, r in who.rubbing.items() if r == k)]
+                    value, rounding = share * forces[normal] - s * forces[i], rounding + share * off[normal]
                 else:
                     static, forward, back = bounds[3 * i : 3 * i + 3]
                     bound = static if k not in who.kinetic else (back if s > 0 else -forward)
