@@ -56,7 +56,8 @@ def random_rubbing(seed: int) -> Rubbing:
     rests = rng.random() < 0.5
     return Rubbing(
         seed, np.linalg.inv(inverse), np.diag(rng.choice([0.0, 0.1, 0.5], n)), spring, loads,
-        float(rng.uniform(0.5, 2)), friction, float(rng.choice([0.0, 0.3, 0.6])), float(rng.choice([0.0, 0.0, 0.4])), 1e-4,
+        float(rng.uniform(0.5, 2)), friction, float(rng.choice([0.0, 0.3, 0.6])), float(rng.choice([0.0, 0.0, 0.4])),
+        1e-4,
         np.array([0.0, 0.0 if rests else 0.4, 0.1][:n]),
         np.array([float(rng.choice([0.0, 1.0, -0.7])), 0.0, 0.2][:n]),
     )  # fmt: skip
