@@ -239,3 +239,15 @@ def test_equal_systems_number_their_modes_themselves() -> None:
         np.testing.assert_allclose(branch.u_lower.sel(state="q"), ends[:, 0], atol=1e-9)
         np.testing.assert_allclose(branch.u_upper.sel(state="q"), ends[:, 1], atol=1e-9)
         np.testing.assert_allclose(ns.special_points(branch).F, [0.3], atol=1e-9)
+
+
+def test_what_stands_moves_in_steps_of_its_place() -> None:
+    """One mass dragged by a belt to mu / k while the other moves: no range of motion says how far it goes."""
+    system = ns.mechanical(
+        np.eye(2), 0.2 * np.eye(2), np.eye(2), parameters={"mu": 2.0, "w": 0.8},
+        forcing={"q1": lambda t, p: np.cos(p.w * t)}, elements={"rub": E.Coulomb(at="q2", friction="mu", belt=1.0)},
+    )  # fmt: skip
+    branch = ns.continue_orbit(ns.find_orbit(system, start={"q2": 2.0}), "mu", (1.0, 3.0))
+    assert branch.section.sel(state="q2").values == pytest.approx(branch.mu.values, abs=1e-12)
+    assert [branch.mu.values.min(), branch.mu.values.max()] == pytest.approx([1.0, 3.0])
+    assert branch.sizes["point"] < 60

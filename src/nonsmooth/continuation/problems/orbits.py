@@ -25,12 +25,14 @@ GROWN = 2.0  # times its size: the motion is measured anew
 
 
 def size_of(maximum: FloatArray, minimum: FloatArray, system: System) -> FloatArray:
-    """Half the range of each state, and 1 for the memory; of a state that no mode moves at least its absolute value.
+    """Half the range of each state, and 1 for the memory; of a state that no mode moves, or that stands on this orbit,
+    at least its absolute value.
 
-    Between two resets such a state has no range that could tell how far it moves along a branch."""
-    half = np.maximum(np.nan_to_num(0.5 * (maximum - minimum)), 1e-3 * system.scale_vector())
+    Between two resets, or at rest, a state has no range that could tell how far it moves along a branch."""
+    least = 1e-3 * system.scale_vector()
+    half = np.maximum(np.nan_to_num(0.5 * (maximum - minimum)), least)
     largest = np.nan_to_num(np.maximum(np.abs(maximum), np.abs(minimum)))
-    still = _still(system.traced)
+    still = _still(system.traced) | (half == least)
     return np.concatenate([np.where(still, np.maximum(half, largest), half), np.ones(len(system.memory))])
 
 
