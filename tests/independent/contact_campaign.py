@@ -51,17 +51,17 @@ def reference(draw: Draw, times: Array) -> tuple[Array, int, str, int]:
     return run.states, int(apart[0]) if len(apart) else len(times), run.failure, len(run.events)
 
 
-def tested(draw: Draw, times: Array) -> Array:
+def tested(draw: Draw, times: Array, floors: bool = False) -> Array:  # noqa: PT028  (no test)
     import nonsmooth as ns
 
     names = [f"q{i + 1}" for i in range(len(draw.q))]
     start = dict(zip(names, draw.q, strict=True)) | {
         f"v_{q}": x for q, x in zip(names, draw.v, strict=True)}  # fmt: skip
-    out = ns.simulate(as_nonsmooth(draw), duration=float(times[-1]), samples=times, start=start)
+    out = ns.simulate(as_nonsmooth(draw, floors), duration=float(times[-1]), samples=times, start=start)
     at = np.searchsorted(out.time.values, times, side="right") - 1
     if not np.allclose(out.time.values[at], times, rtol=0, atol=1e-12):
         raise RuntimeError("the run ended early")
-    return np.asarray(out.u.values[at])
+    return np.asarray(out.u.sel(state=list(start)).values[at])
 
 
 def answer(draw: Draw, times: Array, back: Any) -> None:

@@ -143,12 +143,16 @@ def _element(rng: np.random.Generator, n: int, q: Array, loads: Array, known: li
     return Coulomb(at, friction, static, belt)
 
 
-def as_nonsmooth(draw: Draw) -> Any:
-    """Return the same system through the public constructors."""
+def as_nonsmooth(draw: Draw, floors: bool = False) -> Any:
+    """Return the same system through the public constructors; with ``floors`` each friction (of one bound) as a mass
+    of its own that a load of 2 presses on a floor, which rubs."""
+    from scipy.linalg import block_diag
+
     import nonsmooth as ns
 
     s = draw.system
     n, w = len(s.mass), s.frequency
+    pressed = [name for name, e in s.elements.items() if floors and isinstance(e, Coulomb)]
     names = [f"q{i + 1}" for i in range(n)]
 
     def law(value: float | Harmonic) -> Any:
@@ -172,8 +176,15 @@ def as_nonsmooth(draw: Draw) -> Any:
             built[name] = ns.elements.Backlash(at=at, half_width=e.half_width, stiffness=e.stiffness, damping=e.damping)
         elif isinstance(e, PreloadedSpring):
             built[name] = ns.elements.PreloadedSpring(at=at, preload=e.preload, stiffness=e.stiffness)
+        elif floors:
+            built[name] = ns.elements.Stop(at=f"y_{name}", side=-1, friction=e.friction / 2.0, tangent=at,
+                                           belt=law(e.belt))  # fmt: skip
         else:
             built[name] = ns.elements.Coulomb(at=at, friction=e.friction, static=e.static, belt=law(e.belt))
     forcing = {q: load(row) for q, row in zip(names, s.loads, strict=True) if row.any()}
-    return ns.mechanical(s.mass, s.damping, s.stiffness, parameters={}, forcing=forcing, elements=built,
-                         coordinates=names, period=draw.period)  # fmt: skip
+    forcing |= {f"y_{name}": lambda t, p: -2.0 for name in pressed}
+    more, none = np.diag([0.838] * len(pressed)), np.zeros((len(pressed),) * 2)
+    return ns.mechanical(
+        block_diag(s.mass, more), block_diag(s.damping, none), block_diag(s.stiffness, none), parameters={},
+        forcing=forcing, elements=built, coordinates=[*names, *(f"y_{name}" for name in pressed)], period=draw.period,
+    )  # fmt: skip

@@ -1,4 +1,5 @@
-"""Random systems with a contact that rubs, coupled coordinates, springs or none, and a belt, beside SciPy with events.
+"""Random systems with contacts that rub: coupled coordinates, springs or none, and a belt, beside SciPy with events;
+many elements whose frictions are floors that rub, beside the reference of dry friction.
 
 Seed 4 is not here: its contact slips for .04 within one step of the reference, which misses it (displacement 1e-7).
 """
@@ -6,11 +7,14 @@ Seed 4 is not here: its contact slips for .04 within one step of the reference, 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
+import contact_campaign as campaign
 import numpy as np
 import pytest
-from contact_elements import Array
+from contact_draws import random_contact_system
+from contact_elements import Array, Coulomb
 from rubbing_reference import Motion, Rubbing, off, random_rubbing
 
 import nonsmooth as ns
@@ -55,3 +59,22 @@ def test_states_are_those_of_the_reference(seeds: tuple[int, ...] | range) -> No
         compared.append(agreed / len(times))
         assert np.abs(computed(system, times) - states)[:agreed].max() < 1e-7, seed
     assert np.mean(compared) > 0.95
+
+
+FLOORS = (2, 5, 14, 15, 17, 21, 29, 33, 38, 49, 57, 59)  # frictions and stops that hold the same coordinate
+LEFT = (298,)  # a force touches its bound where a speed is zero: instant and kernel differ in what is rounding
+
+
+@pytest.mark.parametrize("seeds", [FLOORS, pytest.param(range(400), marks=pytest.mark.slow)])
+def test_floors_under_a_constant_load_are_dry_friction(seeds: tuple[int, ...] | range) -> None:
+    for seed in (seed for seed in seeds if seed not in LEFT):
+        draw = random_contact_system(seed)
+        elements = {
+            name: replace(e, static=None) if isinstance(e, Coulomb) else e for name, e in draw.system.elements.items()
+        }
+        draw = replace(draw, system=replace(draw.system, elements=elements))
+        times = np.linspace(0, 3 * draw.period, 181)
+        states, agreed, failure, _ = campaign.reference(draw, times)
+        if not failure:
+            error = np.abs(campaign.tested(draw, times, floors=True) - states)[:agreed] / (1 + np.abs(states[:agreed]))
+            assert error.max() < campaign.DIFFERENT, seed

@@ -19,7 +19,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property, wraps
-from itertools import combinations
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -29,11 +28,11 @@ from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.bounded import least_within
 from nonsmooth.system.derived.elements import Element, Rubbing
 from nonsmooth.system.derived.elements.element import Condition, Leaving
+from nonsmooth.system.derived.faces import as_sums, independent, weakest
 from nonsmooth.system.derived.place import Place
 
 Pattern = tuple[int, ...]  # the phase of each element
 Method = TypeVar("Method", bound=Callable[..., Any])
-DEPENDENT, INDEPENDENT = 1e-13, 1e-7  # what is left of a unit row when those before are taken away
 
 
 class VaryingError(SystemDefinitionError):
@@ -240,26 +239,18 @@ class Assembler(ABC):
     def _basis(self, held: Sequence[int], mode: str, pattern: Pattern, draw: int) -> tuple[list[int], FloatArray]:
         """The same in one state."""
         rows = np.array([self.slopes(self.rate(k, mode), draw) for k in held])
-        rows = rows / np.linalg.norm(rows, axis=1)[:, None]
-        chosen: list[int] = []
-        for i in sorted(range(len(held)), key=lambda i: not self.parts[held[i]].element.bears):  # those with a place
-            row = rows[i]
-            before = rows[chosen]
-            off = row - before.T @ np.linalg.lstsq(before.T, row, rcond=None)[0] if chosen else row
-            length = float(np.linalg.norm(off))
-            if length > INDEPENDENT:
-                chosen.append(i)
-            elif length > DEPENDENT:
-                names = ", ".join(repr(self.parts[k].name) for k in held)
-                raise SystemDefinitionError(
-                    f"elements {names}: whether their rates are independent of each other cannot be told (a part of "
-                    f"{length:.1e} is left of one); write their at= or on= so that equal directions are equal"
-                )
+        first = sorted(range(len(held)), key=lambda i: not self.parts[held[i]].element.bears)  # those with a place
+        chosen, doubt = independent(rows / np.linalg.norm(rows, axis=1)[:, None], first)
+        if doubt:
+            names = ", ".join(repr(self.parts[k].name) for k in held)
+            raise SystemDefinitionError(
+                f"elements {names}: whether their rates are independent of each other cannot be told (a part of "
+                f"{doubt:.1e} is left of one); write their at= or on= so that equal directions are equal"
+            )
         if len(chosen) == len(held):
             return list(held), np.eye(len(held))
         ways = np.array([self.pushes(self.pushing(k, mode, pattern), draw) for k in held])
-        sums = np.linalg.lstsq(ways[chosen].T, ways.T, rcond=None)[0].T
-        return [held[i] for i in chosen], np.where(np.abs(sums) < INDEPENDENT * np.abs(sums).max(), 0.0, sums)
+        return [held[i] for i in chosen], as_sums(ways, chosen)
 
     def flow(self, mode: str, pattern: Pattern, some: Collection[int] | None = None) -> tuple[Any, dict[int, Any]]:
         """The field of a combination of phases, and the force of each element in it; with ``some`` of these alone."""
@@ -317,26 +308,18 @@ class Assembler(ABC):
         forces = self.flow(mode, pattern)[1]
         names = [f"{self.parts[j].name}_{name}" for j in group for name in self.parts[j].element.conditions]
         names.sort(key=lambda name: not name.endswith(("over", "under", "opens")))
+        bounds = {i: self.parts[j].element.most(self.place(j, mode, pattern)) for i, j in enumerate(group)}
+        bounded = [i for i, j in enumerate(group) if bounds[i] is not None and j not in self.rubbing.values()]
+        cones = [
+            (i, group.index(r), self.constant(r, "friction"))
+            for i, r in enumerate(map(self.rubbing.get, group)) if r in group
+        ]  # fmt: skip
         found: list[Leaving] = []
-        edges: list[FloatArray] = []  # of the body of all forces
-        one_sided: list[bool] = []
-        bounds: list[tuple[FloatArray, Any]] = []  # of the forces within bounds
-        for j, row in zip(group, sums, strict=True):
-            most, r = self.parts[j].element.most(self.place(j, mode, pattern)), self.rubbing.get(j)
-            if most is not None and j not in self.rubbing.values():
-                bounds.append((row, most))
-                edges.append(row)
-            elif r in group:  # the cone of a contact that sticks
-                edges += [row + s * self.constant(r, "friction") * sums[group.index(r)] for s in (-1, 1)]
-            elif most is None:
-                edges.append(row)
-            one_sided += [most is None] * (len(edges) - len(one_sided))
-        for edge in _faces(np.array(edges), one_sided):
-            beyond = sum((p.item() * forces[j] for p, j in zip(sums @ edge, group, strict=True) if p), 0)
-            for row, most in bounds:
-                reach = (row @ edge).item()
-                if reach:
-                    beyond -= (reach if reach.real > 0.0 else -reach) * most
+        for weights in weakest(sums, bounded, cones):
+            beyond = sum((p.item() * forces[j] for p, j in zip(weights, group, strict=True) if p), 0)
+            for i in bounded:
+                if reach := weights[i].item():
+                    beyond -= (reach if reach.real > 0.0 else -reach) * bounds[i]
             found.append(Leaving(None, [Condition(beyond, 1, names.pop(0))]))
         return found
 
@@ -365,28 +348,3 @@ class Assembler(ABC):
         if self.asks and self.parts[k].element.held and together:
             return self.asked(k, mode, pattern)
         return self.parts[k].element.leaving(self.place(k, mode, pattern))
-
-
-def _faces(sums: FloatArray, one_sided: Sequence[bool]) -> list[FloatArray]:
-    """The directions in which forces that hold together can be too weak; ``one_sided`` ones push only.
-
-    Forces within bounds add up to a body whose faces lie along all but one of its independent edges."""
-    size = sums.shape[1]
-    found: list[FloatArray] = []
-    for some in combinations(range(len(sums)), size - 1):
-        edges = sums[list(some)]
-        if size > 1 and np.linalg.matrix_rank(edges.real, tol=1e-9) < size - 1:
-            continue
-        normal = np.ones(1, dtype=sums.dtype)
-        if size > 1:
-            m = int(np.abs(np.linalg.svd(edges.real)[2][-1]).argmax())
-            others = [i for i in range(size) if i != m]
-            normal = np.ones(size, dtype=sums.dtype)
-            normal[others] = np.linalg.solve(edges[:, others], -edges[:, m])
-            normal = np.where(np.abs(normal) < 1e-12, 0.0, normal)
-        for side in (normal, -normal):
-            reach = (sums @ side).real
-            if (reach[list(one_sided)] > 1e-9).any() or any(np.allclose(side, other, atol=1e-9) for other in found):
-                continue
-            found.append(side)
-    return found

@@ -17,6 +17,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
+from nonsmooth.system.derived.faces import as_sums, independent, weakest
 
 MOST = 4096  # combinations that are tried
 ZERO = 1e-11  # of the sum of the terms
@@ -111,28 +112,66 @@ def moving_by_trial(who: Candidates, G: FloatArray, begin: Any) -> tuple[dict[in
     return valid[0], ""
 
 
-def _holds(
-    who: Candidates, states: dict[int, int], G: FloatArray, at: dict[int, int]
-) -> tuple[list[int], FloatArray, FloatArray] | None:
-    """Whose rates are held, what unit forces that hold bring along, and the forces for unit rates; None where friction
-    leaves them undetermined."""
+@dataclass
+class _Held:
+    """Forces that a combination needs: the places of the rates that are held, what unit forces bring along, the forces
+    for unit rates; the weights of the forces (:func:`weakest`), the places of those with two bounds of their own."""
+
+    rows: list[int]
+    push: FloatArray
+    inverse: FloatArray
+    weights: FloatArray  # (sums, held)
+    bounded: dict[int, int]  # of those that are held
+
+    def left(
+        self, who: Candidates, forces: FloatArray, off: FloatArray, bounds: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """The distance of each sum of forces from its bound, and its rounding."""
+        high, low = np.zeros((2, len(self.rows)))
+        for j, i in self.bounded.items():
+            static, forward, back = bounds[3 * i : 3 * i + 3]
+            high[j], low[j] = (back, -forward) if who.elements[i] in who.kinetic else (static, static)
+        sizes, ways = np.abs(self.weights), np.clip(self.weights, 0.0, None)
+        most = ways @ high + (ways - self.weights) @ low
+        own = off[self.rows] + ZERO * np.maximum(np.abs(high), np.abs(low))
+        return most - self.weights @ forces[self.rows], sizes @ own
+
+
+def _holds(who: Candidates, states: dict[int, int], G: FloatArray, at: dict[int, int]) -> _Held | None:
+    """The forces that a combination needs; None where friction leaves undetermined how it moves."""
     key = tuple(at), tuple(states.items())
     if key not in who.known:
-        held = [k for k in at if states.get(k) == HELD]
-        push = np.zeros((len(at), len(held)))
-        for j, k in enumerate(held):
-            push[at[k], j] = 1.0
-            r = who.rubbing.get(k)
-            if r is not None and abs(states[r]) == 1:
-                push[at[r], j] = -states[r] * who.shares[r]
-        rows = [at[k] for k in held]
-        matrix = G[rows] @ push
-        full = not held or np.linalg.matrix_rank(matrix, tol=1e-10 * np.abs(matrix).max()) == len(held)
-        who.known[key] = None
-        if full or not who.rubbing:
-            who.known[key] = rows, push, np.linalg.pinv(matrix, rcond=1e-12) if held else matrix
-    found: tuple[list[int], FloatArray, FloatArray] | None = who.known[key]
+        who.known[key] = _found(who, states, G, at)
+    found: _Held | None = who.known[key]
     return found
+
+
+def _found(who: Candidates, states: dict[int, int], G: FloatArray, at: dict[int, int]) -> _Held | None:
+    held = [k for k in at if states.get(k) == HELD]
+    rows, count = [at[k] for k in held], len(held)
+    push = np.zeros((len(at), count))
+    push[rows, range(count)] = 1.0
+    sides = {j: r for j, k in enumerate(held) if (r := who.rubbing.get(k)) is not None}
+    for j, r in sides.items():
+        if states[r] != HELD:
+            push[at[r], j] = -states[r] * who.shares[r]
+    effects = G @ push
+    matrix = effects[rows]
+    rank = np.linalg.matrix_rank(matrix, tol=1e-10 * np.abs(matrix).max(initial=0.0)) if held else 0
+    sums = np.eye(count)
+    if rank < count:
+        ways = (effects / np.maximum(np.linalg.norm(effects, axis=0), 1e-300)).T
+        chosen = independent(ways, sorted(range(count), key=lambda j: held[j] not in who.contacts))[0]
+        if rank == len(chosen):
+            sums = as_sums(effects.T, chosen)
+        elif who.rubbing:
+            return None
+    bounded = {j: at[k] for j, k in enumerate(held) if k not in who.contacts and k not in who.shares}
+    cones = [(j, held.index(r), who.shares[r]) for j, r in sides.items() if states[r] == HELD]
+    weights = weakest(sums, bounded, cones) if held else []
+    inverse = np.asarray(np.linalg.pinv(matrix, rcond=1e-12), dtype=float)
+    inverse[np.abs(inverse) < 1e-13 * np.abs(inverse).max(initial=0.0)] = 0.0  # rates apart stay apart
+    return _Held(rows, push, inverse, np.reshape(weights, (len(weights), count)), bounded)
 
 
 def _followed(
@@ -142,14 +181,16 @@ def _followed(
 
     ``early``: as few as its conditions need. Elements without a state bear no force."""
     at = {k: i for i, k in enumerate(who.elements)}
-    holds = _holds(who, states, G, at)
-    if holds is None:
+    here = _holds(who, states, G, at)
+    if here is None:
         return None
-    rows, push, inverse = holds
-    pending = {
-        (k, s) for k, state in states.items() for s in ((1, -1) if state == HELD and k not in who.contacts else (1,))
-    }
-    pending -= {(k, s) for k, s in pending if k in who.slipping or (states[k] == OPEN and k not in who.contacts)}
+    rows, count = here.rows, len(here.weights)
+    moves = [
+        k for k, state in states.items()
+        if state != HELD and k not in who.slipping and (state or k in who.contacts)
+    ]  # fmt: skip
+    places, signs = [at[k] for k in moves], np.array([states[k] or 1 for k in moves])
+    pending = np.ones(count + len(moves), dtype=bool)
     found: list[tuple[FloatArray, FloatArray]] = []
     for order in range(orders):
         free, sizes, bounds = ahead.rates()
@@ -159,8 +200,8 @@ def _followed(
                 forces[i] = bounds[3 * i + (1 if states[k] > 0 else 2)]
         terms = np.abs(forces)
         if rows:
-            terms += np.abs(push) @ (np.abs(inverse) @ (sizes + np.abs(G) @ terms)[rows])
-            forces -= push @ (inverse @ (free + G @ forces)[rows])
+            terms += np.abs(here.push) @ (np.abs(here.inverse) @ (sizes + np.abs(G) @ terms)[rows])
+            forces -= here.push @ (here.inverse @ (free + G @ forces)[rows])
         a = free + G @ forces
         size = sizes + np.abs(G) @ terms
         if (np.abs(a[rows]) > SAME * size[rows]).any():
@@ -168,26 +209,12 @@ def _followed(
         a[rows] = 0.0
         found.append((a, size))
         off = ZERO * (terms + size / np.maximum(np.abs(np.diag(G)), 1e-300))  # to which forces are known
-        for k, s in list(pending):
-            i, state = at[k], states[k]
-            rounding = off[i] if state == HELD else ZERO * size[i]
-            if state == HELD:
-                if k in who.contacts:
-                    value = forces[i]
-                elif k in who.shares:
-                    share, normal = who.shares[k], at[next(j for j, r in who.rubbing.items() if r == k)]
-                    value, rounding = share * forces[normal] - s * forces[i], rounding + share * off[normal]
-                else:
-                    static, forward, back = bounds[3 * i : 3 * i + 3]
-                    bound = static if k not in who.kinetic else (back if s > 0 else -forward)
-                    value, rounding = bound - s * forces[i], rounding + ZERO * abs(bound)
-            else:
-                value = a[i] * (state or 1)
-            if value < -rounding:
-                return None
-            if value > rounding:
-                pending.discard((k, s))
-        if (early and not pending) or order == orders - 1:
+        values, rounding = here.left(who, forces, off, bounds)
+        values, rounding = np.append(values, signs * a[places]), np.append(rounding, ZERO * size[places])
+        if (values < -rounding)[pending].any():
+            return None
+        pending &= values <= rounding
+        if (early and not pending.any()) or order == orders - 1:
             break
         ahead.put(forces)
     return found
