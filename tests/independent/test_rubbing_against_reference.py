@@ -16,6 +16,7 @@ import pytest
 from contact_draws import random_contact_system
 from contact_elements import Array, Coulomb
 from rubbing_reference import Motion, Rubbing, off, random_rubbing
+from scipy.linalg import block_diag
 
 import nonsmooth as ns
 
@@ -25,26 +26,33 @@ SOME = (0, 3, 6, 13, 14, 17, 66, 81, 83, 96, 223)  # impacts that accumulate, a 
 SLOW = [pytest.param(range(first, first + 100), marks=pytest.mark.slow) for first in range(0, 1000, 100)]
 
 
-def computed(system: Rubbing, times: Array) -> Array:
-    """States by the package."""
-    names, w = ["x", "y", "z"][: len(system.q)], system.frequency
+def computed(times: Array, *systems: Rubbing) -> Array:
+    """States by the package, of systems of one period side by side."""
+    forcing: dict[str, Any] = {}
+    elements: dict[str, Any] = {}
+    starts: list[dict[str, float]] = []
+    w = systems[0].frequency
 
     def load(row: Array) -> Callable[[Any, Any], Any]:
         c, a, b = map(float, row)
         return lambda t, p: c + a * np.cos(w * t) + b * np.sin(w * t)
 
-    stop = ns.elements.Stop(
-        at="y", side=-1, restitution=system.restitution, friction=system.friction, tangent="x", creep=system.creep,
-        belt=system.belt,
-    )  # fmt: skip
+    for i, one in enumerate(systems):
+        names = [f"{axis}{i}" for axis in "xyz"[: len(one.q)]]
+        forcing |= {name: load(row) for name, row in zip(names, one.loads, strict=True) if row.any()}
+        elements[f"stop{i}"] = ns.elements.Stop(
+            at=names[1], side=-1, restitution=one.restitution, friction=one.friction, tangent=names[0],
+            creep=one.creep, belt=one.belt,
+        )  # fmt: skip
+        starts.append(dict(zip((*names, *(f"v_{name}" for name in names)), (*one.q, *one.v), strict=True)))
+    blocks = (block_diag(*[getattr(one, name) for one in systems]) for name in ("mass", "damping", "stiffness"))
     made = ns.mechanical(
-        system.mass, system.damping, system.stiffness, parameters={}, coordinates=names, period=system.period,
-        forcing={name: load(row) for name, row in zip(names, system.loads, strict=True) if row.any()},
-        elements={"stop": stop},
+        *blocks, parameters={}, period=systems[0].period, forcing=forcing, elements=elements,
+        coordinates=[name for one in starts for name in list(one)[: len(one) // 2]],
     )  # fmt: skip
-    start = dict(zip((*names, *(f"v_{name}" for name in names)), (*system.q, *system.v), strict=True))
+    start = {name: value for one in starts for name, value in one.items()}
     run = ns.simulate(made, duration=float(times[-1]), samples=times, start=start)
-    return np.asarray(run.u.values[np.searchsorted(run.time.values, times, side="right") - 1])
+    return np.asarray(run.u.sel(state=list(start)).values[np.searchsorted(run.time.values, times, side="right") - 1])
 
 
 @pytest.mark.parametrize("seeds", [SOME, *SLOW])
@@ -57,8 +65,19 @@ def test_states_are_those_of_the_reference(seeds: tuple[int, ...] | range) -> No
         apart = np.flatnonzero(~(np.abs(states - other).max(axis=1) < 1e-8))
         agreed = int(apart[0]) if len(apart) else len(times)
         compared.append(agreed / len(times))
-        assert np.abs(computed(system, times) - states)[:agreed].max() < 1e-7, seed
+        assert np.abs(computed(times, system) - states)[:agreed].max() < 1e-7, seed
     assert np.mean(compared) > 0.95
+
+
+@pytest.mark.parametrize("pairs", [[(1, 3), (8, 8), (13, 13)], pytest.param(
+    [(2 * i, 2 * i + i % 2) for i in range(60)], marks=pytest.mark.slow)])  # fmt: skip
+def test_systems_side_by_side_move_as_alone(pairs: list[tuple[int, int]]) -> None:
+    """All at the same instants, where both are the same: impacts of contacts that do not feel each other."""
+    for seeds in pairs:
+        systems = [replace(random_rubbing(seed), frequency=1.0) for seed in seeds]
+        times = np.linspace(0, 3 * systems[0].period, 181)
+        states = np.hstack([Motion(one).run(times) for one in systems])
+        assert np.abs(computed(times, *systems) - states).max() < 1e-7, seeds
 
 
 FLOORS = (2, 5, 14, 15, 17, 21, 29, 33, 38, 49, 57, 59)  # frictions and stops that hold the same coordinate

@@ -66,8 +66,10 @@ def decide(
     approaching = [k for k in contacts if here.speeds[k] < 0.0]
     if not approaching:
         return here.outcome(contacts, ())
-    if len(approaching) > 1 and any(k in here.make.rubbing for k in approaching):
-        return here.end("not_unique", approaching)
+    for block in here.apart(contacts):
+        together = [k for k in block if here.speeds[k] < 0.0]
+        if len(together) > 1 and any(k in here.make.rubbing for k in together):
+            return here.end("not_unique", together)
     own = {k: here.law(k, "restitution") for k in contacts}
     if all(-here.speeds[k] < here.creep(k) for k in approaching):
         still = _Instant(numbers.copy(), pattern, met, some)

@@ -73,21 +73,54 @@ class Instant:
         given = getattr(self.parts[k].element, "creep", None)
         return float(given) if given is not None else CREEP * float(self.make.size(self.rates[k]))
 
+    def apart(self, contacts: list[int]) -> list[list[int]]:
+        """Contacts that approach, with closed ones that feel them; beside those that rub apart by whose impulses change
+        whose rates."""
+        from scipy.sparse.csgraph import connected_components
+
+        if not self.make.rubbing or len(contacts) == 1:
+            return [contacts]
+        own = [[k, *([self.make.rubbing[k]] if k in self.make.rubbing else [])] for k in contacts]
+        felt = [[self.numbers.effects(one, other).any() for other in own] for one in own]
+        labels = connected_components(np.array(felt, dtype=int).reshape(len(own), -1), directed=False)[1]
+        blocks = [[k for k, one in zip(contacts, labels, strict=True) if one == g] for g in dict.fromkeys(labels)]
+        return [block for block in blocks if any(self.speeds[k] < 0.0 for k in block)]
+
     def strike(self, contacts: list[int], restitution: dict[int, float]) -> tuple[int, ...]:
-        """The impact of all contacts that are closed; returns those that bore an impulse (see :class:`Outcome`)."""
-        rubs = [k for k in contacts if self.speeds[k] < 0.0 and k in self.make.rubbing]
-        if rubs:
-            return self._rub(rubs[0], contacts, restitution[rubs[0]])
-        if self.make.sequential and len(contacts) > 1:
-            return self._in_sequence(contacts, restitution)
+        """The impacts of all contacts that are closed; returns those that bore an impulse (see :class:`Outcome`)."""
+        struck = tuple[int, ...]()
+        rubs = {k for k in contacts if self.speeds[k] < 0.0 and k in self.make.rubbing}
+        for block in self.apart(contacts):
+            one = next((k for k in block if k in rubs), None)
+            if one is not None:
+                struck += self._rub(one, block, restitution[one])
+            elif self.make.sequential and len(block) > 1:
+                struck += self._in_sequence(block, restitution)
+            else:
+                struck += self._at_once(block, restitution, bool(rubs))
+        return struck
+
+    def _at_once(self, contacts: list[int], restitution: dict[int, float], with_slopes: bool) -> tuple[int, ...]:
+        """Newton's law over all of them."""
         before = np.array([self.speeds[k] for k in contacts])
         given_back = np.array([restitution[k] if self.speeds[k] < 0.0 else 0.0 for k in contacts])
         G = self.numbers.effects(contacts, contacts)
         size = len(contacts)
         impulses = least(G, before * (1.0 + given_back), np.zeros(size), np.full(size, np.inf))
         bore = {k: e for k, e, impulse in zip(contacts, given_back, impulses, strict=True) if impulse > 0.0}
+        if with_slopes:
+            some, slopes = impulses > 0.0, np.zeros((size, size))
+            slopes[some] = -np.linalg.pinv(G[np.ix_(some, some)], rcond=1e-10) @ np.diag(1.0 + given_back)[some]
+            self._keep(contacts, slopes)
         self._struck(contacts, impulses, {k: max(0.0, -e * self.speeds[k]) for k, e in bore.items()})
         return tuple(k if e == self.law(k, "restitution") else ~k for k, e in bore.items())
+
+    def _keep(self, some: list[int], slopes: FloatArray) -> None:
+        """Put the derivatives of impulses in the rates of some elements beside those of others."""
+        from scipy.linalg import block_diag
+
+        others, known = self.rubbed or ((), np.zeros((0, 0)))
+        self.rubbed = (*others, *some), block_diag(known, slopes)
 
     def _rub(self, k: int, contacts: list[int], restitution: float) -> tuple[int, ...]:
         """The impact of one contact that rubs, the others that are closed without friction."""
@@ -100,7 +133,7 @@ class Instant:
             return ()
         impulses, slopes, after = found
         self._struck(some, impulses, dict(zip(some, map(float, after), strict=True)))
-        self.rubbed = tuple(some), slopes
+        self._keep(some, slopes)
         return (k,)
 
     def _struck(self, some: list[int], impulses: FloatArray, after: dict[int, float]) -> None:
@@ -138,7 +171,7 @@ class Instant:
             return ()
         v = np.where(np.abs(v) <= ZERO * np.abs(G) @ impulses, 0.0, v)
         self._struck(contacts, impulses, dict(zip(contacts, map(float, v), strict=True)))
-        self.rubbed = tuple(contacts), slopes
+        self._keep(contacts, slopes)
         return tuple(k for k, impulse in zip(contacts, impulses, strict=True) if impulse > 0.0)
 
     def _behind(self, speeds: dict[int, float], some: list[int], impulses: FloatArray) -> dict[int, float]:
