@@ -11,7 +11,8 @@ and so, compared at equal times,
     = S\,\delta z^- + S_p\,\delta p.
 
 Where a transition happens at a phase of the forcing, :math:`\delta t` follows from the period alone. Transitions
-taken at the same instant have the :math:`\delta t` of the first: their maps are composed before the formula is used.
+that lead to each other at one instant have the :math:`\delta t` of the first: their maps are composed before the
+formula is used.
 
 References
 ----------
@@ -21,12 +22,15 @@ M.A. Aizerman, F.R. Gantmakher, Prikl. Mat. Mekh. 21 (1957) 658-669; P.C. Muelle
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+
+BEHIND = 1e-9  # of an indicator's size: nearer to a boundary than this is on it
 
 
 @dataclass(slots=True)
@@ -111,6 +115,11 @@ class Jump:
         size = np.linalg.norm(self.h_z) * np.linalg.norm(self.f_before)
         return float(abs(self.rate) / size) if size > 0.0 else np.inf
 
+    def is_met(self, field: FloatArray, scale: FloatArray) -> bool:
+        """Return whether motion along a field meets the surface as well, here and from the same side."""
+        size = float(np.abs(self.h_z) @ scale)
+        return abs(self.h) <= BEHIND * size and float(self.h_t + self.h_z @ field) * self.rate > 0.0
+
     @property
     def log_determinant(self) -> float:
         """log\\|det S\\|, minus infinity where S has not full rank."""
@@ -136,8 +145,36 @@ class Touch:
 
 
 def chained(jumps: list[Jump]) -> Jump:
-    """Transitions taken one after the other at the same instant, as one."""
+    """Transitions of which each leads to the next at the same instant, as one."""
     return reduce(_then, jumps)
+
+
+def of_one_instant(jumps: list[Jump], scale: FloatArray) -> Jump:
+    """Transitions taken one after the other at the same instant, as one.
+
+    One that the motion would have met there by itself has an instant of its own: two balls side by side. The effects of
+    such transitions are one after the other, and those of one order where both are not the same, which is said."""
+    groups = [[jumps[0]]]
+    for jump in jumps[1:]:
+        if jump.is_met(jumps[0].f_before, scale):
+            groups.append([jump])
+        else:
+            groups[-1].append(jump)
+    return reduce(_beside, map(chained, groups))
+
+
+def _beside(a: Jump, b: Jump) -> Jump:
+    one, other = b.saltation @ a.saltation, a.saltation @ b.saltation
+    if not np.allclose(one, other, rtol=1e-6, atol=1e-6 * np.abs(one).max()):
+        warnings.warn(
+            "two transitions happen at one instant, each by itself, and which of them a neighbouring motion meets "
+            "first matters: derivatives are those for one order. Start a little off for another.",
+            RuntimeWarning, stacklevel=2,
+        )  # fmt: skip
+    fields = np.array([a.fields[0], b.fields[1], b.R @ a.fields[2] + b.fields[2]])
+    return Jump(
+        b.z_after, b.R @ a.R, fields, a.h, a.h_z, a.h_t, a.h_p, b.S @ a.S, a.instant, a.row, a.indicator
+    )  # fmt: skip
 
 
 def _then(a: Jump, b: Jump) -> Jump:

@@ -244,8 +244,9 @@ def sensitivity(
 
     Notes
     -----
-    Transitions taken at the same instant stand as one crossing, with the last one's number. A parameter that has the
-    name of a variable above (``P``, ``end``) is no coordinate of the result; `system_of` gives its value.
+    Transitions taken at the same instant stand as one crossing, with the last one's number; where several happen by
+    themselves and their order matters, derivatives are those of one order, and a warning says so. A parameter that has
+    the name of a variable above (``P``, ``end``) is no coordinate of the result; `system_of` gives its value.
     """
     asked = as_called(locals())
     drive = driven(system, inputs)

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.flow.saltation import Jump, Touch, chained
+from nonsmooth.flow.saltation import Jump, Touch, of_one_instant
 from nonsmooth.kernels.tangent.segments import Segments
 from nonsmooth.system.phases import phase_slopes, varying_phases
 
@@ -170,7 +170,7 @@ class VariationalFlow:
             jumps: list[Jump] = []
             for one in k:
                 jumps.append(self.jump(values, one, t, jumps[-1].z_after if jumps else z, -1 if jumps else row))
-            return chained(jumps)
+            return of_one_instant(jumps, self.scale)
 
         n, a = self.n, self.n_active
         values, timing = _floats(values), self._no_timing

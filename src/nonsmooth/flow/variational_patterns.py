@@ -148,7 +148,8 @@ class Packed:
     def _rubbed(self, rows: Rows, mode: int, change: Change, w: FloatArray) -> FloatArray:
         """The map of an impact that rubs at an instant: its impulses are homogeneous functions of the rates."""
         numbers = RowNumbers(rows, self.patterns.mode, w.copy())
-        found = decide(numbers, self.patterns.visited[mode], change.elements).rubbed
+        concerned = rows.with_group_of(max(change.elements[0], ~change.elements[0]))
+        found = decide(numbers, self.patterns.visited[mode], change.elements, concerned).rubbed
         return rows.identity() if found is None else rows.rubbed(*found)
 
     def _array(self, modes: Iterable[int], watched: Iterable[int], taken: Iterable[int]) -> FloatArray:

@@ -8,13 +8,13 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.signature import AT_ONCE, Round, Signature, Visit
+from nonsmooth.flow.saltation import BEHIND
 
 if TYPE_CHECKING:
     from nonsmooth.flow.engines.engine import Log
     from nonsmooth.flow.variational import Jump, VariationalFlow
 
 ROUNDING = 1e-13  # of an indicator's size
-BEHIND = 1e-9  # of an indicator's size: nearer to a boundary than this is on it
 
 
 def visits_of(

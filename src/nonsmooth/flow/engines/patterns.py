@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.patterns import Patterns
     from nonsmooth.system.symbolic.traced import Traced
 
-NEAR = 1e-9  # of the terms of a condition: what is no more may be zero
 MOST = 1024  # patterns for which room is made at first
 SECTION = np.array([(0, 1, 1), (0, -1, 1)], dtype=np.int64)  # the last rows of a transition table
 
@@ -212,7 +211,7 @@ class PatternTables:
                 self.work.tally[STARTS] = -1 - ENDS.index(found.ends)
         else:
             numbers = RowNumbers(rows, mode, w, float(self.own.info[here, 0]), pattern)
-            found = decide(numbers, pattern, self._met(here), self._concerned(lead, numbers, here))
+            found = decide(numbers, pattern, self._met(here), self._concerned(lead))
             taken = self._answer(waits, found)
         if taken < 0 or not found.struck:
             self.work.w[: rows.n] = found.states
@@ -225,16 +224,15 @@ class PatternTables:
         places = [part.where.values for part in self.rows.parts]
         return [k for k, place in enumerate(places) if any(np.array_equal(place, row) for row in rows)]
 
-    def _concerned(self, lead: Lead, numbers: RowNumbers, here: int) -> list[int] | None:
-        """The elements whose groups an instant concerns: of which a condition was met, or is zero; None: all."""
-        if lead.kind == TOGETHER:
+    def _concerned(self, lead: Lead) -> list[int] | None:
+        """The group of elements that an instant concerns: of which a condition was met; None: all. What another group
+        does at that instant is asked next: its effects on neighbouring motions are its own."""
+        fired = int(self.work.tally[FIRED])
+        if lead.kind == TOGETHER and fired < 0:
             return None
-        watched = self.watched[here]
-        zero = np.abs(watched @ numbers.w) <= NEAR * (np.abs(watched) @ numbers.size)
-        owners = {self.patterns.owners[slot] for slot in np.flatnonzero(zero)}
-        owners.add(next(k for k, part in enumerate(self.rows.parts) if part.name == lead.element))
-        groups = {self.rows.group[k] for k in owners}
-        return [k for k, group in self.rows.group.items() if group in groups]
+        names = [part.name for part in self.rows.parts]
+        owner = self.patterns.owners[fired] if lead.kind == TOGETHER else names.index(lead.element)
+        return self.rows.with_group_of(owner)
 
     def _answer(self, waits: int, found: Outcome) -> int:
         """The transition to which a question has led; it is made where it is new."""

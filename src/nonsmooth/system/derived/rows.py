@@ -260,6 +260,10 @@ class Rows(Assembler):
         """The number of each element's group."""
         return {k: g for g, (some, *_) in enumerate(self.groups) for k in some}
 
+    def with_group_of(self, k: int) -> list[int]:
+        """The elements of the group of one."""
+        return self.groups[self.group[k]][0]
+
     def phases(self, k: int, pattern: Pattern) -> Any:
         """Those of an element's group."""
         return self.groups[self.group[k]][1](pattern)

@@ -1,0 +1,50 @@
+"""Derivatives where transitions happen at one instant, each by itself: side by side as alone, else with a warning."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+pytestmark = pytest.mark.physics
+
+
+def hopping(count: int, friction: float | None, coupling: float = 0.0) -> tuple[ns.System, dict[str, float]]:
+    """Balls that fall and bounce at the same instants, on a floor that may rub, and a start."""
+    names = [f"{axis}{i}" for i in range(count) for axis in "xy"]
+    system = ns.mechanical(
+        np.eye(2 * count), 0.1 * np.eye(2 * count) + coupling, np.diag([1.0, 0.0] * count), parameters={},
+        coordinates=names, period=2 * np.pi,
+        forcing={f"y{i}": lambda t, p: -1.0 - 0.3 * np.cos(t) for i in range(count)},
+        elements={
+            f"s{i}": ns.elements.Stop(
+                at=f"y{i}", side=-1, restitution=0.6, friction=friction, tangent=f"x{i}" if friction else None
+            )
+            for i in range(count)
+        },
+    )  # fmt: skip
+    return system, {name: 0.2 if name[0] == "x" else 0.5 for name in names}
+
+
+def derivatives(system: ns.System, start: dict[str, float], states: list[str]) -> np.ndarray:
+    found = ns.sensitivity(system, periods=0.4, start=start).Phi
+    return np.asarray(found.sel(state=states, initial_state=states).values)
+
+
+@pytest.mark.parametrize("visited", [True, False])
+@pytest.mark.parametrize("friction", [None, 0.2])
+def test_side_by_side_each_has_the_derivatives_that_it_has_alone(
+    friction: float | None, visited: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if visited:
+        monkeypatch.setattr("nonsmooth.system.derived.combinations.MOST", 1)
+    order = [f"{v}{axis}{i}" for i in range(2) for v in ("", "v_") for axis in "xy"]
+    alone = derivatives(*hopping(1, friction), order[:4])
+    assert np.abs(alone).max() > 1.5  # impacts are there
+    assert derivatives(*hopping(2, friction), order) == pytest.approx(np.kron(np.eye(2), alone), abs=1e-12)
+
+
+def test_those_that_depend_on_an_order_are_warned_of() -> None:
+    with pytest.warns(RuntimeWarning, match="two transitions happen at one instant, each by itself"):
+        derivatives(*hopping(2, None, coupling=0.05), ["x0"])
