@@ -215,7 +215,7 @@ def _why(shooting: Shooting, tried: Solved, name: str) -> tuple[str, str]:
             return "neutral", (
                 f"a multiplier is {size}, so that Newton's method has no single orbit to converge to: the motion "
                 "drifts, dies out or grows very slowly, or belongs to a family of orbits (an undamped system, a free "
-                "translation, a conserved energy)"
+                "translation, a conserved energy, a mass that friction holds wherever it is)"
             )
     return "no_convergence", f"Newton's method did not converge to a {name} orbit"
 
