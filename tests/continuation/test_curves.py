@@ -10,7 +10,6 @@ import pytest
 import xarray as xr
 
 import nonsmooth as ns
-from nonsmooth.continuation.problems.solve import null_vectors
 
 pytestmark = pytest.mark.physics
 
@@ -96,15 +95,3 @@ def test_wrong_arguments(impact: xr.Dataset) -> None:
         ns.continue_curve(graze, {"A": (0.5, 1.0), "omega": (0.5, 1.5)})
     with pytest.raises(TypeError, match="special_points"):
         ns.continue_curve(3, {"A": (0.5, 1.0), "omega": (0.5, 1.5)})
-
-
-@pytest.mark.parametrize("n", [7, 150])
-@pytest.mark.parametrize("cuts", [(), (3,), (2, 5)])
-def test_null_vectors_of_differences_are_constant_between_cuts(n: int, cuts: tuple[int, ...]) -> None:
-    differences = np.eye(n - 1, n) - np.eye(n - 1, n, k=1)
-    differences[list(cuts)] *= 1e-12  # two parts that know nothing of each other
-    found = null_vectors(differences, 1e-7)
-    parts = np.split(np.arange(n), [cut + 1 for cut in cuts])
-    expected = sum(np.outer(one, one) / one.sum() for one in (np.isin(np.arange(n), part) * 1.0 for part in parts))
-    assert len(found) == len(parts)
-    assert found.T @ found == pytest.approx(expected, abs=1e-9)
