@@ -117,6 +117,10 @@ def lyapunov(
     state of modes that are never visited: it is constant. The phase of the forcing is no state, so a forced limit cycle
     has negative exponents only; an autonomous motion that does not end in an equilibrium has one exponent zero.
 
+    Transitions of one instant act as one, with the instant of the first. Where several happen there by themselves in
+    every period (equal masses that hit their stops together), the exponents are not those of neighbouring motions:
+    make the system a little unequal.
+
     A run that stops at a stable equilibrium has the real parts of its eigenvalues, and the standard error is no
     less than the distance from them. A run that begins at an unstable one, as the start of zeros often is, stays there:
     its exponents are no attractor's. A warning names the equilibrium, ``equilibrium`` and the attribute ``note`` say it
