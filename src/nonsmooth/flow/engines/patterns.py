@@ -211,28 +211,24 @@ class PatternTables:
                 self.work.tally[STARTS] = -1 - ENDS.index(found.ends)
         else:
             numbers = RowNumbers(rows, mode, w, float(self.own.info[here, 0]), pattern)
-            found = decide(numbers, pattern, self._met(here), self._concerned(lead))
+            fired = int(tally[FIRED])
+            found = decide(numbers, pattern, self._met(here, fired), self._concerned(lead, fired))
             taken = self._answer(waits, found)
         if taken < 0 or not found.struck:
             self.work.w[: rows.n] = found.states
         self.work.tally[WAITS] = taken + 1
 
-    def _met(self, here: int) -> list[int]:
+    def _met(self, here: int, fired: int) -> list[int]:
         """The elements whose place was met."""
-        fired = int(self.work.tally[FIRED])
-        rows = [] if fired < 0 else [self.watched[here][fired], -self.watched[here][fired]]
-        places = [part.where.values for part in self.rows.parts]
-        return [k for k, place in enumerate(places) if any(np.array_equal(place, row) for row in rows)]
+        row = self.watched[here][fired] if fired >= 0 else np.nan
+        places = enumerate(part.where.values for part in self.rows.parts)
+        return [k for k, place in places if np.array_equal(place, row) or np.array_equal(place, -row)]
 
-    def _concerned(self, lead: Lead) -> list[int] | None:
-        """The group of elements that an instant concerns: of which a condition was met; None: all. What another group
-        does at that instant is asked next: its effects on neighbouring motions are its own."""
-        fired = int(self.work.tally[FIRED])
-        if lead.kind == TOGETHER and fired < 0:
-            return None
-        names = [part.name for part in self.rows.parts]
-        owner = self.patterns.owners[fired] if lead.kind == TOGETHER else names.index(lead.element)
-        return self.rows.with_group_of(owner)
+    def _concerned(self, lead: Lead, fired: int) -> list[int] | None:
+        """The group of elements of which a condition was met, None: all; others are asked next, at the same instant."""
+        if lead.kind != TOGETHER:
+            return self.rows.with_group_of([*self.patterns.elements].index(lead.element))
+        return self.rows.with_group_of(self.patterns.owners[fired]) if fired >= 0 else None
 
     def _answer(self, waits: int, found: Outcome) -> int:
         """The transition to which a question has led; it is made where it is new."""
