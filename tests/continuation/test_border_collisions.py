@@ -59,3 +59,11 @@ def test_an_orbit_born_at_the_border_begins_there():
     points = np.abs(x / mu - np.array([[-0.5 / 1.75], [1.5 / 1.75]])).min(axis=0)
     assert points == pytest.approx(np.zeros(len(mu)), abs=1e-10)
     assert branch.floquet_multipliers.values[1:].real.ravel() == pytest.approx(np.full(len(mu), -0.75), abs=1e-10)
+
+
+def test_points_beyond_which_a_map_has_no_values_print_nothing(capfd):
+    """LAPACK writes to the terminal by itself where a number is not finite: no Python code may hide that."""
+    system = ns.models.square_root_map(lam=0.14578609905744228, mu=0.02)
+    branch = ns.continue_orbit(ns.find_orbit(system, start=[-0.05]), "mu", (-0.1, 0.3))
+    assert float(branch.mu.min()) == pytest.approx(0.0, abs=1e-13)
+    assert "".join(capfd.readouterr()) == ""

@@ -15,7 +15,7 @@ from typing import Any, Generic, Self, TypeVar, cast
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.problems.solve import Factored, null_vectors, solve
+from nonsmooth.continuation.problems.solve import Factored, null_vectors, shortest, solve
 from nonsmooth.errors import SystemDefinitionError
 
 DONE = 1e-9  # a step this small is followed by one of its square
@@ -182,10 +182,7 @@ class Curve(ABC, Generic[P]):
             right[:-1] = self.residual(solved)
             right[-1] = border @ Y - level
             try:
-                if singular:
-                    step = np.linalg.lstsq(self.bordered(solved, border), right, rcond=1e-7)[0]
-                else:
-                    step = solve(self.bordered(solved, border), right)
+                step = (shortest if singular else solve)(self.bordered(solved, border), right)
             except np.linalg.LinAlgError:
                 return None
             length = float(np.abs(step).max())

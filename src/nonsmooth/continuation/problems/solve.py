@@ -15,6 +15,13 @@ def solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
     return Factored(matrix).solve(right)
 
 
+def shortest(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """The shortest x for which matrix x is nearest to right; LinAlgError where a number is not finite."""
+    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):  # LAPACK would print a message of its own
+        raise np.linalg.LinAlgError("a number of the matrix or the right side is not finite")
+    return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-7)[0])
+
+
 def determinant(matrix: FloatArray) -> tuple[float, float]:
     """Sign of the determinant and the logarithm of its size."""
     try:
