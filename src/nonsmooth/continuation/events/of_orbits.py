@@ -198,7 +198,8 @@ class AlongOrbits(Policy):
     def record(self, found: March, step: Step, met: Met) -> None:
         """List a special point, or a boundary that a branch passes with its signature."""
         if isinstance(met.kind, Boundary):
-            mark(found, [met], beside(met.point, contacts_of([met])))
+            beyond = beside(met.point, contacts_of([met]))
+            mark(found, [met], beyond, self._between(met.point, beyond)[1] if beyond is not None else None)
         else:
             super().record(found, step, met)
 
@@ -213,22 +214,25 @@ class AlongOrbits(Policy):
         if beyond is not None and _completes(met, beyond):
             return beyond
         centre = beyond is None and _is_centre(first)
-        name = mark(found, met, beyond, "focus_centre" if centre else "")
+        special, end = self._between(first.point, beyond) if beyond is not None else ([], None)
+        name = mark(found, met, beyond, end, "focus_centre" if centre else "")
         if beyond is None:
             found.ending = name if centre else first.kind.ending or name
         elif is_doubled(beyond) and not is_doubled(first.point):
             # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
             found.ending = "branching"
             return None
-        else:
-            self._watch_between(found, first.point, beyond)
+        for one in reversed(special):
+            found.mark(one.name, one.point.turned())
         return beyond
 
-    def _watch_between(self, found: March, point: OrbitPoint, first: OrbitPoint) -> None:
-        """List the special points between a boundary and the first orbit behind it, by steps back to it."""
-        met: list[Met] = []
-        ds = _as_far(point, first)
-        b, numbers = first.turned(), [kind.number(first.turned()) for kind in self.kinds]
+    def _between(self, point: OrbitPoint, first: OrbitPoint) -> tuple[list[Met], Met | None]:
+        """The special points from the first orbit of a new signature back to ``point``, where the old one ends, and the
+        end of the new one there."""
+        found: list[Met] = []
+        away, steep = abs(first.value - point.value) / first.curve.width, abs(first.rise)
+        b, ds = first.turned(), 2.0 * away / steep if steep * FARTHEST > away else 0.0
+        numbers = [kind.number(b) for kind in self.kinds]
         for _ in range(NEARER if ds else 0):
             new = b.curve.step(b, ds)
             if new is None:  # no values beyond the boundary
@@ -239,12 +243,11 @@ class AlongOrbits(Policy):
             ends = first_met(step, BOUNDARIES)
             if ends:
                 step.ends("change", ends[0].s, ends[0].point)
-            met += special_on(step, self.kinds)
+            found += special_on(step, self.kinds)
             if ends != []:
-                break
+                return found, replace(ends[0], point=ends[0].point.turned()) if ends else None
             b, numbers = new, now
-        for one in reversed(met):
-            found.mark(one.name, one.point.turned())
+        return found, None
 
     def over(self, point: OrbitPoint) -> str | None:
         """Return ``equilibrium`` where an autonomous orbit has all but shrunk to one, ``homoclinic`` where it only
@@ -310,8 +313,10 @@ def contacts_of(met: list[Met]) -> list[Change]:
     return [change for one in met for change in one.kind.contacts(one.point)]
 
 
-def mark(found: March, met: list[Met], beyond: OrbitPoint | None, name: str = "") -> str:
-    """Record the end of a signature, by the contact that begins or ends there where no name is given; its name."""
+def mark(found: March, met: list[Met], beyond: OrbitPoint | None, end: Met | None = None, name: str = "") -> str:
+    """Record the end of a signature, by the contact that begins or ends there where no name is given; its name.
+
+    ``end`` is that place seen from behind, so that it is named alike from either side."""
     point = met[0].point
     names, sliding = list(point.shooting.system.indicators), ""
     if beyond is not None:
@@ -326,7 +331,7 @@ def mark(found: March, met: list[Met], beyond: OrbitPoint | None, name: str = ""
                 found.mark("grazing", free, indicator=names[change.indicator], sliding=sliding, **judged)
                 return "grazing"
     sides = [met[0]]
-    if beyond is not None and (end := _from_behind(point, beyond)):  # named alike from either side
+    if end is not None:
         sides.insert(0 if _is_better(met[0], end.point) else 1, end)
     kind, point = sides[0].kind, sides[0].point
     own = [change.indicator for side in sides for change in side.kind.contacts(side.point)]
@@ -335,22 +340,6 @@ def mark(found: March, met: list[Met], beyond: OrbitPoint | None, name: str = ""
     indicator = own[0] if own else kind.surface(point, beyond)
     found.mark(name, point, indicator=names[indicator] if indicator >= 0 else "", sliding=sliding)
     return name
-
-
-def _as_far(point: OrbitPoint, first: OrbitPoint) -> float:
-    """A step from the first orbit of a new signature to beyond the place ``point`` where the old one ends; 0: none."""
-    away, steep = abs(first.value - point.value) / first.curve.width, abs(first.rise)
-    return 2.0 * away / steep if steep * FARTHEST > away else 0.0
-
-
-def _from_behind(point: OrbitPoint, first: OrbitPoint) -> Met | None:
-    """The end of the new signature seen from its first orbit: the place at which the old one ends."""
-    fresh, back, ds = first.curve, first.turned(), _as_far(point, first)
-    new = fresh.step(back, ds) if ds else None
-    if new is None:
-        return None
-    met = first_met(Step(back, new, ([], []), (fresh.margins(back), fresh.margins(new)), True), BOUNDARIES)
-    return replace(met[0], point=met[0].point.turned()) if met else None
 
 
 def _is_better(met: Met, there: OrbitPoint) -> bool:
