@@ -155,7 +155,8 @@ def one(template: str, seed: int, drawn_one: templates.Drawn, orbit: ns.Orbit) -
         except ns.SolveError:
             row["lost"] += 1
             continue
-        if np.abs((again.u - point["section"].values) / size).max() > 1e-6:
+        moved = [getattr(again, one) - point[one].values for one in ("maximum", "minimum")]  # whatever period it begins in
+        if np.abs(np.array(moved) / size).max() > 1e-6:
             row["lost"] += 1
             continue
         other = ns.continue_orbit(again, name, limits, points=POINTS)

@@ -32,6 +32,8 @@ POWERS = (2.0, 1.0, 0.5)  # of the distance in the parameter: how far from it, b
 ROUNDS = 6  # signatures tried in a row
 STEEP = 1e-3  # of a tangent: its parameter
 BACK = 1e-3  # of its distance: an orbit nearer than this to the branch that has come here is on it
+EXACT = 1e-9  # of the orbit's size: orbits that meet are as near as this
+JUMP = 1e-6  # of the orbit's size: as far an orbit jumps where impacts become slow enough to be completed as rest
 ROUNDING = 1e-12  # of an orbit's size: extremes of two orbits as near as this are the same
 SAME = 1e-9  # in scaled unknowns: two solutions as near as this are one
 AGAIN = 3  # times that Newton's method is begun with one signature
@@ -53,7 +55,7 @@ def beside(
             least = np.inf
             for found in _found(point, common, side, aside):
                 apart = _apart(point, found)
-                arrives = _arrives(point, found) or _shrink([*before, apart])
+                arrives = _arrives(point, found, JUMP if side == forward else EXACT) or _shrink([*before, apart])
                 if arrives and not (_leads_back(point, found) or _came_by(found, passed)):
                     return found if side * found.rise >= 0.0 else found.turned()
                 least = min(least, apart)
@@ -111,10 +113,10 @@ def _apart(a: OrbitPoint, b: OrbitPoint) -> float:
     return max(float(np.nanmax(np.abs(extremes), initial=0.0)), period)
 
 
-def _arrives(point: OrbitPoint, found: OrbitPoint) -> bool:
+def _arrives(point: OrbitPoint, found: OrbitPoint, jump: float) -> bool:
     """Return whether the orbits found come to ``point`` as the parameter comes back to it."""
     nearer = found.curve.at_parameter(found.Y, point.value + NEARER * (found.value - point.value))
-    return nearer is not None and _apart(point, nearer) <= SHRINKS * _apart(point, found) + 1e-9
+    return nearer is not None and _apart(point, nearer) <= SHRINKS * _apart(point, found) + jump
 
 
 def _shrink(distances: list[float]) -> bool:

@@ -215,6 +215,8 @@ class AlongOrbits(Policy):
             return beyond
         centre = beyond is None and _is_centre(first)
         special, end = self._between(first.point, beyond) if beyond is not None else ([], None)
+        if beyond is not None and end is not None and _completes([end], first.point):
+            return beyond
         name = mark(found, met, beyond, end, "focus_centre" if centre else "")
         if beyond is None:
             found.ending = name if centre else first.kind.ending or name
