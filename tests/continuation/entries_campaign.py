@@ -155,7 +155,8 @@ def one(template: str, seed: int, drawn_one: templates.Drawn, orbit: ns.Orbit) -
         except ns.SolveError:
             row["lost"] += 1
             continue
-        moved = [getattr(again, one) - point[one].values for one in ("maximum", "minimum")]  # whatever period it begins in
+        # whatever period it begins in
+        moved = [getattr(again, one) - point[one].values for one in ("maximum", "minimum")]
         if np.abs(np.array(moved) / size).max() > 1e-6:
             row["lost"] += 1
             continue

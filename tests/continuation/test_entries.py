@@ -155,6 +155,43 @@ def test_a_slow_impact_is_the_same_impact() -> None:
         assert np.diff(values).min() > 1e-9, kind
 
 
+def test_where_impacts_accumulate() -> None:
+    """Grazes and flips follow each other ever faster up to where rest begins: all are met from either side.
+
+    Beyond an impact so slow that it is completed as rest the orbit jumps by up to 1e-7 of its size: the first of them,
+    where rest ends, is known no better."""
+    table, limits = templates._table().with_parameters(e=0.2373710, c=0.0564473), (2.14, 2.2)
+    first = ns.find_orbit(table.with_parameters(a=limits[0]), start=[0.1, 0.0], progress=False)
+    branch = ns.continue_orbit(first, "a", limits)
+    at = int(np.flatnonzero(np.diff(np.sign(branch["a"].values - 2.1727)))[-1])
+    here, begun = table.with_parameters(a=float(branch["a"][at])), branch["section"].values[at]
+    other = ns.find_orbit(here, start=begun, transient=0, period_number=1, progress=False)
+    a, b = (ns.special_points(one) for one in (branch, ns.continue_orbit(other, "a", limits)))
+    assert float(a["a"][0]) == pytest.approx(float(b["a"][0]), abs=1e-7)
+    assert a["kind"].values[1:].tolist() == b["kind"].values[1:].tolist()
+    assert a["a"].values[1:] == pytest.approx(b["a"].values[1:], abs=1e-10)
+    assert (a["kind"] == "flip").sum() >= 8
+
+
+def test_a_crossing_that_has_just_passed_the_section() -> None:
+    """An elastic contact that begins at the section of an orbit begun one forcing period later is no end of the branch.
+
+    The branch ends where the orbit of half its period flips, from whichever period it is begun."""
+    values = {"z": 0.3321063608543215, "s": 1.9544936727092173, "b": 1.6471896040241403, "g": 0.3014006099471556,
+              "e": 0.35455152724094197, "k": 1.9928910656372831}  # fmt: skip
+    system = templates._two_stops().with_parameters(values)
+    first = ns.find_orbit(system.with_parameters(w=1.7414550305132799), period_number=2, progress=False)
+    branch = ns.continue_orbit(first, "w", (0.4, 3.0))
+    at = int(np.abs(branch["w"].values - 1.611047026999419).argmin())
+    here = system.with_parameters(w=float(branch["w"][at]))
+    run = ns.simulate(here, duration=2 * np.pi / here.values["w"], start=branch["section"].values[at])
+    later = ns.find_orbit(here, start=run, transient=0, period_number=2, progress=False)
+    tables = [ns.special_points(one) for one in (branch, ns.continue_orbit(later, "w", (0.4, 3.0)))]
+    assert np.abs(later.u - branch["section"].values[at]).max() > 0.1
+    assert tables[0]["kind"].values.tolist() == tables[1]["kind"].values.tolist()
+    assert tables[0]["w"].values == pytest.approx(tables[1]["w"].values, abs=1e-9)
+
+
 @pytest.mark.parametrize("begun", [-0.05, 0.05])
 def test_a_flip_right_behind_a_corner(begun: float) -> None:
     """x -> l x + mu - d sqrt(x) for x > 0: the multiplier l - d / (2 sqrt(x)) is -1 at sqrt(x) = d / (2 (1 + l)).

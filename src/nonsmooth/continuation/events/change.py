@@ -7,6 +7,7 @@ speed, is put in or taken out. With which orbit the branch goes on is for ``neig
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
 
@@ -17,7 +18,7 @@ from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.shooting import Solved
 from nonsmooth.continuation.problems.signature import AT_ONCE, Round, Signature, Visit
 from nonsmooth.continuation.problems.visits import anchored, led
-from nonsmooth.system.symbolic.traced import ASKED, FOUND, Traced
+from nonsmooth.system.symbolic.traced import ASKED, FOUND, Traced, TracedTransition
 
 BEFORE_REST = 1e-4  # of the period: flights after an impact as slow as impacts are followed are shorter
 TOLERANCE = 1e-5  # of an indicator's size: a band as narrow as this stands for no width
@@ -100,14 +101,18 @@ def without(point: OrbitPoint, place: int, count: int) -> list[Change]:
 
 def rest_after(point: OrbitPoint, place: int) -> int | None:
     """The number of impacts from visit ``place`` on that rest follows at once; None where it does not."""
-    visits, times, jumps = point.signature.visits, point.solved.times, point.shooting.system.traced.transitions
+    visits, times = point.signature.visits, point.solved.times
     i = place
     while visits[i].row >= 0 and visits[i + 1].mode == visits[place].mode:
         i += 1
-    last = visits[i]
     soon = float(times[i + 1] - times[place + 1]) < BEFORE_REST * float(times[-1])
-    completes = last.row >= 0 and any(is_tolerance(point, row.indicator) for row in jumps[last.transition].rows)
-    return i - place if completes and soon else None
+    return i - place if soon and completes(point, visits[i]) else None
+
+
+def completes(point: OrbitPoint, visit: Visit) -> bool:
+    """Return whether a visit ends with an impact so slow that it is completed as rest."""
+    jump = point.shooting.system.traced.transitions[visit.transition]
+    return visit.row >= 0 and any(is_tolerance(point, row.indicator, (jump,)) for row in jump.rows)
 
 
 def by_others(point: OrbitPoint, place: int, indicator: int) -> list[Change]:
@@ -176,13 +181,14 @@ def gained(point: OrbitPoint, fresh: OrbitPoint) -> int:
     return rows[0] if rows else -1
 
 
-def is_tolerance(point: OrbitPoint, indicator: int) -> bool:
+def is_tolerance(point: OrbitPoint, indicator: int, among: Sequence[TracedTransition] = ()) -> bool:
     """Return whether an indicator only sets a tolerance: below the creep of a stop impacts are completed as rest.
 
-    It differs from another one of its condition, with the other sign, by a small number."""
+    It differs from another one of its condition, with the other sign, by a small number, in one ``among`` transitions
+    (none given: in any)."""
     flow, values = point.shooting.flow, point.shooting.values
     z = np.linspace(0.3, 0.7, flow.n) * flow.scale
-    for jump in flow.traced.transitions:
+    for jump in among or flow.traced.transitions:
         for row, other in permutations(jump.rows, 2):
             if row.indicator != indicator or row.sign * other.sign >= 0:
                 continue

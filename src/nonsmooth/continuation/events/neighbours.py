@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.events.change import Change, Common, common_orbit
+from nonsmooth.continuation.events.change import Change, Common, common_orbit, completes
 from nonsmooth.continuation.problems.curve import passing
 from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.signature import Round
@@ -33,7 +33,7 @@ ROUNDS = 6  # signatures tried in a row
 STEEP = 1e-3  # of a tangent: its parameter
 BACK = 1e-3  # of its distance: an orbit nearer than this to the branch that has come here is on it
 EXACT = 1e-9  # of the orbit's size: orbits that meet are as near as this
-JUMP = 1e-6  # of the orbit's size: as far an orbit jumps where impacts become slow enough to be completed as rest
+JUMP = 1e-6  # of the orbit's size: as far it jumps where an impact becomes slow enough to be completed as rest
 ROUNDING = 1e-12  # of an orbit's size: extremes of two orbits as near as this are the same
 SAME = 1e-9  # in scaled unknowns: two solutions as near as this are one
 AGAIN = 3  # times that Newton's method is begun with one signature
@@ -51,15 +51,22 @@ def beside(
     forward = float(np.sign(point.tangent[-1])) or 1.0
     nearest: dict[float, list[float]] = {forward: [], -forward: []}  # of those found, at each distance
     for aside in ASIDE:
+        ahead: tuple[float, OrbitPoint] | None = None  # one to which the branch jumps, and how far
         for side, before in nearest.items():
             least = np.inf
             for found in _found(point, common, side, aside):
-                apart = _apart(point, found)
-                arrives = _arrives(point, found, JUMP if side == forward else EXACT) or _shrink([*before, apart])
-                if arrives and not (_leads_back(point, found) or _came_by(found, passed)):
-                    return found if side * found.rise >= 0.0 else found.turned()
+                apart, left = _apart(point, found), _left(point, found)
+                arrives = left <= SHRINKS * apart + EXACT or _shrink([*before, apart])
+                jumps = side == forward and left <= JUMP and _completes(point, found)
+                if (arrives or jumps) and not (_leads_back(point, found) or _came_by(found, passed)):
+                    found = found if side * found.rise >= 0.0 else found.turned()
+                    if arrives and (ahead is None or left < NEARER * ahead[0]):
+                        return found
+                    ahead = ahead or (left, found)
                 least = min(least, apart)
             before.append(least)
+        if ahead is not None:
+            return ahead[1]
     return None
 
 
@@ -113,10 +120,15 @@ def _apart(a: OrbitPoint, b: OrbitPoint) -> float:
     return max(float(np.nanmax(np.abs(extremes), initial=0.0)), period)
 
 
-def _arrives(point: OrbitPoint, found: OrbitPoint, jump: float) -> bool:
-    """Return whether the orbits found come to ``point`` as the parameter comes back to it."""
+def _left(point: OrbitPoint, found: OrbitPoint) -> float:
+    """Distance of an orbit from ``point`` as the parameter has all but come back to it."""
     nearer = found.curve.at_parameter(found.Y, point.value + NEARER * (found.value - point.value))
-    return nearer is not None and _apart(point, nearer) <= SHRINKS * _apart(point, found) + jump
+    return np.inf if nearer is None else _apart(point, nearer)
+
+
+def _completes(*sides: OrbitPoint) -> bool:
+    """Return whether one of two orbits completes an impact as rest: it jumps there."""
+    return any(completes(side, visit) for side in sides for visit in side.signature.crossings)
 
 
 def _shrink(distances: list[float]) -> bool:

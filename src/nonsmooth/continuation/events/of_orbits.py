@@ -25,6 +25,7 @@ from nonsmooth.continuation.events.change import (
     BEFORE_REST,
     Change,
     common_orbit,
+    completes,
     is_tolerance,
     past_the_section,
     rest_after,
@@ -50,6 +51,7 @@ from nonsmooth.continuation.problems.multipliers import product_of_pairs, withou
 from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.primitive import is_doubled
 from nonsmooth.continuation.problems.shooting import Shooting
+from nonsmooth.continuation.problems.signature import AT_ONCE
 from nonsmooth.errors import SystemDefinitionError
 
 POLE = 1e-2  # of a multiplier from 1 or -1: farther off it is no fold, no flip, but a contact of no length
@@ -211,19 +213,16 @@ class AlongOrbits(Policy):
             if after is not None and (after.path.margins[1:] >= 0.0).all():
                 return after  # else another boundary is met with the section
         beyond = beside(first.point, contacts_of(met), [row.point for row in found.rows])
-        if beyond is not None and _completes(met, beyond):
-            return beyond
-        centre = beyond is None and _is_centre(first)
-        special, end = self._between(first.point, beyond) if beyond is not None else ([], None)
-        if beyond is not None and end is not None and _completes([end], first.point):
-            return beyond
-        name = mark(found, met, beyond, end, "focus_centre" if centre else "")
-        if beyond is None:
-            found.ending = name if centre else first.kind.ending or name
-        elif is_doubled(beyond) and not is_doubled(first.point):
-            # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
-            found.ending = "branching"
-            return None
+        special, end = ([], None) if beyond is None else self._between(first.point, beyond)
+        if beyond is None or not (_completes(met, beyond) or (end is not None and _completes([end], first.point))):
+            centre = beyond is None and _is_centre(first)
+            name = mark(found, met, beyond, end, "focus_centre" if centre else "")
+            if beyond is None:
+                found.ending = name if centre else first.kind.ending or name
+            elif is_doubled(beyond) and not is_doubled(first.point):
+                # Beyond the graze at which a doubled orbit is born there is only the shorter one, gone round twice.
+                found.ending = "branching"
+                return None
         for one in reversed(special):
             found.mark(one.name, one.point.turned())
         return beyond
@@ -287,15 +286,18 @@ def _completes(met: list[Met], beyond: OrbitPoint) -> bool:
 
 
 def _but_completed(*sides: OrbitPoint) -> bool:
-    """Return whether two orbits take the same transitions but for impacts that rest follows at once in one of them."""
+    """Return whether two orbits take the same transitions but for impacts that rest follows at once in one of them, and
+    for what an impact as slow as that leads to: a rest left at once is none."""
     rests = [side.solved.times[i + 1] for side in sides for i in range(side.shooting.m) if rest_after(side, i) == 0]
-    soon = BEFORE_REST * sides[0].period
-    words = []
+    soon, words = BEFORE_REST * sides[0].period, []
     for side in sides:
         visits, times = side.signature.visits, side.solved.times[1:]
+        slow = {v.transition: completes(side, v) for v in visits[:-1]}
         words.append([
-            (v.transition, v.row) for v, after, t in zip(visits[:-1], visits[1:], times, strict=False)
-            if v.mode != after.mode or not any(0.0 <= rest - t < soon for rest in rests)
+            "slow" if slow[v.transition] else (v.transition, v.row)
+            for before, v, after, t in zip((visits[-1], *visits), visits[:-1], visits[1:], times, strict=False)
+            if not (v.row == AT_ONCE and slow.get(before.transition))
+            and (v.mode != after.mode or slow[v.transition] or not any(0.0 <= rest - t < soon for rest in rests))
         ])  # fmt: skip
     return bool(rests) and words[0] == words[1]
 

@@ -23,7 +23,9 @@ ROUNDING = 1e-13  # of an indicator's size
 LEAST = 1e-18  # of an indicator's size: a maximum nearer to zero has no sign
 BEGUN = 1e-10  # of the period
 SHORT = 1e-6  # of the period
-NOTHING = 1e-13  # of the period: where a crossing has passed the section its visit has no length, not a negative one
+#: Of the period: a visit as short as rounding, and one at the section, where a crossing has just passed it, has no
+#: length, not a negative one.
+NOTHING, PASSED = 1e-13, 1e-10
 SOLVED = 1e-6  # of its size: as near to a boundary just crossed as an orbit is solved for
 
 
@@ -124,6 +126,7 @@ class Walk:
         self.alone = np.array(shooting.alone, dtype=bool)[self.conditional] | np.array(answers, dtype=bool)
         self.instants = np.flatnonzero(self.at_once)
         self.every = np.arange(m)
+        self.nothing = np.where((self.every == 0) | (self.every == m - 1), PASSED, NOTHING)
 
     def along(self, solved: Solved, states: FloatArray) -> Path | None:
         """Walk along the visits of a solved orbit; ``states`` (m + 1, n_z) begin them.
@@ -137,7 +140,7 @@ class Walk:
         begin_row, which = np.empty((2, m, n_t), dtype=np.int64)
         slope = np.empty((m, 2))
         tau = solved.times[1:] - solved.times[:-1]
-        tau[self.at_once | ((tau < 0.0) & (tau > -NOTHING * float(solved.times[-1])))] = 0.0
+        tau[self.at_once | ((tau < 0.0) & (tau > -self.nothing * float(solved.times[-1])))] = 0.0
         q = self.shooting.flow.on_path(solved.values, self.modes)
         *room, sizes = self.scratch
         status = follow(
