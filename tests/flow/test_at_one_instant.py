@@ -48,3 +48,36 @@ def test_side_by_side_each_has_the_derivatives_that_it_has_alone(
 def test_those_that_depend_on_an_order_are_warned_of() -> None:
     with pytest.warns(RuntimeWarning, match="two transitions happen at one instant, each by itself"):
         derivatives(*hopping(2, None, coupling=0.05), ["x0"])
+
+
+def exponents(count: int, friction: float | None, method: str) -> np.ndarray:
+    """Of balls on springs that bounce once in a period, on a floor that may rub; they do not come to rest."""
+    names = [f"{axis}{i}" for i in range(count) for axis in "xy"]
+    system = ns.mechanical(
+        np.eye(2 * count), 0.1 * np.eye(2 * count), np.eye(2 * count), parameters={}, coordinates=names, period=np.pi,
+        forcing={name: (lambda t, p, a=(0.5 if name[0] == "x" else 2.0): a * np.cos(2 * t)) for name in names},
+        elements={
+            f"s{i}": ns.elements.Stop(
+                at=f"y{i}", side=-1, position=-0.1, restitution=0.8, friction=friction,
+                tangent=f"x{i}" if friction else None,
+            )
+            for i in range(count)
+        },
+    )  # fmt: skip
+    start = {name: 0.2 if name[0] == "x" else 0.5 for name in names}
+    found = ns.lyapunov(system, periods=60, transient=20, start=start, method=method, progress=False)
+    return np.sort(np.exp(found.exponents.values))  # of a rate that an impact takes away: 0
+
+
+@pytest.mark.parametrize(
+    ("friction", "method", "visited"),
+    [(None, "exact", False), (None, "exact", True), (None, "taylor", False), (0.2, "exact", True)],
+)
+def test_side_by_side_each_has_the_exponents_that_it_has_alone(
+    friction: float | None, method: str, visited: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both impacts have an instant of their own, whether they rub or not; as one they lost two digits of all."""
+    if visited:
+        monkeypatch.setattr("nonsmooth.system.derived.combinations.MOST", 1)
+    alone = exponents(1, friction, method)
+    assert exponents(2, friction, method) == pytest.approx(np.repeat(alone, 2), abs=1e-9)

@@ -117,9 +117,9 @@ def lyapunov(
     state of modes that are never visited: it is constant. The phase of the forcing is no state, so a forced limit cycle
     has negative exponents only; an autonomous motion that does not end in an equilibrium has one exponent zero.
 
-    Transitions of one instant act as one, with the instant of the first. Where several happen there by themselves in
-    every period (equal masses that hit their stops together), the exponents are not those of neighbouring motions:
-    make the system a little unequal.
+    Of transitions at one instant each that the motion would have met there by itself has an instant of its own (two
+    balls that bounce side by side); one to which another has led has that one's. Where both feel each other the
+    exponents are those for the order in which they were taken.
 
     A run that stops at a stable equilibrium has the real parts of its eigenvalues, and the standard error is no
     less than the distance from them. A run that begins at an unstable one, as the start of zeros often is, stays there:

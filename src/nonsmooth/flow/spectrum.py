@@ -99,7 +99,7 @@ class Frame:
         none, square = np.zeros(0), np.zeros((n, n))
         record = Record(
             self.scale, self.Q, np.zeros((count, columns)), np.ones(columns), np.array([0.0, 0.0, 0.0, 1.0, 0.0]),
-            square, square.copy(), square.copy(), np.zeros((3, n)), np.zeros(n), np.zeros(n),
+            square, square.copy(), square.copy(), np.zeros((4, n)), np.zeros(n), np.zeros(n),
             np.zeros(noted, dtype=np.int64), np.zeros(0, dtype=np.int64), 0, none, none,
         )  # fmt: skip
         if series:

@@ -246,9 +246,8 @@ class PatternTables:
             way = (key[1], RESET if struck else 0, contact, number, 0)
             self.transitions = np.concatenate([self.transitions, np.array([way], dtype=np.int64)])
             change = Change(struck, rubs=found.rubbed is not None) if struck else None
-            names, kind = found.names or lead.element, found.ends or FOUND
-            self.leads.append(Lead(lead.source, found.pattern, names, lead.rows, kind, change))
-            self.lengths.append(0)
+            names, ends = found.names or lead.element, found.ends or FOUND
+            self._lead(Lead(lead.source, found.pattern, names, lead.rows, ends, change), lead.kind)
             self.form, self.net = self.form._replace(**self._maps()[0]), self._net()
         taken = self.answers[key]
         if found.rubbed is not None:  # of the rates that an impact had, of which its impulses depend as no row does
@@ -270,10 +269,8 @@ class PatternTables:
         self.index[pattern] = here
         self.numbers.append(self.patterns.number(pattern))
         rows, ways = self.rows, []
-        armed: list[tuple[int, int, int]] = []
         flow, forces = rows.flow(self.patterns.mode, pattern)
         conditions, leads, states, meets = self.patterns.leads_of(rows, pattern)
-        first = len(self.leads)
         for lead, change in zip(leads, states, strict=True):
             asked = lead.kind in (ASKED, TOGETHER)
             to = -1 if asked else self.index.get(lead.target, -1)
@@ -282,20 +279,23 @@ class PatternTables:
             contact = lead.kind != TOGETHER and (change is not None or self.numbers[here] == 0)
             number = 0 if change is None else self._map(change)
             ways.append((to, 0 if change is None else RESET, int(contact), number, int(lead.kind == ALONE)))
-            own = () if lead.kind == TOGETHER else lead.rows
-            armed.extend(own)
-            self.lengths.append(len(own))
-            self.leads.append(lead)
-        self.lists.append([*range(first, len(self.leads) - 1)])
+            self._lead(lead, lead.kind)
+        self.lists.append([*range(len(self.leads) - len(leads), len(self.leads) - 1)])
         self.together.append(len(self.leads) - 1)
         self.meets.append(meets)
         self.watched.append(conditions)
         self.transitions = np.concatenate([self.transitions, np.array(ways, dtype=np.int64).reshape(-1, 5)])
-        self.conditions = np.concatenate([self.conditions, np.array(armed, dtype=np.int64).reshape(-1, 3)])
         for t in self.waiting.pop(pattern, []):
             self.transitions[t, 0] = here
         self._stand(flow, conditions, self._output_rows(forces))
         self.net = self._net()
+
+    def _lead(self, lead: Lead, kind: str) -> None:
+        """Put a transition behind the others, with the rows by which it, or the question of that ``kind``, is met."""
+        rows = np.array(() if kind == TOGETHER else lead.rows, dtype=np.int64).reshape(-1, 3)
+        self.conditions = np.concatenate([self.conditions, rows])
+        self.lengths.append(len(rows))
+        self.leads.append(lead)
 
     def _map(self, states: FloatArray) -> int:
         """The number of a map among those of the form; one array is kept once."""

@@ -34,7 +34,7 @@ def frames(jobs, rows, point, net, place, count, units, limit, scale, found):
     step = cuda.local.array((STATES, STATES), float64)
     reset = cuda.local.array((STATES, STATES), float64)
     matrix = cuda.local.array((STATES, STATES), float64)
-    fields = cuda.local.array((3, STATES), float64)
+    fields = cuda.local.array((4, STATES), float64)
     t_z = cuda.local.array(STATES, float64)
     turned = cuda.local.array(STATES, float64)
     for n in range(count):

@@ -187,7 +187,7 @@ def transit(i, t, short, form, net, section, goal, seen, tables, work):
             tally[WAITS], tally[TAKEN], tally[CLOSELY] = t + 1, jumps, 1 if short else 0
             return PAUSED, 0
         mode = take(i, t, fired if jumps == 0 else -1, form, tables, net, work)
-        cross(i, t, mode, form, net, section, goal, seen, tables, work)
+        cross(i, t, jumps, mode, form, net, section, goal, seen, tables, work)
         tally[MODE] = mode
         jumps += 1
         if net.transitions[t, 2] >= DEAD_END:

@@ -136,10 +136,10 @@ def approach(mode, fired, goal, seen, tables, work):
 
 
 @once
-def cross(i, t, mode, form, net, section, goal, seen, tables, work):
-    """Note a transition."""
+def cross(i, t, jumps, mode, form, net, section, goal, seen, tables, work):
+    """Note a transition, before which there were ``jumps`` others at its instant."""
     if GROWS == 2 or (GROWS == 1 and goal.kind == GROW):
-        saltate(i, t, mode, form, net, seen.growth, tables, work)
+        saltate(i, t, jumps, mode, form, net, seen.growth, tables, work)
     elif LOGS == 1 and goal.kind == LOGGED:
         log_transition(t, form, seen.log, work)
     else:

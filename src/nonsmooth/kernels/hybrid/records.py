@@ -225,8 +225,8 @@ class Growth(NamedTuple):
     step: Any  # (n, n) the matrix of a leg or of the transitions of an instant
     reset: Any  # (n, n) the derivative of a transition's map
     matrix: Any  # (n, n) scratch
-    fields: Any  # (3, n) vector field before and after, derivative of the map in time
-    t_z: Any  # (n,) derivative of the instant of a transition in the state
+    fields: Any  # (4, n) vector field before and after, derivative of the map in time, field before the instant
+    t_z: Any  # (n,) derivative of the instant of a transition in the state before all of that instant
     scratch: Any  # (n,)
     taken: Any  # (transitions,) how often; or none
     functions: Any  # addresses of what carries it (``tangent.following``), or none where the stepper does

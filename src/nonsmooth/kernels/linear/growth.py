@@ -1,14 +1,14 @@
 """Steps of a frame of small changes along the exact flow: a segment multiplies it by exp(A tau), from the tables of the
 segment itself, a transition by its saltation (``tangent.frame``)."""
 
-from math import fabs, sqrt
+from math import fabs, inf, sqrt
 
 from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.places import MODE
 from nonsmooth.kernels.linear.bands import by_series, carry
 from nonsmooth.kernels.linear.tables import DEGREE, NODES, STATES, states_of, width_of
-from nonsmooth.kernels.linear.values import slope_of
-from nonsmooth.kernels.tangent.frame import multiply, saltation
+from nonsmooth.kernels.linear.values import slope_of, value_of
+from nonsmooth.kernels.tangent.frame import NEAR, ON_SURFACE, multiply, saltation
 
 SEGMENTS_APART = 4  # in each of them ratios of lengths change by less than exp(pi): so short are steps
 
@@ -88,7 +88,7 @@ def approach_transition(mode, fired, seen, tables, work):
     """Derivative of the instant of a crossing in the state, and how steeply the surface is met."""
     n = states_of(tables.field)
     t_z, S, f = seen.t_z, seen.step, seen.fields
-    slope_along(tables.field, mode, work.w, f[0])
+    slope_along(tables.field, mode, work.w, f[3])
     for r in range(n):
         t_z[r] = 0.0
         for c in range(n):
@@ -100,18 +100,44 @@ def approach_transition(mode, fired, seen, tables, work):
             h = tables.fun[mode, fired, j]
             t_z[j] = -h / rate
             across += h * h
-            speed += f[0, j] * f[0, j]
+            speed += f[3, j] * f[3, j]
         if across * speed > 0.0:
             seen.sums[3] = min(seen.sums[3], fabs(rate) / sqrt(across * speed))
 
 
 @once
-def saltate(i, t, mode, form, net, seen, tables, work):
+def meet_again(t, mode, net, seen, tables, before):
+    """The instant of a transition that the motion would have met at this instant by itself: that is its own."""
+    n, t_z, S, f, own = states_of(tables.field), seen.t_z, seen.step, seen.fields, seen.scratch
+    chosen, rate, near = -1, 0.0, ON_SURFACE
+    for k in range(net.row_start[t], net.row_start[t + 1]):
+        row, size, change = net.rows[k, 0], 0.0, slope_of(tables, mode, net.rows[k, 0], before)
+        for j in range(n):
+            size += fabs(tables.fun[mode, row, j]) * seen.scale[j]
+        off = fabs(value_of(tables, mode, row, before)) / size if size > 0.0 else inf
+        if off <= near and (off < near or fabs(change) > fabs(rate)):
+            chosen, rate, near = row, change, max(off, NEAR)
+    change = rate
+    for j in range(n):
+        change += tables.fun[mode, chosen, j] * (f[3, j] - f[0, j]) if chosen >= 0 else 0.0
+    if change * rate > 0.0:
+        for c in range(n):
+            own[c] = 0.0
+            for j in range(n):
+                own[c] -= tables.fun[mode, chosen, j] / rate * S[j, c]
+        for c in range(n):
+            t_z[c] = own[c]
+
+
+@once
+def saltate(i, t, jumps, mode, form, net, seen, tables, work):
     """Saltation of a transition, from the mode in which it was taken to ``mode``."""
     n = states_of(tables.field)
     before, f, R = work.wp, seen.fields, seen.reset
     slope_along(tables.field, work.tally[MODE], before, f[0])
     slope_along(tables.field, mode, work.w, f[1])
+    if jumps > 0:
+        meet_again(t, work.tally[MODE], net, seen, tables, before)
     for r in range(n):
         f[2, r] = 0.0
         for c in range(n):

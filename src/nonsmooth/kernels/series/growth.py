@@ -79,14 +79,12 @@ def approach_transition(mode, fired, seen, tables, work):
     if not catch_up(seen, work):
         work.w[0] = nan
     anchor_frame(seen, work)
-    work.tally[place.FIRST_OF_INSTANT] = 1
 
 
 @once
-def saltate(i, t, mode, form, net, seen, tables, work):
+def saltate(i, t, jumps, mode, form, net, seen, tables, work):
     """Saltation of a transition."""
     if t < seen.taken.shape[0]:  # others are new, and nobody knows their derivatives yet
         seen.taken[t] += 1
         across = frame_across_at(seen.functions[1])
-        across(seen.follower, t, work.memo[TIME], work.tally[place.FIRST_OF_INSTANT])
-        work.tally[place.FIRST_OF_INSTANT] = 0
+        across(seen.follower, t, work.memo[TIME], jumps)

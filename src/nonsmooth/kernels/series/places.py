@@ -8,12 +8,11 @@ METHODS = {"taylor": TAYLOR, "rkf45": RKF45}
 
 # The jets at the present instant stand in their place; a polynomial of which only a part has been gone; the transition
 # on it, and its row that crosses; it ends at a stop; nothing happens on it; the indicator that vanishes where the next
-# one begins; a graze was left undecided; the motion stays on the section's surface; steps near one place; steps in all;
-# no transition of the instant has moved the frame yet
-READY, OPEN_STEP, PENDING, HIT, LANDING, CALM, ZERO_ROW, DOUBTFUL, STAYS, RESTING, STEPS, FIRST_OF_INSTANT = range(
-    FIRST_COUNT, FIRST_COUNT + 12
+# one begins; a graze was left undecided; the motion stays on the section's surface; steps near one place; steps in all
+READY, OPEN_STEP, PENDING, HIT, LANDING, CALM, ZERO_ROW, DOUBTFUL, STAYS, RESTING, STEPS = range(
+    FIRST_COUNT, FIRST_COUNT + 11
 )
-N_SERIES_TALLY = FIRST_COUNT + 12
+N_SERIES_TALLY = FIRST_COUNT + 11
 
 # Time at which the polynomial begins; its length, and that of its part that is used; the part of it that is gone, and
 # will be at the end of the leg; the length that was planned; value and slope of the section's indicator at its end; the

@@ -20,6 +20,7 @@ from nonsmooth.kernels.tangent.legs import (
     instant_of,
     jet_at,
     jump_at,
+    meet_again,
     step_along,
 )
 
@@ -66,13 +67,17 @@ def frame_along(follower, mode, t0, tau, guess, unit):
 
 
 @kernel(types.void(_i, _i, _f, _i))
-def frame_across(follower, k, t, first):
-    """Transition k, ``first`` of its instant or not, at the state to which the frame was carried: into ``step``."""
+def frame_across(follower, k, t, jumps):
+    """Transition k, after ``jumps`` others of its instant, where the frame was carried: into ``step``."""
     equations, seen, work, out = follower_at(follower)
     n = seen.scale.shape[0]
     jump_at(k, t, n, equations, seen, out, work)
-    if first != 0:
+    if jumps == 0:
         begin(seen)
         _, steep = instant_of(equations.transitions[k, 2], -1, seen.scale, out[:0], seen, out)
-        seen.sums[3] = min(seen.sums[3], steep)
+        for i in range(n):
+            seen.fields[3, i] = seen.fields[0, i]
+    else:
+        steep = meet_again(equations.transitions[k, 2], seen.scale, seen, out)
+    seen.sums[3] = min(seen.sums[3], steep)
     add(seen)

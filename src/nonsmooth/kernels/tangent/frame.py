@@ -9,6 +9,8 @@ from math import fabs, inf, log, sqrt
 from nonsmooth.kernels.compile.cache import inline
 
 ENOUGH = 0.25  # of the square of a length: where as much is left no part along others is
+NEAR = 1e-13  # of an indicator's size: it is zero
+ON_SURFACE = 1e-9  # of an indicator's size: nearer to a surface than this is on it
 SINGULAR = 1e-13  # a pivot below this part of its row's size is that of a matrix without full rank
 
 

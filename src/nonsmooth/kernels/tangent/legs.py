@@ -22,14 +22,13 @@ from nonsmooth.kernels.hybrid.codes import DIVERGED, NO_CONVERGENCE, OK
 from nonsmooth.kernels.hybrid.records import type_of
 from nonsmooth.kernels.series.taylor import fill_powers
 from nonsmooth.kernels.tangent.agreement import fits
-from nonsmooth.kernels.tangent.frame import add_product, saltation
+from nonsmooth.kernels.tangent.frame import NEAR, ON_SURFACE, add_product, saltation
 from nonsmooth.kernels.tangent.segments import Segments
 
 ORDER = 24  # of the series of an orbit's legs
 ACCURACY = 1e-17  # of the last two terms of a series against its largest one, there
 MOST_STEPS = 100_000  # in one leg
 SLIGHT = 1e-6  # of the largest number: what is smaller need not be known better
-NEAR = 1e-13  # of an indicator's size: it is zero
 
 _i, _f = types.int64, types.float64
 _f1, _f2, _f3, _i1, _i2 = _f[::1], _f[:, ::1], _f[:, :, ::1], _i[::1], _i[:, ::1]
@@ -334,6 +333,31 @@ def instant_of(n_rows, row, scale, timing, seen, out):
     for c in range(n_a):
         t_z[n + c] = -out[at + 2 + n + c] / rate
     return row, steep
+
+
+@device
+def meet_again(n_rows, scale, seen, out):
+    """The instant of a transition that the motion would have met at this instant by itself: that is its own."""
+    t_z, S, f, n = seen.t_z, seen.step, seen.fields, scale.shape[0]
+    first, own = seen.matrix[0], seen.scratch
+    for c in range(n):
+        first[c] = t_z[c]
+    row, steep = instant_of(n_rows, -1, scale, out[:0], seen, out)
+    at = n + n * n + n + max(row, 0) * (2 + n)
+    size, rate, change = 0.0, out[at + 1 + n], out[at + 1 + n]
+    for i in range(n):
+        h_z = out[at + 1 + i]
+        size += fabs(h_z) * scale[i]
+        rate += h_z * f[0, i]
+        change += h_z * f[3, i]
+    met = n_rows > 0 and fabs(out[at]) <= ON_SURFACE * size and change * rate > 0.0
+    for c in range(n):
+        own[c] = 0.0
+        for j in range(n):
+            own[c] += t_z[j] * S[j, c]
+    for c in range(n):
+        t_z[c] = own[c] if met else first[c]
+    return steep if met else inf
 
 
 @device
