@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import random_templates as templates
 
 import nonsmooth as ns
 
@@ -154,3 +155,15 @@ def test_a_cycle_is_found_from_wherever_simulate_shows_it(x: float, v: float) ->
     period = float(run.t_events[0][0]) + (1.0 - float(run.y_events[0][0, 0])) / 0.2
     orbit = ns.find_orbit(ns.models.stick_slip_belt(), start={"x": x, "v": v})
     assert orbit.period == pytest.approx(period, abs=1e-8)
+
+
+def test_an_unstable_orbit_is_found_from_itself() -> None:
+    """A motion that begins on it leaves it after some rounds for the attractor, which closes no better."""
+    system, name, limits, _ = templates.impact(np.random.default_rng([5, 6]))
+    branch = ns.continue_orbit(ns.find_orbit(system, max_period=4), name, limits)
+    for i in (int(np.abs(branch[name].values - value).argmin()) for value in (0.7193547, 1.5511334)):
+        begun = branch["section"].values[i]
+        here = system.with_parameters({name: float(branch[name][i])})
+        assert not branch["stable"][i]
+        orbit = ns.find_orbit(here, start=begun, transient=0, period_number=1)
+        assert orbit.u == pytest.approx(begun, abs=1e-9)

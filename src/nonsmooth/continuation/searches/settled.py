@@ -78,8 +78,8 @@ def forced_guesses(
 ) -> list[Guess]:
     """Candidates for the period number, the smallest first, from the last section point.
 
-    For a given period number: from the section points that return nearest to themselves. A return is one in the mode
-    it began in.
+    For a given period number: from the section points that return nearest to themselves, of those that have closed from
+    the first, be it on an unstable orbit that the motion leaves. A return is one in the mode it began in.
     """
     points, modes = settled.points / settled.size, settled.modes
     last = len(points) - 1
@@ -91,7 +91,7 @@ def forced_guesses(
         way, p = 1, period_number
         # The memory is known at the last point only.
         places = [last - p] if len(settled.state.memory) else range(last - p + 1)
-        starts = [(p, i) for i in sorted(places, key=lambda i: gap(i, i + p))[:CHOICE]]
+        starts = [(p, i) for i in sorted(places, key=lambda i: max(gap(i, i + p), CLOSED))[:CHOICE]]
     else:
         way, near = -1, [p for p in range(1, most + 1) if gap(last, last - p) <= NEAR]
         # Chaos comes near its beginning again and again: the nearest few are tried.
