@@ -221,8 +221,8 @@ class PatternTables:
     def _met(self, here: int, fired: int) -> list[int]:
         """The elements whose place was met."""
         row = self.watched[here][fired] if fired >= 0 else np.nan
-        places = enumerate(part.where.values for part in self.rows.parts)
-        return [k for k, place in places if np.array_equal(place, row) or np.array_equal(place, -row)]
+        places = self.rows.places
+        return [*map(int, np.flatnonzero((places == row).all(axis=1) | (places == -row).all(axis=1)))]
 
     def _concerned(self, lead: Lead, fired: int) -> list[int] | None:
         """The group of elements of which a condition was met, None: all; others are asked next, at the same instant."""

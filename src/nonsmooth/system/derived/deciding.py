@@ -187,7 +187,10 @@ class _Instant(Instant):
                 slopes = np.array([self.numbers.slopes(one) for one in expressions])
                 self.numbers.shift(-np.linalg.lstsq(slopes, off, rcond=1e-10)[0])
                 continue
-            amounts = np.linalg.lstsq(self.numbers.effects(by, by), -off, rcond=1e-10)[0]
+            key = "to zero", *by
+            if key not in self.numbers.known:
+                self.numbers.known[key] = np.linalg.pinv(self.numbers.effects(by, by), rcond=1e-10)
+            amounts = self.numbers.known[key] @ -off
             self.numbers.shift(sum(self.numbers.direction(k) * x for k, x in zip(by, amounts, strict=True)))
         for _ in range(2):  # of one state no rounding is left, which would move what rests
             for one in expressions:

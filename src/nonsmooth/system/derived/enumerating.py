@@ -123,6 +123,10 @@ class _Held:
     weights: FloatArray  # (sums, held)
     bounded: dict[int, int]  # of those that are held
 
+    def __post_init__(self) -> None:
+        self.sizes = np.abs(self.push) @ np.abs(self.inverse)
+        self.ways = np.clip(self.weights, 0.0, None)
+
     def left(
         self, who: Candidates, forces: FloatArray, off: FloatArray, bounds: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
@@ -131,10 +135,9 @@ class _Held:
         for j, i in self.bounded.items():
             static, forward, back = bounds[3 * i : 3 * i + 3]
             high[j], low[j] = (back, -forward) if who.elements[i] in who.kinetic else (static, static)
-        sizes, ways = np.abs(self.weights), np.clip(self.weights, 0.0, None)
-        most = ways @ high + (ways - self.weights) @ low
+        most = self.ways @ high + (self.ways - self.weights) @ low
         own = off[self.rows] + ZERO * np.maximum(np.abs(high), np.abs(low))
-        return most - self.weights @ forces[self.rows], sizes @ own
+        return most - self.weights @ forces[self.rows], np.abs(self.weights) @ own
 
 
 def _holds(who: Candidates, states: dict[int, int], G: FloatArray, at: dict[int, int]) -> _Held | None:
@@ -184,7 +187,8 @@ def _followed(
     here = _holds(who, states, G, at)
     if here is None:
         return None
-    rows, count = here.rows, len(here.weights)
+    rows, count, effects = here.rows, len(here.weights), np.abs(G)
+    own = np.maximum(np.diag(effects), 1e-300)
     moves = [
         k for k, state in states.items()
         if state != HELD and k not in who.slipping and (state or k in who.contacts)
@@ -200,15 +204,15 @@ def _followed(
                 forces[i] = bounds[3 * i + (1 if states[k] > 0 else 2)]
         terms = np.abs(forces)
         if rows:
-            terms += np.abs(here.push) @ (np.abs(here.inverse) @ (sizes + np.abs(G) @ terms)[rows])
+            terms += here.sizes @ (sizes + effects @ terms)[rows]
             forces -= here.push @ (here.inverse @ (free + G @ forces)[rows])
         a = free + G @ forces
-        size = sizes + np.abs(G) @ terms
+        size = sizes + effects @ terms
         if (np.abs(a[rows]) > SAME * size[rows]).any():
             return None  # dependent rates that cannot all be held
         a[rows] = 0.0
         found.append((a, size))
-        off = ZERO * (terms + size / np.maximum(np.abs(np.diag(G)), 1e-300))  # to which forces are known
+        off = ZERO * (terms + size / own)  # to which forces are known
         values, rounding = here.left(who, forces, off, bounds)
         values, rounding = np.append(values, signs * a[places]), np.append(rounding, ZERO * size[places])
         if (values < -rounding)[pending].any():

@@ -139,12 +139,11 @@ class _RowsAhead(Ahead):
     def __init__(self, here: RowNumbers, some: Sequence[int], forces: Sequence[tuple[int, Any]], laws: Any) -> None:
         rows = here.rows
         self.n, self.waves, self.w, self.size = rows.n, rows.rates, here.w, here.size
-        self.field = rows.base(here.mode).copy()
-        for k, law in forces:
-            if hasattr(law, "values"):
-                self.field += np.outer(here.direction(k), law.values)
+        known = [(k, law.values) for k, law in forces if hasattr(law, "values")]
+        by, of = [k for k, _ in known], np.array([values for _, values in known]).reshape(len(known), len(here.w))
+        self.field = rows.base(here.mode) + rows.directions[by].T @ of
         self.rows = np.array([rows.rate(k, here.mode).values for k in some])
-        self.directions = np.array([here.direction(k) for k in some])
+        self.directions = rows.directions[[*some]]
         self.laws = np.array([here.row(law) for law in laws]).reshape(len(laws), len(here.w))
 
     def rates(self) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -256,6 +256,16 @@ class Rows(Assembler):
         return [(some, itemgetter(*some), np.flatnonzero(acts[some].any(axis=0))) for some in groups]
 
     @cached_property
+    def directions(self) -> FloatArray:
+        """Those of all elements."""
+        return np.array([part.direction for part in self.parts])
+
+    @cached_property
+    def places(self) -> FloatArray:
+        """The rows of all elements' places."""
+        return np.array([part.where.values for part in self.parts])
+
+    @cached_property
     def group(self) -> dict[int, int]:
         """The number of each element's group."""
         return {k: g for g, (some, *_) in enumerate(self.groups) for k in some}
