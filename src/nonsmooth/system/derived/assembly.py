@@ -129,10 +129,6 @@ class Assembler(ABC):
         return self.law(k, name)
 
     @abstractmethod
-    def shifted_back(self, states: Any, expression: Any) -> Any:
-        """States moved onto the zero of an expression, the shortest way."""
-
-    @abstractmethod
     def behind(self, expression: Any, states: Any) -> Any:
         """An expression behind an impulse, by the states before it."""
 

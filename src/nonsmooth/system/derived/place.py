@@ -91,7 +91,8 @@ class Place:
 
     def back_on(self, states: Any) -> Any:
         """States moved onto the surface of the contact, the shortest way."""
-        return self.make.shifted_back(states, self.where)
+        expressions: Any = self.make  # where nothing is asked: rows always are
+        return expressions.shifted_back(states, self.where)
 
     def is_struck(self) -> bool:
         """Return whether the impact of a stop turns its speed."""

@@ -193,10 +193,6 @@ class Rows(Assembler):
     def joined(self, part: Part, other: Part, share: Any) -> Part:
         return replace(part, direction=part.direction + share * other.direction)
 
-    def shifted_back(self, states: FloatArray, expression: Row) -> FloatArray:
-        slopes = expression.values[: self.n]
-        return states - np.outer(slopes / (slopes @ slopes), expression.values)
-
     def behind(self, expression: Row, states: FloatArray) -> Row:
         values = expression.values[: self.n] @ states
         values[self.n :] += expression.values[self.n :]
