@@ -20,11 +20,15 @@ ROOT = HERE.parent
 SOURCES = ("src", "studies/savi2007/src")
 
 
+LONGEST = 600  # seconds of one test, kernels compiled anew included: a mutant that hangs is caught
+
+
 def passes(tests: list[str], copy: Path) -> bool:
     """Return True where the tests pass with the packages of a copy."""
     paths = os.pathsep.join(str(copy / one) for one in SOURCES)
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests],
+        [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider",
+         "-o", f"faulthandler_timeout={LONGEST}", *tests],
         cwd=ROOT, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True,
     )  # fmt: skip
     if done.returncode not in (0, 1):

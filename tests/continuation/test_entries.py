@@ -184,7 +184,7 @@ def test_a_crossing_that_has_just_passed_the_section() -> None:
     branch = ns.continue_orbit(first, "w", (0.4, 3.0))
     at = int(np.abs(branch["w"].values - 1.611047026999419).argmin())
     here = system.with_parameters(w=float(branch["w"][at]))
-    run = ns.simulate(here, duration=2 * np.pi / here.values["w"], start=branch["section"].values[at])
+    run = ns.simulate(here, duration=4 * np.pi / here.values["w"], start=branch["section"].values[at])
     later = ns.find_orbit(here, start=run, transient=0, period_number=2, progress=False)
     tables = [ns.special_points(one) for one in (branch, ns.continue_orbit(later, "w", (0.4, 3.0)))]
     assert np.abs(later.u - branch["section"].values[at]).max() > 0.1
