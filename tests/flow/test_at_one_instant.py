@@ -76,7 +76,7 @@ def exponents(count: int, friction: float | None, method: str) -> np.ndarray:
 def test_side_by_side_each_has_the_exponents_that_it_has_alone(
     friction: float | None, method: str, visited: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Both impacts have an instant of their own, whether they rub or not; as one they lost two digits of all."""
+    """Both impacts have an instant of their own, whether they rub or not; as one, exponents were off by up to 4 %."""
     if visited:
         monkeypatch.setattr("nonsmooth.system.derived.combinations.MOST", 1)
     alone = exponents(1, friction, method)

@@ -57,7 +57,7 @@ def beside(
             for found in _found(point, common, side, aside):
                 apart, left = _apart(point, found), _left(point, found)
                 arrives = left <= SHRINKS * apart + EXACT or _shrink([*before, apart])
-                jumps = side == forward and left <= JUMP and _completes(point, found)
+                jumps = side == forward and left <= JUMP and _may_jump(point, found)
                 if (arrives or jumps) and not (_leads_back(point, found) or _came_by(found, passed)):
                     found = found if side * found.rise >= 0.0 else found.turned()
                     if arrives and (ahead is None or left < NEARER * ahead[0]):
@@ -126,7 +126,7 @@ def _left(point: OrbitPoint, found: OrbitPoint) -> float:
     return np.inf if nearer is None else _apart(point, nearer)
 
 
-def _completes(*sides: OrbitPoint) -> bool:
+def _may_jump(*sides: OrbitPoint) -> bool:
     """Return whether one of two orbits completes an impact as rest: it jumps there."""
     return any(completes(side, visit) for side in sides for visit in side.signature.crossings)
 
