@@ -292,12 +292,12 @@ def _but_completed(*sides: OrbitPoint) -> bool:
     soon, words = BEFORE_REST * sides[0].period, []
     for side in sides:
         visits, times = side.signature.visits, side.solved.times[1:]
-        slow = [completes(side, v) for v in visits[:-1]]
+        slow = {v.transition: completes(side, v) for v in visits[:-1]}
         words.append([
-            "slow" if now else (v.transition, v.row)
-            for was, now, v, after, t in zip([False, *slow], slow, visits[:-1], visits[1:], times, strict=False)
-            if not (v.row == AT_ONCE and was)
-            and (now or v.mode != after.mode or not any(0.0 <= rest - t < soon for rest in rests))
+            "slow" if slow[v.transition] else (v.transition, v.row)
+            for before, v, after, t in zip((visits[-1], *visits), visits[:-1], visits[1:], times, strict=False)
+            if not (v.row == AT_ONCE and slow.get(before.transition))
+            and (v.mode != after.mode or slow[v.transition] or not any(0.0 <= rest - t < soon for rest in rests))
         ])  # fmt: skip
     return bool(rests) and words[0] == words[1]
 
