@@ -122,6 +122,40 @@ def test_a_branch_that_comes_back_in_another_word_closes(beside: float) -> None:
         assert found.rows[-1].point.X == pytest.approx([-0.8, 0.6], abs=1e-12)
 
 
+class TwiceRound(Plane):
+    """A closed curve that goes twice round a circle: at each angle its two strands lie 2 r apart.
+
+    (rho - 1 + i z)^2 = r^2 exp(i phi), over the radius squared."""
+
+    def __init__(self, r: float) -> None:
+        self.r, self.scale = r, np.ones(3)
+
+    def evaluate(self, Y: Array) -> Solved:
+        x, z, y = Y
+        rho, r = np.hypot(x, y), self.r
+        a, c, s = rho - 1.0, x / rho, y / rho
+        F = np.array([a * a - z * z - r * r * c, 2 * a * z - r * r * s]) / r**2
+        rows = [[2 * a * c - r * r * s * s / rho, -2 * z, 2 * a * s + r * r * s * c / rho],
+                [2 * z * c + r * r * s * c / rho, 2 * a, 2 * z * s - r * r * c * c / rho]]  # fmt: skip
+        return Solved(Y, F, np.array(rows) / r**2)
+
+    def margins(self, point: Point) -> Array:
+        return np.array([np.inf])
+
+
+@pytest.mark.parametrize("r", [1e-3, 2e-5])
+def test_a_branch_that_passes_close_to_its_beginning_has_not_come_back(r: float) -> None:
+    """It is back after two turns, not after one, at which it passes its beginning at a distance of 2 r."""
+    curve = TwiceRound(r)
+    first = curve.near(np.array([1.0 + r, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    found = march(first, Limits((), 0.02, 2000, curve.landmark(first)), Along())
+    points = np.array([row.point.X for row in found.rows])
+    assert found.ending == "closed"
+    turned = np.unwrap(np.arctan2(points[:, 2], points[:, 0]))[-1]
+    assert abs(turned) == pytest.approx(4 * np.pi, abs=1e-9)
+    assert points[-1] == pytest.approx(first.X, abs=1e-12)
+
+
 @pytest.mark.parametrize("low", [0.7, 0.8, 0.9])
 def test_a_fold_beside_a_boundary_is_met_where_the_same_equations_turn_back_beyond_it(low: float) -> None:
     """p' = 10 (x - 0.505) (x - 0.495): the first fold lies before the boundary at x = 1/2, the second behind it."""

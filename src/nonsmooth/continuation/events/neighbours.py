@@ -50,8 +50,10 @@ def beside(
     common = [end for change in contacts if (end := common_orbit(change)) is not None]
     forward = float(np.sign(point.tangent[-1])) or 1.0
     nearest: dict[float, list[float]] = {forward: [], -forward: []}  # of those found, at each distance
+    ahead: tuple[float, OrbitPoint] | None = None  # one to which the branch jumps, and how far
     for aside in ASIDE:
-        ahead: tuple[float, OrbitPoint] | None = None  # one to which the branch jumps, and how far
+        if ahead is not None and aside > ahead[0]:
+            break  # as far from the boundary no orbit could be nearer
         for side, before in nearest.items():
             least = np.inf
             for found in _found(point, common, side, aside):
@@ -65,9 +67,7 @@ def beside(
                     ahead = ahead or (left, found)
                 least = min(least, apart)
             before.append(least)
-        if ahead is not None:
-            return ahead[1]
-    return None
+    return None if ahead is None else ahead[1]
 
 
 def _found(point: OrbitPoint, common: list[Common], side: float, aside: float) -> Iterator[OrbitPoint]:

@@ -247,14 +247,9 @@ class _Marching:
 
     def _close(self, step: Step) -> None:
         """End a step where the branch comes back to its beginning."""
-        place = self.limits.closed
-        back = came_back(place, step) if len(self.found.rows) >= 3 else None
-        if place is None or back is None or back > step.stop:
-            return
-        point = self.curve.between(step.a, step.b, back)
-        last = None if point is None else self.curve.at_landmark(point, place)
-        if last is not None:  # a chord as near as this may belong to another part of the branch
-            step.ends("closed", back, last)
+        back = came_back(self.limits.closed, step) if len(self.found.rows) >= 3 else None
+        if back is not None:
+            step.ends("closed", *back)
 
     def _special(self, step: Step) -> bool:
         """List the special points of a step; True where the branch ends at one."""
@@ -307,13 +302,20 @@ def _easy(iterations: int, bend: float, spread: float) -> float:
     return min(easy, 0.7) if iterations >= 6 else easy
 
 
-def came_back(place: Place | None, step: Step) -> float | None:
-    """Distance along the step at which the branch comes back to a place; None where it does not."""
+def came_back(place: Place | None, step: Step) -> tuple[float, Any] | None:
+    """Distance along the step at which the branch comes back to a place, and the point; None where it does not.
+
+    A chord as near as this may belong to another part of the branch: the point is solved there."""
     if place is None or float(np.abs(step.b.Y - step.a.Y).max()) >= 0.2:
         return None
-    word, X, seen = place
-    if word == step.curve.word():
-        Y = X / step.curve.scale
-        return step.a.along(Y) if passing(Y, step.a.Y, step.b.Y) is not None else None
-    x = passing(seen, step.curve.seen(step.a), step.curve.seen(step.b))
-    return None if x is None else x * step.end
+    (word, X, seen), curve = place, step.curve
+    if word == curve.word():
+        Y = X / curve.scale
+        x, s = passing(Y, step.a.Y, step.b.Y), step.a.along(Y)
+    else:
+        x = passing(seen, curve.seen(step.a), curve.seen(step.b))
+        s = (x or 0.0) * step.end
+    if x is None or s > step.stop or (point := curve.between(step.a, step.b, s)) is None:
+        return None
+    last = curve.at_landmark(point, place)
+    return None if last is None else (s, last)

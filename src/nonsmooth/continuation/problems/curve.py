@@ -22,7 +22,7 @@ DONE = 1e-9  # a step this small is followed by one of its square
 FARTHEST = 2.5  # times the last step: a cubic is not trusted beyond
 SMALL = 1e-6  # residual of a first guess that a small step alone makes a solution
 CLOSE = 1e-12  # where multipliers are wanted to the last digits
-AGAIN = 1e-4  # in scaled unknowns: as near as a branch comes back to a point of its own
+AGAIN = 1e-7  # in scaled unknowns: as near as a branch comes back to a point of its own, both solved
 STEP = 1e-5  # of differences, in scaled unknowns
 #: The word of a curve (of orbits: the signature), the unknowns, and what other curves of the branch have of them.
 Place = tuple[Any, FloatArray, FloatArray]
@@ -131,12 +131,15 @@ class Curve(ABC, Generic[P]):
         return self.word(), point.X, self.seen(point)
 
     def at_landmark(self, point: P, place: Place) -> P | None:
-        """The point nearby that is the one of a landmark; None where there is none."""
+        """The point nearby that is the one of a landmark: across the branch from it, or at its parameter; else None."""
         word, X, seen = place
-        if word == self.word() and np.abs(X / self.scale - point.Y).max() < AGAIN:
-            return point
-        same = self.at_parameter(point.Y, float(X[-1]))
-        return None if same is None or np.abs(self.seen(same) - seen).max() > AGAIN else same
+        level = float(point.tangent @ (X / self.scale)) if word == self.word() else None
+        for border, at in ((point.tangent, level), (np.eye(self.n)[-1], X[-1] / self.scale[-1])):
+            found = None if at is None else self.correct(point.Y, border, at, tolerance=CLOSE, most=2 * self.most)
+            same = None if found is None else self.point(found[0], found[1], point.tangent)
+            if same is not None and np.abs(self.seen(same) - seen).max() < AGAIN:
+                return same
+        return None
 
     def margins(self, point: P) -> FloatArray:
         """The numbers that turn negative beyond the boundaries."""
