@@ -75,8 +75,9 @@ contacts: $(VENV)/.compiled-test  ## 1000 random systems with contacts and frict
 branches: $(VENV)/.compiled-test  ## 100 branches of random systems, each entered at five of its points (an hour)
 	$(BIN)/python tests/continuation/entries_campaign.py --rows out/branches.jsonl
 
-check: $(VENV)/.installed-dev  ## ruff, mypy, import-linter, codespell, the prose of docstrings, the weight of rooms
+check: $(VENV)/.installed-dev  ## ruff (rules and form), mypy, import-linter, codespell, prose of docstrings, weight of rooms
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md src studies tests docs benchmarks examples

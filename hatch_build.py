@@ -58,9 +58,13 @@ def run_apart(code: str, arguments: list[str], environment: dict[str, str]) -> t
     or not: none of them is left for the installer to wait for."""
     with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as said:  # a pipe waits for all who have it
         process = subprocess.Popen(
-            [sys.executable, "-c", _WATCH + code, *arguments], env=environment, stdin=subprocess.PIPE, stdout=said,
-            stderr=subprocess.STDOUT, start_new_session=True,
-        )  # fmt: skip
+            [sys.executable, "-c", _WATCH + code, *arguments],
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=said,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
         try:
             process.wait()
         finally:

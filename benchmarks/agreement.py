@@ -30,14 +30,23 @@ def filling(rng: np.random.Generator) -> Drawn:
     """One state that relaxes under a drive and is set back from a threshold; a valve opens at half of it."""
     a, b, F, w, top, low = rng.uniform((0.1, 0.5, 0.2, 0.5, 0.8, -0.5), (0.6, 2.0, 1.0, 2.0, 1.5, 0.2))
     system = ns.System(
-        states=["x"], parameters={"w": w, "top": top, "low": low},
-        modes={"shut": lambda t, u, p: (b - a * u.x + F * np.cos(p.w * t),),
-               "open": lambda t, u, p: (b - 2 * a * u.x + F * np.cos(p.w * t),)},
-        indicators={"full": lambda t, u, p: u.x - p.top, "half": lambda t, u, p: u.x - 0.5 * p.top,
-                    "third": lambda t, u, p: u.x - 0.3 * p.top},
-        transitions=[ns.Transition("open", "shut", when="full > 0", reset=lambda t, u, p: (p.low,)),
-                     ns.Transition("shut", "open", when="half > 0"), ns.Transition("open", "shut", when="third < 0")],
-    )  # fmt: skip
+        states=["x"],
+        parameters={"w": w, "top": top, "low": low},
+        modes={
+            "shut": lambda t, u, p: (b - a * u.x + F * np.cos(p.w * t),),
+            "open": lambda t, u, p: (b - 2 * a * u.x + F * np.cos(p.w * t),),
+        },
+        indicators={
+            "full": lambda t, u, p: u.x - p.top,
+            "half": lambda t, u, p: u.x - 0.5 * p.top,
+            "third": lambda t, u, p: u.x - 0.3 * p.top,
+        },
+        transitions=[
+            ns.Transition("open", "shut", when="full > 0", reset=lambda t, u, p: (p.low,)),
+            ns.Transition("shut", "open", when="half > 0"),
+            ns.Transition("open", "shut", when="third < 0"),
+        ],
+    )
     return system, 2.0 * np.pi / w, "half"
 
 
@@ -50,15 +59,23 @@ def yielding(rng: np.random.Generator) -> Drawn:
         return u.v, F * np.cos(p.w * t) - k * u.x - c * u.v + 0.2 * p.wall
 
     system = ns.System(
-        states=["x", "v"], parameters={"w": w, "e": e}, memory={"wall": 0.3}, modes={"near": motion, "far": motion},
+        states=["x", "v"],
+        parameters={"w": w, "e": e},
+        memory={"wall": 0.3},
+        modes={"near": motion, "far": motion},
         indicators={"reach": lambda t, u, p: u.x - p.wall, "back": lambda t, u, p: u.x - low},
         transitions=[
-            ns.Transition("near", "near", when="reach > 0", reset=lambda t, u, p: (u.x, -p.e * u.v),
-                          write={"wall": lambda t, u, p: p.wall + d * u.v}),
+            ns.Transition(
+                "near",
+                "near",
+                when="reach > 0",
+                reset=lambda t, u, p: (u.x, -p.e * u.v),
+                write={"wall": lambda t, u, p: p.wall + d * u.v},
+            ),
             ns.Transition("near", "far", when="back < 0", write={"wall": lambda t, u, p: r * p.wall}),
             ns.Transition("far", "near", when="back > 0"),
         ],
-    )  # fmt: skip
+    )
     return system, 2.0 * np.pi / w, "back"
 
 
@@ -80,9 +97,14 @@ def masses(rng: np.random.Generator) -> Drawn:
     if kind in (1, 3):
         elements["rub"] = E.Coulomb(at=names[-1] if kind == 3 else at, friction=uniform(0.05, 0.4))
     system = ns.mechanical(
-        M.tolist(), (0.05 * K + 0.02 * np.eye(n)).tolist(), K.tolist(), parameters={}, coordinates=names,
-        forcing={names[0]: lambda t, p: F * np.cos(w * t)}, elements=elements,
-    )  # fmt: skip
+        M.tolist(),
+        (0.05 * K + 0.02 * np.eye(n)).tolist(),
+        K.tolist(),
+        parameters={},
+        coordinates=names,
+        forcing={names[0]: lambda t, p: F * np.cos(w * t)},
+        elements=elements,
+    )
     return system, 2.0 * np.pi / w, next(iter(system.indicators))
 
 

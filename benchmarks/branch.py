@@ -30,8 +30,10 @@ def run(effort: float) -> tuple[list[str], list[Verdict]]:
     per_point = per_unit(raw, {"ours": n, "SciPy": n_scipy})
     found = list(ns.special_points(branch)["kind"].values)
     omega, sections = theirs()
-    again = [ns.find_orbit(system.with_parameters(omega=float(w)), start=u, period_number=1, transient=0).u
-             for w, u in zip(omega, sections, strict=True)]  # fmt: skip
+    again = [
+        ns.find_orbit(system.with_parameters(omega=float(w)), start=u, period_number=1, transient=0).u
+        for w, u in zip(omega, sections, strict=True)
+    ]
     difference = float(np.abs(np.array(again) - sections).max())
     at_200 = seconds * 200 / n
     lines = [

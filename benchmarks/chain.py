@@ -68,9 +68,11 @@ class Peer:
             return True
 
         self.integrator = hy.taylor_adaptive(
-            list(zip(variables, right, strict=True)), np.zeros(2 * n), tol=1e-14,
+            list(zip(variables, right, strict=True)),
+            np.zeros(2 * n),
+            tol=1e-14,
             t_events=[hy.t_event(over, callback=switch)],
-        )  # fmt: skip
+        )
 
         self.done = 0
 
@@ -101,14 +103,16 @@ def run(effort: float) -> tuple[list[str], list[tuple[str, str, str, bool]]]:
         ns.sweep(ours, "g", values, transient=10, keep=20, method="exact", progress=False)
         chunk = periods // 5
         times = per_unit(
-            interleaved({
-                "exact": lambda ours=ours, values=values: ns.sweep(
-                    ours, "g", values, transient=periods, keep=20, method="exact", progress=False
-                ),
-                "heyoka": lambda peer=peer, chunk=chunk: peer.run(chunk),
-            }),
+            interleaved(
+                {
+                    "exact": lambda ours=ours, values=values: ns.sweep(
+                        ours, "g", values, transient=periods, keep=20, method="exact", progress=False
+                    ),
+                    "heyoka": lambda peer=peer, chunk=chunk: peer.run(chunk),
+                }
+            ),
             {"exact": periods + 20, "heyoka": chunk},
-        )  # fmt: skip
+        )
         exact, theirs = median(times["exact"]), median(times["heyoka"])
         ratios.append(ratio(times, "heyoka", "exact"))
         shown = ns.sweep(ours, "g", values, transient=50, keep=20, progress=False)

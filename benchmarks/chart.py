@@ -30,9 +30,10 @@ PERIODS = 500
 PLANES = {
     "Fig. 9: omega 3-7, rho 0.1-0.3, g 0.02": ({"g": 0.02}, {"omega": (3.0, 7.0), "rho": (0.1, 0.3)}),
     "Fig. 13: g -0.0015-0.002, rho 0.2-0.5, omega 11.15": (
-        {"omega": 11.15}, {"g": (-0.0015, 0.002), "rho": (0.2, 0.5)},
+        {"omega": 11.15},
+        {"g": (-0.0015, 0.002), "rho": (0.2, 0.5)},
     ),
-}  # fmt: skip
+}
 
 
 def periods_run(system: ns.System, ranges: dict[str, tuple[float, float]]) -> float:
@@ -77,11 +78,14 @@ def run(effort: float) -> tuple[list[str], list[Verdict]]:
         batch = partial(lanes.march, sample, PERIODS)
         times = interleaved(
             {
-                "every": partial(ours, threads=1, stop_early=False), "early": partial(ours, threads=1),
-                "heyoka": heyoka, "batch": batch, "scipy": scipy,
+                "every": partial(ours, threads=1, stop_early=False),
+                "early": partial(ours, threads=1),
+                "heyoka": heyoka,
+                "batch": batch,
+                "scipy": scipy,
             },
             repeats=3,
-        )  # fmt: skip
+        )
         points = side * side
         scale = {"every": points, "early": points, "heyoka": len(sample), "batch": len(sample)}
         scale["scipy"] = 4 * 10 / PERIODS

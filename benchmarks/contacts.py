@@ -27,31 +27,44 @@ def harmonic(t: Any, p: Any) -> Any:
 
 def friction(load: Any = None) -> ns.System:
     return ns.mechanical(
-        1.0, 0.05, 1.0, coordinates=["q"], parameters={"F": 1.0, "w": 0.8, "mu": 0.4},
-        forcing={"q": load or harmonic}, elements={"rub": E.Coulomb(at="q", friction="mu")},
-    )  # fmt: skip
+        1.0,
+        0.05,
+        1.0,
+        coordinates=["q"],
+        parameters={"F": 1.0, "w": 0.8, "mu": 0.4},
+        forcing={"q": load or harmonic},
+        elements={"rub": E.Coulomb(at="q", friction="mu")},
+    )
 
 
 def rest(load: Any = None) -> ns.System:
     return ns.mechanical(
-        1.0, 0.2, 1.0, coordinates=["q"], parameters={"F": 1.0, "w": 0.8, "mu": 0.5},
+        1.0,
+        0.2,
+        1.0,
+        coordinates=["q"],
+        parameters={"F": 1.0, "w": 0.8, "mu": 0.5},
         forcing={"q": load or harmonic},
         elements={"stop": E.Stop(at="q", position=0.2, restitution="mu")},
-    )  # fmt: skip
+    )
 
 
 def six(load: Any = None) -> ns.System:
     return ns.mechanical(
-        np.diag([1.0, 0.8]), [[0.1, -0.02], [-0.02, 0.1]], [[3.0, -1.0], [-1.0, 2.0]],
+        np.diag([1.0, 0.8]),
+        [[0.1, -0.02], [-0.02, 0.1]],
+        [[3.0, -1.0], [-1.0, 2.0]],
         parameters={"F": 1.2, "w": 1.1, "mu": 0.3},
         forcing={"q1": load or harmonic},
         elements={
-            "a": E.Coulomb(at="q1", friction="mu", static=0.4), "b": E.Coulomb(at={"q1": 1, "q2": -1}, friction=0.2),
-            "s": E.Stop(at="q2", position=0.4, restitution=0.5), "r": E.Stop(at="q2", position=-0.4, side=-1),
+            "a": E.Coulomb(at="q1", friction="mu", static=0.4),
+            "b": E.Coulomb(at={"q1": 1, "q2": -1}, friction=0.2),
+            "s": E.Stop(at="q2", position=0.4, restitution=0.5),
+            "r": E.Stop(at="q2", position=-0.4, side=-1),
             "e": E.ElasticStop(at="q1", position=0.5, stiffness=20.0),
             "f": E.ElasticStop(at="q1", position=-0.5, side=-1, stiffness=20.0),
         },
-    )  # fmt: skip
+    )
 
 
 def fifty(load: Any = None) -> ns.System:
@@ -64,9 +77,13 @@ def fifty(load: Any = None) -> ns.System:
         elements[f"e{i}"] = E.ElasticStop(at=f"q{i + 2}", position=-0.5, side=-1, stiffness=20.0)
     elements["last"] = E.Stop(at=f"q{n}", position=0.2, restitution=0.3)
     return ns.mechanical(
-        np.eye(n), 0.1 * np.eye(n) + 0.1 * chain, 10.0 * chain, parameters={"F": 2.0, "w": 0.5, "mu": 0.02},
-        forcing={"q1": load or harmonic}, elements=elements,
-    )  # fmt: skip
+        np.eye(n),
+        0.1 * np.eye(n) + 0.1 * chain,
+        10.0 * chain,
+        parameters={"F": 2.0, "w": 0.5, "mu": 0.02},
+        forcing={"q1": load or harmonic},
+        elements=elements,
+    )
 
 
 def rubbing(load: Any = None) -> ns.System:
@@ -78,9 +95,14 @@ def rubbing(load: Any = None) -> ns.System:
     }
     forcing: dict[str, Any] = {f"y{i}": lambda t, p: -1.0 - 0.8 * np.sin(p.w * t) for i in range(1, n + 1)}
     return ns.mechanical(
-        np.eye(2 * n), 0.2 * np.eye(2 * n), np.kron(chain, np.diag([4.0, 1.0])), coordinates=names,
-        parameters={"F": 1.5, "w": 1.1, "mu": 0.3}, forcing={**forcing, "x1": load or harmonic}, elements=elements,
-    )  # fmt: skip
+        np.eye(2 * n),
+        0.2 * np.eye(2 * n),
+        np.kron(chain, np.diag([4.0, 1.0])),
+        coordinates=names,
+        parameters={"F": 1.5, "w": 1.1, "mu": 0.3},
+        forcing={**forcing, "x1": load or harmonic},
+        elements=elements,
+    )
 
 
 LARGE = ("simulate", "sweep", "find_orbit", "continue_orbit", "lyapunov", "sensitivity")

@@ -25,17 +25,26 @@ RTOL, ATOL = 1e-8, 1e-8
 
 def rubbing() -> ns.System:
     return ns.mechanical(
-        1.0, 2 * ZETA, 1.0, parameters={"w": OMEGA, "mu": MU}, forcing={"q": lambda t, p: FORCE * np.cos(p.w * t)},
-        elements={"rub": ns.elements.Coulomb(at="q", friction="mu")}, name="dry friction with stick",
-    )  # fmt: skip
+        1.0,
+        2 * ZETA,
+        1.0,
+        parameters={"w": OMEGA, "mu": MU},
+        forcing={"q": lambda t, p: FORCE * np.cos(p.w * t)},
+        elements={"rub": ns.elements.Coulomb(at="q", friction="mu")},
+        name="dry friction with stick",
+    )
 
 
 def resting() -> ns.System:
     return ns.mechanical(
-        1.0, 2 * ZETA, 1.0, parameters={"w": RATE, "d": GAP}, forcing={"q": lambda t, p: FORCE * np.cos(p.w * t)},
+        1.0,
+        2 * ZETA,
+        1.0,
+        parameters={"w": RATE, "d": GAP},
+        forcing={"q": lambda t, p: FORCE * np.cos(p.w * t)},
         elements={"stop": ns.elements.Stop(at="q", position="d", restitution=E, creep=SLOW)},
         name="impacts that end in rest",
-    )  # fmt: skip
+    )
 
 
 class Rules:
@@ -86,9 +95,11 @@ class Heyoka:
             ]
         self.integrator = hy.taylor_adaptive(
             [(x, moves * v), (v, moves * (push + hy.par[1])), (c, -rules.omega * s), (s, rules.omega * c)],
-            [0.0, 0.0, 1.0, 0.0], tol=1e-14,
-            pars=[1.0, 0.0 if impacts else -rules.mu], t_events=events,
-        )  # fmt: skip
+            [0.0, 0.0, 1.0, 0.0],
+            tol=1e-14,
+            pars=[1.0, 0.0 if impacts else -rules.mu],
+            t_events=events,
+        )
 
     def halt(self, ta: Any, direction: int) -> bool:
         if ta.pars[0] and direction * ta.pars[1] > 0:  # against the motion that friction brakes
@@ -149,8 +160,16 @@ class SciPy:
         while self.t < end:
             events = self.events()
             longest = np.inf if self.moves else 0.5 / self.rules.omega
-            s = solve_ivp(self.field, (self.t, end), self.u, method="DOP853", rtol=RTOL, atol=ATOL, events=events,
-                          max_step=longest)  # fmt: skip
+            s = solve_ivp(
+                self.field,
+                (self.t, end),
+                self.u,
+                method="DOP853",
+                rtol=RTOL,
+                atol=ATOL,
+                events=events,
+                max_step=longest,
+            )
             self.t, self.u = float(s.t[-1]), s.y[:, -1].copy()
             which = next((k for k, found in enumerate(s.t_events) if len(found)), None)
             if which is None:
@@ -181,8 +200,9 @@ def run(effort: float) -> tuple[list[str], list[tuple[str, str, str, bool]]]:
     ]
     verdicts = []
     for ours, name, rules in (
-        (rubbing(), "mu", Rules(OMEGA, MU, 0.0)), (resting(), "d", Rules(RATE, 0.0, GAP)),
-    ):  # fmt: skip
+        (rubbing(), "mu", Rules(OMEGA, MU, 0.0)),
+        (resting(), "d", Rules(RATE, 0.0, GAP)),
+    ):
         impacts = name == "d"
         value = ours.values[name]
         peer, scipy = Heyoka(rules, impacts), SciPy(rules, impacts)

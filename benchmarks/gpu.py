@@ -43,8 +43,12 @@ PERIODS = 500
 
 def page(flops: dict[str, Any]) -> list[str]:
     """Operations of the exact flow."""
-    lines = ["## Floating-point operations, counted", "", "| plane | per forcing period | tables of a point |",
-             "|---|---|---|"]  # fmt: skip
+    lines = [
+        "## Floating-point operations, counted",
+        "",
+        "| plane | per forcing period | tables of a point |",
+        "|---|---|---|",
+    ]
     return [*lines, *(f"| {name} | {one['per_period']:.0f} | {one['tables']:.0f} |" for name, one in flops.items()), ""]
 
 
@@ -58,10 +62,11 @@ def compiled() -> list[str]:
     simulated = printed(str(SCRIPTS / "gpu_script.py"), NUMBA_ENABLE_CUDASIM="1")
     launched = json.loads(simulated.splitlines()[-1])["launched"]
     lines = [
-        "## Kernels for compute capability 9.0, shape of the paper's oscillator", "",
+        "## Kernels for compute capability 9.0, shape of the paper's oscillator",
+        "",
         "| kernel | registers | stack, bytes | spills (store, load), bytes | object, kB | seconds to PTX |",
         "|---|---|---|---|---|---|",
-    ]  # fmt: skip
+    ]
     code = "import json, sys; from nonsmooth.kernels.cuda.ptx import ptx_of; print(ptx_of(*json.load(sys.stdin)))"
     for name, signature in launched.items():
         began = perf_counter()
@@ -149,11 +154,12 @@ def one_launch(plane: str, side: int, returns: int = 256) -> float:
 def timed(flops: dict[str, Any]) -> list[str]:
     name, most = peak()
     lines = [
-        f"On {name}, FP64 peak {most / 1e12:.1f} TFLOP/s by its clock and units:", "",
+        f"On {name}, FP64 peak {most / 1e12:.1f} TFLOP/s by its clock and units:",
+        "",
         "| plane | points | periods/s of one launch | of the peak | chart of every period: s, periods/s |"
         " chart stopping early: s, points/s |",
         "|---|---|---|---|---|---|",
-    ]  # fmt: skip
+    ]
     for plane, (parameters, ranges) in PLANES.items():
         for side in (200, 256, 1000):
             rate = one_launch(plane, min(side, 256))

@@ -76,22 +76,36 @@ def compiled() -> list[str]:
         if used
         else "no ptxas here: pip install nvidia-cuda-nvcc"
     )
-    return [f"- the valve's kernel (Taylor series of order 16), compute capability 9.0: {found}; "
-            f"{seconds:.0f} s of processor time to PTX", ""]  # fmt: skip
+    return [
+        f"- the valve's kernel (Taylor series of order 16), compute capability 9.0: {found}; "
+        f"{seconds:.0f} s of processor time to PTX",
+        "",
+    ]
 
 
 def page(flops: dict[str, float]) -> list[str]:
     return [
         f"- the relief valve: {flops['per_return']:.0f} operations and {flops['steps_per_return']:.1f} steps per"
-        " section return (mean over 8 inflows)", "",
-    ]  # fmt: skip
+        " section return (mean over 8 inflows)",
+        "",
+    ]
 
 
 def scan(inflows: np.ndarray, **options: Any) -> Any:
     return ns.sweep(
-        ns.models.relief_valve(), "q", inflows, direction=None, start=START, section=TOP, transient=TRANSIENT,
-        keep=KEEP, method="taylor", rtol=TOLERANCE, progress=False, **options,
-    )  # fmt: skip
+        ns.models.relief_valve(),
+        "q",
+        inflows,
+        direction=None,
+        start=START,
+        section=TOP,
+        transient=TRANSIENT,
+        keep=KEEP,
+        method="taylor",
+        rtol=TOLERANCE,
+        progress=False,
+        **options,
+    )
 
 
 def apart(a: Any, b: Any, which: np.ndarray, least: Any) -> float:
@@ -123,8 +137,9 @@ def compared(n: int = 400) -> list[str]:
         f"- relief valve, {n} inflows: {differs.mean():.3%} of the labels differ, {int((differs & ~doubtful).sum())}"
         f" of them neither slow nor chaotic; {int(good.sum())} periodic points with |multiplier| < 0.95, extremes at "
         f"most {worst:.1e} of the motion's size apart: {'met' if met else '**not met**'}",
-        f"- the processor's scan beside it, one thread: {rate:.3g} returns/s", "",
-    ]  # fmt: skip
+        f"- the processor's scan beside it, one thread: {rate:.3g} returns/s",
+        "",
+    ]
 
 
 def march(inflows: np.ndarray, transient: int, keep: int) -> tuple[np.ndarray, np.ndarray]:
@@ -151,7 +166,7 @@ def timed(flops: dict[str, float], peak: float) -> list[str]:
         f"| relief valve: trajectories | returns/s, {TRANSIENT} + {KEEP} marched | of the FP64 peak | through sweep | "
         f"published, Titan Black |",
         "|---|---|---|---|---|",
-    ]  # fmt: skip
+    ]
     best = 0.0
     for n in (30720, int(PART * batch_size()), 65536):
         inflows = np.linspace(LOWEST, HIGHEST, n)

@@ -15,8 +15,18 @@ import tempfile
 from pathlib import Path
 
 PROCEDURES = (
-    "springs", "support", "impulse", "drop", "response", "voltage", "crank", "grazing", "contact", "rise", "section",
-)  # fmt: skip
+    "springs",
+    "support",
+    "impulse",
+    "drop",
+    "response",
+    "voltage",
+    "crank",
+    "grazing",
+    "contact",
+    "rise",
+    "section",
+)
 
 
 def spent(*arguments: str) -> float:

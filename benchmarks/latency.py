@@ -80,17 +80,23 @@ def seconds(steps: dict[str, str], folder: str) -> Steps:
     """Return the seconds of each step in a new process, with imports first and the whole process last."""
     parts = {"import": IMPORT, **steps}
     text = [
-        "import json, os, warnings", "from time import perf_counter", "os.environ['MPLBACKEND'] = 'Agg'",
-        "warnings.simplefilter('ignore')", "seconds = {}",
-    ]  # fmt: skip
+        "import json, os, warnings",
+        "from time import perf_counter",
+        "os.environ['MPLBACKEND'] = 'Agg'",
+        "warnings.simplefilter('ignore')",
+        "seconds = {}",
+    ]
     for name, code in parts.items():
         text += ["begin = perf_counter()", code, f"seconds[{name!r}] = perf_counter() - begin"]
     text.append("print(json.dumps(seconds))")
     begin = perf_counter()
     done = subprocess.run(
-        [sys.executable, "-c", "\n".join(text)], stdout=subprocess.PIPE, text=True, check=True,
+        [sys.executable, "-c", "\n".join(text)],
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
         env={**os.environ, "NONSMOOTH_CACHE_DIR": folder},
-    )  # fmt: skip
+    )
     found: Steps = json.loads(done.stdout.splitlines()[-1])
     return {**found, "whole process": perf_counter() - begin}
 
@@ -107,9 +113,13 @@ def newcomer(folder: str) -> Steps:
     with tempfile.TemporaryDirectory() as place:
         begin = perf_counter()
         program = subprocess.Popen(
-            [sys.executable, "-c", code], cwd=place, env=environment, stdin=subprocess.DEVNULL, stdout=theirs,
+            [sys.executable, "-c", code],
+            cwd=place,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=theirs,
             stderr=theirs,
-        )  # fmt: skip
+        )
         os.close(theirs)
         try:
             while os.read(ours, 4096):

@@ -88,8 +88,10 @@ def valve(q: float, tolerance: float) -> _Spectrum:
     equations = [(y1, y2), (y2, -k * y2 - (y1 + delta) + y3), (y3, beta * (q - y1 * hy.sqrt(y3)))]
     impact = _Impact(k, delta, restitution)
     ta = hy.taylor_adaptive(
-        hy.var_ode_sys(equations, hy.var_args.vars, order=1), np.ones(12), tol=tolerance,
+        hy.var_ode_sys(equations, hy.var_args.vars, order=1),
+        np.ones(12),
+        tol=tolerance,
         t_events=[hy.t_event(y1, callback=impact, direction=hy.event_direction.negative)],
-    )  # fmt: skip
+    )
     impact.state = memoryview(ta.state)
     return _Spectrum(ta)

@@ -21,9 +21,10 @@ UNITS = {"Lorenz": 0.5, "valve": 0.25}  # of time between heyoka's QRs: with lon
 
 def lorenz() -> ns.System:
     return ns.System(
-        states=["x", "y", "z"], parameters=LORENZ,
+        states=["x", "y", "z"],
+        parameters=LORENZ,
         modes={"all": lambda t, u, p: (p.s * (u.y - u.x), u.x * (p.r - u.z) - u.y, u.x * u.y - p.b * u.z)},
-    )  # fmt: skip
+    )
 
 
 def run(effort: float) -> tuple[list[str], list[Verdict]]:
@@ -68,7 +69,11 @@ def run(effort: float) -> tuple[list[str], list[Verdict]]:
     worst = min(ratios, key=lambda name: ratios[name])
     lines.append("")
     return lines, [
-        ("Lyapunov spectra of Lorenz and the valve: heyoka / ours, least", "at least 1",
-         f"{ratios[worst]:.2f} ({worst})", ratios[worst] >= 1),
+        (
+            "Lyapunov spectra of Lorenz and the valve: heyoka / ours, least",
+            "at least 1",
+            f"{ratios[worst]:.2f} ({worst})",
+            ratios[worst] >= 1,
+        ),
         ("their errors over a short run, ours / heyoka's, worst", "at most 1", f"{max(errors):.1g}", max(errors) <= 1),
-    ]  # fmt: skip
+    ]

@@ -37,8 +37,9 @@ def exponents(p: Mapping[str, float], u: NDArray[np.float64], n_periods: int) ->
     t, end = 0.0, n_periods * 2 * pi / omega
     while t < end:
         events = [separation] if inside else [entry, second_entry]
-        s = solve_ivp(field(int(inside)), (t, end), [*u, *q.ravel()], method="DOP853", rtol=RTOL, atol=ATOL,
-                      events=events)  # fmt: skip
+        s = solve_ivp(
+            field(int(inside)), (t, end), [*u, *q.ravel()], method="DOP853", rtol=RTOL, atol=ATOL, events=events
+        )
         t, u, q = float(s.t[-1]), s.y[:2, -1], s.y[2:, -1].reshape(2, 2)
         if s.status == 1:
             # Both entries' events may stand in the list, in either order: second_entry jumps where x passes g.

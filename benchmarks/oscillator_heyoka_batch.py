@@ -52,12 +52,15 @@ class Batch:
         rising = hy.event_direction.positive
         self._toggle, self._second = _Toggle(), _Second()
         self.ta = hy.taylor_adaptive_batch(
-            motion, np.zeros((2, self.lanes)), pars=np.zeros((9, self.lanes)), tol=tolerance,
+            motion,
+            np.zeros((2, self.lanes)),
+            pars=np.zeros((9, self.lanes)),
+            tol=tolerance,
             t_events=[
                 hy.t_event_batch(change, callback=self._toggle, direction=rising),
                 hy.t_event_batch(entry, callback=self._second, direction=rising),
             ],
-        )  # fmt: skip
+        )
         self._toggle.pars = self._second.pars = memoryview(self.ta.pars)
         self._second.state = memoryview(self.ta.state)
 
@@ -71,9 +74,16 @@ class Batch:
             for lane, p in enumerate(part):
                 m, depth = p["m"], -p["g"]
                 self.ta.pars[:, lane] = [
-                    2 * p["k"] / m, p["c"] / m, p["rho"] / m, p["omega"], p["g"], p["k_s"] / m, p["c_s"] / m,
-                    p["c_s"] / p["k_s"], float(depth > 0),
-                ]  # fmt: skip
+                    2 * p["k"] / m,
+                    p["c"] / m,
+                    p["rho"] / m,
+                    p["omega"],
+                    p["g"],
+                    p["k_s"] / m,
+                    p["c_s"] / m,
+                    p["c_s"] / p["k_s"],
+                    float(depth > 0),
+                ]
                 ends[lane] = n_periods * 2 * np.pi / p["omega"]
             self.ta.set_time(0.0)
             self.ta.state[:] = 0.0

@@ -15,6 +15,10 @@ def printed(*arguments: str, given: str = "", **environment: str) -> str:
     """Return what ``python *arguments`` prints, with further environment variables; an error where it fails."""
     paths = os.pathsep.join([*sys.path, str(HERE), str(SCRIPTS)])
     return subprocess.run(
-        [sys.executable, *arguments], input=given, capture_output=True, text=True, check=True,
+        [sys.executable, *arguments],
+        input=given,
+        capture_output=True,
+        text=True,
+        check=True,
         env={**os.environ, "PYTHONPATH": paths, **environment},
-    ).stdout  # fmt: skip
+    ).stdout

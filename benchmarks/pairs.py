@@ -90,9 +90,12 @@ def of_a_process(checkout: Path, arguments: list[str]) -> dict[str, float]:
     """The times that a process of its own finds, with the package of a checkout and the scenarios of this one."""
     paths = os.pathsep.join([str(checkout / "src"), str(HERE)])
     done = subprocess.run(
-        [sys.executable, str(Path(__file__)), "--child", *arguments], capture_output=True, text=True, check=True,
+        [sys.executable, str(Path(__file__)), "--child", *arguments],
+        capture_output=True,
+        text=True,
+        check=True,
         env={**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1"},
-    )  # fmt: skip
+    )
     found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
     return found
 

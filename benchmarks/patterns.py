@@ -45,10 +45,14 @@ def system() -> ns.System:
     for j, (kinetic, static) in RUBS.items():
         elements[f"rub{j}"] = ns.elements.Coulomb(at=f"q{j + 1}", friction=kinetic, static=static)
     return ns.mechanical(
-        np.eye(MASSES), C * np.eye(MASSES), STIFFNESS, parameters={"F": FORCE, "w": OMEGA},
-        forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)}, elements=elements,
+        np.eye(MASSES),
+        C * np.eye(MASSES),
+        STIFFNESS,
+        parameters={"F": FORCE, "w": OMEGA},
+        forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
+        elements=elements,
         name=f"{MASSES} masses with {len(elements)} elements",
-    )  # fmt: skip
+    )
 
 
 class SciPy:
@@ -152,9 +156,7 @@ class SciPy:
                 continue
             if self.t >= end:
                 break
-            s = solve_ivp(
-                self.field, (self.t, end), self.u, method="DOP853", rtol=RTOL, atol=ATOL, events=functions
-            )
+            s = solve_ivp(self.field, (self.t, end), self.u, method="DOP853", rtol=RTOL, atol=ATOL, events=functions)
             self.t, self.u = float(s.t[-1]), s.y[:, -1].copy()
             if s.status == 1:
                 hits = [(times[0], k) for k, times in enumerate(s.t_events) if len(times)]

@@ -32,6 +32,9 @@ def resources_of(ptx: str, registers: int | None = None) -> dict[str, Any]:
     used = re.search(r"Used (\d+) registers", done.stderr)
     assert stack is not None and used is not None, done.stderr
     return {
-        "registers": int(used[1]), "stack_bytes": int(stack[1]), "spill_store_bytes": int(stack[2]),
-        "spill_load_bytes": int(stack[3]), "object_bytes": size,
-    }  # fmt: skip
+        "registers": int(used[1]),
+        "stack_bytes": int(stack[1]),
+        "spill_store_bytes": int(stack[2]),
+        "spill_load_bytes": int(stack[3]),
+        "object_bytes": size,
+    }

@@ -82,12 +82,13 @@ class Peer:
 
         self.integrator = hy.taylor_adaptive(
             list(zip(variables, [*v, *forces(x, v, FORCE * hy.cos(OMEGA * hy.time))], strict=True)),
-            np.zeros(2 * MASSES), tol=1e-14,
+            np.zeros(2 * MASSES),
+            tol=1e-14,
             t_events=[
                 hy.t_event(x[i] - PART * REACH[i], callback=rebound(i), direction=hy.event_direction.positive)
                 for i in STOPS
             ],
-        )  # fmt: skip
+        )
         self.done = 0
 
     def run(self, periods: int) -> Array:
@@ -163,16 +164,18 @@ def run(effort: float) -> tuple[list[str], list[tuple[str, str, str, bool]]]:
     balance, impacts = imbalance(ours, BALANCED)
     chunks = {"heyoka": periods // 25, "SciPy": 2}
     times = per_unit(
-        interleaved({
-            "exact": lambda: ns.sweep(
-                ours, "gaps", [PART], transient=periods, keep=2, method="exact", progress=False
-            ),
-            "exact, points": lambda: ns.poincare(ours, n=periods // 5, method="exact"),
-            "heyoka": lambda: peer.run(chunks["heyoka"]),
-            "SciPy": lambda: scipy.run(chunks["SciPy"]),
-        }),
+        interleaved(
+            {
+                "exact": lambda: ns.sweep(
+                    ours, "gaps", [PART], transient=periods, keep=2, method="exact", progress=False
+                ),
+                "exact, points": lambda: ns.poincare(ours, n=periods // 5, method="exact"),
+                "heyoka": lambda: peer.run(chunks["heyoka"]),
+                "SciPy": lambda: scipy.run(chunks["SciPy"]),
+            }
+        ),
         {"exact": periods + 2, "exact, points": periods // 5, **chunks},
-    )  # fmt: skip
+    )
     shown = {name: median(values) for name, values in times.items()}
     over_heyoka, over_scipy = ratio(times, "heyoka", "exact"), ratio(times, "SciPy", "exact")
     lines = [

@@ -40,9 +40,20 @@ def main() -> int:
     effort = 0.1 if options.quick else 1.0
     text, verdicts = ["# Benchmarks", "", *(f"- {fact}" for fact in machine.facts() if fact), ""], []
     parts = (
-        oscillator, chain, rigid_stops, patterns, friction, valve, valve_scan, diagram, chart, chart_size, lyapunov,
-        lyapunov_nonlinear, branch,
-    )  # fmt: skip
+        oscillator,
+        chain,
+        rigid_stops,
+        patterns,
+        friction,
+        valve,
+        valve_scan,
+        diagram,
+        chart,
+        chart_size,
+        lyapunov,
+        lyapunov_nonlinear,
+        branch,
+    )
     for part in parts:
         lines, part_verdicts = part.run(effort)
         print("\n".join(lines), flush=True)

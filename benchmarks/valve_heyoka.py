@@ -52,10 +52,12 @@ class Valve:
         falling = hy.event_direction.negative
         self.ta = hy.taylor_adaptive(
             [(y1, y2), (y2, -k * y2 - (y1 + delta) + y3), (y3, beta * (q - y1 * hy.sqrt(y3)))],
-            [1.0, 0.0, 11.0], pars=[1.25, 10.0, 20.0, 0.8, 5.0], tol=tolerance,
+            [1.0, 0.0, 11.0],
+            pars=[1.25, 10.0, 20.0, 0.8, 5.0],
+            tol=tolerance,
             t_events=[hy.t_event(y1, callback=self.impact, direction=falling)],
             nt_events=[hy.nt_event(y2, self.maxima, direction=falling)],
-        )  # fmt: skip
+        )
         self.impact.pars, self.impact.state = memoryview(self.ta.pars), memoryview(self.ta.state)
 
     def start(self, q: float, u: tuple[float, float, float]) -> None:

@@ -30,9 +30,19 @@ PUBLISHED = 3.7e4  # odeint with SIMD on one i7-4820K core
 def scan(values: np.ndarray) -> Any:
     top = ns.Poincare("lift_velocity", rising=False)
     return ns.sweep(
-        ns.models.relief_valve(), "q", values, direction=None, start=START, section=top, transient=TRANSIENT, keep=KEEP,
-        method="taylor", rtol=TOLERANCE, threads=1, progress=False,
-    )  # fmt: skip
+        ns.models.relief_valve(),
+        "q",
+        values,
+        direction=None,
+        start=START,
+        section=top,
+        transient=TRANSIENT,
+        keep=KEEP,
+        method="taylor",
+        rtol=TOLERANCE,
+        threads=1,
+        progress=False,
+    )
 
 
 def heyoka_scan(peer: valve_heyoka.Valve, values: np.ndarray) -> int:

@@ -121,10 +121,11 @@ def valve_table() -> list[str]:
 def eta_errors() -> tuple[list[str], dict[str, np.ndarray], dict[str, float]]:
     """Table, errors (over ETAS) and error of the paper's setting, for each orbit."""
     lines = [
-        "| orbit | " + " | ".join(f"eta {short(eta, 'g')}" for eta in ETAS)
+        "| orbit | "
+        + " | ".join(f"eta {short(eta, 'g')}" for eta in ETAS)
         + " | order | paper's setting | slowest crossing |",
         "|---|" + "--:|" * (len(ETAS) + 3),
-    ]  # fmt: skip
+    ]
     errors, paper = {}, {}
     for name, parameters in ORBITS.items():
         system = ns.models.discontinuous_support(**parameters)
@@ -169,8 +170,9 @@ def grazing_table() -> tuple[list[str], np.ndarray]:
     """Grazing frequencies of the smoothed model of Fig. 9, against the closed forms of the gaps g - eta and g."""
     found = np.array([smoothed_grazing(eta) for eta in ETAS])
     lines = [
-        "| eta | smoothed model grazes at | closed form, gap g - eta | closed form, gap g |", "|---|---|---|---|",
-    ]  # fmt: skip
+        "| eta | smoothed model grazes at | closed form, gap g - eta | closed form, gap g |",
+        "|---|---|---|---|",
+    ]
     for eta, omega in zip(ETAS, found, strict=True):
         lines.append(f"| {short(eta, 'g')} | {omega:.9f} | {grazing(0.02 - eta):.9f} | {grazing(0.02):.9f} |")
     return lines, found
@@ -190,8 +192,14 @@ def draw(errors: Mapping[str, np.ndarray], paper: Mapping[str, float], found: np
         left.set_ylabel(r"error, $[(\Delta x / 1\,\mathrm{mm})^2 + (\Delta v / 10\,\mathrm{mm/s})^2]^{1/2}$")
         right.loglog(widths, found - grazing(0.02), "o", label="smoothed model")
         line = np.geomspace(ETAS.min(), ETAS.max(), 50)
-        right.loglog(1e6 * line, [grazing(0.02 - eta) - grazing(0.02) for eta in line], "-", color="0.4",
-                     zorder=1, label=r"closed form, gap $g - \eta$")  # fmt: skip
+        right.loglog(
+            1e6 * line,
+            [grazing(0.02 - eta) - grazing(0.02) for eta in line],
+            "-",
+            color="0.4",
+            zorder=1,
+            label=r"closed form, gap $g - \eta$",
+        )
         right.set_ylabel("shift of the grazing frequency (rad/s)")
         for ax in (left, right):
             ax.set_xlabel("half width of the band, $\\eta$ (\N{MICRO SIGN}m)")

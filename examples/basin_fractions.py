@@ -21,9 +21,14 @@ def main(points: int = 101, starts: int = 150) -> Axes:
 
     support = ns.models.discontinuous_support(omega=11.15, g=0.0014)
     shares = ns.basin_fractions(
-        support, "rho", np.linspace(0.25, 0.5, points), n_starts=starts, box={"x": (-0.02, 0.02), "v": (-0.2, 0.2)},
-        seed=1, progress=False,
-    )  # fmt: skip
+        support,
+        "rho",
+        np.linspace(0.25, 0.5, points),
+        n_starts=starts,
+        box={"x": (-0.02, 0.02), "v": (-0.2, 0.2)},
+        seed=1,
+        progress=False,
+    )
     there = shares.sel(rho=0.33, method="nearest")
     periods = there.period_number.values[there.fraction.values > 0]
     assert sorted(periods.tolist()) == [3, 4]

@@ -20,9 +20,10 @@ def main(points: int = 240) -> Axes:
     """The chart from rest; equal g / rho gives equal periods."""
     support = ns.models.discontinuous_support(omega=11.15)
     chart = ns.chart(
-        support, {"g": np.linspace(-0.0015, 0.002, points), "rho": np.linspace(0.2, 0.5, 3 * points // 4)},
+        support,
+        {"g": np.linspace(-0.0015, 0.002, points), "rho": np.linspace(0.2, 0.5, 3 * points // 4)},
         progress=False,
-    )  # fmt: skip
+    )
     ax = ns.plot.chart(chart)
     orbit = ns.find_orbit(support.with_parameters(g=-0.0012, rho=0.33))
     flips = ns.special_points(ns.continue_orbit(orbit, "g", (-0.0015, 0.002)))

@@ -24,12 +24,14 @@ def main() -> Axes:
     import matplotlib.pyplot as plt
 
     oscillator = ns.mechanical(
-        1.0, 0.0, 1.0,
+        1.0,
+        0.0,
+        1.0,
         coordinates=["x"],
         parameters={"omega": 0.8, "F": 0.5},
         forcing={"x": lambda t, p: np.cos(p.omega * t)},
         elements={"rub": ns.elements.Coulomb(at="x", friction="F")},
-    )  # fmt: skip
+    )
     v, u = 1 / (1 - OMEGA**2), np.tan(np.pi / 2 / OMEGA) / OMEGA
     limit = np.abs(v) / np.sqrt(1 + OMEGA**4 * u**2)  # omega^2 a = F in a^2 = v^2 - (F u)^2
     with ns.plot.journal():

@@ -17,11 +17,18 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 rig = ns.mechanical(
-    "m", "c", "k",
+    "m",
+    "c",
+    "k",
     name="mass with a stop and friction",
     parameters={
-        "m": (1.0, "kg"), "c": (0.1, "N s/m"), "k": (1.0, "N/m"), "F": (1.0, "N"), "omega": (1.0, "rad/s"),
-        "mu": (0.15, "N"), "e": 0.6,
+        "m": (1.0, "kg"),
+        "c": (0.1, "N s/m"),
+        "k": (1.0, "N/m"),
+        "F": (1.0, "N"),
+        "omega": (1.0, "rad/s"),
+        "mu": (0.15, "N"),
+        "e": 0.6,
     },
     coordinates={"x": "m"},
     forcing={"x": lambda t, p: p.F * np.cos(p.omega * t)},
@@ -29,7 +36,7 @@ rig = ns.mechanical(
         "rub": ns.elements.Coulomb(at="x", friction="mu"),
         "stop": ns.elements.Stop(at="x", position=1.2, restitution="e"),
     },
-)  # fmt: skip
+)
 
 
 def main(points: int = 121) -> Axes:

@@ -41,10 +41,12 @@ def oscillator() -> ns.System:
         return [u.w, p.g * p.V1 + p.offset - p.d * u.w - p.a * u.V2 - p.q * u.V2**2 - p.b * u.V2**3]
 
     return ns.System(
-        states={"V2": "V", "w": "V/s"}, inputs={"V1": "V"}, modes={"box": field},
+        states={"V2": "V", "w": "V/s"},
+        inputs={"V1": "V"},
+        modes={"box": field},
         parameters={"d": 20.0, "a": 1.7e5, "b": 5e5, "g": 1e5, "q": 0.0, "offset": 0.0, "late": 0.0},
         scale={"V2": 0.1, "w": 40.0, "V1": 0.1, "V1_rate": 40.0},
-    )  # fmt: skip
+    )
 
 
 def finer(V1: np.ndarray) -> ns.Input:

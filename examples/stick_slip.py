@@ -32,7 +32,11 @@ belt = ns.System(
     name="block on a belt",
     states={"x": "m", "v": "m/s"},
     parameters={
-        "m": (1.0, "kg"), "k": (1.0, "N/m"), "f_s": (1.0, "N"), "f_d": (0.5, "N"), "v_b": (0.2, "m/s"),
+        "m": (1.0, "kg"),
+        "k": (1.0, "N/m"),
+        "f_s": (1.0, "N"),
+        "f_d": (0.5, "N"),
+        "v_b": (0.2, "m/s"),
     },
     modes={"stick": ns.Mode(stick, states=["x"]), "slip": slip},
     indicators={
@@ -44,7 +48,7 @@ belt = ns.System(
         ns.Transition("slip", "stick", when="catch > 0", reset=lambda t, u, p: (u.x,)),
     ],
     outputs={"velocity": ({"stick": lambda t, u, p: p.v_b, "slip": lambda t, u, p: u.v}, "m/s")},
-)  # fmt: skip
+)
 
 
 def main() -> Axes:

@@ -22,11 +22,14 @@ K = np.array([[4000.0, -2000.0, 0.0], [-2000.0, 3500.0, -1500.0], [0.0, -1500.0,
 GAP, E = 0.004, 0.6
 
 rig = ns.mechanical(
-    M, C, K, coordinates={"q1": "m", "q2": "m", "q3": "m"},
+    M,
+    C,
+    K,
+    coordinates={"q1": "m", "q2": "m", "q3": "m"},
     parameters={"F": (5.0, "N"), "omega": (18.0, "rad/s"), "g": (GAP, "m"), "e": E},
     forcing={"q1": lambda t, p: p.F * np.cos(p.omega * t)},
     elements={"stop": ns.elements.Stop(at="q3", position="g", restitution="e")},
-)  # fmt: skip
+)
 
 
 def linear(omega: np.ndarray, force: float) -> np.ndarray:

@@ -70,14 +70,17 @@ def labels() -> Labels:
     return Labels(
         name="oscillator",
         states={"x": Quantity("m"), "v": Quantity("m/s", r"\dot x")},
-        parameters={"rho": Quantity("N", r"\rho", 0.3), "omega": Quantity("rad/s", r"\omega", 1.0),
-                    "g": Quantity("m", "g", GAP)},
+        parameters={
+            "rho": Quantity("N", r"\rho", 0.3),
+            "omega": Quantity("rad/s", r"\omega", 1.0),
+            "g": Quantity("m", "g", GAP),
+        },
         modes=("free", "contact"),
         transitions=((0, 1), (1, 0)),
         indicators=("penetration", "separation"),
         outputs={"contact_force": Quantity("N")},
         text="the system as text",
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture
@@ -95,12 +98,22 @@ def trajectory(labels: Labels) -> xr.Dataset:
     state = np.stack([np.cos(time), -np.sin(time)], axis=1)
     at = np.stack([np.cos(crossing), -np.sin(crossing)], axis=1)
     return schema.trajectory(
-        labels, provenance(labels, "simulate", {"periods": 2}, method="exact"),
-        time=time, u=state, mode=mode, segment=segment, crossing_time=crossing,
-        crossing_transition=1 - np.arange(len(crossing)) % 2, u_before=at, u_after=at,
-        touch_time=np.empty(0), touch_indicator=np.empty(0), touch_u=np.empty((0, 2)), touch_clearance=np.empty(0),
+        labels,
+        provenance(labels, "simulate", {"periods": 2}, method="exact"),
+        time=time,
+        u=state,
+        mode=mode,
+        segment=segment,
+        crossing_time=crossing,
+        crossing_transition=1 - np.arange(len(crossing)) % 2,
+        u_before=at,
+        u_after=at,
+        touch_time=np.empty(0),
+        touch_indicator=np.empty(0),
+        touch_u=np.empty((0, 2)),
+        touch_clearance=np.empty(0),
         outputs=np.maximum(state[:, :1] - GAP, 0),
-    )  # fmt: skip
+    )
 
 
 def sweep_arrays(directions: int, starts: int, points: int, keep: int = 4) -> dict[str, np.ndarray]:
@@ -114,22 +127,33 @@ def sweep_arrays(directions: int, starts: int, points: int, keep: int = 4) -> di
     status[..., -1] = by_name("diverged").code
     section[..., -1, :, :] = np.nan
     return {
-        "section": section, "maximum": section.max(axis=-2), "minimum": section.min(axis=-2),
-        "period_number": np.ones(lead, dtype=int), "residual": np.zeros(lead),
-        "crossings_per_period": 2 * np.ones(lead), "contacts_per_period": np.ones(lead),
-        "clearance": np.stack([base, -base], axis=-1), "status": status,
-        "output_maximum": base[..., None] + 0.5, "output_minimum": base[..., None] - 0.5,
-    }  # fmt: skip
+        "section": section,
+        "maximum": section.max(axis=-2),
+        "minimum": section.min(axis=-2),
+        "period_number": np.ones(lead, dtype=int),
+        "residual": np.zeros(lead),
+        "crossings_per_period": 2 * np.ones(lead),
+        "contacts_per_period": np.ones(lead),
+        "clearance": np.stack([base, -base], axis=-1),
+        "status": status,
+        "output_maximum": base[..., None] + 0.5,
+        "output_minimum": base[..., None] - 0.5,
+    }
 
 
 @pytest.fixture
 def swept(labels: Labels) -> xr.Dataset:
     """A sweep of rho both ways over five values, from one start; the last point diverged."""
     return schema.sweep(
-        labels, provenance(labels, "sweep", {"parameter": "rho", "direction": "both"}, method="exact"),
-        "rho", np.linspace(0.2, 0.4, 5), sweep_arrays(2, 1, 5),
-        directions=("up", "down"), starts=np.zeros((1, 2)), squeeze=("start",),
-    )  # fmt: skip
+        labels,
+        provenance(labels, "sweep", {"parameter": "rho", "direction": "both"}, method="exact"),
+        "rho",
+        np.linspace(0.2, 0.4, 5),
+        sweep_arrays(2, 1, 5),
+        directions=("up", "down"),
+        starts=np.zeros((1, 2)),
+        squeeze=("start",),
+    )
 
 
 @pytest.fixture
@@ -141,9 +165,15 @@ def responded(labels: Labels) -> xr.Dataset:
     arrays = sweep_arrays(2, 1, 81)
     x = amplitude[:, None, :, None] * np.array([1.0, 2.0])
     base = schema.sweep(
-        labels, provenance(labels, "frequency_response", {}, method="exact"), "omega", omega,
-        arrays | {"maximum": x, "minimum": -x}, directions=("up", "down"), starts=np.zeros((1, 2)), squeeze=("start",),
-    )  # fmt: skip
+        labels,
+        provenance(labels, "frequency_response", {}, method="exact"),
+        "omega",
+        omega,
+        arrays | {"maximum": x, "minimum": -x},
+        directions=("up", "down"),
+        starts=np.zeros((1, 2)),
+        squeeze=("start",),
+    )
     return schema.response(base, amplitude=x, jumps={"value": [JUMP_UP, JUMP_DOWN], "direction": ["up", "down"]})
 
 
@@ -152,7 +182,11 @@ def points(labels: Labels) -> xr.Dataset:
     """Ten points of a section on the unit circle, from two starts."""
     angle = np.linspace(0, 1, 20).reshape(2, 10)
     return schema.section_points(
-        labels, provenance(labels, "poincare", {"n": 10}, method="exact"),
-        section=np.stack([np.cos(angle), np.sin(angle)], axis=-1), time=angle, mode=np.zeros((2, 10)),
-        status=np.zeros(2), starts=np.zeros((2, 2)),
-    )  # fmt: skip
+        labels,
+        provenance(labels, "poincare", {"n": 10}, method="exact"),
+        section=np.stack([np.cos(angle), np.sin(angle)], axis=-1),
+        time=angle,
+        mode=np.zeros((2, 10)),
+        status=np.zeros(2),
+        starts=np.zeros((2, 2)),
+    )

@@ -69,9 +69,15 @@ def steps(folder: Path) -> dict[str, Callable[[dict[str, Any]], Any]]:
 
     def control_based_continuation(_: Any) -> Any:
         return ns.control_based_continuation(
-            ns.SimulatedRig(s, resolution=5.5e-5, start=free), "frequency", (4.9, 5.1), frequency=5.0, amplitude=0.14,
-            points=2, holding=ns.Holding(release=0), **QUIET,
-        )  # fmt: skip
+            ns.SimulatedRig(s, resolution=5.5e-5, start=free),
+            "frequency",
+            (4.9, 5.1),
+            frequency=5.0,
+            amplitude=0.14,
+            points=2,
+            holding=ns.Holding(release=0),
+            **QUIET,
+        )
 
     def identify(_: Any) -> Any:
         from nonsmooth_savi2007.rig import VirtualRig
@@ -94,8 +100,13 @@ def steps(folder: Path) -> dict[str, Callable[[dict[str, Any]], Any]]:
         branch = found["continue_orbit"]
         unstable = branch.isel(point=np.flatnonzero(branch["stable"].values == 0))
         at = unstable.isel(point=unstable.sizes["point"] // 2)
-        saddle = ns.find_orbit(s.with_parameters(omega=float(at["omega"])), start=at["section"].values, period_number=1,
-                               transient=0, **QUIET)  # fmt: skip
+        saddle = ns.find_orbit(
+            s.with_parameters(omega=float(at["omega"])),
+            start=at["section"].values,
+            period_number=1,
+            transient=0,
+            **QUIET,
+        )
         return ns.manifolds(saddle, length=1.0, distance=0.1)
 
     def explore(_: Any) -> str:
@@ -154,7 +165,7 @@ def steps(folder: Path) -> dict[str, Callable[[dict[str, Any]], Any]]:
         "animate": lambda found: ns.animate(found["simulate"], seconds=1, rate=4).save(folder / "run.gif"),
         "save": lambda found: [ns.save(found["sweep"], folder / f"swept{suffix}") for suffix in (".nc", ".zarr")],
         "load": lambda found: [ns.load(path) for path in found["save"]],
-    }  # fmt: skip
+    }
 
 
 def tdms(path: Path, clock: Any, values: Any) -> Path:
@@ -234,10 +245,15 @@ def plot(found: dict[str, Any], folder: Path) -> None:
 
     mpl.use("Agg")
     for name, figure in {
-        "simulate": ns.plot.time_history, "poincare": ns.plot.section, "sweep": ns.plot.bifurcation,
-        "frequency_response": ns.plot.frequency_response, "chart": ns.plot.chart, "basins": ns.plot.basins,
-        "continue_orbit": ns.plot.branch, "manifolds": ns.plot.manifolds,
-    }.items():  # fmt: skip
+        "simulate": ns.plot.time_history,
+        "poincare": ns.plot.section,
+        "sweep": ns.plot.bifurcation,
+        "frequency_response": ns.plot.frequency_response,
+        "chart": ns.plot.chart,
+        "basins": ns.plot.basins,
+        "continue_orbit": ns.plot.branch,
+        "manifolds": ns.plot.manifolds,
+    }.items():
         ax = figure(found[name][0] if name == "chart" else found[name])
         ax.figure.savefig(folder / f"{name}.png")
 

@@ -25,12 +25,62 @@ SOURCE = str(Path(ns.__file__).parent)
 LONGEST = 20.0  # seconds
 #: Values that people and programs hand over by mistake, and some that are allowed.
 ODD: list[Any] = [
-    None, True, False, 0, 1, 2, 3, -1, 2.5, 3.0, 1e-320, 1e300, -0.0, math.nan, math.inf, 10**30, 3j, "", "a", "up",
-    "no", "x", "rho", "omega", "auto", "taylor", "cuda", [], [1.0], [0.1, 0.2], [[0.0, 0.1]], (0.1, 0.3), (0.3,
-    0.1), {}, {"x": 0.01}, {"x": (0.0, 0.01), "v": (0.0, 0.1)}, {"rho": "up"}, {"y": 1}, np.zeros(2), np.array(3.0),
-    np.array([]), np.array(["a"]), np.float64(0.2), np.int64(4), np.bool_(True), object(), len, ns,
-    ns.Stroboscopic(0.5), ns.Poincare("penetration"), b"x", range(3), {1, 2}, 1.0 + 0.0j, "1e-3",
-]  # fmt: skip
+    None,
+    True,
+    False,
+    0,
+    1,
+    2,
+    3,
+    -1,
+    2.5,
+    3.0,
+    1e-320,
+    1e300,
+    -0.0,
+    math.nan,
+    math.inf,
+    10**30,
+    3j,
+    "",
+    "a",
+    "up",
+    "no",
+    "x",
+    "rho",
+    "omega",
+    "auto",
+    "taylor",
+    "cuda",
+    [],
+    [1.0],
+    [0.1, 0.2],
+    [[0.0, 0.1]],
+    (0.1, 0.3),
+    (0.3, 0.1),
+    {},
+    {"x": 0.01},
+    {"x": (0.0, 0.01), "v": (0.0, 0.1)},
+    {"rho": "up"},
+    {"y": 1},
+    np.zeros(2),
+    np.array(3.0),
+    np.array([]),
+    np.array(["a"]),
+    np.float64(0.2),
+    np.int64(4),
+    np.bool_(True),
+    object(),
+    len,
+    ns,
+    ns.Stroboscopic(0.5),
+    ns.Poincare("penetration"),
+    b"x",
+    range(3),
+    {1, 2},
+    1.0 + 0.0j,
+    "1e-3",
+]
 
 
 def bases() -> dict[str, tuple[Any, ...]]:
@@ -41,8 +91,13 @@ def bases() -> dict[str, tuple[Any, ...]]:
     orbit = ns.find_orbit(s, progress=False)
     branch = ns.continue_orbit(orbit, "omega", (4.9, 5.9))
     lost = branch.isel(point=int(branch["special_point"][:2].mean()))  # between its two folds
-    saddle = ns.find_orbit(s.with_parameters(omega=float(lost["omega"])), start=lost["section"].values,
-                           period_number=1, transient=0, progress=False)  # fmt: skip
+    saddle = ns.find_orbit(
+        s.with_parameters(omega=float(lost["omega"])),
+        start=lost["section"].values,
+        period_number=1,
+        transient=0,
+        progress=False,
+    )
     points = ns.poincare(s, n=300)["section"].values
     free = ns.mechanical(1.0, 0.2, "k", parameters={"k": 4.0}, coordinates=["q"])
     record = {"q": (np.arange(0, 5, 0.05), np.exp(-0.1 * np.arange(0, 5, 0.05)) * np.cos(2 * np.arange(0, 5, 0.05)))}
@@ -69,34 +124,68 @@ def bases() -> dict[str, tuple[Any, ...]]:
             {"system": valve, "parameter": "q", "range": (8.9, 9.1), "start": {"y1": 2.0, "y3": 12.0}, "points": 3},
         ),
         "bifurcation_diagram": (
-            {"system": s, "parameter": "omega", "range": (4.9, 5.0), "n": 3, "transient": 10, "points": 3, "depth": 0,
-             "budget": 5.0, "progress": False},
+            {
+                "system": s,
+                "parameter": "omega",
+                "range": (4.9, 5.0),
+                "n": 3,
+                "transient": 10,
+                "points": 3,
+                "depth": 0,
+                "budget": 5.0,
+                "progress": False,
+            },
         ),
         "manifolds": ({"orbit": saddle, "length": 0.5},),
         "special_points": ({"branch": branch},),
         "smoothing_report": ({"system": s, "etas": [1e-3], "transient": 5, "progress": False},),
         "fit": ({"system": free, "recording": record, "parameters": ["k"], "tries": 1, "progress": False},),
         "select_model": (
-            {"models": {"a": (free, ["k"]), "b": (free, ["k"])}, "recording": record, "folds": 2, "tries": 1,
-             "progress": False},
+            {
+                "models": {"a": (free, ["k"]), "b": (free, ["k"])},
+                "recording": record,
+                "folds": 2,
+                "tries": 1,
+                "progress": False,
+            },
         ),
         "plan_experiment": (
-            {"system": free, "runs": {"a": {"duration": 2.0, "samples": 20, "start": {"q": 1.0}}}, "parameters": ["k"],
-             "measured": {"q": ns.Sensor(noise=1e-3)}},
+            {
+                "system": free,
+                "runs": {"a": {"duration": 2.0, "samples": 20, "start": {"q": 1.0}}},
+                "parameters": ["k"],
+                "measured": {"q": ns.Sensor(noise=1e-3)},
+            },
         ),
         "propagate": (
-            {"found": {}, "verb": ns.sweep, "start": s, "parameter": "rho", "values": [0.14], "draws": 2,
-             "settings": {"g": (0.02, 1e-4)}, **few},
+            {
+                "found": {},
+                "verb": ns.sweep,
+                "start": s,
+                "parameter": "rho",
+                "values": [0.14],
+                "draws": 2,
+                "settings": {"g": (0.02, 1e-4)},
+                **few,
+            },
         ),
-        "compare": ({"measured": ns.sweep(s, "omega", [5.0], keep=40, progress=False).isel(omega=0), "theory": s,
-                     "noise": [1e-4, 1e-3], "transient": 10, "draws": 0, "splits": 20},),
+        "compare": (
+            {
+                "measured": ns.sweep(s, "omega", [5.0], keep=40, progress=False).isel(omega=0),
+                "theory": s,
+                "noise": [1e-4, 1e-3],
+                "transient": 10,
+                "draws": 0,
+                "splits": 20,
+            },
+        ),
         "region": ({"result": run, "condition": "x < 0.01"},),
         "table": ({"result": run},),
         "Poincare": ({"indicator": "penetration"},),
         "Stroboscopic": ({},),
         "Holding": ({},),
         "SimulatedRig": ({"system": s},),
-    }  # fmt: skip
+    }
 
 
 class Slow(BaseException):

@@ -27,10 +27,25 @@ def passes(tests: list[str], copy: Path) -> bool:
     """Return True where the tests pass with the packages of a copy."""
     paths = os.pathsep.join(str(copy / one) for one in SOURCES)
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider",
-         "-o", f"faulthandler_timeout={LONGEST}", *tests],
-        cwd=ROOT, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-x",
+            "-q",
+            "-n",
+            "0",
+            "-p",
+            "no:cacheprovider",
+            "-o",
+            f"faulthandler_timeout={LONGEST}",
+            *tests,
+        ],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+    )
     if done.returncode not in (0, 1):
         raise SystemExit(f"pytest could not run {' '.join(tests)}:\n{done.stdout}{done.stderr}")
     return done.returncode == 0

@@ -38,9 +38,10 @@ def define(**changes: object) -> ns.System:
         "modes": {"free": lambda t, u, p: (u.v, -p.k * u.x), "contact": lambda t, u, p: (u.v, -10 * p.k * u.x)},
         "indicators": {"gap": lambda t, u, p: u.x - p.g},
         "transitions": [
-            ns.Transition("free", "contact", when="gap > 0"), ns.Transition("contact", "free", when="gap < 0")
+            ns.Transition("free", "contact", when="gap > 0"),
+            ns.Transition("contact", "free", when="gap < 0"),
         ],
-    }  # fmt: skip
+    }
     return ns.System(**(parts | changes))
 
 

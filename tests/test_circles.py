@@ -36,8 +36,9 @@ def imports(source: Path) -> dict[str, set[str]]:
 
 def circle(graph: dict[str, set[str]], room: str = "") -> list[str]:
     """One circle within a room; empty where there is none."""
-    within = {name: {to for to in found if to.startswith(room)} for name, found in graph.items()
-              if name.startswith(room)}  # fmt: skip
+    within = {
+        name: {to for to in found if to.startswith(room)} for name, found in graph.items() if name.startswith(room)
+    }
     try:
         TopologicalSorter(within).prepare()
     except CycleError as error:
@@ -68,9 +69,11 @@ def test_a_circle_is_found(tmp_path: Path) -> None:
     """a imports b for types only, b imports a inside a function; c imports both."""
     (tmp_path / "p").mkdir()
     for name, text in {
-        "__init__": "", "a": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from p.b import B\n",
-        "b": "def f():\n    from p import a\n", "c": "import p.a\nimport p.b\n",
-    }.items():  # fmt: skip
+        "__init__": "",
+        "a": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from p.b import B\n",
+        "b": "def f():\n    from p import a\n",
+        "c": "import p.a\nimport p.b\n",
+    }.items():
         (tmp_path / "p" / f"{name}.py").write_text(text, encoding="utf-8")
     assert set(circle(imports(tmp_path))) == {"p.a", "p.b"}
 

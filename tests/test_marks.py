@@ -24,8 +24,11 @@ def files_of(path: Path) -> set[Path]:
     found = {path}
     for one in (waiting := [path]):
         for name in imported(one):
-            places = [HERE.parent / f"{name.replace('.', '/')}.py", one.parent / f"{name}.py",
-                      HERE / "independent" / f"{name}.py"]  # fmt: skip
+            places = [
+                HERE.parent / f"{name.replace('.', '/')}.py",
+                one.parent / f"{name}.py",
+                HERE / "independent" / f"{name}.py",
+            ]
             new = {place for place in places if place.is_file()} - found
             found |= new
             waiting += new
@@ -36,9 +39,12 @@ def test_public_names_only() -> None:
     marked = [path for path in HERE.rglob("test_*.py") if MARK in path.read_text(encoding="utf-8")]
     assert len(marked) > 40
     inner = {
-        (path.name, one.name, name) for path in marked for one in files_of(path) for name in imported(one)
+        (path.name, one.name, name)
+        for path in marked
+        for one in files_of(path)
+        for name in imported(one)
         if name.startswith("nonsmooth.")
-    }  # fmt: skip
+    }
     assert inner == set()
 
 

@@ -26,203 +26,334 @@ MISTAKES = {
     # the functions of a system
     "arguments in another order": (
         "def swing(u, t, p):\n    return u.v, -p.k * u.x\n\nsystem(modes={'free': swing})",
-        "function `swing`): its arguments are (u, t, p)", "f(t, u, p): time, states, parameters", "write them so",
+        "function `swing`): its arguments are (u, t, p)",
+        "f(t, u, p): time, states, parameters",
+        "write them so",
     ),
     "arguments as in SciPy": (
         "def swing(t, y):\n    return [y[1], -y[0]]\n\nsystem(modes={'free': swing})",
-        "mode 'free' (function `swing`): its arguments are (t, y)", "called as f(t, u, p)", "write them so",
+        "mode 'free' (function `swing`): its arguments are (t, y)",
+        "called as f(t, u, p)",
+        "write them so",
     ),
     "names that hide another order": (
         "system(modes={'free': lambda state, time, par: (state.v, -par.k * state.x)})",
-        "its arguments are (state, time, par)", "called as f(t, u, p): time, states, parameters", "mode 'free'",
+        "its arguments are (state, time, par)",
+        "called as f(t, u, p): time, states, parameters",
+        "mode 'free'",
     ),
     "an indicator without the time": (
         "system(indicators={'gap': lambda u, p: u.x - p.g})",
-        "indicator 'gap': its arguments are (u, p)", "called as f(t, u, p)", "write them so",
+        "indicator 'gap': its arguments are (u, p)",
+        "called as f(t, u, p)",
+        "write them so",
     ),
     "a reset of the state alone": (
         "system(transitions=[ns.Transition('free', 'free', when='gap > 0', reset=lambda u: (u.x, -u.v))])",
-        "the reset of transition free -> free: its arguments are (u)", "called as f(t, u, p)", "write them so",
+        "the reset of transition free -> free: its arguments are (u)",
+        "called as f(t, u, p)",
+        "write them so",
     ),
     "a power as in MATLAB": (FIELD.format("(u.v, -u.x^3)"), "mode 'free'", "`^` is not a power", "write x**3"),
     "math.cos": (
-        FIELD.format("(u.v, math.cos(p.omega * t))"), "the number was `p.omega*t`", "NumPy's functions", "np.cos"
+        FIELD.format("(u.v, math.cos(p.omega * t))"),
+        "the number was `p.omega*t`",
+        "NumPy's functions",
+        "np.cos",
     ),
     "an if on a state": (
         "def swing(t, u, p):\n    if u.x > p.g:\n        return u.v, -10 * u.x\n    return u.v, -u.x\n\n"
         "system(modes={'free': swing})",
-        "mode 'free': `u.x > p.g` cannot be decided", "ns.where(condition, a, b)", "Make it two modes",
+        "mode 'free': `u.x > p.g` cannot be decided",
+        "ns.where(condition, a, b)",
+        "Make it two modes",
     ),
     "np.sign": (
-        FIELD.format("(u.v, -np.sign(u.v))"), "contains `sign` of the state", "an indicator that changes sign",
+        FIELD.format("(u.v, -np.sign(u.v))"),
+        "contains `sign` of the state",
+        "an indicator that changes sign",
         "Make it two modes",
     ),
     "an array of floats": (
-        FIELD.format("np.array([u.v, -u.x], dtype=float)"), "the number was `u.v`", "symbolic number", "without dtype"
+        FIELD.format("np.array([u.v, -u.x], dtype=float)"),
+        "the number was `u.v`",
+        "symbolic number",
+        "without dtype",
     ),
     "one derivative of two": (
-        FIELD.format("-p.k * u.x"), "it returned 1 values", "must return 2 values", "one for each of x, v"
+        FIELD.format("-p.k * u.x"),
+        "it returned 1 values",
+        "must return 2 values",
+        "one for each of x, v",
     ),
     "a parameter in capitals": (
-        FIELD.format("(u.v, -p.K * u.x)"), "`K` is not a parameter", "all: e, g, k, omega", "nearest: k"
+        FIELD.format("(u.v, -p.K * u.x)"),
+        "`K` is not a parameter",
+        "all: e, g, k, omega",
+        "nearest: k",
     ),
     "a parameter among the states": (
-        FIELD.format("(u.v, -u.k * u.x)"), "`k` is not a state", "all: v, x", "of mode 'free'"
+        FIELD.format("(u.v, -u.k * u.x)"),
+        "`k` is not a state",
+        "all: v, x",
+        "of mode 'free'",
     ),
     "a condition as an indicator": (
         "system(indicators={'gap': lambda t, u, p: u.x > p.g})",
-        "`u.x > p.g` is a condition, not a number", "ns.where(condition, a, b)", "write the difference of both sides",
+        "`u.x > p.g` is a condition, not a number",
+        "ns.where(condition, a, b)",
+        "write the difference of both sides",
     ),
     # the parts of a system
     "== in a condition": (IMPACT.format("gap == 0"), "cannot read 'gap == 0'", "<indicator> > 0", "new indicator"),
     "or in a condition": (
-        IMPACT.format("gap > 0 or gap < 0"), "'gap > 0 or gap < 0'", "joined by 'and'", "'or' is a second transition"
+        IMPACT.format("gap > 0 or gap < 0"),
+        "'gap > 0 or gap < 0'",
+        "joined by 'and'",
+        "'or' is a second transition",
     ),
-    "states in a condition": (
-        IMPACT.format("x > g"), "cannot read 'x > g'", "<indicator> > 0", 'write "gap > 0"'
-    ),
+    "states in a condition": (IMPACT.format("x > g"), "cannot read 'x > g'", "<indicator> > 0", 'write "gap > 0"'),
     "a misspelt mode": (
         "system(transitions=[ns.Transition('free', 'fre', when='gap > 0')])",
-        "`fre` is not a mode", "all: free", "nearest: free;",
+        "`fre` is not a mode",
+        "all: free",
+        "nearest: free;",
     ),
     "a tuple as a transition": (
         "system(transitions=[('free', 'free', 'gap > 0')])",
-        "not ('free', 'free', 'gap > 0')", "a list of ns.Transition", "write ns.Transition(",
+        "not ('free', 'free', 'gap > 0')",
+        "a list of ns.Transition",
+        "write ns.Transition(",
     ),
     "one transition without its list": (
         "system(transitions=ns.Transition('free', 'free', when='gap > 0', reset=lambda t, u, p: (u.x, -u.v)))",
-        "not free -> free alone", "a list of ns.Transition", "put it into [ ]",
+        "not free -> free alone",
+        "a list of ns.Transition",
+        "put it into [ ]",
     ),
     "a unit in the value": (
-        "system(parameters={'k': '8.47 N/m'})", "not '8.47 N/m'", "a real number", '{"k": (8.47, "N/m")}'
+        "system(parameters={'k': '8.47 N/m'})",
+        "not '8.47 N/m'",
+        "a real number",
+        '{"k": (8.47, "N/m")}',
     ),
     "a unit before the value": (
-        "system(parameters={'k': ('N/m', 8.47)})", "parameter 'k' is ('N/m', 8.47)", "(number, unit)", "give a number"
+        "system(parameters={'k': ('N/m', 8.47)})",
+        "parameter 'k' is ('N/m', 8.47)",
+        "(number, unit)",
+        "give a number",
     ),
     "states as one string": ("system(states='x v')", "not 'x v'", "or be a list of names", '{"x": "m"}'),
     "parts by position": (
         "ns.System({'x': 'm'}, {'k': 1.0}, {'free': lambda t, u, p: -u.x})",
-        "not 3", "no arguments by position", "System(states=, parameters=, modes=",
+        "not 3",
+        "no arguments by position",
+        "System(states=, parameters=, modes=",
     ),
     "a reserved name": (
-        "system(parameters={'period': 1.0})", "'period' cannot name a parameter", "Reserved: ", "try period_"
+        "system(parameters={'period': 1.0})",
+        "'period' cannot name a parameter",
+        "Reserved: ",
+        "try period_",
     ),
     "a mass of zero": ("osc.with_parameters(m=0)", "m = 0", "divide by zero", "give m another value"),
     "an unknown parameter": (
-        "osc.with_parameters(gap=0.001)", "`gap` is not a parameter", "all: c, c_s, g, k,", "nearest: g [m]"
+        "osc.with_parameters(gap=0.001)",
+        "`gap` is not a parameter",
+        "all: c, c_s, g, k,",
+        "nearest: g [m]",
     ),
     "a parameter by position": (
-        "osc.with_parameters('rho', 0.3)", "not 2: give 0.3", "takes 1 argument by position", "by its name"
+        "osc.with_parameters('rho', 0.3)",
+        "not 2: give 0.3",
+        "takes 1 argument by position",
+        "by its name",
     ),
-    "a parameter as an attribute": (
-        "osc.rho", "no 'rho'", "system.values['rho']", "with_parameters(rho=...)"
-    ),
+    "a parameter as an attribute": ("osc.rho", "no 'rho'", "system.values['rho']", "with_parameters(rho=...)"),
     "text as a band": ("osc.smoothed('1e-5')", "not '1e-5'", "a real number", "eta must be"),
     # names of the package
     "a misspelt verb": (
-        "ns.simulte(osc)", "no attribute 'simulte'", "dir(nonsmooth) lists all", "nearest: ns.simulate"
+        "ns.simulte(osc)",
+        "no attribute 'simulte'",
+        "dir(nonsmooth) lists all",
+        "nearest: ns.simulate",
     ),
     "a figure among the verbs": (
-        "ns.bifurcation(osc)", "no attribute 'bifurcation'", "dir(nonsmooth) lists all", "nearest: ns.plot.bifurcation"
+        "ns.bifurcation(osc)",
+        "no attribute 'bifurcation'",
+        "dir(nonsmooth) lists all",
+        "nearest: ns.plot.bifurcation",
     ),
     "a misspelt figure": (
-        "ns.plot.bifurcaton(osc)", "`bifurcaton` is not a figure", "all: COLORS", "nearest: bifurcation;"
+        "ns.plot.bifurcaton(osc)",
+        "`bifurcaton` is not a figure",
+        "all: COLORS",
+        "nearest: bifurcation;",
     ),
     "a misspelt model": (
-        "ns.models.discontinous_support()", "`discontinous_support`", "chua_circuit, discontinuous_support,",
+        "ns.models.discontinous_support()",
+        "`discontinous_support`",
+        "chua_circuit, discontinuous_support,",
         "nearest: discontinuous_support;",
     ),
     # verbs and their arguments
     "the length by position": (
-        "ns.simulate(osc, 20)", "not 2: give 20", "takes 1 argument by position", "simulate(system, periods=, duration="
+        "ns.simulate(osc, 20)",
+        "not 2: give 20",
+        "takes 1 argument by position",
+        "simulate(system, periods=, duration=",
     ),
     "a parameter as an option": (
-        "ns.simulate(osc, periods=3, omega=3.0)", "`omega` is a parameter", "not an option",
-        "with_parameters(omega=...)"
+        "ns.simulate(osc, periods=3, omega=3.0)",
+        "`omega` is a parameter",
+        "not an option",
+        "with_parameters(omega=...)",
     ),
     "an option of SciPy": (
-        "ns.simulate(osc, t_span=(0, 10))", "`t_span` is not an option of simulate", "all: atol, duration", "nearest: "
+        "ns.simulate(osc, t_span=(0, 10))",
+        "`t_span` is not an option of simulate",
+        "all: atol, duration",
+        "nearest: ",
     ),
     "a model that is not called": (
         "ns.simulate(ns.models.discontinuous_support, periods=3)",
-        "not <function discontinuous_support", "takes an ns.System", "call it: discontinuous_support()",
+        "not <function discontinuous_support",
+        "takes an ns.System",
+        "call it: discontinuous_support()",
     ),
     "no length": ("ns.simulate(osc)", "once", "periods=... or duration=...", "give the length"),
     "a negative length": ("ns.simulate(osc, periods=-5)", "periods = -5", "must be positive", "the length of a run"),
     "periods without forcing": (
-        "ns.simulate(valve, periods=5)", "no forcing period", "in place of periods", "give duration=..."
+        "ns.simulate(valve, periods=5)",
+        "no forcing period",
+        "in place of periods",
+        "give duration=...",
     ),
     "a billion periods": (
-        "ns.simulate(osc, periods=1e9)", "a run with 2.56e+11 samples", "GiB are free", "give samples="
+        "ns.simulate(osc, periods=1e9)",
+        "a run with 2.56e+11 samples",
+        "GiB are free",
+        "give samples=",
     ),
     "a method of SciPy": (
-        "ns.simulate(osc, periods=1, method='RK45')", "'RK45'", "'exact', 'taylor', 'rkf45'", "method ="
+        "ns.simulate(osc, periods=1, method='RK45')",
+        "'RK45'",
+        "'exact', 'taylor', 'rkf45'",
+        "method =",
     ),
     "a tolerance for the exact flow": (
-        "ns.simulate(osc, periods=1, method='exact', rtol=1e-9)", 'method="exact"', "no tolerance", "leave rtol, atol"
+        "ns.simulate(osc, periods=1, method='exact', rtol=1e-9)",
+        'method="exact"',
+        "no tolerance",
+        "leave rtol, atol",
     ),
     "a start that is too short": (
-        "ns.simulate(osc, periods=1, start=[0.1])", "not shape (1,)", "2 numbers (x, v)", "or name them: {'x': 0.0"
+        "ns.simulate(osc, periods=1, start=[0.1])",
+        "not shape (1,)",
+        "2 numbers (x, v)",
+        "or name them: {'x': 0.0",
     ),
     "a start with a unit": (
-        "ns.simulate(osc, periods=1, start={'x': '1 mm'})", "not '1 mm'", "a real number", "the start of state 'x'"
+        "ns.simulate(osc, periods=1, start={'x': '1 mm'})",
+        "not '1 mm'",
+        "a real number",
+        "the start of state 'x'",
     ),
     "a start that is NaN": (
-        "ns.simulate(osc, periods=1, start={'x': float('nan')})", "[nan, 0.0]", "a finite number", "state 'x'"
+        "ns.simulate(osc, periods=1, start={'x': float('nan')})",
+        "[nan, 0.0]",
+        "a finite number",
+        "state 'x'",
     ),
     "an unknown mode": (
-        "ns.simulate(osc, periods=1, mode='fre')", "`fre` is not a mode", "all: contact", "nearest: free"
+        "ns.simulate(osc, periods=1, mode='fre')",
+        "`fre` is not a mode",
+        "all: contact",
+        "nearest: free",
     ),
     "values before their name": (
-        "ns.sweep(osc, [0.2, 0.3], 'rho')", "not [0.2, 0.3]", "by its name in quotes", "before its values"
+        "ns.sweep(osc, [0.2, 0.3], 'rho')",
+        "not [0.2, 0.3]",
+        "by its name in quotes",
+        "before its values",
     ),
     "a name as a keyword": (
-        "ns.sweep(osc, rho=[0.2, 0.3])", "sweep needs parameter and values", "direction=",
-        "sweep(system, parameter, values"
+        "ns.sweep(osc, rho=[0.2, 0.3])",
+        "sweep needs parameter and values",
+        "direction=",
+        "sweep(system, parameter, values",
     ),
     "no values": ("ns.sweep(osc, 'rho', [])", "shape (0,)", "a list of numbers", "give at least one"),
     "one value": ("ns.sweep(osc, 'rho', 0.3)", "shape ()", "a list of numbers", "write [value]"),
     "values with NaN": ("ns.sweep(osc, 'rho', [0.2, float('nan')])", "number 1 is nan", "must be finite", "'rho'"),
     "values as text": ("ns.sweep(osc, 'rho', '0.1, 0.2')", "not '0.1, 0.2'", "real numbers", "values of 'rho'"),
     "more periods than are kept": (
-        "ns.sweep(osc, 'rho', [0.2], keep=10, max_period=16)", "max_period = 16", "periods up to 9", "raise keep"
+        "ns.sweep(osc, 'rho', [0.2], keep=10, max_period=16)",
+        "max_period = 16",
+        "periods up to 9",
+        "raise keep",
     ),
     "another direction": ("ns.sweep(osc, 'rho', [0.2], direction='forward')", "'forward'", "'up', 'down'", "allowed: "),
     "an indicator as a section": (
-        "ns.poincare(osc, section='penetration')", "not 'penetration'", "ns.Poincare(...)", "section must be"
+        "ns.poincare(osc, section='penetration')",
+        "not 'penetration'",
+        "ns.Poincare(...)",
+        "section must be",
     ),
     "a section of an unknown indicator": (
-        "ns.poincare(osc, section=ns.Poincare('penetraton'))", "`penetraton`", "all: penetration",
-        "nearest: penetration;"
+        "ns.poincare(osc, section=ns.Poincare('penetraton'))",
+        "`penetraton`",
+        "all: penetration",
+        "nearest: penetration;",
     ),
     "a phase in degrees": ("ns.Stroboscopic(90)", "phase = 90", "0 <= phase < 1", "in forcing periods"),
     "more points than memory": (
-        "ns.poincare(osc, n=1e10)", "1 x 1e+10 section points", "GiB are free", "ask for fewer"
+        "ns.poincare(osc, n=1e10)",
+        "1 x 1e+10 section points",
+        "GiB are free",
+        "ask for fewer",
     ),
     "a mesh as a grid": (
         "a, b = np.meshgrid([3.0, 4.0], [0.1, 0.2])\nns.chart(osc, {'omega': a, 'rho': b})",
-        "shape (2, 2)", "a list of numbers", "give one axis",
+        "shape (2, 2)",
+        "a list of numbers",
+        "give one axis",
     ),
     "one parameter of a chart": (
-        "ns.chart(osc, {'rho': [0.1, 0.2]})", "given: ['rho']", "two parameters", '{"omega": values, "rho": values}'
+        "ns.chart(osc, {'rho': [0.1, 0.2]})",
+        "given: ['rho']",
+        "two parameters",
+        '{"omega": values, "rho": values}',
     ),
     "parameters as a plane of starts": (
-        "ns.basins(osc, {'rho': [0.1, 0.2], 'omega': [3, 4]})", "`rho` is not a state", "all: v, x", "support'"
+        "ns.basins(osc, {'rho': [0.1, 0.2], 'omega': [3, 4]})",
+        "`rho` is not a state",
+        "all: v, x",
+        "support'",
     ),
     "a GPU by its common name": (
-        "ns.chart(osc, {'omega': [3.0, 4.0], 'rho': [0.1, 0.2]}, device='gpu')", "'gpu'", "'cpu', 'cuda'", "allowed: "
+        "ns.chart(osc, {'omega': [3.0, 4.0], 'rho': [0.1, 0.2]}, device='gpu')",
+        "'gpu'",
+        "'cpu', 'cuda'",
+        "allowed: ",
     ),
     "a misspelt option of find_orbit": (
-        "ns.find_orbit(osc, period=2)", "`period` is not an option", "all: ", "nearest: period_number"
+        "ns.find_orbit(osc, period=2)",
+        "`period` is not an option",
+        "all: ",
+        "nearest: period_number",
     ),
     "a branch of a system": (
-        "ns.continue_orbit(osc, 'rho', (0.2, 0.5))", "not System", "a branch (of continue_orbit)", "of find_orbit"
+        "ns.continue_orbit(osc, 'rho', (0.2, 0.5))",
+        "not System",
+        "a branch (of continue_orbit)",
+        "of find_orbit",
     ),
     # files
     "a result as a table": ("ns.load('data.csv')", "data.csv", ".nc (NetCDF) or .zarr (Zarr)", "must end in"),
     "no such file": ("ns.load('none.nc')", "none.nc: no such file", ".nc or .zarr", "written by nonsmooth.save"),
     "save in another order": ("ns.save('run.nc', osc)", "got str", "an xarray.Dataset", "save takes"),
-}  # fmt: skip
+}
 
 
 def system(**changes: Any) -> ns.System:
@@ -237,8 +368,14 @@ def system(**changes: Any) -> ns.System:
     return ns.System(**(parts | changes))
 
 
-NAMES = {"ns": ns, "np": np, "math": math, "system": system, "osc": ns.models.discontinuous_support(),
-         "valve": ns.models.relief_valve()}  # fmt: skip
+NAMES = {
+    "ns": ns,
+    "np": np,
+    "math": math,
+    "system": system,
+    "osc": ns.models.discontinuous_support(),
+    "valve": ns.models.relief_valve(),
+}
 
 
 @pytest.fixture
@@ -267,27 +404,43 @@ FILES = {
     "a misspelt key": (STUDY + "[simulate]\nperiod = 3\n", "`period` is not a key", "nearest: periods", "all: "),
     "a misspelt table": (STUDY + "[simulat]\nperiods = 3\n", "`simulat` is not a table", "nearest: simulate", "all: "),
     "another file ending": (
-        STUDY + '[simulate]\nperiods = 3\n[output]\ndata = "run.csv"\n', "'run.csv'", "must end in .nc, .zarr", "data ="
+        STUDY + '[simulate]\nperiods = 3\n[output]\ndata = "run.csv"\n',
+        "'run.csv'",
+        "must end in .nc, .zarr",
+        "data =",
     ),
     "values as a range": (
-        STUDY + '[sweep]\nparameter = "rho"\nvalues = "0.2:0.5"\n', "values is '0.2:0.5'", "give a list", "n = ... }"
+        STUDY + '[sweep]\nparameter = "rho"\nvalues = "0.2:0.5"\n',
+        "values is '0.2:0.5'",
+        "give a list",
+        "n = ... }",
     ),
     "more values than memory": (
         STUDY + '[sweep]\nparameter = "rho"\nvalues = { from = 0.2, to = 0.5, n = 5e12 }\n',
-        "n = 5e+12 numbers", "GiB are free", "take fewer",
+        "n = 5e+12 numbers",
+        "GiB are free",
+        "take fewer",
     ),
     "a number of 400 digits": (
-        STUDY + f"[simulate]\nperiods = {'9' * 400}\n", "periods must be finite", "not inf", "nonsmooth: "
+        STUDY + f"[simulate]\nperiods = {'9' * 400}\n",
+        "periods must be finite",
+        "not inf",
+        "nonsmooth: ",
     ),
     "a number of 5000 digits": (
-        STUDY + f"[simulate]\nperiods = {'9' * 5000}\n", "is not a TOML file", "digits", "study"
+        STUDY + f"[simulate]\nperiods = {'9' * 5000}\n",
+        "is not a TOML file",
+        "digits",
+        "study",
     ),
     "5000 brackets": (STUDY + f"[simulate]\nperiods = {'[' * 5000}\n", "is not a TOML file", "recursion", "study"),
     "a text of a million letters": (
-        STUDY + f'[simulate]\nperiods = 3\nmethod = "{"x" * 10**6}"\n', "(1000002 characters)", "'auto', 'exact'",
-        "method"
+        STUDY + f'[simulate]\nperiods = 3\nmethod = "{"x" * 10**6}"\n',
+        "(1000002 characters)",
+        "'auto', 'exact'",
+        "method",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", FILES)
@@ -309,14 +462,21 @@ LONG = list(map(float, range(10**5)))
 @pytest.mark.parametrize(
     "typed",
     [
-        "ns.sweep(osc, 'rho', ['a', *LONG])", "ns.simulate(osc, periods=1, start=['a', *LONG])", "ns.chart(osc, LONG)",
-        "osc.with_parameters(rho=LONG)", "ns.simulate(osc, periods=1, samples=['a', *LONG])",
-        "ns.simulate(osc, periods=1, ramps={'rho': LONG})", "ns.poincare(osc, section=LONG)", "osc.smoothed(LONG)",
-        "osc.with_parameters(rho=10**5000)", "osc.with_parameters({'x' * 10**6: 1.0})", "ns.simulate(osc, LONG)",
+        "ns.sweep(osc, 'rho', ['a', *LONG])",
+        "ns.simulate(osc, periods=1, start=['a', *LONG])",
+        "ns.chart(osc, LONG)",
+        "osc.with_parameters(rho=LONG)",
+        "ns.simulate(osc, periods=1, samples=['a', *LONG])",
+        "ns.simulate(osc, periods=1, ramps={'rho': LONG})",
+        "ns.poincare(osc, section=LONG)",
+        "osc.smoothed(LONG)",
+        "osc.with_parameters(rho=10**5000)",
+        "osc.with_parameters({'x' * 10**6: 1.0})",
+        "ns.simulate(osc, LONG)",
         "ns.System.from_text('{' * 10**6)",
         "system(transitions=[ns.Transition('free', 'free', when='gap > 0 or ' * 10**5)])",
     ],
-)  # fmt: skip
+)
 def test_a_message_quotes_little_of_what_was_given(typed: str, nothing_compiled: None) -> None:
     with pytest.raises((ValueError, TypeError)) as raised:
         exec(typed, {**NAMES, "LONG": LONG})
@@ -333,10 +493,11 @@ def test_a_reset_with_the_wrong_sign(method: str, sign: int) -> None:
         modes={"motion": lambda t, u, p: (u.v, p.A * np.cos(p.omega * t) - p.k * u.x - p.c * u.v)},
         indicators={"stop": lambda t, u, p: sign * (u.x - p.d)},
         transitions=[
-            ns.Transition("motion", "motion", when=f"stop {'>' if sign > 0 else '<'} 0",
-                          reset=lambda t, u, p: (u.x, p.e * u.v))
+            ns.Transition(
+                "motion", "motion", when=f"stop {'>' if sign > 0 else '<'} 0", reset=lambda t, u, p: (u.x, p.e * u.v)
+            )
         ],
-    )  # fmt: skip
+    )
     with pytest.raises(ns.SolveError, match="The reset of motion -> motion leaves the state on its way on") as raised:
         ns.simulate(wrong, periods=10, method=method)
     before, after = (float(word) for word in str(raised.value).split("d(stop)/dt is ")[1].split()[0:6:4])
@@ -347,10 +508,12 @@ def test_a_reset_with_the_wrong_sign(method: str, sign: int) -> None:
 def test_real_chatter_is_not_taken_for_a_wrong_sign() -> None:
     """A ball that comes to rest: the rates after its impacts point away from the floor."""
     ball = ns.System(
-        states=["x", "v"], parameters={"e": 0.5}, modes={"flight": lambda t, u, p: (u.v, -1.0)},
+        states=["x", "v"],
+        parameters={"e": 0.5},
+        modes={"flight": lambda t, u, p: (u.v, -1.0)},
         indicators={"floor": lambda t, u, p: -u.x},
         transitions=[ns.Transition("flight", "flight", when="floor > 0", reset=lambda t, u, p: (u.x, -p.e * u.v))],
-    )  # fmt: skip
+    )
     with pytest.raises(ns.SolveError, match="ever shorter times") as raised:
         ns.simulate(ball, duration=20.0, start=[1.0, 0.0])
     assert raised.value.status == "chatter" and "other sign" not in str(raised.value)

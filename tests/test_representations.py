@@ -45,29 +45,41 @@ def short(text: str) -> bool:
 
 def findings() -> tuple[Finding, ...]:
     return tuple(
-        Finding(f"q{i}", Estimate(2.0, 0.1, "N"), "by a <method> that is told " + "at length " * 30, 40, ("a", "b"),
-                tuple(f"note {k}: " + "words " * 100 for k in range(6)), {"other": Estimate(1.0, 0.25, "m")})
+        Finding(
+            f"q{i}",
+            Estimate(2.0, 0.1, "N"),
+            "by a <method> that is told " + "at length " * 30,
+            40,
+            ("a", "b"),
+            tuple(f"note {k}: " + "words " * 100 for k in range(6)),
+            {"other": Estimate(1.0, 0.25, "m")},
+        )
         for i in range(9)
-    )  # fmt: skip
+    )
 
 
 def identified(**more: object) -> ParameterSet:
     return ParameterSet(
         {"k": Estimate(8.47, 0.05, "N/m"), "c": Estimate(0.8, 0.1, "N s/m", logarithmic=True)},
-        np.diag([0.05**2, 0.01, 0.0]), extra={"gain": Estimate(1.0, 0.0)}, findings=findings(),
-        identifiability={"k": "from the springs"}, notes=["a long note " * 40] * 12, **more,
-    )  # fmt: skip
+        np.diag([0.05**2, 0.01, 0.0]),
+        extra={"gain": Estimate(1.0, 0.0)},
+        findings=findings(),
+        identifiability={"k": "from the springs"},
+        notes=["a long note " * 40] * 12,
+        **more,
+    )
 
 
 def many_modes(modes: int) -> ns.System:
     """A chain of modes, one behind the other."""
     names = [f"mode{i}" for i in range(modes)]
     return ns.System(
-        states=["x"], parameters={f"parameter_{i}": float(i) for i in range(30)},
+        states=["x"],
+        parameters={f"parameter_{i}": float(i) for i in range(30)},
         modes={name: lambda t, u, p: (p.parameter_1,) for name in names},
         indicators={f"h_{name}": lambda t, u, p, i=i: u.x - i for i, name in enumerate(names)},
         transitions=[ns.Transition(a, b, when=f"h_{b} > 0") for a, b in pairwise(names)],
-    )  # fmt: skip
+    )
 
 
 def test_a_system_is_short_and_printed_whole() -> None:
@@ -114,9 +126,13 @@ def test_a_finding_is_one_line_and_printed_whole() -> None:
 
 def test_a_recording_is_short() -> None:
     sensors = {
-        f"s{i}": xr.Dataset({f"channel{i}_{k}": ("time", np.zeros(5), {"units": "N"}) for k in range(40)},
-                            {"time": np.arange(5.0)}, {"rate": 100.0}) for i in range(40)
-    }  # fmt: skip
+        f"s{i}": xr.Dataset(
+            {f"channel{i}_{k}": ("time", np.zeros(5), {"units": "N"}) for k in range(40)},
+            {"time": np.arange(5.0)},
+            {"rate": 100.0},
+        )
+        for i in range(40)
+    }
     recording = ns.Recording.from_runs({"run": sensors}, synthetic=True, warnings=("a <warning>",))
     assert short(repr(recording)) and "5 samples at 100 Hz: channel0_0 [N]" in repr(recording)
     cells = Page(recording._repr_html_()).cells

@@ -35,10 +35,11 @@ def test_a_library_has_one_bound() -> None:
     """An extra, the tests and what a build needs ask for no other version than the package does."""
     project = PROJECT["project"]
     everywhere = [
-        *project["dependencies"], *(one for extra in project["optional-dependencies"].values() for one in extra),
+        *project["dependencies"],
+        *(one for extra in project["optional-dependencies"].values() for one in extra),
         *(one for group in PROJECT["dependency-groups"].values() for one in group),
         *PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["hooks"]["custom"]["dependencies"],
-    ]  # fmt: skip
+    ]
     bounds: dict[str, set[str]] = {}
     for one in everywhere:
         name, bound = re.match(r"([\w-]+)(?:\[\w+\])?([^;]*)", one).groups()  # type: ignore[union-attr]

@@ -117,9 +117,11 @@ def test_wells_by_symmetry(two_wells: ns.System) -> None:
 def test_a_motion_that_escapes_is_diverged() -> None:
     """x'' = -x + x^3 beyond the barrier of 1 escapes; below it (damped) it comes to rest."""
     system = ns.System(
-        states=["x", "v"], parameters={"d": 0.5},
-        modes={"only": lambda t, u, p: (u.v, -u.x + u.x**3 - p.d * u.v)}, period=1.0,
-    )  # fmt: skip
+        states=["x", "v"],
+        parameters={"d": 0.5},
+        modes={"only": lambda t, u, p: (u.v, -u.x + u.x**3 - p.d * u.v)},
+        period=1.0,
+    )
     found = basins(system, {"x": [-1.5, 0.0, 0.5, 1.5], "v": [0.0]}, transient=100, keep=20, **QUIET)
     assert found["label"].values.ravel().tolist() == [-2, 0, 0, -2]
     assert float(found["fraction"][0]) == 0.5

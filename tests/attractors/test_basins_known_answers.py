@@ -78,9 +78,12 @@ def test_cycles_that_differ_by_a_shift_in_time_are_two() -> None:
         return -(1.5 * u.x - 0.5 * u.x**3), p.b * u.y
 
     twice = ns.System(
-        states=["x", "y"], parameters={"b": 0.5, "a": 0.0}, modes={"rest": lambda t, u, p: (0 * u.x, 0 * u.y)},
-        transitions=[ns.Transition("rest", "rest", at=phase, reset=kick) for phase in (0.25, 0.75)], period=1.0,
-    )  # fmt: skip
+        states=["x", "y"],
+        parameters={"b": 0.5, "a": 0.0},
+        modes={"rest": lambda t, u, p: (0 * u.x, 0 * u.y)},
+        transitions=[ns.Transition("rest", "rest", at=phase, reset=kick) for phase in (0.25, 0.75)],
+        period=1.0,
+    )
     found = ns.basins(twice, {"x": [-0.8, -0.3, 0.3, 0.8], "y": [0.0, 0.5]}, **QUIET)
     assert found["period_number"].values.tolist() == [1, 1]
     np.testing.assert_array_equal(found["label"].values, np.repeat([[0], [0], [1], [1]], 2, axis=1))
@@ -112,13 +115,15 @@ def test_two_modes_at_the_same_section_point_are_two_attractors() -> None:
 def test_memory_goes_on_where_a_run_goes_on() -> None:
     """The side on which a run began is kept in memory, and the motion goes to it."""
     system = ns.System(
-        states=["x", "y"], parameters={"a": 1.0}, memory={"side": 0.0},
+        states=["x", "y"],
+        parameters={"a": 1.0},
+        memory={"side": 0.0},
         modes={"wait": lambda t, u, p: (0 * u.x, -p.a * u.y), "run": lambda t, u, p: (p.side - u.x, -p.a * u.y)},
         transitions=[
             ns.Transition("wait", "run", at=0.5, write={"side": lambda t, u, p: u.x / np.sqrt(u.x**2 + 1e-20)})
         ],
         period=1.0,
-    )  # fmt: skip
+    )
     found = ns.basins(system, {"x": [-2.0, -0.5, 0.5], "y": [0.0, 1.0]}, **QUIET)
     assert found["confirmed"].values.tolist() == [1, 1]
     np.testing.assert_allclose(found["section"].sel(state="x"), [-1.0, 1.0], atol=1e-9)
@@ -129,14 +134,15 @@ def test_memory_goes_on_where_a_run_goes_on() -> None:
 def test_a_start_late_in_the_period_is_on_the_force_of_that_time(stiffening: float) -> None:
     """A force +A, then -A in the second half: half a period later all is mirrored, x -> -x, v -> -v. Exact, Taylor."""
     system = ns.System(
-        states=["x", "v"], parameters={"w": 1.05, "a": 6.0, "s": stiffening},
+        states=["x", "v"],
+        parameters={"w": 1.05, "a": 6.0, "s": stiffening},
         modes={
             "plus": lambda t, u, p: (u.v, -u.x - stiffening * u.x**3 - 0.2 * u.v + p.a),
             "minus": lambda t, u, p: (u.v, -u.x - stiffening * u.x**3 - 0.2 * u.v - p.a),
         },
         transitions=[ns.Transition("plus", "minus", at=0.5), ns.Transition("minus", "plus", at=0.0)],
         period=lambda p: 2 * np.pi / p.w,
-    )  # fmt: skip
+    )
     axis = np.linspace(-2.0, 2.0, 5)
     for phase in (0.0, 0.2):
         one, other = (
@@ -151,9 +157,10 @@ def test_a_start_late_in_the_period_is_on_the_force_of_that_time(stiffening: flo
 def test_motion_without_damping_has_no_attractor(hasty) -> None:
     """Every start of a linear oscillator keeps a torus of its own."""
     system = ns.System(
-        states=["x", "v"], parameters={"w": 1.0, "k": 2.3},
+        states=["x", "v"],
+        parameters={"w": 1.0, "k": 2.3},
         modes={"only": lambda t, u, p: (u.v, -p.k * u.x + np.cos(p.w * t))},
-    )  # fmt: skip
+    )
     found = ns.basins(system, {"x": [-1.0, 0.0, 1.0], "v": [0.0, 0.7]}, **QUIET)
     assert found.sizes["attractor"] == 0 and (found["label"] == -1).all()
 
@@ -211,9 +218,12 @@ def test_chaos_and_tori_in_four_dimensions(hasty) -> None:
 
     def system(kick: Any, **parameters: float) -> ns.System:
         return ns.System(
-            states=names, parameters=parameters, modes={"rest": rest}, period=1.0,
+            states=names,
+            parameters=parameters,
+            modes={"rest": rest},
+            period=1.0,
             transitions=[ns.Transition("rest", "rest", at=0.5, reset=kick)],
-        )  # fmt: skip
+        )
 
     chaos = system(
         lambda t, u, p: (p.a * u.x - u.x**3, 0.3 * u.y + 0.2 * u.x, 0.5 * u.z + 0.3 * u.x, 0.8 * u.w + 0.2 * u.x), a=2.4
@@ -224,9 +234,11 @@ def test_chaos_and_tori_in_four_dimensions(hasty) -> None:
     def turn(t: Any, u: Any, p: Any) -> Any:
         f, g = 1.5 - 0.5 * (u.x**2 + u.y**2), 1.5 - 0.5 * (u.z**2 + u.w**2)
         return (
-            f * (p.c * u.x - p.s * u.y), f * (p.s * u.x + p.c * u.y),
-            g * (p.c2 * u.z - p.s2 * u.w), g * (p.s2 * u.z + p.c2 * u.w),
-        )  # fmt: skip
+            f * (p.c * u.x - p.s * u.y),
+            f * (p.s * u.x + p.c * u.y),
+            g * (p.c2 * u.z - p.s2 * u.w),
+            g * (p.s2 * u.z + p.c2 * u.w),
+        )
 
     a, b = np.pi * (np.sqrt(5.0) - 1.0), 2 * np.pi * np.sqrt(2.0)
     torus = system(turn, c=np.cos(a), s=np.sin(a), c2=np.cos(b), s2=np.sin(b))
@@ -258,12 +270,13 @@ def test_a_cycle_longer_than_max_period_is_found_and_confirmed(hasty) -> None:
 def test_an_autonomous_cycle_has_the_multiplier_of_its_radius(a: float) -> None:
     """r' = a r (1 - r^2): the multiplier of the circle is exp(-4 pi a), however strongly it draws in."""
     system = ns.System(
-        states=["x", "y"], parameters={"a": a},
-        modes={"only": lambda t, u, p: (
-            p.a * u.x * (1 - u.x**2 - u.y**2) - u.y, p.a * u.y * (1 - u.x**2 - u.y**2) + u.x
-        )},
+        states=["x", "y"],
+        parameters={"a": a},
+        modes={
+            "only": lambda t, u, p: (p.a * u.x * (1 - u.x**2 - u.y**2) - u.y, p.a * u.y * (1 - u.x**2 - u.y**2) + u.x)
+        },
         indicators={"height": lambda t, u, p: u.y},
-    )  # fmt: skip
+    )
     found = ns.basins(system, {"x": [-2.0, 0.5], "y": [0.1, 0.7]}, section=ns.Poincare("height"), **QUIET)
     assert (found["label"] == 0).all()
     assert float(found["multiplier"][0]) == pytest.approx(np.exp(-4 * np.pi * a), rel=1e-2, abs=2e-8)
@@ -291,10 +304,12 @@ def test_starts_beyond_a_stop_say_so() -> None:
 def test_a_number_ends_where_its_branch_ends() -> None:
     """x -> x + (mu + x - x^3) / 4: the left root ends at mu = 2 / sqrt(27), and what takes its starts is another."""
     system = ns.System(
-        states=["x"], parameters={"mu": 0.0}, modes={"rest": lambda t, u, p: 0 * u.x},
+        states=["x"],
+        parameters={"mu": 0.0},
+        modes={"rest": lambda t, u, p: 0 * u.x},
         transitions=[ns.Transition("rest", "rest", at=0.5, reset=lambda t, u, p: u.x + (p.mu + u.x - u.x**3) / 4)],
         period=1.0,
-    )  # fmt: skip
+    )
     mu = np.linspace(-0.6, 0.6, 9)
     found = ns.basin_fractions(system, "mu", mu, box={"x": (-1.5, -1.4)}, n_starts=4, **QUIET)
     left = mu < 2 / np.sqrt(27)

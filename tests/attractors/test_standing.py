@@ -16,9 +16,14 @@ GRID = {"q": np.linspace(-1.4, 0.9, 13), "v_q": np.linspace(-1.5, 1.5, 13)}
 
 def rubbed(**forcing: Any) -> ns.System:
     return ns.mechanical(
-        1.0, 0.1, K, parameters={"mu": MU, "F": 0.3, "w": 1.0}, elements={"f": E.Coulomb(at="q", friction="mu")},
-        coordinates=["q"], **forcing,
-    )  # fmt: skip
+        1.0,
+        0.1,
+        K,
+        parameters={"mu": MU, "F": 0.3, "w": 1.0},
+        elements={"f": E.Coulomb(at="q", friction="mu")},
+        coordinates=["q"],
+        **forcing,
+    )
 
 
 FREE = rubbed()
@@ -83,9 +88,13 @@ def test_a_sweep_without_forcing_ends_at_rest() -> None:
 def test_what_sticks_for_good_beside_what_moves() -> None:
     """One mass sticks, one is driven: cycles that differ in where the first one stands are one attractor."""
     system = ns.mechanical(
-        np.eye(2), 0.1 * np.eye(2), [[3.0, -1.0], [-1.0, 2.0]], parameters={"F": 0.3, "w": 1.0},
-        forcing={"q2": lambda t, p: p.F * np.cos(p.w * t)}, elements={"f": E.Coulomb(at="q1", friction=1.5)},
-    )  # fmt: skip
+        np.eye(2),
+        0.1 * np.eye(2),
+        [[3.0, -1.0], [-1.0, 2.0]],
+        parameters={"F": 0.3, "w": 1.0},
+        forcing={"q2": lambda t, p: p.F * np.cos(p.w * t)},
+        elements={"f": E.Coulomb(at="q1", friction=1.5)},
+    )
     grid = {"q1": np.linspace(-0.2, 0.2, 5), "q2": np.linspace(-0.2, 0.2, 3)}
     found = ns.basins(system, grid, progress=False)
     assert (found["label"].values == 0).all() and found["name"].values.tolist() == ["period 1"]
@@ -97,12 +106,15 @@ def test_what_sticks_for_good_beside_what_moves() -> None:
 def test_rest_against_either_of_two_stops() -> None:
     """q'' = q - .1 q' between stops: the middle is unstable, both stops draw in."""
     system = ns.mechanical(
-        1.0, 0.1, -1.0, coordinates=["q"],
+        1.0,
+        0.1,
+        -1.0,
+        coordinates=["q"],
         elements={
             "a": E.Stop(at="q", position=1.0, restitution=0.5),
             "b": E.Stop(at="q", position=-1.5, side=-1, restitution=0.5),
         },
-    )  # fmt: skip
+    )
     grid = {"q": np.linspace(-1.4, 0.9, 8), "v_q": np.linspace(-0.4, 0.4, 6)}
     found = ns.basins(system, grid, section=ns.Poincare("a_gap"), progress=False)
     assert sorted(found["name"].values) == ["equilibrium in a_open_b_rest", "equilibrium in a_rest_b_open"]

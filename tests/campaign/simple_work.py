@@ -63,5 +63,6 @@ def hashes(path: Path) -> dict[str, str]:
     """Hash of every file of a store's results."""
     return {
         str(file.relative_to(path)): hashlib.sha256(file.read_bytes()).hexdigest()
-        for file in sorted((path / "results").rglob("*")) if file.is_file()
-    }  # fmt: skip
+        for file in sorted((path / "results").rglob("*"))
+        if file.is_file()
+    }

@@ -45,9 +45,17 @@ class Crew:
 
     def __init__(self, address: str) -> None:
         self.command = [
-            sys.executable, "-c", "from distributed.cli.dask_worker import main; main()", address, "--nthreads", "1",
-            "--no-nanny", "--no-dashboard", "--memory-limit", "0",
-        ]  # fmt: skip
+            sys.executable,
+            "-c",
+            "from distributed.cli.dask_worker import main; main()",
+            address,
+            "--nthreads",
+            "1",
+            "--no-nanny",
+            "--no-dashboard",
+            "--memory-limit",
+            "0",
+        ]
         self.environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(HERE), *filter(None, sys.path)])}
         self.members = [self._begin() for _ in range(3)]
         self.stop = threading.Event()

@@ -97,11 +97,13 @@ class Cluster:
         code = "from distributed.cli.dask_{0} import main; main()"
         self.processes = [
             subprocess.Popen(
-                [sys.executable, "-c", code.format(one[0]), *one[1:]], env=environment, stdout=subprocess.DEVNULL,
+                [sys.executable, "-c", code.format(one[0]), *one[1:]],
+                env=environment,
+                stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
             )
             for one in words
-        ]  # fmt: skip
+        ]
 
     def stop(self) -> None:
         for process in self.processes:

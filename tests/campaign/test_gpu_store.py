@@ -22,12 +22,17 @@ HERE = Path(__file__).parent
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     environment = os.environ | {
-        "NUMBA_ENABLE_CUDASIM": "1", "PYTHONPATH": os.pathsep.join([str(HERE), *filter(None, sys.path)]),
-    }  # fmt: skip
+        "NUMBA_ENABLE_CUDASIM": "1",
+        "PYTHONPATH": os.pathsep.join([str(HERE), *filter(None, sys.path)]),
+    }
     done = subprocess.run(
-        [sys.executable, str(HERE / "gpu_store_script.py")], env=environment, capture_output=True, text=True,
-        check=False, cwd=tmp_path_factory.mktemp("gpu"),
-    )  # fmt: skip
+        [sys.executable, str(HERE / "gpu_store_script.py")],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path_factory.mktemp("gpu"),
+    )
     assert done.returncode == 0, done.stderr[-3000:]
     facts: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return facts

@@ -26,9 +26,15 @@ store = "chart.zarr"
 PLANES = {
     "omega, rho": {"parameters": "g = 0.02", "x": "omega", "x0": 3.0, "x1": 7.0, "y": "rho", "y0": 0.1, "y1": 0.3},
     "g, rho": {
-        "parameters": "omega = 11.15", "x": "g", "x0": -0.0015, "x1": 0.002, "y": "rho", "y0": 0.2, "y1": 0.5,
+        "parameters": "omega = 11.15",
+        "x": "g",
+        "x0": -0.0015,
+        "x1": 0.002,
+        "y": "rho",
+        "y0": 0.2,
+        "y1": 0.5,
     },
-}  # fmt: skip
+}
 PLAN = """
 import json, sys, h5netcdf, xarray
 from pathlib import Path

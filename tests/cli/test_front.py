@@ -20,9 +20,19 @@ from nonsmooth.cli.study import named_model, read_study
 from nonsmooth.cli.verb_options import VERBS, options_of
 
 COMMANDS = (
-    "init", "run", "plan", "show", "explore", "models", "identify", "compare", "reproduce", "rig", "schema",
+    "init",
+    "run",
+    "plan",
+    "show",
+    "explore",
+    "models",
+    "identify",
+    "compare",
+    "reproduce",
+    "rig",
+    "schema",
     "completion",
-)  # fmt: skip
+)
 
 
 def run(*arguments: str | Path) -> int:
@@ -75,9 +85,12 @@ def test_a_closed_pipe_is_silent(command: tuple[str, ...], unbuffered: str) -> N
     reading, writing = os.pipe()
     os.close(reading)
     done = subprocess.run(
-        [sys.executable, "-m", "nonsmooth", *command], stdout=writing, stderr=subprocess.PIPE, text=True,
+        [sys.executable, "-m", "nonsmooth", *command],
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        text=True,
         env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
-    )  # fmt: skip
+    )
     os.close(writing)
     assert (done.returncode, done.stderr) == (141, "")
 
@@ -99,8 +112,24 @@ def test_a_fault_of_the_package_is_one_message_that_says_so(
         run("--traceback", "models")
 
 
-WEIRD = ('""', '"a"', "-1", "1e308", "nan", "true", "[]", '[1, "a"]', "{}", '{ x = "b" }', "[{}]", "1979-05-27",
-         "[[1, 2], [3]]", "9223372036854775807", "{ x = { y = 1 } }", '"\\u0000"')  # fmt: skip
+WEIRD = (
+    '""',
+    '"a"',
+    "-1",
+    "1e308",
+    "nan",
+    "true",
+    "[]",
+    '[1, "a"]',
+    "{}",
+    '{ x = "b" }',
+    "[{}]",
+    "1979-05-27",
+    "[[1, 2], [3]]",
+    "9223372036854775807",
+    "{ x = { y = 1 } }",
+    '"\\u0000"',
+)
 LEAST = {
     "simulate": {"periods": "1"},
     "sweep": {"parameter": '"rho"', "values": "[0.3, 0.31]", "transient": "3", "keep": "3"},
@@ -149,9 +178,12 @@ def test_no_value_of_any_key_ends_in_a_traceback(
     ],
 )
 def test_odd_arguments_are_one_message(
-    arguments: tuple[str | bytes, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str | bytes, ...],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "wrong.py").write_text("raise BaseException('x')\n")
     (tmp_path / "odd.nc").touch()
@@ -207,10 +239,16 @@ def test_a_first_study_file_reads_with_each_of_its_comments_taken_out(
         assert read_study(path).verb == verb
 
 
-@pytest.mark.parametrize(("model", "verb"), [
-    ("discontinuous_support", "simulate"), ("discontinuous_support", "sweep"),
-    ("discontinuous_support", "frequency_response"), ("impact_oscillator", "poincare"), ("relief_valve", "simulate"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("model", "verb"),
+    [
+        ("discontinuous_support", "simulate"),
+        ("discontinuous_support", "sweep"),
+        ("discontinuous_support", "frequency_response"),
+        ("impact_oscillator", "poincare"),
+        ("relief_valve", "simulate"),
+    ],
+)
 def test_a_first_study_file_runs(
     model: str, verb: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -24,18 +24,22 @@ ODD: dict[str, Any] = {
     "parameters are a list": {"system": {"parameters": [1], "text": 3}, "options": {}},
     "options are missing": {"system": {"parameters": {}, "text": "t"}},
     "parameters of every type": {
-        "system": {"parameters": {"a": None, "b": "nan", "c": [1], "d": {}, "e": 10**400, "f": "word"}}, "options": {},
+        "system": {"parameters": {"a": None, "b": "nan", "c": [1], "d": {}, "e": 10**400, "f": "word"}},
+        "options": {},
     },
     "text that would never end": {
-        "system": {"name": "s", "parameters": {}, "text": "((9**9999)**9999)*u.x " + "(" * 3000}, "options": {},
+        "system": {"name": "s", "parameters": {}, "text": "((9**9999)**9999)*u.x " + "(" * 3000},
+        "options": {},
     },
     "long": {"verb": "x" * 1_500_000, "system": {"name": "n" * 10**6, "parameters": {}}, "options": {"o": "p" * 10**6}},
     "escapes": {
-        "verb": ESCAPE, "method": ESCAPE, "system": {"name": ESCAPE, "parameters": {ESCAPE: ESCAPE}, "text": ESCAPE},
+        "verb": ESCAPE,
+        "method": ESCAPE,
+        "system": {"name": ESCAPE, "parameters": {ESCAPE: ESCAPE}, "text": ESCAPE},
         "options": {ESCAPE: ESCAPE, "list": [ESCAPE] * 9},
     },
     "escapes without a system": {ESCAPE: ESCAPE, "list": [ESCAPE]},
-}  # fmt: skip
+}
 
 
 def shown(capsys: pytest.CaptureFixture[str]) -> str:

@@ -96,8 +96,10 @@ def at_boundary(system: ns.System, point: xr.Dataset) -> float:
         here = np.flatnonzero(modes == mode)
         if not len(here):
             continue
-        h, rate, bend = (np.array([np.broadcast_to(x, len(here)) for x in part], dtype=float)
-                         for part in indicators(traced, mode)(times[here], states[here].T, p, m))  # fmt: skip
+        h, rate, bend = (
+            np.array([np.broadcast_to(x, len(here)) for x in part], dtype=float)
+            for part in indicators(traced, mode)(times[here], states[here].T, p, m)
+        )
         near = np.abs(rate) < np.abs(bend) * period / SAMPLES * 1.5
         found.append(np.abs(h - rate**2 / np.where(near, 2 * bend, 1.0))[near].min(initial=np.inf))
     for i in range(run.sizes["crossing"]):
@@ -150,8 +152,13 @@ def one(template: str, seed: int, drawn_one: templates.Drawn, orbit: ns.Orbit) -
         point = branch.isel(point=i)
         here = system.with_parameters({name: float(point[name])})
         try:
-            again = ns.find_orbit(here, start=point["section"].values, transient=0, progress=False,
-                                  period_number=int(branch["period_number"]))  # fmt: skip
+            again = ns.find_orbit(
+                here,
+                start=point["section"].values,
+                transient=0,
+                progress=False,
+                period_number=int(branch["period_number"]),
+            )
         except ns.SolveError:
             row["lost"] += 1
             continue
@@ -168,8 +175,9 @@ def one(template: str, seed: int, drawn_one: templates.Drawn, orbit: ns.Orbit) -
                 row["differs"].append(f"{part.__name__} from {float(point[name])!r}: {words}")
     row["residuals"] = [
         (str(branch["special_kind"].values[k]), float(branch["special_value"][k]), r)
-        for k in range(branch.sizes["special"]) if not (r := residual(system, branch, name, k)) < SAME
-    ]  # fmt: skip
+        for k in range(branch.sizes["special"])
+        if not (r := residual(system, branch, name, k)) < SAME
+    ]
     return row
 
 

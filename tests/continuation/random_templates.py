@@ -25,19 +25,31 @@ def _force(t: Any, p: Any) -> Any:
 def _elastic() -> ns.System:
     stops = ns.elements.ElasticStop
     return ns.mechanical(
-        1.0, lambda p: 2 * p.z, 1.0, name="two elastic stops", coordinates="x", forcing={"x": _force},
+        1.0,
+        lambda p: 2 * p.z,
+        1.0,
+        name="two elastic stops",
+        coordinates="x",
+        forcing={"x": _force},
         parameters={"z": 0.05, "f": 1.0, "m": 0.0, "w": 0.8, "b": 0.5, "g": -0.1, "k": 5.0, "l": 5.0, "c": 0.1},
         elements={
             "upper": stops(at="x", position="b", stiffness="k", damping="c"),
             "lower": stops(at="x", position="g", side=-1, stiffness="l", damping="c"),
         },
-    )  # fmt: skip
+    )
 
 
 def elastic(rng: Random) -> Drawn:
     """An elastic stop with a gap above, one that is preloaded below (position -g > 0), both with dampers."""
-    drawn = {"z": (0.02, 0.1), "m": (-0.3, 0.3), "b": (0.2, 1.2), "g": (-0.3, 0.1), "k": (1, 10), "l": (1, 10),
-             "c": (0.02, 0.3)}  # fmt: skip
+    drawn = {
+        "z": (0.02, 0.1),
+        "m": (-0.3, 0.3),
+        "b": (0.2, 1.2),
+        "g": (-0.3, 0.1),
+        "k": (1, 10),
+        "l": (1, 10),
+        "c": (0.02, 0.3),
+    }
     return _elastic().with_parameters(_drawn(rng, drawn)), "w", (0.6, 2.5), None
 
 
@@ -66,14 +78,18 @@ def static(rng: Random) -> Drawn:
 @cache
 def _two_stops() -> ns.System:
     return ns.mechanical(
-        np.eye(2), lambda p: [[2 * p.z, -p.z], [-p.z, p.z]], lambda p: [[1 + p.s, -p.s], [-p.s, p.s]],
-        name="two masses, two stops", coordinates=["x", "y"], forcing={"x": _force},
+        np.eye(2),
+        lambda p: [[2 * p.z, -p.z], [-p.z, p.z]],
+        lambda p: [[1 + p.s, -p.s], [-p.s, p.s]],
+        name="two masses, two stops",
+        coordinates=["x", "y"],
+        forcing={"x": _force},
         parameters={"z": 0.1, "s": 1.0, "f": 1.0, "m": 0.0, "w": 1.0, "b": 1.0, "g": 1.0, "e": 0.5, "k": 4.0},
         elements={
             "rigid": ns.elements.Stop(at="x", position="b", restitution="e"),
             "soft": ns.elements.ElasticStop(at="y", position=lambda t, u, p: -p.g, side=-1, stiffness="k"),
         },
-    )  # fmt: skip
+    )
 
 
 def two_stops(rng: Random) -> Drawn:
@@ -88,10 +104,13 @@ def _relay() -> ns.System:
         return lambda t, u, p: (u.v, p.A * np.cos(p.w * t) - u.x - 2 * p.z * u.v - side * p.F)
 
     return ns.System(
-        name="forced relay", states=["x", "v"], parameters={"A": 1.0, "w": 1.5, "z": 0.1, "F": 0.5, "c": 0.5},
-        modes={"below": plant(-1), "above": plant(1)}, indicators={"h": lambda t, u, p: u.v + p.c * u.x},
+        name="forced relay",
+        states=["x", "v"],
+        parameters={"A": 1.0, "w": 1.5, "z": 0.1, "F": 0.5, "c": 0.5},
+        modes={"below": plant(-1), "above": plant(1)},
+        indicators={"h": lambda t, u, p: u.v + p.c * u.x},
         transitions=[ns.Surface("h", below="below", above="above", mode="sliding")],
-    )  # fmt: skip
+    )
 
 
 def relay(rng: Random) -> Drawn:
@@ -103,11 +122,15 @@ def relay(rng: Random) -> Drawn:
 @cache
 def _table() -> ns.System:
     return ns.mechanical(
-        1.0, lambda p: p.c, 0.0, name="mass on a table", coordinates="x",
+        1.0,
+        lambda p: p.c,
+        0.0,
+        name="mass on a table",
+        coordinates="x",
         forcing={"x": lambda t, p: p.a * np.cos(p.w * t) - p.G},
         parameters={"a": 1.5, "w": 1.0, "G": 1.0, "e": 0.5, "c": 0.0},
         elements={"table": ns.elements.Stop(at="x", position=0.0, side=-1, restitution="e")},
-    )  # fmt: skip
+    )
 
 
 def rest(rng: Random) -> Drawn:
@@ -141,6 +164,5 @@ def _drawn(rng: Random, ranges: dict[str, tuple[float, float]]) -> dict[str, flo
 
 
 TEMPLATES: dict[str, Callable[[Random], Drawn]] = {
-    one.__name__: one
-    for one in (elastic, impact, coulomb, static, two_stops, relay, rest, buck, piecewise_map, gear)
+    one.__name__: one for one in (elastic, impact, coulomb, static, two_stops, relay, rest, buck, piecewise_map, gear)
 }

@@ -21,12 +21,14 @@ def bang_bang_duffing() -> ns.System:
         return v, -p.A - 0.2 * v - x - x**3
 
     return ns.System(
-        name="bang-bang Duffing", states=["x", "v"], parameters={"A": 26.0, "omega": 1.0},
+        name="bang-bang Duffing",
+        states=["x", "v"],
+        parameters={"A": 26.0, "omega": 1.0},
         modes={"down": down, "up": up},
         transitions=[ns.Transition("down", "up", at=0.5), ns.Transition("up", "down", at=0.0)],
         period=lambda p: 2 * np.pi / p.omega,
         symmetry=(lambda u: (-u.x, -u.v), 0.5, {"down": "up", "up": "down"}),
-    )  # fmt: skip
+    )
 
 
 def stick_slip_with_impact() -> ns.System:
@@ -45,17 +47,19 @@ def stick_slip_with_impact() -> ns.System:
         return -p.n - f / 5, v, p.n + 6 * f / 5
 
     return ns.System(
-        name="stick-slip with impact", states=["s", "x", "v"],
+        name="stick-slip with impact",
+        states=["s", "x", "v"],
         parameters={"V": 0.5, "c": 0.04, "omega": 0.92, "e": 0.8, "n": 3.17},
         modes={"stick": ns.Mode(stick, states=["x", "v"]), "slip": slip},
         indicators={"wall": lambda t, u, p: u.x - 0.5, "slider": lambda t, u, p: u.s},
         transitions=[
-            ns.Transition("stick", "slip", when="wall > 0",
-                          reset=lambda t, u, p: ((1 + p.e) / 6 * u.v, u.x, -p.e * u.v)),
+            ns.Transition(
+                "stick", "slip", when="wall > 0", reset=lambda t, u, p: ((1 + p.e) / 6 * u.v, u.x, -p.e * u.v)
+            ),
             ns.Transition("slip", "stick", when="slider < 0"),
         ],
         period=lambda p: np.pi / p.omega,
-    )  # fmt: skip
+    )
 
 
 def planar() -> ns.System:
@@ -75,12 +79,16 @@ def planar() -> ns.System:
         return field(x, y, p.alpha * (p.beta - r), p.gamma + p.beta - r)
 
     return ns.System(
-        name="planar", states=["x", "y"], parameters={"alpha": 1.0, "beta": 2.0, "gamma": 1.5},
-        modes={"right": right, "left": left}, indicators={"side": lambda t, u, p: u.x},
+        name="planar",
+        states=["x", "y"],
+        parameters={"alpha": 1.0, "beta": 2.0, "gamma": 1.5},
+        modes={"right": right, "left": left},
+        indicators={"side": lambda t, u, p: u.x},
         transitions=[
-            ns.Transition("right", "left", when="side < 0"), ns.Transition("left", "right", when="side > 0"),
+            ns.Transition("right", "left", when="side < 0"),
+            ns.Transition("left", "right", when="side > 0"),
         ],
-    )  # fmt: skip
+    )
 
 
 def belt() -> ns.System:
@@ -93,11 +101,13 @@ def belt() -> ns.System:
         return u.v, -u.x + p.F / (1 + p.delta * (p.v_b - u.v))
 
     return ns.System(
-        name="belt", states=["x", "v"], parameters={"v_b": 0.2, "F": 1.0, "delta": 3.0},
+        name="belt",
+        states=["x", "v"],
+        parameters={"v_b": 0.2, "F": 1.0, "delta": 3.0},
         modes={"stick": stick, "slip": slip},
         indicators={"pull": lambda t, u, p: u.x - p.F, "relative": lambda t, u, p: u.v - p.v_b},
         transitions=[
             ns.Transition("stick", "slip", when="pull > 0"),
             ns.Transition("slip", "stick", when="relative > 0", reset=lambda t, u, p: (u.x, p.v_b)),
         ],
-    )  # fmt: skip
+    )

@@ -22,14 +22,18 @@ def kicked() -> ns.System:
         return lambda t, u, p: (factor * p.c * (1 - u.x), p.A * np.cos(2 * np.pi * t) - 9 * u.y)
 
     return ns.System(
-        states=["x", "y"], parameters={"c": 0.5, "j": 0.3, "b": 0.2, "A": 0.0}, period=1.0,
+        states=["x", "y"],
+        parameters={"c": 0.5, "j": 0.3, "b": 0.2, "A": 0.0},
+        period=1.0,
         modes={"above": decay(1.0), "below": decay(3.0)},
         indicators={"level": lambda t, u, p: u.x - p.b},
         transitions=[
-            ns.Transition("above", "above", **kick), ns.Transition("below", "below", **kick),
-            ns.Transition("above", "below", when="level < 0"), ns.Transition("below", "above", when="level > 0"),
+            ns.Transition("above", "above", **kick),
+            ns.Transition("below", "below", **kick),
+            ns.Transition("above", "below", when="level < 0"),
+            ns.Transition("below", "above", when="level > 0"),
         ],
-    )  # fmt: skip
+    )
 
 
 def closed_form(j: float, c: float = 0.5, b: float = 0.2) -> tuple[float, float]:
@@ -73,13 +77,15 @@ def impacts_in_two_steps() -> ns.System:
         return u.v, p.A * np.cos(t) - 0.1 * u.v - u.x
 
     return ns.System(
-        states=["x", "v"], parameters={"A": 1.0, "e": 0.8}, modes={"free": field, "impact": field},
+        states=["x", "v"],
+        parameters={"A": 1.0, "e": 0.8},
+        modes={"free": field, "impact": field},
         indicators={"stop": lambda t, u, p: u.x - 1, "speed": lambda t, u, p: u.v},
         transitions=[
             ns.Transition("free", "impact", when="stop > 0", reset=lambda t, u, p: (u.x, -p.e * u.v)),
             ns.Transition("impact", "free", when="speed < 0"),
         ],
-    )  # fmt: skip
+    )
 
 
 def test_an_impact_in_two_steps_is_that_in_one() -> None:
@@ -103,10 +109,16 @@ def test_transitions_of_one_instant_pass_the_section_together() -> None:
 
     The orbits are those of simulations, through both ends of the range."""
     system = ns.mechanical(
-        1.0, 0.1, 1.0, parameters={"w": 0.8}, forcing={"q": lambda t, p: np.cos(p.w * t)},
-        elements={"rub": ns.elements.Coulomb(at="q", friction=0.2),
-                  "stop": ns.elements.Stop(at="q", position=0.5, restitution=0.5)},
-    )  # fmt: skip
+        1.0,
+        0.1,
+        1.0,
+        parameters={"w": 0.8},
+        forcing={"q": lambda t, p: np.cos(p.w * t)},
+        elements={
+            "rub": ns.elements.Coulomb(at="q", friction=0.2),
+            "stop": ns.elements.Stop(at="q", position=0.5, restitution=0.5),
+        },
+    )
     branch = ns.continue_orbit(ns.find_orbit(system, transient=300, progress=False), "w", (0.64, 1.0))
     assert endings(branch) == ["range", "range"]
     assert misses(system, branch, "w") < 1e-9

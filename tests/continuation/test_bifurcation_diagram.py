@@ -20,15 +20,30 @@ pytestmark = pytest.mark.physics
 support = ns.models.discontinuous_support
 #: Parameters, range, kinds of special points with their numbers on branches of period 1, and closed or known values.
 FIGURES: dict[str, tuple[dict[str, float], str, tuple[float, float], dict[str, int], list[float]]] = {
-    "9": ({"rho": 0.14, "g": 0.02}, "omega", (3.0, 7.0), {"fold": 2, "flip": 2, "grazing": 2},
-          [known.FOLDS["figure 9 upper"], known.FOLDS["figure 9 rising"], known.FLIPS_NEAR_GRAZING["figure 9 lower"]]),
-    "10": ({"rho": 0.16, "g": 0.0145}, "omega", (2.4, 7.4), {"fold": 4, "grazing": 2},
-           [known.FOLDS[f"figure 10 {word}"] for word in ("upper", "small", "rising")]),
+    "9": (
+        {"rho": 0.14, "g": 0.02},
+        "omega",
+        (3.0, 7.0),
+        {"fold": 2, "flip": 2, "grazing": 2},
+        [known.FOLDS["figure 9 upper"], known.FOLDS["figure 9 rising"], known.FLIPS_NEAR_GRAZING["figure 9 lower"]],
+    ),
+    "10": (
+        {"rho": 0.16, "g": 0.0145},
+        "omega",
+        (2.4, 7.4),
+        {"fold": 4, "grazing": 2},
+        [known.FOLDS[f"figure 10 {word}"] for word in ("upper", "small", "rising")],
+    ),
     "11": ({"omega": 3.69, "g": -0.0045}, "rho", (0.2, 0.5), {"flip": 1}, []),
     "13": ({"omega": 11.15, "rho": 0.33}, "g", (-0.0015, 0.002), {"flip": 1}, []),
-    "17": ({"rho": 0.23, "g": 0.0036}, "omega", (8.4, 10.4), {"flip": 2, "grazing": 1},
-           [known.FLIPS_NEAR_GRAZING["figure 17"]]),
-}  # fmt: skip
+    "17": (
+        {"rho": 0.23, "g": 0.0036},
+        "omega",
+        (8.4, 10.4),
+        {"flip": 2, "grazing": 1},
+        [known.FLIPS_NEAR_GRAZING["figure 17"]],
+    ),
+}
 
 
 def truth(row: Any, name: str) -> float:

@@ -15,12 +15,13 @@ pytestmark = pytest.mark.physics
 def skew(left: float, right: float, step: float = 0.0, mu: float = -0.1) -> ns.Map:
     """Slopes on either side of 0, and how far the map falls there."""
     return ns.Map(
-        states=["x"], parameters={"left": left, "right": right, "step": step, "mu": mu},
+        states=["x"],
+        parameters={"left": left, "right": right, "step": step, "mu": mu},
         branches=[
             ns.Branch(lambda u, p: (p.left * u.x + p.mu,), when="x < 0"),
             ns.Branch(lambda u, p: (p.right * u.x + p.mu - p.step,), when="x > 0"),
         ],
-    )  # fmt: skip
+    )
 
 
 def branch_of(system: ns.Map, **options: Any) -> Any:

@@ -66,11 +66,12 @@ def test_trajectory_from_an_impact() -> None:
     system = ns.models.impact_oscillator()
     at = float(ns.find_orbit(system).crossing_times[0])
     shifted = ns.System(
-        states=["x", "v"], parameters={"A": 1.0, "c": 0.1, "e": 0.8, "phi": at},
+        states=["x", "v"],
+        parameters={"A": 1.0, "c": 0.1, "e": 0.8, "phi": at},
         modes={"motion": lambda t, u, p: (u.v, p.A * np.cos(t + p.phi) - u.x - p.c * u.v)},
         indicators={"stop": lambda t, u, p: u.x - 1.0},
         transitions=[ns.Transition("motion", "motion", when="stop > 0", reset=lambda t, u, p: (u.x, -p.e * u.v))],
-    )  # fmt: skip
+    )
     orbit = ns.find_orbit(shifted)
     run = orbit.trajectory()
     assert orbit.crossing_times == pytest.approx([0.0], abs=1e-12) and orbit.u[0] == pytest.approx(1.0, abs=1e-12)
@@ -93,10 +94,18 @@ def test_orbit_of_the_smoothed_switch() -> None:
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("layout", 7), ("layout", -1), ("mode", 5), ("unknowns", np.nan), ("tangent", np.nan), ("ended", 99),
-        ("special_point", -3), ("special_indicator", "elsewhere"), ("clearance", None), ("stable", None),
+        ("layout", 7),
+        ("layout", -1),
+        ("mode", 5),
+        ("unknowns", np.nan),
+        ("tangent", np.nan),
+        ("ended", 99),
+        ("special_point", -3),
+        ("special_indicator", "elsewhere"),
+        ("clearance", None),
+        ("stable", None),
     ],
-)  # fmt: skip
+)
 def test_damaged_branch(branch: xr.Dataset, name: str, value: object) -> None:
     """An index that points nowhere, a number that is lost, a variable that is gone: refused, never read as another."""
     edited = branch.drop_vars(name) if value is None else branch.assign({name: xr.full_like(branch[name], value)})
@@ -128,8 +137,17 @@ def branch() -> xr.Dataset:
 def test_schema(branch: xr.Dataset) -> None:
     """Dims and variables that scripts may rely on."""
     assert {"point", "state", "multiplier", "special"} <= set(branch.dims)
-    for name in ("section", "maximum", "minimum", "period", "floquet_multipliers", "stable", "signature", "clearance",
-                 "status"):  # fmt: skip
+    for name in (
+        "section",
+        "maximum",
+        "minimum",
+        "period",
+        "floquet_multipliers",
+        "stable",
+        "signature",
+        "clearance",
+        "status",
+    ):
         assert "point" in branch[name].dims, name
     assert branch["rho"].dims == ("point",) and branch["rho"].attrs["units"] == "N"
     special = ns.special_points(branch)

@@ -17,13 +17,14 @@ NAMES = ["F", "mu", "e", "X"]
 @cache
 def rig() -> ns.System:
     return ns.System(
-        states=["x", "v"], parameters={"F": 1.4, "w": 0.8, "mu": 0.15, "e": 0.4, "X": 0.7},
+        states=["x", "v"],
+        parameters={"F": 1.4, "w": 0.8, "mu": 0.15, "e": 0.4, "X": 0.7},
         modes={"all": lambda t, u, p: (u.v, p.F * np.cos(p.w * t) - 0.1 * u.v - u.x - u.x**3)},
         elements={
             "a": Coulomb(speed=lambda t, u, p: u.v, on={"v": 1.0}, friction="mu", static=0.3),
             "s": Stop(gap=lambda t, u, p: p.X - u.x, on={"v": -1.0}, restitution="e"),
         },
-    )  # fmt: skip
+    )
 
 
 @cache
@@ -76,10 +77,13 @@ def test_frictions_of_one_coordinate_are_their_sum() -> None:
     def branch(*friction: float) -> xr.Dataset:
         rubs = {f"rub{k}": ns.elements.Coulomb(at="q2", friction=mu) for k, mu in enumerate(friction)}
         system = ns.mechanical(
-            np.eye(2), 0.1 * np.eye(2), [[2.0, -1.0], [-1.0, 2.0]], parameters={"F": 1.0, "w": 1.03},
+            np.eye(2),
+            0.1 * np.eye(2),
+            [[2.0, -1.0], [-1.0, 2.0]],
+            parameters={"F": 1.0, "w": 1.03},
             forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
             elements={**rubs, "other": ns.elements.Coulomb(at="q1", friction=0.29)},
-        )  # fmt: skip
+        )
         return ns.continue_orbit(ns.find_orbit(system, transient=300, progress=False), "w", (0.8, 1.3))
 
     one = branch(0.34)

@@ -74,9 +74,13 @@ def test_the_number_of_impacts_before_rest_is_no_event() -> None:
     """Motion behind rest knows nothing of the restitution: over the whole range the mass rests at the section, the
     extremes are the same, and only the impacts on the way become more. No special point, and no way back."""
     system = ns.mechanical(
-        1.0, 0.1, 1.0, parameters={"w": 0.4, "r": 0.5}, forcing={"q": lambda t, p: np.cos(p.w * t)},
+        1.0,
+        0.1,
+        1.0,
+        parameters={"w": 0.4, "r": 0.5},
+        forcing={"q": lambda t, p: np.cos(p.w * t)},
         elements={"stop": ns.elements.Stop(at="q", position=0.3, restitution="r", creep=1e-7)},
-    )  # fmt: skip
+    )
     branch = ns.continue_orbit(ns.find_orbit(system, progress=False), "r", (0.45, 0.58))
     assert endings(branch) == ["range", "range"]
     assert branch.sizes["special"] == 0

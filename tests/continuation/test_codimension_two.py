@@ -18,10 +18,13 @@ from nonsmooth.continuation.problems.shooting import Shooting
 def mapping(f: Callable[[Any, Any], Any], start: Mapping[str, float], **parameters: float) -> tuple[ns.System, Any]:
     """A map as a system that stands still and jumps in the middle of every period; and a start."""
     system = ns.System(
-        states=list(start), parameters=parameters, period=1.0, scale=dict.fromkeys(start, 1000.0),  # a size of 1
+        states=list(start),
+        parameters=parameters,
+        period=1.0,
+        scale=dict.fromkeys(start, 1000.0),  # a size of 1
         modes={"rest": lambda t, u, p: tuple(0 * x for x in u) if len(start) > 1 else 0 * next(iter(u))},
         transitions=[ns.Transition("rest", "rest", at=0.5, reset=lambda t, u, p: f(u, p))],
-    )  # fmt: skip
+    )
     return system, ns.find_orbit(system, start=dict(start), transient=0, period_number=1)
 
 
@@ -153,8 +156,9 @@ def test_chenciner_point_with_quadratic_terms() -> None:
 
 def test_cusp_and_fold_flip() -> None:
     """x -> x + h + s x - x^3: folds 27 h^2 = 4 s^3, cusp at 0; beside it y -> -(s + 1/2) y + y^3 flips at s = 1/2."""
-    _, orbit = mapping(lambda u, p: (u.x + p.h + p.s * u.x - u.x**3, -(p.s + 0.5) * u.y + u.y**3),
-                       {"x": 1.0, "y": 0.0}, h=0.0, s=0.8)  # fmt: skip
+    _, orbit = mapping(
+        lambda u, p: (u.x + p.h + p.s * u.x - u.x**3, -(p.s + 0.5) * u.y + u.y**3), {"x": 1.0, "y": 0.0}, h=0.0, s=0.8
+    )
     branch = ns.continue_orbit(orbit, "h", (-1.0, 1.0))
     curve = ns.continue_curve(row(branch, "fold"), {"h": (-0.9, 0.9), "s": (-0.5, 1.0)})
     h, s = curve["h"].values, curve["s"].values

@@ -33,10 +33,14 @@ def quadrants() -> ns.System:
             transitions.append(ns.Transition(f"m{i}{j}", f"m{1 - i}{j}", when=f"right {'<' if i else '>'} 0"))
             transitions.append(ns.Transition(f"m{i}{j}", f"m{i}{1 - j}", when=f"above {'<' if j else '>'} 0"))
     return ns.System(
-        name="quadrants", states=["x", "y", "z", "r"], parameters={"phi": 0.0, "c": 0.1, "q": 1.0}, modes=modes,
-        transitions=transitions, period=2 * np.pi,
+        name="quadrants",
+        states=["x", "y", "z", "r"],
+        parameters={"phi": 0.0, "c": 0.1, "q": 1.0},
+        modes=modes,
+        transitions=transitions,
+        period=2 * np.pi,
         indicators={"right": lambda t, u, p: u.x, "above": lambda t, u, p: u.y - p.c},
-    )  # fmt: skip
+    )
 
 
 def corners(branch: xr.Dataset) -> list[float]:
@@ -93,9 +97,14 @@ def test_a_surface_and_a_phase_change_their_order(start: float) -> None:
             transitions.append(ns.Transition(f"m{i}{s}", f"m{1 - i}{s}", when=f"right {'<' if i else '>'} 0"))
             transitions.append(ns.Transition(f"m{i}{s}", f"m{i}{1 - s}", at=0.95 if s else 0.3 / np.pi))
     system = ns.System(
-        name="phase", states=["x", "z"], parameters={"phi": start}, modes=modes, transitions=transitions,
-        indicators={"right": lambda t, u, p: u.x}, period=2 * np.pi,
-    )  # fmt: skip
+        name="phase",
+        states=["x", "z"],
+        parameters={"phi": start},
+        modes=modes,
+        transitions=transitions,
+        indicators={"right": lambda t, u, p: u.x},
+        period=2 * np.pi,
+    )
     branch = ns.continue_orbit(ns.find_orbit(system), "phi", (-0.45, 0.45))
     assert branch["phi"].values[[0, -1]] == pytest.approx([-0.45, 0.45])
     assert corners(branch) == pytest.approx([0.1], abs=1e-9)

@@ -52,8 +52,13 @@ def test_curves_of_folds_and_flips_against_the_closed_form(figure_9: xr.Dataset,
     for k in (len(mu) // 4, 3 * len(mu) // 4):
         at = curve.isel(point=k)
         p = {"g": 0.02, "rho": float(at["rho"]), "omega": float(at["omega"])}
-        orbit = ns.find_orbit(ns.models.discontinuous_support(**p), start=at["section"].values, period_number=1,
-                              transient=0) if kind == "flip" else None  # fmt: skip
+        orbit = (
+            ns.find_orbit(
+                ns.models.discontinuous_support(**p), start=at["section"].values, period_number=1, transient=0
+            )
+            if kind == "flip"
+            else None
+        )
         if orbit is None:
             continue
         found = closed.special(kind, p, "omega", 1, orbit.u, orbit.crossing_times, False)

@@ -20,7 +20,7 @@ def logistic() -> ns.Map:
 def diagram(depth: int, max_period: int, system: Any = None, limits: tuple[float, float] = (2.9, 3.5)) -> Any:
     return ns.bifurcation_diagram(
         system or logistic(), "r", limits, n=31, start={"x": 0.4}, depth=depth, max_period=max_period, progress=False
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(("depth", "parents"), [(0, [-1, -1, -1]), (1, [-1, 0, -1]), (2, [-1, 0, 1])])
@@ -48,13 +48,16 @@ def test_a_longer_orbit_beside_a_branch_is_another_branch() -> None:
         return lambda u, p: (100 * p.r - side * 0.5 - 0.3 * (u.x - 100 * p.r - side * 0.5),)
 
     system = ns.Map(
-        states=["x"], parameters={"r": 1.0}, scale={"x": 100.0},
+        states=["x"],
+        parameters={"r": 1.0},
+        scale={"x": 100.0},
         branches=[
-            ns.Branch(outside(-1), when="low < 0 and high < 0"), ns.Branch(inside, when="low > 0 and high < 0"),
+            ns.Branch(outside(-1), when="low < 0 and high < 0"),
+            ns.Branch(inside, when="low > 0 and high < 0"),
             ns.Branch(outside(1), when="low > 0 and high > 0"),
         ],
         indicators={"low": lambda u, p: u.x - 100 * p.r + 0.25, "high": lambda u, p: u.x - 100 * p.r - 0.25},
-    )  # fmt: skip
+    )
     found = ns.bifurcation_diagram(
         system, "r", (1.0, 2.0), n=21, start={"x": 100.0}, depth=0, max_period=2, progress=False
     )
@@ -68,8 +71,9 @@ def test_a_longer_orbit_beside_a_branch_is_another_branch() -> None:
 @pytest.mark.parametrize(("a", "b"), [(0.995, 2.0), (2.0, 0.995), (0.998, 0.997), (0.997, 0.998)])
 def test_a_curve_that_leaves_by_a_corner_ends_at_the_nearer_edge(a: float, b: float) -> None:
     """x -> x + a - b - x^2 has its folds at a = b: the curve ends where the first of both is at its edge."""
-    system = ns.Map(states=["x"], parameters={"a": 0.5, "b": 0.4}, branches=[
-        ns.Branch(lambda u, p: (u.x + p.a - p.b - u.x**2,))])  # fmt: skip
+    system = ns.Map(
+        states=["x"], parameters={"a": 0.5, "b": 0.4}, branches=[ns.Branch(lambda u, p: (u.x + p.a - p.b - u.x**2,))]
+    )
     branch = ns.continue_orbit(ns.find_orbit(system, start={"x": 0.3}, progress=False), "a", (0.2, 0.8))
     table = ns.special_points(branch)
     fold = table.isel(special=int(np.flatnonzero(table["kind"].values == "fold")[0]))

@@ -15,7 +15,8 @@ pytestmark = pytest.mark.physics
 
 def coulomb(w: float, F: float) -> ns.System:
     return ns.System(
-        states=["x", "v"], parameters={"w": w, "F": F},
+        states=["x", "v"],
+        parameters={"w": w, "F": F},
         modes={
             "forward": lambda t, u, p: (u.v, np.cos(p.w * t) - u.x - p.F),
             "backward": lambda t, u, p: (u.v, np.cos(p.w * t) - u.x + p.F),
@@ -34,7 +35,7 @@ def coulomb(w: float, F: float) -> ns.System:
             ns.Transition("stick", "forward", when="push > 0"),
             ns.Transition("stick", "backward", when="pull < 0"),
         ],
-    )  # fmt: skip
+    )
 
 
 def by_surface(w: float, F: float) -> ns.System:

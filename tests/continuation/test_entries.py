@@ -21,9 +21,14 @@ W = mpf(1) / 5
 
 def by_element(F: float) -> ns.System:
     return ns.mechanical(
-        1.0, 0.0, 1.0, parameters={"w": 0.2, "F": F}, forcing={"q": lambda t, p: np.cos(p.w * t)},
-        elements={"f": ns.elements.Coulomb(at="q", friction="F")}, coordinates=["q"],
-    )  # fmt: skip
+        1.0,
+        0.0,
+        1.0,
+        parameters={"w": 0.2, "F": F},
+        forcing={"q": lambda t, p: np.cos(p.w * t)},
+        elements={"f": ns.elements.Coulomb(at="q", friction="F")},
+        coordinates=["q"],
+    )
 
 
 def by_surface(F: float) -> ns.System:
@@ -91,9 +96,15 @@ def test_sliding_bifurcations_of_elements_and_surfaces(v_b: float) -> None:
         Belt(*case).without_contact(),
     ]
     element = ns.mechanical(
-        1.0, 0.04, 1.0, parameters={"v_b": v_b}, forcing={"q": lambda t, p: np.cos(0.8 * t)}, coordinates=["q"],
-        period=2 * np.pi / 0.8, elements={"f": ns.elements.Coulomb(at="q", friction=0.3, belt="v_b")},
-    )  # fmt: skip
+        1.0,
+        0.04,
+        1.0,
+        parameters={"v_b": v_b},
+        forcing={"q": lambda t, p: np.cos(0.8 * t)},
+        coordinates=["q"],
+        period=2 * np.pi / 0.8,
+        elements={"f": ns.elements.Coulomb(at="q", friction=0.3, belt="v_b")},
+    )
     for system in (element, ns.models.dry_friction_oscillator(omega=0.8, zeta=0.02, f_k=0.3, f_s=0.3, v_b=v_b)):
         special = ns.special_points(ns.continue_orbit(ns.find_orbit(system), "v_b", (0.05, 3.0)))
         assert special["sliding"].values.tolist() == ["crossing_sliding", "switching_sliding", "grazing_sliding"]
@@ -177,8 +188,14 @@ def test_a_crossing_that_has_just_passed_the_section() -> None:
     """An elastic contact that begins at the section of an orbit begun one forcing period later is no end of the branch.
 
     The branch ends where the orbit of half its period flips, from whichever period it is begun."""
-    values = {"z": 0.3321063608543215, "s": 1.9544936727092173, "b": 1.6471896040241403, "g": 0.3014006099471556,
-              "e": 0.35455152724094197, "k": 1.9928910656372831}  # fmt: skip
+    values = {
+        "z": 0.3321063608543215,
+        "s": 1.9544936727092173,
+        "b": 1.6471896040241403,
+        "g": 0.3014006099471556,
+        "e": 0.35455152724094197,
+        "k": 1.9928910656372831,
+    }
     system = templates._two_stops().with_parameters(values)
     first = ns.find_orbit(system.with_parameters(w=1.7414550305132799), period_number=2, progress=False)
     branch = ns.continue_orbit(first, "w", (0.4, 3.0))
@@ -199,12 +216,13 @@ def test_a_flip_right_behind_a_corner(begun: float) -> None:
     The first orbit found behind the border lies beyond that flip, and the map has no values on the other side."""
     lam, d = 0.15, 3e-4
     slight = ns.Map(
-        states=["x"], parameters={"mu": begun, "d": d},
+        states=["x"],
+        parameters={"mu": begun, "d": d},
         branches=[
             ns.Branch(lambda u, p: (lam * u.x + p.mu,), when="x < 0"),
             ns.Branch(lambda u, p: (lam * u.x + p.mu - p.d * np.sqrt(u.x),), when="x > 0"),
         ],
-    )  # fmt: skip
+    )
     root = (np.sqrt(d * d + 4 * (1 - lam) * abs(begun)) - d) / (2 * (1 - lam))
     start = begun / (1 - lam) if begun < 0 else root**2
     orbit = ns.find_orbit(slight, start=[float(start)], period_number=1, transient=0, progress=False)

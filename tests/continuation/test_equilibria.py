@@ -67,21 +67,27 @@ def hinge() -> ns.System:
         return p.mu - 2 * x, -y
 
     return ns.System(
-        name="hinge", states=["x", "y"], parameters={"mu": -0.5}, modes={"below": below, "above": above},
+        name="hinge",
+        states=["x", "y"],
+        parameters={"mu": -0.5},
+        modes={"below": below, "above": above},
         indicators={"side": lambda t, u, p: u.x},
         transitions=[
-            ns.Transition("below", "above", when="side > 0"), ns.Transition("above", "below", when="side < 0"),
+            ns.Transition("below", "above", when="side > 0"),
+            ns.Transition("above", "below", when="side < 0"),
         ],
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(("power", "kind"), [(2, "transcritical"), (3, "pitchfork")])
 def test_crossings_of_equilibria(power: int, kind: str) -> None:
     """x' = mu x - x^n: x = 0 is crossed at mu = 0 by mu = x^(n - 1)."""
     system = ns.System(
-        name="crossing", states=["x"], parameters={"mu": -0.5},
+        name="crossing",
+        states=["x"],
+        parameters={"mu": -0.5},
         modes={"one": lambda t, u, p: (p.mu * u.x - u.x**power,)},
-    )  # fmt: skip
+    )
     special = ns.special_points(ns.continue_equilibrium(system, "mu", (-1.0, 1.0)))
     assert special["kind"].values.tolist() == [kind]
     assert float(special["mu"][0]) == pytest.approx(0.0, abs=1e-12)

@@ -95,8 +95,9 @@ def test_multipliers_just_past_the_graze(side: str) -> None:
     depth = branch["maximum"].sel(state="x").values - g
     order = [int(k) for k in np.flatnonzero(contact & (depth > 0) & (depth < 3e-8))]
     near = [k for k in order if abs(float(branch["omega"][k]) - graze_at) < 1e-3]
-    errors = np.array([np.abs(sorted_by_imag(branch["floquet_multipliers"].values[k]) - sorted_by_imag(limit)).max()
-                       for k in near])  # fmt: skip
+    errors = np.array(
+        [np.abs(sorted_by_imag(branch["floquet_multipliers"].values[k]) - sorted_by_imag(limit)).max() for k in near]
+    )
     depths = depth[near]
     shallow = depths < 1.2e-10
     assert shallow.any() and errors[shallow].max() < 1e-2

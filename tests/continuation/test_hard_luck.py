@@ -180,11 +180,14 @@ def test_wrong_arguments(arguments: tuple[object, ...], words: str) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"range": 3.0}, "two ends"), ({"range": (0.5, 1.5, 2.0)}, "two ends"), ({"range": (2.0, 0.5)}, "below"),
-        ({"range": (2.0, 3.0)}, "the system lies at a = 1.0, outside"), ({"step": 0}, "must be at least"),
+        ({"range": 3.0}, "two ends"),
+        ({"range": (0.5, 1.5, 2.0)}, "two ends"),
+        ({"range": (2.0, 0.5)}, "below"),
+        ({"range": (2.0, 3.0)}, "the system lies at a = 1.0, outside"),
+        ({"step": 0}, "must be at least"),
         ({"step": -0.1}, "must be at least"),
     ],
-)  # fmt: skip
+)
 def test_wrong_arguments_of_an_equilibrium(options: dict[str, Any], words: str) -> None:
     system = ns.System(states=["x"], parameters={"a": 1.0}, modes={"one": lambda t, u, p: p.a - u.x * u.x})
     with pytest.raises(ValueError, match=words):
@@ -201,7 +204,7 @@ def test_wrong_arguments_of_an_equilibrium(options: dict[str, Any], words: str) 
         ({"omega": (3.9, 5.0)}, {}, "two parameters"),
         ({"omega": (3.9, 5.0), "rho": (0.1, 0.3)}, {"step": 0}, "must be at least"),
     ],
-)  # fmt: skip
+)
 def test_wrong_arguments_of_a_curve(ranges: Any, options: dict[str, Any], words: str, flip: xr.Dataset) -> None:
     with pytest.raises(ValueError, match=words):
         ns.continue_curve(flip, ranges, **options)

@@ -20,14 +20,19 @@ def speed_squared(slope: float) -> float:
 
 def rimless_wheel(slope: float) -> ns.System:
     return ns.System(
-        states=["theta", "omega"], parameters={"slope": slope, "alpha": ALPHA},
+        states=["theta", "omega"],
+        parameters={"slope": slope, "alpha": ALPHA},
         modes={"stance": lambda t, u, p: (u.omega, np.sin(u.theta))},
         indicators={"heel": lambda t, u, p: u.theta - p.slope - p.alpha},
         transitions=[
-            ns.Transition("stance", "stance", when="heel > 0",
-                          reset=lambda t, u, p: (p.slope - p.alpha, u.omega * np.cos(2 * p.alpha))),
+            ns.Transition(
+                "stance",
+                "stance",
+                when="heel > 0",
+                reset=lambda t, u, p: (p.slope - p.alpha, u.omega * np.cos(2 * p.alpha)),
+            ),
         ],
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("slope", [0.1, 0.2])

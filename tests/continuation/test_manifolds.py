@@ -20,12 +20,15 @@ A, B = 1.4, 0.3
 def henon() -> ns.System:
     """x, y stand still (k = 0) and jump by the Henon map in the middle of every period."""
     return ns.System(
-        states=["x", "y"], parameters={"a": A, "b": B, "k": 0.0},
-        modes={"still": lambda t, u, p: (p.k * u.x, p.k * u.y)}, scale={"x": 1000.0, "y": 1000.0},
-        transitions=[ns.Transition("still", "still", at=0.5,
-                                   reset=lambda t, u, p: (1.0 - p.a * u.x**2 + u.y, p.b * u.x))],
+        states=["x", "y"],
+        parameters={"a": A, "b": B, "k": 0.0},
+        modes={"still": lambda t, u, p: (p.k * u.x, p.k * u.y)},
+        scale={"x": 1000.0, "y": 1000.0},
+        transitions=[
+            ns.Transition("still", "still", at=0.5, reset=lambda t, u, p: (1.0 - p.a * u.x**2 + u.y, p.b * u.x))
+        ],
         period=lambda p: 1.0 + 0.0 * p.k,
-    )  # fmt: skip
+    )
 
 
 def henon_map(p: np.ndarray) -> np.ndarray:
@@ -123,10 +126,11 @@ def linear() -> ns.System:
     M = V @ np.diag([0.3, -0.7]) @ np.linalg.inv(V)
     a, b, c, d = map(float, M.ravel())
     return ns.System(
-        states=["x", "y"], parameters={"w": 2.0},
+        states=["x", "y"],
+        parameters={"w": 2.0},
         modes={"only": lambda t, u, p: (a * u.x + b * u.y + np.cos(p.w * t), c * u.x + d * u.y)},
         period=lambda p: 2 * np.pi / p.w,
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(("kind", "direction"), [("unstable", (1.0, 1.0)), ("stable", (1.0, -2.0))])

@@ -16,9 +16,12 @@ pytestmark = pytest.mark.physics
 def kicked(states: list[str], values: dict[str, float], kick: Callable[..., Any]) -> ns.System:
     """States at rest but for a reset in the middle of every period of length 1."""
     return ns.System(
-        states=states, parameters=values, modes={"rest": lambda t, u, p: tuple(0 * x for x in u)}, period=1.0,
+        states=states,
+        parameters=values,
+        modes={"rest": lambda t, u, p: tuple(0 * x for x in u)},
+        period=1.0,
         transitions=[ns.Transition("rest", "rest", at=0.5, reset=kick)],
-    )  # fmt: skip
+    )
 
 
 def logistic(r: float) -> ns.System:
@@ -31,9 +34,14 @@ def henon(a: float) -> ns.System:
 
 @pytest.mark.parametrize(
     ("r", "period_number", "multiplier"),
-    [(2.99, 1, -0.99), (2.999, 1, -0.999), (2.9999, 1, -0.9999), (3.001, 2, 4 + 2 * 3.001 - 3.001**2),
-     (3.449, 2, 4 + 2 * 3.449 - 3.449**2)],
-)  # fmt: skip
+    [
+        (2.99, 1, -0.99),
+        (2.999, 1, -0.999),
+        (2.9999, 1, -0.9999),
+        (3.001, 2, 4 + 2 * 3.001 - 3.001**2),
+        (3.449, 2, 4 + 2 * 3.449 - 3.449**2),
+    ],
+)
 def test_the_period_near_a_flip(r: float, period_number: int, multiplier: float) -> None:
     """A motion that settles slowly returns better after two periods, or 24, than after its own one."""
     orbit = ns.find_orbit(logistic(r), start={"x": 0.3})
@@ -67,9 +75,12 @@ def test_modes_that_alternate(phase: float) -> None:
         return lambda t, u, p: (-rate * u.x, p.A * np.cos(2 * np.pi * t) - 2 * rate * u.y)
 
     system = ns.System(
-        states=["x", "y"], parameters={"A": 0.0}, modes={"slow": decay(1.0), "fast": decay(3.0)}, period=1.0,
+        states=["x", "y"],
+        parameters={"A": 0.0},
+        modes={"slow": decay(1.0), "fast": decay(3.0)},
+        period=1.0,
         transitions=[ns.Transition("slow", "fast", at=phase), ns.Transition("fast", "slow", at=phase)],
-    )  # fmt: skip
+    )
     orbit = ns.find_orbit(system, start={"x": 1.0})
     assert orbit.period_number == 2
     assert orbit.floquet_multipliers == pytest.approx([np.exp(-4.0), np.exp(-8.0)], abs=1e-12)

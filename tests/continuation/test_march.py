@@ -99,8 +99,11 @@ def test_a_circle_closes_with_two_folds() -> None:
     found = run(circle(), -0.8, 0.6, 1.0, closes=True)
     assert found.ending == "closed"
     assert sorted((one.kind, round(one.point.value)) for one in found.special) == [
-        ("fold", -1), ("fold", 1), ("zero", -1), ("zero", 1),
-    ]  # fmt: skip
+        ("fold", -1),
+        ("fold", 1),
+        ("zero", -1),
+        ("zero", 1),
+    ]
     for one in found.special:
         assert one.point.X == pytest.approx([0.0, np.sign(one.point.value)], abs=1e-9)
     X = np.array([row.point.X for row in found.rows])
@@ -135,8 +138,10 @@ class TwiceRound(Plane):
         rho, r = np.hypot(x, y), self.r
         a, c, s = rho - 1.0, x / rho, y / rho
         F = np.array([a * a - z * z - r * r * c, 2 * a * z - r * r * s]) / r**2
-        rows = [[2 * a * c - r * r * s * s / rho, -2 * z, 2 * a * s + r * r * s * c / rho],
-                [2 * z * c + r * r * s * c / rho, 2 * a, 2 * z * s - r * r * c * c / rho]]  # fmt: skip
+        rows = [
+            [2 * a * c - r * r * s * s / rho, -2 * z, 2 * a * s + r * r * s * c / rho],
+            [2 * z * c + r * r * s * c / rho, 2 * a, 2 * z * s - r * r * c * c / rho],
+        ]
         return Solved(Y, F, np.array(rows) / r**2)
 
     def margins(self, point: Point) -> Array:
@@ -269,12 +274,16 @@ def test_nothing_lands_at_the_section() -> None:
     found = []
     for phase in (0.0, 1.0):
         system = ns.mechanical(
-            1.0, 0.2, 1.0, parameters={"w": 0.8, "s": phase}, forcing={"q": lambda t, p: np.cos(p.w * t + p.s)},
+            1.0,
+            0.2,
+            1.0,
+            parameters={"w": 0.8, "s": phase},
+            forcing={"q": lambda t, p: np.cos(p.w * t + p.s)},
             elements={
                 "wall": ns.elements.Stop(at="q", position=0.5, restitution=0.6),
                 "spring": ns.elements.ElasticStop(at="q", position=-3.0, side=-1, stiffness=2.0),
             },
-        )  # fmt: skip
+        )
         curve, X = curve_of(ns.find_orbit(system, progress=False), "w", 1.0)
         path = curve.walk.along(curve.shooting.evaluate(X), curve.shooting.split(X)[1].copy())
         found.append(path.margins[1:])

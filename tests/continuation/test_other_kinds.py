@@ -66,13 +66,16 @@ def clutch(**parameters: float) -> ns.System:
         return v, p.A * np.cos(t) - 0.4 * v - 2.0 * x - 3.0 * (x - 1.0)
 
     system = ns.System(
-        name="clutch", states=["x", "v"], parameters={"A": 1.3, "c": 0.5}, modes={"free": free, "engaged": engaged},
+        name="clutch",
+        states=["x", "v"],
+        parameters={"A": 1.3, "c": 0.5},
+        modes={"free": free, "engaged": engaged},
         indicators={"beyond": lambda t, u, p: u.x - 1.0, "slow": lambda t, u, p: p.c - u.v},
         transitions=[
             ns.Transition("free", "engaged", when="beyond > 0 and slow > 0"),
             ns.Transition("engaged", "free", when="beyond < 0"),
         ],
-    )  # fmt: skip
+    )
     return system.with_parameters(parameters)
 
 
@@ -144,9 +147,12 @@ def test_transcritical_of_the_logistic_map() -> None:
 def test_a_reset_at_a_phase_counts_where_it_changes_nothing(r: float, period_number: int, multiplier: float) -> None:
     """The logistic map as a kick: 2 - r at its fixed point, 4 + 2 r - r^2 on its cycle of two."""
     system = ns.System(
-        states=["x"], parameters={"r": r}, modes={"rest": lambda t, u, p: 0 * u.x}, period=1.0,
+        states=["x"],
+        parameters={"r": r},
+        modes={"rest": lambda t, u, p: 0 * u.x},
+        period=1.0,
         transitions=[ns.Transition("rest", "rest", at=0.5, reset=lambda t, u, p: p.r * u.x * (1 - u.x))],
-    )  # fmt: skip
+    )
     orbit = ns.find_orbit(system, start={"x": 0.3})
     assert orbit.period_number == period_number
     assert orbit.floquet_multipliers == pytest.approx([multiplier], abs=1e-12)

@@ -53,11 +53,14 @@ def figure_17() -> xr.Dataset:
 
 CASES: dict[str, tuple[float, float, dict[str, float]]] = {
     # rho, g, and the fold or flip beside each grazing point that heyoka found
-    "figure_9": (0.14, 0.02, {"upper": known.FOLDS["figure 9 upper"],
-                              "lower": known.FLIPS_NEAR_GRAZING["figure 9 lower"]}),
+    "figure_9": (
+        0.14,
+        0.02,
+        {"upper": known.FOLDS["figure 9 upper"], "lower": known.FLIPS_NEAR_GRAZING["figure 9 lower"]},
+    ),
     "figure_10": (0.16, 0.0145, {"upper": known.FOLDS["figure 10 upper"], "lower": known.FOLDS["figure 10 small"]}),
     "figure_17": (0.23, 0.0036, {"upper": known.FLIPS_NEAR_GRAZING["figure 17"]}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("figure", CASES)
@@ -82,8 +85,10 @@ def test_grazing_points_and_what_stands_beside_them(figure: str, request: pytest
         assert min(abs(found - graze) for graze in exact) < 4e-4
 
 
-@pytest.mark.parametrize(("figure", "kind", "count"), [("figure_9", "fold", 2), ("figure_9", "flip", 2),
-                                                       ("figure_10", "fold", 4), ("figure_17", "flip", 2)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("figure", "kind", "count"),
+    [("figure_9", "fold", 2), ("figure_9", "flip", 2), ("figure_10", "fold", 4), ("figure_17", "flip", 2)],
+)
 def test_folds_and_flips_against_the_closed_form(
     figure: str, kind: str, count: int, request: pytest.FixtureRequest
 ) -> None:
@@ -126,9 +131,13 @@ CASCADES: dict[str, tuple[str, Callable[[], xr.Dataset]]] = {
 }
 
 
-@pytest.mark.parametrize("figure", [
-    "figure 13", *(pytest.param(name, marks=pytest.mark.slow) for name in ("figure 11", "figure 17")),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "figure",
+    [
+        "figure 13",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("figure 11", "figure 17")),
+    ],
+)
 def test_period_doublings(figure: str) -> None:
     """The first four flips, each on the branch that leaves the one before; the first two against the closed form."""
     name, begin = CASCADES[figure]

@@ -95,9 +95,13 @@ def duffing_map(omega: float, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     def field(t: float, y: np.ndarray, force: float) -> list[float]:
         stiffness = 1.0 + 3.0 * y[0] ** 2
         return [
-            y[1], force - 0.2 * y[1] - y[0] - y[0] ** 3,
-            y[4], y[5], -0.2 * y[4] - stiffness * y[2], -0.2 * y[5] - stiffness * y[3],
-        ]  # fmt: skip
+            y[1],
+            force - 0.2 * y[1] - y[0] - y[0] ** 3,
+            y[4],
+            y[5],
+            -0.2 * y[4] - stiffness * y[2],
+            -0.2 * y[5] - stiffness * y[3],
+        ]
 
     half, y = np.pi / omega, np.array([*u, 1.0, 0.0, 0.0, 1.0])
     for force in (-26.0, 26.0):

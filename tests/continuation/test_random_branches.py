@@ -109,9 +109,12 @@ def test_square_root_map_behind_its_border(lam: float, begun: float) -> None:
         return np.where(mu > 0, root**2, mu / (1 - lam))
 
     orbit = ns.find_orbit(
-        ns.models.square_root_map(lam=lam, mu=begun), start=[float(fixed(begun))], period_number=1, transient=0,
+        ns.models.square_root_map(lam=lam, mu=begun),
+        start=[float(fixed(begun))],
+        period_number=1,
+        transient=0,
         progress=False,
-    )  # fmt: skip
+    )
     branch = ns.continue_orbit(orbit, "mu", (-0.1, 0.3))
     assert endings(branch) == ["range", "range"]
     assert branch["section"].values[:, 0] == pytest.approx(fixed(branch["mu"].values), abs=1e-11)

@@ -54,9 +54,13 @@ def test_a_force_beyond_the_stop_from_the_first() -> None:
 def test_a_slipping_equilibrium_on_a_belt() -> None:
     """The belt drags forward with the friction: 2 q = mu, whichever mode comes first."""
     belt = ns.mechanical(
-        1.0, 0.1, 2.0, parameters={"vd": 0.3}, elements={"f": E.Coulomb(at="q", friction=MU, belt="vd")},
+        1.0,
+        0.1,
+        2.0,
+        parameters={"vd": 0.3},
+        elements={"f": E.Coulomb(at="q", friction=MU, belt="vd")},
         coordinates=["q"],
-    )  # fmt: skip
+    )
     branch = ns.continue_equilibrium(belt, "vd", (0.1, 1.0))
     assert branch["u"].values[:, 0] == pytest.approx(MU / 2.0, abs=1e-12)
     for mode in ("f_stick", "f_forward"):
@@ -85,20 +89,23 @@ def test_friction_before_a_stop() -> None:
     assert branch["u_upper"].values[:, 0] == pytest.approx(np.minimum((P + MU) / 2, 1.0), abs=1e-9)
     assert branch["u_lower"].values[:, 0] == pytest.approx(np.minimum((P - MU) / 2, 1.0), abs=1e-9)
     assert boundaries(branch) == [
-        ("persistence", pytest.approx(2.0 - MU, abs=1e-9)), ("persistence", pytest.approx(2.0 + MU, abs=1e-9)),
-    ]  # fmt: skip
+        ("persistence", pytest.approx(2.0 - MU, abs=1e-9)),
+        ("persistence", pytest.approx(2.0 + MU, abs=1e-9)),
+    ]
 
 
 def test_two_equilibria_that_vanish_at_a_boundary() -> None:
     """x' = mu + x below 0 and mu - x above: x = -mu and x = mu, both for mu > 0 only: a non-smooth fold."""
     system = ns.System(
-        states=["x"], parameters={"mu": 0.5},
+        states=["x"],
+        parameters={"mu": 0.5},
         modes={"below": lambda t, u, p: (p.mu + u.x,), "above": lambda t, u, p: (p.mu - u.x,)},
         indicators={"side": lambda t, u, p: u.x},
         transitions=[
-            ns.Transition("below", "above", when="side > 0"), ns.Transition("above", "below", when="side < 0"),
+            ns.Transition("below", "above", when="side > 0"),
+            ns.Transition("above", "below", when="side < 0"),
         ],
-    )  # fmt: skip
+    )
     branch = ns.continue_equilibrium(system, "mu", (-1.0, 1.0), start={"x": -0.4})
     special = ns.special_points(branch)
     assert special["boundary"].values.tolist() == ["non_smooth_fold"]
@@ -110,9 +117,13 @@ def test_two_frictions_are_followed_by_their_extreme_points() -> None:
     """K q = P e_1 + lambda_1 (1, 0) + lambda_2 (0, 1): the extent is |K^-1| times the bounds, about K^-1 P e_1."""
     stiffness, bounds = np.array([[3.0, -1.0], [-1.0, 2.0]]), np.array([0.5, 0.3])
     system = ns.mechanical(
-        np.diag([1.0, 2.0]), 0.1 * np.eye(2), stiffness, parameters={"P": 0.0}, forcing={"q1": lambda t, p: p.P},
+        np.diag([1.0, 2.0]),
+        0.1 * np.eye(2),
+        stiffness,
+        parameters={"P": 0.0},
+        forcing={"q1": lambda t, p: p.P},
         elements={"f": E.Coulomb(at="q1", friction=bounds[0]), "g": E.Coulomb(at="q2", friction=bounds[1])},
-    )  # fmt: skip
+    )
     branch = ns.continue_equilibrium(system, "P", (-1.0, 2.0))
     whole(branch, -1.0, 2.0)
     inverse = np.linalg.inv(stiffness)
@@ -127,9 +138,12 @@ def test_another_extreme_point_is_no_boundary() -> None:
     """The coupling c changes its sign, and with it the corner at which q1 is largest: (3 m + |c| n) / (6 - c^2)."""
     m, n = 0.5, 0.4
     system = ns.mechanical(
-        np.eye(2), 0.1 * np.eye(2), lambda p: [[2.0, p.c], [p.c, 3.0]], parameters={"c": -1.0},
+        np.eye(2),
+        0.1 * np.eye(2),
+        lambda p: [[2.0, p.c], [p.c, 3.0]],
+        parameters={"c": -1.0},
         elements={"f": E.Coulomb(at="q1", friction=m), "g": E.Coulomb(at="q2", friction=n)},
-    )  # fmt: skip
+    )
     branch = ns.continue_equilibrium(system, "c", (-1.5, 1.5))
     c = branch["c"].values
     assert c[[0, -1]] == pytest.approx([-1.5, 1.5])
@@ -141,9 +155,14 @@ def test_a_set_that_runs_into_another() -> None:
     """k < 0: beyond |P + |k| q| <= mu the stop at g holds the mass too; both are one where P + mu = |k| g."""
     k, mu, g = 0.5, 0.4, 1.0
     system = ns.mechanical(
-        1.0, 0.1, -k, parameters={"P": 0.5}, forcing={"q": lambda t, p: p.P}, coordinates=["q"],
+        1.0,
+        0.1,
+        -k,
+        parameters={"P": 0.5},
+        forcing={"q": lambda t, p: p.P},
+        coordinates=["q"],
         elements={"f": E.Coulomb(at="q", friction=mu), "s": E.Stop(at="q", position=g)},
-    )  # fmt: skip
+    )
     branch = ns.continue_equilibrium(system, "P", (-0.6, 0.6), start={"q": g})
     ((name, P),) = boundaries(branch)
     assert name == "persistence" and pytest.approx(mu - k * g, abs=1e-7) == P
@@ -158,9 +177,11 @@ def test_a_set_that_runs_into_another() -> None:
 def test_a_pendulum_with_friction() -> None:
     """|T - sin q| <= mu about q = 0: asin(T - mu) to asin(T + mu), up to where one end turns."""
     pendulum = ns.System(
-        states=["q", "v"], parameters={"T": 0.2}, modes={"swing": lambda t, u, p: (u.v, p.T - np.sin(u.q))},
+        states=["q", "v"],
+        parameters={"T": 0.2},
+        modes={"swing": lambda t, u, p: (u.v, p.T - np.sin(u.q))},
         elements={"f": E.Coulomb(speed=lambda t, u, p: u.v, on={"v": 1.0}, friction=MU)},
-    )  # fmt: skip
+    )
     branch = ns.continue_equilibrium(pendulum, "T", (-0.45, 0.45))
     whole_range = branch["T"].values[[0, -1]]
     assert whole_range == pytest.approx([-0.45, 0.45])
@@ -171,9 +192,14 @@ def test_a_pendulum_with_friction() -> None:
 def test_a_mass_that_is_pulled_away() -> None:
     """Without a spring it stands anywhere as long as |P| <= mu."""
     system = ns.mechanical(
-        1.0, 0.1, 0.0, parameters={"P": 0.1}, forcing={"q": lambda t, p: p.P}, coordinates=["q"],
+        1.0,
+        0.1,
+        0.0,
+        parameters={"P": 0.1},
+        forcing={"q": lambda t, p: p.P},
+        coordinates=["q"],
         elements={"f": E.Coulomb(at="q", friction=MU)},
-    )  # fmt: skip
+    )
     branch = ns.continue_equilibrium(system, "P", (-1.0, 1.0), start={"q": 0.7})
     assert branch["P"].values[[0, -1]] == pytest.approx([-MU, MU], abs=1e-9)
     assert np.isinf(branch["u_upper"].values[:, 0]).all()
@@ -186,9 +212,14 @@ def test_friction_between_two_walls(impacts: str) -> None:
     end."""
     walls = {"up": ns.elements.Stop(at="q", position=1.0), "down": ns.elements.Stop(at="q", position=-1.0, side=-1)}
     system = ns.mechanical(
-        1.0, 0.1, 1.0, parameters={"F": 0.0, "mu": 0.2}, forcing={"q": "F"}, impacts=impacts,
+        1.0,
+        0.1,
+        1.0,
+        parameters={"F": 0.0, "mu": 0.2},
+        forcing={"q": "F"},
+        impacts=impacts,
         elements={"friction": ns.elements.Coulomb(at="q", friction="mu"), **walls},
-    )  # fmt: skip
+    )
     branch = ns.continue_equilibrium(system, "F", (-1.5, 1.5))
     for side, sign in (("lower", -1.0), ("upper", 1.0)):
         ends = np.clip(branch.F + sign * 0.2, -1.0, 1.0)
@@ -200,9 +231,16 @@ def test_friction_between_two_walls(impacts: str) -> None:
     found = ns.basin_fractions(system, "F", forces, box=box, n_starts=20, section=section, progress=False)
     np.testing.assert_array_equal(found.fraction, 1.0)
     swept = ns.sweep(
-        system, "F", forces, direction=None, start={"q": 0.3, "v_q": 0.5}, section=section, transient=20, keep=10,
+        system,
+        "F",
+        forces,
+        direction=None,
+        start={"q": 0.3, "v_q": 0.5},
+        section=section,
+        transient=20,
+        keep=10,
         progress=False,
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(swept.equilibrium_minimum.sel(state="q"), [-0.1, 0.7, 1.0], atol=1e-9)
     np.testing.assert_allclose(swept.equilibrium_maximum.sel(state="q"), [0.3, 1.0, 1.0], atol=1e-9)
 
@@ -225,8 +263,9 @@ def test_equal_systems_number_their_modes_themselves() -> None:
         elements = {
             "friction": ns.elements.Coulomb(at="q", friction=0.2),
             "soft": ns.elements.ElasticStop(at="q", position=0.5, stiffness=2.0),
-            "up": ns.elements.Stop(at="q", position=1.0), "down": ns.elements.Stop(at="q", position=-1.0, side=-1),
-        }  # fmt: skip
+            "up": ns.elements.Stop(at="q", position=1.0),
+            "down": ns.elements.Stop(at="q", position=-1.0, side=-1),
+        }
         system = ns.mechanical(
             1.0, 0.1, 1.0, parameters={"F": 0.0}, forcing={"q": "F"}, impacts="sequential", elements=elements
         )
@@ -244,9 +283,13 @@ def test_equal_systems_number_their_modes_themselves() -> None:
 def test_what_stands_moves_in_steps_of_its_place() -> None:
     """One mass dragged by a belt to mu / k while the other moves: no range of motion says how far it goes."""
     system = ns.mechanical(
-        np.eye(2), 0.2 * np.eye(2), np.eye(2), parameters={"mu": 2.0, "w": 0.8},
-        forcing={"q1": lambda t, p: np.cos(p.w * t)}, elements={"rub": E.Coulomb(at="q2", friction="mu", belt=1.0)},
-    )  # fmt: skip
+        np.eye(2),
+        0.2 * np.eye(2),
+        np.eye(2),
+        parameters={"mu": 2.0, "w": 0.8},
+        forcing={"q1": lambda t, p: np.cos(p.w * t)},
+        elements={"rub": E.Coulomb(at="q2", friction="mu", belt=1.0)},
+    )
     branch = ns.continue_orbit(ns.find_orbit(system, start={"q2": 2.0}), "mu", (1.0, 3.0))
     assert branch.section.sel(state="q2").values == pytest.approx(branch.mu.values, abs=1e-12)
     assert [branch.mu.values.min(), branch.mu.values.max()] == pytest.approx([1.0, 3.0])

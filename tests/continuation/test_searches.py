@@ -20,27 +20,30 @@ QUIET = {"progress": False}
 def beyond_one(growth: float) -> ns.System:
     """A saddle at 0; beyond x = 1 the equilibrium 1.5 with the eigenvalues growth / 2 +- i sqrt(1 - growth^2 / 4)."""
     return ns.System(
-        states=["x", "v"], parameters={"growth": growth},
+        states=["x", "v"],
+        parameters={"growth": growth},
         modes={"near": lambda t, u, p: (u.v, u.x), "far": lambda t, u, p: (u.v, p.growth * u.v - (u.x - 1.5))},
         indicators={"beyond": lambda t, u, p: u.x - 1},
         transitions=[ns.Transition("near", "far", when="beyond > 0"), ns.Transition("far", "near", when="beyond < 0")],
-    )  # fmt: skip
+    )
 
 
 def undamped(stiffness: float, damping: float = 0.0) -> ns.System:
     return ns.System(
-        states=["x", "v"], parameters={"k": stiffness, "c": damping, "F": 1.0, "omega": 1.0},
+        states=["x", "v"],
+        parameters={"k": stiffness, "c": damping, "F": 1.0, "omega": 1.0},
         modes={"all": lambda t, u, p: (u.v, -p.k * u.x - p.c * u.v + p.F * np.cos(p.omega * t))},
-    )  # fmt: skip
+    )
 
 
 #: Damping that pushes below x = 1 and brakes beyond: a stable cycle.
 CYCLE = ns.System(
-    states=["x", "v"], parameters={"push": 0.2, "brake": 1.0},
+    states=["x", "v"],
+    parameters={"push": 0.2, "brake": 1.0},
     modes={"near": lambda t, u, p: (u.v, p.push * u.v - u.x), "far": lambda t, u, p: (u.v, -p.brake * u.v - u.x)},
     indicators={"beyond": lambda t, u, p: u.x - 1},
     transitions=[ns.Transition("near", "far", when="beyond > 0"), ns.Transition("far", "near", when="beyond < 0")],
-)  # fmt: skip
+)
 
 
 def test_a_start_at_an_unstable_equilibrium_is_named_at_once() -> None:
@@ -95,10 +98,12 @@ def test_an_orbit_of_an_undamped_system_is_neutral_not_unstable() -> None:
 def test_a_family_of_cycles_is_said_to_be_one() -> None:
     """x'' = -x - (x^3 beyond a kink): here a ball that loses nothing; each height has its own period."""
     ball = ns.System(
-        states=["x", "v"], parameters={"weight": 1.0}, modes={"flight": lambda t, u, p: (u.v, -p.weight)},
+        states=["x", "v"],
+        parameters={"weight": 1.0},
+        modes={"flight": lambda t, u, p: (u.v, -p.weight)},
         indicators={"floor": lambda t, u, p: u.x},
         transitions=[ns.Transition("flight", "flight", when="floor < 0", reset=lambda t, u, p: (u.x, -u.v))],
-    )  # fmt: skip
+    )
     with pytest.raises(ns.SolveError, match="a multiplier is 1.*family of orbits") as caught:
         ns.find_orbit(ball, start={"x": 1.0}, **QUIET)
     assert caught.value.status == "neutral"

@@ -130,9 +130,15 @@ def test_a_fast_belt_from_crossing_to_no_contact() -> None:
     grazing = Belt(*case).without_contact()
     same(branch, "v_b", [("crossing_sliding", crossing)])
     branch = ns.continue_orbit(branch, range=(0.05, 3.0))
-    same(branch, "v_b", [
-        ("crossing_sliding", crossing), ("switching_sliding", switching), ("grazing_sliding", grazing),
-    ])  # fmt: skip
+    same(
+        branch,
+        "v_b",
+        [
+            ("crossing_sliding", crossing),
+            ("switching_sliding", switching),
+            ("grazing_sliding", grazing),
+        ],
+    )
     straight_on = ns.continue_orbit(ns.special_points(branch).isel(special=1), "v_b", (2.0, 2.2), virtual=True)
     same(straight_on, "v_b", [("switching_sliding", switching)])
 
@@ -142,14 +148,18 @@ def test_a_slow_belt_from_two_slips_to_no_contact() -> None:
     case = "0.3", "0.05", "0.6"
     branch = friction("v_b", (0.01, 1.5), omega=0.3, zeta=0.05, v_b=0.1, f_k=0.6, f_s=0.6)
     slips, sticks = Belt(*case, BACKWARD, STICK), Belt(*case, STICK, BACKWARD)
-    same(branch, "v_b", [
-        ("adding_sliding", slips.touch(1, FORWARD, 0.105, 19.8, 4.21, 0.89, 9.70, -0.72)),
-        ("adding_sliding", slips.touch(1, BACKWARD, 0.112, 11.8, 3.50, 1.09, 9.31, -0.61)),
-        ("grazing_sliding", slips.touch(0, BACKWARD, 0.159, 9.42, 2.63, 1.29, 13.46, -0.32)),
-        ("adding_sliding", sticks.touch(0, BACKWARD, 0.249, 13.7, 12.49, -0.29, 19.73, 1.51)),
-        ("grazing_sliding", sticks.touch(1, BACKWARD, 0.252, 34.2, 14.82, 0.30, 19.56, 1.49)),
-        ("grazing_sliding", Belt(*case).without_contact()),
-    ])  # fmt: skip
+    same(
+        branch,
+        "v_b",
+        [
+            ("adding_sliding", slips.touch(1, FORWARD, 0.105, 19.8, 4.21, 0.89, 9.70, -0.72)),
+            ("adding_sliding", slips.touch(1, BACKWARD, 0.112, 11.8, 3.50, 1.09, 9.31, -0.61)),
+            ("grazing_sliding", slips.touch(0, BACKWARD, 0.159, 9.42, 2.63, 1.29, 13.46, -0.32)),
+            ("adding_sliding", sticks.touch(0, BACKWARD, 0.249, 13.7, 12.49, -0.29, 19.73, 1.51)),
+            ("grazing_sliding", sticks.touch(1, BACKWARD, 0.252, 34.2, 14.82, 0.30, 19.56, 1.49)),
+            ("grazing_sliding", Belt(*case).without_contact()),
+        ],
+    )
 
 
 def test_den_hartogs_limit_of_motion_without_stops() -> None:
@@ -225,10 +235,14 @@ def test_the_relay_s_adding_and_grazing_sliding() -> None:
     def flows(sigma: Any) -> Any:
         return relay(mpf("0.2"), mpf(10), sigma)
 
-    same(branch, "sigma", [
-        ("adding_sliding", relay_adding(flows, lambda p: p, 1.58, 3.70, 1.97, 1.13, 0.09)),
-        ("grazing_sliding", relay_grazing(flows, 1.59, 3.73, 2.16, 0.94, 2.02)),
-    ])  # fmt: skip
+    same(
+        branch,
+        "sigma",
+        [
+            ("adding_sliding", relay_adding(flows, lambda p: p, 1.58, 3.70, 1.97, 1.13, 0.09)),
+            ("grazing_sliding", relay_grazing(flows, 1.59, 3.73, 2.16, 0.94, 2.02)),
+        ],
+    )
 
 
 def test_the_relay_s_crossing_sliding() -> None:

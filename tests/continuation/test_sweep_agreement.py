@@ -32,8 +32,9 @@ def test_section_points_of_figure_11_lie_on_the_branches() -> None:
         k = int(np.argmin(np.abs(stable["rho"].values - rho)))
         if abs(float(stable["rho"][k]) - rho) > 0.02:
             continue
-        orbit = ns.find_orbit(system.with_parameters(rho=rho), start=stable["section"].values[k], period_number=n,
-                              transient=0)  # fmt: skip
+        orbit = ns.find_orbit(
+            system.with_parameters(rho=rho), start=stable["section"].values[k], period_number=n, transient=0
+        )
         mu = float(np.abs(orbit.floquet_multipliers).max())
         same = np.isclose(orbit.crossings_per_period, float(sweep["crossings_per_period"][i]))
         if not same or not mu ** (TRANSIENT / n) < 1e-8:

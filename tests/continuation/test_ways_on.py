@@ -34,7 +34,9 @@ def whole(branch: xr.Dataset, name: str, low: float, high: float) -> None:
     """The branch lies between both edges of the range."""
     assert sorted(branch[name].values[[0, -1]]) == pytest.approx([low, high])
     assert [str(branch["ended"].attrs["flag_meanings"]).split()[int(i)] for i in branch["ended"].values] == [
-        "range", "range"]  # fmt: skip
+        "range",
+        "range",
+    ]
 
 
 def coulomb(w: float, F: float = 0.5, ratio: float = 1.0, z: float = 0.0) -> ns.System:
@@ -47,14 +49,17 @@ def coulomb(w: float, F: float = 0.5, ratio: float = 1.0, z: float = 0.0) -> ns.
         return u.x, 0 * u.v
 
     return ns.System(
-        name="coulomb", states=["x", "v"], parameters={"w": w, "F": F, "r": ratio, "z": z},
+        name="coulomb",
+        states=["x", "v"],
+        parameters={"w": w, "F": F, "r": ratio, "z": z},
         modes={
             "forward": lambda t, u, p: (u.v, net(t, u, p) - p.F - 2 * p.z * u.v),
             "backward": lambda t, u, p: (u.v, net(t, u, p) + p.r * p.F - 2 * p.z * u.v),
             "stick": lambda t, u, p: (0 * u.v, 0 * u.v),
         },
         indicators={
-            "speed": lambda t, u, p: u.v, "push": lambda t, u, p: net(t, u, p) - p.F,
+            "speed": lambda t, u, p: u.v,
+            "push": lambda t, u, p: net(t, u, p) - p.F,
             "pull": lambda t, u, p: net(t, u, p) + p.r * p.F,
         },
         transitions=[
@@ -62,9 +67,10 @@ def coulomb(w: float, F: float = 0.5, ratio: float = 1.0, z: float = 0.0) -> ns.
             ns.Transition("backward", "forward", when="speed > 0 and push > 0"),
             ns.Transition("forward", "stick", when="speed < 0 and pull > 0", reset=rest),
             ns.Transition("backward", "stick", when="speed > 0 and push < 0", reset=rest),
-            ns.Transition("stick", "forward", when="push > 0"), ns.Transition("stick", "backward", when="pull < 0"),
+            ns.Transition("stick", "forward", when="push > 0"),
+            ns.Transition("stick", "backward", when="pull < 0"),
         ],
-    )  # fmt: skip
+    )
 
 
 def onset_of_stops(F: float) -> float:
@@ -111,14 +117,20 @@ def buck(V: float) -> ns.System:
         return u.v, u.i, 0 * u.w
 
     return ns.System(
-        name="buck", states=["v", "i", "w"], parameters=parameters, modes={"off": circuit(0.0), "on": circuit(1.0)},
+        name="buck",
+        states=["v", "i", "w"],
+        parameters=parameters,
+        modes={"off": circuit(0.0), "on": circuit(1.0)},
         indicators={"ramp": lambda t, u, p: p.a * (u.v - 11.3) - (3.8 + 4.4 * u.w)},
         transitions=[
-            ns.Transition("off", "on", when="ramp < 0"), ns.Transition("on", "off", when="ramp > 0"),
-            ns.Transition("on", "on", at=0.0, reset=tick), ns.Transition("off", "off", at=0.0, reset=tick),
+            ns.Transition("off", "on", when="ramp < 0"),
+            ns.Transition("on", "off", when="ramp > 0"),
+            ns.Transition("on", "on", at=0.0, reset=tick),
+            ns.Transition("off", "off", at=0.0, reset=tick),
         ],
-        period=lambda p: p.T, scale={"v": 10.0, "i": 1.0, "w": 1.0},
-    )  # fmt: skip
+        period=lambda p: p.T,
+        scale={"v": 10.0, "i": 1.0, "w": 1.0},
+    )
 
 
 def test_corner_is_the_same_from_either_side() -> None:
@@ -155,7 +167,9 @@ def test_skipped_cycle_of_the_buck_converter() -> None:
 def gear(w: float) -> ns.System:
     """A gear with backlash, forced without a mean: both flanks are met alike."""
     return ns.System(
-        name="gear", states=["x", "v"], parameters={"z": 0.05, "w": w},
+        name="gear",
+        states=["x", "v"],
+        parameters={"z": 0.05, "w": w},
         modes={
             "free": lambda t, u, p: (u.v, -2 * p.z * u.v + np.cos(p.w * t)),
             "drive": lambda t, u, p: (u.v, -2 * p.z * u.v - (u.x - 1) + np.cos(p.w * t)),
@@ -163,11 +177,13 @@ def gear(w: float) -> ns.System:
         },
         indicators={"high": lambda t, u, p: u.x - 1, "low": lambda t, u, p: u.x + 1},
         transitions=[
-            ns.Transition("free", "drive", when="high > 0"), ns.Transition("drive", "free", when="high < 0"),
-            ns.Transition("free", "coast", when="low < 0"), ns.Transition("coast", "free", when="low > 0"),
+            ns.Transition("free", "drive", when="high > 0"),
+            ns.Transition("drive", "free", when="high < 0"),
+            ns.Transition("free", "coast", when="low < 0"),
+            ns.Transition("coast", "free", when="low > 0"),
         ],
         symmetry=(lambda u: (-u.x, -u.v), 0.5, {"free": "free", "drive": "coast", "coast": "drive"}),
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="module")
@@ -199,7 +215,9 @@ def test_closed_branch_ends_where_it_began(gears: xr.Dataset) -> None:
     first = int(np.flatnonzero((special["kind"] == "pitchfork") & (special["w"] > 0.4))[0])
     branch = ns.continue_orbit(special.isel(special=first))
     assert [str(branch["ended"].attrs["flag_meanings"]).split()[int(i)] for i in branch["ended"].values] == [
-        "closed", "closed"]  # fmt: skip
+        "closed",
+        "closed",
+    ]
     found = ns.special_points(branch)
     both = zip(found["kind"].values, found["section"].values, strict=True)
     points = [(str(kind), *np.round(u, 6)) for kind, u in both]
@@ -216,19 +234,21 @@ def chua(alpha: float) -> ns.System:
 
     def circuit(side: int) -> Any:
         slope = -8 / 7 if side == 0 else -5 / 7
-        return lambda t, u, p: (
-            p.alpha * (u.y - u.x - slope * u.x + side * 3 / 7), u.x - u.y + u.z, -100 / 7 * u.y
-        )  # fmt: skip
+        return lambda t, u, p: (p.alpha * (u.y - u.x - slope * u.x + side * 3 / 7), u.x - u.y + u.z, -100 / 7 * u.y)
 
     return ns.System(
-        name="chua", states=["x", "y", "z"], parameters={"alpha": alpha},
+        name="chua",
+        states=["x", "y", "z"],
+        parameters={"alpha": alpha},
         modes={"middle": circuit(0), "right": circuit(1), "left": circuit(-1)},
         indicators={"high": lambda t, u, p: u.x - 1, "low": lambda t, u, p: u.x + 1},
         transitions=[
-            ns.Transition("middle", "right", when="high > 0"), ns.Transition("right", "middle", when="high < 0"),
-            ns.Transition("middle", "left", when="low < 0"), ns.Transition("left", "middle", when="low > 0"),
+            ns.Transition("middle", "right", when="high > 0"),
+            ns.Transition("right", "middle", when="high < 0"),
+            ns.Transition("middle", "left", when="low < 0"),
+            ns.Transition("left", "middle", when="low > 0"),
         ],
-    )  # fmt: skip
+    )
 
 
 def test_focus_centre_and_its_large_cycle() -> None:
@@ -264,10 +284,14 @@ def ripple(c: float) -> ns.System:
         return slopes
 
     return ns.System(
-        name="ripple", states=["x", "y"], parameters={"c": c, "e": 0.01}, modes={"low": field(0.0), "high": field(1.0)},
-        indicators={"h": lambda t, u, p: u.x}, period=2 * np.pi,
+        name="ripple",
+        states=["x", "y"],
+        parameters={"c": c, "e": 0.01},
+        modes={"low": field(0.0), "high": field(1.0)},
+        indicators={"h": lambda t, u, p: u.x},
+        period=2 * np.pi,
         transitions=[ns.Transition("low", "high", when="h > 0"), ns.Transition("high", "low", when="h < 0")],
-    )  # fmt: skip
+    )
 
 
 def test_touches_between_two_samples_of_a_step() -> None:
@@ -277,8 +301,10 @@ def test_touches_between_two_samples_of_a_step() -> None:
         s = np.sin(t)
         return float((s**3 - 3e-4 * s) * (2 + np.cos(t)))
 
-    grazes = [-g(brentq(lambda t: (g(t + 1e-7) - g(t - 1e-7)) / 2e-7, t - 5e-3, t + 5e-3, xtol=1e-15))
-              for t in (-0.01, 0.01, np.pi - 0.01, np.pi + 0.01)]  # fmt: skip
+    grazes = [
+        -g(brentq(lambda t: (g(t + 1e-7) - g(t - 1e-7)) / 2e-7, t - 5e-3, t + 5e-3, xtol=1e-15))
+        for t in (-0.01, 0.01, np.pi - 0.01, np.pi + 0.01)
+    ]
     branch = ns.continue_orbit(ns.find_orbit(ripple(-2e-5)), "c", (-2.5e-5, 2.5e-5))
     whole(branch, "c", -2.5e-5, 2.5e-5)
     special = ns.special_points(branch)

@@ -24,10 +24,17 @@ def held(rig, points=12, release=0, **limits):
     there = []
     try:
         branch = ns.control_based_continuation(
-            rig, "frequency", (1.15, 1.4), frequency=1.3, amplitude=DRIVE, direction="down", step=0.2, points=points,
+            rig,
+            "frequency",
+            (1.15, 1.4),
+            frequency=1.3,
+            amplitude=DRIVE,
+            direction="down",
+            step=0.2,
+            points=points,
             holding=ns.Holding(transient=20, release=release, **limits),
             progress=lambda done: there.append(rig.readings) if done else None,
-        )  # fmt: skip
+        )
     except ns.SolveError as error:
         return None, str(error), there
     return branch, str(branch["ended_because"].values), there
@@ -103,8 +110,11 @@ def test_a_rate_too_low_for_the_delay_is_said(per_turn, delay, limits):
     rig = OwnRig(per_turn, delay)
     branch, sentence, _ = held(rig, **limits)
     safe(rig, limits.get("greatest_force", np.inf), limits.get("greatest_position", np.inf))
-    assert branch is None and ("the controlled motion grows" in sentence or "the controller shakes it" in sentence
-                               or "beyond its limit" in sentence)  # fmt: skip
+    assert branch is None and (
+        "the controlled motion grows" in sentence
+        or "the controller shakes it" in sentence
+        or "beyond its limit" in sentence
+    )
 
 
 def test_the_wrong_sign_of_an_actuator_is_said():
@@ -168,10 +178,12 @@ def test_delays_and_rates(capsys):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"greatest_force": 0.0}, "greatest_force"), ({"greatest_position": 0.0}, "positive"),
-        ({"greatest_position": (2, 1)}, "first end must be below"), ({"greatest_position": "far"}, "low, high"),
+        ({"greatest_force": 0.0}, "greatest_force"),
+        ({"greatest_position": 0.0}, "positive"),
+        ({"greatest_position": (2, 1)}, "first end must be below"),
+        ({"greatest_position": "far"}, "low, high"),
     ],
-)  # fmt: skip
+)
 def test_limits_that_are_none_are_answered(given, message):
     with pytest.raises(ValueError, match=message):
         ns.Holding(**given)

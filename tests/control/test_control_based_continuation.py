@@ -20,9 +20,13 @@ def branch_of(branch):
     half = 0.5 * (branch["maximum"] - branch["minimum"]).sel(state="x").values
     first, last = (int(i) for i in branch["special_point"].values[kinds == "fold"])
     return {
-        "at": branch["omega"].values, "half": half, "upper": slice(0, first + 1), "unstable": slice(first, last + 1),
-        "section": branch["section"].values, "folds": branch["omega"].values[[first, last]],
-    }  # fmt: skip
+        "at": branch["omega"].values,
+        "half": half,
+        "upper": slice(0, first + 1),
+        "unstable": slice(first, last + 1),
+        "section": branch["section"].values,
+        "folds": branch["omega"].values[[first, last]],
+    }
 
 
 def amplitude_at(theory, part, omega):
@@ -39,7 +43,13 @@ def measured(theory):
     model = ns.models.discontinuous_support(g=0.02, rho=0.14, omega=5.72)
     rig = ns.SimulatedRig(model, start=start.tolist(), **CONTROLLED)
     return ns.control_based_continuation(
-        rig, "frequency", (5.6, 5.9), frequency=5.72, amplitude=0.14, step=0.25, holding=ns.Holding(transient=20),
+        rig,
+        "frequency",
+        (5.6, 5.9),
+        frequency=5.72,
+        amplitude=0.14,
+        step=0.25,
+        holding=ns.Holding(transient=20),
         progress=False,
     )
 
@@ -105,9 +115,14 @@ BRIEFLY = {"transient": 15, "release": 0}
 
 def test_three_methods_are_enough_and_motion_without_contact_is_that_of_the_formula():
     found = ns.control_based_continuation(
-        Bare(free_motion()), "frequency", (6.3, 6.8), direction="down", step=0.3,
-        holding=ns.Holding(mass=0.838, **BRIEFLY), **WITHOUT_CONTACT,
-    )  # fmt: skip
+        Bare(free_motion()),
+        "frequency",
+        (6.3, 6.8),
+        direction="down",
+        step=0.3,
+        holding=ns.Holding(mass=0.838, **BRIEFLY),
+        **WITHOUT_CONTACT,
+    )
     m, k, c, rho, omega = 0.838, 8.47, 0.87, 0.05, found["drive_frequency"].values
     formula = rho / np.hypot(2 * k - m * omega**2, c * omega)
     spread = np.abs(found["amplitude"].values - formula) / found["amplitude_uncertainty"].values

@@ -13,7 +13,8 @@ def stopped_duffing(**parameters):
         return p.A * np.cos(p.w * t) - p.c * u.v - p.k * u.x - p.k_3 * u.x**3
 
     return ns.System(
-        name="Duffing with an elastic stop", states={"x": "m", "v": "m/s"},
+        name="Duffing with an elastic stop",
+        states={"x": "m", "v": "m/s"},
         parameters={"M": 2.0, "c": 0.16, "k": 2.0, "k_3": 0.6, "K": 6.0, "d": 0.9, "A": 0.22, "w": 0.9},
         modes={
             "free": lambda t, u, p: (u.v, smooth(t, u, p) / p.M),
@@ -21,10 +22,11 @@ def stopped_duffing(**parameters):
         },
         indicators={"depth": lambda t, u, p: u.x - p.d},
         transitions=[
-            ns.Transition("free", "stop", when="depth > 0"), ns.Transition("stop", "free", when="depth < 0"),
+            ns.Transition("free", "stop", when="depth > 0"),
+            ns.Transition("stop", "free", when="depth < 0"),
         ],
         period=lambda p: 2 * np.pi / p.w,
-    ).with_parameters(parameters)  # fmt: skip
+    ).with_parameters(parameters)
 
 
 @pytest.fixture(scope="module")
@@ -38,9 +40,7 @@ def theory():
 
 
 def held(noise, seed):
-    rig = ns.SimulatedRig(
-        stopped_duffing(), mass="M", frequency="w", amplitude="A", rate=12.0, noise=noise, seed=seed
-    )  # fmt: skip
+    rig = ns.SimulatedRig(stopped_duffing(), mass="M", frequency="w", amplitude="A", rate=12.0, noise=noise, seed=seed)
     return ns.control_based_continuation(
         rig, "w", (1.0, 1.35), frequency=1.06, amplitude=0.22, step=0.15, holding=ns.Holding(release=0), progress=False
     )

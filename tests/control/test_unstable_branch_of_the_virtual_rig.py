@@ -71,7 +71,7 @@ def amplitude(system, start):
     def after(u, instants=INSTANTS[[0, -1]]):
         run = ns.simulate(
             system, start={"x": u[0], "v": u[1]}, samples=instants * period, duration=period, method="rkf45", rtol=1e-11
-        )  # fmt: skip
+        )
         return run["u"].sel(state=["x", "v"]).values
 
     u = np.array(start)

@@ -137,11 +137,16 @@ def oscillator_at_a_wall(*, filtered: bool) -> ns.System:
         return rates
 
     return ns.System(
-        name="at a wall", states=["x", "v", *(["z", "y"] if filtered else [])], parameters={"F": 0.3, "w": 0.8},
-        modes={"free": field(False), "contact": field(True)}, indicators={"wall": lambda t, u, p: u.x + 0.2},
-        transitions=[ns.Transition("free", "contact", when="wall > 0"),
-                     ns.Transition("contact", "free", when="wall < 0")],
-    )  # fmt: skip
+        name="at a wall",
+        states=["x", "v", *(["z", "y"] if filtered else [])],
+        parameters={"F": 0.3, "w": 0.8},
+        modes={"free": field(False), "contact": field(True)},
+        indicators={"wall": lambda t, u, p: u.x + 0.2},
+        transitions=[
+            ns.Transition("free", "contact", when="wall > 0"),
+            ns.Transition("contact", "free", when="wall < 0"),
+        ],
+    )
 
 
 def test_states_that_only_follow_add_their_own_multipliers() -> None:

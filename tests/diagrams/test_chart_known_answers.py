@@ -85,10 +85,12 @@ def test_falling_axes_refined() -> None:
 def test_starts_count_the_roots_they_reach() -> None:
     """x -> a x - b x^3: 0 for a < 1, +-sqrt((a - 1) / b) for a in (1, 2), two cycles of period 2 for a above 2."""
     system = ns.System(
-        states=["x"], parameters={"a": 1.5, "b": 1.0}, modes={"rest": lambda t, u, p: 0 * u.x},
+        states=["x"],
+        parameters={"a": 1.5, "b": 1.0},
+        modes={"rest": lambda t, u, p: 0 * u.x},
         transitions=[ns.Transition("rest", "rest", at=0.5, reset=lambda t, u, p: p.a * u.x - p.b * u.x**3)],
         period=1.0,
-    )  # fmt: skip
+    )
     starts = [{"x": -0.3}, {"x": 0.2}, {"x": 0.5}]
     plane = ns.chart(system, {"a": [0.5, 1.9, 1.5, 2.1], "b": [1.0, 2.0]}, start=starts, **QUIET)
     assert plane["n_attractors"].values.T.tolist() == [[1, 2, 2, 2]] * 2
@@ -128,13 +130,19 @@ def test_returns_that_are_passed_over_change_the_count_only(rising: bool | None,
         return u.x * rate - p.w * u.y, u.y * rate + p.w * u.x
 
     system = ns.System(
-        states=["x", "y"], parameters={"a": 0.02, "w": 1.0}, modes={"only": field},
+        states=["x", "y"],
+        parameters={"a": 0.02, "w": 1.0},
+        modes={"only": field},
         indicators={"height": lambda t, u, p: u.y},
-    )  # fmt: skip
+    )
     plane = ns.chart(
-        system, {"a": [0.01, 0.02], "w": [1.0]}, start=[{"x": 1.5}, {"x": 0.2, "y": -1.2}, {"x": -0.5, "y": 0.3}],
-        section=ns.Poincare("height", rising=rising, every=every), lyapunov=400, **QUIET,
-    )  # fmt: skip
+        system,
+        {"a": [0.01, 0.02], "w": [1.0]},
+        start=[{"x": 1.5}, {"x": 0.2, "y": -1.2}, {"x": -0.5, "y": 0.3}],
+        section=ns.Poincare("height", rising=rising, every=every),
+        lyapunov=400,
+        **QUIET,
+    )
     assert (plane["period_number"] == period).all() and (plane["n_attractors"] == 1).all()
     np.testing.assert_allclose(plane["lyapunov"].values[:, 0], [[-0.48] * 3, [-0.96] * 3], rtol=1e-3)
     np.testing.assert_allclose(plane["maximum"], 1.0, rtol=1e-8)
@@ -149,25 +157,27 @@ def test_a_section_at_the_phase_of_a_transition_lies_behind_it(method: str, phas
     (Forces of size 0: a shape of code that is there.)"""
     section = ns.Stroboscopic(phase)
     kicked = ns.System(
-        states=["x", "v"], parameters={"k": 1.3, "w": 1.0, "A": 0.0},
+        states=["x", "v"],
+        parameters={"k": 1.3, "w": 1.0, "A": 0.0},
         modes={"free": lambda t, u, p: (u.v, -p.k * u.x + p.A * np.cos(p.w * t))},
         transitions=[ns.Transition("free", "free", at=0.5, reset=lambda t, u, p: (1.0 - u.x / 2, -u.v / 2))],
         period=lambda p: 2 * np.pi / p.w,
-    )  # fmt: skip
+    )
     grid = {"k": [1.3], "w": [0.9, 1.1]}
     plane = ns.chart(kicked, grid, section=section, method=method, lyapunov=200, **QUIET)
     assert (plane["period_number"] == 1).all() and (plane["crossings_per_period"] == 1).all()
     np.testing.assert_allclose(plane["lyapunov"][0], np.log(0.5) * np.array([0.9, 1.1]) / (2 * np.pi), rtol=2e-2)
 
     force = ns.System(
-        states=["x", "v"], parameters={"a": 6.0, "w": 1.05, "A": 0.0},
+        states=["x", "v"],
+        parameters={"a": 6.0, "w": 1.05, "A": 0.0},
         modes={
             "plus": lambda t, u, p: (u.v, -u.x - 0.2 * u.v + p.a + p.A * np.cos(p.w * t)),
             "minus": lambda t, u, p: (u.v, -u.x - 0.2 * u.v - p.a + p.A * np.cos(p.w * t)),
         },
         transitions=[ns.Transition("plus", "minus", at=0.5), ns.Transition("minus", "plus", at=0.0)],
         period=lambda p: 2 * np.pi / p.w,
-    )  # fmt: skip
+    )
     matrix, rest, half = np.array([[0.0, 1.0], [-1.0, -0.2]]), np.array([6.0, 0.0]), np.pi / 1.05
     there = expm(half * matrix)
     begin = np.linalg.solve(np.eye(2) + there, there @ rest - rest)  # half a period on: rest + there (u - rest) = -u

@@ -64,10 +64,18 @@ def test_edges_belong_to_bins_as_in_numpy_and_nothing_is_lost() -> None:
 def test_points_that_fail_are_counted_nowhere() -> None:
     system = ns.models.relief_valve()
     result = ns.sweep(
-        system, "q", [8.0, 9.5], direction=None, start={"y1": 1.0, "y2": 0.0, "y3": 11.0}, transient=60, keep=20,
-        section=ns.Poincare("lift_velocity", rising=False, t_max=50.0), density={"y1": (0, 10)}, bins=5,
+        system,
+        "q",
+        [8.0, 9.5],
+        direction=None,
+        start={"y1": 1.0, "y2": 0.0, "y3": 11.0},
+        transient=60,
+        keep=20,
+        section=ns.Poincare("lift_velocity", rising=False, t_max=50.0),
+        density={"y1": (0, 10)},
+        bins=5,
         progress=False,
-    )  # fmt: skip
+    )
     assert result["density"].sel(q=8.0, state="y1").sum() == 20
     if int(result["status"].sel(q=9.5)) == 7:
         assert result["density"].sel(q=9.5).sum() == 0

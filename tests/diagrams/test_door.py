@@ -65,9 +65,16 @@ def test_words_are_no_switches(options: dict[str, Any], message: str) -> None:
 
 def test_numpy_switches_are_taken() -> None:
     plane = ns.chart(
-        SUPPORT, PLANE, transient=20, keep=20, stop_early=np.False_, extremes=np.True_, lyapunov=np.False_,
-        refine=np.False_, **QUIET,
-    )  # fmt: skip
+        SUPPORT,
+        PLANE,
+        transient=20,
+        keep=20,
+        stop_early=np.False_,
+        extremes=np.True_,
+        lyapunov=np.False_,
+        refine=np.False_,
+        **QUIET,
+    )
     assert "lyapunov" not in plane and "computed" not in plane
 
 

@@ -123,9 +123,10 @@ def test_spectra_are_those_of_the_processor(simulated: dict[str, Any]) -> None:
 
 @pytest.mark.skipif(not COMPILER[1], reason="nvidia-nvvm is not installed (extra `test`, Linux only)")
 @pytest.mark.parametrize(
-    ("entries", "optimised"), [(ENTRIES - LONG, False), pytest.param(ENTRIES, True, marks=pytest.mark.slow)],
+    ("entries", "optimised"),
+    [(ENTRIES - LONG, False), pytest.param(ENTRIES, True, marks=pytest.mark.slow)],
     ids=["most", "all optimised"],
-)  # fmt: skip
+)
 def test_every_kernel_compiles_for_the_types_it_is_launched_with(
     simulated: dict[str, Any], entries: set[str], optimised: bool, request: pytest.FixtureRequest
 ) -> None:
@@ -196,7 +197,10 @@ def test_a_machine_without_a_gpu_says_so() -> None:
     )
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_ENABLE_CUDASIM"}
     done = subprocess.run(
-        [sys.executable, "-c", code], env=environment | {"CUDA_VISIBLE_DEVICES": ""}, capture_output=True, text=True,
+        [sys.executable, "-c", code],
+        env=environment | {"CUDA_VISIBLE_DEVICES": ""},
+        capture_output=True,
+        text=True,
         check=False,
-    )  # fmt: skip
+    )
     assert re.search('RuntimeError: .*found no GPU on this machine.*use device="cpu"', done.stderr), done.stderr

@@ -51,9 +51,12 @@ ENTRIES = {"advance", "beside", "measure", "contract", "decide", "separated"}
 
 def run(code: list[str], given: str = "", **environment: str) -> str:
     done = subprocess.run(
-        [sys.executable, *code], input=given, capture_output=True, text=True,
+        [sys.executable, *code],
+        input=given,
+        capture_output=True,
+        text=True,
         env={**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(FOLDER)]), **environment},
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout
 
@@ -120,9 +123,13 @@ def test_basins_have_the_labels_and_attractors_of_the_processor(simulated: dict[
 
 
 @pytest.mark.skipif(not COMPILER[1], reason="nvidia-nvvm is not installed (extra `test`, Linux only)")
-@pytest.mark.parametrize("name", [
-    "valve, typed", *(pytest.param(name, marks=pytest.mark.slow) for name in ("valve", "two wells", "filtered")),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "name",
+    [
+        "valve, typed",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("valve", "two wells", "filtered")),
+    ],
+)
 def test_the_kernels_compile_for_the_types_they_are_launched_with(simulated: dict[str, Any], name: str) -> None:
     printed = run(["-c", COMPILE], json.dumps([name, simulated["launched"]]))
     assert json.loads(printed.splitlines()[-1]) == [[1, True]] * len(ENTRIES)

@@ -25,13 +25,17 @@ def balance(loads: Any) -> Any:
 def between_stops(e: float, m: float = 1.0) -> ns.System:
     """A mass m under m cos t between stops at -1 and 1."""
     return ns.mechanical(
-        "m", 0.0, 0.0, parameters={"m": (m, "kg"), "w": (1.0, "rad/s"), "e": e}, coordinates={"q": "m"},
+        "m",
+        0.0,
+        0.0,
+        parameters={"m": (m, "kg"), "w": (1.0, "rad/s"), "e": e},
+        coordinates={"q": "m"},
         forcing={"q": lambda t, p: p.m * np.cos(p.w * t)},
         elements={
             "right": Stop(at="q", position=1.0, restitution="e"),
             "left": Stop(at="q", position=-1.0, side=-1, restitution="e"),
         },
-    )  # fmt: skip
+    )
 
 
 def speed_between_stops(e: float) -> float:
@@ -50,9 +54,12 @@ def test_impacts_between_two_stops(e: float) -> None:
     start = {"q": -1 - 1 - np.cos(f) + (e * v + np.sin(f)) * (np.pi - f), "v_q": e * v + np.sin(f)}
     orbit = ns.find_orbit(system, start=start, transient=0, period_number=1, loads=True, progress=False)
     expected = {
-        "impact_speed_maximum": v, "impacts": 1.0, "impulse": m * (1 + e) * v, "energy": 0.5 * m * (1 - e**2) * v**2,
+        "impact_speed_maximum": v,
+        "impacts": 1.0,
+        "impulse": m * (1 + e) * v,
+        "energy": 0.5 * m * (1 - e**2) * v**2,
         "force_maximum": 0.0,
-    }  # fmt: skip
+    }
     for name in ("left", "right"):
         found = {key: orbit.loads[f"{name}_{key}"] for key in expected}
         assert found == pytest.approx(expected, rel=1e-11), orbit
@@ -79,9 +86,12 @@ def test_a_ball_on_a_table_takes_from_it_what_impacts_dissipate() -> None:
         states={"x": "m", "v": "m/s"},
         parameters={"A": 1.7 / (2 * np.pi), "w": 2 * np.pi, "g": g, "e": e, "m": (3.0, "kg")},
         modes={"fly": lambda t, u, p: (u.v, -p.g)},
-        elements={"table": Stop(gap=lambda t, u, p: u.x - p.A * np.cos(p.w * t), on={"v": lambda t, u, p: 1 / p.m},
-                                restitution="e")},
-    )  # fmt: skip
+        elements={
+            "table": Stop(
+                gap=lambda t, u, p: u.x - p.A * np.cos(p.w * t), on={"v": lambda t, u, p: 1 / p.m}, restitution="e"
+            )
+        },
+    )
     A, up = 1.7 / (2 * np.pi), (1 - e) / (1 + e) * g / 2  # the speed of the table at the impact
     late = np.arcsin(up / 1.7) / (2 * np.pi)
     for left in (0.5 - late, late):  # from the impact to the end of the period; one of the two motions is stable
@@ -101,10 +111,12 @@ def test_a_ball_on_a_table_takes_from_it_what_impacts_dissipate() -> None:
 
 def test_a_ball_that_rests_on_its_table_for_a_part_of_the_period_gets_no_energy_either() -> None:
     ball = ns.System(
-        states=["x", "v"], parameters={"A": 0.3, "w": 2 * np.pi, "g": 9.81, "e": 0.5},
-        modes={"fly": lambda t, u, p: (u.v, -p.g)}, scale={"x": 0.1},
+        states=["x", "v"],
+        parameters={"A": 0.3, "w": 2 * np.pi, "g": 9.81, "e": 0.5},
+        modes={"fly": lambda t, u, p: (u.v, -p.g)},
+        scale={"x": 0.1},
         elements=[Stop(gap=lambda t, u, p: u.x - p.A * np.cos(p.w * t), on={"v": 1.0}, restitution="e")],
-    )  # fmt: skip
+    )
     found = ns.sweep(ball, "A", [0.27, 0.3], start={"x": 1.0}, direction=None, loads=True, progress=False)
     assert (found["period_number"] == 1).all() and (found["stop_impacts"] >= 2).all()
     force, impulse = found["stop_force_maximum"].values, found["stop_impulse"].values
@@ -118,9 +130,13 @@ def test_a_ball_that_rests_on_its_table_for_a_part_of_the_period_gets_no_energy_
 def test_dry_friction_takes_four_times_friction_and_amplitude(w: float) -> None:
     """Continuous sliding under cos(w t) with friction 0.3 (Den Hartog 1931), k = m = 1."""
     rig = ns.mechanical(
-        1.0, 0.0, 1.0, parameters={"w": w}, forcing={"q": lambda t, p: np.cos(p.w * t)},
+        1.0,
+        0.0,
+        1.0,
+        parameters={"w": w},
+        forcing={"q": lambda t, p: np.cos(p.w * t)},
         elements={"rub": Coulomb(at="q", friction=0.3)},
-    )  # fmt: skip
+    )
     turn = np.pi / w
     amplitude = np.sqrt((1 / (1 - w**2)) ** 2 - (0.3 * np.sin(turn) / (w * (1 + np.cos(turn)))) ** 2)
     orbit = ns.find_orbit(rig, loads=True, progress=False)
@@ -135,9 +151,12 @@ def test_a_belt_gives_what_a_damper_takes() -> None:
     """Stick-slip: with damping the belt's energy goes there, without it none is given on the whole."""
     for c in (0.0, 0.02):
         rig = ns.mechanical(
-            1.0, "c", 1.0, parameters={"c": c},
+            1.0,
+            "c",
+            1.0,
+            parameters={"c": c},
             elements={"belt": Coulomb(at="q", friction=0.6, static=1.0, belt=0.5)},
-        )  # fmt: skip
+        )
         orbit = ns.find_orbit(rig, start={"q": 0.0, "v_q": 0.5}, loads=True, progress=False)
         assert orbit.period_number == 0 and set(orbit.signature.text(rig.traced).split()) & {"belt_stick"}
         assert orbit.loads["belt_energy"] == pytest.approx(-orbit.loads["work_of_damping"], abs=1e-12)
@@ -154,9 +173,13 @@ def test_work_of_base_and_damping_of_a_linear_oscillator() -> None:
     """A resonance curve: the damper takes pi c w X^2 a period."""
     c, Y = 0.3, 2.0
     rig = ns.mechanical(
-        "m", c, 4.0, parameters={"m": (1.0, "kg"), "w": 1.0}, coordinates={"q": "m"},
+        "m",
+        c,
+        4.0,
+        parameters={"m": (1.0, "kg"), "w": 1.0},
+        coordinates={"q": "m"},
         base=lambda t, p: -Y * p.w**2 * np.cos(p.w * t),
-    )  # fmt: skip
+    )
     w = np.linspace(0.5, 3.0, 6)
     found = ns.frequency_response(rig, w, parameter="w", direction="up", loads=True, progress=False)
     X = Y * w**2 / np.hypot(4.0 - w**2, c * w)
@@ -167,17 +190,23 @@ def test_work_of_base_and_damping_of_a_linear_oscillator() -> None:
 
 
 EVERY: dict[str, dict[str, Any]] = {
-    "stops": {"wall": Stop(at="q2", position=0.3, restitution="e"),
-              "bumper": Stop(at={"q2": 1, "q1": -1}, position=-0.5, side=-1, restitution=0.7)},
+    "stops": {
+        "wall": Stop(at="q2", position=0.3, restitution="e"),
+        "bumper": Stop(at={"q2": 1, "q1": -1}, position=-0.5, side=-1, restitution=0.7),
+    },
     "plastic": {"wall": Stop(at="q2", position=0.2), "rub": Coulomb(at="q1", friction=0.2, static=0.25, belt=0.3)},
-    "elastic": {"soft": ElasticStop(at="q1", position=0.2, stiffness=20.0, damping=1.0),
-                "pull": ElasticStop(at="q2", position=-0.3, side=-1, stiffness=8.0, damping=0.5, pulls=True)},
-    "play": {"play": Backlash(at={"q1": 1, "q2": -1}, half_width=0.1, stiffness=5.0, damping=0.2),
-             "spring": PreloadedSpring(at="q1", preload=0.2, stiffness=1.0)},
+    "elastic": {
+        "soft": ElasticStop(at="q1", position=0.2, stiffness=20.0, damping=1.0),
+        "pull": ElasticStop(at="q2", position=-0.3, side=-1, stiffness=8.0, damping=0.5, pulls=True),
+    },
+    "play": {
+        "play": Backlash(at={"q1": 1, "q2": -1}, half_width=0.1, stiffness=5.0, damping=0.2),
+        "spring": PreloadedSpring(at="q1", preload=0.2, stiffness=1.0),
+    },
     "moving": {"hammer": Stop(at="q1", position=lambda t, u, p: 0.2 + 0.1 * np.sin(p.w * t), restitution="e")},
     "many": {f"s{k}": ElasticStop(at="q1", position=0.1 * k, stiffness=3.0, damping=0.1) for k in range(1, 10)}
-            | {"wall": Stop(at="q2", position=0.2, restitution="e")},
-}  # fmt: skip
+    | {"wall": Stop(at="q2", position=0.2, restitution="e")},
+}
 
 
 @pytest.mark.parametrize("kind", list(EVERY))
@@ -185,9 +214,14 @@ def test_energy_in_is_energy_out(kind: str) -> None:
     """On every cycle of a sweep, from outputs alone; K is not symmetric in one of them."""
     stiffness = [[2.0, -1.0], [-0.9 if kind == "play" else -1.0, 1.0]]
     pair = ns.mechanical(
-        np.diag([1.0, 0.5]), [[0.3, -0.1], [-0.1, 0.2]], stiffness, parameters={"w": 1.1, "e": 0.6},
-        forcing={"q1": lambda t, p: np.cos(p.w * t)}, base=lambda t, p: 0.2 * np.cos(p.w * t), elements=EVERY[kind],
-    )  # fmt: skip
+        np.diag([1.0, 0.5]),
+        [[0.3, -0.1], [-0.1, 0.2]],
+        stiffness,
+        parameters={"w": 1.1, "e": 0.6},
+        forcing={"q1": lambda t, p: np.cos(p.w * t)},
+        base=lambda t, p: 0.2 * np.cos(p.w * t),
+        elements=EVERY[kind],
+    )
     found = ns.sweep(pair, "w", np.linspace(0.7, 1.5, 9), loads=True, progress=False)
     cycles = found["period_number"].values > 0
     assert cycles.sum() >= 5
@@ -201,10 +235,16 @@ def test_energy_in_is_energy_out(kind: str) -> None:
 
 def test_sweep_chart_and_orbit_give_the_same_loads(tmp_path: Path) -> None:
     rig = ns.mechanical(
-        1.0, 0.05, 1.0, parameters={"w": 0.9, "mu": 0.5}, forcing={"q": lambda t, p: 0.3 * np.cos(p.w * t)},
-        elements={"rub": Coulomb(at="q", friction="mu", static=0.8, belt=-0.37),
-                  "soft": ElasticStop(at="q", position=-0.4, side=-1, stiffness=30.0, damping=0.4)},
-    )  # fmt: skip
+        1.0,
+        0.05,
+        1.0,
+        parameters={"w": 0.9, "mu": 0.5},
+        forcing={"q": lambda t, p: 0.3 * np.cos(p.w * t)},
+        elements={
+            "rub": Coulomb(at="q", friction="mu", static=0.8, belt=-0.37),
+            "soft": ElasticStop(at="q", position=-0.4, side=-1, stiffness=30.0, damping=0.4),
+        },
+    )
     w = [1.0, 1.3]
     swept = ns.sweep(rig, "w", w, direction=None, loads=True, progress=False)
     charts = [
@@ -250,10 +290,16 @@ def test_a_section_at_the_impact_counts_it_once() -> None:
 def test_a_motion_without_a_period_has_averages() -> None:
     """Over the kept window energy in and energy out differ by what the masses have more at its end."""
     system = ns.mechanical(
-        1.0, 0.2, 0.0, parameters={"w": 0.55, "e": 0.5}, forcing={"q": lambda t, p: np.cos(p.w * t)},
-        elements={"right": Stop(at="q", position=1.0, restitution="e"),
-                  "left": Stop(at="q", position=-1.0, side=-1, restitution="e")},
-    )  # fmt: skip
+        1.0,
+        0.2,
+        0.0,
+        parameters={"w": 0.55, "e": 0.5},
+        forcing={"q": lambda t, p: np.cos(p.w * t)},
+        elements={
+            "right": Stop(at="q", position=1.0, restitution="e"),
+            "left": Stop(at="q", position=-1.0, side=-1, restitution="e"),
+        },
+    )
     found = ns.sweep(system, "e", [0.5], start={"v_q": 0.3}, keep=40, loads=True, progress=False).isel(e=0)
     assert int(found["period_number"]) == 0
     largest = max(float(found["maximum"].sel(state="v_q")), -float(found["minimum"].sel(state="v_q")))
@@ -264,11 +310,13 @@ def test_a_motion_without_a_period_has_averages() -> None:
 def test_a_nonlinear_system_with_elements() -> None:
     """A damper in a contact takes the integral of c v^2 while it is closed."""
     system = ns.System(
-        states=["x", "v"], parameters={"w": 1.2},
+        states=["x", "v"],
+        parameters={"w": 1.2},
         modes={"all": lambda t, u, p: (u.v, 0.7 * np.cos(p.w * t) - 0.2 * u.v - u.x - u.x**3)},
-        elements={"soft": ElasticStop(gap=lambda t, u, p: 0.3 - u.x, on={"v": -1.0}, stiffness=10.0, damping=0.8,
-                                      pulls=True)},
-    )  # fmt: skip
+        elements={
+            "soft": ElasticStop(gap=lambda t, u, p: 0.3 - u.x, on={"v": -1.0}, stiffness=10.0, damping=0.8, pulls=True)
+        },
+    )
     orbit = ns.find_orbit(system, loads=True, progress=False)
     run = orbit.trajectory(20001)
     closed = run["mode"].values == list(system.modes).index("soft_contact")
@@ -281,27 +329,38 @@ def test_a_nonlinear_system_with_elements() -> None:
 def test_three_balls_and_two_stops_at_one_place_share_impulses() -> None:
     """Newton's law at once: (1, 0, 0) becomes (-1/3, 2/3, 2/3) by the impulses 4/3 and 2/3, no energy lost."""
     balls = ns.mechanical(
-        np.eye(3), np.zeros((3, 3)), np.zeros((3, 3)), coordinates=["a", "b", "c"], parameters={},
-        elements={"ab": Stop(at={"b": 1, "a": -1}, side=-1, restitution=1.0),
-                  "bc": Stop(at={"c": 1, "b": -1}, side=-1, restitution=1.0)},
-    )  # fmt: skip
+        np.eye(3),
+        np.zeros((3, 3)),
+        np.zeros((3, 3)),
+        coordinates=["a", "b", "c"],
+        parameters={},
+        elements={
+            "ab": Stop(at={"b": 1, "a": -1}, side=-1, restitution=1.0),
+            "bc": Stop(at={"c": 1, "b": -1}, side=-1, restitution=1.0),
+        },
+    )
     run = ns.simulate(balls, duration=1.0, start={"a": -0.5, "v_a": 1.0})
     assert run["ab_impulse"].values == pytest.approx([4 / 3]) and run["bc_impulse"].values == pytest.approx([2 / 3])
     for name, speed in (("ab", 1.0), ("bc", 0.0)):
         assert run[f"{name}_energy_lost"].values == pytest.approx([0.0])
         assert run[f"{name}_impact_speed"].values == pytest.approx([speed])
     double = ns.mechanical(
-        1.0, 0.0, 0.0, parameters={},
+        1.0,
+        0.0,
+        0.0,
+        parameters={},
         elements={name: Stop(at="q", position=1.0, restitution=0.5) for name in ("one", "other")},
-    )  # fmt: skip
+    )
     run = ns.simulate(double, duration=2.0, start={"v_q": 1.0})
     assert run["one_impulse"].values == pytest.approx([0.75]) and run["other_impulse"].values == pytest.approx([0.75])
 
 
 def test_loads_are_refused_where_there_are_none() -> None:
-    plain = ns.models.duffing() if hasattr(ns.models, "duffing") else ns.System(
-        states=["x"], parameters={"a": 1.0}, modes={"all": lambda t, u, p: -p.a * u.x + np.cos(t)}
-    )  # fmt: skip
+    plain = (
+        ns.models.duffing()
+        if hasattr(ns.models, "duffing")
+        else ns.System(states=["x"], parameters={"a": 1.0}, modes={"all": lambda t, u, p: -p.a * u.x + np.cos(t)})
+    )
     for verb in (
         lambda: ns.sweep(plain, next(iter(plain.values)), [1.0], loads=True),
         lambda: ns.find_orbit(plain, loads=True),

@@ -50,11 +50,16 @@ def folded(expansion: float, contraction: float, reset: float = 0.0) -> ns.Syste
         return p.mu - u.x, u.y + p.r * u.x
 
     return ns.System(
-        states=["x", "y"], parameters={"mu": expansion, "b": contraction, "r": reset, "A": 0.0}, period=1.0,
-        modes={"low": grow, "high": grow}, indicators={"middle": lambda t, u, p: u.x - p.mu / 2},
-        transitions=[ns.Transition("low", "high", when="middle > 0"),
-                     ns.Transition("high", "low", at=0.999, reset=fold)],
-    )  # fmt: skip
+        states=["x", "y"],
+        parameters={"mu": expansion, "b": contraction, "r": reset, "A": 0.0},
+        period=1.0,
+        modes={"low": grow, "high": grow},
+        indicators={"middle": lambda t, u, p: u.x - p.mu / 2},
+        transitions=[
+            ns.Transition("low", "high", when="middle > 0"),
+            ns.Transition("high", "low", at=0.999, reset=fold),
+        ],
+    )
 
 
 def test_a_tent_map_as_a_flow_has_its_logarithms() -> None:
@@ -81,16 +86,20 @@ def test_what_a_saltation_matrix_adds_is_counted() -> None:
         return 1.0 - (u.x - p.edge) / 1.5, u.y
 
     system = ns.System(
-        states=["x", "y"], parameters={"k": k, "low": low, "high": high, "edge": edge, "A": 0.0}, period=1.0,
+        states=["x", "y"],
+        parameters={"k": k, "low": low, "high": high, "edge": edge, "A": 0.0},
+        period=1.0,
         modes={
             "slow": lambda t, u, p: (p.low + p.A * np.cos(2 * np.pi * t), -u.y),
             "fast": lambda t, u, p: (p.high + p.A * np.cos(2 * np.pi * t), -u.y),
         },
         indicators={"middle": lambda t, u, p: u.x - p.edge},
-        transitions=[ns.Transition("slow", "fast", when="middle > 0"),
-                     ns.Transition("slow", "slow", at=0.999, reset=pulse),
-                     ns.Transition("fast", "slow", at=0.999, reset=fold)],
-    )  # fmt: skip
+        transitions=[
+            ns.Transition("slow", "fast", when="middle > 0"),
+            ns.Transition("slow", "slow", at=0.999, reset=pulse),
+            ns.Transition("fast", "slow", at=0.999, reset=fold),
+        ],
+    )
     run = ns.simulate(system, periods=40, start={"x": 0.1, "y": 1.0})
     names = run.crossing_transition.attrs["flag_meanings"].split()
     counts = np.bincount(run.crossing_transition.values, minlength=3)
@@ -137,9 +146,10 @@ def test_both_ways_to_a_spectrum_agree() -> None:
 
 def lorenz() -> ns.System:
     return ns.System(
-        states=["x", "y", "z"], parameters={"s": 10.0, "r": 28.0, "b": 8 / 3},
+        states=["x", "y", "z"],
+        parameters={"s": 10.0, "r": 28.0, "b": 8 / 3},
         modes={"all": lambda t, u, p: (p.s * (u.y - u.x), u.x * (p.r - u.z) - u.y, u.x * u.y - p.b * u.z)},
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(("pieces", "options"), [(4096, {}), (64, {}), (64, {"order": 18})])
@@ -163,9 +173,12 @@ def test_a_frame_marched_with_its_motion_is_one_that_follows_a_record() -> None:
     """Lorenz's system and a forced one, whose clock goes on from the transient, in periods and in pieces of none. The
     record is a run of the series engine, which knows nothing of frames: it gives the true motion."""
     duffing = ns.System(
-        states=["x", "v"], parameters={"c": 0.2}, period=4.0, scale={"x": 0.5, "v": 2.0},
+        states=["x", "v"],
+        parameters={"c": 0.2},
+        period=4.0,
+        scale={"x": 0.5, "v": 2.0},
         modes={"all": lambda t, u, p: (u.v, u.x - u.x**3 - p.c * u.v + 0.3 * np.cos(np.pi * t / 2))},
-    )  # fmt: skip
+    )
     for system, start, length in (
         (lorenz(), [1.0, 1.0, 20.0], {"duration": 8.0}),
         (duffing, [0.1, 0.2], {"periods": 5, "transient": 2}),
@@ -182,9 +195,11 @@ def test_a_frame_marched_with_its_motion_is_one_that_follows_a_record() -> None:
 def test_a_motion_that_needs_its_steps_checked_is_recorded() -> None:
     """A kick once in a period, 3e-3 of it long: Taylor steps of their own choice pass over it (-1.04 then)."""
     kicked = ns.System(
-        states=["x"], parameters={"w": 0.01}, period=1.0,
+        states=["x"],
+        parameters={"w": 0.01},
+        period=1.0,
         modes={"all": lambda t, u, p: (40.0 * np.exp(-((np.sin(np.pi * t) / p.w) ** 2)) - u.x - u.x**3,)},
-    )  # fmt: skip
+    )
 
     def field(t: float, y: Any) -> list[float]:
         return [40.0 * np.exp(-((np.sin(np.pi * t) / 0.01) ** 2)) - y[0] - y[0] ** 3, -1.0 - 3.0 * y[0] ** 2]
@@ -248,9 +263,12 @@ def test_equilibria_are_named_along_a_sweep() -> None:
 def test_a_fixed_point_of_a_forced_system_is_no_attractor_where_its_neighbours_leave() -> None:
     """x grows by r in a kick and is folded, x -> r x (1 - x): the start of zeros stays, with the exponent log r."""
     logistic = ns.System(
-        states=["x"], parameters={"r": 3.9}, modes={"rest": lambda t, u, p: 0 * u.x}, period=1.0,
+        states=["x"],
+        parameters={"r": 3.9},
+        modes={"rest": lambda t, u, p: 0 * u.x},
+        period=1.0,
         transitions=[ns.Transition("rest", "rest", at=0.5, reset=lambda t, u, p: p.r * u.x * (1 - u.x))],
-    )  # fmt: skip
+    )
     with pytest.warns(UserWarning, match=r"x = 0 \(mode 'rest'\) is an unstable equilibrium"):
         found = spectrum(logistic, periods=640)
     assert abs(float(found.exponents[0]) - np.log(3.9)) < 1e-12 and np.isnan(found.standard_error[0])
@@ -258,8 +276,9 @@ def test_a_fixed_point_of_a_forced_system_is_no_attractor_where_its_neighbours_l
 
 def test_an_autonomous_cycle_with_impacts_has_a_zero_exponent() -> None:
     """Test problem E at q = 5: impacts on the seat, three states, one exponent zero."""
-    found = spectrum(ns.models.relief_valve().with_parameters(q=5.0), duration=2000.0, transient=200.0,
-                     start={"y1": 1.0, "y3": 5.0})  # fmt: skip
+    found = spectrum(
+        ns.models.relief_valve().with_parameters(q=5.0), duration=2000.0, transient=200.0, start={"y1": 1.0, "y3": 5.0}
+    )
     error = found.standard_error.values
     assert np.abs(found.exponents.values).min() < 5e-3
     assert found.exponents.values[2] < -0.5 and np.isfinite(error).all()
@@ -272,12 +291,15 @@ def test_sticking_loses_a_direction() -> None:
         return u.v, -u.x + p.F / (1 + p.d * (p.b - u.v))
 
     system = ns.System(
-        states=["x", "v"], parameters={"F": 1.0, "d": 3.0, "b": 0.2},
+        states=["x", "v"],
+        parameters={"F": 1.0, "d": 3.0, "b": 0.2},
         modes={"slip": slip, "stick": lambda t, u, p: (p.b, 0.0 * u.v)},
         indicators={"relative": lambda t, u, p: u.v - p.b, "pull": lambda t, u, p: u.x - p.F},
-        transitions=[ns.Transition("slip", "stick", when="relative > 0", reset=lambda t, u, p: (u.x, p.b)),
-                     ns.Transition("stick", "slip", when="pull > 0")],
-    )  # fmt: skip
+        transitions=[
+            ns.Transition("slip", "stick", when="relative > 0", reset=lambda t, u, p: (u.x, p.b)),
+            ns.Transition("stick", "slip", when="pull > 0"),
+        ],
+    )
     found = spectrum(system, duration=1200.0, start={"x": 0.0, "v": 0.0})
     assert found.exponents.values[1] == -np.inf and abs(found.exponents.values[0]) < 1e-3
     assert found.trace_defect == 0.0 and found.kaplan_yorke == 1.0
@@ -312,8 +334,10 @@ def test_a_sweep_is_its_points() -> None:
 
 def test_a_point_that_fails_keeps_its_status() -> None:
     system = ns.System(
-        states=["x", "y"], parameters={"a": -1.0}, modes={"all": lambda t, u, p: (p.a * u.x + np.cos(t), -9 * u.y)},
-    )  # fmt: skip
+        states=["x", "y"],
+        parameters={"a": -1.0},
+        modes={"all": lambda t, u, p: (p.a * u.x + np.cos(t), -9 * u.y)},
+    )
     found = spectrum(system, parameter="a", values=[-1.0, 5.0, -2.0], periods=64, transient=64, direction=None)
     assert list(found.status.values) == [0, 3, 0] and np.isnan(found.exponents.values[1]).all()
     assert np.abs(found.exponents.values[[0, 2]] - [[-1.0, -9.0], [-2.0, -9.0]]).max() < 1e-12
@@ -326,15 +350,25 @@ def test_a_stop_that_moves_past_a_carried_state_begins_anew() -> None:
     system = ns.models.impact_oscillator().with_parameters(A=0.01)
     c, far = system.values["c"], 5.0
     found = ns.lyapunov(
-        system, parameter="d", values=[far, 4.0, 1.0], direction="down", start={"x": 0.99}, periods=40, transient=0,
+        system,
+        parameter="d",
+        values=[far, 4.0, 1.0],
+        direction="down",
+        start={"x": 0.99},
+        periods=40,
+        transient=0,
         progress=False,
-    )  # fmt: skip
+    )
     assert found["status"].values.tolist() == [0, 0, 0]
     np.testing.assert_allclose(found["exponents"].sum("exponent"), -c, rtol=1e-6)
     moved = ns.lyapunov(
-        ns.models.impact_oscillator(), parameter="d", values=[-1.0, 0.5, 1.0], direction="down", periods=40,
+        ns.models.impact_oscillator(),
+        parameter="d",
+        values=[-1.0, 0.5, 1.0],
+        direction="down",
+        periods=40,
         progress=False,
-    )  # fmt: skip
+    )
     assert moved["status"].values.tolist()[1:] == [0, 0]
 
 
@@ -368,12 +402,15 @@ def test_errors_at_the_door() -> None:
 def test_results_are_saved_whole(tmp_path: Path) -> None:
     """NetCDF keeps infinities, units and the input; a sweep and a single point."""
     system = ns.models.discontinuous_support()
-    for k, found in enumerate((
-        ns.lyapunov(system, periods=64, transient=64),
-        ns.lyapunov(system.smoothed(1e-3), parameter="rho", values=[0.2, 0.3], periods=64, transient=64,
-                    progress=False),
-        ns.sensitivity(system.smoothed(1e-3), periods=1, parameters=("rho", "eta")),
-    )):  # fmt: skip
+    for k, found in enumerate(
+        (
+            ns.lyapunov(system, periods=64, transient=64),
+            ns.lyapunov(
+                system.smoothed(1e-3), parameter="rho", values=[0.2, 0.3], periods=64, transient=64, progress=False
+            ),
+            ns.sensitivity(system.smoothed(1e-3), periods=1, parameters=("rho", "eta")),
+        )
+    ):
         path = tmp_path / f"{k}.nc"
         ns.save(found, path)
         assert ns.load(path).identical(found)
@@ -384,9 +421,13 @@ def test_what_contacts_hold_is_no_exponent() -> None:
     has the eigenvalues of x'' + 0.1 x' + 2 x = 0; one at rest at a stop loses place and speed."""
     for element, free in (({"f": Coulomb(at="q1", friction=6.0)}, [0.0]), ({"s": Stop(at="q1", position=0.3)}, [])):
         pair = ns.mechanical(
-            np.eye(2), 0.1 * np.eye(2), [[2.0, -1.0], [-1.0, 2.0]], parameters={"w": 0.7}, elements=element,
+            np.eye(2),
+            0.1 * np.eye(2),
+            [[2.0, -1.0], [-1.0, 2.0]],
+            parameters={"w": 0.7},
+            elements=element,
             forcing={"q1": lambda t, p: 3.0 + 0.3 * np.cos(p.w * t)},
-        )  # fmt: skip
+        )
         found = ns.lyapunov(pair, periods=400)
         exponents = found["exponents"].values
         lost = 2 - len(free)

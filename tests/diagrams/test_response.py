@@ -86,14 +86,24 @@ def test_jumps_are_those_of_every_state_and_output_and_a_plot_draws_its_own() ->
         return tuple(x - x**3 + s * p.a + ripple for x, s in ((u.x, 0.0), (u.y, 1.0), (u.z, 2.0)))
 
     system = ns.System(
-        states=["x", "y", "z"], parameters={"a": 0.0, "w": 20.0}, modes={"only": field},
+        states=["x", "y", "z"],
+        parameters={"a": 0.0, "w": 20.0},
+        modes={"only": field},
         outputs={"square": lambda t, u, p: u.z * u.z},
-    )  # fmt: skip
+    )
     a = np.linspace(0.0, 0.6, 61)
     response = ns.frequency_response(
-        system, a, parameter="a", direction="up", start={"x": -1.2, "y": -1.2, "z": -1.2}, transient=200, keep=4,
-        max_period=3, rtol=1e-10, progress=False,
-    )  # fmt: skip
+        system,
+        a,
+        parameter="a",
+        direction="up",
+        start={"x": -1.2, "y": -1.2, "z": -1.2},
+        transient=200,
+        keep=4,
+        max_period=3,
+        rtol=1e-10,
+        progress=False,
+    )
     fold, names = 2 / (3 * np.sqrt(3)), response["jump_variable"].values.astype(str)
     assert set(names) == {"y", "z", "square"} and names.tolist() == sorted(names, key=["y", "z", "square"].index)
     for name, place in (("y", fold), ("z", fold / 2), ("square", fold / 2)):

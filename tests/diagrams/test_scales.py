@@ -15,10 +15,12 @@ QUIET = {"progress": False}
 def cubic(unit: float) -> ns.System:
     """x -> a x - x^3 / unit^2 once per period: x / unit follows one map, whatever the unit."""
     return ns.System(
-        states=["x"], parameters={"a": 2.1, "unit": unit}, modes={"rest": lambda t, u, p: 0 * u.x},
+        states=["x"],
+        parameters={"a": 2.1, "unit": unit},
+        modes={"rest": lambda t, u, p: 0 * u.x},
         transitions=[ns.Transition("rest", "rest", at=0.5, reset=lambda t, u, p: p.a * u.x - u.x**3 / p.unit**2)],
         period=1.0,
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1e-3, 1.0, 1e8])
@@ -39,15 +41,19 @@ def test_states_far_below_their_scale_are_named() -> None:
     for call in (
         lambda: ns.basins(
             ns.System(
-                states=["x", "y"], parameters={"a": 1.0}, period=1.0,
+                states=["x", "y"],
+                parameters={"a": 1.0},
+                period=1.0,
                 modes={"only": lambda t, u, p: (u.x - u.x**3, -p.a * u.y)},
             ),
-            {"x": [-1.0, 1.0], "y": [1e-6]}, transient=50, **QUIET,
+            {"x": [-1.0, 1.0], "y": [1e-6]},
+            transient=50,
+            **QUIET,
         ),
         lambda: ns.chart(small, {"a": [1.7], "unit": [1e-6]}, start={"x": 3e-7}, **QUIET),
         lambda: ns.sweep(small, "a", [1.7], start={"x": 3e-7}, **QUIET),
         lambda: ns.basin_fractions(small, "a", [1.7], box={"x": (0.0, 1e-6)}, n_starts=3, **QUIET),
-    ):  # fmt: skip
+    ):
         with pytest.warns(UserWarning, match=r"give System\(scale="):
             call()
     with warnings.catch_warnings():
@@ -60,9 +66,10 @@ def test_states_far_below_their_scale_are_named() -> None:
 def test_motion_about_a_large_value_has_its_period(method: str) -> None:
     """A linear oscillator about x = x0, driven or at rest: period 1, whatever rounding or steps leave of it."""
     system = ns.System(
-        states=["x", "v"], parameters={"omega": 1.3, "force": 0.0, "x0": 1.0},
+        states=["x", "v"],
+        parameters={"omega": 1.3, "force": 0.0, "x0": 1.0},
         modes={"only": lambda t, u, p: (u.v, -(u.x - p.x0) - 0.3 * u.v + p.force * np.cos(p.omega * t))},
-    )  # fmt: skip
+    )
     grid = {"force": [0.0, 1.0], "x0": [1.0, 1e3, 1e5, 1e7]}
     plane = ns.chart(system, grid, start={"x": 1e5}, method=method, **QUIET)
     assert (plane["period_number"] == 1).all()

@@ -45,9 +45,23 @@ def amplitude(p: dict[str, float], omega: np.ndarray) -> np.ndarray:
 def test_period_numbers_of_the_logistic_map(logistic: ns.System) -> None:
     """Flips at 3, 1 + sqrt(6), 3.5440903, 3.5644073; period three from 1 + sqrt(8) to 3.8414990."""
     known = {
-        1.5: 1, 2.9: 1, 3.05: 2, 3.44: 2, 3.46: 4, 3.54: 4, 3.5445: 8, 3.564: 8, 3.566: 16, 3.83: 3, 3.8285: 3,
-        3.845: 6, 3.6275: 6, 3.7: 0, 3.9: 0, 4.0: 0,
-    }  # fmt: skip
+        1.5: 1,
+        2.9: 1,
+        3.05: 2,
+        3.44: 2,
+        3.46: 4,
+        3.54: 4,
+        3.5445: 8,
+        3.564: 8,
+        3.566: 16,
+        3.83: 3,
+        3.8285: 3,
+        3.845: 6,
+        3.6275: 6,
+        3.7: 0,
+        3.9: 0,
+        4.0: 0,
+    }
     diagram = ns.sweep(logistic, "r", list(known), start={"x": 0.3}, direction=None, **QUIET)
     found = dict(zip(known, diagram["period_number"].values.tolist(), strict=True))
     assert found == known
@@ -105,9 +119,17 @@ def test_a_diverging_point_keeps_its_status_and_the_rest_is_whole(logistic: ns.S
 def test_negative_damping_for_a_part_of_the_values(method: str, linear: ns.System) -> None:
     values = np.array([0.5, -0.5, 1.0, -2.0])
     swept = ns.sweep(
-        linear.with_parameters(g=1e12), "c", values, direction=None, transient=200, keep=4, max_period=3, method=method,
-        **METHODS[method], **QUIET,
-    )  # fmt: skip
+        linear.with_parameters(g=1e12),
+        "c",
+        values,
+        direction=None,
+        transient=200,
+        keep=4,
+        max_period=3,
+        method=method,
+        **METHODS[method],
+        **QUIET,
+    )
     assert words(swept["status"]) == ["ok", "diverged", "ok", "diverged"]
     p = dict(linear.values)
     for i in (0, 2):
@@ -120,9 +142,16 @@ def test_extremes_of_a_linear_motion(method: str, phase: float, linear: ns.Syste
     """x = a cos(w t - d): true extremes, section points at the phase, clearance of both indicators."""
     omega = np.linspace(3.0, 6.0, 7)
     swept = ns.sweep(
-        linear, "omega", omega, section=ns.Stroboscopic(phase), transient=150, keep=20, method=method,
-        **METHODS[method], **QUIET,
-    )  # fmt: skip
+        linear,
+        "omega",
+        omega,
+        section=ns.Stroboscopic(phase),
+        transient=150,
+        keep=20,
+        method=method,
+        **METHODS[method],
+        **QUIET,
+    )
     p = dict(linear.values)
     a = amplitude(p, omega)
     assert (swept["period_number"] == 1).all()
@@ -180,11 +209,19 @@ def test_the_three_methods_agree_point_by_point() -> None:
     values = np.linspace(0.2, 0.34, 8)
     results = {
         method: ns.sweep(
-            system, "rho", values, direction=None, section=ns.Stroboscopic(0.13), transient=300, keep=48,
-            method=method, **settings, **QUIET,
+            system,
+            "rho",
+            values,
+            direction=None,
+            section=ns.Stroboscopic(0.13),
+            transient=300,
+            keep=48,
+            method=method,
+            **settings,
+            **QUIET,
         )
         for method, settings in METHODS.items()
-    }  # fmt: skip
+    }
     settled = results["exact"]["status"].values == 0
     assert settled.sum() >= 3
     for method in ("taylor", "rkf45"):
@@ -201,9 +238,17 @@ def test_a_carried_state_keeps_the_phase_of_the_forcing(method: str, phase: floa
     itself, which lies on the section, is no return."""
     omega = np.array([3.1, 4.3]) + phase
     swept = ns.sweep(
-        linear, "omega", omega, section=ns.Stroboscopic(phase), transient=0, keep=3, max_period=2, method=method,
-        **METHODS[method], **QUIET,
-    )  # fmt: skip
+        linear,
+        "omega",
+        omega,
+        section=ns.Stroboscopic(phase),
+        transient=0,
+        keep=3,
+        max_period=2,
+        method=method,
+        **METHODS[method],
+        **QUIET,
+    )
     assert words(swept["status"])[1] == "not_periodic"  # so that there was one pass only
     shifted = linear_with_phase(omega[1], phase, linear)
     run = ns.simulate(shifted, periods=3, start=swept["section"].values[0, -1], samples=4)
@@ -331,9 +376,16 @@ def test_the_relief_valve_on_its_section() -> None:
     """An autonomous system: q = 8 is the published cycle (period one, y1 from 0.668282564 to 6.009885866); no impacts;
     at q = 9 the equilibrium is stable, so maxima of the lift come ever nearer to it."""
     swept = ns.sweep(
-        ns.models.relief_valve(), "q", [8.0], section=ns.Poincare("lift_velocity", rising=False),
-        start={"y1": 3.0, "y2": 0.0, "y3": 13.0}, transient=200, keep=20, rtol=1e-11, **QUIET,
-    )  # fmt: skip
+        ns.models.relief_valve(),
+        "q",
+        [8.0],
+        section=ns.Poincare("lift_velocity", rising=False),
+        start={"y1": 3.0, "y2": 0.0, "y3": 13.0},
+        transient=200,
+        keep=20,
+        rtol=1e-11,
+        **QUIET,
+    )
     assert words(swept["status"]) == ["ok"]
     assert swept["period_number"].values.tolist() == [1]
     assert swept["maximum"].sel(state="y1").values[0] == pytest.approx(6.009885866, abs=1e-8)
@@ -344,9 +396,17 @@ def test_the_relief_valve_on_its_section() -> None:
 
 def test_a_section_that_is_never_met_is_a_status() -> None:
     swept = ns.sweep(
-        ns.models.discontinuous_support(rho=0.05), "g", [-0.001, 0.5], direction=None,
-        section=ns.Poincare("penetration", t_max=30.0), transient=20, keep=4, max_period=3, method="taylor", **QUIET,
-    )  # fmt: skip
+        ns.models.discontinuous_support(rho=0.05),
+        "g",
+        [-0.001, 0.5],
+        direction=None,
+        section=ns.Poincare("penetration", t_max=30.0),
+        transient=20,
+        keep=4,
+        max_period=3,
+        method="taylor",
+        **QUIET,
+    )
     assert words(swept["status"])[1] == "no_convergence"
     assert np.isnan(swept["section"].values[1]).all()
     assert np.isfinite(swept["section"].values[0]).all()
@@ -392,9 +452,7 @@ def test_without_judgement_the_points_are_those_of_poincare_and_no_period_is_cla
     assert not {"period_number", "residual"} & set(looked.variables)
     assert words(looked["status"]) == ["ok"] * 3
     assert ns.plot.bifurcation(looked)
-    bare = ns.sweep(
-        system, "rho", values, direction=None, transient=60, keep=20, judge=False, extremes=False, **QUIET
-    )  # fmt: skip
+    bare = ns.sweep(system, "rho", values, direction=None, transient=60, keep=20, judge=False, extremes=False, **QUIET)
     np.testing.assert_allclose(bare["section"], looked["section"], atol=1e-12)
     assert np.array_equal(bare["contacts_per_period"], looked["contacts_per_period"])
     assert not {"maximum", "minimum", "clearance"} & set(bare.variables)

@@ -10,9 +10,12 @@ import pytest
 
 #: Sizes that show the same in less time than those of the pictures.
 SMALL = {
-    "basins": {"points": 40}, "chart": {"points": 40}, "basin_fractions": {"points": 14, "starts": 60},
-    "element_loads": {"points": 41}, "three_masses": {"points": 25, "forces": 9},
-}  # fmt: skip
+    "basins": {"points": 40},
+    "chart": {"points": 40},
+    "basin_fractions": {"points": 14, "starts": 60},
+    "element_loads": {"points": 41},
+    "three_masses": {"points": 25, "forces": 9},
+}
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 
 

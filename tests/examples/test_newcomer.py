@@ -50,9 +50,13 @@ def on_a_terminal(words: list[str], folder: Path) -> str:
 
     ours, theirs = pty.openpty()
     program = subprocess.Popen(
-        words, cwd=folder, env=environment() | {"TERM": "xterm", "COLUMNS": "80"}, stdin=subprocess.DEVNULL,
-        stdout=theirs, stderr=theirs,
-    )  # fmt: skip
+        words,
+        cwd=folder,
+        env=environment() | {"TERM": "xterm", "COLUMNS": "80"},
+        stdin=subprocess.DEVNULL,
+        stdout=theirs,
+        stderr=theirs,
+    )
     os.close(theirs)
     said = b""
     while True:

@@ -79,8 +79,10 @@ class Page:
 
     def until_done(self) -> None:
         """Wait until everything that was asked for is shown."""
-        self.until("(() => { const told = document.documentElement.dataset;"
-                   " return told.sent === told.heard && told.busy === ''; })()")  # fmt: skip
+        self.until(
+            "(() => { const told = document.documentElement.dataset;"
+            " return told.sent === told.heard && told.busy === ''; })()"
+        )
 
     def readout(self) -> dict[str, str]:
         return dict(json.loads(self.tab.evaluate('Bokeh.documents[0].get_model_by_name("readout").value')))
@@ -115,9 +117,8 @@ class Page:
             self.tab.screenshot(path=str(Path(folder) / f"explorer_{name}.png"))
 
     def notes(self) -> str:
-        return str(self.tab.evaluate(
-            '[...document.querySelectorAll(".note:not([hidden]), .wrong")].map(one => one.textContent).join(" ").trim()'
-        ))  # fmt: skip
+        every = '[...document.querySelectorAll(".note:not([hidden]), .wrong")]'
+        return str(self.tab.evaluate(f'{every}.map(one => one.textContent).join(" ").trim()'))
 
 
 def browser_program() -> str | None:

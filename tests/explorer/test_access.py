@@ -27,9 +27,13 @@ def ask(server: Any, path: str, **headers: str) -> tuple[int, dict[str, str]]:
 
 def handshake(origin: str) -> dict[str, str]:
     return {
-        "Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13", "Origin": origin,
-        "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==", "Sec-WebSocket-Protocol": "bokeh, nothing",
-    }  # fmt: skip
+        "Upgrade": "websocket",
+        "Connection": "Upgrade",
+        "Sec-WebSocket-Version": "13",
+        "Origin": origin,
+        "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+        "Sec-WebSocket-Protocol": "bokeh, nothing",
+    }
 
 
 def test_the_token_lets_in_and_the_cookie_after_it(server: Any) -> None:

@@ -13,14 +13,22 @@ from nonsmooth.explorer.building import KINDS, read_plan
 ONE = {"m": "1", "k": "1", "c": "0.1", "F": "0.5"}
 TWO = {"m": "0.5", "k": "2", "c": "0", "F": "0"}
 ALL = {
-    "masses": [ONE, TWO], "omega": "0.9",
+    "masses": [ONE, TWO],
+    "omega": "0.9",
     "elements": [
         {"kind": "stop", "at": "2", "other": "0", "side": "above", "position": "0.3", "restitution": "0.6"},
-        {"kind": "elastic", "at": "2", "other": "1", "side": "below", "position": "-0.5", "stiffness": "20",
-         "damping": "1"},
+        {
+            "kind": "elastic",
+            "at": "2",
+            "other": "1",
+            "side": "below",
+            "position": "-0.5",
+            "stiffness": "20",
+            "damping": "1",
+        },
         {"kind": "friction", "at": "1", "other": "0", "friction": "0.2", "belt": "0"},
     ],
-}  # fmt: skip
+}
 
 
 def python_of(form: Any) -> ns.System:
@@ -57,12 +65,15 @@ def test_elements_between_masses_and_several_kinds_together() -> None:
 
 @pytest.mark.parametrize(
     ("change", "said"),
-    [({"masses": [{**ONE, "m": "0"}]}, "mass 1, mass = 0"),
-     ({"masses": [{**ONE, "k": "__import__('os')"}]}, "is no number"),
-     ({"elements": [{"kind": "stop", "at": 3}]}, "no mass 3"),
-     ({"elements": [{"kind": "stop", "at": 1, "other": 1}]}, "with itself"),
-     ({"elements": [{"kind": "stop", "at": 1, "restitution": 2}]}, "at most 1"), ({"omega": -1}, "forcing frequency")],
-)  # fmt: skip
+    [
+        ({"masses": [{**ONE, "m": "0"}]}, "mass 1, mass = 0"),
+        ({"masses": [{**ONE, "k": "__import__('os')"}]}, "is no number"),
+        ({"elements": [{"kind": "stop", "at": 3}]}, "no mass 3"),
+        ({"elements": [{"kind": "stop", "at": 1, "other": 1}]}, "with itself"),
+        ({"elements": [{"kind": "stop", "at": 1, "restitution": 2}]}, "at most 1"),
+        ({"omega": -1}, "forcing frequency"),
+    ],
+)
 def test_what_does_not_fit_is_refused_with_its_row(change: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         read_plan({**ALL, **change})

@@ -27,20 +27,29 @@ SHORT: dict[str, Any] = {"transient": 60, "start": [0.0, 0.0]}
 def results() -> dict[str, Any]:
     return {
         "diagram": ns.sweep(
-            SYSTEM, "rho", np.linspace(0.25, 0.3, 7), direction="both", keep=20, section=ns.Stroboscopic(0.0),
-            progress=False, **SHORT,
+            SYSTEM,
+            "rho",
+            np.linspace(0.25, 0.3, 7),
+            direction="both",
+            keep=20,
+            section=ns.Stroboscopic(0.0),
+            progress=False,
+            **SHORT,
         ),
         "run": ns.simulate(SYSTEM, periods=8, **SHORT),
         "section": ns.poincare(SYSTEM, section=ns.Stroboscopic(0.25), n=12, **SHORT),
         "response": ns.frequency_response(SYSTEM, np.linspace(3.0, 5.0, 5), keep=20, progress=False, **SHORT),
         "chart": ns.chart(
-            SYSTEM, {"rho": np.linspace(0.2, 0.5, 6), "omega": np.linspace(3.0, 5.0, 5)}, refine=True, progress=False,
+            SYSTEM,
+            {"rho": np.linspace(0.2, 0.5, 6), "omega": np.linspace(3.0, 5.0, 5)},
+            refine=True,
+            progress=False,
             **SHORT,
         ),
         "basins": ns.basins(
             SYSTEM, {"x": np.linspace(-0.01, 0.01, 5), "v": np.linspace(-0.1, 0.1, 4)}, transient=60, progress=False
         ),
-    }  # fmt: skip
+    }
 
 
 def write(folder: Path, view: str, kind: str, results: Any, state: Any = STATE) -> Path:
@@ -67,10 +76,17 @@ def same(path: Path, shown: Any) -> None:
     assert made.drop_attrs().identical(shown.drop_attrs())
 
 
-@pytest.mark.parametrize(("view", "key"), [
-    ("diagram", "diagram"), ("portrait", "run"), ("section", "section"), ("response", "response"), ("chart", "chart"),
-    ("basins", "basins"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("view", "key"),
+    [
+        ("diagram", "diagram"),
+        ("portrait", "run"),
+        ("section", "section"),
+        ("response", "response"),
+        ("chart", "chart"),
+        ("basins", "basins"),
+    ],
+)
 def test_the_script_and_the_study_file_make_what_was_shown(
     view: str, key: str, results: dict[str, Any], tmp_path: Path
 ) -> None:
@@ -110,9 +126,11 @@ def test_a_motion_moves_in_a_file_and_other_views_say_that_they_do_not(results: 
 
 @pytest.mark.parametrize("view", ["branches", "spectrum"])
 def test_what_has_no_table_in_a_study_file_is_saved_as_the_script_that_makes_it(view: str, tmp_path: Path) -> None:
-    shown = ns.bifurcation_diagram(
-        SYSTEM, "rho", (0.26, 0.3), start=[0.0, 0.0], transient=100, progress=False
-    ) if view == "branches" else ns.amplitude_spectrum(SYSTEM, **SHORT)  # fmt: skip
+    shown = (
+        ns.bifurcation_diagram(SYSTEM, "rho", (0.26, 0.3), start=[0.0, 0.0], transient=100, progress=False)
+        if view == "branches"
+        else ns.amplitude_spectrum(SYSTEM, **SHORT)
+    )
     script = write(tmp_path, view, "py", {view: shown})
     run(script)
     same(script.with_suffix(".nc"), shown)

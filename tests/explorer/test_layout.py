@@ -43,9 +43,11 @@ def box(page: Any, which: str) -> dict[str, float]:
 
 def frame(page: Any, figure: str) -> list[float]:
     """Width and height of the frame of a figure."""
-    return list(page.tab.evaluate(
-        "name => (one => [one.inner_width, one.inner_height])(Bokeh.documents[0].get_model_by_name(name))", figure
-    ))  # fmt: skip
+    return list(
+        page.tab.evaluate(
+            "name => (one => [one.inner_width, one.inner_height])(Bokeh.documents[0].get_model_by_name(name))", figure
+        )
+    )
 
 
 @pytest.mark.parametrize(("width", "height", "large"), SIZES)
@@ -114,7 +116,7 @@ def test_the_tour_covers_nothing(server: Any, new_page: Callable[..., Any]) -> N
                     const box = one.getBoundingClientRect();
                     return box.bottom <= tour.top + 1 || box.top >= tour.bottom - 1 || !box.width;
                 });
-            }""")  # fmt: skip
+            }""")
             page.tab.click("#tour-next")
         assert not page.tab.is_visible("#tour")
 
@@ -126,14 +128,17 @@ def test_one_colour_says_up_in_every_view_and_marks_of_branches_are_told(
     legends = page.ui()["legends"]
     up = {words: color for words, color, *_ in legends["diagram"]}["up"]
     assert up == dict(legends["response"])["up"]
-    drawn = page.tab.evaluate("""(color => {
+    drawn = page.tab.evaluate(
+        """(color => {
         const source = Bokeh.documents[0].get_model_by_name("diagram image");
         const seen = new Uint8Array(source.data.image[0].buffer);
         const [red, green, blue] = [1, 3, 5].map(i => parseInt(color.slice(i, i + 2), 16));
         for (let i = 0; i < seen.length; i += 4)
             if (seen[i + 3] && seen[i] === red && seen[i + 1] === green && seen[i + 2] === blue) return true;
         return false;
-    })""", up)  # fmt: skip
+    })""",
+        up,
+    )
     assert drawn
     page.until('document.getElementById("legend-diagram").textContent.includes("flip")')
     told = page.tab.inner_text("#legend-diagram").replace("\n", "")

@@ -23,8 +23,10 @@ _TIME = np.arange(0.0, 20.0, 0.02)
 FILES = {
     "steady.csv": b"time (s),x (m)\n" + "".join(f"{t:.3f},{0.02 * np.sin(3.69 * t):.6f}\n" for t in _TIME).encode(),
     "other.csv": b"time (s),v (m/s)\n" + "".join(f"{t:.3f},{0.1 * np.cos(t):.6f}\n" for t in _TIME).encode(),
-    "picture.png": b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "words.csv": b"not,a\nrecording,at all\n", "empty.mat": b"",
-}  # fmt: skip
+    "picture.png": b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR",
+    "words.csv": b"not,a\nrecording,at all\n",
+    "empty.mat": b"",
+}
 #: Acts on one visible control that is chosen by two numbers from 0 to 1, as a person's hand would, and says which.
 HAND = """([kind, which, value, leftOut]) => {
     const open = document.querySelector("dialog[open]") || document;

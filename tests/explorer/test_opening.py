@@ -44,9 +44,14 @@ def test_a_study_opens_on_its_model_range_and_start(tmp_path: Path) -> None:
     found = view(query)
     assert system is None
     assert {key: found[key] for key in ("model", "over", "direction", "transient", "keep", "start", "shown")} == {
-        "model": "discontinuous_support", "over": "g", "direction": "down", "transient": "50", "keep": "20",
-        "start": "0.0 0.01", "shown": "x",
-    }  # fmt: skip
+        "model": "discontinuous_support",
+        "over": "g",
+        "direction": "down",
+        "transient": "50",
+        "keep": "20",
+        "start": "0.0 0.01",
+        "shown": "x",
+    }
     assert [float(found[key]) for key in ("p.k", "low", "high")] == [9.0, -0.001, 0.002]
     Catalogue.of(system).state_of(parse_qsl(query))
 
@@ -69,9 +74,13 @@ def test_a_result_opens_on_the_system_in_its_record(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "content", "said"),
-    [("a.toml", "[system]\nmodel = 'discontinuous_support'\n", "verb"), ("a.nc", "no result", "a.nc"),
-     ("gone.nc", None, "no such file"), ("rig.csv", "t,x\n0,1\n", "drop it into the page")],
-)  # fmt: skip
+    [
+        ("a.toml", "[system]\nmodel = 'discontinuous_support'\n", "verb"),
+        ("a.nc", "no result", "a.nc"),
+        ("gone.nc", None, "no such file"),
+        ("rig.csv", "t,x\n0,1\n", "drop it into the page"),
+    ],
+)
 def test_what_cannot_be_opened_is_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, content: str | None, said: str
 ) -> None:

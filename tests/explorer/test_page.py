@@ -99,9 +99,11 @@ def test_a_moved_slider_redraws_the_diagram_live(server: Any, new_page: Callable
         alone.append((1000 * (time.perf_counter() - begun), 1000 * (time.process_time() - spent)))
     wall, cpu = (statistics.median(one[k] for one in alone) for k in (0, 1))
     print(f"the sweep alone: median {wall:.0f} ms, {cpu:.0f} ms of processor time; load {os.getloadavg()[0]:.1f}")
-    print(f"slider to first look: median {statistics.median(first):.0f} ms, longest {max(first):.0f} ms; "
-          f"to the judged diagram: up and down {statistics.median(judged[:MOVES]):.0f} ms, "
-          f"every column from rest {statistics.median(judged[MOVES:]):.0f} ms")  # fmt: skip
+    print(
+        f"slider to first look: median {statistics.median(first):.0f} ms, longest {max(first):.0f} ms; "
+        f"to the judged diagram: up and down {statistics.median(judged[:MOVES]):.0f} ms, "
+        f"every column from rest {statistics.median(judged[MOVES:]):.0f} ms"
+    )
     assert statistics.median(first) < 3 * wall + 1000  # 250 ms with two free cores; a crowded machine is no fault
 
 

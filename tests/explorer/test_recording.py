@@ -36,11 +36,15 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Path:
     x = np.interp(400 * period + time, *run["u"].sel(state="x").groupby("time").last().pipe(lambda u: (u.time, u)))
     step = 2 * np.pi / 1440
     sensors = {
-        "Angle": xr.Dataset({"Angle": ("time", np.rint(x / TRAVEL / step) * step, {"units": "rad"})},
-                            {"time": ("time", time + 0.3, {"units": "s"})}),
-        "Turn": xr.Dataset({"Turn": ("time", np.arange(14.0), {"units": "turns"})},
-                           {"time": ("time", np.arange(14) * period + 0.3, {"units": "s"})}),
-    }  # fmt: skip
+        "Angle": xr.Dataset(
+            {"Angle": ("time", np.rint(x / TRAVEL / step) * step, {"units": "rad"})},
+            {"time": ("time", time + 0.3, {"units": "s"})},
+        ),
+        "Turn": xr.Dataset(
+            {"Turn": ("time", np.arange(14.0), {"units": "turns"})},
+            {"time": ("time", np.arange(14) * period + 0.3, {"units": "s"})},
+        ),
+    }
     folder = tmp_path_factory.mktemp("rig")
     recording = Recording.from_runs({"Run #1": sensors}, synthetic=True)
     write_cap(recording, folder / "rig.cap")
@@ -125,8 +129,10 @@ def test_a_file_that_is_no_recording_is_refused_and_nothing_is_lost(page: Any, r
     drop(page, "rig.cap", rig.with_name("rig.cap").read_bytes())
     page.tab.wait_for_selector("#recording-body:visible")
     for name, content in {
-        "notes.csv": b"import os\nos.abort()\n", "picture.mat": b"\x89PNG\r\n\x1a\n\0\0\0", "empty.lvm": b"",
-    }.items():  # fmt: skip
+        "notes.csv": b"import os\nos.abort()\n",
+        "picture.mat": b"\x89PNG\r\n\x1a\n\0\0\0",
+        "empty.lvm": b"",
+    }.items():
         drop(page, name, content)
         page.until(f'document.getElementById("wrong-recording").textContent.includes("{name}")')
         assert page.tab.inner_text("#recording-name") == "rig.cap (synthetic)"
@@ -230,11 +236,14 @@ def test_measured_responses_of_runs_and_of_a_table_over_frequency(tmp_path: Path
     for k, omega in enumerate((3.0, 5.0), 1):
         time, turns = np.linspace(0.0, 20.0, 2001), np.arange(8) * 2 * np.pi / omega
         runs[f"Run #{k}"] = {
-            "Position": xr.Dataset({"Position": ("time", 10.0 * k * np.cos(omega * time), {"units": "mm"})},
-                                   {"time": ("time", time, {"units": "s"})}),
-            "Turn": xr.Dataset({"Turn": ("time", np.arange(8.0), {"units": "turns"})},
-                               {"time": ("time", turns, {"units": "s"})}),
-        }  # fmt: skip
+            "Position": xr.Dataset(
+                {"Position": ("time", 10.0 * k * np.cos(omega * time), {"units": "mm"})},
+                {"time": ("time", time, {"units": "s"})},
+            ),
+            "Turn": xr.Dataset(
+                {"Turn": ("time", np.arange(8.0), {"units": "turns"})}, {"time": ("time", turns, {"units": "s"})}
+            ),
+        }
     file = write_capstone_csv(Recording.from_runs(runs, synthetic=True), tmp_path / "steps.csv")
     recorded = read({"content": file.read_bytes(), "name": "steps.csv"})["recorded"]
     omega, height = response_points(recorded, matched(recorded, system), system, system.values, "omega", "x")

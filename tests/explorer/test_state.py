@@ -31,12 +31,19 @@ def test_a_query_brings_every_field_back(rho: float, low: float, start: tuple[fl
 @pytest.mark.parametrize(
     ("query", "said"),
     [
-        ("p.rho=__import__('os')", "is no number"), ("p.rho=nan", "is no number"), ("p.rho=1e999", "is no number"),
-        ("p.gap=1", "is no parameter; there are: m, k"), ("over=x", "allowed: m, k"), ("shown=rho", "allowed: x, v"),
-        ("start=1", "give 2 numbers"), ("columns=1e9", "from 10 to 4000"), ("eta=0", "greater than 0"),
-        ("direction=sideways", "allowed: both, up"), ("class=1", "nothing that a view holds"),
+        ("p.rho=__import__('os')", "is no number"),
+        ("p.rho=nan", "is no number"),
+        ("p.rho=1e999", "is no number"),
+        ("p.gap=1", "is no parameter; there are: m, k"),
+        ("over=x", "allowed: m, k"),
+        ("shown=rho", "allowed: x, v"),
+        ("start=1", "give 2 numbers"),
+        ("columns=1e9", "from 10 to 4000"),
+        ("eta=0", "greater than 0"),
+        ("direction=sideways", "allowed: both, up"),
+        ("class=1", "nothing that a view holds"),
     ],
-)  # fmt: skip
+)
 def test_what_does_not_fit_is_refused(query: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         from_query(query, FIRST, STATES)

@@ -35,10 +35,22 @@ def worker(answers: queue.Queue[Answer]) -> Iterator[Worker]:
 def job(view: str, **options: Any) -> dict[str, Any]:
     state = first_state("discontinuous_support", SYSTEM)
     return {
-        "view": view, "text": SYSTEM.to_text(), "values": dict(state.values), "method": "auto", "eta": 0.0,
-        "transient": 100, "keep": 20, "start": [0.0, 0.0], "begin": [0.0, 0.0], "over": "rho", "low": 0.2, "high": 0.5,
-        "columns": 11, "direction": "both", **options,
-    }  # fmt: skip
+        "view": view,
+        "text": SYSTEM.to_text(),
+        "values": dict(state.values),
+        "method": "auto",
+        "eta": 0.0,
+        "transient": 100,
+        "keep": 20,
+        "start": [0.0, 0.0],
+        "begin": [0.0, 0.0],
+        "over": "rho",
+        "low": 0.2,
+        "high": 0.5,
+        "columns": 11,
+        "direction": "both",
+        **options,
+    }
 
 
 def last_of(answers: queue.Queue[Answer], number: int) -> Answer:
@@ -52,8 +64,16 @@ def test_a_view_is_what_the_verb_returns(worker: Worker, answers: queue.Queue[An
     worker.ask(1, job("diagram"))
     kind, _, (found, warned) = last_of(answers, 1)
     assert (kind, warned) == ("done", [])
-    alone = ns.sweep(SYSTEM, "rho", found["diagram"]["rho"].values, direction="both", start=[0.0, 0.0], transient=100,
-                     keep=20, progress=False)  # fmt: skip
+    alone = ns.sweep(
+        SYSTEM,
+        "rho",
+        found["diagram"]["rho"].values,
+        direction="both",
+        start=[0.0, 0.0],
+        transient=100,
+        keep=20,
+        progress=False,
+    )
     assert found["diagram"].drop_attrs().identical(alone.drop_attrs())
 
 

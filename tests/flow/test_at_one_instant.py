@@ -14,8 +14,12 @@ def hopping(count: int, friction: float | None, coupling: float = 0.0) -> tuple[
     """Balls that fall and bounce at the same instants, on a floor that may rub, and a start."""
     names = [f"{axis}{i}" for i in range(count) for axis in "xy"]
     system = ns.mechanical(
-        np.eye(2 * count), 0.1 * np.eye(2 * count) + coupling, np.diag([1.0, 0.0] * count), parameters={},
-        coordinates=names, period=2 * np.pi,
+        np.eye(2 * count),
+        0.1 * np.eye(2 * count) + coupling,
+        np.diag([1.0, 0.0] * count),
+        parameters={},
+        coordinates=names,
+        period=2 * np.pi,
         forcing={f"y{i}": lambda t, p: -1.0 - 0.3 * np.cos(t) for i in range(count)},
         elements={
             f"s{i}": ns.elements.Stop(
@@ -23,7 +27,7 @@ def hopping(count: int, friction: float | None, coupling: float = 0.0) -> tuple[
             )
             for i in range(count)
         },
-    )  # fmt: skip
+    )
     return system, {name: 0.2 if name[0] == "x" else 0.5 for name in names}
 
 
@@ -54,16 +58,25 @@ def exponents(count: int, friction: float | None, method: str) -> np.ndarray:
     """Of balls on springs that bounce once in a period, on a floor that may rub; they do not come to rest."""
     names = [f"{axis}{i}" for i in range(count) for axis in "xy"]
     system = ns.mechanical(
-        np.eye(2 * count), 0.1 * np.eye(2 * count), np.eye(2 * count), parameters={}, coordinates=names, period=np.pi,
+        np.eye(2 * count),
+        0.1 * np.eye(2 * count),
+        np.eye(2 * count),
+        parameters={},
+        coordinates=names,
+        period=np.pi,
         forcing={name: (lambda t, p, a=(0.5 if name[0] == "x" else 2.0): a * np.cos(2 * t)) for name in names},
         elements={
             f"s{i}": ns.elements.Stop(
-                at=f"y{i}", side=-1, position=-0.1, restitution=0.8, friction=friction,
+                at=f"y{i}",
+                side=-1,
+                position=-0.1,
+                restitution=0.8,
+                friction=friction,
                 tangent=f"x{i}" if friction else None,
             )
             for i in range(count)
         },
-    )  # fmt: skip
+    )
     start = {name: 0.2 if name[0] == "x" else 0.5 for name in names}
     found = ns.lyapunov(system, periods=60, transient=20, start=start, method=method, progress=False)
     return np.sort(np.exp(found.exponents.values))  # of a rate that an impact takes away: 0

@@ -16,16 +16,20 @@ SECTION = ns.Poincare("rate")
 def line(a: float, c: float) -> ns.System:
     """x'' = a x - c x': eigenvalues (-c +- sqrt(c^2 + 4 a)) / 2."""
     return ns.System(
-        name="line", states=["x", "v"], parameters={"a": a, "c": c},
-        modes={"all": lambda t, u, p: (u.v, p.a * u.x - p.c * u.v)}, indicators={"rate": lambda t, u, p: u.v},
-    )  # fmt: skip
+        name="line",
+        states=["x", "v"],
+        parameters={"a": a, "c": c},
+        modes={"all": lambda t, u, p: (u.v, p.a * u.x - p.c * u.v)},
+        indicators={"rate": lambda t, u, p: u.v},
+    )
 
 
 def lorenz(r: float) -> ns.System:
     return ns.System(
-        states=["x", "y", "z"], parameters={"s": 10.0, "r": r, "b": 8 / 3},
+        states=["x", "y", "z"],
+        parameters={"s": 10.0, "r": r, "b": 8 / 3},
         modes={"all": lambda t, u, p: (p.s * (u.y - u.x), u.x * (p.r - u.z) - u.y, u.x * u.y - p.b * u.z)},
-    )  # fmt: skip
+    )
 
 
 def at(system: ns.System, *u: float, **options: Any) -> Any:
@@ -50,10 +54,12 @@ def test_eigenvalues_of_the_lorenz_system() -> None:
 def test_a_boundary_and_what_lies_beyond_it() -> None:
     """x' = -x below the boundary x = b: at b = 0 no eigenvalue decides, at b < 0 a transition leads away."""
     system = ns.System(
-        states=["x"], parameters={"b": 1.0}, modes={"low": lambda t, u, p: -u.x, "high": lambda t, u, p: 2 * u.x},
+        states=["x"],
+        parameters={"b": 1.0},
+        modes={"low": lambda t, u, p: -u.x, "high": lambda t, u, p: 2 * u.x},
         indicators={"beyond": lambda t, u, p: u.x - p.b},
         transitions=[ns.Transition("low", "high", when="beyond > 0"), ns.Transition("high", "low", when="beyond < 0")],
-    )  # fmt: skip
+    )
     assert at(system, 0.0).kind == "stable"
     assert at(system.with_parameters(b=0.0), 0.0).kind == "undecided"
     assert at(system.with_parameters(b=-1.0), 0.0) is None
@@ -62,9 +68,10 @@ def test_a_boundary_and_what_lies_beyond_it() -> None:
 def test_under_a_forcing() -> None:
     """x' = (a + b cos t) x has the multiplier exp(2 pi a); a force beside it moves the state."""
     system = ns.System(
-        states=["x"], parameters={"a": 0.1, "b": 2.0, "f": 0.0},
+        states=["x"],
+        parameters={"a": 0.1, "b": 2.0, "f": 0.0},
         modes={"all": lambda t, u, p: (p.a + p.b * np.cos(t)) * u.x + p.f * np.sin(t)},
-    )  # fmt: skip
+    )
     for a, kind in ((0.1, "unstable"), (-0.1, "stable"), (0.0, "undecided")):
         found = at(system.with_parameters(a=a), 0.0)
         assert found.kind == kind and abs(found.eigenvalues[0] - a) < 1e-4

@@ -38,9 +38,11 @@ def test_two_frictions_leave_a_parallelogram() -> None:
     """K q = lambda_1 (1, 0) + lambda_2 (1, -1) with |lambda_1| <= m, |lambda_2| <= n: K^-1 of four corners."""
     stiffness, m, n = np.array([[3.0, -1.0], [-1.0, 2.0]]), 0.5, 0.3
     system = ns.mechanical(
-        np.diag([1.0, 2.0]), 0.1 * np.eye(2), stiffness,
+        np.diag([1.0, 2.0]),
+        0.1 * np.eye(2),
+        stiffness,
         elements={"f": E.Coulomb(at="q1", friction=m), "g": E.Coulomb(at={"q1": 1, "q2": -1}, friction=n)},
-    )  # fmt: skip
+    )
     corners = [np.linalg.solve(stiffness, [a * m + b * n, -b * n]) for a in (-1, 1) for b in (-1, 1)]
     (found,) = sets(system)
     assert found.free == 2
@@ -66,9 +68,12 @@ def test_an_elastic_stop_within_the_interval() -> None:
 def test_a_buckled_mass_between_stops_has_three() -> None:
     """q'' = q / 2 between rigid stops at 1 and -1.5: both stops and the middle, which is unstable."""
     system = ns.mechanical(
-        1.0, 0.1, -0.5, coordinates=["q"],
+        1.0,
+        0.1,
+        -0.5,
+        coordinates=["q"],
         elements={"a": E.Stop(at="q", position=1.0), "b": E.Stop(at="q", position=-1.5, side=-1)},
-    )  # fmt: skip
+    )
     found = sets(system)
     assert [one.lower[0] for one in found] == pytest.approx([-1.5, 0.0, 1.0], abs=1e-12)
     assert not any(one.free for one in found)
@@ -85,18 +90,26 @@ def test_two_stops_never_close_together() -> None:
 def test_a_forcing_below_friction(F: float, half: float) -> None:
     """It stands where |F cos wt - k q| <= mu at all times: |q| <= (mu - F) / k."""
     system = ns.mechanical(
-        1.0, 0.1, K, parameters={"w": 1.3}, forcing={"q": lambda t, p: F * np.cos(p.w * t + 0.4)},
+        1.0,
+        0.1,
+        K,
+        parameters={"w": 1.3},
+        forcing={"q": lambda t, p: F * np.cos(p.w * t + 0.4)},
         elements={"f": E.Coulomb(at="q", friction=MU)},
-    )  # fmt: skip
+    )
     (found,) = sets(system)
     assert [found.lower[0], found.upper[0]] == pytest.approx([-half, half], abs=1e-7)
 
 
 def test_a_forcing_above_friction_leaves_none() -> None:
     system = ns.mechanical(
-        1.0, 0.1, K, parameters={"w": 1.3}, forcing={"q": lambda t, p: 0.6 * np.cos(p.w * t)},
+        1.0,
+        0.1,
+        K,
+        parameters={"w": 1.3},
+        forcing={"q": lambda t, p: 0.6 * np.cos(p.w * t)},
         elements={"f": E.Coulomb(at="q", friction=MU)},
-    )  # fmt: skip
+    )
     assert sets(system) == []
 
 
@@ -110,9 +123,11 @@ def test_without_a_spring_it_has_no_ends() -> None:
 def test_a_pendulum_with_friction(near: float, low: float, high: float) -> None:
     """|T - sin q| <= mu: asin(T - mu) to asin(T + mu), and mirrored about the upright position."""
     pendulum = ns.System(
-        states=["q", "v"], parameters={"T": 0.2}, modes={"swing": lambda t, u, p: (u.v, p.T - np.sin(u.q))},
+        states=["q", "v"],
+        parameters={"T": 0.2},
+        modes={"swing": lambda t, u, p: (u.v, p.T - np.sin(u.q))},
         elements={"f": E.Coulomb(speed=lambda t, u, p: u.v, on={"v": 1.0}, friction=MU)},
-    )  # fmt: skip
+    )
     (found,) = sets(pendulum, near, 0.0)
     ends = np.arcsin([low, high])
     assert [found.lower[0], found.upper[0]] == pytest.approx(np.pi - ends if near else ends, abs=1e-9)
@@ -121,9 +136,11 @@ def test_a_pendulum_with_friction(near: float, low: float, high: float) -> None:
 def test_a_relay_on_a_surface() -> None:
     """x'' = -x - F sgn x': the sliding mode rests where |x| <= F."""
     relay = ns.System(
-        states=["x", "v"], parameters={"F": 0.4},
+        states=["x", "v"],
+        parameters={"F": 0.4},
         modes={"back": lambda t, u, p: (u.v, p.F - u.x), "ahead": lambda t, u, p: (u.v, -p.F - u.x)},
-        indicators={"s": lambda t, u, p: u.v}, transitions=[ns.Surface("s", "back", "ahead")],
-    )  # fmt: skip
+        indicators={"s": lambda t, u, p: u.v},
+        transitions=[ns.Surface("s", "back", "ahead")],
+    )
     (found,) = sets(relay)
     assert [found.lower[0], found.upper[0]] == pytest.approx([-0.4, 0.4], abs=1e-9)

@@ -33,13 +33,19 @@ def test_a_cart_under_held_and_linear_forces() -> None:
 def test_a_block_with_friction_under_steps() -> None:
     """It holds up to mu = .5, slides under .8 with a = .3 from t = 1, and under 0 stops at t = 2 + .3 / .5."""
     block = ns.mechanical(
-        1.0, 0.0, 0.0, forcing={"q": lambda t, p: p.load}, inputs={"load": ""},
+        1.0,
+        0.0,
+        0.0,
+        forcing={"q": lambda t, p: p.load},
+        inputs={"load": ""},
         elements={"floor": ns.elements.Coulomb(at="q", friction=0.5)},
-    )  # fmt: skip
+    )
     run = ns.simulate(
-        block, duration=4.0, samples=[0.5, 1.5, 2.3, 3.5],
+        block,
+        duration=4.0,
+        samples=[0.5, 1.5, 2.3, 3.5],
         inputs={"load": ns.Input([0, 1, 2, 3], [0.4, 0.8, 0.0, -0.45], between="steps")},
-    )  # fmt: skip
+    )
     half = 0.15 + 0.3 * 0.3 - 0.25 * 0.09
     np.testing.assert_allclose(at(run, np.array([0.5, 1.5, 2.3, 3.5]), 1)[:, 0], [0, 0.0375, half, 0.24], atol=1e-13)
     np.testing.assert_allclose(run.crossing_time, [1.0, 2.6], atol=1e-13)
@@ -50,9 +56,14 @@ def test_a_block_with_friction_under_steps() -> None:
 def test_a_step_that_lets_a_block_go_does_so_at_its_own_time() -> None:
     """x(2) = (.8 - mu) (2 - 1 - late)^2 / 2, whatever the friction was before; derivatives in mu and in the delay."""
     block = ns.mechanical(
-        1.0, 0.0, 0.0, parameters={"mu": 0.5, "late": 0.1}, forcing={"q": lambda t, p: p.load}, inputs={"load": ""},
+        1.0,
+        0.0,
+        0.0,
+        parameters={"mu": 0.5, "late": 0.1},
+        forcing={"q": lambda t, p: p.load},
+        inputs={"load": ""},
         elements={"floor": ns.elements.Coulomb(at="q", friction="mu")},
-    )  # fmt: skip
+    )
     load = ns.Input([0, 1], [0.4, 0.8], between="steps", delay="late")
     found = ns.sensitivity(block, duration=2.0, parameters=["mu", "late"], inputs={"load": load})
     np.testing.assert_allclose(found.end[:2], [0.3 * 0.81 / 2, 0.27], atol=1e-13)
@@ -62,8 +73,9 @@ def test_a_step_that_lets_a_block_go_does_so_at_its_own_time() -> None:
 
 def test_a_delay_moves_a_ramp_from_the_start_on() -> None:
     """v(2) = (1/m) times the integral of 3 (t - late) + 3 over 0 < t < 2."""
-    cart = ns.mechanical(2.0, 0.0, 0.0, parameters={"late": 0.1}, forcing={"q": lambda t, p: p.force},
-                         inputs={"force": "N"})  # fmt: skip
+    cart = ns.mechanical(
+        2.0, 0.0, 0.0, parameters={"late": 0.1}, forcing={"q": lambda t, p: p.force}, inputs={"force": "N"}
+    )
     force = ns.Input([-1, 5], [0, 18], delay="late")
     found = ns.sensitivity(cart, duration=2.0, parameters=["late"], inputs={"force": force})
     np.testing.assert_allclose(found.end[:2], [(3 * 8 / 6 + 2.7 * 2) / 2, (6 + 2.7 * 2) / 2], atol=1e-13)
@@ -73,11 +85,13 @@ def test_a_delay_moves_a_ramp_from_the_start_on() -> None:
 def test_a_step_that_brings_a_reset_about() -> None:
     """v is halved where the force rises above 1, at t = 1 + late: v(2) = (1 + (1 + late)/2)/2 + 2 (1 - late)."""
     rig = ns.System(
-        states=["x", "v"], parameters={"late": 0.1}, inputs={"f": ""},
+        states=["x", "v"],
+        parameters={"late": 0.1},
+        inputs={"f": ""},
         modes={"low": lambda t, u, p: [u.v, p.f], "high": lambda t, u, p: [u.v, p.f]},
         indicators={"level": lambda t, u, p: p.f - 1},
         transitions=[ns.Transition("low", "high", when="level > 0", reset=lambda t, u, p: [u.x, u.v / 2])],
-    )  # fmt: skip
+    )
     step = ns.Input([0, 1], [0.5, 2.0], between="steps", delay="late")
     found = ns.sensitivity(rig, duration=2.0, start={"v": 1.0}, parameters=["late"], inputs={"f": step})
     assert abs(found.end[1] - (0.5 + 0.25 * 1.1 + 1.8)) < 1e-13
@@ -89,10 +103,14 @@ def test_a_mass_pressed_on_a_stop_lifts_where_the_load_turns() -> None:
     for rubs in (False, True):
         more: dict[str, Any] = {"friction": 0.3, "tangent": "y"} if rubs else {}
         box = ns.mechanical(
-            np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), coordinates=["x", "y"],
-            forcing={"x": lambda t, p: p.load}, inputs={"load": ""},
+            np.eye(2),
+            np.zeros((2, 2)),
+            np.zeros((2, 2)),
+            coordinates=["x", "y"],
+            forcing={"x": lambda t, p: p.load},
+            inputs={"load": ""},
             elements={"wall": ns.elements.Stop(at="x", position=0.0, **more)},
-        )  # fmt: skip
+        )
         run = ns.simulate(box, duration=2.0, samples=[0.5, 2.0], inputs={"load": ([0, 2], [1, -1])})
         np.testing.assert_allclose(at(run, np.array([2.0]), 1), [[-1 / 6]], atol=1e-13)
         assert abs(run["wall_force"].values[np.searchsorted(run.time.values, 0.5)] - 0.5) < 1e-13
@@ -105,12 +123,15 @@ def drawn(seed: int) -> tuple[ns.System, dict[str, Any], Callable[..., Any], np.
     k, c, e = rng.uniform(0.5, 2), rng.uniform(0.02, 0.2), rng.uniform(0.3, 0.9)
     parameters = {"k": k, "c": c, "e": e, "late": 0.031}
     system = ns.System(
-        states={"x": "m", "v": "m/s"}, parameters=parameters, inputs={"f": "N", "b": "m"},
-        modes={"one": lambda t, u, p: [
-            u.v, -p.k * (u.x - p.b) - p.c * (u.v - p.b_rate) - (u.x**3 if cubic else 0) + p.f]},
+        states={"x": "m", "v": "m/s"},
+        parameters=parameters,
+        inputs={"f": "N", "b": "m"},
+        modes={
+            "one": lambda t, u, p: [u.v, -p.k * (u.x - p.b) - p.c * (u.v - p.b_rate) - (u.x**3 if cubic else 0) + p.f]
+        },
         indicators={"gap": lambda t, u, p: u.x - wall},
         transitions=[ns.Transition("one", "one", when="gap > 0", reset=lambda t, u, p: [u.x, -p.e * u.v])],
-    )  # fmt: skip
+    )
     clocks = np.cumsum(rng.uniform(0.02, 0.2, 120)), np.cumsum(rng.uniform(0.1, 0.4, 60))
     held = ns.Input(clocks[0], rng.standard_normal(120), between="steps", delay="late")
     base = ns.Input(clocks[1], 0.2 * rng.standard_normal(60))
@@ -137,8 +158,9 @@ def by_scipy(field: Any, breaks: np.ndarray, wall: float, e: float, times: np.nd
                 return float(x[0] - wall)
 
             contact.terminal, contact.direction = True, 1  # type: ignore[attr-defined]
-            one = solve_ivp(field, (t, end), x, "DOP853", args=(middle,), events=contact, rtol=1e-12, atol=1e-13,
-                            dense_output=True)  # fmt: skip
+            one = solve_ivp(
+                field, (t, end), x, "DOP853", args=(middle,), events=contact, rtol=1e-12, atol=1e-13, dense_output=True
+            )
             here = (times >= t) & (times <= one.t[-1])
             if here.any():
                 found[here] = one.sol(times[here]).T

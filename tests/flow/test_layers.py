@@ -75,9 +75,13 @@ def test_dry_friction_in_its_limit_loses_the_same_amplitude_every_half_period(rt
     """Coulomb: |x| falls by 2 F / K from one turning point to the next. A layer of width w changes that by O(w)."""
     width, turns = 1e-6, 4
     end = ns.simulate(
-        BLOCKS["step"].with_parameters(w=width), duration=turns * np.pi / np.sqrt(K), start={"x": START},
-        method="taylor", rtol=rtol, samples=2,
-    )  # fmt: skip
+        BLOCKS["step"].with_parameters(w=width),
+        duration=turns * np.pi / np.sqrt(K),
+        start={"x": START},
+        method="taylor",
+        rtol=rtol,
+        samples=2,
+    )
     assert end["u"].values[-1, 0] == pytest.approx(START - turns * 2.0 * F / K, abs=rtol + turns * width / np.sqrt(K))
 
 

@@ -143,10 +143,12 @@ def row_of_masses(masses: int, stops: list[int], part: float, e: float, c: float
         return lambda t, u, p: [-p.e * a if k == masses + i else a for k, a in enumerate(list(u))]
 
     return ns.System(
-        states=names, parameters={"w": w, "c": c, "e": e}, modes={"free": motion},
+        states=names,
+        parameters={"w": w, "c": c, "e": e},
+        modes={"free": motion},
         indicators={f"over{i}": lambda t, u, p, i=i: list(u)[i] - part * float(reach[i]) for i in stops},
         transitions=[ns.Transition("free", "free", when=f"over{i} > 0", reset=rebound(i)) for i in stops],
-    )  # fmt: skip
+    )
 
 
 def stiffness(masses: int) -> np.ndarray:
@@ -210,7 +212,8 @@ def test_random_systems_run_as_by_their_series() -> None:
             return lambda t, u, p: tuple(A[which] @ np.array(list(u)) + F * np.cos(2.0 * t) + which * b)
 
         system = ns.System(
-            states=[f"u{i}" for i in range(n)], parameters={"c": 0.1},
+            states=[f"u{i}" for i in range(n)],
+            parameters={"c": 0.1},
             modes={"one": field(0), "other": field(1)},
             indicators={
                 "high": lambda t, u, p, h=h: h @ np.array(list(u)) - p.c,
@@ -220,7 +223,7 @@ def test_random_systems_run_as_by_their_series() -> None:
                 ns.Transition("one", "other", when="high > 0"),
                 ns.Transition("other", "one", when="low < 0", reset=lambda t, u, p, k=kick: np.array(list(u)) + k),
             ],
-        )  # fmt: skip
+        )
         start = rng.normal(0.0, 1.0, n)
         found, said = [], []
         for way in ({"method": "exact"}, {"method": "taylor", "rtol": 1e-13}):

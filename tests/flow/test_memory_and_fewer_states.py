@@ -17,26 +17,40 @@ from nonsmooth.kernels.hybrid.kept import Section
 def yielding() -> Template:
     """A mass strikes a wall that gives way by a part of the speed of each impact, and pulls towards where it stands."""
     ranges = {
-        "k": (0.5, 2.0), "c": (0.05, 0.4), "F": (0.5, 2.0), "w": (0.6, 1.8), "e": (0.5, 0.9), "d": (0.02, 0.1),
-        "a": (-0.3, 0.3), "r": (0.3, 0.9), "low": (-0.8, -0.4),
-    }  # fmt: skip
+        "k": (0.5, 2.0),
+        "c": (0.05, 0.4),
+        "F": (0.5, 2.0),
+        "w": (0.6, 1.8),
+        "e": (0.5, 0.9),
+        "d": (0.02, 0.1),
+        "a": (-0.3, 0.3),
+        "r": (0.3, 0.9),
+        "low": (-0.8, -0.4),
+    }
 
     def motion(t, u, p):
         return u.v, p.F * np.cos(p.w * t) - p.k * u.x - p.c * u.v + p.a * p.wall
 
     system = ns.System(
-        name="yielding wall", states=["x", "v"], memory={"wall": 0.3},
+        name="yielding wall",
+        states=["x", "v"],
+        memory={"wall": 0.3},
         parameters={name: 0.5 * (low + high) for name, (low, high) in ranges.items()},
         modes={"near": motion, "far": motion},
         indicators={"reach": lambda t, u, p: u.x - p.wall, "back": lambda t, u, p: u.x - p.low},
         transitions=[
-            ns.Transition("near", "near", when="reach > 0", reset=lambda t, u, p: (u.x, -p.e * u.v),
-                          write={"wall": lambda t, u, p: p.wall + p.d * u.v}),
+            ns.Transition(
+                "near",
+                "near",
+                when="reach > 0",
+                reset=lambda t, u, p: (u.x, -p.e * u.v),
+                write={"wall": lambda t, u, p: p.wall + p.d * u.v},
+            ),
             ns.Transition("near", "far", when="back < 0", write={"wall": lambda t, u, p: p.r * p.wall}),
             ns.Transition("far", "near", when="back > 0"),
         ],
         outputs={"room": lambda t, u, p: p.wall - u.x},
-    )  # fmt: skip
+    )
     return Template(system, (), ranges, (-0.3, 0.2), (12.0, 20.0))
 
 
@@ -81,12 +95,21 @@ def test_a_ball_on_a_floor_that_sinks() -> None:
     """Free falls between a floor that each impact lowers by a tenth of its speed: flights and speeds by hand."""
     e, d = 0.6, 0.1
     ball = ns.System(
-        states=["x", "v"], parameters={"e": e, "d": d, "A": 0.0, "w": 1.0}, memory={"floor": 0.0},
+        states=["x", "v"],
+        parameters={"e": e, "d": d, "A": 0.0, "w": 1.0},
+        memory={"floor": 0.0},
         modes={"flight": lambda t, u, p: (u.v, -1.0 + p.A * np.cos(p.w * t))},
         indicators={"above": lambda t, u, p: u.x - p.floor},
-        transitions=[ns.Transition("flight", "flight", when="above < 0", reset=lambda t, u, p: (u.x, -p.e * u.v),
-                                   write={"floor": lambda t, u, p: p.floor + p.d * u.v})],
-    )  # fmt: skip
+        transitions=[
+            ns.Transition(
+                "flight",
+                "flight",
+                when="above < 0",
+                reset=lambda t, u, p: (u.x, -p.e * u.v),
+                write={"floor": lambda t, u, p: p.floor + p.d * u.v},
+            )
+        ],
+    )
     assert isinstance(engine_for(ball), LinearEngine)
     run = ns.simulate(ball, duration=5.0, start={"x": 0.5}, samples=11)
     t, x, v, floor, fall = 0.0, 0.5, 0.0, 0.0, []
@@ -121,12 +144,15 @@ def test_a_lacking_state_has_no_value_and_no_part_in_extremes() -> None:
         return u.v, 0.5 - u.x + p.A * np.cos(p.w * t)
 
     belt = ns.System(
-        states=["x", "v"], parameters={"A": 0.0, "w": 1.0, "v_b": 0.2},
+        states=["x", "v"],
+        parameters={"A": 0.0, "w": 1.0, "v_b": 0.2},
         modes={"stick": ns.Mode(lambda t, u, p: (p.v_b,), states=["x"]), "slip": slip},
         indicators={"strain": lambda t, u, p: u.x - 1.0, "catch": lambda t, u, p: u.v - p.v_b},
-        transitions=[ns.Transition("stick", "slip", when="strain > 0", reset=lambda t, u, p: (u.x, p.v_b)),
-                     ns.Transition("slip", "stick", when="catch > 0", reset=lambda t, u, p: (u.x,))],
-    )  # fmt: skip
+        transitions=[
+            ns.Transition("stick", "slip", when="strain > 0", reset=lambda t, u, p: (u.x, p.v_b)),
+            ns.Transition("slip", "stick", when="catch > 0", reset=lambda t, u, p: (u.x,)),
+        ],
+    )
     engine = engine_for(belt)
     assert isinstance(engine, LinearEngine) and not isinstance(engine, PlanarEngine)
     run = ns.simulate(belt, duration=20.0, start={"v": 7.0}, samples=400)
@@ -148,7 +174,8 @@ def test_a_contact_lifts_off_where_its_force_vanishes(length: float, rate: float
     Distance, speed and acceleration vanish together there; the flight from there is a parabola."""
     g = length * rate**2 * 9.81 / (4 * np.pi**2)
     system = ns.System(
-        states=["x", "v"], parameters={"A": 0.3 * length, "w": rate, "e": 0.4, "g": g, "creep": 1e-6 * length * rate},
+        states=["x", "v"],
+        parameters={"A": 0.3 * length, "w": rate, "e": 0.4, "g": g, "creep": 1e-6 * length * rate},
         modes={
             "fly": lambda t, u, p: (u.v, -p.g),
             "rest": ns.Mode(lambda t, u, p: (-p.A * p.w * np.sin(p.w * t),), states=["x"]),
@@ -159,14 +186,22 @@ def test_a_contact_lifts_off_where_its_force_vanishes(length: float, rate: float
             "away": lambda t, u, p: u.v + p.A * p.w * np.sin(p.w * t) + p.creep,
         },
         transitions=[
-            ns.Transition("fly", "fly", when="gap < 0 and away < 0", reset=lambda t, u, p: (
-                p.A * np.cos(p.w * t), -p.e * u.v - (1 + p.e) * p.A * p.w * np.sin(p.w * t))),
+            ns.Transition(
+                "fly",
+                "fly",
+                when="gap < 0 and away < 0",
+                reset=lambda t, u, p: (p.A * np.cos(p.w * t), -p.e * u.v - (1 + p.e) * p.A * p.w * np.sin(p.w * t)),
+            ),
             ns.Transition("fly", "rest", when="gap < 0 and away > 0", reset=lambda t, u, p: (p.A * np.cos(p.w * t),)),
-            ns.Transition("rest", "fly", when="lift < 0", reset=lambda t, u, p: (
-                p.A * np.cos(p.w * t), -p.A * p.w * np.sin(p.w * t))),
+            ns.Transition(
+                "rest",
+                "fly",
+                when="lift < 0",
+                reset=lambda t, u, p: (p.A * np.cos(p.w * t), -p.A * p.w * np.sin(p.w * t)),
+            ),
         ],
         scale={"x": 0.1 * length, "v": 0.1 * length * rate},
-    )  # fmt: skip
+    )
     amplitudes = np.linspace(0.26, 0.31, 26) * length
     found = ns.sweep(system, "A", amplitudes, start={"x": length}, direction=None, progress=False)
     assert (found["period_number"] == 1).all() and (found["status"] == 0).all()

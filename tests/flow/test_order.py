@@ -18,20 +18,22 @@ W = 2 * np.pi
 def spirals() -> System:
     """Problem L: x' = A1 x inside the unit circle, A2 x outside, from (1 / e, 0): on the circle at t = 1 exactly."""
     return System(
-        states=("x", "y"), parameters={"w": W},
+        states=("x", "y"),
+        parameters={"w": W},
         modes={
             "inner": lambda t, u, p: (u.x - p.w * u.y, p.w * u.x + u.y),
             "outer": lambda t, u, p: (u.x + p.w * u.y, -p.w * u.x + u.y),
         },
         indicators={"circle": lambda t, u, p: u.x**2 + u.y**2 - 1.0},
         transitions=[Transition("inner", "outer", when="circle > 0"), Transition("outer", "inner", when="circle < 0")],
-    )  # fmt: skip
+    )
 
 
 def tangent() -> System:
     """x = tan t up to 1 (at pi/4), then x' = -2 x^2 down to 1/2 (at pi/4 + 1/2), then x' = x."""
     return System(
-        states=("x",), parameters={"top": 1.0, "low": 0.5},
+        states=("x",),
+        parameters={"top": 1.0, "low": 0.5},
         modes={
             "rise": lambda t, u, p: (1.0 + u.x**2,),
             "fall": lambda t, u, p: (-2.0 * u.x**2,),
@@ -39,14 +41,19 @@ def tangent() -> System:
         },
         indicators={"high": lambda t, u, p: u.x - p.top, "deep": lambda t, u, p: u.x - p.low},
         transitions=[Transition("rise", "fall", when="high > 0"), Transition("fall", "grow", when="deep < 0")],
-    )  # fmt: skip
+    )
 
 
 CASES = {
-    "spirals": (spirals, [np.exp(-1.0), 0.0], np.pi / 2,
-                np.exp(W / 4 - 1) * np.array([np.cos(W * (W / 4 - 1)), -np.sin(W * (W / 4 - 1))]), 0.02),
+    "spirals": (
+        spirals,
+        [np.exp(-1.0), 0.0],
+        np.pi / 2,
+        np.exp(W / 4 - 1) * np.array([np.cos(W * (W / 4 - 1)), -np.sin(W * (W / 4 - 1))]),
+        0.02,
+    ),
     "tangent": (tangent, [0.0], 2.0, np.array([0.5 * np.exp(2.0 - np.pi / 4 - 0.5)]), 0.1),
-}  # fmt: skip
+}
 
 
 def errors(case: str, steps: np.ndarray, method: str, **options: Any) -> np.ndarray:

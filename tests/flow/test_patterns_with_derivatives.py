@@ -8,8 +8,20 @@ from nonsmooth.system.derived import combinations
 
 E = ns.elements
 START = {"q1": -0.4, "q2": 0.2, "q3": 0.3, "v_q1": 0.1, "v_q2": 0.33, "v_q3": 0.2}
-VALUES = {"m": 1.0, "k": 1.0, "c": 0.05, "F": 1.2, "omega": 0.9, "mu": 0.05, "e": 0.6, "pos": 0.35, "belt": 0.2,
-          "phi": 0.1, "fr": 0.1, "kc": 3.0}  # fmt: skip
+VALUES = {
+    "m": 1.0,
+    "k": 1.0,
+    "c": 0.05,
+    "F": 1.2,
+    "omega": 0.9,
+    "mu": 0.05,
+    "e": 0.6,
+    "pos": 0.35,
+    "belt": 0.2,
+    "phi": 0.1,
+    "fr": 0.1,
+    "kc": 3.0,
+}
 
 
 def row(n, elements, used, impacts="simultaneous"):
@@ -25,9 +37,14 @@ def row(n, elements, used, impacts="simultaneous"):
     def make(**other):
         values = {name: value for name, value in {**VALUES, **other}.items() if name in names}
         return ns.mechanical(
-            mass, damping, stiffness, parameters=values, elements=elements, impacts=impacts,
+            mass,
+            damping,
+            stiffness,
+            parameters=values,
+            elements=elements,
+            impacts=impacts,
             forcing={"q1": lambda t, p: p.F * np.cos(p.omega * t + p.phi)},
-        )  # fmt: skip
+        )
 
     return make
 
@@ -46,13 +63,15 @@ RUBS = {
     "stop": E.Stop(at="q1", position="pos", restitution="e", friction="mu", tangent="q2", belt="belt"),
     "friction": E.Coulomb(at="q2", friction="fr"),
 }
-SLIPS = {"stop": E.Stop(at="q1", position="pos", restitution="e", friction="mu", tangent={"q2": 1, "q1": 0.2},
-                        belt=1.5)}  # fmt: skip
+SLIPS = {
+    "stop": E.Stop(at="q1", position="pos", restitution="e", friction="mu", tangent={"q2": 1, "q1": 0.2}, belt=1.5)
+}
 CRADLE = {
     "a": E.Stop(at={"q1": 1, "q2": -1}, restitution="e"),
     "b": E.Stop(at={"q2": 1, "q3": -1}, position=0.1, restitution="e"),
-    "c": E.Stop(at="q3", position="pos", restitution="e"), "friction": E.Coulomb(at="q2", friction="fr"),
-}  # fmt: skip
+    "c": E.Stop(at="q3", position="pos", restitution="e"),
+    "friction": E.Coulomb(at="q2", friction="fr"),
+}
 CASES = {
     "rubs": (row(2, RUBS, {"pos", "e", "mu", "belt", "fr"}), ("m", "k", "mu", "e", "pos", "omega", "phi", "fr")),
     "slips": (row(2, SLIPS, {"pos", "e", "mu"}), ("m", "k", "mu", "e", "pos", "omega", "phi")),
@@ -90,10 +109,14 @@ def test_a_run_answers_to_parameters_and_start_as_differences_say(case):
 def test_friction_and_impacts_that_accumulate_at_one_coordinate():
     """A mass comes to rest at a stop under friction; where both hold, nothing of the start is left."""
     system = ns.mechanical(
-        1.0, 0.05, 1.0, coordinates=["q"], parameters={"pos": -0.35, "F": 0.5, "w": 0.9},
+        1.0,
+        0.05,
+        1.0,
+        coordinates=["q"],
+        parameters={"pos": -0.35, "F": 0.5, "w": 0.9},
         forcing={"q": lambda t, p: p.F * np.cos(p.w * t + 0.1)},
         elements={"stop": E.Stop(at="q", position="pos", restitution=0.6), "f": E.Coulomb(at="q", friction=0.1)},
-    )  # fmt: skip
+    )
     found = ns.sensitivity(system, duration=23.1, start={"q": -0.5, "v_q": 0.2}, parameters=["pos", "F"])
     assert found.sizes["crossing"] > 50
     np.testing.assert_allclose(found.P.sel(parameter="pos"), [1.0, 0.0], atol=1e-10)
@@ -103,10 +126,13 @@ def test_friction_and_impacts_that_accumulate_at_one_coordinate():
 
 def pair():
     return ns.mechanical(
-        np.diag([1.0, 0.8]), [[0.1, -0.02], [-0.02, 0.1]], [[3.0, -1.0], [-1.0, 2.0]],
-        parameters={"F": 1.2, "w": 1.1, "mu": 0.1}, forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
+        np.diag([1.0, 0.8]),
+        [[0.1, -0.02], [-0.02, 0.1]],
+        [[3.0, -1.0], [-1.0, 2.0]],
+        parameters={"F": 1.2, "w": 1.1, "mu": 0.1},
+        forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
         elements={"f": E.Coulomb(at="q2", friction="mu"), "s": E.Stop(at="q1", position=0.4, restitution=0.5)},
-    )  # fmt: skip
+    )
 
 
 def rubs():
@@ -150,9 +176,11 @@ def test_orbits_and_branches_are_those_of_the_system_written_out(monkeypatch):
 def test_two_frictions_whose_shares_depend_on_a_parameter_are_one_of_their_sum():
     def system(elements, **other):
         return ns.System(
-            states=["x", "v"], parameters={"a": 2.0, "F": 0.9, "w": 0.7, **other},
-            modes={"m": lambda t, u, p: (u.v, p.F * np.cos(p.w * t) - u.x)}, elements=elements,
-        )  # fmt: skip
+            states=["x", "v"],
+            parameters={"a": 2.0, "F": 0.9, "w": 0.7, **other},
+            modes={"m": lambda t, u, p: (u.v, p.F * np.cos(p.w * t) - u.x)},
+            elements=elements,
+        )
 
     def rub(push, friction):
         return E.Coulomb(speed=lambda t, u, p: u.v, on={"v": push}, friction=friction)
@@ -160,8 +188,10 @@ def test_two_frictions_whose_shares_depend_on_a_parameter_are_one_of_their_sum()
     two = system({"f": rub(1.0, 0.1), "g": rub(lambda t, u, p: p.a, 0.05)})
     for a in (2.0, 1.0):
         one = system({"f": rub(1.0, 0.1 + 0.05 * a)})
-        runs = [ns.sensitivity(s, duration=30.0, start={"x": 0.4}, parameters=["F"])
-                for s in (two.with_parameters(a=a), one)]  # fmt: skip
+        runs = [
+            ns.sensitivity(s, duration=30.0, start={"x": 0.4}, parameters=["F"])
+            for s in (two.with_parameters(a=a), one)
+        ]
         assert runs[0].sizes["crossing"] > 3
         np.testing.assert_allclose(runs[0].end, runs[1].end, atol=1e-12)
         np.testing.assert_allclose(runs[0].P, runs[1].P, atol=1e-11)

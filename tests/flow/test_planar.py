@@ -50,9 +50,11 @@ def test_every_kind_of_linear_mode(case: str, oscillator: ns.System) -> None:
     p = system.values
     assert isinstance(engine_for(system), PlanarEngine)
     truth = LinearFlow(
-        [[0, 1], [-p["k"], -p["c"]]], [0, p["f0"]],
-        {1: ([0, p["f1"]], [0, 0]), 3: ([0, 0], [0, p["f3"]])}, p["omega"],
-    )  # fmt: skip
+        [[0, 1], [-p["k"], -p["c"]]],
+        [0, p["f0"]],
+        {1: ([0, p["f1"]], [0, 0]), 3: ([0, 0], [0, p["f3"]])},
+        p["omega"],
+    )
     run = ns.simulate(system, periods=6, start={"x": 0.7, "v": -0.4}, samples=14)
     assert run.attrs["nonsmooth"].count('"method": "exact"') == 1
     states = np.array([truth.exactly(0.0, (0.7, -0.4), t) for t in run["time"].values])
@@ -103,10 +105,8 @@ def ball() -> ns.System:
         parameters={"g": (9.81, "m/s^2"), "e": 0.7},
         modes={"flight": lambda t, u, p: (u.v, -p.g)},
         indicators={"floor": lambda t, u, p: u.x},
-        transitions=[
-            ns.Transition("flight", "flight", when="floor < 0", reset=lambda t, u, p: (0.0, -p.e * u.v))
-        ],
-    )  # fmt: skip
+        transitions=[ns.Transition("flight", "flight", when="floor < 0", reset=lambda t, u, p: (0.0, -p.e * u.v))],
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -206,9 +206,7 @@ def on_its_orbit(system: ns.System, shift: float, g: float) -> tuple[ns.System, 
     forced = system.with_parameters(
         c1=f1 * np.cos(shift), s1=-f1 * np.sin(shift), c3=f3 * np.cos(3 * shift), s3=-f3 * np.sin(3 * shift), g=g
     )
-    start = {
-        "x": A1 * np.cos(shift) + A3 * np.cos(3 * shift), "v": -A1 * np.sin(shift) - 3 * A3 * np.sin(3 * shift)
-    }  # fmt: skip
+    start = {"x": A1 * np.cos(shift) + A3 * np.cos(3 * shift), "v": -A1 * np.sin(shift) - 3 * A3 * np.sin(3 * shift)}
     return forced, start
 
 
@@ -294,9 +292,13 @@ def test_touches_of_a_friction_are_where_its_limit_is_nearly_reached(method: str
 
     def run(F: float) -> xr.Dataset:
         system = ns.mechanical(
-            1.0, 0.1, 1.0, parameters={"F": F, "w": 0.5}, forcing={"q": lambda t, p: p.F * np.cos(p.w * t)},
+            1.0,
+            0.1,
+            1.0,
+            parameters={"F": F, "w": 0.5},
+            forcing={"q": lambda t, p: p.F * np.cos(p.w * t)},
             elements={"rub": ns.elements.Coulomb(at="q", friction=0.6)},
-        )  # fmt: skip
+        )
         return ns.simulate(system, duration=60.0, start={"q": 0.0}, method=method, **METHODS[method])
 
     held = run(0.59)
@@ -320,12 +322,16 @@ def test_an_impact_that_meets_the_end_of_a_step_every_period_is_no_chatter():
 def test_a_step_never_passes_two_ends_of_a_period() -> None:
     """A slow mode, its own step far longer than the period, and then a transition at a quarter of a period."""
     system = ns.System(
-        states=["x", "y"], parameters={"a": 0.3}, period=1.0,
+        states=["x", "y"],
+        parameters={"a": 0.3},
+        period=1.0,
         modes={"waiting": lambda t, u, p: (p.a * u.x, -p.a * u.y), "ready": lambda t, u, p: (p.a * u.x, -p.a * u.y)},
         indicators={"level": lambda t, u, p: u.x - 5.0},
-        transitions=[ns.Transition("waiting", "ready", when="level > 0"),
-                     ns.Transition("ready", "waiting", at=0.25, reset=lambda t, u, p: (u.x / 5.0, u.y + 0.0))],
-    )  # fmt: skip
+        transitions=[
+            ns.Transition("waiting", "ready", when="level > 0"),
+            ns.Transition("ready", "waiting", at=0.25, reset=lambda t, u, p: (u.x / 5.0, u.y + 0.0)),
+        ],
+    )
     run = ns.simulate(system, periods=7, start={"x": 1.0, "y": 1.0}, method="exact")
     assert np.abs(run.crossing_time.values - [np.log(5.0) / 0.3, 6.25]).max() < 1e-12
     assert abs(run.u_before.values[1, 0] - np.exp(0.3 * 6.25)) < 1e-12

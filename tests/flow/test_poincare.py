@@ -160,9 +160,15 @@ def test_a_valve_that_comes_to_rest_stands_at_its_equilibrium() -> None:
     top = ns.Poincare("lift_velocity", rising=False)
     options = {"section": top, "start": start, "method": "taylor", "rtol": 1e-10}
     scan = ns.sweep(
-        ns.models.relief_valve(), "q", [8.0, 8.6, 9.0], direction=None, transient=1024, keep=32, progress=False,
+        ns.models.relief_valve(),
+        "q",
+        [8.0, 8.6, 9.0],
+        direction=None,
+        transient=1024,
+        keep=32,
+        progress=False,
         **options,
-    )  # fmt: skip
+    )
     assert scan["status"].values.tolist() == [0, 0, 0] and scan["period_number"].values.tolist() == [1, 1, 1]
     assert scan["equilibrium"].values.tolist() == ["", "equilibrium in open", "equilibrium in open"]
     y1 = scan["section"].sel(state="y1").values[2, -1]
@@ -207,10 +213,12 @@ def test_every_start_begins_with_the_initial_memory(method: str) -> None:
     """A point that only a kick of the memory's size moves, once a period: by arithmetic. (A second state and a force of
     size 0: a shape of code that is there.)"""
     system = ns.System(
-        states=["x", "y"], parameters={"A": 0.0, "w": 2 * np.pi}, memory={"m": 0.3},
+        states=["x", "y"],
+        parameters={"A": 0.0, "w": 2 * np.pi},
+        memory={"m": 0.3},
         modes={"all": lambda t, u, p: (0.0, p.A * np.cos(p.w * t))},
         transitions=[ns.Transition("all", "all", at=0.5, reset=lambda t, u, p: (u.x + p.m, u.y))],
-    )  # fmt: skip
+    )
     found = ns.poincare(system, n=2, start=[[0.0, 0.0], [1.0, 0.0]], method=method)
     assert np.allclose(found["section"].values[..., 0], [[0.3, 0.6], [1.3, 1.6]], atol=1e-12)
 
@@ -218,8 +226,12 @@ def test_every_start_begins_with_the_initial_memory(method: str) -> None:
 def test_steps_of_returns_that_are_only_counted_do_not_add_up() -> None:
     """A section met by whole steps alone, at rest: more than two million segments pass in so many periods."""
     system = ns.mechanical(
-        1.0, 0.1, 1.0, parameters={"w": 0.4}, forcing={"q": lambda t, p: np.cos(p.w * t)},
+        1.0,
+        0.1,
+        1.0,
+        parameters={"w": 0.4},
+        forcing={"q": lambda t, p: np.cos(p.w * t)},
         elements={"stop": ns.elements.Stop(at="q", position=0.3, restitution=0.5, creep=1e-7)},
-    )  # fmt: skip
+    )
     found = ns.poincare(system, n=3, transient=300_000)
     assert np.allclose(found.section.values, [0.3, 0.0], atol=1e-15)

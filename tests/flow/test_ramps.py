@@ -72,9 +72,15 @@ def test_the_support_under_a_slow_ramp_of_the_force(method: str) -> None:
     t, u, mode, crossings = 0.0, np.zeros(2), 1, []  # g < 0: the start is in contact
     while t < end:
         step = solve_ivp(
-            field(mode), (t, end), u, method="DOP853", rtol=1e-12, atol=1e-16, events=leave if mode else enter,
+            field(mode),
+            (t, end),
+            u,
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-16,
+            events=leave if mode else enter,
             max_step=0.01,
-        )  # fmt: skip
+        )
         t, u = step.t[-1], step.y[:, -1]
         if step.status == 1:
             crossings.append(t)

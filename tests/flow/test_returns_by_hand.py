@@ -15,9 +15,14 @@ ANSWER = 1.0 / (K - W**2 + 1j * C * W)  # to cos w t
 
 def forced(**elements: ns.elements.Stop) -> ns.System:
     return ns.mechanical(
-        1.0, C, K, parameters={"w": W}, forcing={"q": lambda t, p: np.cos(p.w * t)}, elements=elements or None,
+        1.0,
+        C,
+        K,
+        parameters={"w": W},
+        forcing={"q": lambda t, p: np.cos(p.w * t)},
+        elements=elements or None,
         coordinates=["q"],
-    )  # fmt: skip
+    )
 
 
 def state(t: np.ndarray) -> np.ndarray:
@@ -40,7 +45,9 @@ def test_returns_at_a_phase(phase: float) -> None:
 def test_returns_at_a_level(level: float, every: int) -> None:
     """q rises through a level once in a period; of these returns every third one."""
     system = ns.System(
-        states=["q", "v"], parameters={"w": W}, modes={"m": lambda t, u, p: (u.v, np.cos(p.w * t) - C * u.v - K * u.q)},
+        states=["q", "v"],
+        parameters={"w": W},
+        modes={"m": lambda t, u, p: (u.v, np.cos(p.w * t) - C * u.v - K * u.q)},
         indicators={"over": lambda t, u, p: u.q - level},
     )
     section = ns.Poincare("over", rising=True, every=every)

@@ -23,12 +23,16 @@ def block(speed: str) -> ns.System:
     belt = (lambda t, p: p.v_b) if speed == "constant" else (lambda t, p: p.v_b * np.sin(p.omega * t))
     rest = lambda t, u, p: p.A * np.cos(p.omega * t) - u.x - 0.1 * u.v
     return ns.System(
-        name="block on a belt", states=["x", "v"], parameters={"A": 0.6, "omega": 0.7, "F": 0.5, "v_b": 0.3},
-        modes={"slower": lambda t, u, p: (u.v, rest(t, u, p) + p.F),
-               "faster": lambda t, u, p: (u.v, rest(t, u, p) - p.F)},
+        name="block on a belt",
+        states=["x", "v"],
+        parameters={"A": 0.6, "omega": 0.7, "F": 0.5, "v_b": 0.3},
+        modes={
+            "slower": lambda t, u, p: (u.v, rest(t, u, p) + p.F),
+            "faster": lambda t, u, p: (u.v, rest(t, u, p) - p.F),
+        },
         indicators={"slip": lambda t, u, p: u.v - belt(t, p)},
         transitions=[ns.Surface("slip", below="slower", above="faster", mode="stick")],
-    )  # fmt: skip
+    )
 
 
 def arrivals(system: ns.System, sources: tuple[str, ...], method: str) -> Any:
@@ -55,9 +59,13 @@ def test_each_arrival_at_a_belt_is_one_return(speed: str, method: str) -> None:
 
 def test_a_contact_that_rests_is_met_at_its_impacts() -> None:
     system = ns.mechanical(
-        1.0, 0.1, 1.0, parameters=ELEMENT, forcing={"q": lambda t, p: np.cos(p.w * t)},
+        1.0,
+        0.1,
+        1.0,
+        parameters=ELEMENT,
+        forcing={"q": lambda t, p: np.cos(p.w * t)},
         elements={"stop": ns.elements.Stop(at="q", position="d", restitution=0.5, creep=1e-4)},
-    )  # fmt: skip
+    )
     known = arrivals(system, ("stop_open",), "auto")
     ends = [k * system.period() for k in (20, 20 + PERIODS)]
     many = ns.poincare(system, section=ns.Poincare("stop_gap", rising=False), n=1000).time.values
@@ -68,9 +76,14 @@ def test_a_contact_that_rests_is_met_at_its_impacts() -> None:
 def test_a_sweep_of_the_stick_slip_belt_finds_one_return_per_cycle_everywhere() -> None:
     values = np.linspace(0.12, 0.28, 600)[[193, 194, 373, 416, 422, 470]]
     swept = ns.sweep(
-        ns.models.stick_slip_belt(), "v_b", values, direction="down", start=[0.1, 0.1],
-        section=ns.Poincare("relative"), progress=False,
-    )  # fmt: skip
+        ns.models.stick_slip_belt(),
+        "v_b",
+        values,
+        direction="down",
+        start=[0.1, 0.1],
+        section=ns.Poincare("relative"),
+        progress=False,
+    )
     assert (swept.period_number.values == 1).all()
 
 
@@ -80,6 +93,6 @@ def test_an_impact_passes_its_stop_both_ways(method: str) -> None:
     times = [
         ns.poincare(ball, section=ns.Poincare("stop", rising=rising), n=6, transient=50, method=method).time.values
         for rising in (True, False, None)
-    ]  # fmt: skip
+    ]
     np.testing.assert_allclose(times[1], times[0], rtol=1e-12)
     np.testing.assert_allclose(times[2], times[0], rtol=1e-12)

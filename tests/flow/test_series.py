@@ -33,9 +33,14 @@ def record(
 
 
 def chain(
-    system: System, start: list[float], plan: Section, keep: int, transient: int = 0, method: str = "taylor",
+    system: System,
+    start: list[float],
+    plan: Section,
+    keep: int,
+    transient: int = 0,
+    method: str = "taylor",
     **options: Any,
-) -> Kept:  # fmt: skip
+) -> Kept:
     e = engine(system, method, **options)
     out = e.kept(1, keep)
     state = State(np.zeros(len(system.states)), system.memory_vector())
@@ -59,18 +64,22 @@ def rotor(**modes: Any) -> System:
     """(x, y) = (cos t, sin t), with indicators x and y."""
     turn = lambda t, u, p: (-u.y, u.x)
     return System(
-        states=("x", "y"), parameters={"a": 1.0}, modes={"only": turn} | modes,
+        states=("x", "y"),
+        parameters={"a": 1.0},
+        modes={"only": turn} | modes,
         indicators={"right": lambda t, u, p: u.x, "up": lambda t, u, p: u.y},
         outputs={"radius": (lambda t, u, p: u.x**2 + u.y**2, ""), "corner": (lambda t, u, p: np.abs(u.x), "")},
-    )  # fmt: skip
+    )
 
 
 def forced(omega: float = 2.0) -> System:
     """x' = cos(omega t): x = sin(omega t) / omega."""
     return System(
-        states=("x",), parameters={"omega": omega}, modes={"only": lambda t, u, p: (np.cos(p.omega * t),)},
+        states=("x",),
+        parameters={"omega": omega},
+        modes={"only": lambda t, u, p: (np.cos(p.omega * t),)},
         indicators={"level": lambda t, u, p: u.x - 0.1},
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="module")
@@ -105,10 +114,12 @@ def test_the_impact_oscillator_between_impacts() -> None:
     """x'' = -x, wall at x = d: amplitude from the energy, rebound with -r v (test problem A without forcing)."""
     d, r, v0 = 0.5, 0.8, 1.0
     system = System(
-        states=("x", "v"), parameters={"d": d, "r": r}, modes={"free": lambda t, u, p: (u.v, -u.x)},
+        states=("x", "v"),
+        parameters={"d": d, "r": r},
+        modes={"free": lambda t, u, p: (u.v, -u.x)},
         indicators={"wall": lambda t, u, p: u.x - p.d},
         transitions=[Transition("free", "free", when="wall > 0", reset=lambda t, u, p: (u.x, -p.r * u.v))],
-    )  # fmt: skip
+    )
     for method in TIGHT:
         log, _ = record(system, [0.0, v0], 7.0, method=method)
         times, energy, t = [np.arcsin(d / v0)], v0**2, np.arcsin(d / v0)
@@ -126,11 +137,16 @@ def test_simultaneous_transitions_go_in_declared_order_and_chains_are_logged() -
     """x = t: two transitions hold at x = 1; the target of the first is left at once, as x > 1 holds there too."""
     fields = {name: (lambda t, u, p: (1.0,)) for name in "abcd"}
     system = System(
-        states=("x",), parameters={"g": 1.0}, modes=fields, indicators={"h": lambda t, u, p: u.x - p.g},
+        states=("x",),
+        parameters={"g": 1.0},
+        modes=fields,
+        indicators={"h": lambda t, u, p: u.x - p.g},
         transitions=[
-            Transition("a", "b", when="h > 0"), Transition("a", "d", when="h > 0"), Transition("b", "c", when="h > 0"),
+            Transition("a", "b", when="h > 0"),
+            Transition("a", "d", when="h > 0"),
+            Transition("b", "c", when="h > 0"),
         ],
-    )  # fmt: skip
+    )
     log, state = record(system, [0.0], 2.0, [0.5, 1.0, 1.5])
     np.testing.assert_array_equal(log.crossing_transition, [0, 2])
     np.testing.assert_allclose(log.crossing_time, 1.0, rtol=1e-15)
@@ -143,17 +159,20 @@ def test_an_endless_chain_is_chatter() -> None:
     """Two modes that hand a moving point to one another at the same instant."""
     field = lambda t, u, p: (1.0,)
     system = System(
-        states=("x",), parameters={"g": 1.0}, modes={"a": field, "b": field},
+        states=("x",),
+        parameters={"g": 1.0},
+        modes={"a": field, "b": field},
         indicators={"h": lambda t, u, p: u.x - p.g},
         transitions=[Transition("a", "b", when="h > 0"), Transition("b", "a", when="h > 0")],
-    )  # fmt: skip
+    )
     assert record(system, [0.0], 2.0)[0].status == codes.CHATTER
 
 
 def test_after_limits_to_the_third_order() -> None:
     """At (0, 0, 0) the indicator x vanishes with its first two derivatives; it rises like t^3 / 6 in mode b."""
     system = System(
-        states=("x", "v", "w", "s"), parameters={"g": 1.0},
+        states=("x", "v", "w", "s"),
+        parameters={"g": 1.0},
         modes={
             "a": lambda t, u, p: (0.0, 0.0, 0.0, 1.0),
             "b": lambda t, u, p: (u.v, u.w, 1.0, 1.0),
@@ -161,7 +180,7 @@ def test_after_limits_to_the_third_order() -> None:
         },
         indicators={"clock": lambda t, u, p: u.s - p.g, "h": lambda t, u, p: u.x},
         transitions=[Transition("a", "b", when="clock > 0"), Transition("b", "c", when="h > 0")],
-    )  # fmt: skip
+    )
     for method in TIGHT:
         log, _ = record(system, [0.0, 0.0, 0.0, 0.0], 2.0, method=method)
         np.testing.assert_array_equal(log.crossing_transition, [0, 1])
@@ -172,9 +191,12 @@ def test_after_limits_to_the_third_order() -> None:
 def test_transitions_at_a_phase_are_exact_stops(method: str) -> None:
     """Bang-bang: x' = -1 in the first half of each period, +1 in the second; x is a triangle wave."""
     system = System(
-        states=("x",), parameters={"T": 0.7}, modes={"down": lambda t, u, p: (-1.0,), "up": lambda t, u, p: (1.0,)},
-        transitions=[Transition("down", "up", at=0.5), Transition("up", "down", at=0.0)], period=lambda p: p.T,
-    )  # fmt: skip
+        states=("x",),
+        parameters={"T": 0.7},
+        modes={"down": lambda t, u, p: (-1.0,), "up": lambda t, u, p: (1.0,)},
+        transitions=[Transition("down", "up", at=0.5), Transition("up", "down", at=0.0)],
+        period=lambda p: p.T,
+    )
     samples = np.linspace(0.0, 7.0, 41)
     log, _ = record(system, [0.0], 7.0, samples, method=method)
     np.testing.assert_allclose(log.crossing_time, 0.35 * np.arange(1, 21), rtol=1e-14)
@@ -184,13 +206,15 @@ def test_transitions_at_a_phase_are_exact_stops(method: str) -> None:
 def test_a_mode_may_lack_a_state() -> None:
     """Sticking holds x and has no v: NaN there; the release gives it back."""
     system = System(
-        states=("x", "v"), parameters={"T": 2.0}, period=lambda p: p.T,
+        states=("x", "v"),
+        parameters={"T": 2.0},
+        period=lambda p: p.T,
         modes={"slip": lambda t, u, p: (u.v, 0.0), "stick": Mode(lambda t, u, p: (0.5,), states=["x"])},
         transitions=[
             Transition("slip", "stick", at=0.5),
             Transition("stick", "slip", at=0.0, reset=lambda t, u, p: (u.x, 2.0)),
         ],
-    )  # fmt: skip
+    )
     log, _ = record(system, [0.0, 1.0], 2.9, [0.5, 1.5, 2.5])
     np.testing.assert_allclose(log.sample_u, [[0.5, 1.0], [1.25, np.nan], [2.5, 2.0]], rtol=1e-14)
     np.testing.assert_allclose(log.u_before, [[1.0, 1.0], [1.5, np.nan]], rtol=1e-14)
@@ -203,7 +227,8 @@ def test_a_mode_may_lack_a_state() -> None:
 def test_logs_grow() -> None:
     """More than a thousand crossings and touches in one record; every one at its place."""
     system = System(
-        states=("x", "v"), parameters={"g": 0.5},
+        states=("x", "v"),
+        parameters={"g": 0.5},
         modes={"a": lambda t, u, p: (u.v, -u.x), "b": lambda t, u, p: (u.v, -u.x)},
         indicators={"h": lambda t, u, p: u.x - p.g, "far": lambda t, u, p: u.x - 1.5 - 0 * p.g},
         transitions=[
@@ -211,7 +236,7 @@ def test_logs_grow() -> None:
             Transition("b", "a", when="h < 0"),
             Transition("b", "a", when="far > 0"),
         ],
-    )  # fmt: skip
+    )
     turns = 600
     log, _ = record(system, [0.0, 1.0], 2 * np.pi * turns)
     first = np.arcsin(0.5)
@@ -282,10 +307,12 @@ def test_a_section_may_be_bound_to_a_mode() -> None:
     """y = sin t; mode b from t = 4 on (x + t clock): only passes after that count."""
     turn = lambda t, u, p: (-u.y, u.x, 1.0)
     system = System(
-        states=("x", "y", "s"), parameters={"g": 4.0}, modes={"a": turn, "b": turn},
+        states=("x", "y", "s"),
+        parameters={"g": 4.0},
+        modes={"a": turn, "b": turn},
         indicators={"up": lambda t, u, p: u.y, "clock": lambda t, u, p: u.s - p.g},
         transitions=[Transition("a", "b", when="clock > 0")],
-    )  # fmt: skip
+    )
     plan = Section(indicator=0, rising=0, mode=1)
     out = chain(system, [1.0, 0.0, 0.0], plan, keep=2)
     np.testing.assert_allclose(out.section_time[0], [2 * np.pi, 3 * np.pi], rtol=1e-12)
@@ -314,9 +341,11 @@ def test_maxima_of_the_flight_are_sections_and_extremes_hold_both_sides_of_a_jum
 
 def test_no_return_is_said_so() -> None:
     system = System(
-        states=("x",), parameters={"a": 1.0}, modes={"only": lambda t, u, p: (-p.a * u.x,)},
+        states=("x",),
+        parameters={"a": 1.0},
+        modes={"only": lambda t, u, p: (-p.a * u.x,)},
         indicators={"h": lambda t, u, p: u.x},
-    )  # fmt: skip
+    )
     assert chain(system, [1.0], Section(indicator=0, t_max=20.0), keep=1).status[0] == codes.NO_CONVERGENCE
 
 
@@ -330,8 +359,10 @@ def test_divergence_has_a_status(method: str) -> None:
 def test_a_failed_point_does_not_spoil_the_next_one() -> None:
     """x' = -a x + cos t: the second of three carried points diverges (a < 0)."""
     system = System(
-        states=("x",), parameters={"a": 1.0}, modes={"only": lambda t, u, p: (-p.a * u.x + np.cos(t),)},
-    )  # fmt: skip
+        states=("x",),
+        parameters={"a": 1.0},
+        modes={"only": lambda t, u, p: (-p.a * u.x + np.cos(t),)},
+    )
     e = engine(system)
     tables = e.prepare(np.array([[1.0], [-3.0], [1.0]]))
     out = e.kept(3, 2)
@@ -347,9 +378,7 @@ def test_points_do_not_depend_on_how_they_are_chunked() -> None:
     whole, parts = e.kept(6, 2), e.kept(6, 2)
     e.chain(e.prepare(points), 0, 6, State(np.zeros(1), np.zeros(0)), starts, Section(), 3, 2, whole)
     for first in range(0, 6, 2):
-        e.chain(
-            e.prepare(points), first, first + 2, State(np.zeros(1), np.zeros(0)), starts, Section(), 3, 2, parts
-        )
+        e.chain(e.prepare(points), first, first + 2, State(np.zeros(1), np.zeros(0)), starts, Section(), 3, 2, parts)
     np.testing.assert_array_equal(whole.section, parts.section)
     np.testing.assert_array_equal(whole.high, parts.high)
 
@@ -362,9 +391,10 @@ def test_four_linear_states_against_the_matrix_exponential() -> None:
 
     A = np.array([[0.1, 2.0, 0.0, 0.3], [-30.0, -0.2, 1.0, 0.0], [0.0, 0.5, -0.4, 5.0], [1.0, 0.0, -5.0, 0.0]])
     system = System(
-        states=("a", "b", "c", "d"), parameters={"g": 1.0},
+        states=("a", "b", "c", "d"),
+        parameters={"g": 1.0},
         modes={"only": lambda t, u, p: tuple(A @ np.array(u) * p.g)},
-    )  # fmt: skip
+    )
     start = [1.0, -1.0, 0.5, 2.0]
     _, state = record(system, start, 3.0, method="taylor", rtol=1e-15)
     truth = expm(3.0 * A) @ start
@@ -373,14 +403,15 @@ def test_four_linear_states_against_the_matrix_exponential() -> None:
 
 def two_spirals(w: float) -> System:
     return System(
-        states=("x", "y"), parameters={"w": w},
+        states=("x", "y"),
+        parameters={"w": w},
         modes={
             "inner": lambda t, u, p: (u.x - p.w * u.y, p.w * u.x + u.y),
             "outer": lambda t, u, p: (u.x + p.w * u.y, -p.w * u.x + u.y),
         },
         indicators={"circle": lambda t, u, p: u.x**2 + u.y**2 - 1.0},
         transitions=[Transition("inner", "outer", when="circle > 0"), Transition("outer", "inner", when="circle < 0")],
-    )  # fmt: skip
+    )
 
 
 def test_linear_modes_through_a_curved_surface() -> None:

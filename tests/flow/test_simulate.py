@@ -58,12 +58,20 @@ def replay(run: xr.Dataset, p: dict[str, float], tolerance: float) -> None:
 @pytest.mark.parametrize(
     ("method", "changes"),
     [(method, {}) for method in METHODS]
-    + [("exact", changes) for changes in (
-        {"rho": 0.39, "c_s": 0.0}, {"rho": 0.39, "c_s": 60.0}, {"rho": 0.23, "g": 0.0014, "omega": 9.6},
-        {"c": 12.0, "rho": 3.0}, {"c": 2 * np.sqrt(2 * 8.47 * 0.838), "rho": 3.0}, {"k": 0.0, "c": 0.0, "g": 0.0},
-        {"c": 0.0, "omega": np.sqrt(2 * 8.47 / 0.838)}, {"c_s": 70.0, "rho": 1e-3, "g": -0.05, "omega": 5.0},
-    )],
-)  # fmt: skip
+    + [
+        ("exact", changes)
+        for changes in (
+            {"rho": 0.39, "c_s": 0.0},
+            {"rho": 0.39, "c_s": 60.0},
+            {"rho": 0.23, "g": 0.0014, "omega": 9.6},
+            {"c": 12.0, "rho": 3.0},
+            {"c": 2 * np.sqrt(2 * 8.47 * 0.838), "rho": 3.0},
+            {"k": 0.0, "c": 0.0, "g": 0.0},
+            {"c": 0.0, "omega": np.sqrt(2 * 8.47 / 0.838)},
+            {"c_s": 70.0, "rho": 1e-3, "g": -0.05, "omega": 5.0},
+        )
+    ],
+)
 def test_the_support_stretch_by_stretch(method: str, changes: dict[str, float]) -> None:
     """Table 1, then an elastic support, an overdamped contact, Fig. 13, over- and critically damped free modes,
     a free mass, resonance, and a support far into the mass's way."""
@@ -297,8 +305,10 @@ def test_a_start_in_contact_takes_the_transition_first(method: str) -> None:
 
 @pytest.mark.parametrize("suffix", [".nc", ".zarr"])
 def test_a_run_is_saved_and_loaded_whole(suffix: str, tmp_path: Path) -> None:
-    for name, system in (("sharp", ns.models.discontinuous_support()),
-                         ("smooth", ns.models.discontinuous_support().smoothed(1e-4))):  # fmt: skip
+    for name, system in (
+        ("sharp", ns.models.discontinuous_support()),
+        ("smooth", ns.models.discontinuous_support().smoothed(1e-4)),
+    ):
         run = ns.simulate(system, periods=3)
         again = ns.load(ns.save(run, tmp_path / (name + suffix)))
         xr.testing.assert_identical(run, again)
@@ -332,14 +342,15 @@ def test_a_motion_as_small_as_the_tolerance_is_warned_of() -> None:
 def test_five_transitions_of_one_instant_are_taken_by_every_method(method: str) -> None:
     """Thrown 0.9 beyond the surface, the state is set back by 0.25 until it is before it again: four times."""
     system = ns.System(
-        states=["x", "v"], parameters={"A": 0.0, "w": 1.0},
+        states=["x", "v"],
+        parameters={"A": 0.0, "w": 1.0},
         modes={"first": lambda t, u, p: (1.0, p.A * np.cos(p.w * t)), "then": lambda t, u, p: (1.0, -u.v)},
         indicators={"beyond": lambda t, u, p: u.x},
         transitions=[
             ns.Transition("first", "then", when="beyond > 0", reset=lambda t, u, p: (u.x + 0.9, u.v)),
             ns.Transition("then", "then", when="beyond > 0", reset=lambda t, u, p: (u.x - 0.25, u.v)),
         ],
-    )  # fmt: skip
+    )
     run = ns.simulate(system, duration=0.55, start={"x": -0.5}, method=method)
     np.testing.assert_allclose(run.crossing_time, 0.5, atol=1e-12)
     assert run.crossing_transition.values.tolist() == [0, 1, 1, 1, 1]

@@ -14,11 +14,18 @@ import nonsmooth as ns
 @pytest.mark.parametrize(
     ("start", "mode"),
     [
-        ((0.0, 2.0), "forward"), ((3.0, 2.0), "forward"), ((-3.0, 0.5), "forward"), ((3.0, 0.31), "forward"),
-        ((0.0, -2.0), "backward"), ((-3.0, 0.2), "backward"), ((3.0, -0.5), "backward"),
-        ((1.0, 0.3), "stick"), ((0.6, 0.3), "forward"), ((1.4, 0.3), "backward"),
+        ((0.0, 2.0), "forward"),
+        ((3.0, 2.0), "forward"),
+        ((-3.0, 0.5), "forward"),
+        ((3.0, 0.31), "forward"),
+        ((0.0, -2.0), "backward"),
+        ((-3.0, 0.2), "backward"),
+        ((3.0, -0.5), "backward"),
+        ((1.0, 0.3), "stick"),
+        ((0.6, 0.3), "forward"),
+        ((1.4, 0.3), "backward"),
     ],
-)  # fmt: skip
+)
 def test_a_start_goes_to_its_side(start: tuple[float, float], mode: str) -> None:
     """Beside the surface by its indicator alone, on it by the forces: |cos 0 - x| < 0.3 sticks."""
     system = ns.models.dry_friction_oscillator(v_b=0.3)
@@ -30,14 +37,15 @@ def test_a_start_goes_to_its_side(start: tuple[float, float], mode: str) -> None
 def test_sliding_round_a_circle(rtol: float) -> None:
     """Inside r' = r, theta' = 1, outside r' = -r, theta' = 3: on r = 1 half of each, theta' = 2."""
     system = ns.System(
-        states=["x", "y"], parameters={},
+        states=["x", "y"],
+        parameters={},
         modes={
             "inside": lambda t, u, p: (u.x - u.y, u.x + u.y),
             "outside": lambda t, u, p: (-u.x - 3 * u.y, 3 * u.x - u.y),
         },
         indicators={"radius": lambda t, u, p: u.x**2 + u.y**2 - 1},
         transitions=[ns.Surface("radius", below="inside", above="outside")],
-    )  # fmt: skip
+    )
     for r, arrives, angle in ((0.5, np.log(2), np.log(2)), (3.0, np.log(3), 3 * np.log(3))):
         run = ns.simulate(system, duration=100.0, start={"x": r}, samples=1001, rtol=rtol)
         assert run.crossing_time.values[-1] == pytest.approx(arrives, abs=0.01 * rtol)
@@ -51,14 +59,16 @@ def test_an_impact_out_of_a_stick() -> None:
     """A belt carries a mass to a wall at x = 1; it rebounds with -e v_b and slips, x'' = F - x, back to the wall."""
     rebound = {"when": "wall > 0", "reset": lambda t, u, p: (u.x, -p.e * u.v)}
     system = ns.System(
-        states=["x", "v"], parameters={"F": 2.0, "v_b": 0.5, "e": 0.8},
+        states=["x", "v"],
+        parameters={"F": 2.0, "v_b": 0.5, "e": 0.8},
         modes={"slower": lambda t, u, p: (u.v, p.F - u.x), "faster": lambda t, u, p: (u.v, -p.F - u.x)},
         indicators={"slip": lambda t, u, p: u.v - p.v_b, "wall": lambda t, u, p: u.x - 1},
         transitions=[
             ns.Surface("slip", below="slower", above="faster", mode="stick"),
-            ns.Transition("slower", "slower", **rebound), ns.Transition("faster", "faster", **rebound),
+            ns.Transition("slower", "slower", **rebound),
+            ns.Transition("faster", "faster", **rebound),
         ],
-    )  # fmt: skip
+    )
     run = ns.simulate(system, duration=3.0, start={"x": 0.5, "v": 0.5}, samples=2)
     labels = [system.transitions[i].label for i in run.crossing_transition.values]
     first = labels.index("stick -> slower")
@@ -122,10 +132,12 @@ def test_a_belt_that_speeds_up() -> None:
 
 def test_a_start_on_a_repelling_surface_is_refused() -> None:
     system = ns.System(
-        states=["x", "v"], parameters={"F": 0.3},
+        states=["x", "v"],
+        parameters={"F": 0.3},
         modes={"low": lambda t, u, p: (u.v, -u.x - p.F), "high": lambda t, u, p: (u.v, -u.x + p.F)},
-        indicators={"h": lambda t, u, p: u.v}, transitions=[ns.Surface("h", below="low", above="high")],
-    )  # fmt: skip
+        indicators={"h": lambda t, u, p: u.v},
+        transitions=[ns.Surface("h", below="low", above="high")],
+    )
     with pytest.raises(ValueError, match=r"'v': 0.0.* lies on the surface 'h' where both vector fields lead away"):
         ns.simulate(system, duration=1.0)
     assert len(ns.simulate(system, duration=1.0, start={"x": 1.0}).crossing_time) <= 1  # crossing is no question
@@ -138,9 +150,12 @@ def test_resets_that_land_beyond_each_others_stops_end_at_once_with_a_sentence()
         ns.Transition("fly", "fly", when="left > 0", reset=lambda t, u, p: (u.x + 3, -u.v)),
     ]
     system = ns.System(
-        states=["x", "v"], parameters={"a": 1.0}, modes={"fly": lambda t, u, p: (u.v, -p.a * u.x)},
-        indicators={"right": lambda t, u, p: u.x - 1, "left": lambda t, u, p: -u.x - 1}, transitions=walls,
-    )  # fmt: skip
+        states=["x", "v"],
+        parameters={"a": 1.0},
+        modes={"fly": lambda t, u, p: (u.v, -p.a * u.x)},
+        indicators={"right": lambda t, u, p: u.x - 1, "left": lambda t, u, p: -u.x - 1},
+        transitions=walls,
+    )
     ns.simulate(system, duration=0.1)  # compiled
     begin = process_time()
     with pytest.raises(ns.SolveError, match="without end") as caught:
@@ -154,12 +169,15 @@ def test_friction_under_the_force_of_a_rigid_contact_is_refused() -> None:
     begin = process_time()
     with pytest.raises(ns.SystemDefinitionError, match=r"need not exist or be unique \(Painleve\)"):
         ns.mechanical(
-            [[1.0, 0.0], [0.0, 1.0]], 0.0 * np.eye(2), np.eye(2), coordinates=["x", "y"],
+            [[1.0, 0.0], [0.0, 1.0]],
+            0.0 * np.eye(2),
+            np.eye(2),
+            coordinates=["x", "y"],
             elements={
                 "floor": ns.elements.Stop(at="y", side=-1, position=0.0),
                 "rub": ns.elements.Coulomb(at="x", friction=0.5, normal="floor"),
             },
-        )  # fmt: skip
+        )
     assert process_time() - begin < 1
 
 
@@ -167,9 +185,12 @@ def test_a_reset_that_lands_beyond_another_stop_takes_its_impact_at_the_same_ins
     right = ns.Transition("fly", "fly", when="right > 0", reset=lambda t, u, p: (u.x - 3, -u.v))
     left = ns.Transition("fly", "fly", when="left > 0", reset=lambda t, u, p: (-0.5 + 0 * u.x, -u.v / 2))
     system = ns.System(
-        states=["x", "v"], parameters={"a": 1.0}, modes={"fly": lambda t, u, p: (u.v, -p.a * u.x)},
-        indicators={"right": lambda t, u, p: u.x - 1, "left": lambda t, u, p: -u.x - 1}, transitions=[right, left],
-    )  # fmt: skip
+        states=["x", "v"],
+        parameters={"a": 1.0},
+        modes={"fly": lambda t, u, p: (u.v, -p.a * u.x)},
+        indicators={"right": lambda t, u, p: u.x - 1, "left": lambda t, u, p: -u.x - 1},
+        transitions=[right, left],
+    )
     run = ns.simulate(system, duration=0.6, start={"v": 2.0}, samples=2)
     assert run.crossing_time.values == pytest.approx([np.pi / 6] * 2, abs=1e-12)
     assert run.u_after.values == pytest.approx(np.array([[-2, -(3**0.5)], [-0.5, 3**0.5 / 2]]), abs=1e-12)
@@ -178,10 +199,12 @@ def test_a_reset_that_lands_beyond_another_stop_takes_its_impact_at_the_same_ins
 def test_sliding_into_a_two_fold_ends_with_a_sentence() -> None:
     """In the time scaled by y - x the sliding flow is x' = y, y' = -3 y - 2 x: a node that attracts x < 0 < y."""
     system = ns.System(
-        states=["x", "y", "z"], parameters={},
+        states=["x", "y", "z"],
+        parameters={},
         modes={"below": lambda t, u, p: (0, 2, u.y), "above": lambda t, u, p: (1, -3, u.x)},
-        indicators={"h": lambda t, u, p: u.z}, transitions=[ns.Surface("h", below="below", above="above")],
-    )  # fmt: skip
+        indicators={"h": lambda t, u, p: u.z},
+        transitions=[ns.Surface("h", below="below", above="above")],
+    )
     with pytest.raises(ns.SolveError, match="Sliding in mode 'h_sliding' .* two-fold.* not unique") as caught:
         ns.simulate(system, duration=5.0, start=[-0.5, 0.5, 0.0])
     assert caught.value.status == "not_unique"
@@ -191,11 +214,13 @@ def test_sliding_into_a_two_fold_ends_with_a_sentence() -> None:
 def test_a_two_fold_has_its_own_status_in_sweeps() -> None:
     """The same with x' = a y on the surface: a node that attracts x < 0 < y too."""
     system = ns.System(
-        states=["x", "y", "z"], parameters={"a": 1.0, "w": 1.0},
+        states=["x", "y", "z"],
+        parameters={"a": 1.0, "w": 1.0},
         modes={"below": lambda t, u, p: (0 * t, 2, u.y), "above": lambda t, u, p: (p.a, -3, u.x)},
-        indicators={"h": lambda t, u, p: u.z}, transitions=[ns.Surface("h", below="below", above="above")],
+        indicators={"h": lambda t, u, p: u.z},
+        transitions=[ns.Surface("h", below="below", above="above")],
         period=lambda p: 2 * np.pi / p.w,
-    )  # fmt: skip
+    )
     begin = {"x": -0.5, "y": 0.5, "z": 0.0}
     found = ns.sweep(system, "a", [0.9, 1.0], start=begin, direction=None, transient=5, keep=20, progress=False)
     names = dict(zip(found.status.flag_values.tolist(), found.status.flag_meanings.split(), strict=True))
@@ -216,14 +241,17 @@ def test_four_fields_that_leave_the_motion_on_two_surfaces_open() -> None:
     z = {"mm": 0.0, "pm": 1.0, "mp": 0.0, "pp": 0.0}
     speed = {"mm": (1, 1), "pm": (-1, 2), "mp": (3, -1), "pp": (-1, -1)}
     system = ns.System(
-        states=["x", "y", "z"], parameters={},
+        states=["x", "y", "z"],
+        parameters={},
         modes={mode: (lambda t, u, p, mode=mode: (*speed[mode], z[mode] - u.z)) for mode in z},
         indicators={"one": lambda t, u, p: u.x, "two": lambda t, u, p: u.y},
         transitions=[
-            ns.Surface("one", below="mm", above="pm"), ns.Surface("one", below="mp", above="pp"),
-            ns.Surface("two", below="mm", above="mp"), ns.Surface("two", below="pm", above="pp"),
+            ns.Surface("one", below="mm", above="pm"),
+            ns.Surface("one", below="mp", above="pp"),
+            ns.Surface("two", below="mm", above="mp"),
+            ns.Surface("two", below="pm", above="pp"),
         ],
-    )  # fmt: skip
+    )
     assert not any(mode.startswith("one_two_sliding") for mode in system.modes)
     with pytest.raises(ns.SolveError, match=r"do not determine one field on both") as caught:
         ns.simulate(system, duration=5.0, start=[-0.5, -1.0, 0.2])

@@ -29,10 +29,16 @@ def test_random_starts_fill_their_box_and_repeat() -> None:
 @pytest.mark.parametrize(
     ("start", "one"),
     [
-        (None, True), ({"x": 1.0}, True), ([1.0, 2.0], True), ((1, 2), True), (np.array([1.0, 2.0]), True),
-        ([[1.0, 2.0]], False), ([{"x": 1.0}, {"v": 1.0}], False), (np.zeros((3, 2)), False),
+        (None, True),
+        ({"x": 1.0}, True),
+        ([1.0, 2.0], True),
+        ((1, 2), True),
+        (np.array([1.0, 2.0]), True),
+        ([[1.0, 2.0]], False),
+        ([{"x": 1.0}, {"v": 1.0}], False),
+        (np.zeros((3, 2)), False),
     ],
-)  # fmt: skip
+)
 def test_one_start_is_told_from_several(start: object, one: bool, system: ns.System) -> None:
     assert is_one_start(start) is one
     assert start_states(system, start).shape[1] == 2

@@ -13,11 +13,12 @@ pytestmark = pytest.mark.physics
 def ball_on_a_table() -> ns.System:
     """A ball (g = 1) over a table that moves as a sin t, x its height over the table."""
     return ns.System(
-        states=["x", "v"], parameters={"a": 1.0, "e": 0.5},
+        states=["x", "v"],
+        parameters={"a": 1.0, "e": 0.5},
         modes={"flight": lambda t, u, p: (u.v, -1.0 + p.a * np.sin(t))},
         indicators={"table": lambda t, u, p: -u.x},
         transitions=[ns.Transition("flight", "flight", when="table > 0", reset=lambda t, u, p: (u.x, -p.e * u.v))],
-    )  # fmt: skip
+    )
 
 
 def one_bounce(e: float, above: float) -> tuple[ns.System, dict[str, float], np.ndarray]:

@@ -249,10 +249,11 @@ def test_a_short_leg_from_balanced_forces_ends() -> None:
 def test_a_leg_where_forcing_equals_friction_ends() -> None:
     """All of the force is the rounding of A cos w t and F, whatever the states: Phi(0, v) = tau to first order."""
     system = ns.System(
-        states=["x", "v"], parameters={"A": 0.4468628829226984, "F": 0.4468628827096838, "w": 1.2642722025962563},
+        states=["x", "v"],
+        parameters={"A": 0.4468628829226984, "F": 0.4468628827096838, "w": 1.2642722025962563},
         modes={"slip": lambda t, u, p: (u.v, p.A * np.cos(p.w * t) - p.F - u.x - 0.2 * u.v)},
         period=lambda p: 2 * np.pi / p.w,
-    )  # fmt: skip
+    )
     flow, tau = VariationalFlow.of(system, ("A",)), 4.87496328e-05
     legs = flow.segments(system.parameter_vector(), [0], [0.0], [tau], [[-1.39172937e-15, -3.64448472e-15]])
     assert legs.status[0] == codes.OK
@@ -336,11 +337,12 @@ def test_saltation_of_the_papers_oscillator() -> None:
 def test_stick_has_a_singular_saltation_matrix() -> None:
     """A mass that comes to rest on a belt forgets its velocity: a zero eigenvalue, and log|det S| is minus infinity."""
     system = ns.System(
-        states=["x", "v"], parameters={"f": 0.3, "b": 0.2},
+        states=["x", "v"],
+        parameters={"f": 0.3, "b": 0.2},
         modes={"slip": lambda t, u, p: (u.v, -u.x + p.f), "stick": lambda t, u, p: (p.b, 0.0)},
         indicators={"relative": lambda t, u, p: u.v - p.b},
         transitions=[ns.Transition("slip", "stick", when="relative > 0", reset=lambda t, u, p: (u.x, p.b))],
-    )  # fmt: skip
+    )
     flow = VariationalFlow.of(system, ("b",))
     jump = flow.jump(system.parameter_vector(), 0, 0.0, [-0.5, 0.2])
     # at equal times: x has moved at b on both sides, v is b
@@ -355,13 +357,19 @@ def test_transitions_at_one_instant_are_one() -> None:
     """A reset that lands beyond a second surface: the second transition happens when the first does."""
     parameters = {"a": -1.0, "b": 0.7, "g": 0.5, "r": 0.4}
     system = ns.System(
-        states=["x", "y"], parameters=parameters,
-        modes={"one": lambda t, u, p: (1.0 + 0 * u.x, p.a * u.y), "two": lambda t, u, p: (2.0 + 0 * u.x, u.y),
-               "three": lambda t, u, p: (0.5 + 0 * u.x, p.b * u.y + u.x)},
+        states=["x", "y"],
+        parameters=parameters,
+        modes={
+            "one": lambda t, u, p: (1.0 + 0 * u.x, p.a * u.y),
+            "two": lambda t, u, p: (2.0 + 0 * u.x, u.y),
+            "three": lambda t, u, p: (0.5 + 0 * u.x, p.b * u.y + u.x),
+        },
         indicators={"wall": lambda t, u, p: u.x - p.g - 0.1 * u.y, "high": lambda t, u, p: u.y - 0.2},
-        transitions=[ns.Transition("one", "two", when="wall > 0", reset=lambda t, u, p: (u.x + p.r, 2 * u.y)),
-                     ns.Transition("two", "three", when="high > 0", reset=lambda t, u, p: (u.x * u.y, u.y + u.x))],
-    )  # fmt: skip
+        transitions=[
+            ns.Transition("one", "two", when="wall > 0", reset=lambda t, u, p: (u.x + p.r, 2 * u.y)),
+            ns.Transition("two", "three", when="high > 0", reset=lambda t, u, p: (u.x * u.y, u.y + u.x)),
+        ],
+    )
     state = State(np.array([0.0, 0.6]), np.zeros(0))
     _, path = exact_end(system, state, 1.5)
     assert path == (0, 1)
@@ -453,9 +461,10 @@ def test_a_steep_layer_in_the_middle_of_a_step_is_not_passed_over() -> None:
 
     F, s, w = 0.3, 1e-3, 0.7
     system = ns.System(
-        states=["x", "v"], parameters={"F": F, "s": s, "w": w},
+        states=["x", "v"],
+        parameters={"F": F, "s": s, "w": w},
         modes={"one": lambda t, u, p: (u.v, np.cos(p.w * t) - u.x - 0.05 * u.v - p.F * np.tanh(u.v / p.s))},
-    )  # fmt: skip
+    )
 
     def rates(t, z):
         x, v, *Phi = z
@@ -472,10 +481,12 @@ def test_a_steep_layer_in_the_middle_of_a_step_is_not_passed_over() -> None:
 def test_second_derivatives_of_linear_systems_have_gradients() -> None:
     """L_f^2 h of rows of numbers is differentiated too, in state, time and a parameter of the forcing."""
     system = ns.System(
-        states=["x", "v"], parameters={"A": 1.3, "w": 1.7, "c": 0.4}, modes={
-            "one": lambda t, u, p: (u.v, p.A * np.cos(p.w * t) - u.x - 0.2 * u.v)},
-        indicators={"h": lambda t, u, p: u.v + p.c * u.x}, transitions=[],
-    )  # fmt: skip
+        states=["x", "v"],
+        parameters={"A": 1.3, "w": 1.7, "c": 0.4},
+        modes={"one": lambda t, u, p: (u.v, p.A * np.cos(p.w * t) - u.x - 0.2 * u.v)},
+        indicators={"h": lambda t, u, p: u.v + p.c * u.x},
+        transitions=[],
+    )
     flow, values = VariationalFlow.of(system, ("A", "w", "c")), system.parameter_vector()
     t, z = 0.7, np.array([0.3, -0.2])
     touch = flow.indicator(values, 0, 0, t, z)

@@ -30,8 +30,17 @@ def march(fields, events, mode, u, times):
 
             zero.terminal, zero.direction = True, direction
             rows.append((zero, action))
-        found = solve_ivp(fields[mode], (t, end + 1e-9), u, "DOP853", rtol=1e-11, atol=1e-12, dense_output=True,
-                          events=[zero for zero, _ in rows], max_step=0.2)  # fmt: skip
+        found = solve_ivp(
+            fields[mode],
+            (t, end + 1e-9),
+            u,
+            "DOP853",
+            rtol=1e-11,
+            atol=1e-12,
+            dense_output=True,
+            events=[zero for zero, _ in rows],
+            max_step=0.2,
+        )
         last = found.t[-1]
         here = np.searchsorted(times, last, "left") if found.status == 1 else len(times)
         if here > k:
@@ -98,11 +107,13 @@ def duffing() -> ns.System:
         return v, p.F * np.cos(p.w * t) - p.c * v - p.a * x - p.b * x**3
 
     return ns.System(
-        name="Duffing with a stop", states=["x", "v"], modes={"free": motion},
+        name="Duffing with a stop",
+        states=["x", "v"],
+        modes={"free": motion},
         parameters={"a": 1.0, "b": 0.5, "c": 0.15, "F": 1.0, "w": 0.9, "g": 0.8, "e": 0.7},
         indicators={"stop": lambda t, u, p: u.x - p.g},
         transitions=[ns.Transition("free", "free", when="stop > 0", reset=lambda t, u, p: (u.x, -p.e * u.v))],
-    )  # fmt: skip
+    )
 
 
 def _xv(rng):
@@ -199,8 +210,9 @@ def _chua(p, start, t):
 
     events = {
         0: [(lambda t, u: u[0] - 1, 1, go(1)), (lambda t, u: u[0] + 1, -1, go(-1))],
-        1: [(lambda t, u: u[0] - 1, -1, go(0))], -1: [(lambda t, u: u[0] + 1, 1, go(0))],
-    }  # fmt: skip
+        1: [(lambda t, u: u[0] - 1, -1, go(0))],
+        -1: [(lambda t, u: u[0] + 1, 1, go(0))],
+    }
     return march({s: field(s) for s in (-1, 0, 1)}, events, 0, [start["x"], start["y"], start["z"]], t)[:, :1]
 
 
@@ -209,9 +221,10 @@ def _friction(p, start, t):
         return p["f_0"] * np.cos(p["omega"] * t) - u[0] - 2 * p["zeta"] * u[1]
 
     fields = {
-        1: lambda t, u: [u[1], others(t, u) - p["f_k"]], -1: lambda t, u: [u[1], others(t, u) + p["f_k"]],
+        1: lambda t, u: [u[1], others(t, u) - p["f_k"]],
+        -1: lambda t, u: [u[1], others(t, u) + p["f_k"]],
         0: lambda t, u: [0.0, 0.0],
-    }  # fmt: skip
+    }
 
     def stop(t, u):
         u = np.array([u[0], 0.0])
@@ -219,10 +232,13 @@ def _friction(p, start, t):
         return (0 if abs(rest) <= p["f_s"] else 1 if rest > 0 else -1), u
 
     events = {
-        1: [(lambda t, u: u[1], -1, stop)], -1: [(lambda t, u: u[1], 1, stop)],
-        0: [(lambda t, u: others(t, u) - p["f_s"], 1, lambda t, u: (1, np.array([u[0], 1e-14]))),
-            (lambda t, u: others(t, u) + p["f_s"], -1, lambda t, u: (-1, np.array([u[0], -1e-14])))],
-    }  # fmt: skip
+        1: [(lambda t, u: u[1], -1, stop)],
+        -1: [(lambda t, u: u[1], 1, stop)],
+        0: [
+            (lambda t, u: others(t, u) - p["f_s"], 1, lambda t, u: (1, np.array([u[0], 1e-14]))),
+            (lambda t, u: others(t, u) + p["f_s"], -1, lambda t, u: (-1, np.array([u[0], -1e-14]))),
+        ],
+    }
     return march(fields, events, 1, [start["x"], start["v"]], t)[:, :1]
 
 
@@ -239,8 +255,9 @@ def _bilinear(p, start, t):
 
     events = {
         0: [(lambda t, u: u[0] - p["g"], 1, go(1)), (lambda t, u: u[0] + p["g"], -1, go(-1))],
-        1: [(lambda t, u: u[0] - p["g"], -1, go(0))], -1: [(lambda t, u: u[0] + p["g"], 1, go(0))],
-    }  # fmt: skip
+        1: [(lambda t, u: u[0] - p["g"], -1, go(0))],
+        -1: [(lambda t, u: u[0] + p["g"], 1, go(0))],
+    }
     return march({s: field(s) for s in (-1, 0, 1)}, events, 0, [start["x"], start["v_x"]], t)[:, :1]
 
 
@@ -266,10 +283,13 @@ def _relay(p, start, t):
         return [0.0, u[2] + 2 * s * u[1], -u[1]]
 
     events = {
-        1: [(lambda t, u: u[0], 1, meet)], -1: [(lambda t, u: u[0], -1, meet)],
-        0: [(lambda t, u: u[1] - 1, 1, lambda t, u: (-1, np.array([1e-14, u[1], u[2]]))),
-            (lambda t, u: u[1] + 1, -1, lambda t, u: (1, np.array([-1e-14, u[1], u[2]])))],
-    }  # fmt: skip
+        1: [(lambda t, u: u[0], 1, meet)],
+        -1: [(lambda t, u: u[0], -1, meet)],
+        0: [
+            (lambda t, u: u[1] - 1, 1, lambda t, u: (-1, np.array([1e-14, u[1], u[2]]))),
+            (lambda t, u: u[1] + 1, -1, lambda t, u: (1, np.array([-1e-14, u[1], u[2]]))),
+        ],
+    }
     return march(
         {1: field(1), -1: field(-1), 0: slide},
         events,
@@ -282,45 +302,120 @@ def _relay(p, start, t):
 CASES = {
     case.name: case
     for case in (
-        Case("Duffing with a stop", duffing, {"a": 1.0, "b": 0.5, "c": 0.15, "F": 1.0, "w": 0.9, "g": 0.8, "e": 0.7},
-             ["a", "b", "c", "g", "e"], _duffing, _xv, {"x": "position"}, 80.0),
-        Case("impact oscillator", ns.models.impact_oscillator,
-             {"k": 1.0, "c": 0.1, "omega": 1.3, "d": 0.6, "e": 0.6, "A": 1.0}, ["k", "c", "d", "e"], _impact, _xv,
-             {"x": "position"}, 70.0),
-        Case("stick-slip belt", ns.models.stick_slip_belt, {"F": 1.0, "delta": 3.0, "v_b": 0.2},
-             ["F", "delta", "v_b"], _belt,
-             lambda rng: {"x": 0.5 + 0.1 * rng.random(), "v": 0.1 - 0.1 * rng.random()}, {"x": "position"}, 60.0),
-        Case("gear pair", ns.models.gear_pair, {"zeta": 0.05, "F_m": 0.1, "F_a": 0.4, "b": 1.0, "omega": 0.7},
-             ["zeta", "F_m", "F_a", "b"], _gears,
-             lambda rng: {"q": 1.1 + 0.05 * rng.standard_normal(), "v_q": 0.1 * rng.standard_normal()},
-             {"q": "transmission error"}, 90.0),
-        Case("impact damper", ns.models.impact_damper,
-             {"zeta": 0.02, "mu": 0.15, "e": 0.75, "d": 1.0, "F": 0.1, "omega": 1.0}, ["zeta", "mu", "e", "F"], _damper,
-             lambda rng: {"x": 0.1 * rng.standard_normal(), "y": 0.1 * rng.standard_normal(),
-                          "v_x": 0.1 * rng.standard_normal(), "v_y": 0.3 + 0.1 * rng.random()},
-             {"x": "position"}, 60.0, noise=0.003, resolution=0.003),
-        Case("relief valve", ns.models.relief_valve, {"k": 1.25, "delta": 10.0, "beta": 20.0, "r": 0.8, "q": 5.0},
-             ["k", "delta", "beta", "r", "q"], _valve,
-             lambda rng: {"y1": 1.0 + 0.5 * rng.random(), "y2": 0.0, "y3": 10.0 + rng.random()},
-             {"y3": "pressure"}, 25.0),
-        Case("Chua's circuit", ns.models.chua_circuit, {"alpha": 9.0, "beta": 100 / 7, "a": -1 / 7, "b": 2 / 7},
-             ["alpha", "beta", "a", "b"], _chua,
-             lambda rng: {"x": 0.1 + 0.5 * rng.random(), "y": 0.05 * rng.standard_normal(),
-                          "z": 0.1 * rng.standard_normal()},
-             {"x": "voltage"}, 40.0),
-        Case("dry friction", ns.models.dry_friction_oscillator,
-             {"f_0": 1.0, "omega": 0.4, "f_k": 0.4, "f_s": 0.5, "zeta": 0.05, "v_b": 0.0},
-             ["f_0", "f_k", "f_s", "zeta"], _friction,
-             lambda rng: {"x": 0.2 * rng.standard_normal(), "v": 0.3 + 0.2 * rng.random()},
-             {"x": "position"}, 110.0),
-        Case("bilinear oscillator", ns.models.bilinear_oscillator,
-             {"zeta": 0.05, "beta": 10.0, "g": 1.0, "A": 2.0, "omega": 0.7}, ["zeta", "beta", "g", "A"], _bilinear,
-             lambda rng: {"x": 0.3 * rng.standard_normal(), "v_x": 0.3 * rng.standard_normal()},
-             {"x": "position"}, 60.0),
-        Case("relay feedback", ns.models.relay_feedback, {"xi": 0.05, "omega": 6.0, "sigma": 1.0},
-             ["xi", "omega", "sigma"], _relay,
-             lambda rng: {"x1": 0.2 + 0.1 * rng.random(), "x2": 0.1 * rng.standard_normal(),
-                          "x3": 0.1 * rng.standard_normal()},
-             {"x1": "level"}, 20.0),
+        Case(
+            "Duffing with a stop",
+            duffing,
+            {"a": 1.0, "b": 0.5, "c": 0.15, "F": 1.0, "w": 0.9, "g": 0.8, "e": 0.7},
+            ["a", "b", "c", "g", "e"],
+            _duffing,
+            _xv,
+            {"x": "position"},
+            80.0,
+        ),
+        Case(
+            "impact oscillator",
+            ns.models.impact_oscillator,
+            {"k": 1.0, "c": 0.1, "omega": 1.3, "d": 0.6, "e": 0.6, "A": 1.0},
+            ["k", "c", "d", "e"],
+            _impact,
+            _xv,
+            {"x": "position"},
+            70.0,
+        ),
+        Case(
+            "stick-slip belt",
+            ns.models.stick_slip_belt,
+            {"F": 1.0, "delta": 3.0, "v_b": 0.2},
+            ["F", "delta", "v_b"],
+            _belt,
+            lambda rng: {"x": 0.5 + 0.1 * rng.random(), "v": 0.1 - 0.1 * rng.random()},
+            {"x": "position"},
+            60.0,
+        ),
+        Case(
+            "gear pair",
+            ns.models.gear_pair,
+            {"zeta": 0.05, "F_m": 0.1, "F_a": 0.4, "b": 1.0, "omega": 0.7},
+            ["zeta", "F_m", "F_a", "b"],
+            _gears,
+            lambda rng: {"q": 1.1 + 0.05 * rng.standard_normal(), "v_q": 0.1 * rng.standard_normal()},
+            {"q": "transmission error"},
+            90.0,
+        ),
+        Case(
+            "impact damper",
+            ns.models.impact_damper,
+            {"zeta": 0.02, "mu": 0.15, "e": 0.75, "d": 1.0, "F": 0.1, "omega": 1.0},
+            ["zeta", "mu", "e", "F"],
+            _damper,
+            lambda rng: {
+                "x": 0.1 * rng.standard_normal(),
+                "y": 0.1 * rng.standard_normal(),
+                "v_x": 0.1 * rng.standard_normal(),
+                "v_y": 0.3 + 0.1 * rng.random(),
+            },
+            {"x": "position"},
+            60.0,
+            noise=0.003,
+            resolution=0.003,
+        ),
+        Case(
+            "relief valve",
+            ns.models.relief_valve,
+            {"k": 1.25, "delta": 10.0, "beta": 20.0, "r": 0.8, "q": 5.0},
+            ["k", "delta", "beta", "r", "q"],
+            _valve,
+            lambda rng: {"y1": 1.0 + 0.5 * rng.random(), "y2": 0.0, "y3": 10.0 + rng.random()},
+            {"y3": "pressure"},
+            25.0,
+        ),
+        Case(
+            "Chua's circuit",
+            ns.models.chua_circuit,
+            {"alpha": 9.0, "beta": 100 / 7, "a": -1 / 7, "b": 2 / 7},
+            ["alpha", "beta", "a", "b"],
+            _chua,
+            lambda rng: {
+                "x": 0.1 + 0.5 * rng.random(),
+                "y": 0.05 * rng.standard_normal(),
+                "z": 0.1 * rng.standard_normal(),
+            },
+            {"x": "voltage"},
+            40.0,
+        ),
+        Case(
+            "dry friction",
+            ns.models.dry_friction_oscillator,
+            {"f_0": 1.0, "omega": 0.4, "f_k": 0.4, "f_s": 0.5, "zeta": 0.05, "v_b": 0.0},
+            ["f_0", "f_k", "f_s", "zeta"],
+            _friction,
+            lambda rng: {"x": 0.2 * rng.standard_normal(), "v": 0.3 + 0.2 * rng.random()},
+            {"x": "position"},
+            110.0,
+        ),
+        Case(
+            "bilinear oscillator",
+            ns.models.bilinear_oscillator,
+            {"zeta": 0.05, "beta": 10.0, "g": 1.0, "A": 2.0, "omega": 0.7},
+            ["zeta", "beta", "g", "A"],
+            _bilinear,
+            lambda rng: {"x": 0.3 * rng.standard_normal(), "v_x": 0.3 * rng.standard_normal()},
+            {"x": "position"},
+            60.0,
+        ),
+        Case(
+            "relay feedback",
+            ns.models.relay_feedback,
+            {"xi": 0.05, "omega": 6.0, "sigma": 1.0},
+            ["xi", "omega", "sigma"],
+            _relay,
+            lambda rng: {
+                "x1": 0.2 + 0.1 * rng.random(),
+                "x2": 0.1 * rng.standard_normal(),
+                "x3": 0.1 * rng.standard_normal(),
+            },
+            {"x1": "level"},
+            20.0,
+        ),
     )
-}  # fmt: skip
+}

@@ -16,11 +16,13 @@ def relay():
         return lambda t, u, p: (u.v, sign * p.F - p.c * u.v - p.k * u.x)
 
     return ns.System(
-        name="relay with hysteresis", states=["x", "v"], parameters=RELAY,
+        name="relay with hysteresis",
+        states=["x", "v"],
+        parameters=RELAY,
         modes={"up": field(1), "down": field(-1)},
         indicators={"upper": lambda t, u, p: u.x - p.h, "lower": lambda t, u, p: u.x + p.h},
         transitions=[ns.Transition("up", "down", when="upper > 0"), ns.Transition("down", "up", when="lower < 0")],
-    )  # fmt: skip
+    )
 
 
 def relay_record(p, x, v, mode, t):
@@ -41,31 +43,39 @@ def damper():
         return lambda t, u, p: (u.v, p.A * np.cos(p.w * t) - p.c * u.v - p.k * u.x - sign * p.f, abs(sign) * u.v)
 
     return ns.System(
-        name="friction damper with play", states=["x", "v", "y"], parameters=DAMPER,
+        name="friction damper with play",
+        states=["x", "v", "y"],
+        parameters=DAMPER,
         modes={"apart": field(0), "right": field(1), "left": field(-1)},
         indicators={
-            "ahead": lambda t, u, p: u.x - u.y - p.g, "behind": lambda t, u, p: u.x - u.y + p.g,
+            "ahead": lambda t, u, p: u.x - u.y - p.g,
+            "behind": lambda t, u, p: u.x - u.y + p.g,
             "speed": lambda t, u, p: u.v,
         },
         transitions=[
             ns.Transition("apart", "right", when="ahead > 0 and speed > 0"),
             ns.Transition("apart", "left", when="behind < 0 and speed < 0"),
-            ns.Transition("right", "apart", when="speed < 0"), ns.Transition("left", "apart", when="speed > 0"),
+            ns.Transition("right", "apart", when="speed < 0"),
+            ns.Transition("left", "apart", when="speed > 0"),
         ],
         period=lambda p: 2 * np.pi / p.w,
-    )  # fmt: skip
+    )
 
 
 def damper_record(p, x, v, y, mode, t):
     def field(sign):
         return lambda t, u: [
-            u[1], p["A"] * np.cos(p["w"] * t) - p["c"] * u[1] - p["k"] * u[0] - sign * p["f"], abs(sign) * u[1]
-        ]  # fmt: skip
+            u[1],
+            p["A"] * np.cos(p["w"] * t) - p["c"] * u[1] - p["k"] * u[0] - sign * p["f"],
+            abs(sign) * u[1],
+        ]
 
     events = {
-        "apart": [(lambda t, u: u[0] - u[2] - p["g"], 1, lambda t, u: ("right", u)),
-                  (lambda t, u: u[0] - u[2] + p["g"], -1, lambda t, u: ("left", u))],
+        "apart": [
+            (lambda t, u: u[0] - u[2] - p["g"], 1, lambda t, u: ("right", u)),
+            (lambda t, u: u[0] - u[2] + p["g"], -1, lambda t, u: ("left", u)),
+        ],
         "right": [(lambda t, u: u[1], -1, lambda t, u: ("apart", u))],
         "left": [(lambda t, u: u[1], 1, lambda t, u: ("apart", u))],
-    }  # fmt: skip
+    }
     return march({"apart": field(0), "right": field(1), "left": field(-1)}, events, mode, [x, v, y], t)[:, 0]

@@ -12,10 +12,12 @@ SYSTEMS = ("relay", "friction damper", "backlash", "belt")
 LEVEL = 0.01  # of the noise, over the standard deviation of the motion
 #: Systems with the parameters that are found and the one whose term the model lacks.
 LACKING = {
-    "Duffing with a stop": (["a", "c", "g", "e"], "b"), "impact oscillator": (["k", "d", "e"], "c"),
-    "gear pair": (["F_a", "b", "zeta"], "F_m"), "bilinear oscillator": (["A", "g", "zeta"], "beta"),
+    "Duffing with a stop": (["a", "c", "g", "e"], "b"),
+    "impact oscillator": (["k", "d", "e"], "c"),
+    "gear pair": (["F_a", "b", "zeta"], "F_m"),
+    "bilinear oscillator": (["A", "g", "zeta"], "beta"),
     "dry friction": (["f_k", "f_s"], "zeta"),
-}  # fmt: skip
+}
 
 
 def autoregressive(n, rho, rng):
@@ -74,8 +76,14 @@ def fitted(name, kind, seed):
     rng = np.random.default_rng(seed)
     system, truth, find, t, clean, quantity = motion(name, rng, seed)
     y, of_sensor, options, _ = readings(kind, clean, rng)
-    found = ns.fit(off(system, truth, find, rng), {quantity: (t, y)}, find, progress=False,
-                   measured={quantity: ns.Sensor(quantity, **of_sensor)}, **options)  # fmt: skip
+    found = ns.fit(
+        off(system, truth, find, rng),
+        {quantity: (t, y)},
+        find,
+        progress=False,
+        measured={quantity: ns.Sensor(quantity, **of_sensor)},
+        **options,
+    )
     return found, np.array([(found[k] - truth[k]) / found.uncertainty[k] for k in find])
 
 

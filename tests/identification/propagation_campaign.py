@@ -53,9 +53,14 @@ def cases() -> dict[str, Case]:
     support = ns.models.discontinuous_support().with_parameters(omega=3.69, g=-0.0045, rho=0.42)
     stop = ns.elements.ElasticStop(at="q", position=1.0, stiffness="k_s", damping=0.0)
     bench = ns.mechanical(
-        1.0, "c", "k", parameters={"c": 0.1, "k": 1.0, "k_s": 6.0, "omega": 1.3}, coordinates=["q"],
-        elements={"s": stop}, forcing={"q": lambda t, p: 0.5 * np.cos(p.omega * t)},
-    )  # fmt: skip
+        1.0,
+        "c",
+        "k",
+        parameters={"c": 0.1, "k": 1.0, "k_s": 6.0, "omega": 1.3},
+        coordinates=["q"],
+        elements={"s": stop},
+        forcing={"q": lambda t, p: 0.5 * np.cos(p.omega * t)},
+    )
     flip = (ns.continue_orbit, "rho", (0.36, 0.45))
     fold = (ns.continue_orbit, "omega", (1.25, 1.4))
     omega = np.concatenate([np.arange(1.2, 1.33, 0.01), np.arange(1.335, 1.36, 1e-4)])  # fine about the jump
@@ -69,12 +74,32 @@ def cases() -> dict[str, Case]:
         return float(values[0]) if len(values) else np.nan
 
     return {
-        "flip": Case(support, 15.0, 400, 1e-4, {"x": 0.01}, ["k", "c"], "x",
-                     branch_point("rho", (0.36, 0.45), "flip", 0.5), flip, "flip"),
-        "fold": Case(bench, 60.0, 400, 0.02, {"q": 0.5}, ["k", "c", "k_s"], "q",
-                     branch_point("omega", (1.25, 1.4), "fold", 0.2, UPPER), fold, "fold"),
+        "flip": Case(
+            support,
+            15.0,
+            400,
+            1e-4,
+            {"x": 0.01},
+            ["k", "c"],
+            "x",
+            branch_point("rho", (0.36, 0.45), "flip", 0.5),
+            flip,
+            "flip",
+        ),
+        "fold": Case(
+            bench,
+            60.0,
+            400,
+            0.02,
+            {"q": 0.5},
+            ["k", "c", "k_s"],
+            "q",
+            branch_point("omega", (1.25, 1.4), "fold", 0.2, UPPER),
+            fold,
+            "fold",
+        ),
         "jump": Case(bench, 60.0, 400, 0.02, {"q": 0.5}, ["k", "c", "k_s"], "q", jumped, jump, "jump"),
-    }  # fmt: skip
+    }
 
 
 def record(case: Case, rng: np.random.Generator) -> dict[str, Any]:
@@ -96,8 +121,18 @@ def main(draws: int, records: int) -> None:
         base = case.system.with_parameters(found)
         if name == "jump":
             verb, omega = case.verb
-            band = ns.propagate(found, verb, base, omega, direction="up", transient=150, keep=10, draws=draws // 4,
-                                start={"q": 0.0, "v_q": 0.0}, progress=False)  # fmt: skip
+            band = ns.propagate(
+                found,
+                verb,
+                base,
+                omega,
+                direction="up",
+                transient=150,
+                keep=10,
+                draws=draws // 4,
+                start={"q": 0.0, "v_q": 0.0},
+                progress=False,
+            )
             mine = band["jump_variable"].values == "q"
             drawn, linear = band["jump_value_draws"].values[:, mine][:, 0], np.nan
         else:
@@ -111,8 +146,10 @@ def main(draws: int, records: int) -> None:
             drawn, linear = band["special_value_draws"].values[:, at], float(band["special_first_order"][at])
         drawn, refitted = drawn[np.isfinite(drawn)], refitted[np.isfinite(refitted)]
         error = 1 / np.sqrt(2 * len(refitted))
-        print(f"{name}: standard deviation by {len(drawn)} draws {np.std(drawn):.3e}, to first order {linear:.3e}, "
-              f"by {len(refitted)} fits {np.std(refitted):.3e} (+-{error:.0%})")  # fmt: skip
+        print(
+            f"{name}: standard deviation by {len(drawn)} draws {np.std(drawn):.3e}, to first order {linear:.3e}, "
+            f"by {len(refitted)} fits {np.std(refitted):.3e} (+-{error:.0%})"
+        )
         for by, values in (("draws", drawn), ("fits", refitted)):
             about = " ".join(f"{q:.2e}" for q in np.quantile(values, QUANTILES) - np.median(values))
             print(f"  quantiles about the median, {by}: {about}")

@@ -46,15 +46,27 @@ def normalized(found, truth):
 @pytest.mark.parametrize(
     ("system", "start", "measured", "names"),
     [
-        (ns.models.discontinuous_support, {"x": 0.01, "v": 0.0}, {"x": ns.Sensor(gain=2.0, offset=0.1, delay=0.03)},
-         ["k", "k_s", "g", "omega", "x.gain", "x.offset", "x.delay", "phase"]),
-        (ns.models.impact_oscillator, {"x": 0.1, "v": 0.3}, {"x": "x", "v": ns.Sensor(delay=0.05)},
-         ["k", "c", "d", "e"]),
-        (ns.models.chua_circuit, {"x": 0.3, "y": 0.1, "z": 0.0}, {"y": "y", "diode_force": "f"},
-         ["alpha", "beta", "a", "b"]),
+        (
+            ns.models.discontinuous_support,
+            {"x": 0.01, "v": 0.0},
+            {"x": ns.Sensor(gain=2.0, offset=0.1, delay=0.03)},
+            ["k", "k_s", "g", "omega", "x.gain", "x.offset", "x.delay", "phase"],
+        ),
+        (
+            ns.models.impact_oscillator,
+            {"x": 0.1, "v": 0.3},
+            {"x": "x", "v": ns.Sensor(delay=0.05)},
+            ["k", "c", "d", "e"],
+        ),
+        (
+            ns.models.chua_circuit,
+            {"x": 0.3, "y": 0.1, "z": 0.0},
+            {"y": "y", "diode_force": "f"},
+            ["alpha", "beta", "a", "b"],
+        ),
     ],
     ids=["support", "impacts", "output"],
-)  # fmt: skip
+)
 def test_derivatives_are_those_of_differences(system, start, measured, names):
     made = system()
     length = 4.3 * made.period() if made.period() else 8.0
@@ -97,8 +109,12 @@ def test_sensors_and_phase_are_found_from_a_closed_form():
     # the start is where the window begins, before the first sample by the longest delay: compare the others
     system = free().with_parameters(k=11.0, c=0.6)
     data = {"encoder": (t, y)}
-    found = ns.fit(system, data, {"k": None, "c": (0.0, None), "x.offset": None, "phase": None},
-                   measured={"x": ns.Sensor("encoder", delay=0.013)})  # fmt: skip
+    found = ns.fit(
+        system,
+        data,
+        {"k": None, "c": (0.0, None), "x.offset": None, "phase": None},
+        measured={"x": ns.Sensor("encoder", delay=0.013)},
+    )
     assert np.all(np.abs(normalized(found, {"k": K, "c": C, "x.offset": 0.004})) < 3.5)
     phase = found.estimate("phase")
     assert abs((phase.value - truth["phase"] + 0.5) % 1.0 - 0.5) < 3.5 * phase.uncertainty
@@ -114,8 +130,12 @@ def test_a_delay_and_a_gain_are_found_beside_a_sensor_that_is_known():
     made = ns.System.from_text(system.to_text())
     assert made == system
     both = {"x": (t, x), "v": (t[5:], np.gradient(late, t)[5:])}
-    found = ns.fit(system.with_parameters(k=9.0), both, ["k", "v.gain", "v.delay"],
-                   measured={"x": "x", "v": ns.Sensor("v", gain=200.0, delay=0.02, noise=5.0)})  # fmt: skip
+    found = ns.fit(
+        system.with_parameters(k=9.0),
+        both,
+        ["k", "v.gain", "v.delay"],
+        measured={"x": "x", "v": ns.Sensor("v", gain=200.0, delay=0.02, noise=5.0)},
+    )
     assert abs(found["k"] - K) < 4 * found.uncertainty["k"]
     assert found.estimate("v.gain").value == pytest.approx(250.0, rel=0.02)
     assert found.estimate("v.delay").value == pytest.approx(0.031, abs=0.002)
@@ -239,10 +259,14 @@ def test_readings_of_which_the_model_has_no_motion_are_counted():
     assert any("readings are not used" in sentence for sentence in found.anomalies)
 
 
-@pytest.mark.parametrize(("name", "seed"), [
-    pytest.param("impact damper", 1, marks=pytest.mark.slow),
-    pytest.param("relay feedback", 34, marks=pytest.mark.slow), ("relief valve", 16),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [
+        pytest.param("impact damper", 1, marks=pytest.mark.slow),
+        pytest.param("relay feedback", 34, marks=pytest.mark.slow),
+        ("relief valve", 16),
+    ],
+)
 def test_hidden_states_are_found_from_a_guess_far_off(name, seed, tmp_path):
     """No window of a part of a swing says where the ball is; short windows of the relay do not come to a minimum.
 
@@ -294,8 +318,11 @@ def test_models_are_ranked_by_what_they_predict():
             "undamped": (system.with_parameters(c=0.0), ["k"]),
             "with one more": (system, ["k", "c", "m"]),  # known beside rho: a parameter that nothing asks for
         },
-        {"x": (t, x)}, folds=2, tries=1, progress=False,
-    )  # fmt: skip
+        {"x": (t, x)},
+        folds=2,
+        tries=1,
+        progress=False,
+    )
     assert ranked.rms.sel(model="true") == pytest.approx(1.0, abs=0.15)  # white noise of known irregularity
     assert ranked.rms.sel(model="undamped") > 3.0
     more = ranked.sel(model=["true", "with one more"])
@@ -334,7 +361,7 @@ def test_mistakes_are_answered_with_what_to_do():
         ({"parameters": ["k"], "priors": {"c": (1.0, 0.1)}}, "is not an unknown of this fit"),
         ({"parameters": ["k"], "window": -1.0}, "must be positive"),
         ({"parameters": ["k"], "free_start": False}, "give start="),
-    ):  # fmt: skip
+    ):
         with pytest.raises(ValueError, match=sentence.replace("(", r"\(")):
             ns.fit(system, data, **arguments)
     with pytest.raises(TypeError, match="a recording is a Recording, a Dataset over time, a DataFrame"):

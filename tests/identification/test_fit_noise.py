@@ -34,9 +34,12 @@ def test_coloured_noise_is_no_failure_of_the_model(rho):
 def test_the_uncertainty_of_a_constant_under_coloured_noise_is_that_of_the_closed_form():
     # a constant read with noise of correlation rho: the variance of the mean is size^2 (1 + rho) / (1 - rho) / n
     system = ns.System(
-        name="constant", states=["x", "v"], parameters={"q": 1.0}, modes={"only": lambda t, u, p: (u.v, -u.x)},
+        name="constant",
+        states=["x", "v"],
+        parameters={"q": 1.0},
+        modes={"only": lambda t, u, p: (u.v, -u.x)},
         outputs={"y": lambda t, u, p: p.q + 0 * u.x},
-    )  # fmt: skip
+    )
     n, rho, size, rng = 4000, 0.8, 0.02, np.random.default_rng(0)
     y = 1.3 + size * autoregressive(n, rho, rng)
     record, start = {"y": (np.arange(n) * 0.1, y)}, {"x": 0.0, "v": 0.0}

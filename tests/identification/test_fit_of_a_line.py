@@ -61,7 +61,7 @@ def test_the_scatter_of_the_record_is_the_uncertainty_whatever_noise_is_stated()
     stated = [
         ns.fit(line(), readings(), ["a"], measured={"x": ns.Sensor("x", noise=k * NOISE)}, progress=False)
         for k in (1, 5)
-    ]  # fmt: skip
+    ]
     for name in ("a", "x(0)"):
         sizes = [one.estimate(name).uncertainty for one in (*stated, plain())]
         assert sizes == pytest.approx([sizes[-1]] * 3, rel=0.05)
@@ -74,9 +74,13 @@ def test_a_value_known_before_is_weighed_by_its_precision(centre: float, error: 
     (a, _), C, _ = regression(readings())
     weight = np.array([1 / (NOISE**2 * C[0, 0]), 1 / error**2])
     found = ns.fit(
-        line(), readings(), ["a"], measured={"x": ns.Sensor("x", noise=NOISE)}, priors={"a": (centre, error)},
+        line(),
+        readings(),
+        ["a"],
+        measured={"x": ns.Sensor("x", noise=NOISE)},
+        priors={"a": (centre, error)},
         progress=False,
-    )  # fmt: skip
+    )
     assert found["a"] == pytest.approx(weight @ [a, centre] / weight.sum(), rel=1e-6)
     assert found.estimate("a").uncertainty == pytest.approx(weight.sum() ** -0.5, rel=0.3)
 

@@ -15,11 +15,13 @@ TRUTH = {"k": 40.0, "c": 0.6, "e": 0.8, "late": 0.03}
 
 def rig(**values: float) -> ns.System:
     return ns.System(
-        states={"x": "m", "v": "m/s"}, parameters=TRUTH | values, inputs={"f": "N"},
+        states={"x": "m", "v": "m/s"},
+        parameters=TRUTH | values,
+        inputs={"f": "N"},
         modes={"one": lambda t, u, p: [u.v, -p.k * u.x - p.c * u.v + p.f]},
         indicators={"gap": lambda t, u, p: u.x - 0.05},
         transitions=[ns.Transition("one", "one", when="gap > 0", reset=lambda t, u, p: [u.x, -p.e * u.v])],
-    )  # fmt: skip
+    )
 
 
 def motion(t: np.ndarray, force: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -68,9 +70,13 @@ def test_what_is_refused(recording: dict[str, Any]) -> None:
 def test_a_run_that_begins_at_rest_in_a_mode_that_slips() -> None:
     """Friction catches the block at once, by a transition that sets its rate to zero: derivatives know that."""
     block = ns.mechanical(
-        1.0, 0.0, 0.0, parameters={"mu": 0.5}, forcing={"q": lambda t, p: 0.3 + 0.9 * np.sin(t)},
+        1.0,
+        0.0,
+        0.0,
+        parameters={"mu": 0.5},
+        forcing={"q": lambda t, p: 0.3 + 0.9 * np.sin(t)},
         elements={"floor": ns.elements.Coulomb(at="q", friction="mu")},
-    )  # fmt: skip
+    )
     found = ns.sensitivity(block, duration=3.0, start={"v_q": 0.0}, mode="floor_forward", parameters=["mu"])
     h = 1e-6
     ends = [

@@ -36,9 +36,7 @@ def test_each_run_has_its_own_damping_and_offset_and_all_share_the_stiffness() -
     rng = np.random.default_rng(3)
     truth = {"0": (0.1, 0.02), "1": (0.2, -0.01), "2": (0.4, 0.05)}
     runs = [{"q": (T, decay(T, c=c) + o + 1e-3 * rng.standard_normal(T.size))} for c, o in truth.values()]
-    found = ns.fit(
-        oscillator(k=8.6), runs, ["k", "c", "q.offset"], per_run=["c", "q.offset"], progress=False, tries=2
-    )
+    found = ns.fit(oscillator(k=8.6), runs, ["k", "c", "q.offset"], per_run=["c", "q.offset"], progress=False, tries=2)
     assert list(found) == ["k"] and not found.anomalies
     within(found, {"k": 9.0})
     within(found, {f"c, {run}": c for run, (c, _) in truth.items()})
@@ -76,15 +74,22 @@ def test_derivatives_in_sensor_clock_and_phase_are_those_of_differences(names: l
     begin = -0.5 if "q.delay" in names else 0.0  # the window begins earlier by the longest delay
     stop = ns.elements.Stop(at="q", position=0.7, restitution=0.8)
     s = ns.mechanical(
-        1.0, "c", "k", parameters={"k": 9.0, "c": 0.15, "late": 0.0}, coordinates=["q"], elements={"s": stop},
+        1.0,
+        "c",
+        "k",
+        parameters={"k": 9.0, "c": 0.15, "late": 0.0},
+        coordinates=["q"],
+        elements={"s": stop},
         forcing={"q": lambda t, p: 0.5 * np.cos(2.0 * (t + p.late))},
-    )  # fmt: skip
+    )
     t, start, period = np.linspace(0.0, 4.0, 81), {"q": 0.1, "v_q": 3.0}, np.pi
     unknowns = {name: (0.0, 0.5) if name == "q.delay" else None for name in names}
     plan = ns.plan_experiment(
-        s, {"run": {"duration": 4.0, "samples": t, "start": start}}, unknowns if "q.delay" in names else names,
+        s,
+        {"run": {"duration": 4.0, "samples": t, "start": start}},
+        unknowns if "q.delay" in names else names,
         measured={"q": ns.Sensor(noise=1e-3)},
-    )  # fmt: skip
+    )
 
     def readings(own: dict[str, float], q: float, v: float) -> Any:
         at = own.get("clock", 1.0) * t - own.get("q.delay", 0.0) + own.get("phase", 0.0) * period - begin
@@ -136,9 +141,14 @@ def test_a_knock_in_one_of_two_driven_runs_with_a_stop() -> None:
     rng, t, period = np.random.default_rng(0), np.arange(0.0, 40.0, 0.04), np.pi
     stop = ns.elements.Stop(at="q", position=0.15, restitution="e")
     s = ns.mechanical(
-        1.0, "c", "k", parameters={"c": 0.1, "k": 9.0, "F": 0.5, "e": 0.8}, coordinates=["q"], elements={"s": stop},
+        1.0,
+        "c",
+        "k",
+        parameters={"c": 0.1, "k": 9.0, "F": 0.5, "e": 0.8},
+        coordinates=["q"],
+        elements={"s": stop},
         forcing={"q": lambda t, p: p.F * np.cos(2.0 * t)},
-    )  # fmt: skip
+    )
     runs = []
     for phase, F in ((0.2, 0.5), (0.7, 0.55)):
         at = t + phase * period
@@ -147,9 +157,14 @@ def test_a_knock_in_one_of_two_driven_runs_with_a_stop() -> None:
         runs.append({"q": (t, q + 1e-3 * rng.standard_normal(t.size))})
     runs[1]["q"][1][500:530] += 0.05 * np.sin(np.arange(30))
     found = ns.fit(
-        s.with_parameters(k=8.7, e=0.7, c=0.15), runs, ["k", "c", "e", "F", "phase"], per_run=["F"], leave_out=True,
-        progress=False, tries=4,
-    )  # fmt: skip
+        s.with_parameters(k=8.7, e=0.7, c=0.15),
+        runs,
+        ["k", "c", "e", "F", "phase"],
+        per_run=["F"],
+        leave_out=True,
+        progress=False,
+        tries=4,
+    )
     within(found, {"k": 9.0, "c": 0.1, "e": 0.8, "F, 0": 0.5, "F, 1": 0.55, "phase, 0": 0.2, "phase, 1": 0.7})
     assert len([note for note in found.notes if note.startswith("left out: run 1")]) == 1
     assert "q(0), 1 from 21" in " ".join(found.extra) and found.estimate("q.noise").value < 1.2e-3

@@ -103,9 +103,13 @@ def test_a_run_that_does_not_move_tells_nothing_and_priors_stand() -> None:
 def test_through_a_stop_information_comes_with_the_impacts() -> None:
     """Before the first impact nothing is told of the restitution; behind each one more."""
     s = ns.mechanical(
-        1.0, 0.0, 1.0, parameters={"e": 0.8}, coordinates=["q"],
+        1.0,
+        0.0,
+        1.0,
+        parameters={"e": 0.8},
+        coordinates=["q"],
         elements={"s": ns.elements.Stop(at="q", position=0.5, restitution="e")},
-    )  # fmt: skip
+    )
     runs = {str(T): {"duration": T, "samples": 200, "start": {"q": 0.0, "v_q": 1.0}} for T in (0.4, 3.0, 9.0)}
     found = ns.plan_experiment(s, runs, ["e"], measured={"q": ns.Sensor(noise=0.01)}, free_start=False)
     first, second, third = found["uncertainty"].values[:, 0]
@@ -123,8 +127,10 @@ def test_through_a_stop_information_comes_with_the_impacts() -> None:
 )
 def test_what_does_not_fit_is_refused(change: dict[str, Any], error: type[Exception], message: str) -> None:
     given: dict[str, Any] = {
-        "runs": {"a": {"duration": 3.0, "samples": 50, "start": {"q": 1.0}}}, "parameters": ["k"],
-        "measured": {"q": ns.Sensor(noise=0.01)}, **change,
-    }  # fmt: skip
+        "runs": {"a": {"duration": 3.0, "samples": 50, "start": {"q": 1.0}}},
+        "parameters": ["k"],
+        "measured": {"q": ns.Sensor(noise=0.01)},
+        **change,
+    }
     with pytest.raises(error, match=message):
         ns.plan_experiment(oscillator(), given.pop("runs"), given.pop("parameters"), **given)

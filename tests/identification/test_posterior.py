@@ -27,9 +27,15 @@ def test_a_linear_model_with_normal_noise_has_the_normal_posterior_of_the_books(
     mean = np.linalg.solve(precision, X.T @ y / NOISE**2 + np.array([0.6 * 0.02**-2, 0.0]))
     error = np.sqrt(np.linalg.inv(precision)[0, 0])
     found = ns.fit(
-        line(), {"x": (T, y)}, ["a"], measured={"x": ns.Sensor(noise=NOISE)}, priors={"a": (0.6, 0.02)}, mode="one",
-        posterior=1500, progress=False,
-    )  # fmt: skip
+        line(),
+        {"x": (T, y)},
+        ["a"],
+        measured={"x": ns.Sensor(noise=NOISE)},
+        priors={"a": (0.6, 0.02)},
+        mode="one",
+        posterior=1500,
+        progress=False,
+    )
     a = found.posterior.sel(parameter="a").values
     assert len(a) > 900  # by the chains' measured memory
     assert abs(a.mean() - mean[0]) < 0.2 * error
@@ -48,9 +54,13 @@ def test_a_bound_cuts_the_posterior() -> None:
     e -= X @ np.linalg.lstsq(X, e, rcond=None)[0]  # the unbounded optimum is the truth itself
     error = NOISE * np.sqrt(np.linalg.inv(X.T @ X)[0, 0])
     found = ns.fit(
-        line().with_parameters(a=0.75), {"x": (T, 0.2 + 0.7 * T + e)}, {"a": (0.7, None)},
-        measured={"x": ns.Sensor(noise=NOISE)}, posterior=1500, progress=False,
-    )  # fmt: skip
+        line().with_parameters(a=0.75),
+        {"x": (T, 0.2 + 0.7 * T + e)},
+        {"a": (0.7, None)},
+        measured={"x": ns.Sensor(noise=NOISE)},
+        posterior=1500,
+        progress=False,
+    )
     a = found.posterior.sel(parameter="a").values
     assert a.min() >= 0.7
     assert np.mean(a) - 0.7 == pytest.approx(error * np.sqrt(2 / np.pi), rel=0.1)

@@ -44,9 +44,17 @@ def test_the_grazing_point_of_each_draw_is_the_closed_form_and_so_are_its_deriva
     s = support()
     found = known(s, {"k": 0.05, "c": 0.02, "m": 0.004}, correlation=0.4)
     band = ns.propagate(
-        found, ns.continue_orbit, ns.find_orbit(s), "rho", (0.08, 0.15), draws=10, seed=3, first_order=True,
-        settings={"g": (0.02, 1e-4)}, **QUIET,
-    )  # fmt: skip
+        found,
+        ns.continue_orbit,
+        ns.find_orbit(s),
+        "rho",
+        (0.08, 0.15),
+        draws=10,
+        seed=3,
+        first_order=True,
+        settings={"g": (0.02, 1e-4)},
+        **QUIET,
+    )
     assert band["special_kind"].values[0] == "grazing" and int(band["failed"]) == 0
     drawn = {**s.values, **{name: band[f"drawn_{name}"].values for name in ("k", "c", "m", "g")}}
     np.testing.assert_allclose(band["special_value_draws"].values[:, 0], grazing(drawn), rtol=1e-9)
@@ -86,9 +94,16 @@ def test_a_hopf_point_to_first_order_is_that_of_its_draws() -> None:
     """By differences; the valve's Hopf point moves by 1 % and less, in proportion."""
     s = ns.models.relief_valve(q=9.0)
     band = ns.propagate(
-        known(s, {"k": 1e-3, "beta": 0.01}), ns.continue_equilibrium, s, "q", (8.0, 9.5), draws=8, first_order=True,
-        start={"y1": 2.0, "y3": 12.0}, **QUIET,
-    )  # fmt: skip
+        known(s, {"k": 1e-3, "beta": 0.01}),
+        ns.continue_equilibrium,
+        s,
+        "q",
+        (8.0, 9.5),
+        draws=8,
+        first_order=True,
+        start={"y1": 2.0, "y3": 12.0},
+        **QUIET,
+    )
     assert band["special_kind"].values.tolist() == ["hopf"] and band["source"].values.tolist() == ["k", "beta"]
     linear = band["special_value"].values[0] + sum(
         band["special_slope"].values[0, i] * (band[f"drawn_{name}"].values - s.values[name])
@@ -102,9 +117,14 @@ def scaled_stop() -> ns.System:
     """A mass that meets an elastic stop; ``a`` scales force and gap, so that every motion is ``a`` times as large."""
     stop = ns.elements.ElasticStop(at="q", position="a", stiffness=6.0, damping=0.0)
     return ns.mechanical(
-        1.0, 0.1, 1.0, parameters={"a": 1.0, "omega": 1.0}, elements={"s": stop}, coordinates=["q"],
+        1.0,
+        0.1,
+        1.0,
+        parameters={"a": 1.0, "omega": 1.0},
+        elements={"s": stop},
+        coordinates=["q"],
         forcing={"q": lambda t, p: 0.5 * p.a * np.cos(p.omega * t)},
-    )  # fmt: skip
+    )
 
 
 def test_the_band_of_a_branch_with_folds_scales_as_its_motions_do() -> None:
@@ -142,11 +162,26 @@ def test_the_probability_of_a_period_is_that_of_the_side_of_a_flip() -> None:
     found = known(s, {"k": 0.05})
     rho = np.array([0.34, 0.4])
     plane = ns.propagate(
-        found, ns.sweep, s, "rho", rho, draws=10, transient=400, keep=20, direction=None, start={"x": 0.0, "v": 0.0},
+        found,
+        ns.sweep,
+        s,
+        "rho",
+        rho,
+        draws=10,
+        transient=400,
+        keep=20,
+        direction=None,
+        start={"x": 0.0, "v": 0.0},
         **QUIET,
-    )  # fmt: skip
+    )
     flips = ns.propagate(
-        found, ns.continue_orbit, ns.find_orbit(s.with_parameters(rho=0.45)), "rho", (0.3, 0.5), draws=10, step=0.1,
+        found,
+        ns.continue_orbit,
+        ns.find_orbit(s.with_parameters(rho=0.45)),
+        "rho",
+        (0.3, 0.5),
+        draws=10,
+        step=0.1,
         **QUIET,
     )["special_value_draws"].values[:, 0]
     of_one = plane["period_number_probability"].sel(period_value=1).values

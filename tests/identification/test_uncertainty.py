@@ -65,9 +65,11 @@ def test_parameters_known_mainly_together_keep_the_uncertainty_of_white_residual
         r = y - table @ np.linalg.lstsq(table, y, rcond=None)[0]
         state = State([r], [r], [table], [np.zeros((n, 1))])
         problem = SimpleNamespace(
-            pieces=[piece], derivatives=lambda theta, starts, now=state: now, weights=lambda state: [np.ones(n)],
+            pieces=[piece],
+            derivatives=lambda theta, starts, now=state: now,
+            weights=lambda state: [np.ones(n)],
             unknowns=SimpleNamespace(precision=np.zeros((2, 2))),
-        )  # fmt: skip
+        )
         found = sandwich(problem, np.zeros(2), np.zeros((1, 1)))
         white = np.linalg.inv(table.T @ table) * (r @ r) / (n - 2)
         ratios.append(np.sqrt(np.diag(found.covariance) / np.diag(white)))

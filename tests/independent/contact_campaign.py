@@ -55,8 +55,7 @@ def tested(draw: Draw, times: Array, floors: bool = False) -> Array:  # noqa: PT
     import nonsmooth as ns
 
     names = [f"q{i + 1}" for i in range(len(draw.q))]
-    start = dict(zip(names, draw.q, strict=True)) | {
-        f"v_{q}": x for q, x in zip(names, draw.v, strict=True)}  # fmt: skip
+    start = dict(zip(names, draw.q, strict=True)) | {f"v_{q}": x for q, x in zip(names, draw.v, strict=True)}
     out = ns.simulate(as_nonsmooth(draw, floors), duration=float(times[-1]), samples=times, start=start)
     at = np.searchsorted(out.time.values, times, side="right") - 1
     if not np.allclose(out.time.values[at], times, rtol=0, atol=1e-12):
@@ -97,8 +96,14 @@ def one(seed: int, only_reference: bool = False, stacks: bool = False) -> dict[s
     times = np.linspace(0, PERIODS * draw.period, PERIODS * INSTANTS + 1)
     begun = time.perf_counter()
     states, agreed, failure, events = reference(draw, times)
-    row: dict[str, Any] = {"seed": seed, "share": agreed / len(times), "events": events, "failure": failure,
-                           "elements": draw.words(), "reference_s": round(time.perf_counter() - begun, 2)}  # fmt: skip
+    row: dict[str, Any] = {
+        "seed": seed,
+        "share": agreed / len(times),
+        "events": events,
+        "failure": failure,
+        "elements": draw.words(),
+        "reference_s": round(time.perf_counter() - begun, 2),
+    }
     if only_reference:
         return row
     begun = time.perf_counter()

@@ -18,7 +18,7 @@ from contact_elements import (
     Stop,
     System,
     harmonic,
-)  # fmt: skip
+)
 
 MASSES = (1.0, 1.0, 0.838, 1.3, 0.7, 2.0)
 RESTITUTIONS = (0.0, 0.0, 0.0, 0.3, 0.5, 0.8, 0.95, 0.985, 0.999)
@@ -41,9 +41,7 @@ class Draw:
     def words(self) -> str:
         """Return the elements in short: kind and row."""
         signs = {1.0: "+", -1.0: "-", 0.0: "0"}
-        return " ".join(
-            f"{type(e).__name__}({''.join(signs[a] for a in e.at)})" for e in self.system.elements.values()
-        )  # fmt: skip
+        return " ".join(f"{type(e).__name__}({''.join(signs[a] for a in e.at)})" for e in self.system.elements.values())
 
 
 def random_contact_system(seed: int) -> Draw:
@@ -61,8 +59,11 @@ def random_contact_system(seed: int) -> Draw:
     frequency = float(rng.choice([0.5, 0.7, 1.0, 1.3, rng.uniform(0.4, 2.0)]))
     loads = np.zeros((n, 3))
     for i in range(n):
-        loads[i] = [rng.choice([0.0, 0.0, 0.3, 0.5, rng.uniform(-0.5, 0.5)]), rng.choice([0.0, 0.5, rng.normal()]),
-                    rng.choice([0.0, 0.0, rng.normal()])]  # fmt: skip
+        loads[i] = [
+            rng.choice([0.0, 0.0, 0.3, 0.5, rng.uniform(-0.5, 0.5)]),
+            rng.choice([0.0, 0.5, rng.normal()]),
+            rng.choice([0.0, 0.0, rng.normal()]),
+        ]
     if n > 1 and rng.random() < 0.3:
         loads[1] = loads[0]  # equal loads
     still = rng.random() < 0.4
@@ -126,9 +127,14 @@ def _element(rng: np.random.Generator, n: int, q: Array, loads: Array, known: li
         return Stop(at, position, side, float(rng.choice(RESTITUTIONS)))
     if kind == "elastic":
         side = int(rng.choice([1, -1]))
-        return ElasticStop(at, here + side * float(rng.choice([0.0, 0.2, rng.uniform(-0.1, 1)])), side,
-                           float(rng.choice([10.0, 100.0, 1000.0])), float(rng.choice([0.0, 0.5, 3.0])),
-                           bool(rng.random() < 0.3))  # fmt: skip
+        return ElasticStop(
+            at,
+            here + side * float(rng.choice([0.0, 0.2, rng.uniform(-0.1, 1)])),
+            side,
+            float(rng.choice([10.0, 100.0, 1000.0])),
+            float(rng.choice([0.0, 0.5, 3.0])),
+            bool(rng.random() < 0.3),
+        )
     if kind == "backlash":
         return Backlash(at, float(rng.choice([0.05, 0.2])), float(rng.choice([1.0, 20.0])), float(rng.choice([0, 0.1])))
     if kind == "preload":
@@ -167,24 +173,33 @@ def as_nonsmooth(draw: Draw, floors: bool = False) -> Any:
     for name, e in s.elements.items():
         at = {q: a for q, a in zip(names, e.at, strict=True) if a}
         if isinstance(e, Stop):
-            built[name] = ns.elements.Stop(at=at, position=law(e.position), side=e.side, restitution=e.restitution,
-                                           creep=REST_SPEED)  # fmt: skip
+            built[name] = ns.elements.Stop(
+                at=at, position=law(e.position), side=e.side, restitution=e.restitution, creep=REST_SPEED
+            )
         elif isinstance(e, ElasticStop):
-            built[name] = ns.elements.ElasticStop(at=at, position=law(e.position), side=e.side, stiffness=e.stiffness,
-                                                  damping=e.damping, pulls=e.pulls)  # fmt: skip
+            built[name] = ns.elements.ElasticStop(
+                at=at, position=law(e.position), side=e.side, stiffness=e.stiffness, damping=e.damping, pulls=e.pulls
+            )
         elif isinstance(e, Backlash):
             built[name] = ns.elements.Backlash(at=at, half_width=e.half_width, stiffness=e.stiffness, damping=e.damping)
         elif isinstance(e, PreloadedSpring):
             built[name] = ns.elements.PreloadedSpring(at=at, preload=e.preload, stiffness=e.stiffness)
         elif floors:
-            built[name] = ns.elements.Stop(at=f"y_{name}", side=-1, friction=e.friction / 2.0, tangent=at,
-                                           belt=law(e.belt))  # fmt: skip
+            built[name] = ns.elements.Stop(
+                at=f"y_{name}", side=-1, friction=e.friction / 2.0, tangent=at, belt=law(e.belt)
+            )
         else:
             built[name] = ns.elements.Coulomb(at=at, friction=e.friction, static=e.static, belt=law(e.belt))
     forcing = {q: load(row) for q, row in zip(names, s.loads, strict=True) if row.any()}
     forcing |= {f"y_{name}": lambda t, p: -2.0 for name in pressed}
     more, none = np.diag([0.838] * len(pressed)), np.zeros((len(pressed),) * 2)
     return ns.mechanical(
-        block_diag(s.mass, more), block_diag(s.damping, none), block_diag(s.stiffness, none), parameters={},
-        forcing=forcing, elements=built, coordinates=[*names, *(f"y_{name}" for name in pressed)], period=draw.period,
-    )  # fmt: skip
+        block_diag(s.mass, more),
+        block_diag(s.damping, none),
+        block_diag(s.stiffness, none),
+        parameters={},
+        forcing=forcing,
+        elements=built,
+        coordinates=[*names, *(f"y_{name}" for name in pressed)],
+        period=draw.period,
+    )

@@ -85,8 +85,14 @@ class System:
     elements: dict[str, Element] = field(default_factory=dict)
 
 
-def one_mass(mass: float = 1.0, damping: float = 0.0, stiffness: float = 0.0, load: float | Harmonic = 0.0,
-             frequency: float = 1.0, **elements: Element) -> System:  # fmt: skip
+def one_mass(
+    mass: float = 1.0,
+    damping: float = 0.0,
+    stiffness: float = 0.0,
+    load: float | Harmonic = 0.0,
+    frequency: float = 1.0,
+    **elements: Element,
+) -> System:
     """Return the system of one coordinate; the worked cases are mostly these."""
     matrices = (np.array([[float(x)]]) for x in (mass, damping, stiffness))
     return System(*matrices, np.array([harmonic(load)]), frequency, elements)
@@ -112,8 +118,13 @@ def parts(system: System) -> tuple[Part, ...]:
     def add(name: str, kind: str, at: tuple[float, ...], offset: Harmonic, sign: float, **numbers: float) -> None:
         """The quantity is sign * (offset - at . q), its rate likewise; of a friction it is a rate already."""
         direction = -sign * np.array(at, float)
-        row = np.concatenate((np.zeros(n) if kind == "friction" else direction,
-                              direction if kind == "friction" else np.zeros(n), sign * np.array(offset)))  # fmt: skip
+        row = np.concatenate(
+            (
+                np.zeros(n) if kind == "friction" else direction,
+                direction if kind == "friction" else np.zeros(n),
+                sign * np.array(offset),
+            )
+        )
         rate = row if kind == "friction" else row @ kinematics(n, w)
         out.append(Part(name, kind, direction, rate, row, numbers))
 

@@ -92,8 +92,9 @@ class Mode:
         for fixed in product((None, 0, 1), repeat=m):
             if any(f == 1 and np.isinf(b) for f, b in zip(fixed, self.bounds, strict=True)):
                 continue
-            f = np.array([0.0 if s is None else (low, b)[s]
-                          for s, low, b in zip(fixed, lower, self.bounds, strict=True)])  # fmt: skip
+            f = np.array(
+                [0.0 if s is None else (low, b)[s] for s, low, b in zip(fixed, lower, self.bounds, strict=True)]
+            )
             free = [i for i, s in enumerate(fixed) if s is None]
             if free:
                 f[free] = np.linalg.pinv(self.generators[free].T) @ (c - self.generators.T @ f)

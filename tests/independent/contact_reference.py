@@ -110,8 +110,7 @@ class Reference:
             if i not in touching and self.parts[i].zero @ z < 0:
                 raise NoAnswerError(f"{self.parts[i].name} is penetrated")
         rates = [self.parts[i].rate for i in touching]
-        hit = {i: -float(r @ z) for i, r in zip(touching, rates, strict=True)
-               if r @ z < 0 and not self.is_zero(r, z)}  # fmt: skip
+        hit = {i: -float(r @ z) for i, r in zip(touching, rates, strict=True) if r @ z < 0 and not self.is_zero(r, z)}
         booked = {self.parts[i].name: speed for i, speed in hit.items()}
         if not hit:
             z, mode = self.rules_at(z)
@@ -132,8 +131,9 @@ class Reference:
             plastic -= loose
         event = Event(t, mode.states, self.named(touching, impulse), booked)
         for i in plastic:
-            opened = self.rules.mode(tuple("open" if j == i else s for j, s in enumerate(mode.states)),
-                                     ("static",) * len(self.parts))  # fmt: skip
+            opened = self.rules.mode(
+                tuple("open" if j == i else s for j, s in enumerate(mode.states)), ("static",) * len(self.parts)
+            )
             e_i, push = self.parts[i].numbers["e"], 0.0 if opened is None else -self.parts[i].rate @ opened.A @ after
             if push > 0 and e_i < 1:
                 event.rest_time[self.parts[i].name] = t + 2 * e_i * hit[i] / (push * (1 - e_i))
@@ -336,7 +336,14 @@ class Reference:
         return z[self.n : 2 * self.n], (mode.A @ z)[self.n : 2 * self.n], named
 
 
-def simulate(system: System, q: Array, v: Array, times: Array, impacts: str = "simultaneous",
-             rest_speed: float = 1e-7, max_events: int = 20_000) -> Run:  # fmt: skip
+def simulate(
+    system: System,
+    q: Array,
+    v: Array,
+    times: Array,
+    impacts: str = "simultaneous",
+    rest_speed: float = 1e-7,
+    max_events: int = 20_000,
+) -> Run:
     """Simulate a system of :mod:`contact_elements`; see :meth:`Reference.simulate`."""
     return Reference(system, impacts, rest_speed).simulate(q, v, times, max_events)

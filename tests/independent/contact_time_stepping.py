@@ -95,10 +95,18 @@ def time_stepping(system: System, q: Array, v: Array, spacing: float, count: int
     names = ("e", "k", "c", "pulls", "static", "kinetic")
     numbers = np.array([[float(p.numbers.get(key, 0.0)) for key in names] for p in listed])
     return _march(
-        spacing / every, every * count, every, n, system.frequency,
+        spacing / every,
+        every * count,
+        every,
+        n,
+        system.frequency,
         np.concatenate((np.asarray(q, float), np.asarray(v, float), [1.0, 1.0, 0.0])),
-        np.hstack((-system.stiffness, -system.damping, system.loads)), kinematics(n, system.frequency),
-        np.linalg.inv(system.mass), np.array([kinds[p.kind] for p in listed]),
-        np.array([p.direction for p in listed]), np.array([p.rate for p in listed]),
-        np.array([p.zero for p in listed]), numbers,
-    )  # fmt: skip
+        np.hstack((-system.stiffness, -system.damping, system.loads)),
+        kinematics(n, system.frequency),
+        np.linalg.inv(system.mass),
+        np.array([kinds[p.kind] for p in listed]),
+        np.array([p.direction for p in listed]),
+        np.array([p.rate for p in listed]),
+        np.array([p.zero for p in listed]),
+        numbers,
+    )

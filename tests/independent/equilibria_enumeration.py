@@ -69,7 +69,7 @@ class Draw:
         forcing = {
             name: (lambda t, p, a=float(a), b=float(b): a + b * p.P)
             for name, a, b in zip(names, self.load, self.push, strict=True)
-        }  # fmt: skip
+        }
         return ns.mechanical(
             self.M, self.C, self.K, parameters={"P": 0.0}, forcing=forcing, elements=elements, coordinates=names
         )
@@ -168,9 +168,14 @@ def pieces(one: Draw, P: float) -> Iterator[Piece]:
                 G.append(gap)
                 h.append(-room)
         piece = Piece(
-            states, np.vstack([A, *E]) if E else A, np.append(b, e), np.array(G).reshape(-1, m), np.array(h),
-            np.zeros(n), np.zeros(n),
-        )  # fmt: skip
+            states,
+            np.vstack([A, *E]) if E else A,
+            np.append(b, e),
+            np.array(G).reshape(-1, m),
+            np.array(h),
+            np.zeros(n),
+            np.zeros(n),
+        )
         if _solve(piece, np.zeros(m)) is None:
             continue
         for k, (side, sign) in product(range(n), ((piece.lower, 1.0), (piece.upper, -1.0))):

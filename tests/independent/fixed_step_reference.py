@@ -90,8 +90,11 @@ def duffing_truth(duration: float) -> tuple[tuple[float, float], tuple[float, ..
 
     ta = hy.taylor_adaptive(
         [(x, v), (v, free - hy.par[0] * (p["support"] * (x - p["g"]) + p["dashpot"] * v))],
-        list(DUFFING_START), pars=[0.0], tol=1e-18, high_accuracy=True,
+        list(DUFFING_START),
+        pars=[0.0],
+        tol=1e-18,
+        high_accuracy=True,
         t_events=[hy.t_event(x - p["g"], callback=Switch(), cooldown=1e-10)],
-    )  # fmt: skip
+    )
     ta.propagate_until(duration)
     return (float(ta.state[0]), float(ta.state[1])), tuple(times), min(speeds)

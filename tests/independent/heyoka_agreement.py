@@ -87,11 +87,19 @@ def compare(figure: int, p: dict[str, float], model: ns.System) -> Agreement:
     )
     times = [abs(a - b) for (a, _), (b, _), ok in zip(kinds, expected, calm, strict=False) if ok]
     return Agreement(
-        figure, p, theirs.n_contacts, float(hs.growth(p, theirs, scale=SCALE).max()), float(difference.max()),
-        float(np.max(difference / allowance[1:])), worst, theirs.nearest_graze(), same, max(times, default=0.0),
+        figure,
+        p,
+        theirs.n_contacts,
+        float(hs.growth(p, theirs, scale=SCALE).max()),
+        float(difference.max()),
+        float(np.max(difference / allowance[1:])),
+        worst,
+        theirs.nearest_graze(),
+        same,
+        max(times, default=0.0),
         *touches(run, theirs, until),
         float(allowance.max()),
-    )  # fmt: skip
+    )
 
 
 def run_period(p: dict[str, float]) -> float:

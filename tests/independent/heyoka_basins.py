@@ -47,9 +47,12 @@ class Support:
         self.period = 2 * np.pi / p["omega"]
         pars = [2 * p["k"] / m, p["c"] / m, p["rho"] / m, p["omega"], p["g"], p["k_s"] / m, p["c_s"] / m, self.tau, 0.0]
         self.ta = hy.taylor_adaptive(
-            [(x, v), (v, free - on * (support * depth + dashpot * v))], [0.0, 0.0], pars=pars, tol=1e-14,
+            [(x, v), (v, free - on * (support * depth + dashpot * v))],
+            [0.0, 0.0],
+            pars=pars,
+            tol=1e-14,
             t_events=watched,
-        )  # fmt: skip
+        )
 
     def start(self, u: NDArray[np.float64]) -> None:
         depth = u[0] - self.gap

@@ -140,6 +140,10 @@ def fold(
             raise RuntimeError("no fold within 20000 steps along the branch")
     low, high = points[-3][0] if len(points) > 2 else points[0][0], points[-1][0]
     guess["z"][1] = points[-2][1]
-    found = minimize_scalar(lambda s: -sign * value(s), bounds=(min(low, high), max(low, high)), method="bounded",
-                            options={"xatol": 1e-6 * abs(arc)})  # fmt: skip
+    found = minimize_scalar(
+        lambda s: -sign * value(s),
+        bounds=(min(low, high), max(low, high)),
+        method="bounded",
+        options={"xatol": 1e-6 * abs(arc)},
+    )
     return float(-sign * found.fun)

@@ -107,8 +107,14 @@ class Masses:
             if isinstance(e, Friction):
                 upper.append([*unit, 1.0])
                 right.append(e.most)
-        found = linprog([*np.zeros(count), -1.0], A_ub=upper, b_ub=right, A_eq=np.hstack([G, np.zeros((count, 1))]),
-                        b_eq=needed, bounds=(None, None))  # fmt: skip
+        found = linprog(
+            [*np.zeros(count), -1.0],
+            A_ub=upper,
+            b_ub=right,
+            A_eq=np.hstack([G, np.zeros((count, 1))]),
+            b_eq=needed,
+            bounds=(None, None),
+        )
         return float(-found.fun) if found.status == 0 else -1.0
 
     # Instants
@@ -178,21 +184,27 @@ class Masses:
                     continue
                 event: Any
                 if isinstance(e, Friction):
+
                     def event(t: float, y: Array, i: int = i, s: int = s, begin: float = t) -> float:
                         return float(s * self.rates(y[:n], y[n:])[i]) if t > begin else 1.0
                 else:
+
                     def event(t: float, y: Array, i: int = i, begin: float = t) -> float:
                         return float(self.gaps(y[:n])[i]) if t > begin else 1.0
+
                 events.append(event)
             if 0 in state:
+
                 def held(t: float, y: Array, state: Any = state) -> float:
                     return self.margin(t, y[:n], y[n:], state)
-                events.append(held)  # fmt: skip
+
+                events.append(held)
             for event in events:
                 event.terminal, event.direction = True, -1
             ahead = times[times > t + 1e-13]
-            run = solve_ivp(flow, (t, times[-1]), y, "DOP853", t_eval=ahead, events=events, rtol=1e-12, atol=1e-13,
-                            max_step=0.05)  # fmt: skip
+            run = solve_ivp(
+                flow, (t, times[-1]), y, "DOP853", t_eval=ahead, events=events, rtol=1e-12, atol=1e-13, max_step=0.05
+            )
             if len(run.t):
                 out[np.searchsorted(times, run.t)] = np.transpose(run.y)
             if run.status == 0:

@@ -69,9 +69,17 @@ class RigidStop:
             todo = t < until
 
     def _fly(
-        self, i: Any, t: Array, x: Array, v: Array, stuck: NDArray[np.bool_], until: float, d: float, e: float,
+        self,
+        i: Any,
+        t: Array,
+        x: Array,
+        v: Array,
+        stuck: NDArray[np.bool_],
+        until: float,
+        d: float,
+        e: float,
         impacts: NDArray[np.int64],
-    ) -> None:  # fmt: skip
+    ) -> None:
         begin, x0, v0 = t[i], x[i], v[i]
         last = until - begin
         x1, v1 = self.flow(begin, x0, v0, last)

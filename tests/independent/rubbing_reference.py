@@ -55,12 +55,19 @@ def random_rubbing(seed: int) -> Rubbing:
     loads[1] = [-rng.uniform(1, 3), *(rng.normal(size=2) * rng.choice([0.0, 0.5, 2.0]))]
     rests = rng.random() < 0.5
     return Rubbing(
-        seed, np.linalg.inv(inverse), np.diag(rng.choice([0.0, 0.1, 0.5], n)), spring, loads,
-        float(rng.uniform(0.5, 2)), friction, float(rng.choice([0.0, 0.3, 0.6])), float(rng.choice([0.0, 0.0, 0.4])),
+        seed,
+        np.linalg.inv(inverse),
+        np.diag(rng.choice([0.0, 0.1, 0.5], n)),
+        spring,
+        loads,
+        float(rng.uniform(0.5, 2)),
+        friction,
+        float(rng.choice([0.0, 0.3, 0.6])),
+        float(rng.choice([0.0, 0.0, 0.4])),
         1e-4,
         np.array([0.0, 0.0 if rests else 0.4, 0.1][:n]),
         np.array([float(rng.choice([0.0, 1.0, -0.7])), 0.0, 0.2][:n]),
-    )  # fmt: skip
+    )
 
 
 class Motion:
@@ -115,6 +122,7 @@ class Motion:
         if phase == FLIGHT:
             return [lambda t, z: z[1]]
         if phase == STICK:
+
             def cone(t: float, z: Array) -> float:
                 tangential, normal = self.forces(STICK, t, z)
                 return self.s.friction * normal - abs(tangential)
@@ -176,9 +184,16 @@ class Motion:
                 return np.concatenate((z[n:], self.accelerations(phase, t, z)))
 
             out = solve_ivp(
-                field, (t, times[-1]), z, "DOP853", events=some, rtol=1e-12, atol=1e-14, dense_output=True,
+                field,
+                (t, times[-1]),
+                z,
+                "DOP853",
+                events=some,
+                rtol=1e-12,
+                atol=1e-14,
+                dense_output=True,
                 max_step=s.period / 100,
-            )  # fmt: skip
+            )
             here = (times >= t) & (times <= out.t[-1])
             if here.any():
                 found[here] = out.sol(times[here]).T

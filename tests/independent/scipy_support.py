@@ -40,8 +40,14 @@ def run_oscillator(
                 events.append(event)
             s = solve_ivp(
                 lambda t, u, mode=mode: [u[1], hs.acceleration(p, t, u[0], u[1], mode)],
-                (t, period), u, method="DOP853", rtol=1e-12, atol=1e-16, events=events, max_step=period / 200,
-            )  # fmt: skip
+                (t, period),
+                u,
+                method="DOP853",
+                rtol=1e-12,
+                atol=1e-16,
+                events=events,
+                max_step=period / 200,
+            )
             hits = [
                 (when, kind, state)
                 for (_, _, kind), times, points in zip(rows, s.t_events, s.y_events, strict=True)

@@ -70,9 +70,14 @@ def test_exactly_these_attractors_from_200_starts_in_20_seeds(seeds: range) -> N
         system = ns.models.discontinuous_support(**parameters)
         for seed in seeds:
             found = basin_fractions(
-                system, "g", [parameters["g"]], n_starts=200, box={"x": (-x, x), "v": (-v, v)}, seed=seed,
+                system,
+                "g",
+                [parameters["g"]],
+                n_starts=200,
+                box={"x": (-x, x), "v": (-v, v)},
+                seed=seed,
                 progress=False,
-            )  # fmt: skip
+            )
             assert sorted(found["period_number"].values[0].tolist()) == periods, (parameters, seed)
         print(f"200 starts, {len(seeds)} seeds: {periods} and no others")
 

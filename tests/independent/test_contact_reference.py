@@ -18,7 +18,7 @@ from contact_elements import (
     System,
     harmonic,
     one_mass,
-)  # fmt: skip
+)
 from contact_impacts import sequential, simultaneous, stronge
 from contact_reference import Reference, Run, simulate
 from contact_time_stepping import time_stepping
@@ -73,8 +73,14 @@ def test_two_carts_with_a_plastic_stop_between_them() -> None:
 
 @pytest.mark.parametrize("belt", [-0.5, -0.37, -0.25, -1.1])
 def test_a_mass_stuck_to_a_belt_hits_a_plastic_stop(belt: float) -> None:
-    system = one_mass(damping=0.05, stiffness=1.0, load=(0, 0.3, 0), frequency=0.7,
-                      f=Coulomb(ONE, 1.2, belt=belt), s=Stop(ONE, 0.2, side=-1))  # fmt: skip
+    system = one_mass(
+        damping=0.05,
+        stiffness=1.0,
+        load=(0, 0.3, 0),
+        frequency=0.7,
+        f=Coulomb(ONE, 1.2, belt=belt),
+        s=Stop(ONE, 0.2, side=-1),
+    )
     out = run(system, [0.8], [belt], [10.0])
     assert out.events[1].time == pytest.approx(0.6 / -belt, rel=1e-14)
     assert out.events[1].approach["s"] == pytest.approx(-belt, rel=1e-14)
@@ -108,8 +114,9 @@ def test_the_first_derivative_that_is_not_zero_decides() -> None:
 @pytest.mark.parametrize("reverse", [False, True])
 def test_frictions_that_hold_together(reverse: bool) -> None:
     elements = {"a": Coulomb(ONE, 0.3, static=0.6), "b": Coulomb(ONE, 0.3)}
-    system = one_mass(load=(0, 0, 0.75), frequency=0.5,
-                      **dict(reversed(elements.items()) if reverse else elements.items()))  # fmt: skip
+    system = one_mass(
+        load=(0, 0, 0.75), frequency=0.5, **dict(reversed(elements.items()) if reverse else elements.items())
+    )
     assert np.array_equal(run(system, [0], [0], [200.0]).states, [[0, 0]])
     _, a, forces = Reference(system).behind(np.zeros(1), np.zeros(1), t=np.pi)
     assert np.array_equal(a, [0.0])
@@ -127,10 +134,15 @@ def test_looks_of_coupled_frictions() -> None:
     assert forces == pytest.approx({"b": 1.0})
 
 
-@pytest.mark.parametrize(("e", "law", "after"), [
-    (1.0, "simultaneous", (-1 / 3, 2 / 3, 2 / 3)), (1.0, "sequential", (0, 0, 1)),
-    (0.0, "simultaneous", (1 / 3, 1 / 3, 1 / 3)), (0.0, "sequential", (1 / 3, 1 / 3, 1 / 3)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("e", "law", "after"),
+    [
+        (1.0, "simultaneous", (-1 / 3, 2 / 3, 2 / 3)),
+        (1.0, "sequential", (0, 0, 1)),
+        (0.0, "simultaneous", (1 / 3, 1 / 3, 1 / 3)),
+        (0.0, "sequential", (1 / 3, 1 / 3, 1 / 3)),
+    ],
+)
 def test_three_balls(e: float, law: str, after: tuple[float, ...]) -> None:
     balls = carts(3, a=Stop((1, -1, 0), restitution=e), b=Stop((0, 1, -1), restitution=e))
     out = run(balls, [0, 0, 0], [1, 0, 0], [1.0], impacts=law)
@@ -168,8 +180,9 @@ def test_two_plastic_stops(w: float) -> None:
 def test_end_of_sticking_between_two_plastic_stops() -> None:
     # above it the mass leaves at once when it arrives: an arrival in the half period that pulls it away
     def sticks(w: float) -> bool:
-        system = one_mass(damping=0.2, load=(0, 1.0, 0), frequency=w, right=Stop(ONE, 1.0),
-                          left=Stop(ONE, -1.0, side=-1))  # fmt: skip
+        system = one_mass(
+            damping=0.2, load=(0, 1.0, 0), frequency=w, right=Stop(ONE, 1.0), left=Stop(ONE, -1.0, side=-1)
+        )
         out = run(system, [0], [0], [80 * np.pi / w])
         return any("closed" in x.states for x in out.events[-6:])
 
@@ -240,9 +253,19 @@ def test_a_contact_that_separates_already_can_add_energy() -> None:
 
 def test_energy_of_a_conservative_system() -> None:
     """Springs with play, stops with e = 1, preload: energy stays."""
-    system = System(np.diag([1.0, 0.838]), np.zeros((2, 2)), np.array([[2.0, -1.0], [-1.0, 2.0]]), np.zeros((2, 3)),
-                    1.0, {"a": Stop((1, 0), 0.6, restitution=1.0), "b": Backlash((0, 1), 0.3, 50.0),
-                     "p": PreloadedSpring((1, -1), 0.2, 3.0), "d": ElasticStop((0, 1), -0.4, -1, 200.0)})  # fmt: skip
+    system = System(
+        np.diag([1.0, 0.838]),
+        np.zeros((2, 2)),
+        np.array([[2.0, -1.0], [-1.0, 2.0]]),
+        np.zeros((2, 3)),
+        1.0,
+        {
+            "a": Stop((1, 0), 0.6, restitution=1.0),
+            "b": Backlash((0, 1), 0.3, 50.0),
+            "p": PreloadedSpring((1, -1), 0.2, 3.0),
+            "d": ElasticStop((0, 1), -0.4, -1, 200.0),
+        },
+    )
     times = np.linspace(0, 30, 400)
     out = run(system, [0.2, 0.1], [1.3, -0.9], list(times))
     q, v = out.states[:, :2], out.states[:, 2:]
@@ -275,8 +298,9 @@ def test_a_preloaded_spring_holds_and_lets_go() -> None:
 @pytest.mark.parametrize("mass", [0.838, 1.0, 1.3, 0.7, 3.1])
 def test_singular_combinations(mass: float) -> None:
     """Stops on both sides of one coordinate at one place with a friction: it stays, whatever the mass."""
-    system = one_mass(mass, load=(0.4, 0, 0.9), a=Stop(ONE, 0.0), b=Stop(ONE, 0.0), c=Coulomb(ONE, 0.2),
-                      d=Stop(ONE, 0.0, side=-1))  # fmt: skip
+    system = one_mass(
+        mass, load=(0.4, 0, 0.9), a=Stop(ONE, 0.0), b=Stop(ONE, 0.0), c=Coulomb(ONE, 0.2), d=Stop(ONE, 0.0, side=-1)
+    )
     out = run(system, [0], [0], [40.0])
     assert np.array_equal(out.states, [[0, 0]])
     assert len(out.events) < 3
@@ -348,8 +372,12 @@ def test_time_stepping_agrees(seed: int) -> None:
     draw = random_contact_system(seed)
     count = 60
     states = simulate(draw.system, draw.q, draw.v, np.linspace(0, draw.period, count + 1)).states[:, : len(draw.q)]
-    worst = [np.abs(time_stepping(draw.system, draw.q, draw.v, draw.period / 60, count, every)[:, : len(draw.q)]
-                    - states).max() for every in (400, 3200)]  # fmt: skip
+    worst = [
+        np.abs(
+            time_stepping(draw.system, draw.q, draw.v, draw.period / 60, count, every)[:, : len(draw.q)] - states
+        ).max()
+        for every in (400, 3200)
+    ]
     assert worst[1] < max(worst[0] / 3, 1e-6)
     assert worst[1] < 3e-4
 
@@ -378,8 +406,11 @@ def test_accelerations_are_those_of_the_convex_problem(seeds: range) -> None:
             at = rng.integers(-1, 2, n).astype(float)
             at[rng.integers(n)] = 1.0
             row = tuple(map(float, at))
-            elements[f"e{k}"] = Stop(row, 0.0, int(rng.choice([1, -1]))) if rng.random() < 0.4 else Coulomb(
-                row, float(rng.integers(1, 4)))  # fmt: skip
+            elements[f"e{k}"] = (
+                Stop(row, 0.0, int(rng.choice([1, -1])))
+                if rng.random() < 0.4
+                else Coulomb(row, float(rng.integers(1, 4)))
+            )
         system = System(mass, np.zeros((n, n)), np.zeros((n, n)), loads, 1.0, elements)
         reference = Reference(system)
         _, a, forces = reference.behind(np.zeros(n), np.zeros(n))

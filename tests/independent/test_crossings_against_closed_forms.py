@@ -121,7 +121,8 @@ def gate() -> ns.System:
     ("method", "settings", "width", "tolerance"),
     [
         (method, settings, width, 1e-7)
-        for method, settings in {**METHODS, "auto": {}}.items() if method != "exact"  # the indicator is not affine
+        for method, settings in {**METHODS, "auto": {}}.items()
+        if method != "exact"  # the indicator is not affine
         for width in (1e-2, 1e-4, 1e-5)
     ]
     + [("taylor", {"step": 0.25, "rtol": 1e-12}, width, 1e-6) for width in (1e-2, 1e-4, 1e-5)]
@@ -176,8 +177,11 @@ def test_contact_through_the_second_indicator_beyond_the_gap(method: str, c_s: f
     assert theirs.crossings[0].u[0] > p["g"]
     run = ns.simulate(
         ns.models.discontinuous_support().with_parameters(p),
-        periods=1, start={"x": start[0], "v": start[1]}, method=method, **METHODS[method],
-    )  # fmt: skip
+        periods=1,
+        start={"x": start[0], "v": start[1]},
+        method=method,
+        **METHODS[method],
+    )
     assert len(run["crossing_time"]) == len(theirs.crossings)
     assert np.max(np.abs(run["crossing_time"].values - [c.time for c in theirs.crossings])) < 1e-9
     assert np.max(np.abs(run["u"].transpose("time", "state").values[-1] - theirs.states[-1])) < 1e-10

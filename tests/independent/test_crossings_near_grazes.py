@@ -66,9 +66,12 @@ def wrong_of(gate: ns.System, count: int, seed: int) -> tuple[list[str], int, in
             continue
         judged += 1
         run = ns.simulate(
-            gate.with_parameters(c=c, k=float(k)), duration=duration, samples=2, method="exact",
+            gate.with_parameters(c=c, k=float(k)),
+            duration=duration,
+            samples=2,
+            method="exact",
             start={"x": float(np.sin(phi_0)), "v": float(np.cos(phi_0))},
-        )  # fmt: skip
+        )
         if int(run.status) != 0:
             said += 1
             continue
@@ -89,9 +92,12 @@ def test_a_root_finder_that_has_not_converged_has_found_nothing(gate: ns.System)
     """The first guess stands on the indicator's maximum: ten steps of Halley's method do not converge from there."""
     phi, c = 4.824163895694583, 0.999425333961005
     run = ns.simulate(
-        gate.with_parameters(c=c, k=0.9999999), duration=9.0, samples=2, method="exact",
+        gate.with_parameters(c=c, k=0.9999999),
+        duration=9.0,
+        samples=2,
+        method="exact",
         start={"x": np.sin(phi), "v": np.cos(phi)},
-    )  # fmt: skip
+    )
     up = np.arcsin(c)
     np.testing.assert_allclose(run.crossing_time.values, [up - phi + 2 * np.pi, 3 * np.pi - up - phi], rtol=1e-11)
 
@@ -99,7 +105,9 @@ def test_a_root_finder_that_has_not_converged_has_found_nothing(gate: ns.System)
 def test_conditions_that_become_true_together(gate: ns.System) -> None:
     """A gap and the force of a spring without a damper are the same function, but for rounding where k is not 1."""
     both = ns.System(
-        states=["x", "v"], parameters={"c": 0.9, "k": 1210.0}, modes=dict.fromkeys("ab", lambda t, u, p: (u.v, -u.x)),
+        states=["x", "v"],
+        parameters={"c": 0.9, "k": 1210.0},
+        modes=dict.fromkeys("ab", lambda t, u, p: (u.v, -u.x)),
         indicators={"over": lambda t, u, p: u.x - p.c, "push": lambda t, u, p: p.k * (u.x - p.c)},
         transitions=[
             ns.Transition("a", "b", when="over > 0 and push > 0"),
@@ -111,9 +119,12 @@ def test_conditions_that_become_true_together(gate: ns.System) -> None:
         c = 1.0 - 10.0 ** rng.uniform(-6.0, -3.0)
         phi = rng.uniform(-np.pi, 0.0)
         run = ns.simulate(
-            both.with_parameters(c=c, k=k), duration=2 * np.pi * TURNS - 0.3, samples=2,
-            start={"x": float(np.sin(phi)), "v": float(np.cos(phi))}, method="exact",
-        )  # fmt: skip
+            both.with_parameters(c=c, k=k),
+            duration=2 * np.pi * TURNS - 0.3,
+            samples=2,
+            start={"x": float(np.sin(phi)), "v": float(np.cos(phi))},
+            method="exact",
+        )
         truth = expected(phi, c, 2.0, 2 * np.pi * TURNS - 0.3)
         np.testing.assert_allclose(run.crossing_time.values, truth, rtol=0, atol=1e-10, err_msg=f"{c!r} {phi!r}")
 

@@ -28,13 +28,16 @@ class Reference:
 
     def system(self) -> ns.System:
         return ns.mechanical(
-            self.M, self.C, self.K, parameters={"w": self.w, "F": self.F, "e": self.e},
+            self.M,
+            self.C,
+            self.K,
+            parameters={"w": self.w, "F": self.F, "e": self.e},
             forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
             elements={
                 "rub": Coulomb(at="q1", friction=self.kinetic, static=self.static),
                 "wall": Stop(at="q2", position=self.d, restitution="e"),
             },
-        )  # fmt: skip
+        )
 
     def pushes(self, t: float, u: np.ndarray) -> np.ndarray:
         """Forces on both masses without friction and wall."""
@@ -71,15 +74,28 @@ class Reference:
                 add(lambda t, u: self.pushes(t, u)[1], -1, "lift")
             # a first short step: what has just become zero is not met again
             short = min(1e-4 if name == "lift" else 1e-10, END - t)
-            part = solve_ivp(lambda t, u, a=rub, b=wall: self.field(a, b, t, u), (t, t + short), u, method="DOP853",
-                             rtol=1e-12, atol=1e-14)  # fmt: skip
+            part = solve_ivp(
+                lambda t, u, a=rub, b=wall: self.field(a, b, t, u),
+                (t, t + short),
+                u,
+                method="DOP853",
+                rtol=1e-12,
+                atol=1e-14,
+            )
             inside = [f for f in events if f.direction * f(part.t[-1], part.y[:, -1]) < 0]
             if len(inside) < len(events):
                 t, u = part.t[-1], part.y[:, -1]
                 name = next(f.name for f in events if f not in inside)
             else:
-                run = solve_ivp(lambda t, u, a=rub, b=wall: self.field(a, b, t, u), (part.t[-1], END), part.y[:, -1],
-                                method="DOP853", rtol=1e-12, atol=1e-14, events=events)  # fmt: skip
+                run = solve_ivp(
+                    lambda t, u, a=rub, b=wall: self.field(a, b, t, u),
+                    (part.t[-1], END),
+                    part.y[:, -1],
+                    method="DOP853",
+                    rtol=1e-12,
+                    atol=1e-14,
+                    events=events,
+                )
                 t, u = run.t[-1], run.y[:, -1].copy()
                 if run.status == 0:
                     break

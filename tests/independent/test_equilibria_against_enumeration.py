@@ -30,12 +30,17 @@ def test_two_hundred_systems(first: int) -> None:
 def test_the_enumeration_knows_an_interval_and_a_stop() -> None:
     """|P - 2 q| <= .5 up to a stop at 1: from P = 1.5 on the upper end is the stop."""
     one = equilibria_enumeration.Draw(
-        0, np.eye(1), 0.3 * np.eye(1), 2.0 * np.eye(1), np.zeros(1), np.ones(1),
+        0,
+        np.eye(1),
+        0.3 * np.eye(1),
+        2.0 * np.eye(1),
+        np.zeros(1),
+        np.ones(1),
         (
             equilibria_enumeration.Part("friction", np.ones(1), mu=0.5),
             equilibria_enumeration.Part("stop", np.ones(1), position=1.0),
         ),
-    )  # fmt: skip
+    )
     for P, low, high in ((0.0, -0.25, 0.25), (1.7, 0.6, 1.0), (3.0, 1.0, 1.0)):
         (found,) = equilibria_enumeration.components(one, P)
         assert [found.lower[0], found.upper[0]] == pytest.approx([low, high], abs=1e-9)

@@ -53,9 +53,10 @@ def test_the_spectrum_of_a_chaotic_normal_form():
 def test_henons_attractor():
     """The published exponents of Henon's map, 0.419 and -1.623 (their sum is ln b)."""
     henon = ns.Map(
-        states=["x", "y"], parameters={"a": 1.4, "b": 0.3},
+        states=["x", "y"],
+        parameters={"a": 1.4, "b": 0.3},
         branches=[ns.Branch(lambda u, p: (1 - p.a * u.x**2 + u.y, p.b * u.x))],
-    )  # fmt: skip
+    )
     found = ns.lyapunov(henon, periods=100_000, start={"x": 0.1, "y": 0.1})
     assert found.exponents.values == pytest.approx([0.419, -1.623], abs=3e-3)
     assert found.exponents.values.sum() == pytest.approx(np.log(0.3), abs=1e-10)

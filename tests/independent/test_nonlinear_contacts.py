@@ -62,25 +62,50 @@ def duffing(mass: tuple[float, ...], load: float, rate: float, *pairs: Any) -> t
 ONE, TWO = (1.0,), (1.0, 1.3)
 CASES: dict[str, tuple[Any, ...]] = {
     "two frictions and a stop": (
-        ONE, 1.0, 0.8, [0.1], friction((1.0,), ONE, friction=0.2, static=0.3),
-        friction((1.0,), ONE, friction=0.15, belt=0.1), stop((1.0,), ONE, 0.6, 0.5),
+        ONE,
+        1.0,
+        0.8,
+        [0.1],
+        friction((1.0,), ONE, friction=0.2, static=0.3),
+        friction((1.0,), ONE, friction=0.15, belt=0.1),
+        stop((1.0,), ONE, 0.6, 0.5),
     ),
     "frictions that hold together": (
-        ONE, 0.9, 0.5, [0.0], friction((1.0,), ONE, friction=0.3, static=0.5), friction((1.0,), ONE, friction=0.3),
+        ONE,
+        0.9,
+        0.5,
+        [0.0],
+        friction((1.0,), ONE, friction=0.3, static=0.5),
+        friction((1.0,), ONE, friction=0.3),
     ),
     "a plastic stop of a mass that rubs": (
-        ONE, 1.2, 0.7, [0.0], friction((1.0,), ONE, friction=0.2), stop((1.0,), ONE, 0.3, 0.0),
+        ONE,
+        1.2,
+        0.7,
+        [0.0],
+        friction((1.0,), ONE, friction=0.2),
+        stop((1.0,), ONE, 0.3, 0.0),
         stop((-1.0,), ONE, 0.5, 0.3),
     ),
     "two masses that rub on each other and on the ground": (
-        TWO, 1.5, 0.6, [0.1, 0.0], friction((1.0, 0.0), TWO, friction=0.2), friction((0.0, 1.0), TWO, friction=0.15),
+        TWO,
+        1.5,
+        0.6,
+        [0.1, 0.0],
+        friction((1.0, 0.0), TWO, friction=0.2),
+        friction((0.0, 1.0), TWO, friction=0.15),
         friction((1.0, -1.0), TWO, friction=0.1, static=0.2),
     ),
     "two masses with a stop between them and one outside": (
-        TWO, 2.0, 0.7, [0.0, 0.1], stop((1.0, -1.0), TWO, 0.1, 0.0), stop((0.0, 1.0), TWO, 0.3, 0.4),
+        TWO,
+        2.0,
+        0.7,
+        [0.0, 0.1],
+        stop((1.0, -1.0), TWO, 0.1, 0.0),
+        stop((0.0, 1.0), TWO, 0.3, 0.4),
         friction((0.0, 1.0), TWO, friction=0.2, static=0.25),
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -118,13 +143,18 @@ def test_a_mass_in_a_ring_rolls_along_it(e: float) -> None:
         return (u.vx, u.vy, *f)
 
     system = ns.System(
-        states=["x", "y", "vx", "vy"], parameters={}, modes={"all": field},
+        states=["x", "y", "vx", "vy"],
+        parameters={},
+        modes={"all": field},
         elements={
-            "ring": Stop(gap=lambda t, u, p: R - radius(u), restitution=e,
-                         on={"vx": lambda t, u, p: -u.x / radius(u), "vy": lambda t, u, p: -u.y / radius(u)}),
+            "ring": Stop(
+                gap=lambda t, u, p: R - radius(u),
+                restitution=e,
+                on={"vx": lambda t, u, p: -u.x / radius(u), "vy": lambda t, u, p: -u.y / radius(u)},
+            ),
             "rub": Coulomb(speed=lambda t, u, p: u.vx, on={"vx": 1.0}, friction=0.2, static=0.3),
         },
-    )  # fmt: skip
+    )
     times = np.linspace(0.0, 2 * 2 * np.pi / rate, 81)
     reference = Masses(np.eye(2), force, [ring, Friction((1.0, 0.0), 0.2, 0.3)])
     expected = reference.run(np.array([0.3, 0.1]), np.array([0.2, 0.5]), times)

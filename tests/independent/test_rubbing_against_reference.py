@@ -41,15 +41,24 @@ def computed(times: Array, *systems: Rubbing) -> Array:
         names = [f"{axis}{i}" for axis in "xyz"[: len(one.q)]]
         forcing |= {name: load(row) for name, row in zip(names, one.loads, strict=True) if row.any()}
         elements[f"stop{i}"] = ns.elements.Stop(
-            at=names[1], side=-1, restitution=one.restitution, friction=one.friction, tangent=names[0],
-            creep=one.creep, belt=one.belt,
-        )  # fmt: skip
+            at=names[1],
+            side=-1,
+            restitution=one.restitution,
+            friction=one.friction,
+            tangent=names[0],
+            creep=one.creep,
+            belt=one.belt,
+        )
         starts.append(dict(zip((*names, *(f"v_{name}" for name in names)), (*one.q, *one.v), strict=True)))
     blocks = (block_diag(*[getattr(one, name) for one in systems]) for name in ("mass", "damping", "stiffness"))
     made = ns.mechanical(
-        *blocks, parameters={}, period=systems[0].period, forcing=forcing, elements=elements,
+        *blocks,
+        parameters={},
+        period=systems[0].period,
+        forcing=forcing,
+        elements=elements,
         coordinates=[name for one in starts for name in list(one)[: len(one) // 2]],
-    )  # fmt: skip
+    )
     start = {name: value for one in starts for name, value in one.items()}
     run = ns.simulate(made, duration=float(times[-1]), samples=times, start=start)
     return np.asarray(run.u.sel(state=list(start)).values[np.searchsorted(run.time.values, times, side="right") - 1])
@@ -69,8 +78,10 @@ def test_states_are_those_of_the_reference(seeds: tuple[int, ...] | range) -> No
     assert np.mean(compared) > 0.95
 
 
-@pytest.mark.parametrize("pairs", [[(1, 3), (8, 8), (13, 13)], pytest.param(
-    [(2 * i, 2 * i + i % 2) for i in range(60)], marks=pytest.mark.slow)])  # fmt: skip
+@pytest.mark.parametrize(
+    "pairs",
+    [[(1, 3), (8, 8), (13, 13)], pytest.param([(2 * i, 2 * i + i % 2) for i in range(60)], marks=pytest.mark.slow)],
+)
 def test_systems_side_by_side_move_as_alone(pairs: list[tuple[int, int]]) -> None:
     """All at the same instants, where both are the same: impacts of contacts that do not feel each other."""
     for seeds in pairs:

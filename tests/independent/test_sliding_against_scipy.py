@@ -40,16 +40,20 @@ def linear(seed: int, n: int, kind: str) -> tuple[ns.System, Filippov, np.ndarra
         return lambda t, u, p: A @ u + c * np.cos(w * t) + sign * g
 
     system = ns.System(
-        states=[f"x{i}" for i in range(n)], parameters={"w": w},
+        states=[f"x{i}" for i in range(n)],
+        parameters={"w": w},
         modes={BELOW: side(1), ABOVE: side(-1)},
         indicators={"h": lambda t, u, p: k @ u - b * (1 + m * np.cos(w * t))},
         transitions=[ns.Surface("h", below=BELOW, above=ABOVE, mode=SLIDING, static=static)],
-    )  # fmt: skip
+    )
     reference = Filippov(
-        lambda t, u: A @ u + c * np.cos(w * t) + g, lambda t, u: A @ u + c * np.cos(w * t) - g,
-        lambda t, u: k @ u - b * (1 + m * np.cos(w * t)), lambda t, u: k,
-        lambda t, u: b * m * w * np.sin(w * t), static,
-    )  # fmt: skip
+        lambda t, u: A @ u + c * np.cos(w * t) + g,
+        lambda t, u: A @ u + c * np.cos(w * t) - g,
+        lambda t, u: k @ u - b * (1 + m * np.cos(w * t)),
+        lambda t, u: k,
+        lambda t, u: b * m * w * np.sin(w * t),
+        static,
+    )
     return system, reference, random.uniform(-1, 1, n)
 
 
@@ -88,14 +92,17 @@ def test_two_contacts_that_stick_in_turn_and_together(seed: int) -> None:
         return lambda t, u, p: (u[2], u[3], *(c * np.cos(w * t) - K @ u[:2] - 0.05 * u[2:] - F * np.array(signs)))
 
     system = ns.System(
-        states=["x0", "x1", "v0", "v1"], parameters={"w": w},
+        states=["x0", "x1", "v0", "v1"],
+        parameters={"w": w},
         modes={names[a] + names[b]: side((a, b)) for a in (1, -1) for b in (1, -1)},
         indicators={f"rub{i}": (lambda t, u, p, i=i: u[2 + i] - belt[i]) for i in (0, 1)},
         transitions=[
-            ns.Surface("rub0", below="mm", above="pm"), ns.Surface("rub0", below="mp", above="pp"),
-            ns.Surface("rub1", below="mm", above="mp"), ns.Surface("rub1", below="pm", above="pp"),
+            ns.Surface("rub0", below="mm", above="pm"),
+            ns.Surface("rub0", below="mp", above="pp"),
+            ns.Surface("rub1", below="mm", above="mp"),
+            ns.Surface("rub1", below="pm", above="pp"),
         ],
-    )  # fmt: skip
+    )
     contacts = Contacts(lambda t, x, v: c * np.cos(w * t) - K @ x - 0.05 * v, F, belt)
     changes, last = rub(contacts, start, 25.0)
     run = ns.simulate(system, duration=25.0, start=start, samples=2501)

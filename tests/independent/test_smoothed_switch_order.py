@@ -49,9 +49,10 @@ def test_order_two_in_eta_and_the_second_code_agrees(name: str) -> None:
     order = np.polyfit(np.log(ETAS), np.log(errors), 1)[0]
     paper = np.linalg.norm((smoothed_end(p, 1e-5, u, rtol=1e-6) - exact.states[-1]) / SCALE)
     print(
-        f"\n{name}: order {order:.4f}; errors " + ", ".join(f"{e:.2e}" for e in errors)
+        f"\n{name}: order {order:.4f}; errors "
+        + ", ".join(f"{e:.2e}" for e in errors)
         + f" (in 1 mm, 1 cm/s) at eta {ETAS}; the paper's setting (eta 1e-5, rtol 1e-6): {paper:.2e}"
-    )  # fmt: skip
+    )
     assert abs(order - 2) <= 0.1
     reference, _ = smoothed_reference.march(p, 1e-5, u, N_PERIODS)
     assert np.max(np.abs(ends[1] - reference) / SCALE) < 1e-7  # the smoothing itself makes 1e-5 to 1e-4 here

@@ -24,13 +24,15 @@ def switched() -> ns.System:
         return lambda t, u, p: A @ u
 
     return ns.System(
-        states=["x1", "x2"], parameters={"steep": SLOPES[0], "flat": SLOPES[1]},
+        states=["x1", "x2"],
+        parameters={"steep": SLOPES[0], "flat": SLOPES[1]},
         modes={"first": field(MATRICES[0]), "second": field(MATRICES[1])},
         indicators={"above": lambda t, u, p: u.x2 - p.steep * u.x1, "below": lambda t, u, p: u.x2 - p.flat * u.x1},
         transitions=[
-            ns.Transition("first", "second", when="above < 0"), ns.Transition("second", "first", when="below > 0"),
+            ns.Transition("first", "second", when="above < 0"),
+            ns.Transition("second", "first", when="below > 0"),
         ],
-    )  # fmt: skip
+    )
 
 
 def exponential(mode, s):

@@ -66,8 +66,11 @@ def test_spectra_of_chaotic_stick_slip(make: Callable[[], tuple[ns.System, Stick
     phase = np.mod(t[:-1], 2 * np.pi / reference.w)
     gaps = np.abs(reference.next_onset(phase, side[:-1]) - phase - np.diff(t))
     grown = np.log(np.abs(reference.slope(phase, side[:-1])))
-    parts = [batch.sum() / np.diff(t)[i].sum() for i in np.array_split(np.arange(len(grown)), BATCHES)
-             for batch in [grown[i]]]  # fmt: skip
+    parts = [
+        batch.sum() / np.diff(t)[i].sum()
+        for i in np.array_split(np.arange(len(grown)), BATCHES)
+        for batch in [grown[i]]
+    ]
     expected, error = grown.sum() / np.diff(t).sum(), np.std(parts, ddof=1) / BATCHES**0.5
     found = ns.lyapunov(system, periods=periods, start=BEGIN, progress=False)
     exponents, own = found.exponents.values, float(found.standard_error[0])

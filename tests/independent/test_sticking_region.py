@@ -16,16 +16,17 @@ pytestmark = pytest.mark.physics
 BEYOND = 1e-12
 COMBINATIONS = [
     (sigma, w, r) for sigma in (-0.5, 0.0, 0.4, 0.8, 0.95) for w, r in ((0.4, 0.6), (0.7, 0.8), (1.3, 0.5), (2.1, 0.9))
-]  # fmt: skip
+]
 PERIODS = 1000
 
 
 def at_the_stop(sigma: float, w: float, r: float) -> ns.System:
     return ns.System(
-        states=["x", "v"], parameters={"w": w, "sigma": sigma, "r": r},
+        states=["x", "v"],
+        parameters={"w": w, "sigma": sigma, "r": r},
         modes={"free": lambda t, u, p: (u.v, np.cos(p.w * t) - u.x)},
         elements={"stop": ns.elements.Stop(gap=lambda t, u, p: p.sigma - u.x, on={"v": -1.0}, restitution="r")},
-    )  # fmt: skip
+    )
 
 
 def campaign(combinations: list[tuple[float, float, float]], count: int, periods: int) -> dict[str, float]:

@@ -24,17 +24,31 @@ def test_published_cycle(method: str) -> None:
     """Maximum and period from the section, minimum from the true extremes of the kept window."""
     top = ns.Poincare("lift_velocity", rising=False)
     swept = ns.sweep(
-        ns.models.relief_valve(), "q", [8.0], section=top, start=start_of(START), transient=500, keep=4, max_period=3,
-        method=method, rtol=1e-12, progress=False,
-    )  # fmt: skip
+        ns.models.relief_valve(),
+        "q",
+        [8.0],
+        section=top,
+        start=start_of(START),
+        transient=500,
+        keep=4,
+        max_period=3,
+        method=method,
+        rtol=1e-12,
+        progress=False,
+    )
     y1 = swept.sel(state="y1")
     assert float(y1["maximum"].squeeze()) == pytest.approx(known.VALVE_CYCLE["maximum"], abs=2e-9)
     assert float(y1["minimum"].squeeze()) == pytest.approx(known.VALVE_CYCLE["minimum"], abs=2e-9)
     assert int(swept["period_number"].squeeze()) == 1
     section = ns.poincare(
-        ns.models.relief_valve().with_parameters(q=8.0), section=top, start=start_of(START), transient=500, n=4,
-        method=method, rtol=1e-12,
-    )  # fmt: skip
+        ns.models.relief_valve().with_parameters(q=8.0),
+        section=top,
+        start=start_of(START),
+        transient=500,
+        n=4,
+        method=method,
+        rtol=1e-12,
+    )
     assert np.diff(section["time"].values) == pytest.approx(known.VALVE_CYCLE["period"], abs=2e-9)
 
 
@@ -43,9 +57,13 @@ def test_published_cycle(method: str) -> None:
 def test_impacts_and_end_state(method: str, q: float, duration: float) -> None:
     theirs = hv.run({"q": q}, START, duration, tolerance=1e-16)
     ours = ns.simulate(
-        ns.models.relief_valve().with_parameters(q=q), duration=duration, start=start_of(START), samples=2,
-        method=method, rtol=METHODS[method],
-    )  # fmt: skip
+        ns.models.relief_valve().with_parameters(q=q),
+        duration=duration,
+        start=start_of(START),
+        samples=2,
+        method=method,
+        rtol=METHODS[method],
+    )
     assert len(theirs.impact_time) >= 4
     assert len(ours["crossing_time"]) == len(theirs.impact_time)
     tolerance = 1e-11 if method == "taylor" else 1e-8
@@ -62,9 +80,13 @@ def test_section_returns(method: str, q: float) -> None:
     theirs = hv.run({"q": q}, START, 30.0, tolerance=1e-16)
     late = theirs.section_time > 1e-9
     ours = ns.poincare(
-        ns.models.relief_valve().with_parameters(q=q), section=ns.Poincare("lift_velocity", rising=False),
-        start=start_of(START), n=10, method=method, rtol=METHODS[method],
-    )  # fmt: skip
+        ns.models.relief_valve().with_parameters(q=q),
+        section=ns.Poincare("lift_velocity", rising=False),
+        start=start_of(START),
+        n=10,
+        method=method,
+        rtol=METHODS[method],
+    )
     points = ours["section"].transpose("iterate", "state").values
     times = ours["time"].values
     first = int(times[0] < 1e-9)

@@ -91,9 +91,9 @@ def test_one_of_an_edited_source_is_not_used(package):
 
 
 @pytest.mark.parametrize(
-    ("whose", "version"), [("numba.__version__", "0.0"), ("llvmlite.__version__", "0.0"),
-                           ("sys.version_info", (3, 99, 0))],
-)  # fmt: skip
+    ("whose", "version"),
+    [("numba.__version__", "0.0"), ("llvmlite.__version__", "0.0"), ("sys.version_info", (3, 99, 0))],
+)
 def test_one_of_other_versions_is_not_used(package, monkeypatch, whose, version):
     monkeypatch.setattr(whose, version)
     assert package.call() == COMPILED
@@ -188,7 +188,10 @@ def test_what_is_compiled_ahead_is_what_a_later_process_looks_for(tmp_path):
     assert compile_ahead(folder, target.level(), work) == 1
     assert not stale.exists()
     done = subprocess.run(
-        [sys.executable, "-c", LATER, str(folder)], capture_output=True, text=True, check=True,
+        [sys.executable, "-c", LATER, str(folder)],
+        capture_output=True,
+        text=True,
+        check=True,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "NONSMOOTH_CACHE_DIR": str(tmp_path / "empty")},
-    )  # fmt: skip
+    )
     assert json.loads(done.stdout) == [["count", 1, 0]]

@@ -81,12 +81,24 @@ def made(generators: list[np.ndarray]) -> tuple[Any, Any, Any]:
 
     none = [np.zeros((1, 0, n)), np.zeros((1, 0)), np.zeros((1, 0, 1)), np.zeros((1, 0, 1))]
     form = Form(
-        of(lambda M: M[:n, :n]), of(lambda M: M[:n, n]), of(lambda M: M[None, :n, n + 1]),
-        of(lambda M: M[None, :n, n + 2]), np.array([1]), np.array([RATE]), np.array([2 * np.pi / RATE]), *none,
-        np.zeros((1, 0, 2, n)), np.zeros((1, 0, 2)), np.zeros((1, 0, 2, 1)), np.zeros((1, 0, 2, 1)),
-        np.zeros((1, 0, n, n)), np.zeros((1, 0, n)), np.zeros((1, 0, 1, n)), np.zeros((1, 0, 1, n)),
+        of(lambda M: M[:n, :n]),
+        of(lambda M: M[:n, n]),
+        of(lambda M: M[None, :n, n + 1]),
+        of(lambda M: M[None, :n, n + 2]),
+        np.array([1]),
+        np.array([RATE]),
+        np.array([2 * np.pi / RATE]),
+        *none,
+        np.zeros((1, 0, 2, n)),
+        np.zeros((1, 0, 2)),
+        np.zeros((1, 0, 2, 1)),
+        np.zeros((1, 0, 2, 1)),
+        np.zeros((1, 0, n, n)),
+        np.zeros((1, 0, n)),
+        np.zeros((1, 0, 1, n)),
+        np.zeros((1, 0, 1, n)),
         np.zeros((2, n), dtype=np.int64),
-    )  # fmt: skip
+    )
     tables, work = scratch(n, 1, 2, 0, 0, 2)
     module.build(0, form, tables, work)
     work.w[:n] = np.random.default_rng(6).normal(size=n)

@@ -191,10 +191,12 @@ def test_stamp_follows_imports_through_kernel_files(monkeypatch):
     from nonsmooth.kernels.compile import cache
 
     sources = {
-        "low": "x = 1", "mid": "from .low import x", "top": "from . import mid",
+        "low": "x = 1",
+        "mid": "from .low import x",
+        "top": "from . import mid",
         "other": "import nonsmooth.kernels.mid",
         "apart": "y = 2  # a word: low, mid, top",
-    }  # fmt: skip
+    }
 
     def stamp(text):
         monkeypatch.setattr(cache, "_kernel_sources", lambda: dict(sources))
@@ -224,7 +226,7 @@ def test_what_was_not_used_for_long_is_removed_where_it_is_ours(tmp_path, filled
     users = {
         compiled: ["thesis.tex", "old", code.stem, f"copy_of_{code.name}", f"{code.name}.bak", f"a-{32 * '0'}.nbc"],
         generated: ["notes.py", f"{module.stem}.txt", f"model_{20 * '0'}.py", f"solver_{module.stem[-20:]}.py"],
-    }  # fmt: skip
+    }
     for folder, names in users.items():
         for name in names:
             (folder / name).write_text("a user's own")

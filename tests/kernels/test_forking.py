@@ -66,7 +66,7 @@ def test_a_fork_beside_a_compile() -> None:
     assert (done.stdout.strip(), done.stderr) == ("7", "")
 
 
-LOADING = '''
+LOADING = """
 import importlib, os, sys, threading, time, warnings
 import nonsmooth
 
@@ -94,15 +94,15 @@ for k in range(50):  # each while a module is loaded that the child asks for too
     assert os.waitstatus_to_exitcode(status) == 0, k
     thread.join()
 print("hung:", hung)
-'''
+"""
 
-WITHIN = '''
+WITHIN = """
 import sys
 import nonsmooth
 sys.path.insert(0, FOLDER)
 import forks_itself
 print(forks_itself.status)
-'''
+"""
 
 
 def run(script: str, folder: Path) -> str:

@@ -38,7 +38,7 @@ def rules(keep: int, size: np.ndarray = SIZE, max_period: int = 16, **given: Any
         "perturb_least": size,
         "perturb_rounded": 0.0,
     }
-    return Rules(**(usual | given))  # fmt: skip
+    return Rules(**(usual | given))
 
 
 class Job:
@@ -138,8 +138,11 @@ def test_multipliers_are_those_of_the_map() -> None:
     rng = np.random.default_rng(5)
     turn = 0.9 * np.array([[np.cos(1.0), -np.sin(1.0)], [np.sin(1.0), np.cos(1.0)]])
     for n in (1, 2, 3, 6):
-        kinds = [np.diag(np.linspace(0.1, 0.7, n) * (-1.0) ** np.arange(n)), 0.6 * np.eye(n) + np.eye(n, k=1),
-                 np.eye(n, k=1)]  # fmt: skip
+        kinds = [
+            np.diag(np.linspace(0.1, 0.7, n) * (-1.0) ** np.arange(n)),
+            0.6 * np.eye(n) + np.eye(n, k=1),
+            np.eye(n, k=1),
+        ]
         if n > 1:
             kinds.append(np.block([[turn, np.ones((2, n - 2))], [np.zeros((n - 2, 2)), 0.5 * np.eye(n - 2)]]))
         for normal, radius in zip(kinds, (0.7 if n > 1 else 0.1, 0.6, 0.0, 0.9), strict=False):

@@ -42,9 +42,12 @@ print(json.dumps([numbers, len(compiled)]))
 
 def run(folder, **environment):
     done = subprocess.run(
-        [sys.executable, "-c", SCRIPT], capture_output=True, text=True, check=True,
+        [sys.executable, "-c", SCRIPT],
+        capture_output=True,
+        text=True,
+        check=True,
         env={**os.environ, "NONSMOOTH_CACHE_DIR": str(folder), **environment},
-    )  # fmt: skip
+    )
     numbers, compiles = json.loads(done.stdout.splitlines()[-1])
     return np.array(numbers), compiles
 

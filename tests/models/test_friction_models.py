@@ -81,10 +81,11 @@ def test_impacts_and_sticking_against_scipy() -> None:
     leaving = {
         "stick": [(lambda t, u: load(t, u) - f, 1, "forward", None), (lambda t, u: load(t, u) + f, -1, "back", None)],
         "forward": [
-            (lambda t, u: u[0] - g, 1, "back", lambda u: [g, -e * u[1]]), (lambda t, u: u[1], -1, "stick", still),
+            (lambda t, u: u[0] - g, 1, "back", lambda u: [g, -e * u[1]]),
+            (lambda t, u: u[1], -1, "stick", still),
         ],
         "back": [(lambda t, u: u[1], 1, "stick", still)],
-    }  # fmt: skip
+    }
     fields = {"stick": lambda t, u: [0.0, 0.0], "forward": slip(1), "back": slip(-1)}
     _, u, log = march(fields, leaving, "forward", np.zeros(2), 60.0)
     run = ns.simulate(ns.models.impact_friction_oscillator(omega=w, f=f, g=g, e=e), duration=60.0)
@@ -115,7 +116,7 @@ def test_the_stribeck_oscillator_against_scipy() -> None:
         ],
         "belt_forward": [(lambda t, u: u[1] - 1, -1, "belt_stick", still)],
         "belt_back": [(lambda t, u: u[1] - 1, 1, "belt_stick", still)],
-    }  # fmt: skip
+    }
     fields = {"belt_stick": lambda t, u: [u[1], 0.0], "belt_forward": side(1), "belt_back": side(-1)}
     _, u, log = march(fields, leaving, "belt_back", np.zeros(2), 50.0)
     system = ns.models.stribeck_oscillator()

@@ -120,9 +120,10 @@ def test_impacts_of_the_duffing_masses_against_scipy() -> None:
 
     leaving = {
         "motion": [
-            (lambda t, u: u[1] - u[0] - 4, 1, "motion", impact), (lambda t, u: u[1] - u[0] + 4, -1, "motion", impact),
+            (lambda t, u: u[1] - u[0] - 4, 1, "motion", impact),
+            (lambda t, u: u[1] - u[0] + 4, -1, "motion", impact),
         ]
-    }  # fmt: skip
+    }
     _, u, log = march({"motion": motion}, leaving, "motion", np.zeros(4), 60.0)
     run = ns.simulate(ns.models.impact_duffing(), duration=60.0)
     assert len(log) > 5

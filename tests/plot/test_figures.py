@@ -19,9 +19,12 @@ from nonsmooth.plot.labels import column, name_and_unit
 from nonsmooth.plot.trajectories import with_gaps
 
 CASES = [
-    ("time_history", "trajectory"), ("phase_portrait", "trajectory"), ("bifurcation", "swept"),
-    ("frequency_response", "responded"), ("section", "points"),
-]  # fmt: skip
+    ("time_history", "trajectory"),
+    ("phase_portrait", "trajectory"),
+    ("bifurcation", "swept"),
+    ("frequency_response", "responded"),
+    ("section", "points"),
+]
 
 
 @pytest.fixture(autouse=True)
@@ -71,9 +74,19 @@ def test_a_result_of_another_verb_is_refused(figure: str, name: str) -> None:
 
 @pytest.mark.parametrize(
     "figure",
-    ["branch", "curve", "chart", "basins", "basin_fractions", "manifolds", "density", "multipliers", "orbit",
-     "time_history"],
-)  # fmt: skip
+    [
+        "branch",
+        "curve",
+        "chart",
+        "basins",
+        "basin_fractions",
+        "manifolds",
+        "density",
+        "multipliers",
+        "orbit",
+        "time_history",
+    ],
+)
 def test_what_is_no_result_is_refused(figure: str) -> None:
     with pytest.raises(TypeError, match="not (from )?float"):
         getattr(plot, figure)(3.0)
@@ -209,9 +222,14 @@ def test_a_legend_covers_nothing(crowded: bool, outside: bool) -> None:
 def test_loads_are_drawn_with_their_units() -> None:
     """A resonance curve of a load: its own name and unit, and the values as they stand."""
     rig = ns.mechanical(
-        "m", 0.1, 1.0, parameters={"m": (2.0, "kg"), "w": 1.0}, coordinates={"q": "m"},
-        forcing={"q": lambda t, p: np.cos(p.w * t)}, elements={"wall": ns.elements.Stop(at="q", position=1.0)},
-    )  # fmt: skip
+        "m",
+        0.1,
+        1.0,
+        parameters={"m": (2.0, "kg"), "w": 1.0},
+        coordinates={"q": "m"},
+        forcing={"q": lambda t, p: np.cos(p.w * t)},
+        elements={"wall": ns.elements.Stop(at="q", position=1.0)},
+    )
     w = np.linspace(0.8, 1.0, 5)
     curve = ns.frequency_response(rig, w, parameter="w", direction="up", loads=True, progress=False)
     ax = plot.frequency_response(curve, y="wall_energy")

@@ -61,13 +61,17 @@ def test_what_does_not_fit_is_said(run, options, error, words) -> None:
 
 def test_the_phases_of_one_element_are_shaded() -> None:
     rig = ns.mechanical(
-        1.0, 0.05, 1.0, coordinates=["x"], parameters={"w": 0.8},
+        1.0,
+        0.05,
+        1.0,
+        coordinates=["x"],
+        parameters={"w": 0.8},
         forcing={"x": lambda t, p: np.cos(p.w * t)},
         elements={
             "rub": ns.elements.Coulomb(at="x", friction=0.3),
             "soft": ns.elements.ElasticStop(at="x", position=0.5, stiffness=5.0),
         },
-    )  # fmt: skip
+    )
     run = ns.simulate(rig, periods=2, transient=20)
     middle = 0.5 * (run.time.values[1:] + run.time.values[:-1])
     x = np.interp(middle, run.time.values, run.u.sel(state="x").values)

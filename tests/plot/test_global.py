@@ -110,9 +110,11 @@ def test_a_density_diagram_shows_the_shares_of_the_bins() -> None:
 def test_runs_that_diverge_have_a_colour_of_their_own() -> None:
     """x' = -x + x^3: starts within (-1, 1) come to rest, the others grow without end."""
     system = ns.System(
-        states=["x", "y"], parameters={"a": 1.0}, period=1.0,
+        states=["x", "y"],
+        parameters={"a": 1.0},
+        period=1.0,
         modes={"only": lambda t, u, p: (-u.x + p.a * u.x**3, -u.y)},
-    )  # fmt: skip
+    )
     found = ns.basins(system, {"x": [-1.5, 0.5, 1.5], "y": [0.0, 1.0]}, transient=50, keep=20, progress=False)
     axes = draw_basins(found)
     names = [text.get_text() for text in axes.get_legend().get_texts()]

@@ -46,12 +46,17 @@ def spring() -> xr.Dataset:
     pull = np.repeat([1, -1], 50)
     return xr.Dataset(
         {
-            "displacement": ("sample", x), "force": ("sample", 16.94 * x + 0.01 * pull), "pull": ("sample", pull),
-            "slope": ("line", [16.94]), "intercept": ("line", [0.0]), "slope_error": ("line", [0.02]),
-            "friction_force": 0.01, "friction_force_error": 0.001,
+            "displacement": ("sample", x),
+            "force": ("sample", 16.94 * x + 0.01 * pull),
+            "pull": ("sample", pull),
+            "slope": ("line", [16.94]),
+            "intercept": ("line", [0.0]),
+            "slope_error": ("line", [0.02]),
+            "friction_force": 0.01,
+            "friction_force_error": 0.001,
         },
         attrs=SYNTHETIC,
-    )  # fmt: skip
+    )
 
 
 def decay() -> xr.Dataset:
@@ -60,23 +65,36 @@ def decay() -> xr.Dataset:
     magnitude, frequency = np.abs(np.fft.rfft(x)) / 1024, np.fft.rfftfreq(2048, 0.01)
     return xr.Dataset(
         {
-            "x": ("time", x), "fitted": ("time", x), "magnitude": ("frequency", magnitude), "peak_frequency": 0.711,
-            "grid_step": frequency[1], "grid_peak": frequency[np.argmax(magnitude)], "decay_frequency": 0.7155,
+            "x": ("time", x),
+            "fitted": ("time", x),
+            "magnitude": ("frequency", magnitude),
+            "peak_frequency": 0.711,
+            "grid_step": frequency[1],
+            "grid_peak": frequency[np.argmax(magnitude)],
+            "decay_frequency": 0.7155,
         },
-        {"time": t, "frequency": frequency}, SYNTHETIC,
-    )  # fmt: skip
+        {"time": t, "frequency": frequency},
+        SYNTHETIC,
+    )
 
 
 def amplitudes() -> xr.Dataset:
     omega = np.linspace(3, 6, 12)
     return xr.Dataset(
         {
-            "omega": ("run", omega), "amplitude": ("run", 0.02 / omega), "amplitude_error": ("run", 1e-4 + 0 * omega),
-            "joint_amplitude": ("omega_fine", 0.02 / omega), "viscous_amplitude": ("omega_fine", 0.021 / omega),
-            "c_joint": 0.87, "c_joint_error": 0.004, "c_viscous": 0.95, "c_viscous_error": 0.002,
+            "omega": ("run", omega),
+            "amplitude": ("run", 0.02 / omega),
+            "amplitude_error": ("run", 1e-4 + 0 * omega),
+            "joint_amplitude": ("omega_fine", 0.02 / omega),
+            "viscous_amplitude": ("omega_fine", 0.021 / omega),
+            "c_joint": 0.87,
+            "c_joint_error": 0.004,
+            "c_viscous": 0.95,
+            "c_viscous_error": 0.002,
         },
-        {"omega_fine": omega}, SYNTHETIC,
-    )  # fmt: skip
+        {"omega_fine": omega},
+        SYNTHETIC,
+    )
 
 
 def band() -> xr.Dataset:
@@ -84,11 +102,18 @@ def band() -> xr.Dataset:
     height = 0.02 / np.sqrt((20.25 - omega**2) ** 2 + 1.08 * omega**2)
     return xr.Dataset(
         {
-            "omega": ("run", omega), "amplitude": ("run", height), "omega_low": 3.9, "omega_high": 5.0,
-            "largest": height.max(), "damping_ratio": 0.115, "damping_ratio_error": 0.001, "c": 0.87, "c_error": 0.01,
+            "omega": ("run", omega),
+            "amplitude": ("run", height),
+            "omega_low": 3.9,
+            "omega_high": 5.0,
+            "largest": height.max(),
+            "damping_ratio": 0.115,
+            "damping_ratio_error": 0.001,
+            "c": 0.87,
+            "c_error": 0.01,
         },
         attrs=SYNTHETIC,
-    )  # fmt: skip
+    )
 
 
 def circle() -> xr.Dataset:
@@ -97,13 +122,20 @@ def circle() -> xr.Dataset:
     over = ("crank_length", "omega_fine")
     return xr.Dataset(
         {
-            "omega": ("run", omega), "crank": ("run", np.full(40, 0.0165)), "real": ("run", response.real),
-            "imaginary": ("run", response.imag), "fitted_real": (over, response.real[None]),
-            "fitted_imaginary": (over, response.imag[None]), "omega_0": 4.5, "omega_0_error": 0.001, "c": 0.87,
+            "omega": ("run", omega),
+            "crank": ("run", np.full(40, 0.0165)),
+            "real": ("run", response.real),
+            "imaginary": ("run", response.imag),
+            "fitted_real": (over, response.real[None]),
+            "fitted_imaginary": (over, response.imag[None]),
+            "omega_0": 4.5,
+            "omega_0_error": 0.001,
+            "c": 0.87,
             "c_error": 0.01,
         },
-        {"omega_fine": omega, "crank_length": [0.0165]}, SYNTHETIC,
-    )  # fmt: skip
+        {"omega_fine": omega, "crank_length": [0.0165]},
+        SYNTHETIC,
+    )
 
 
 def peaks() -> xr.Dataset:
@@ -111,36 +143,51 @@ def peaks() -> xr.Dataset:
     height = 0.08 * np.exp(-0.52 * t)
     return xr.Dataset(
         {
-            "peak_time": ("peak", t), "peak_height": ("peak", height), "log_height": ("peak", np.log(height)),
-            "used": ("peak", (t < 7).astype(int)), "slope": -0.52, "intercept": np.log(0.08), "damping_ratio": 0.0075,
-            "damping_ratio_error": 0.0001, "c": 0.87, "c_error": 0.01,
+            "peak_time": ("peak", t),
+            "peak_height": ("peak", height),
+            "log_height": ("peak", np.log(height)),
+            "used": ("peak", (t < 7).astype(int)),
+            "slope": -0.52,
+            "intercept": np.log(0.08),
+            "damping_ratio": 0.0075,
+            "damping_ratio_error": 0.0001,
+            "c": 0.87,
+            "c_error": 0.01,
         },
         attrs=SYNTHETIC,
-    )  # fmt: skip
+    )
 
 
 def line() -> xr.Dataset:
     v = np.arange(2.0, 12.0)
     return xr.Dataset(
         {
-            "setting": ("run", v, {"units": "V", "long_name": "voltage"}), "fitted": ("setting_fine", 1.2 * v - 0.9),
+            "setting": ("run", v, {"units": "V", "long_name": "voltage"}),
+            "fitted": ("setting_fine", 1.2 * v - 0.9),
             "reading": ("run", 1.2 * v - 0.9 + 0.01 * np.sin(v), {"units": "rad/s", "long_name": "frequency"}),
-            "reading_error": ("run", np.full(10, 0.02)), "slope": 1.2, "slope_error": 0.004,
+            "reading_error": ("run", np.full(10, 0.02)),
+            "slope": 1.2,
+            "slope_error": 0.004,
         },
-        {"setting_fine": v}, SYNTHETIC,
-    )  # fmt: skip
+        {"setting_fine": v},
+        SYNTHETIC,
+    )
 
 
 def touch() -> xr.Dataset:
     s = np.linspace(4.8, 5.5, 15)
     return xr.Dataset(
         {
-            "setting": ("run", s, {"units": "rad/s", "long_name": "frequency"}), "amplitude": ("run", 0.1 / s),
-            "contact": ("run", (s < 5.1).astype(int)), "grazing_low": 5.1, "grazing_high": 5.15, "gap": 0.0195,
+            "setting": ("run", s, {"units": "rad/s", "long_name": "frequency"}),
+            "amplitude": ("run", 0.1 / s),
+            "contact": ("run", (s < 5.1).astype(int)),
+            "grazing_low": 5.1,
+            "grazing_high": 5.15,
+            "gap": 0.0195,
             "gap_error": 3e-5,
         },
         attrs=SYNTHETIC,
-    )  # fmt: skip
+    )
 
 
 def shots() -> xr.Dataset:
@@ -148,19 +195,25 @@ def shots() -> xr.Dataset:
     x = 0.01 * np.cos(11.15 * t)
     return xr.Dataset(
         {
-            "x": ("time", x + 1e-5 * np.sin(99 * t)), "fitted": ("time", x), "segment": ("time", (t / 0.4).astype(int)),
-            "in_contact": ("time", (x > 0.009).astype(int)), "gap": 0.009, "gap_error": 2e-5,
+            "x": ("time", x + 1e-5 * np.sin(99 * t)),
+            "fitted": ("time", x),
+            "segment": ("time", (t / 0.4).astype(int)),
+            "in_contact": ("time", (x > 0.009).astype(int)),
+            "gap": 0.009,
+            "gap_error": 2e-5,
         },
-        {"time": t}, SYNTHETIC,
-    )  # fmt: skip
+        {"time": t},
+        SYNTHETIC,
+    )
 
 
 def flat() -> xr.Dataset:
     value = np.geomspace(0.06, 6, 30)
     return xr.Dataset(
         {"cost": ("value", 3 * np.log(value / 0.6) ** 2), "best": 0.6, "low": 0.2, "high": 1.9},
-        {"value": value}, {**SYNTHETIC, "parameter": "c_s", "units": "N s/m"},
-    )  # fmt: skip
+        {"value": value},
+        {**SYNTHETIC, "parameter": "c_s", "units": "N s/m"},
+    )
 
 
 def many() -> xr.Dataset:
@@ -168,8 +221,9 @@ def many() -> xr.Dataset:
     over = ("rig", "parameter")
     return xr.Dataset(
         {"truth": (over, 0 * off), "estimate": (over, off), "uncertainty": (over, 1 + 0 * off)},
-        {"parameter": ["k", "c", "c_s"]}, SYNTHETIC,
-    )  # fmt: skip
+        {"parameter": ["k", "c", "c_s"]},
+        SYNTHETIC,
+    )
 
 
 def fitted_motion() -> xr.Dataset:
@@ -177,13 +231,18 @@ def fitted_motion() -> xr.Dataset:
     hit = np.abs(t - 4) < 0.1
     data = xr.Dataset(
         {
-            "measured": ("sample", np.sin(t), {"units": "m"}), "fitted": ("sample", np.sin(t)),
-            "residual": ("sample", np.cos(40 * t)), "window": ("sample", column), "run": ("sample", column),
-            "quantity": ("sample", column), "mode": ("sample", (t > 4).astype(int)),
+            "measured": ("sample", np.sin(t), {"units": "m"}),
+            "fitted": ("sample", np.sin(t)),
+            "residual": ("sample", np.cos(40 * t)),
+            "window": ("sample", column),
+            "run": ("sample", column),
+            "quantity": ("sample", column),
+            "mode": ("sample", (t > 4).astype(int)),
             "place": ("sample", np.where(hit, 2, t > 4)),
         },
-        {"time": ("sample", t)}, SYNTHETIC,
-    )  # fmt: skip
+        {"time": ("sample", t)},
+        SYNTHETIC,
+    )
     for name, flags in {"run": "run", "quantity": "x", "mode": "free contact", "place": "free contact hit"}.items():
         data[name].attrs["flag_meanings"] = flags
     return data
@@ -201,10 +260,20 @@ def test_a_fit_is_drawn_over_time_and_by_place() -> None:
 
 PICTURES = {
     "fit_residuals": fitted_motion,
-    "force_displacement": spring, "impulse_response": decay, "impulse_history": decay, "amplitude_fit": amplitudes,
-    "free_decay": peaks, "drop_decay": peaks, "calibration": line, "grazing": touch, "multiple_shooting": shots,
-    "profile": flat, "coverage": many, "half_power": band, "nyquist": circle,
-}  # fmt: skip
+    "force_displacement": spring,
+    "impulse_response": decay,
+    "impulse_history": decay,
+    "amplitude_fit": amplitudes,
+    "free_decay": peaks,
+    "drop_decay": peaks,
+    "calibration": line,
+    "grazing": touch,
+    "multiple_shooting": shots,
+    "profile": flat,
+    "coverage": many,
+    "half_power": band,
+    "nyquist": circle,
+}
 
 
 # Pictures of what was found in measured recordings: tests/plot/test_recorded.py.
@@ -253,8 +322,9 @@ def test_lengths_are_drawn_in_millimetres() -> None:
 
 
 def test_one_slope_of_many_pulls_is_one_number() -> None:
-    lines = xr.Dataset({"slope": ("line", [16.94] * 12), "intercept": ("line", [0.0] * 12),
-                        "slope_error": ("line", [0.02] * 12)})  # fmt: skip
+    lines = xr.Dataset(
+        {"slope": ("line", [16.94] * 12), "intercept": ("line", [0.0] * 12), "slope_error": ("line", [0.02] * 12)}
+    )
     data = spring().drop_vars(["slope", "intercept", "slope_error"]).merge(lines, combine_attrs="no_conflicts")
     written = words(identification.force_displacement(data))
     assert "slope 16.940 ± 0.020 N/m" in written and "12 lines" not in written
@@ -310,9 +380,15 @@ def test_a_calibration_ends_at_zero_and_shows_its_band() -> None:
     """omega = 1.2 V - 0.9 is zero at 0.75 V: a motor does not turn backwards. The band shows where residuals do."""
     fine = np.linspace(0, 12, 49)
     fit = 1.2 * fine - 0.9
-    data = line().drop_vars(["fitted", "setting_fine"]).assign(
-        fitted=("setting_fine", fit), fitted_low=("setting_fine", fit - 0.02), fitted_high=("setting_fine", fit + 0.02)
-    )  # fmt: skip
+    data = (
+        line()
+        .drop_vars(["fitted", "setting_fine"])
+        .assign(
+            fitted=("setting_fine", fit),
+            fitted_low=("setting_fine", fit - 0.02),
+            fitted_high=("setting_fine", fit + 0.02),
+        )
+    )
     ax = identification.calibration(data.assign_coords(setting_fine=fine))
     assert ax.lines[0].get_ydata().min() >= 0 and ax.lines[0].get_xdata()[0] == pytest.approx(0.75, abs=0.26)
     (band,) = strip_of(ax).collections[:1]
@@ -340,16 +416,22 @@ def diagram() -> xr.Dataset:
     return xr.Dataset(
         {
             "theory_section": (("rho", "direction", "iterate", "state"), np.zeros((2, 1, 2, 2))),
-            "measured_rho": ("sample", rho), "measured_section": (("sample", "state"), np.zeros((2, 2))),
-            "theory_flip": ("flip", [0.42]), "measured_flip": ("flip", [0.40]), "measured_flip_read": ("flip", [0.46]),
+            "measured_rho": ("sample", rho),
+            "measured_section": (("sample", "state"), np.zeros((2, 2))),
+            "theory_flip": ("flip", [0.42]),
+            "measured_flip": ("flip", [0.40]),
+            "measured_flip_read": ("flip", [0.46]),
             "measured_flip_error": ("flip", [0.01]),
         },
         {
-            "rho": ("rho", rho, {"units": "N"}), "state": ["x", "v"], "state_unit": ("state", ["m", "m/s"]),
-            "direction": ["up"], "flip": ["1-2"],
+            "rho": ("rho", rho, {"units": "N"}),
+            "state": ["x", "v"],
+            "state_unit": ("state", ["m", "m/s"]),
+            "direction": ["up"],
+            "flip": ["1-2"],
         },
         SYNTHETIC | {"comparison": "diagram"},
-    )  # fmt: skip
+    )
 
 
 def test_a_delayed_flip_shows_as_read_and_as_corrected() -> None:
@@ -366,20 +448,28 @@ def test_jumps_and_their_differences_stand_in_the_legend() -> None:
     omega = np.array([3.0, 4.0, 5.0])
     result = xr.Dataset(
         {
-            "theory_amplitude": (("omega", "direction"), np.full((3, 1), 0.01)), "measured_omega": ("run", omega),
-            "measured_direction": ("run", ["up"] * 3), "measured_amplitude": ("run", np.full(3, 0.01)),
-            "measured_amplitude_error": ("run", np.full(3, 1e-4)), "jump_direction": ("jump", ["up"]),
-            "measured_jump": ("jump", [4.1]), "theory_jump": ("jump", [4.05]),
+            "theory_amplitude": (("omega", "direction"), np.full((3, 1), 0.01)),
+            "measured_omega": ("run", omega),
+            "measured_direction": ("run", ["up"] * 3),
+            "measured_amplitude": ("run", np.full(3, 0.01)),
+            "measured_amplitude_error": ("run", np.full(3, 1e-4)),
+            "jump_direction": ("jump", ["up"]),
+            "measured_jump": ("jump", [4.1]),
+            "theory_jump": ("jump", [4.05]),
         },
         {
-            "omega": ("omega", omega, {"units": "rad/s"}), "direction": ["up"], "state": ["x"],
+            "omega": ("omega", omega, {"units": "rad/s"}),
+            "direction": ["up"],
+            "state": ["x"],
             "state_unit": ("state", ["m"]),
         },
         SYNTHETIC | {"comparison": "response"},
-    )  # fmt: skip
+    )
     ax = comparison_response(result)
     assert "\N{MINUS SIGN}0.050" in [text.get_text() for text in ax.texts]
     assert {
-        "jump, theory", "jump, virtual rig (synthetic)", "numbers: theory less measured (rad/s)",
-    } <= set(entries(ax))  # fmt: skip
+        "jump, theory",
+        "jump, virtual rig (synthetic)",
+        "numbers: theory less measured (rad/s)",
+    } <= set(entries(ax))
     assert ax.get_ylabel().endswith("(mm)")

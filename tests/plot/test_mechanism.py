@@ -22,8 +22,22 @@ def chain():
         lambda p: [[p.m1, 0, 0], [0, p.m2, 0], [0, 0, p.m3]],
         lambda p: [[2 * p.c, -p.c, 0], [-p.c, 2 * p.c, -p.c], [0, -p.c, p.c]],
         lambda p: [[p.k1 + p.k2, -p.k2, 0], [-p.k2, p.k2 + p.k3, -p.k3], [0, -p.k3, p.k3]],
-        parameters={"m1": 1.0, "m2": 1.0, "m3": 0.5, "c": 0.1, "k1": 1.0, "k2": 1.0, "k3": 2.0, "F": 1.0, "w": 1.0,
-                    "g": 0.4, "mu": 0.2, "v_b": 0.1, "k_s": 20.0, "b": 0.2},
+        parameters={
+            "m1": 1.0,
+            "m2": 1.0,
+            "m3": 0.5,
+            "c": 0.1,
+            "k1": 1.0,
+            "k2": 1.0,
+            "k3": 2.0,
+            "F": 1.0,
+            "w": 1.0,
+            "g": 0.4,
+            "mu": 0.2,
+            "v_b": 0.1,
+            "k_s": 20.0,
+            "b": 0.2,
+        },
         forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
         elements={
             "stop": E.Stop(at="q3", position="g", restitution=0.7),
@@ -34,7 +48,7 @@ def chain():
             "snub": E.ElasticStop(at="q2", position=-0.3, side=-1, stiffness="k_s", damping=0.1),
             "play": E.Backlash(at={"q3": 1, "q2": -1}, half_width="b", stiffness="k_s"),
         },
-    )  # fmt: skip
+    )
 
 
 def test_a_chain_is_read_as_it_was_built(chain) -> None:
@@ -43,9 +57,13 @@ def test_a_chain_is_read_as_it_was_built(chain) -> None:
     assert scheme.masses == ["m_{1}", "m_{2}", "m_{3}"]
     joined = {(one.kind, one.left, one.right, one.label) for one in scheme.links if one.kind in ("spring", "damper")}
     assert joined == {
-        ("spring", GROUND, 0, "k_{1}"), ("spring", 0, 1, "k_{2}"), ("spring", 1, 2, "k_{3}"),
-        ("damper", GROUND, 0, "c"), ("damper", 0, 1, "c"), ("damper", 1, 2, "c"),
-    }  # fmt: skip
+        ("spring", GROUND, 0, "k_{1}"),
+        ("spring", 0, 1, "k_{2}"),
+        ("spring", 1, 2, "k_{3}"),
+        ("damper", GROUND, 0, "c"),
+        ("damper", 0, 1, "c"),
+        ("damper", 1, 2, "c"),
+    }
     contacts = {(one.kind, one.left, one.right, one.gap, one.pulls) for one in scheme.links if one.gap}
     assert contacts == {
         ("stop", 2, GROUND, 0.4, False),  # on the right of the last mass
@@ -129,19 +147,39 @@ def test_gaps_and_displacements_are_to_one_scale() -> None:
         (lambda: ns.models.chua_circuit(), "has no mass to draw"),
         (lambda: ns.models.rubbing_rotor(), "follows a curve"),
         (lambda: ns.mechanical([[2.0, 1.0], [1.0, 2.0]], np.eye(2), np.eye(2), parameters={}), "not diagonal"),
-        (lambda: ns.mechanical(
-            [[2.0, 1.0], [1.0, 2.0]], np.zeros((2, 2)), np.eye(2), parameters={}, forcing={"q1": lambda t, p: np.cos(t)}
-        ), "not diagonal"),
-        (lambda: ns.mechanical(
-            [[2.0, 1.0], [1.0, 2.0]], np.zeros((2, 2)), np.eye(2), parameters={},
-            elements={"stop": E.Stop(at="q1", position=1.0)},
-        ), "not diagonal"),
-        (lambda: ns.mechanical(
-            np.eye(2), 0.1 * np.eye(2), np.eye(2), coordinates=["x", "y"], parameters={},
-            elements={"floor": E.Stop(at="y", side=-1, position=-1.0, friction=0.3, tangent="x")},
-        ), "rubs along another coordinate"),
+        (
+            lambda: ns.mechanical(
+                [[2.0, 1.0], [1.0, 2.0]],
+                np.zeros((2, 2)),
+                np.eye(2),
+                parameters={},
+                forcing={"q1": lambda t, p: np.cos(t)},
+            ),
+            "not diagonal",
+        ),
+        (
+            lambda: ns.mechanical(
+                [[2.0, 1.0], [1.0, 2.0]],
+                np.zeros((2, 2)),
+                np.eye(2),
+                parameters={},
+                elements={"stop": E.Stop(at="q1", position=1.0)},
+            ),
+            "not diagonal",
+        ),
+        (
+            lambda: ns.mechanical(
+                np.eye(2),
+                0.1 * np.eye(2),
+                np.eye(2),
+                coordinates=["x", "y"],
+                parameters={},
+                elements={"floor": E.Stop(at="y", side=-1, position=-1.0, friction=0.3, tangent="x")},
+            ),
+            "rubs along another coordinate",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_has_no_sketch_says_why(system, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         ns.plot.mechanism(system())

@@ -98,8 +98,9 @@ def test_an_orbit_without_contact_shows_its_nearest_approach() -> None:
 def test_manifolds_start_at_the_saddle(orbit: ns.Orbit, branch: xr.Dataset) -> None:
     folds = branch["special_point"].values[branch["special_kind"].values == "fold"]
     at = branch.isel(point=int(folds.sum() // 2))
-    saddle = ns.find_orbit(orbit.system.with_parameters(omega=float(at["omega"])), start=at["section"].values,
-                           period_number=1, transient=0)  # fmt: skip
+    saddle = ns.find_orbit(
+        orbit.system.with_parameters(omega=float(at["omega"])), start=at["section"].values, period_number=1, transient=0
+    )
     assert not saddle.stable
     ax = plot.manifolds(ns.manifolds(saddle, length=1.0, distance=0.1))
     assert words(ax) == ["unstable manifold", "stable manifold", "saddle"]

@@ -70,11 +70,15 @@ def test_steady_pictures_write_the_frequency() -> None:
 
 def impacts(single: list[bool]) -> xr.Dataset:
     n = len(single)
-    return xr.Dataset({
-        "single": ("impact", single), "restitution": ("impact", np.linspace(0.3, 0.5, n)),
-        "v_before": ("impact", -np.linspace(1.0, 2.0, n)), "half_sample": ("impact", np.full(n, 0.01)),
-        "impact_time": ("impact", np.linspace(0.2, 0.8, n)),
-    })  # fmt: skip
+    return xr.Dataset(
+        {
+            "single": ("impact", single),
+            "restitution": ("impact", np.linspace(0.3, 0.5, n)),
+            "v_before": ("impact", -np.linspace(1.0, 2.0, n)),
+            "half_sample": ("impact", np.full(n, 0.01)),
+            "impact_time": ("impact", np.linspace(0.2, 0.8, n)),
+        }
+    )
 
 
 def test_restitution_draws_impacts_of_one_corner_only() -> None:

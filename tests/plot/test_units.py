@@ -49,12 +49,27 @@ def unit_of(ax: Any, base: str) -> float:
 @pytest.mark.parametrize(
     ("unit", "largest", "power"),
     [
-        ("m", 1.2, 0), ("m", 0.5, -3), ("m", 0.025, -3), ("m", 1e-4, -3), ("m", 5e-5, -6), ("m", 3e-8, -9),
-        ("m/s", 0.12, -3), ("m/s", 3.0, 0), ("m s", 0.11, -3), ("N", 0.5, 0), ("N", 0.005, -3), ("rad/s", 9.0, 0),
-        ("rad/s", 2e-5, -6), ("kg", 0.01, 0), ("1", 0.01, 0), ("m^2", 0.01, 0), ("m", 0.0, 0), ("m", np.nan, 0),
+        ("m", 1.2, 0),
+        ("m", 0.5, -3),
+        ("m", 0.025, -3),
+        ("m", 1e-4, -3),
+        ("m", 5e-5, -6),
+        ("m", 3e-8, -9),
+        ("m/s", 0.12, -3),
+        ("m/s", 3.0, 0),
+        ("m s", 0.11, -3),
+        ("N", 0.5, 0),
+        ("N", 0.005, -3),
+        ("rad/s", 9.0, 0),
+        ("rad/s", 2e-5, -6),
+        ("kg", 0.01, 0),
+        ("1", 0.01, 0),
+        ("m^2", 0.01, 0),
+        ("m", 0.0, 0),
+        ("m", np.nan, 0),
         ("m", 1e-15, -9),
     ],
-)  # fmt: skip
+)
 def test_prefixes_by_the_size_of_the_values(unit: str, largest: float, power: int) -> None:
     assert power_for(unit, largest) == power
 

@@ -121,8 +121,11 @@ def arrow(kind: str) -> bytes:
     pyarrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed (extra `experiment`)")
     from pyarrow import feather, parquet
 
-    fields = [pyarrow.field("time", "f8", metadata={"unit": "s"}), pyarrow.field("x (mm)", "f8"),
-              pyarrow.field("force", "f8", metadata={"units": "N"})]  # fmt: skip
+    fields = [
+        pyarrow.field("time", "f8", metadata={"unit": "s"}),
+        pyarrow.field("x (mm)", "f8"),
+        pyarrow.field("force", "f8", metadata={"units": "N"}),
+    ]
     held = pyarrow.table([T, X, F], schema=pyarrow.schema(fields))
     if kind == "stamps":
         dates = np.datetime64("2026-05-31T23:59:59.9") + (K * 10).astype("timedelta64[ms]")
@@ -183,80 +186,110 @@ PLAIN = {"x": "mm", "force": "N"}
 
 FILES: dict[str, File] = {
     "units in the second row": File(
-        table("t,x,force\ns,mm,N", lambda k: ROW(T[k], X[k], F[k])), {"units_row": 2}, "units_row=2"),
+        table("t,x,force\ns,mm,N", lambda k: ROW(T[k], X[k], F[k])), {"units_row": 2}, "units_row=2"
+    ),
     "title lines above": File(
         table("Bench 3; stop\nOperator M. S.\n\nt (s),x (mm),force (N)", lambda k: ROW(T[k], X[k], F[k])),
-        {"header": 4}, "give header=4"),
+        {"header": 4},
+        "give header=4",
+    ),
     "title lines, units in a row": File(
         table("Bench 3\nOperator\nt;x;force\n[s];[mm];[N]", lambda k: ROW(T[k], X[k], F[k]).replace(",", ";")),
-        {"header": 3, "units_row": 4}, "header=3, units_row=4"),
+        {"header": 3, "units_row": 4},
+        "header=3, units_row=4",
+    ),
     "sep= of a spreadsheet": File(
-        table("sep=;\nt (s);x (mm);force (N)", lambda k: f"{german(T[k])};{german(X[k])};{comma(F[k])}")),
+        table("sep=;\nt (s);x (mm);force (N)", lambda k: f"{german(T[k])};{german(X[k])};{comma(F[k])}")
+    ),
     "decimal comma, thousands with points": File(
         table("t (s);x (mm);force (N)", lambda k: f"{german(T[k])};{german(X[k])};{german(F[k])}"),
-        {"decimal": ",", "thousands": "."}, "decimal=',', thousands='.'"),
+        {"decimal": ",", "thousands": "."},
+        "decimal=',', thousands='.'",
+    ),
     "thousands with commas": File(
         table("t (s)\tx (mm)\tforce (N)", lambda k: f"{T[k]}\t{X[k]}\t{F[k]:,.2f}"),
-        {"thousands": ","}, "decimal='.', thousands=','"),
+        {"thousands": ","},
+        "decimal='.', thousands=','",
+    ),
     "missing values marked": File(
         table("t (s),x (mm),force (N)", lambda k: ROW(T[k], X[k], F[k]), every={7: ".065,#N/A,#N/A", 9: ".085,-,#N/A"}),
-        {"na": ("#N/A", "-")}, "na='#N/A'"),
+        {"na": ("#N/A", "-")},
+        "na='#N/A'",
+    ),
     "stamps of ISO 8601": File(
-        table("time,x (mm),force (N)", lambda k: f"{stamp(k, '%Y-%m-%dT%H:%M:%S.%f')},{X[k]},{F[k]}")),
+        table("time,x (mm),force (N)", lambda k: f"{stamp(k, '%Y-%m-%dT%H:%M:%S.%f')},{X[k]},{F[k]}")
+    ),
     "stamps with zones": File(
-        table("time,x (mm),force (N)", lambda k: f"{stamp(k, '%Y-%m-%d %H:%M:%S.%f')}+02:00,{X[k]},{F[k]}")),
+        table("time,x (mm),force (N)", lambda k: f"{stamp(k, '%Y-%m-%d %H:%M:%S.%f')}+02:00,{X[k]},{F[k]}")
+    ),
     "stamps of a country": File(
         table("Zeit;x (mm);force (N)", lambda k: f"{stamp(k, '%d.%m.%Y %H:%M:%S,%f')};{german(X[k])};{comma(F[k])}"),
-        {"units": {"time": "%d.%m.%Y %H:%M:%S,%f"}}, "units={'time': '%d.%m.%Y"),
+        {"units": {"time": "%d.%m.%Y %H:%M:%S,%f"}},
+        "units={'time': '%d.%m.%Y",
+    ),
     "a clock that passes midnight": File(
         table("time,x (mm),force (N)", lambda k: f"{stamp(k, '%H:%M:%S.%f')},{X[k]},{F[k]}"),
-        {"wraps": {"time": 86400}}, "wraps={'time'"),
+        {"wraps": {"time": 86400}},
+        "wraps={'time'",
+    ),
     "milliseconds since 1970": File(
-        table("t_ms,x (mm),force (N)", lambda k: f"{1_780_000_000_000 + 10 * k},{X[k]},{F[k]}")),
+        table("t_ms,x (mm),force (N)", lambda k: f"{1_780_000_000_000 + 10 * k},{X[k]},{F[k]}")
+    ),
     "a clock in microseconds that wraps": File(
         table("time (us),x (mm),force (N)", lambda k: f"{(2**32 - 100_000 + 10_000 * k) % 2**32},{X[k]},{F[k]}"),
-        {"wraps": {"time": 2**32}}, "wraps={'time'"),
+        {"wraps": {"time": 2**32}},
+        "wraps={'time'",
+    ),
     "an encoder that wraps": File(
         table("t (s),x (mm),force (N)", lambda k: ROW(T[k], (X[k] + 65000) % 65536 - 65000, F[k])),
-        {"wraps": {"x": 65536}}),
+        {"wraps": {"x": 65536}},
+    ),
     "a log of the serial port, words in between": File(
         table("Sensor ready\nt (s),x (mm),force (N)", lambda k: ROW(T[k], X[k], F[k]), every={9: "Sensor lost"}),
-        {"header": 2, "skip": "Sensor"}, "header=2"),
+        {"header": 2, "skip": "Sensor"},
+        "header=2",
+    ),
     "words between the rows": File(
         table("t (s),x (mm),force (N)", lambda k: ROW(T[k], X[k], F[k]), every={9: "Calibrating ..."}),
-        {"skip": "Calib"}, "skip='Calibrating"),
-    "each number with its label": File(
-        table("", lambda k: f"t:{T[k]},x:{X[k]},force:{F[k]}"), {"units": UNITS}),
+        {"skip": "Calib"},
+        "skip='Calibrating",
+    ),
+    "each number with its label": File(table("", lambda k: f"t:{T[k]},x:{X[k]},force:{F[k]}"), {"units": UNITS}),
     "the clock of the serial monitor": File(
         table("", lambda k: f"{stamp(k, '%H:%M:%S.%f', 12)[:-3]} -> {X[k]},{F[k]}"),
-        {"columns": {"time": 0, "x": (1, "mm"), "force": (2, "N")}}, "columns={'time': 0"),
-    "no time at all": File(
-        table("x (mm),force (N)", lambda k: f"{X[k]},{F[k]}"), {"rate": 100}, "rate="),
+        {"columns": {"time": 0, "x": (1, "mm"), "force": (2, "N")}},
+        "columns={'time': 0",
+    ),
+    "no time at all": File(table("x (mm),force (N)", lambda k: f"{X[k]},{F[k]}"), {"rate": 100}, "rate="),
     "a time written with too few digits": File(
-        table("t (s),x (mm),force (N)", lambda k: f"{T[k]:.1f},{X[k]},{F[k]}"), {"rate": 100}),
+        table("t (s),x (mm),force (N)", lambda k: f"{T[k]:.1f},{X[k]},{F[k]}"), {"rate": 100}
+    ),
     "UTF-16 with tabs": File(
-        table("t (s)\tx (mm)\tforce (N)", lambda k: ROW(T[k], X[k], F[k]).replace(",", "\t"), encoding="utf-16")),
+        table("t (s)\tx (mm)\tforce (N)", lambda k: ROW(T[k], X[k], F[k]).replace(",", "\t"), encoding="utf-16")
+    ),
     "a workbook with titles and units": File(
-        lambda: workbook(False), {"header": 2, "units_row": 3}, "header=2, units_row=3"),
+        lambda: workbook(False), {"header": 2, "units_row": 3}, "header=2, units_row=3"
+    ),
     "a workbook with dates": File(lambda: workbook(True)),
     "HDF5 with units": File(hdf5_units),
     "HDF5, a matrix with its rate": File(
-        hdf5_matrix, {"units": {"data(1)": "mm", "data(2)": "N"}}, names={"x": "data(1)", "force": "data(2)"}),
+        hdf5_matrix, {"units": {"data(1)": "mm", "data(2)": "N"}}, names={"x": "data(1)", "force": "data(2)"}
+    ),
     "HDF5, rows of a table": File(hdf5_rows, {"units": UNITS}),
     "npz": File(lambda: npz(t=T, x=X, force=F), {"units": UNITS}),
-    "npz with a rate beside": File(
-        lambda: npz(fs=100.0, x=X, force=F), {"rate": 100, "units": UNITS}, "rate="),
+    "npz with a rate beside": File(lambda: npz(fs=100.0, x=X, force=F), {"rate": 100, "units": UNITS}, "rate="),
     "npy, a matrix": File(
         lambda: npy(np.stack([T, X, F], axis=1)),
         {"columns": {"time": "values(:,1)", "x": ("values(:,2)", "mm"), "force": ("values(:,3)", "N")}},
-        "columns={'time'"),
+        "columns={'time'",
+    ),
     "npy of rows": File(lambda: npy(np.rec.fromarrays([T, X, F], names="t,x,force")), {"units": UNITS}),
     "Parquet": File(lambda: arrow("parquet")),
     "Parquet with dates": File(lambda: arrow("stamps")),
     "Feather": File(lambda: arrow("feather")),
     "universal file": File(universal, names={"x": "1+X", "force": "2+X"}),
     "ASAM MDF": File(measurement),
-}  # fmt: skip
+}
 
 
 def content(file: File, tmp_path: Path) -> bytes:

@@ -163,10 +163,14 @@ def _parquet(feather: bool) -> bytes:
 
 def _uff() -> bytes:
     pytest.importorskip("pyuff", reason="pyuff is not installed (extra `experiment`)")
-    head = ["    -1", "    58", *["NONE"] * 5,
-            f"{1:5d}{0:10d}{0:5d}{0:10d} {'N':10s}{1:10d}{1:4d} {'N':10s}{1:10d}{1:4d}",
-            f"{4:10d}{4:10d}{1:10d}{0.0:13.5e}{0.01:13.5e}{0.0:13.5e}",
-            *[f"{kind:10d}{0:5d}{0:5d}{0:5d} {'x':20s} {'s':20s}" for kind in (17, 8, 0, 0)]]  # fmt: skip
+    head = [
+        "    -1",
+        "    58",
+        *["NONE"] * 5,
+        f"{1:5d}{0:10d}{0:5d}{0:10d} {'N':10s}{1:10d}{1:4d} {'N':10s}{1:10d}{1:4d}",
+        f"{4:10d}{4:10d}{1:10d}{0.0:13.5e}{0.01:13.5e}{0.0:13.5e}",
+        *[f"{kind:10d}{0:5d}{0:5d}{0:5d} {'x':20s} {'s':20s}" for kind in (17, 8, 0, 0)],
+    ]
     return ("\n".join([*head, "".join(f"{v:20.12e}" for v in range(4)), "    -1"]) + "\n").encode()
 
 
@@ -196,17 +200,58 @@ SEEDS: dict[str, Callable[[], Seed]] = {
     "uff": lambda: Seed(_uff(), "uff"),
     "stamps": lambda: Seed(b"time,x\n" + b"".join(b"2026-05-31T12:00:%02d.5,%d\n" % (k, k) for k in range(20)), None),
     "table, options": lambda: Seed(
-        b"Bench\nt;x\ns;mm\n" + b"".join(b"%d;1.00%d,5\n" % (k, k) for k in range(9)), "csv",
+        b"Bench\nt;x\ns;mm\n" + b"".join(b"%d;1.00%d,5\n" % (k, k) for k in range(9)),
+        "csv",
         Options(header=2, units_row=3, decimal=",", thousands=".", na=("n",), skip=("S",), wraps={"x": 64.0}),
     ),
 }
 
 PIECES = [
-    b"", b"\0", b"\0" * 4, b"\xff" * 4, b"\xff" * 8, b"\xff\xff\xff\x7f", b"\0\0\0\x40", b"\x80", b"\xef\xbb\xbf",
-    b"\xff\xfe", b"\n", b"\r", b"\t", b",", b";", b'"', b"'", b" ", b".", b"-", b"/", b"\\", b"(", b")", b"<", b">",
-    b"&a;", b"<!DOCTYPE a>", b"nan", b"inf", b"1e999", b"99999999999", b"0", b"1", b"-1", b"Run #1", b"Time (s) ",
-    b"***End_of_Header***", b"X_Value", b"Samples", b"Channels", b"DataSet", b"TDSm", b"PK\x03\x04",
-]  # fmt: skip
+    b"",
+    b"\0",
+    b"\0" * 4,
+    b"\xff" * 4,
+    b"\xff" * 8,
+    b"\xff\xff\xff\x7f",
+    b"\0\0\0\x40",
+    b"\x80",
+    b"\xef\xbb\xbf",
+    b"\xff\xfe",
+    b"\n",
+    b"\r",
+    b"\t",
+    b",",
+    b";",
+    b'"',
+    b"'",
+    b" ",
+    b".",
+    b"-",
+    b"/",
+    b"\\",
+    b"(",
+    b")",
+    b"<",
+    b">",
+    b"&a;",
+    b"<!DOCTYPE a>",
+    b"nan",
+    b"inf",
+    b"1e999",
+    b"99999999999",
+    b"0",
+    b"1",
+    b"-1",
+    b"Run #1",
+    b"Time (s) ",
+    b"***End_of_Header***",
+    b"X_Value",
+    b"Samples",
+    b"Channels",
+    b"DataSet",
+    b"TDSm",
+    b"PK\x03\x04",
+]
 MUTATION = st.tuples(
     st.sampled_from(["set", "set", "put", "cut", "double", "end", "swap"]),
     st.integers(0, 1 << 20),
@@ -264,9 +309,13 @@ def fuzz(name: str, examples: int, *, deep: bool) -> dict[str, Any]:
     worst = peak = 0.0
 
     @settings(
-        max_examples=examples, deadline=None, database=None, derandomize=not deep,
-        phases=[Phase.generate] if deep else [Phase.generate, Phase.shrink], suppress_health_check=list(HealthCheck),
-    )  # fmt: skip
+        max_examples=examples,
+        deadline=None,
+        database=None,
+        derandomize=not deep,
+        phases=[Phase.generate] if deep else [Phase.generate, Phase.shrink],
+        suppress_health_check=list(HealthCheck),
+    )
     @given(st.lists(MUTATION, min_size=1, max_size=6))
     def run(mutations: list[tuple[str, int, int, bytes]]) -> None:
         nonlocal worst, peak

@@ -64,9 +64,12 @@ def test_packed_variables() -> None:
 
 def test_structs_are_runs_with_units_and_notes() -> None:
     one = struct_(
-        "test", frequency=doubles("", 1, 3, 2), amplitude=doubles("", 4, 5, 6), units=chars("", "Hz, mm"),
+        "test",
+        frequency=doubles("", 1, 3, 2),
+        amplitude=doubles("", 4, 5, 6),
+        units=chars("", "Hz, mm"),
         level=doubles("", 0.25),
-    )  # fmt: skip
+    )
     recording = parse_recording(HEADER + one, "x.mat", Options(axis="frequency"))
     assert recording.runs == ("test",) and recording.units == {"amplitude": "mm"}
     assert recording.channel("amplitude")["frequency"].values.tolist() == [1, 3, 2]

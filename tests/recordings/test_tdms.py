@@ -37,10 +37,12 @@ def segment(objects: list[bytes], values: list[float]) -> bytes:
 
 
 WAVE = segment(
-    [numbers("/'pull'/'x'", 3, wf_increment=0.25, wf_start_offset=1.0, unit_string="mm"),
-     numbers("/'pull'/'F'", 2, wf_increment=0.5)],
+    [
+        numbers("/'pull'/'x'", 3, wf_increment=0.25, wf_start_offset=1.0, unit_string="mm"),
+        numbers("/'pull'/'F'", 2, wf_increment=0.5),
+    ],
     [1.0, 2.0, 3.0, 10.0, 20.0],
-)  # fmt: skip
+)
 
 
 def test_waveforms() -> None:

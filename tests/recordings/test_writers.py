@@ -92,8 +92,9 @@ def test_equal_recordings_give_equal_files(tmp_path: Path) -> None:
 @settings(max_examples=40, deadline=None)
 @given(
     st.lists(st.floats(allow_infinity=False, allow_nan=False, width=64), min_size=1, max_size=30),
-    st.floats(-1e6, 1e6), st.floats(1e-6, 1e3),
-)  # fmt: skip
+    st.floats(-1e6, 1e6),
+    st.floats(1e-6, 1e3),
+)
 def test_any_doubles_through_cap(values: list[float], start: float, step: float) -> None:
     import tempfile
 

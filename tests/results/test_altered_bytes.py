@@ -64,10 +64,12 @@ def with_all_types(swept: xr.Dataset) -> xr.Dataset:
     """A result with scalars, text, complex numbers, NaN, flags, an array that is compressed, and an empty one."""
     return swept.assign(
         floquet_multipliers=("multiplier", np.array([1 + 2j, complex(np.nan, 1)]), {"long_name": "multipliers"}),
-        ended_because=("end", np.array(["the range ends", "µ < 0"])), period=((), 2.5, {"units": "s"}),
-        many=("sample", np.arange(6000) % 7 * 0.5), stable=("end", np.array([1, 0], np.int8)),
+        ended_because=("end", np.array(["the range ends", "µ < 0"])),
+        period=((), 2.5, {"units": "s"}),
+        many=("sample", np.arange(6000) % 7 * 0.5),
+        stable=("end", np.array([1, 0], np.int8)),
         touch=("hit", np.empty(0)),
-    ).assign_attrs(comparison="sweep", level=0.95, counts=np.array([3, 4]))  # fmt: skip
+    ).assign_attrs(comparison="sweep", level=0.95, counts=np.array([3, 4]))
 
 
 def same(found: xr.Dataset, result: xr.Dataset) -> bool:

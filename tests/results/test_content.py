@@ -47,8 +47,9 @@ words = st.text(letters, max_size=6)
 numbers = st.one_of(st.integers(-(2**63), 2**63 - 1), st.floats(width=64))
 attributes = st.dictionaries(
     st.sampled_from(["units", "long_name", "symbol", "level", "limits"]),
-    st.one_of(words, numbers, hnp.arrays(st.sampled_from(["f8", "i4", "f4"]), st.integers(0, 4))), max_size=3,
-)  # fmt: skip
+    st.one_of(words, numbers, hnp.arrays(st.sampled_from(["f8", "i4", "f4"]), st.integers(0, 4))),
+    max_size=3,
+)
 types = st.sampled_from(["f8", "f4", "i1", "i2", "i4", "i8", "u1", "u8", "?", "c16", "c8", ">f8", "U"])
 
 
@@ -90,11 +91,12 @@ def base() -> xr.Dataset:
         {
             "section": (("rho", "state"), np.arange(6.0).reshape(3, 2), {"long_name": "section"}),
             "status": ("rho", np.array([0, 1, 0], np.int8), {"flag_values": np.array([0, 1], np.int8)}),
-            "period": ((), 1.5), "note": ("rho", np.array(["a", "b", "c"])),
+            "period": ((), 1.5),
+            "note": ("rho", np.array(["a", "b", "c"])),
         },
         {"rho": ("rho", [1.0, 2.0, 3.0], {"units": "N"}), "g": ((), 0.02, {"units": "m"})},
         {"nonsmooth": RECORD, "level": 0.95},
-    )  # fmt: skip
+    )
 
 
 def _with_value(ds: xr.Dataset) -> xr.Dataset:
@@ -136,8 +138,9 @@ def test_every_change_is_another_hash(change: str) -> None:
 def test_what_is_no_content_does_not_change_the_hash() -> None:
     ds = base()
     wider = ds.assign(note=("rho", np.array(["a", "b", "c"], "U40")))
-    turned = ds.assign(section=(("rho", "state"), np.asfortranarray(ds["section"].values.astype(">f8")), {
-        "long_name": "section"}))  # fmt: skip
+    turned = ds.assign(
+        section=(("rho", "state"), np.asfortranarray(ds["section"].values.astype(">f8")), {"long_name": "section"})
+    )
     other_order = ds[["note", "period", "status", "section"]]
     one = ds.assign_attrs(level=[0.95])
     for same in (wider, turned, other_order, one, ds.assign_attrs(level=np.float64(0.95))):
@@ -188,9 +191,11 @@ def test_a_netcdf_file_that_another_program_has_written_anew(tmp_path: Path) -> 
 def test_another_program_changes_a_zarr_store(tmp_path: Path) -> None:
     path = save(base(), tmp_path / "r.zarr")
     for name, old, new in (
-        (".zmetadata", '"units": "m"', '"units": "mm"'), (".zattrs", '"level": 0.95', '"level": 0.94'),
-        (".zmetadata", "period", "Period"), (".zmetadata", '"<f8"', '"<i8"'),
-    ):  # fmt: skip
+        (".zmetadata", '"units": "m"', '"units": "mm"'),
+        (".zattrs", '"level": 0.95', '"level": 0.94'),
+        (".zmetadata", "period", "Period"),
+        (".zmetadata", '"<f8"', '"<i8"'),
+    ):
         before = (path / name).read_text()
         assert old in before
         (path / name).write_text(before.replace(old, new))
@@ -250,16 +255,21 @@ def test_a_file_written_through_netcdf4_loads() -> None:
         {
             "section": (("point", "state"), np.column_stack([n**2.0, -n / 4]), {"long_name": "section points"}),
             "floquet_multipliers": ("point", n * (0.5 - 0.25j), {"long_name": "multipliers"}),
-            "status": ("point", (n % 2).astype(np.int8), {
-                "flag_values": np.array([0, 1], np.int8), "flag_meanings": "ok slow"}),
-            "many": ("sample", np.arange(5000) % 7 * 0.5), "touch_time": ("touch", np.empty(0)),
+            "status": (
+                "point",
+                (n % 2).astype(np.int8),
+                {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "ok slow"},
+            ),
+            "many": ("sample", np.arange(5000) % 7 * 0.5),
+            "touch_time": ("touch", np.empty(0)),
         },
         {
-            "point": ("point", n.astype(float), {"units": "N"}), "state": np.array(["x", "v"]),
+            "point": ("point", n.astype(float), {"units": "N"}),
+            "state": np.array(["x", "v"]),
             "g": ((), 0.02, {"units": "m", "symbol": "g"}),
         },
         {"nonsmooth": '{"version": "0.1.0", "verb": "sweep"}'},
-    )  # fmt: skip
+    )
     xr.testing.assert_identical(old, expected)
     assert old["status"].dtype == np.int8 and old["floquet_multipliers"].dtype == complex
 
@@ -275,7 +285,7 @@ def test_a_file_written_through_netcdf4_loads() -> None:
         (lambda ds: ds.drop_attrs(), ValueError, "no attribute 'nonsmooth', so load would refuse it"),
         (lambda ds: ds.assign(period=((), 1.5, {"scale_factor": 2.0})), TypeError, "variable 'period'"),
     ],
-)  # fmt: skip
+)
 @pytest.mark.filterwarnings("ignore")  # xarray says it too, in its own words
 @pytest.mark.parametrize("ending", FORMATS)
 def test_what_would_not_come_back_is_refused_and_nothing_is_written(

@@ -14,10 +14,12 @@ def test_limits_at_each_impact_of_a_ball() -> None:
     """Impacts at 1, 2 and 2.5 s with e = 1/2, dropped from g / 2: before each the speed is -g, -g / 2, -g / 4."""
     g = 2.0
     ball = ns.System(
-        states={"x": "m", "v": "m/s"}, parameters={"g": g}, modes={"fly": lambda t, u, p: (u.v, -p.g)},
+        states={"x": "m", "v": "m/s"},
+        parameters={"g": g},
+        modes={"fly": lambda t, u, p: (u.v, -p.g)},
         elements={"floor": ns.elements.Stop(gap=lambda t, u, p: u.x, on={"v": 1.0}, restitution=0.5)},
         outputs={"energy": (lambda t, u, p: p.g * u.x + u.v**2 / 2, "J")},
-    )  # fmt: skip
+    )
     run = ns.simulate(ball, duration=2.6, start={"x": g / 2}, samples=27)
     time, v = run["time"].values, run["u"].sel(state="v").values
     assert run["crossing_time"].values == pytest.approx([1.0, 2.0, 2.5], abs=1e-10)

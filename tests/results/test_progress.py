@@ -148,9 +148,11 @@ def test_a_function_hears_the_fraction_done_and_may_cancel() -> None:
     seen: list[float] = []
     with pytest.raises(KeyboardInterrupt, match="cancelled"):
         ns.chart(
-            osc, {"rho": [0.3, 0.4], "omega": [3.0, 3.6]}, transient=20,
+            osc,
+            {"rho": [0.3, 0.4], "omega": [3.0, 3.6]},
+            transient=20,
             progress=lambda done: seen.append(done) or len(seen) < 2,
-        )  # fmt: skip
+        )
     assert len(seen) == 2
     with pytest.raises(TypeError, match=r"True, False,? or a function"):
         ns.sweep(osc, "rho", [0.3], progress="yes")

@@ -28,16 +28,28 @@ class Stroboscope:
 
 
 def test_the_record_holds_the_whole_input(labels: Labels) -> None:
-    options = {"values": np.array([0.1, 0.2]), "section": Stroboscope(0.25), "start": None, "rtol": np.float64(1e-9),
-               "bound": np.inf, "direction": "both", "keep": np.int64(100)}  # fmt: skip
+    options = {
+        "values": np.array([0.1, 0.2]),
+        "section": Stroboscope(0.25),
+        "start": None,
+        "rtol": np.float64(1e-9),
+        "bound": np.inf,
+        "direction": "both",
+        "keep": np.int64(100),
+    }
     record = read_provenance(xr.Dataset(attrs=provenance(labels, "sweep", options, method="exact", seed=7)))
     assert record["version"] == package_version()
     assert record["system"]["text"] == labels.text
     assert record["system"]["parameters"] == {"rho": 0.3, "omega": 1.0, "g": 0.5}
     assert record["options"] == {
-        "values": [0.1, 0.2], "section": {"type": "Stroboscope", "phase": 0.25}, "start": None, "rtol": 1e-9,
-        "bound": "inf", "direction": "both", "keep": 100,
-    }  # fmt: skip
+        "values": [0.1, 0.2],
+        "section": {"type": "Stroboscope", "phase": 0.25},
+        "start": None,
+        "rtol": 1e-9,
+        "bound": "inf",
+        "direction": "both",
+        "keep": 100,
+    }
     assert (record["method"], record["seed"], record["created"]) == ("exact", 7, None)
 
 
@@ -82,10 +94,12 @@ def chain_of_masses(masses: int) -> ns.System:
         return (*(getattr(u, name) for name in places), -p.e * u.v0, *(getattr(u, name) for name in speeds[1:]))
 
     return ns.System(
-        states=[*places, *speeds], parameters={"k": 1.0, "m": 1.0, "e": 0.8, "g": 0.1}, modes={"free": field},
+        states=[*places, *speeds],
+        parameters={"k": 1.0, "m": 1.0, "e": 0.8, "g": 0.1},
+        modes={"free": field},
         indicators={"stop": lambda t, u, p: u.x0 - p.g},
         transitions=[ns.Transition("free", "free", when="stop > 0", reset=bounce)],
-    )  # fmt: skip
+    )
 
 
 def swept_over(labels: Labels, values: np.ndarray, starts: np.ndarray, **options: object) -> xr.Dataset:
@@ -93,9 +107,15 @@ def swept_over(labels: Labels, values: np.ndarray, starts: np.ndarray, **options
     arrays = {"status": np.zeros((1, len(starts), len(values)), np.int8)}
     given = {"parameter": "rho", "values": values, "start": starts, **options}
     return schema.sweep(
-        labels, provenance(labels, "sweep", given, method="exact"), "rho", values, arrays,
-        directions=("up",), starts=starts, squeeze=("direction",),
-    )  # fmt: skip
+        labels,
+        provenance(labels, "sweep", given, method="exact"),
+        "rho",
+        values,
+        arrays,
+        directions=("up",),
+        starts=starts,
+        squeeze=("direction",),
+    )
 
 
 def test_the_attribute_is_short_and_its_record_whole() -> None:
@@ -138,8 +158,15 @@ def test_a_record_from_before_it_was_compressed_is_read() -> None:
     """As version 0.1.0 wrote it until then: all in plain JSON."""
     system = {"name": "s", "text": "the text", "parameters": {"k": 2.0}}
     options = {"values": [0.1, 0.2]}
-    record = {"version": "0.1.0", "verb": "sweep", "system": system, "options": options, "method": "exact",
-              "seed": None, "created": None}  # fmt: skip
+    record = {
+        "version": "0.1.0",
+        "verb": "sweep",
+        "system": system,
+        "options": options,
+        "method": "exact",
+        "seed": None,
+        "created": None,
+    }
     assert read_provenance(xr.Dataset(attrs={ATTRIBUTE: json.dumps(record)})) == record
 
 

@@ -21,9 +21,15 @@ def arrays(directions: int, starts: int, points: int, keep: int = 3) -> dict[str
 
 def build(labels: Labels, directions: tuple[str, ...], starts: int, squeeze: tuple[str, ...]) -> xr.Dataset:
     return schema.sweep(
-        labels, {"nonsmooth": "{}"}, "rho", [0.2, 0.3, 0.4, 0.5], arrays(len(directions), starts, 4),
-        directions=directions, starts=np.arange(2.0 * starts).reshape(starts, 2), squeeze=squeeze,
-    )  # fmt: skip
+        labels,
+        {"nonsmooth": "{}"},
+        "rho",
+        [0.2, 0.3, 0.4, 0.5],
+        arrays(len(directions), starts, 4),
+        directions=directions,
+        starts=np.arange(2.0 * starts).reshape(starts, 2),
+        squeeze=squeeze,
+    )
 
 
 def test_a_dim_exists_only_where_the_argument_was_a_sequence(labels: Labels) -> None:
@@ -95,9 +101,15 @@ def test_a_trajectory_has_its_crossings_and_outputs(trajectory: xr.Dataset) -> N
 
 def test_section_points_from_one_start_have_no_start_dim(labels: Labels) -> None:
     one = schema.section_points(
-        labels, {}, section=np.zeros((1, 5, 2)), time=np.arange(5.0)[None], mode=np.zeros((1, 5)), status=[0],
-        starts=[[0.0, 1.0]], squeeze=("start",),
-    )  # fmt: skip
+        labels,
+        {},
+        section=np.zeros((1, 5, 2)),
+        time=np.arange(5.0)[None],
+        mode=np.zeros((1, 5)),
+        status=[0],
+        starts=[[0.0, 1.0]],
+        squeeze=("start",),
+    )
     assert one["section"].dims == ("iterate", "state")
     assert one["status"].dims == ()
     assert one["start_state"].values.tolist() == [0, 1]

@@ -19,13 +19,22 @@ def hashed(whole: dict[str, Any] | None = None, coordinate: bool = False, name: 
 @pytest.mark.parametrize(
     "changed",
     [
-        {"dims": ("b", "a")}, {"data": np.arange(4.0).reshape(2, 2).T}, {"data": np.arange(4).reshape(2, 2)},
-        {"data": np.arange(4.0, dtype=np.float32).reshape(2, 2)}, {"attrs": {"units": "mm"}}, {"attrs": {"unit": "m"}},
-        {"dims": ("a", "c")}, {"coordinate": True}, {"name": "y"}, {"attrs": {}},
-        {"data": np.nextafter(np.arange(4.0), 9.0).reshape(2, 2)}, {"attrs": {"units": ["m", "m"]}},
-        {"data": np.array([["0", "1"], ["2", "3"]])}, {"attrs": {"units": 1}},
+        {"dims": ("b", "a")},
+        {"data": np.arange(4.0).reshape(2, 2).T},
+        {"data": np.arange(4).reshape(2, 2)},
+        {"data": np.arange(4.0, dtype=np.float32).reshape(2, 2)},
+        {"attrs": {"units": "mm"}},
+        {"attrs": {"unit": "m"}},
+        {"dims": ("a", "c")},
+        {"coordinate": True},
+        {"name": "y"},
+        {"attrs": {}},
+        {"data": np.nextafter(np.arange(4.0), 9.0).reshape(2, 2)},
+        {"attrs": {"units": ["m", "m"]}},
+        {"data": np.array([["0", "1"], ["2", "3"]])},
+        {"attrs": {"units": 1}},
     ],
-)  # fmt: skip
+)
 def test_it_sees(changed: dict[str, Any]) -> None:
     assert hashed(**changed) != hashed()
 

@@ -61,8 +61,13 @@ def test_two_carts_go_on_together() -> None:
 
 
 def test_a_mass_stuck_to_a_belt_is_stopped() -> None:
-    system = one(lambda t, p: 0.3 * np.cos(0.7 * t), c=0.05, k=1.0,
-                 f=Coulomb(at="q", friction=1.2, belt=-0.5), s=Stop(at="q", position=0.2, side=-1))  # fmt: skip
+    system = one(
+        lambda t, p: 0.3 * np.cos(0.7 * t),
+        c=0.05,
+        k=1.0,
+        f=Coulomb(at="q", friction=1.2, belt=-0.5),
+        s=Stop(at="q", position=0.2, side=-1),
+    )
     run = ns.simulate(system, start={"q": 0.8, "v_q": -0.5}, duration=6)
     assert run["crossing_time"].values == pytest.approx([1.2], rel=1e-13)
     assert end(run) == pytest.approx([0.2, 0.0], abs=1e-14)
@@ -115,9 +120,13 @@ def arrival(w: float) -> float:
 @cache
 def two_stops() -> ns.System:
     return ns.mechanical(
-        1.0, 0.2, 0.0, parameters={"w": 1.0}, forcing={"q": lambda t, p: np.cos(p.w * t)},
+        1.0,
+        0.2,
+        0.0,
+        parameters={"w": 1.0},
+        forcing={"q": lambda t, p: np.cos(p.w * t)},
         elements={"a": Stop(at="q", position=1.0), "b": Stop(at="q", position=-1.0, side=-1)},
-    )  # fmt: skip
+    )
 
 
 def visits(w: float) -> tuple[list[tuple[float, float]], int]:
@@ -154,10 +163,17 @@ def test_a_load_as_large_as_the_friction_stops_a_mass() -> None:
     assert end(run) == pytest.approx([-1 / (4 * mu), 0.0], abs=1e-15)
 
 
-@pytest.mark.parametrize(("force", "friction"), [
-    (lambda t, p: 0.5, {"friction": 0.3, "static": 0.6}),  # static and kinetic friction both have a solution: it stays
-    (lambda t, p: 0.5 * np.cos(t), {"friction": 0.5}),  # the load equals the friction and falls
-], ids=["static", "tie"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("force", "friction"),
+    [
+        (
+            lambda t, p: 0.5,
+            {"friction": 0.3, "static": 0.6},
+        ),  # static and kinetic friction both have a solution: it stays
+        (lambda t, p: 0.5 * np.cos(t), {"friction": 0.5}),  # the load equals the friction and falls
+    ],
+    ids=["static", "tie"],
+)
 def test_what_can_stick_does(force: Force, friction: dict[str, float]) -> None:
     run = ns.simulate(one(force, f=Coulomb(at="q", **friction)), start={}, duration=20)
     assert not run["u"].values.any()
@@ -180,12 +196,21 @@ def test_frictions_that_hold_together(order: str) -> None:
     assert forces == pytest.approx(-0.75 * np.sin(0.5 * run["time"].values), abs=1e-12)
 
 
-@pytest.mark.parametrize(("rubs", "loads", "accelerations"), [
-    (({"at": "q1", "friction": 2, "static": 5}, {"at": {"q1": 1, "q2": -1}, "friction": 2}), (-5.0, -6.0),
-     (-4.5, -4.5)),
-    (({"at": {"q1": 1, "q2": 1}, "friction": 1, "static": 6}, {"at": "q1", "friction": 2, "static": 3}), (-2.0, -8.0),
-     (0.0, -7.0)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("rubs", "loads", "accelerations"),
+    [
+        (
+            ({"at": "q1", "friction": 2, "static": 5}, {"at": {"q1": 1, "q2": -1}, "friction": 2}),
+            (-5.0, -6.0),
+            (-4.5, -4.5),
+        ),
+        (
+            ({"at": {"q1": 1, "q2": 1}, "friction": 1, "static": 6}, {"at": "q1", "friction": 2, "static": 3}),
+            (-2.0, -8.0),
+            (0.0, -7.0),
+        ),
+    ],
+)
 def test_what_slips_is_looked_at_with_kinetic_friction(rubs: Any, loads: Any, accelerations: Any) -> None:
     """Once it slips, all that could hold is asked again with its static friction."""
     run = ns.simulate(carts(2, loads, a=Coulomb(**rubs[0]), b=Coulomb(**rubs[1])), start={}, duration=0.5)
@@ -195,8 +220,15 @@ def test_what_slips_is_looked_at_with_kinetic_friction(rubs: Any, loads: Any, ac
 
 def between(mass: float) -> tuple[xr.Dataset, np.ndarray]:
     """A mass with friction between two stops, which rests at both and is stuck there; and where it is held."""
-    system = one(lambda t, p: np.cos(1.1 * t), mass=mass, c=0.1, k=1.0, f=Coulomb(at="q", friction=0.1),
-                 a=Stop(at="q", position=0.5, restitution=0.5), b=Stop(at="q", position=-0.5, side=-1))  # fmt: skip
+    system = one(
+        lambda t, p: np.cos(1.1 * t),
+        mass=mass,
+        c=0.1,
+        k=1.0,
+        f=Coulomb(at="q", friction=0.1),
+        a=Stop(at="q", position=0.5, restitution=0.5),
+        b=Stop(at="q", position=-0.5, side=-1),
+    )
     run = ns.simulate(system, periods=10)
     held = [any(word in name for word in ("stick", "rest")) for name in system.modes]
     return run, np.array(held)[run["mode"].values]
@@ -222,8 +254,11 @@ def test_forces_of_hyperstatic_contacts_lie_within_their_bounds() -> None:
 
 def test_forces_of_frictions_that_hold_together_lie_within_their_bounds() -> None:
     """Of least norm within the bounds: .45 and .3 under .75."""
-    system = one(lambda t, p: 0.75 * np.sin(0.5 * t), a=Coulomb(at="q", friction=0.3, static=0.6),
-                 b=Coulomb(at="q", friction=0.3))  # fmt: skip
+    system = one(
+        lambda t, p: 0.75 * np.sin(0.5 * t),
+        a=Coulomb(at="q", friction=0.3, static=0.6),
+        b=Coulomb(at="q", friction=0.3),
+    )
     run = ns.simulate(system, start={}, duration=np.pi, samples=3)
     assert run["a_force"].values[-1] == pytest.approx(-0.45, abs=1e-12)
     assert run["b_force"].values[-1] == pytest.approx(-0.3, abs=1e-12)
@@ -249,7 +284,7 @@ HOLDS = {
     "a": Coulomb(speed=lambda t, u, p: u.v, friction=0.2, static=0.35, **PULL),
     "b": Coulomb(speed=lambda t, u, p: u.v, friction=0.1, **PULL),
     "s": Stop(gap=lambda t, u, p: 0.9 - u.x, on={"v": -1.0}, restitution=0.3),
-}  # fmt: skip
+}
 
 
 def block(pull: Any = lambda u, p: 0 * u.x, **given: Any) -> ns.System:
@@ -266,9 +301,10 @@ def test_modes_of_the_systems_own_are_those_of_an_elastic_stop(start: list[float
         return lambda t, u, p: (u.v, 1.6 * np.cos(0.7 * t) - 0.05 * u.v - u.x - k * (u.x - 0.4))
 
     modes = block(
-        modes={"soft": field(0.0), "hard": field(5.0)}, indicators={"g": lambda t, u, p: u.x - 0.4},
+        modes={"soft": field(0.0), "hard": field(5.0)},
+        indicators={"g": lambda t, u, p: u.x - 0.4},
         transitions=[ns.Transition("soft", "hard", when="g > 0"), ns.Transition("hard", "soft", when="g < 0")],
-    )  # fmt: skip
+    )
     spring = ElasticStop(gap=lambda t, u, p: 0.4 - u.x, on={"v": -1.0}, stiffness=5.0)
     element = block(modes={"all": field(0.0)}, elements={**HOLDS, "spring": spring})
     grid = np.linspace(0, 5 * 2 * np.pi / 0.7, 101)
@@ -283,7 +319,7 @@ def test_a_reset_of_the_systems_own_sets_free_what_sticks(kick: float) -> None:
     system = block(
         period=2 * np.pi,
         transitions=[ns.Transition("all", "all", at=0.25, reset=lambda t, u, p: (u.x, u.v + kick))],
-    )  # fmt: skip
+    )
     run = ns.simulate(system, duration=6.0, start=[0.0, 0.0])
     if kick**2 / 0.6 < 0.9:
         assert run["crossing_time"].values[-1] == pytest.approx(np.pi / 2 + kick / 0.3, rel=1e-12)
@@ -295,9 +331,11 @@ def test_a_reset_of_the_systems_own_sets_free_what_sticks(kick: float) -> None:
 
 def test_memory_of_the_systems_own_loads_what_sticks() -> None:
     system = block(
-        lambda u, p: p.load, memory={"load": ""}, period=2 * np.pi,
+        lambda u, p: p.load,
+        memory={"load": ""},
+        period=2 * np.pi,
         transitions=[ns.Transition("all", "all", at=0.25, write={"load": lambda t, u, p: 0.5})],
-    )  # fmt: skip
+    )
     run = ns.simulate(system, duration=3.0, start=[0.0, 0.0])
     gone = 3.0 - np.pi / 2
     assert end(run) == pytest.approx([0.1 * gone**2, 0.2 * gone], abs=1e-14)
@@ -308,14 +346,18 @@ def test_memory_of_the_systems_own_loads_what_sticks() -> None:
 
 def rig(order: str = "abs") -> ns.System:
     elements = {
-        "a": Coulomb(at="q1", friction=0.2), "b": Coulomb(at={"q1": 1, "q2": -1}, friction=0.1, static=0.15),
+        "a": Coulomb(at="q1", friction=0.2),
+        "b": Coulomb(at={"q1": 1, "q2": -1}, friction=0.1, static=0.15),
         "s": Stop(at={"q1": 1, "q2": -1}, position=0.2, restitution=0.5),
-    }  # fmt: skip
+    }
     return ns.mechanical(
-        [[1.0, 0.0], [0.0, 1.3]], [[0.1, -0.05], [-0.05, 0.1]], [[2.0, -1.0], [-1.0, 2.0]],
-        parameters={"w": 0.7, "F": 0.8}, forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
+        [[1.0, 0.0], [0.0, 1.3]],
+        [[0.1, -0.05], [-0.05, 0.1]],
+        [[2.0, -1.0], [-1.0, 2.0]],
+        parameters={"w": 0.7, "F": 0.8},
+        forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
         elements={name: elements[name] for name in order},
-    )  # fmt: skip
+    )
 
 
 def test_the_order_of_elements_changes_nothing() -> None:

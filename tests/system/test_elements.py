@@ -20,18 +20,21 @@ NO_FORCE: dict[str, Any] = {"parameters": {"F": 0.0}, "forcing": {"a": lambda t,
 def shaken(**values: float) -> ns.System:
     """A mass under a force cos(w t), with a rigid stop on its right."""
     return ns.System(
-        states=["x", "v"], parameters={"w": 1.0, "k": 1.0, "c": 0.0, "d": 0.3, "e": 0.5},
+        states=["x", "v"],
+        parameters={"w": 1.0, "k": 1.0, "c": 0.0, "d": 0.3, "e": 0.5},
         modes={"all": lambda t, u, p: (u.v, np.cos(p.w * t) - p.k * u.x - p.c * u.v)},
         elements={"stop": Stop(gap=lambda t, u, p: p.d - u.x, on={"v": -1.0}, restitution="e")},
-    ).with_parameters(values)  # fmt: skip
+    ).with_parameters(values)
 
 
 def test_a_ball_comes_to_rest_when_its_bounces_end() -> None:
     """Accumulation 2 v0 / (g (1 - e)) after the first impact that leaves with the speed v0."""
     ball = ns.System(
-        states=["x", "v"], parameters={"g": 9.81, "e": 0.5}, modes={"fly": lambda t, u, p: (u.v, -p.g)},
+        states=["x", "v"],
+        parameters={"g": 9.81, "e": 0.5},
+        modes={"fly": lambda t, u, p: (u.v, -p.g)},
         elements={"floor": Stop(gap=lambda t, u, p: u.x, on={"v": 1.0}, restitution="e", creep=1e-12)},
-    )  # fmt: skip
+    )
     run = ns.simulate(ball, duration=2.0, start={"x": 1.0})
     first = np.sqrt(2 / 9.81)
     assert run["crossing_time"].values[-1] == pytest.approx(first + 2 * 0.5 * 9.81 * first / (9.81 * 0.5), abs=1e-12)
@@ -48,10 +51,12 @@ def test_a_ball_on_a_vibrating_table_lifts_off_with_its_acceleration(method: str
     """It rests through a part of each period: the flight that follows begins where the table falls as fast as it."""
     g, rate = 9.81, 2 * np.pi
     ball = ns.System(
-        states=["x", "v"], parameters={"A": 0.3, "w": rate, "g": g, "e": e},
-        modes={"fly": lambda t, u, p: (u.v, -p.g)}, scale={"x": 0.1},
+        states=["x", "v"],
+        parameters={"A": 0.3, "w": rate, "g": g, "e": e},
+        modes={"fly": lambda t, u, p: (u.v, -p.g)},
+        scale={"x": 0.1},
         elements=[Stop(gap=lambda t, u, p: u.x - p.A * np.cos(p.w * t), on={"v": 1.0}, restitution="e")],
-    )  # fmt: skip
+    )
     amplitudes = np.linspace(0.26, 0.31, 9)
     found = ns.sweep(ball, "A", amplitudes, start={"x": 1.0}, direction=None, progress=False, method=method)
     assert (found["period_number"] == 1).all() and (found["status"] == 0).all()
@@ -87,7 +92,7 @@ def test_a_stop_holds_and_no_impact_adds_energy() -> None:
 @pytest.mark.parametrize(
     ("start", "mode", "speed"),
     [((0.3, 0.0), "stop_rest", 0.0), ((0.3, 1.0), "stop_open", -0.5), ((0.3, -1.0), "stop_open", -1.0)],
-)  # fmt: skip
+)
 def test_a_start_on_the_stop(method: str, start: tuple[float, float], mode: str, speed: float) -> None:
     """It rests where the force presses, rebounds where it moves in, leaves where it moves out."""
     system = shaken()
@@ -101,9 +106,13 @@ def test_a_start_on_the_stop(method: str, start: tuple[float, float], mode: str,
 def test_friction_sticks_below_its_static_force_and_slips_with_its_kinetic_one() -> None:
     """Under a slowly rising force P sin(w t) the mass holds until P sin(w t) = static, then feels the kinetic one."""
     rig = ns.mechanical(
-        1.0, 0.0, 0.0, parameters={"w": 0.1}, forcing={"q": lambda t, p: np.sin(p.w * t)},
+        1.0,
+        0.0,
+        0.0,
+        parameters={"w": 0.1},
+        forcing={"q": lambda t, p: np.sin(p.w * t)},
         elements={"rub": Coulomb(at="q", friction=0.3, static=0.5)},
-    )  # fmt: skip
+    )
     run = ns.simulate(rig, duration=12.0)
     slip = np.arcsin(0.5) / 0.1
     assert run["crossing_time"].values[0] == pytest.approx(slip, rel=1e-13)
@@ -117,9 +126,13 @@ def test_friction_sticks_below_its_static_force_and_slips_with_its_kinetic_one()
 def test_impacts_between_masses_keep_the_momentum() -> None:
     """Two free masses with an elastic bumper, an inelastic one and a spring each: momentum before and after."""
     pair = ns.mechanical(
-        [[2.0, 0.0], [0.0, 1.0]], np.zeros((2, 2)), np.zeros((2, 2)), coordinates=["a", "b"], **NO_FORCE,
+        [[2.0, 0.0], [0.0, 1.0]],
+        np.zeros((2, 2)),
+        np.zeros((2, 2)),
+        coordinates=["a", "b"],
+        **NO_FORCE,
         elements={"bumper": Stop(at={"b": 1, "a": -1}, position=0.0, side=-1, restitution=0.25)},
-    )  # fmt: skip
+    )
     run = ns.simulate(pair, duration=3.0, start={"a": 0.0, "b": 1.0, "v_a": 1.0, "v_b": 0.0})
     before, after = run["u_before"].values[0], run["u_after"].values[0]
     assert run["crossing_time"].values == pytest.approx([1.0], rel=1e-14)
@@ -130,11 +143,16 @@ def test_impacts_between_masses_keep_the_momentum() -> None:
 def test_what_friction_holds_is_driven_away_by_an_impact() -> None:
     """A finite force bears no impulse: the struck mass leaves with (1 + e) / 2 and the momentum is kept."""
     pair = ns.mechanical(
-        np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), coordinates=["a", "b"], **NO_FORCE,
+        np.eye(2),
+        np.zeros((2, 2)),
+        np.zeros((2, 2)),
+        coordinates=["a", "b"],
+        **NO_FORCE,
         elements={
-            "bumper": Stop(at={"b": 1, "a": -1}, side=-1, restitution=0.25), "rub": Coulomb(at="b", friction=0.1),
+            "bumper": Stop(at={"b": 1, "a": -1}, side=-1, restitution=0.25),
+            "rub": Coulomb(at="b", friction=0.1),
         },
-    )  # fmt: skip
+    )
     run = ns.simulate(pair, duration=1.5, start={"a": 0.0, "b": 1.0, "v_a": 1.0})
     assert run["u_after"].values[0] == pytest.approx([1.0, 1.0, 0.375, 0.625], abs=1e-14)
     assert run["u"].values[-1] == pytest.approx([1.1875, 1.3, 0.375, 0.575], abs=1e-13)
@@ -153,11 +171,15 @@ def test_a_mass_that_rubs_rebounds() -> None:
 def test_friction_under_the_force_of_an_elastic_contact() -> None:
     """A wall pressed by 1 brakes the slider with 0.3 until it sticks; an open one lets it go."""
     slider = ns.mechanical(
-        np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), forcing={"q1": lambda t, p: 1.0},
+        np.eye(2),
+        np.zeros((2, 2)),
+        np.zeros((2, 2)),
+        forcing={"q1": lambda t, p: 1.0},
         elements={
-            "wall": ElasticStop(at="q1", stiffness=20.0), "rub": Coulomb(at="q2", friction=0.3, normal="wall"),
+            "wall": ElasticStop(at="q1", stiffness=20.0),
+            "rub": Coulomb(at="q2", friction=0.3, normal="wall"),
         },
-    )  # fmt: skip
+    )
     run = ns.simulate(slider, duration=5.0, start={"q1": 0.05, "v_q2": 1.0}, samples=11)
     assert run["u"].values[-1] == pytest.approx([0.05, 0.5 / 0.3, 0.0, 0.0], abs=1e-12)
     assert slider.modes[int(run["mode"][-1])] == "rub_stick_wall_contact"
@@ -171,14 +193,16 @@ def test_two_stops_of_a_mass_that_varies(rest: bool) -> None:
 
     def between(push: Callable[[Any], Any]) -> ns.System:
         return ns.System(
-            states=["x", "v"], parameters={"e": 0.5},
+            states=["x", "v"],
+            parameters={"e": 0.5},
             modes={"all": lambda t, u, p: (u.v, -u.x * u.v**2 / (1 + u.x**2))},
             elements={
-                "right": Stop(gap=lambda t, u, p: 1 - u.x, on={"v": lambda t, u, p: -push(u)}, restitution="e",
-                              rest=rest),
+                "right": Stop(
+                    gap=lambda t, u, p: 1 - u.x, on={"v": lambda t, u, p: -push(u)}, restitution="e", rest=rest
+                ),
                 "left": Stop(gap=lambda t, u, p: 1 + u.x, on={"v": lambda t, u, p: push(u)}, restitution="e"),
             },
-        )  # fmt: skip
+        )
 
     run = ns.simulate(between(lambda u: 1 / (1 + u.x**2)), duration=3.0, start={"v": 1.0})
     length = (np.sqrt(2) + np.arcsinh(1)) / 2  # of the track from 0 to 1: (1 + x^2) v^2 is kept
@@ -189,9 +213,11 @@ def test_two_stops_of_a_mass_that_varies(rest: bool) -> None:
 def test_an_elastic_contact_without_a_damper_acts_on_any_state() -> None:
     """x' = -x + F with F = -3 (x - 1) above 1: decay with the rate 4 down to x = 1, then with the rate 1."""
     diode = ns.System(
-        states=["x"], parameters={}, modes={"all": lambda t, u, p: (-u.x,)},
+        states=["x"],
+        parameters={},
+        modes={"all": lambda t, u, p: (-u.x,)},
         elements=[Backlash(displacement=lambda t, u, p: u.x, on={"x": 1.0}, half_width=1.0, stiffness=3.0)],
-    )  # fmt: skip
+    )
     run = ns.simulate(diode, duration=2.0, start={"x": 2.0})
     turn = np.log((2 - 0.75) / (1 - 0.75)) / 4  # x = 3/4 + (2 - 3/4) exp(-4 t)
     assert run["crossing_time"].values[-1] == pytest.approx(turn, rel=1e-13)
@@ -204,10 +230,14 @@ def test_a_block_rests_on_two_feet_and_tips_over_one() -> None:
     Height h and angle of a bar of mass 1 and inertia 1 on feet at -1 and 1, loaded by g = 1 and a moment a t: the feet
     bear (1 -+ a t) / 2, and one of them opens at a t = 1."""
     bar = ns.mechanical(
-        np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), coordinates=["h", "angle"], parameters={"a": 0.5},
+        np.eye(2),
+        np.zeros((2, 2)),
+        np.zeros((2, 2)),
+        coordinates=["h", "angle"],
+        parameters={"a": 0.5},
         forcing={"h": lambda t, p: -1.0, "angle": lambda t, p: p.a * t},
         elements={"left": Stop(at={"h": 1, "angle": 1}, side=-1), "right": Stop(at={"h": 1, "angle": -1}, side=-1)},
-    )  # fmt: skip
+    )
     run = ns.simulate(bar, duration=1.9, samples=20)
     t = run["time"].values
     assert np.allclose(run["left_force"].values[1:], 0.5 * (1 - 0.5 * t[1:]), atol=1e-13)
@@ -226,10 +256,12 @@ def test_the_papers_oscillator_is_one_elastic_stop() -> None:
         gap=lambda t, u, p: p.g - u.x, on={"v": lambda t, u, p: -1 / p.m}, stiffness="k_s", damping="c_s"
     )
     own = ns.System(
-        states=["x", "v"], parameters=dict(p), elements={"support": stop}, scale=dict(paper.scale),
-        modes={"free": lambda t, u, p: (
-            u.v, (p.rho * np.cos(p.omega * t) - 2 * p.k * u.x - p.c * u.v) / p.m)},
-    )  # fmt: skip
+        states=["x", "v"],
+        parameters=dict(p),
+        elements={"support": stop},
+        scale=dict(paper.scale),
+        modes={"free": lambda t, u, p: (u.v, (p.rho * np.cos(p.omega * t) - 2 * p.k * u.x - p.c * u.v) / p.m)},
+    )
     a, b = (ns.poincare(one, n=50, transient=50)["section"].values for one in (paper, own))
     assert np.allclose(a, b, atol=1e-11 * abs(a).max())
 
@@ -261,14 +293,15 @@ def test_a_contact_written_by_hand_lifts_off_where_its_force_vanishes() -> None:
         return u.v, np.cos(p.w * t) - u.x - p.c * u.v
 
     plastic = ns.System(
-        states=["x", "v"], parameters={"w": 0.3, "c": 0.1},
+        states=["x", "v"],
+        parameters={"w": 0.3, "c": 0.1},
         modes={"flight": flight, "contact": ns.Mode(lambda t, u, p: (0 * u.x,), states=["x"])},
         indicators={"stop": lambda t, u, p: u.x, "pressing": lambda t, u, p: np.cos(p.w * t) - u.x},
         transitions=[
             ns.Transition("flight", "contact", when="stop > 0", reset=lambda t, u, p: (0.0,)),
             ns.Transition("contact", "flight", when="pressing < 0", reset=lambda t, u, p: (0.0, 0.0)),
         ],
-    )  # fmt: skip
+    )
     found = ns.sweep(plastic, "w", np.linspace(0.15, 2.5, 41), start={"x": -0.5}, progress=False)
     assert (found["status"] == 0).all()
     run = ns.simulate(plastic, periods=1, start={"x": -0.5})
@@ -299,9 +332,11 @@ def test_a_law_of_the_speed_may_be_any_callable() -> None:
 def test_indicators_are_called_after_the_element_whose_they_are() -> None:
     """Also where two elements meet at the same place."""
     both = ns.mechanical(
-        1.0, 0.0, 1.0,
+        1.0,
+        0.0,
+        1.0,
         elements={"soft": ElasticStop(at="q", position=0.1, stiffness=1.0), "wall": Stop(at="q", position=0.1)},
-    )  # fmt: skip
+    )
     jump = next(t for t in both.transitions if t.source != t.target and "rest" in both.modes[t.target])
     assert {both.indicators[row.indicator].split("_")[0] for row in jump.rows} == {"wall"}
 
@@ -333,13 +368,16 @@ def test_what_is_refused_says_what_to_write() -> None:
 def test_multipliers_through_stick_and_rest() -> None:
     """Against differences of the map over one period, where the orbit sticks and, with a stop, also rests."""
     rig = ns.mechanical(
-        np.diag([1.0, 0.5]), [[0.1, -0.05], [-0.05, 0.05]], [[2.0, -1.0], [-1.0, 1.0]], parameters={"w": 0.7},
+        np.diag([1.0, 0.5]),
+        [[0.1, -0.05], [-0.05, 0.05]],
+        [[2.0, -1.0], [-1.0, 1.0]],
+        parameters={"w": 0.7},
         forcing={"q1": lambda t, p: np.cos(p.w * t)},
         elements={
             "rub": Coulomb(at="q1", friction=0.5, static=0.6),
             "wall": Stop(at="q2", position=0.5, restitution=0.3),
         },
-    )  # fmt: skip
+    )
     orbit = ns.find_orbit(rig)
     start = orbit.to_dataset()["section"].values.reshape(-1, 4)[0]
     visited = set(np.array(rig.modes)[ns.simulate(rig, periods=1, start=start, samples=200)["mode"].values])
@@ -357,12 +395,16 @@ def test_multipliers_through_stick_and_rest() -> None:
 
 def test_a_system_is_printed_with_its_elements_as_they_were_given() -> None:
     rig = ns.mechanical(
-        1.0, 0.1, 1.0, parameters={"mu": 0.3, "w": 2.0},
+        1.0,
+        0.1,
+        1.0,
+        parameters={"mu": 0.3, "w": 2.0},
         elements={
-            "f": Coulomb(at="q", friction="mu", belt=-0.5), "s": Stop(at="q", position=-0.2, side=-1),
+            "f": Coulomb(at="q", friction="mu", belt=-0.5),
+            "s": Stop(at="q", position=-0.2, side=-1),
             "g": Coulomb(at={"q": 2}, friction=lambda v, p: p.mu / (1 + v), belt=lambda t, u, p: np.sin(p.w * t)),
         },
-    )  # fmt: skip
+    )
     lines = [line.strip() for line in str(rig).splitlines()]
     assert 'elements    f: Coulomb(at="q", belt=-0.5, friction="mu")' in lines
     assert 's: Stop(at="q", position=-0.2, side=-1)' in lines
@@ -400,9 +442,14 @@ def test_small_numbers_without_scales_are_warned_of() -> None:
 
     def system(**scale: Any) -> ns.System:
         return ns.mechanical(
-            1.0, 0.2, 0.0, parameters={"w": 1.0}, forcing={"q": lambda t, p: 1e-7 * np.cos(p.w * t)}, **scale,
+            1.0,
+            0.2,
+            0.0,
+            parameters={"w": 1.0},
+            forcing={"q": lambda t, p: 1e-7 * np.cos(p.w * t)},
+            **scale,
             elements={"s": Stop(at="q", position=1e-7, restitution=0.5)},
-        )  # fmt: skip
+        )
 
     def large(t: Any, p: Any) -> Any:
         return np.cos(p.w * t)
@@ -414,9 +461,16 @@ def test_small_numbers_without_scales_are_warned_of() -> None:
         warnings.simplefilter("error")
         run = ns.simulate(system(scale={"q": 1e-7, "v_q": 1e-7}), periods=3)
     true = ns.simulate(
-        ns.mechanical(1.0, 0.2, 0.0, parameters={"w": 1.0}, forcing={"q": large},
-                      elements={"s": Stop(at="q", position=1.0, restitution=0.5)}), periods=3,
-    )  # fmt: skip
+        ns.mechanical(
+            1.0,
+            0.2,
+            0.0,
+            parameters={"w": 1.0},
+            forcing={"q": large},
+            elements={"s": Stop(at="q", position=1.0, restitution=0.5)},
+        ),
+        periods=3,
+    )
     assert run["u"].values[-1] * 1e7 == pytest.approx(true["u"].values[-1], rel=1e-9)
 
 
@@ -426,11 +480,18 @@ def test_what_sticks_or_rests_keeps_no_speed(impacts: str) -> None:
     for mass in (0.838, 2.4734, 0.41010313678540405):
         walls = {"up": Stop(at="q", position=0.5), "down": Stop(at="q", position=-0.8, side=-1, restitution=0.4)}
         system = ns.mechanical(
-            mass, 0.3, 1.0, parameters={}, forcing={"q": lambda t, p: 2.0 * np.cos(0.7 * t)}, impacts=impacts,
+            mass,
+            0.3,
+            1.0,
+            parameters={},
+            forcing={"q": lambda t, p: 2.0 * np.cos(0.7 * t)},
+            impacts=impacts,
             elements={"rub": Coulomb(at="q", friction=0.6), **walls},
-        )  # fmt: skip
+        )
         run = ns.simulate(system, periods=6, start={"q": 0.1})
-        held = [any(word in system.modes[system.transitions[k].target] for word in ("stick", "rest"))
-                for k in run.crossing_transition.values]  # fmt: skip
+        held = [
+            any(word in system.modes[system.transitions[k].target] for word in ("stick", "rest"))
+            for k in run.crossing_transition.values
+        ]
         assert sum(held) > 4
         assert not run.u_after.values[held, 1].any()

@@ -18,7 +18,7 @@ def mass(force: Any = None, **elements: Any) -> ns.System:
     """q'' = force + the elements' forces."""
     return ns.mechanical(
         1.0, 0.0, 0.0, parameters={}, forcing={"q": force} if force else None, elements=elements, coordinates=["q"]
-    )  # fmt: skip
+    )
 
 
 def run(system: ns.System, duration: float, q: float, v: float) -> Any:
@@ -113,9 +113,13 @@ def test_an_impact_turns_the_speed_round_by_the_restitution(side: int, e: float)
     with pytest.raises(ns.SystemDefinitionError, match="between 0 and 1"):
         E.Stop(at="q", position=0.3, restitution=1.1)
     by_name = ns.mechanical(
-        1.0, 0.0, 0.0, parameters={"e": 0.5}, elements={"s": E.Stop(at="q", position=1.0, restitution="e")},
+        1.0,
+        0.0,
+        0.0,
+        parameters={"e": 0.5},
+        elements={"s": E.Stop(at="q", position=1.0, restitution="e")},
         coordinates=["q"],
-    )  # fmt: skip
+    )
     for wrong in (1.1, -0.1):
         with pytest.raises(ValueError, match="restitution of element 's' lies between 0 and 1"):
             by_name.with_parameters(e=wrong)

@@ -50,12 +50,24 @@ def traced():
     )
     outputs = tuple((corner, smooth) for corner, smooth in zip(CORNERS, SMOOTH, strict=False))
     return Traced(
-        name="made", t=T, u=(X, Y), p=(A, B, Q), m=(M,), state_names=("x", "lambda"),
-        parameter_names=("t", "def", "q0"), memory_names=("C",), mode_names=("first", "second"),
-        indicator_names=("gap", "other"), output_names=tuple(f"o{i}" for i in range(len(outputs))),
-        fields=((SMOOTH[0], SMOOTH[2]), (SMOOTH[7], sp.S.Zero)), lacking=((False, False), (False, True)),
-        indicators=(SMOOTH[3], SMOOTH[5]), transitions=transitions, outputs=outputs, period=None,
-    )  # fmt: skip
+        name="made",
+        t=T,
+        u=(X, Y),
+        p=(A, B, Q),
+        m=(M,),
+        state_names=("x", "lambda"),
+        parameter_names=("t", "def", "q0"),
+        memory_names=("C",),
+        mode_names=("first", "second"),
+        indicator_names=("gap", "other"),
+        output_names=tuple(f"o{i}" for i in range(len(outputs))),
+        fields=((SMOOTH[0], SMOOTH[2]), (SMOOTH[7], sp.S.Zero)),
+        lacking=((False, False), (False, True)),
+        indicators=(SMOOTH[3], SMOOTH[5]),
+        transitions=transitions,
+        outputs=outputs,
+        period=None,
+    )
 
 
 PARAMETERS = (0.75, -1.5, 2.25)
@@ -198,10 +210,24 @@ def test_large_model_stays_compact():
     x, v = u[:n], u[n:]
     forces = [A * (x[(i + 1) % n] + x[i - 1] - 2 * x[i]) - x[i] ** 3 - B * v[i] for i in range(n)]
     big = Traced(
-        name="chain", t=T, u=u, p=(A, B), m=(), state_names=tuple(map(str, u)), parameter_names=("a", "b"),
-        memory_names=(), mode_names=("only",), indicator_names=("g",), output_names=(), fields=((*v, *forces),),
-        lacking=((False,) * len(u),), indicators=(x[0] - 1,), transitions=(), outputs=(), period=None,
-    )  # fmt: skip
+        name="chain",
+        t=T,
+        u=u,
+        p=(A, B),
+        m=(),
+        state_names=tuple(map(str, u)),
+        parameter_names=("a", "b"),
+        memory_names=(),
+        mode_names=("only",),
+        indicator_names=("g",),
+        output_names=(),
+        fields=((*v, *forces),),
+        lacking=((False,) * len(u),),
+        indicators=(x[0] - 1,),
+        transitions=(),
+        outputs=(),
+        period=None,
+    )
     source = model_source(big)
     assert len(source) < 60_000
     assert "N_SCRATCH = 40\n" in source

@@ -24,10 +24,12 @@ def balls(restitution, impacts, count=3):
 @pytest.mark.parametrize(
     ("restitution", "impacts", "speeds"),
     [
-        (1.0, "simultaneous", (-1 / 3, 2 / 3, 2 / 3)), (1.0, "sequential", (0, 0, 1)),
-        (0.0, "simultaneous", (1 / 3, 1 / 3, 1 / 3)), (0.0, "sequential", (1 / 3, 1 / 3, 1 / 3)),
+        (1.0, "simultaneous", (-1 / 3, 2 / 3, 2 / 3)),
+        (1.0, "sequential", (0, 0, 1)),
+        (0.0, "simultaneous", (1 / 3, 1 / 3, 1 / 3)),
+        (0.0, "sequential", (1 / 3, 1 / 3, 1 / 3)),
     ],
-)  # fmt: skip
+)
 def test_three_balls_that_touch(restitution, impacts, speeds):
     """Of a row in touch the last one leaves (Newton's cradle), or all part at once."""
     run = ns.simulate(balls(restitution, impacts), duration=1.0, start={"v_q1": 1.0})

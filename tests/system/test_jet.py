@@ -22,12 +22,24 @@ def make(fields, indicators=(), outputs=()):
     """A Traced of one mode in x, y, z with the parameters a, b."""
     u = (X, Y, Z)[: len(fields)]
     return Traced(
-        name="made", t=T, u=u, p=(A, B), m=(), state_names=tuple(map(str, u)), parameter_names=("a", "b"),
-        memory_names=(), mode_names=("only",), indicator_names=tuple(f"g{i}" for i in range(len(indicators))),
-        output_names=tuple(f"o{i}" for i in range(len(outputs))), fields=(tuple(map(sp.sympify, fields)),),
-        lacking=((False,) * len(fields),), indicators=tuple(map(sp.sympify, indicators)), transitions=(),
-        outputs=tuple((sp.sympify(o),) for o in outputs), period=None,
-    )  # fmt: skip
+        name="made",
+        t=T,
+        u=u,
+        p=(A, B),
+        m=(),
+        state_names=tuple(map(str, u)),
+        parameter_names=("a", "b"),
+        memory_names=(),
+        mode_names=("only",),
+        indicator_names=tuple(f"g{i}" for i in range(len(indicators))),
+        output_names=tuple(f"o{i}" for i in range(len(outputs))),
+        fields=(tuple(map(sp.sympify, fields)),),
+        lacking=((False,) * len(fields),),
+        indicators=tuple(map(sp.sympify, indicators)),
+        transitions=(),
+        outputs=tuple((sp.sympify(o),) for o in outputs),
+        period=None,
+    )
 
 
 def series(traced, u, t=0.0, order=12):

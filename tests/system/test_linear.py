@@ -21,17 +21,26 @@ def make(*fields, indicators=(), outputs=(), resets=(), period=None, u=(X, Y), m
     """A Traced with one mode for each field, and one transition for each reset (or None)."""
     modes, sympify = range(len(fields)), sp.sympify
     return Traced(
-        name="made", t=T, u=u, p=(A, B, W), m=memory, state_names=tuple(map(str, u)), parameter_names=("a", "b", "w"),
-        memory_names=tuple(map(str, memory)), mode_names=tuple(f"mode{i}" for i in modes),
+        name="made",
+        t=T,
+        u=u,
+        p=(A, B, W),
+        m=memory,
+        state_names=tuple(map(str, u)),
+        parameter_names=("a", "b", "w"),
+        memory_names=tuple(map(str, memory)),
+        mode_names=tuple(f"mode{i}" for i in modes),
         indicator_names=tuple(f"g{i}" for i in range(len(indicators))),
         output_names=tuple(f"o{i}" for i in range(len(outputs))),
-        fields=tuple(tuple(map(sympify, f)) for f in fields), lacking=tuple((False,) * len(u) for _ in modes),
+        fields=tuple(tuple(map(sympify, f)) for f in fields),
+        lacking=tuple((False,) * len(u) for _ in modes),
         indicators=tuple(map(sympify, indicators)),
         transitions=tuple(
             TracedTransition(0, 0, (Row(0, 1),), reset=None if r is None else tuple(map(sympify, r))) for r in resets
         ),
-        outputs=tuple(tuple(map(sympify, o)) for o in outputs), period=period,
-    )  # fmt: skip
+        outputs=tuple(tuple(map(sympify, o)) for o in outputs),
+        period=period,
+    )
 
 
 POINTS = np.array([[0.7, -1.3, 2.1], [0.2, 0.4, 5.0], [-1.0, 3.0, 0.3]])
@@ -134,9 +143,14 @@ def test_switched_oscillator_has_linear_modes_and_nonlinear_indicators():
 def test_two_degrees_of_freedom():
     u = (X, Y, Z, V)
     form, tables = check(
-        make((Z, V, -2 * X + Y - A * Z + B * sp.cos(W * T), X - 2 * Y - A * V), indicators=[X - Y - A],
-             resets=[(X, Y, -A * Z + B * V, Z)], period=PERIOD, u=u)
-    )  # fmt: skip
+        make(
+            (Z, V, -2 * X + Y - A * Z + B * sp.cos(W * T), X - 2 * Y - A * V),
+            indicators=[X - Y - A],
+            resets=[(X, Y, -A * Z + B * V, Z)],
+            period=PERIOD,
+            u=u,
+        )
+    )
     assert form.affine_resets
     assert tables.A.shape == (3, 1, 4, 4)
 
@@ -189,16 +203,28 @@ def test_cancelling_terms_are_multiplied_out():
         make((Y, -X), (Y, X * Y)),
         make((Y, -X * MEMORY), memory=(MEMORY,)),
     ],
-    ids=["cubic", "parametric forcing", "pendulum", "ramp", "no period", "two frequencies", "irrational",
-         "decaying", "not harmonic", "second mode", "memory times a state"],
-)  # fmt: skip
+    ids=[
+        "cubic",
+        "parametric forcing",
+        "pendulum",
+        "ramp",
+        "no period",
+        "two frequencies",
+        "irrational",
+        "decaying",
+        "not harmonic",
+        "second mode",
+        "memory times a state",
+    ],
+)
 def test_not_linear(traced):
     assert linear_form(traced) is None
 
 
 def test_memory_is_a_state_that_only_transitions_change():
-    traced = make((Y, A * MEMORY - X), indicators=[X - B * MEMORY], outputs=[[MEMORY + Y]], resets=[(X, MEMORY)],
-                  memory=(MEMORY,))  # fmt: skip
+    traced = make(
+        (Y, A * MEMORY - X), indicators=[X - B * MEMORY], outputs=[[MEMORY + Y]], resets=[(X, MEMORY)], memory=(MEMORY,)
+    )
     jump = traced.transitions[0]
     form = linear_form(replace(traced, transitions=(jump, replace(jump, reset=None, writes=((0, MEMORY / 2 + Y),)))))
     assert form.affine_indicators and form.affine_outputs and form.affine_resets

@@ -14,20 +14,25 @@ import nonsmooth as ns
 def tent(**more: Any) -> ns.Map:
     """A tent with a step: the branches do not agree on the border."""
     return ns.Map(
-        name="tent", states=["x"], parameters={"a": 1.7, "c": 0.3, "step": 0.1},
+        name="tent",
+        states=["x"],
+        parameters={"a": 1.7, "c": 0.3, "step": 0.1},
         branches=[
             ns.Branch(lambda u, p: (p.a * u.x,), when="right < 0"),
             ns.Branch(lambda u, p: (p.a * (2 * p.c - u.x) - p.step,), when="right > 0"),
         ],
-        indicators={"right": lambda u, p: u.x - p.c}, **more,
-    )  # fmt: skip
+        indicators={"right": lambda u, p: u.x - p.c},
+        **more,
+    )
 
 
 def one_state(*branches: tuple[Any, str], **indicators: Any) -> ns.Map:
     return ns.Map(
-        states=["x"], parameters={"a": 1.0}, branches=[ns.Branch(f, when=when) for f, when in branches],
+        states=["x"],
+        parameters={"a": 1.0},
+        branches=[ns.Branch(f, when=when) for f, when in branches],
         indicators=indicators,
-    )  # fmt: skip
+    )
 
 
 def same(u: Any, p: Any) -> Any:
@@ -74,17 +79,26 @@ def test_a_map_is_a_system_that_travels_as_text():
     ("branches", "indicators", "message"),
     [
         ([(same, "x < 0")], {}, "lies in no region"),
-        ([(same, "x < 0"), (same, "x > 0"), (same, "far > 0")], {"far": lambda u, p: u.x - p.a},
-         "regions of the branches 2 and 3"),
-        ([(same, "low < 0"), (same, "high > 0")],
-         {"low": lambda u, p: u.x + p.a, "high": lambda u, p: u.x - p.a}, "lies in no region"),
-        ([(same, "curved < 0"), (same, "x > 0"), (same, "x < 0")], {"curved": lambda u, p: u.x**2 - p.a},
-         "regions of the branches 1 and"),
+        (
+            [(same, "x < 0"), (same, "x > 0"), (same, "far > 0")],
+            {"far": lambda u, p: u.x - p.a},
+            "regions of the branches 2 and 3",
+        ),
+        (
+            [(same, "low < 0"), (same, "high > 0")],
+            {"low": lambda u, p: u.x + p.a, "high": lambda u, p: u.x - p.a},
+            "lies in no region",
+        ),
+        (
+            [(same, "curved < 0"), (same, "x > 0"), (same, "x < 0")],
+            {"curved": lambda u, p: u.x**2 - p.a},
+            "regions of the branches 1 and",
+        ),
         ([(same, "x < 0"), (same, "y > 0")], {}, "`y` is not an indicator"),
         ([(same, "x < 0"), (lambda u, p: (u.x, u.x), "x > 0")], {}, "branch 2 must return 1 value"),
         ([(same, "x < 0"), (lambda t, u, p: (u.x,), "x > 0")], {}, r"called as f\(u, p\)"),
     ],
-)  # fmt: skip
+)
 def test_regions_that_do_not_cover_the_states_once(branches: Any, indicators: Any, message: str):
     with pytest.raises(ns.SystemDefinitionError, match=message):
         one_state(*branches, **indicators)
@@ -102,8 +116,13 @@ def test_signs_that_no_point_has_are_no_gap():
     """Three pieces: nothing lies below -a and above a at once."""
     low, high = lambda u, p: u.x + p.a, lambda u, p: u.x - p.a
     one_state((same, "low < 0"), (same, "low > 0 and high < 0"), (same, "high > 0"), low=low, high=high)
-    one_state((same, "low < 0 and high < 0"), (same, "low > 0 and high < 0"), (same, "low > 0 and high > 0"), low=low,
-              high=high)  # fmt: skip
+    one_state(
+        (same, "low < 0 and high < 0"),
+        (same, "low > 0 and high < 0"),
+        (same, "low > 0 and high > 0"),
+        low=low,
+        high=high,
+    )
 
 
 def test_a_region_that_opens_at_other_values_ends_the_run():

@@ -85,9 +85,14 @@ def test_a_mass_that_rests_on_a_stop_goes_where_the_stop_goes(others: dict[str, 
     """Pressed by 2 + .1 cos t against its own spring it rests at q = d, whether d falls under it or away from it."""
     stop = E.Stop(at="q", position="d")
     system = ns.mechanical(
-        1.0, 0.2, 1.0, parameters={"d": 0.5, "w": 1.0}, forcing={"q": lambda t, p: 2.0 + 0.1 * np.cos(p.w * t)},
-        elements={"stop": stop, **others}, coordinates=["q"],
-    )  # fmt: skip
+        1.0,
+        0.2,
+        1.0,
+        parameters={"d": 0.5, "w": 1.0},
+        forcing={"q": lambda t, p: 2.0 + 0.1 * np.cos(p.w * t)},
+        elements={"stop": stop, **others},
+        coordinates=["q"],
+    )
     values = np.linspace(0.5, 0.8, 4)
     swept = ns.sweep(
         system, "d", values, direction=direction, start={"q": 0.5}, transient=20, keep=3, max_period=1, progress=False
@@ -102,9 +107,14 @@ def test_a_stop_that_moves_by_a_ramp_pushes_the_mass() -> None:
     """A mass that rests on it stays within 1e-4 of the scale: the ramp moves by a hundred times that."""
     stop = E.Stop(at="q", position="d")
     system = ns.mechanical(
-        1.0, 0.2, 1.0, parameters={"d": 0.8}, forcing={"q": lambda t, p: 2.0}, elements={"stop": stop},
+        1.0,
+        0.2,
+        1.0,
+        parameters={"d": 0.8},
+        forcing={"q": lambda t, p: 2.0},
+        elements={"stop": stop},
         coordinates=["q"],
-    )  # fmt: skip
+    )
     run = ns.simulate(system, duration=0.6, start={"q": 0.8}, ramps={"d": (0.8, 0.79)})
     assert run["u"].sel(state="q").values == pytest.approx(0.8 - 0.01 * run["time"].values / 0.6, abs=1.1e-4)
 
@@ -114,9 +124,14 @@ def test_an_impact_slower_than_creep_under_a_pull_rebounds(others: dict[str, Any
     v = 0.05
     stop = E.Stop(at="q", position=0.5, restitution=0.5, creep=0.1)
     system = ns.mechanical(
-        1.0, 0.0, 0.0, parameters={"w": 1.0}, forcing={"q": lambda t, p: -1.0 + 0.0 * np.cos(p.w * t)},
-        elements={"stop": stop, **others}, coordinates=["q"],
-    )  # fmt: skip
+        1.0,
+        0.0,
+        0.0,
+        parameters={"w": 1.0},
+        forcing={"q": lambda t, p: -1.0 + 0.0 * np.cos(p.w * t)},
+        elements={"stop": stop, **others},
+        coordinates=["q"],
+    )
     first = np.sqrt(1.0 + v**2)  # v0^2 = v^2 + 2 * 1/2
     run = ns.simulate(system, duration=first - v + 0.3, start={"v_q": first})
     assert run["crossing_time"].values == pytest.approx([first - v], abs=1e-10)
@@ -129,11 +144,12 @@ def test_what_was_taken_off_a_surface_decays_at_the_same_rate_whatever_its_gradi
 
     for length in (1.0, 30.0):
         system = System(
-            states=["x", "y"], parameters={"L": length},
+            states=["x", "y"],
+            parameters={"L": length},
             modes={"below": lambda t, u, p: (1.0, 0.5), "above": lambda t, u, p: (1.0, -2.0)},
             indicators={"h": lambda t, u, p: p.L * (u.x + 2 * u.y)},
             transitions=[Surface("h", below="below", above="above", field=lambda t, u, p: (2.0, -1.0))],
-        )  # fmt: skip
+        )
         off = 1e-9
         run = ns.simulate(system, duration=1.5, start={"x": off}, mode="h_sliding")
         x, y = end(run)
@@ -146,8 +162,10 @@ def test_a_gap_between_regions_of_a_map_is_shown_in_the_units_of_its_states() ->
     still = lambda u, p: (0.5 * u.x,)
     with pytest.raises(ns.SystemDefinitionError, match="lies in no region") as caught:
         ns.Map(
-            states=["x"], parameters={"a": 1.0}, scale={"x": 100.0},
+            states=["x"],
+            parameters={"a": 1.0},
+            scale={"x": 100.0},
             branches=[ns.Branch(still, when="low < 0"), ns.Branch(still, when="high > 0")],
             indicators={"low": lambda u, p: u.x - 200 * p.a, "high": lambda u, p: u.x - 500 * p.a},
-        )  # fmt: skip
+        )
     assert 200.0 < float(re.search(r"x = (\S+) lies", str(caught.value))[1]) < 500.0

@@ -20,14 +20,18 @@ def pair() -> ns.System:
     """Two masses that rub, hit a wall and press against each other; four states and one harmonic."""
     stiffness = np.array([[2.0, -1.0], [-1.0, 2.0]])
     return ns.mechanical(
-        np.eye(2), 0.05 * stiffness, stiffness, parameters={"F": 1.0, "w": 0.7, "mu": 0.1, "e": 0.6, "k": 5.0},
-        forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)}, outputs={"power": lambda t, u, p: p.k * u.q1},
+        np.eye(2),
+        0.05 * stiffness,
+        stiffness,
+        parameters={"F": 1.0, "w": 0.7, "mu": 0.1, "e": 0.6, "k": 5.0},
+        forcing={"q1": lambda t, p: p.F * np.cos(p.w * t)},
+        outputs={"power": lambda t, u, p: p.k * u.q1},
         elements={
             "rub": Coulomb(at="q1", friction="mu", static=lambda t, u, p: 1.3 * p.mu),
             "wall": Stop(at="q2", position=0.4, restitution="e"),
             "soft": ElasticStop(at={"q1": 1, "q2": -1}, position=0.5, stiffness="k", damping=0.1),
         },
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture
@@ -67,8 +71,16 @@ def test_section_points_and_sweeps_are_the_same(both: tuple[ns.System, ns.System
     values = np.linspace(0.3, 1.2, 7)
     a, b = (ns.frequency_response(s, values, parameter="w", direction="both", progress=False) for s in both)
     assert (a["period_number"] == b["period_number"]).all() and (a["status"] == b["status"]).all()
-    for name in ("section", "maximum", "minimum", "amplitude", "contacts_per_period", "wall_force_maximum",
-                 "rub_force_minimum", "power_maximum"):  # fmt: skip
+    for name in (
+        "section",
+        "maximum",
+        "minimum",
+        "amplitude",
+        "contacts_per_period",
+        "wall_force_maximum",
+        "rub_force_minimum",
+        "power_maximum",
+    ):
         assert np.allclose(a[name], b[name], rtol=0, atol=1e-10), name
 
 
@@ -102,9 +114,11 @@ def test_exponents_are_those_of_the_system_written_out(both: tuple[ns.System, ns
 def test_what_cannot_be_done_with_patterns_is_refused(both: tuple[ns.System, ns.System]) -> None:
     made = both[1]
     verbs: list[Any] = [
-        lambda s: s.smoothed(0.1), lambda s: s.derivatives, lambda s: s.to_latex(),
+        lambda s: s.smoothed(0.1),
+        lambda s: s.derivatives,
+        lambda s: s.to_latex(),
         lambda s: ns.simulate(s, periods=1, ramps={"w": (0.5, 0.6)}),
-    ]  # fmt: skip
+    ]
     for verb in verbs:
         with pytest.raises(ns.SystemDefinitionError, match="made when a run first visits it"):
             verb(made)
@@ -119,9 +133,12 @@ def test_what_cannot_be_done_with_patterns_is_refused(both: tuple[ns.System, ns.
         ns.simulate(stribeck, duration=1.0)
     with pytest.raises(ns.SystemDefinitionError, match="one mode and no indicators"):
         ns.System(
-            states=["x", "v"], parameters={}, modes={"a": lambda t, u, p: (u.v, -u.x)},
-            indicators={"middle": lambda t, u, p: u.x}, elements=[Stop(gap=lambda t, u, p: 1 - u.x, on={"v": -1.0})],
-        )  # fmt: skip
+            states=["x", "v"],
+            parameters={},
+            modes={"a": lambda t, u, p: (u.v, -u.x)},
+            indicators={"middle": lambda t, u, p: u.x},
+            elements=[Stop(gap=lambda t, u, p: 1 - u.x, on={"v": -1.0})],
+        )
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -138,9 +155,13 @@ def test_an_instant_asks_the_elements_that_it_concerns(seed: int, monkeypatch: p
 
     def row() -> ns.System:
         return ns.mechanical(
-            np.eye(6), 0.1 * stiffness, stiffness, parameters={"w": 0.6},
-            forcing={f"q{i}": lambda t, p: np.cos(p.w * t) for i in (1, 4)}, elements=elements,
-        )  # fmt: skip
+            np.eye(6),
+            0.1 * stiffness,
+            stiffness,
+            parameters={"w": 0.6},
+            forcing={f"q{i}": lambda t, p: np.cos(p.w * t) for i in (1, 4)},
+            elements=elements,
+        )
 
     monkeypatch.setattr(combinations, "MOST", 0)
     asked: list[bool] = []

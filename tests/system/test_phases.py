@@ -16,11 +16,13 @@ from nonsmooth.kernels.hybrid.kept import Section
 def heater(duty: float = 0.3, **more: float) -> ns.System:
     """x' = gain - x in the first part of each period, x' = -x in the rest: a linear map from period to period."""
     return ns.System(
-        name="heater", states=["x"], parameters={"duty": duty, "gain": 2.0, "span": 1.0},
+        name="heater",
+        states=["x"],
+        parameters={"duty": duty, "gain": 2.0, "span": 1.0},
         modes={"on": lambda t, u, p: (p.gain - u.x,), "off": lambda t, u, p: (-u.x,)},
         transitions=[ns.Transition("on", "off", at=lambda p: p.duty), ns.Transition("off", "on", at=0.0)],
         period=lambda p: p.span,
-    )  # fmt: skip
+    )
 
 
 def steady(duty: float, span: float = 1.0) -> float:
@@ -97,13 +99,15 @@ def test_a_phase_outside_the_period_is_refused(duty: float):
 
 def test_a_phase_depends_on_parameters_alone():
     def system(at: Any) -> ns.System:
-        kick = ns.Transition(
-            "one", "one", at=at, reset=lambda t, u, p: (u.x + 1,), write={"kept": lambda t, u, p: u.x}
-        )
+        kick = ns.Transition("one", "one", at=at, reset=lambda t, u, p: (u.x + 1,), write={"kept": lambda t, u, p: u.x})
         return ns.System(
-            states=["x"], parameters={"a": 0.5}, modes={"one": lambda t, u, p: (-u.x,)}, period=1.0,
-            memory={"kept": ""}, transitions=[kick],
-        )  # fmt: skip
+            states=["x"],
+            parameters={"a": 0.5},
+            modes={"one": lambda t, u, p: (-u.x,)},
+            period=1.0,
+            memory={"kept": ""},
+            transitions=[kick],
+        )
 
     assert system(lambda p: 0.25).transitions[0].at == 0.25
     with pytest.raises(ns.SystemDefinitionError, match="may depend on the parameters only"):

@@ -9,9 +9,11 @@ import nonsmooth as ns
 def quadrants(g, h, pp, pm, mp, mm):
     """The surfaces between four modes, by the signs of two indicators."""
     return [
-        ns.Surface(g, below=mp, above=pp), ns.Surface(g, below=mm, above=pm),
-        ns.Surface(h, below=pm, above=pp), ns.Surface(h, below=mm, above=mp),
-    ]  # fmt: skip
+        ns.Surface(g, below=mp, above=pp),
+        ns.Surface(g, below=mm, above=pm),
+        ns.Surface(h, below=pm, above=pp),
+        ns.Surface(h, below=mm, above=mp),
+    ]
 
 
 def twisting(load=0.0, r1=10.0, r2=3.0):
@@ -22,11 +24,13 @@ def twisting(load=0.0, r1=10.0, r2=3.0):
 
     sides = {"pp": (1, 1), "pm": (1, -1), "mp": (-1, 1), "mm": (-1, -1)}
     return ns.System(
-        name="twisting controller", states=["x1", "x2"], parameters={},
+        name="twisting controller",
+        states=["x1", "x2"],
+        parameters={},
         modes={key: field(*s) for key, s in sides.items()},
         indicators={"h1": lambda t, u, p: u.x1, "h2": lambda t, u, p: u.x2},
         transitions=quadrants("h1", "h2", "pp", "pm", "mp", "mm"),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("speed", [1.0, -0.5])
@@ -57,11 +61,12 @@ def test_surfaces_of_relative_degree_one_stay_filippovs():
         return lambda t, u, p: (-a, -2 * b)
 
     system = ns.System(
-        states=["x", "y"], parameters={},
+        states=["x", "y"],
+        parameters={},
         modes={"a": field(1, 1), "b": field(1, -1), "c": field(-1, 1), "d": field(-1, -1)},
         indicators={"h": lambda t, u, p: u.x, "g": lambda t, u, p: u.y},
         transitions=quadrants("h", "g", "a", "b", "c", "d"),
-    )  # fmt: skip
+    )
     assert len(system.surfaces) == 4
     assert "h_g_sliding" in system.modes
 
@@ -77,11 +82,12 @@ def with_strengths():
         return lambda t, u, p: (u.x2, p.load - p.r1 * a - p.r2 * b)
 
     return ns.System(
-        states=["x1", "x2"], parameters={"r1": 10.0, "r2": 3.0, "load": 0.0},
+        states=["x1", "x2"],
+        parameters={"r1": 10.0, "r2": 3.0, "load": 0.0},
         modes={"pp": field(1, 1), "pm": field(1, -1), "mp": field(-1, 1), "mm": field(-1, -1)},
         indicators={"h1": lambda t, u, p: u.x1, "h2": lambda t, u, p: u.x2},
         transitions=quadrants("h1", "h2", "pp", "pm", "mp", "mm"),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(("load", "holds"), [(8.9, True), (9.1, False)])

@@ -15,11 +15,14 @@ G = 9.81
 def floor(friction, restitution=0.0, angle=0.0, forcing=None, normal=None, damping=0.0, stiffness=0.0, **options):
     """A unit mass above a rigid floor, x along it and y away from it; gravity inclined by an angle."""
     return ns.mechanical(
-        np.eye(2), np.diag([damping, 0.0]), np.diag([stiffness, 0.0]), coordinates=["x", "y"],
+        np.eye(2),
+        np.diag([damping, 0.0]),
+        np.diag([stiffness, 0.0]),
+        coordinates=["x", "y"],
         parameters={"w": 1.0} if forcing or normal else {},
         forcing={"x": forcing or (lambda t, p: -G * np.sin(angle)), "y": normal or (lambda t, p: -G * np.cos(angle))},
         elements={"floor": E.Stop(at="y", side=-1, restitution=restitution, friction=friction, tangent="x", **options)},
-    )  # fmt: skip
+    )
 
 
 class TestImpacts:
@@ -51,7 +54,11 @@ class TestImpacts:
     def test_a_ball_that_bounces_with_spin(self, friction, slip):
         """A solid ball: G_tt = 7/2 of the mass; the slip falls by 3.5 mu (1 + e), or ends."""
         ball = ns.mechanical(
-            np.diag([1.0, 1.0, 0.4]), np.zeros((3, 3)), np.zeros((3, 3)), parameters={}, coordinates=["x", "y", "r"],
+            np.diag([1.0, 1.0, 0.4]),
+            np.zeros((3, 3)),
+            np.zeros((3, 3)),
+            parameters={},
+            coordinates=["x", "y", "r"],
             elements={"s": E.Stop(at="y", side=-1, restitution=0.5, friction=friction, tangent={"x": 1, "r": 1})},
         )
         run = ns.simulate(ball, duration=1.5, start={"y": 1.0, "v_y": -1.0, "v_x": 1.0})
@@ -109,12 +116,18 @@ class TestSliding:
     @pytest.mark.parametrize("friction", [0.05, 0.12])
     def test_under_gravity_it_is_dry_friction_of_that_force(self, friction):
         """Sticking, slipping and turning as ``Coulomb`` has it with the weight as normal force."""
+
         def load(t, p):
             return np.cos(p.w * t)
 
         own = floor(friction, forcing=load, stiffness=2.0, damping=0.1)
         other = ns.mechanical(
-            1.0, 0.1, 2.0, coordinates=["x"], parameters={"w": 1.0}, forcing={"x": load},
+            1.0,
+            0.1,
+            2.0,
+            coordinates=["x"],
+            parameters={"w": 1.0},
+            forcing={"x": load},
             elements={"f": E.Coulomb(at="x", friction=friction * G)},
         )
         one, two = (ns.simulate(s, periods=10, start={"x": 0.5}, samples=501) for s in (own, other))
@@ -123,12 +136,18 @@ class TestSliding:
 
     def test_with_a_load_that_varies_it_is_friction_of_that_normal_force(self):
         """Never lifting: friction that follows the load; Coulomb has the same normal force as a function."""
+
         def down(t, p):
             return -(2.0 + 1.5 * np.cos(p.w * t + 1.0))
 
         own = floor(0.3, forcing=lambda t, p: np.cos(p.w * t), normal=down, stiffness=0.5)
         other = ns.mechanical(
-            1.0, 0.0, 0.5, coordinates=["x"], parameters={"w": 1.0}, forcing={"x": lambda t, p: np.cos(p.w * t)},
+            1.0,
+            0.0,
+            0.5,
+            coordinates=["x"],
+            parameters={"w": 1.0},
+            forcing={"x": lambda t, p: np.cos(p.w * t)},
             elements={"f": E.Coulomb(at="x", friction=0.3, normal=lambda t, u, p: -down(t, p))},
         )
         one, two = (ns.simulate(s, periods=8, samples=401) for s in (own, other))
@@ -141,7 +160,9 @@ class TestSliding:
         a, mu, v = 2.0, 0.3, 50.0
         run = ns.simulate(
             floor(mu, normal=lambda t, p: -(1.0 - a * np.sin(p.w * t)), forcing=lambda t, p: 0.0 * np.cos(p.w * t)),
-            duration=2.0, start={"v_x": v}, samples=[2.0],
+            duration=2.0,
+            start={"v_x": v},
+            samples=[2.0],
         )
         lift = np.arcsin(1 / a)
         assert float(run.crossing_time[0]) == pytest.approx(lift, abs=1e-13)
@@ -172,13 +193,14 @@ class TestSliding:
         for i in range(blocks - 1):
             chain[2 * i : 2 * i + 3 : 2, 2 * i : 2 * i + 3 : 2] += [[1.0, -1.0], [-1.0, 1.0]]
         sliding = ns.mechanical(
-            np.eye(n), 0 * np.eye(n), chain, parameters={},
+            np.eye(n),
+            0 * np.eye(n),
+            chain,
+            parameters={},
             coordinates=[f"{axis}{i}" for i in range(blocks) for axis in "xy"],
             forcing={f"y{i}": lambda t, p: -G for i in range(blocks)},
-            elements={
-                f"s{i}": E.Stop(at=f"y{i}", side=-1, friction=friction, tangent=f"x{i}") for i in range(blocks)
-            },
-        )  # fmt: skip
+            elements={f"s{i}": E.Stop(at=f"y{i}", side=-1, friction=friction, tangent=f"x{i}") for i in range(blocks)},
+        )
         run = ns.simulate(sliding, duration=2.0, start={f"v_x{i}": speed for i in range(blocks)})
         ends, distance = abs(speed) / (friction * G), speed * abs(speed) / (2 * friction * G)
         assert run.crossing_time.values == pytest.approx(ends, abs=1e-14)
@@ -196,9 +218,14 @@ class TestVerbs:
     def test_exponents(self):
         own = floor(0.1, forcing=self.load, stiffness=2.0, damping=0.1)
         other = ns.mechanical(
-            1.0, 0.1, 2.0, coordinates=["x"], parameters={"w": 1.0}, forcing={"x": self.load},
+            1.0,
+            0.1,
+            2.0,
+            coordinates=["x"],
+            parameters={"w": 1.0},
+            forcing={"x": self.load},
             elements={"f": E.Coulomb(at="x", friction=0.1 * G)},
-        )  # fmt: skip
+        )
         one, two = (ns.lyapunov(s, periods=50, transient=20, progress=False).exponents.values for s in (own, other))
         np.testing.assert_allclose(one[:2], two, atol=1e-9)
         assert (one[2:] == -np.inf).all()
@@ -217,13 +244,19 @@ class TestParadox:
     def rod(press):
         """G_nn = 1, G_nt = 1: slipping forward at mu = 2 the contact force would pull itself in."""
         return ns.System(
-            states=["x", "y", "vx", "vy"], parameters={},
+            states=["x", "y", "vx", "vy"],
+            parameters={},
             modes={"all": lambda t, u, p: (u.vx, u.vy, 0.0, -press)},
-            elements={"tip": E.Stop(
-                gap=lambda t, u, p: u.y, on={"vy": 1.0, "vx": 1.0}, friction=2.0, tangent=lambda t, u, p: u.vx,
-                on_tangent={"vx": 2.0, "vy": 1.0},
-            )},
-        )  # fmt: skip
+            elements={
+                "tip": E.Stop(
+                    gap=lambda t, u, p: u.y,
+                    on={"vy": 1.0, "vx": 1.0},
+                    friction=2.0,
+                    tangent=lambda t, u, p: u.vx,
+                    on_tangent={"vx": 2.0, "vy": 1.0},
+                )
+            },
+        )
 
     def test_a_landing_that_jams(self):
         """While it slips the normal impulse drives the tip on into the ground: the impact goes on until the slip ends,
@@ -249,12 +282,19 @@ class TestParadox:
             arm = length / 2 * np.array([np.sin(a), np.cos(a)])  # of the tip's forces, along and across the floor
             G = np.eye(2) + np.outer(arm, arm) / inertia
             rod = ns.System(
-                states=["x", "y", "vx", "vy"], parameters={}, modes={"all": lambda t, u, p: (u.vx, u.vy, 0.0, -1.0)},
-                elements={"tip": E.Stop(
-                    gap=lambda t, u, p: u.y, on={"vy": G[1, 1], "vx": G[0, 1]}, friction=friction,
-                    tangent=lambda t, u, p: u.vx, on_tangent={"vx": G[0, 0], "vy": G[0, 1]},
-                )},
-            )  # fmt: skip
+                states=["x", "y", "vx", "vy"],
+                parameters={},
+                modes={"all": lambda t, u, p: (u.vx, u.vy, 0.0, -1.0)},
+                elements={
+                    "tip": E.Stop(
+                        gap=lambda t, u, p: u.y,
+                        on={"vy": G[1, 1], "vx": G[0, 1]},
+                        friction=friction,
+                        tangent=lambda t, u, p: u.vx,
+                        on_tangent={"vx": G[0, 0], "vy": G[0, 1]},
+                    )
+                },
+            )
             if status:
                 with pytest.raises(SolveError, match="Painleve") as caught:
                     ns.simulate(rod, duration=1.0, start={"vx": 1.0})
@@ -266,12 +306,16 @@ class TestParadox:
 
     def test_two_contacts_that_close_at_once_of_which_one_rubs(self):
         cup = ns.mechanical(
-            np.eye(2), 0 * np.eye(2), 0 * np.eye(2), coordinates=["x", "y"], parameters={},
+            np.eye(2),
+            0 * np.eye(2),
+            0 * np.eye(2),
+            coordinates=["x", "y"],
+            parameters={},
             elements={
                 "floor": E.Stop(at="y", side=-1, friction=0.1, tangent="x"),
                 "wall": E.Stop(at="x", side=-1),
             },
-        )  # fmt: skip
+        )
         with pytest.raises(SolveError, match=r"'floor', 'wall'.*impacts at one instant"):
             ns.simulate(cup, duration=2.0, start={"x": 1.0, "y": 1.0, "v_x": -1.0, "v_y": -1.0})
 
@@ -288,7 +332,11 @@ class TestParadox:
     def test_what_does_not_fit_is_refused(self, options, message):
         with pytest.raises(SystemDefinitionError, match=message):
             ns.mechanical(
-                np.eye(2), 0 * np.eye(2), 0 * np.eye(2), coordinates=["x", "y"], parameters={},
+                np.eye(2),
+                0 * np.eye(2),
+                0 * np.eye(2),
+                coordinates=["x", "y"],
+                parameters={},
                 elements={"s": E.Stop(at="y", **options)},
             )
 
@@ -309,7 +357,11 @@ class TestLoads:
     def test_a_hopping_block_takes_what_the_forcing_gives(self):
         """Per period, by loads alone: work of the forcing = damping + stop + friction."""
         hop = floor(
-            0.2, restitution=0.0, forcing=lambda t, p: 0.5 * np.cos(p.w * t), stiffness=2.0, damping=0.3,
+            0.2,
+            restitution=0.0,
+            forcing=lambda t, p: 0.5 * np.cos(p.w * t),
+            stiffness=2.0,
+            damping=0.3,
             normal=lambda t, p: -(1.0 + 2.0 * np.sin(p.w * t)),
         )
         response = ns.sweep(hop, "w", [1.0], transient=200, keep=10, loads=True, progress=False)

@@ -16,7 +16,8 @@ from nonsmooth.system.transition import Surface, Transition
 
 def friction(belt: Any = lambda t, p: p.v_b, transitions: Any = (), **surface: Any) -> System:
     return System(
-        states=["x", "v"], parameters={"mu": 0.5, "v_b": 0.2, "w": 1.3},
+        states=["x", "v"],
+        parameters={"mu": 0.5, "v_b": 0.2, "w": 1.3},
         modes={
             "slow": lambda t, u, p: (u.v, np.cos(p.w * t) - u.x + p.mu),
             "fast": lambda t, u, p: (u.v, np.cos(p.w * t) - u.x - p.mu),
@@ -24,7 +25,7 @@ def friction(belt: Any = lambda t, p: p.v_b, transitions: Any = (), **surface: A
         indicators={"slip": lambda t, u, p: u.v - belt(t, p), "wall": lambda t, u, p: u.x - 1},
         transitions=[Surface("slip", below="slow", above="fast", mode="stick", **surface), *transitions],
         outputs={"friction": {"slow": lambda t, u, p: p.mu, "fast": lambda t, u, p: -p.mu}},
-    )  # fmt: skip
+    )
 
 
 def same(a: Any, b: Any) -> bool:
@@ -63,11 +64,12 @@ def test_a_moving_mass_leaves_and_enters_by_the_forces_alone():
 def test_fields_whose_difference_turns_are_combined_by_filippov():
     """On the surface z = x y + t the combination has L_s h = -kappa h exactly, and is convex."""
     system = System(
-        states=["x", "y", "z"], parameters={},
+        states=["x", "y", "z"],
+        parameters={},
         modes={"low": lambda t, u, p: (u.y, u.x * u.z, 1 + u.x**2), "high": lambda t, u, p: (-u.z, u.x, -2 - u.y**2)},
         indicators={"h": lambda t, u, p: u.z - u.x * u.y - t},
         transitions=[Surface("h", below="low", above="high")],
-    )  # fmt: skip
+    )
     traced = system.traced
     h = traced.indicators[0]
     low, high, slide = traced.fields[:3]
@@ -88,11 +90,12 @@ def test_a_relay_keeps_its_plant_on_the_surface():
         return lambda t, u, p: A @ u - sign * b * p.g * (1 + u.x**2)
 
     system = System(
-        states=["x", "y", "z"], parameters={"g": 1.0},
+        states=["x", "y", "z"],
+        parameters={"g": 1.0},
         modes={"minus": side(-1), "plus": side(1)},
         indicators={"h": lambda t, u, p: k @ u},
         transitions=[Surface("h", below="minus", above="plus")],
-    )  # fmt: skip
+    )
     traced = system.traced
     P = np.eye(3) - np.outer(b, k) / (k @ b)
     jacobian = np.array(sp.Matrix(traced.fields[2]).jacobian(traced.u), dtype=float)
@@ -102,19 +105,25 @@ def test_a_relay_keeps_its_plant_on_the_surface():
 def two_contacts() -> System:
     def side(one: int, two: int) -> Any:
         return lambda t, u, p: (
-            u.v1, u.v2, np.cos(t) - 2 * u.x1 + u.x2 - one * p.F1, u.x1 - 2 * u.x2 - two * p.F2,
-        )  # fmt: skip
+            u.v1,
+            u.v2,
+            np.cos(t) - 2 * u.x1 + u.x2 - one * p.F1,
+            u.x1 - 2 * u.x2 - two * p.F2,
+        )
 
     signs = {-1: "m", 1: "p"}
     return System(
-        states=["x1", "x2", "v1", "v2"], parameters={"F1": 0.3, "F2": 0.2},
+        states=["x1", "x2", "v1", "v2"],
+        parameters={"F1": 0.3, "F2": 0.2},
         modes={signs[a] + signs[b]: side(a, b) for a in (-1, 1) for b in (-1, 1)},
         indicators={"rub1": lambda t, u, p: u.v1, "rub2": lambda t, u, p: u.v2 - 0.1},
         transitions=[
-            Surface("rub1", below="mm", above="pm"), Surface("rub1", below="mp", above="pp"),
-            Surface("rub2", below="mm", above="mp"), Surface("rub2", below="pm", above="pp"),
+            Surface("rub1", below="mm", above="pm"),
+            Surface("rub1", below="mp", above="pp"),
+            Surface("rub2", below="mm", above="mp"),
+            Surface("rub2", below="pm", above="pp"),
         ],
-    )  # fmt: skip
+    )
 
 
 def test_two_contacts_may_stick_both():
@@ -152,16 +161,19 @@ def test_a_sliding_mass_that_meets_a_spring_slides_on() -> None:
         return lambda t, u, p: (u.v, -u.x - stiffness * (u.x - 1) - sign * p.F)
 
     system = System(
-        states=["x", "v"], parameters={"F": 0.5},
+        states=["x", "v"],
+        parameters={"F": 0.5},
         modes={"m": side(-1, 0.0), "q": side(1, 0.0), "m_pressed": side(-1, 9.0), "q_pressed": side(1, 9.0)},
         indicators={"slip": lambda t, u, p: u.v - 0.2, "wall": lambda t, u, p: u.x - 1},
         transitions=[
             Surface("slip", below="m", above="q", mode="stick"),
             Surface("slip", below="m_pressed", above="q_pressed", mode="stick_pressed"),
-            Transition("m", "m_pressed", when="wall > 0"), Transition("q", "q_pressed", when="wall > 0"),
-            Transition("m_pressed", "m", when="wall < 0"), Transition("q_pressed", "q", when="wall < 0"),
+            Transition("m", "m_pressed", when="wall > 0"),
+            Transition("q", "q_pressed", when="wall > 0"),
+            Transition("m_pressed", "m", when="wall < 0"),
+            Transition("q_pressed", "q", when="wall < 0"),
         ],
-    )  # fmt: skip
+    )
     labels = [jump.label for jump in system.transitions]
     assert labels.count("stick -> stick_pressed") == labels.count("stick_pressed -> stick") == 1
     assert not {"stick -> m_pressed", "stick -> q_pressed"} & set(labels)
@@ -170,11 +182,12 @@ def test_a_sliding_mass_that_meets_a_spring_slides_on() -> None:
 def utkin(field: Any) -> System:
     """A control c that enters squared: Utkin's solves x' = 0.2 + c = 0; Filippov mixes both ends."""
     return System(
-        states=["x", "y"], parameters={},
+        states=["x", "y"],
+        parameters={},
         modes={s: (lambda t, u, p, c=c: (0.2 + c, c * c - u.y)) for s, c in (("below", 1.0), ("above", -1.0))},
         indicators={"h": lambda t, u, p: u.x},
         transitions=[Surface("h", below="below", above="above", field=field)],
-    )  # fmt: skip
+    )
 
 
 def test_a_field_may_be_given_for_the_surface():
@@ -208,9 +221,12 @@ def test_wrong_surfaces(given: dict[str, Any], says: str) -> None:
     if "mode" in given:
         with pytest.raises(SystemDefinitionError, match=says):
             System(
-                states=["x"], parameters={}, modes={"slow": lambda t, u, p: (1,), "fast": lambda t, u, p: (-1,)},
-                indicators={"h": lambda t, u, p: u.x}, transitions=[Surface("h", below="slow", above="fast", **given)],
-            )  # fmt: skip
+                states=["x"],
+                parameters={},
+                modes={"slow": lambda t, u, p: (1,), "fast": lambda t, u, p: (-1,)},
+                indicators={"h": lambda t, u, p: u.x},
+                transitions=[Surface("h", below="slow", above="fast", **given)],
+            )
         return
     with pytest.raises(SystemDefinitionError, match=says):
         friction(**given)

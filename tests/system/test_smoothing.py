@@ -183,9 +183,7 @@ def general():
         return u.v, (p.rho * np.cos(p.omega * t) - 2 * p.k * u.x - p.c * u.v) / p.m
 
     def contact(t, u, p):
-        return u.v, (
-            p.rho * np.cos(p.omega * t) - 2 * p.k * u.x - (p.c + p.c_s) * u.v - p.k_s * (u.x - p.g)
-        ) / p.m  # fmt: skip
+        return u.v, (p.rho * np.cos(p.omega * t) - 2 * p.k * u.x - (p.c + p.c_s) * u.v - p.k_s * (u.x - p.g)) / p.m
 
     known = discontinuous_support()
     return System(
@@ -266,19 +264,21 @@ def test_a_surface_is_smoothed_as_a_pair():
 @pytest.mark.parametrize(
     ("given", "why"),
     [
-        ({"static": 1.5}, "static value"), ({"static": lambda t, u, p: 1 + u.x**2}, "static value"),
+        ({"static": 1.5}, "static value"),
+        ({"static": lambda t, u, p: 1 + u.x**2}, "static value"),
         ({"static": lambda t, u, p: 1.2 * p.F}, "static value"),
         ({"field": lambda t, u, p: (u.v, 0)}, "`field` of its own"),
     ],
-)  # fmt: skip
+)
 def test_a_band_has_no_static_friction_and_no_field_of_its_own(given, why):
     def sticking(**values):
         return System(
-            states=["x", "v"], parameters={"F": 1.0},
+            states=["x", "v"],
+            parameters={"F": 1.0},
             modes={"left": lambda t, u, p: (u.v, p.F - u.x), "right": lambda t, u, p: (u.v, -p.F - u.x)},
             indicators={"slip": lambda t, u, p: u.v - 0.2},
             transitions=[Surface("slip", below="left", above="right", **values)],
-        )  # fmt: skip
+        )
 
     with pytest.raises(SystemDefinitionError, match=f"'left' and 'right': .*{why}"):
         sticking(**given).smoothed(0.01)
@@ -308,10 +308,12 @@ def test_what_cannot_be_smoothed_names_the_pair():
         modes={name: (lambda t, u, p, s=s: (s * u.y, u.x)) for s, name in enumerate(["A", "B", "C"])},
         indicators={"one": lambda t, u, p: u.x, "two": lambda t, u, p: u.y},
         transitions=[
-            Transition("A", "B", when="one > 0"), Transition("B", "A", when="one < 0"),
-            Transition("A", "C", when="two > 0"), Transition("C", "A", when="two < 0"),
+            Transition("A", "B", when="one > 0"),
+            Transition("B", "A", when="one < 0"),
+            Transition("A", "C", when="two > 0"),
+            Transition("C", "A", when="two < 0"),
         ],
-    )  # fmt: skip
+    )
     with pytest.raises(SystemDefinitionError, match=r"'A' and 'B' and between 'A' and 'C' overlap"):
         overlapping.smoothed(1e-5)
 
@@ -325,9 +327,13 @@ def test_contact_force_is_the_difference_of_the_fields(smoothed):
 
 def rubbing(**element):
     return ns.mechanical(
-        1.0, 0.0, 0.0, parameters={"f": 0.1, "mu": 0.2, "mu_s": 0.2}, forcing={"q": lambda t, p: p.f},
+        1.0,
+        0.0,
+        0.0,
+        parameters={"f": 0.1, "mu": 0.2, "mu_s": 0.2},
+        forcing={"q": lambda t, p: p.f},
         elements={"floor": ns.elements.Coulomb(at="q", **{"friction": "mu", **element})},
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(("band", "creep"), [("linear", 0.5), ("tanh", np.arctanh(0.5)), ("arctan", 1.0)])
@@ -362,14 +368,17 @@ def test_static_friction_above_the_kinetic_one_has_no_band():
 def test_arctan_weights_sum_to_one_where_three_regions_meet():
     """Fields 1 in the middle, 2 right and 3 left of it, at x = 1 and x = -1."""
     system = System(
-        states=["x"], parameters={"d": 1.0},
+        states=["x"],
+        parameters={"d": 1.0},
         modes={"middle": lambda t, u, p: (1,), "right": lambda t, u, p: (2,), "left": lambda t, u, p: (3,)},
         indicators={"r": lambda t, u, p: u.x - p.d, "l": lambda t, u, p: u.x + p.d},
         transitions=[
-            Transition("middle", "right", when="r > 0"), Transition("right", "middle", when="r < 0"),
-            Transition("middle", "left", when="l < 0"), Transition("left", "middle", when="l > 0"),
+            Transition("middle", "right", when="r > 0"),
+            Transition("right", "middle", when="r < 0"),
+            Transition("middle", "left", when="l < 0"),
+            Transition("left", "middle", when="l > 0"),
         ],
-    ).smoothed(0.1, "arctan")  # fmt: skip
+    ).smoothed(0.1, "arctan")
     traced = system.traced
     field = sp.lambdify([traced.u[0], traced.p], traced.fields[0][0])
     for place in (-2.0, -1.0, 0.3, 1.0, 2.0):
@@ -382,12 +391,15 @@ def test_arctan_weights_sum_to_one_where_three_regions_meet():
 
 def test_bands_that_cross_are_for_arctan_alone():
     two = ns.mechanical(
-        1.0, 0.1, 1.0, parameters={"k": 5.0, "mu": 0.2},
+        1.0,
+        0.1,
+        1.0,
+        parameters={"k": 5.0, "mu": 0.2},
         elements={
             "floor": ns.elements.Coulomb(at="q", friction="mu"),
             "wall": ns.elements.ElasticStop(at="q", position=1.0, stiffness="k"),
         },
-    )  # fmt: skip
+    )
     with pytest.raises(SystemDefinitionError, match='vanish together; bands may do so with band="arctan"'):
         two.smoothed(1e-3)
     smooth = two.smoothed(1e-3, "arctan")
@@ -416,8 +428,12 @@ def test_unknown_bands_are_refused():
 def test_a_preloaded_spring_rests_in_its_band():
     """P - k s on one side, -P - k s on the other: within the band a spring of the stiffness P / eta + k."""
     spring = ns.mechanical(
-        1.0, 0.2, 0.0, parameters={"P": 1.0, "k": 1.0, "f": 0.3}, forcing={"q": lambda t, p: p.f},
+        1.0,
+        0.2,
+        0.0,
+        parameters={"P": 1.0, "k": 1.0, "f": 0.3},
+        forcing={"q": lambda t, p: p.f},
         elements={"spring": ns.elements.PreloadedSpring(at="q", preload="P", stiffness="k")},
-    )  # fmt: skip
+    )
     run = ns.simulate(spring.smoothed(1e-3), duration=400.0, start={"q": 0.5}, samples=2)
     assert run.u.values[-1] == pytest.approx([0.3 / 1001, 0.0], abs=1e-9)

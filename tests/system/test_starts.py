@@ -20,21 +20,26 @@ def block(first: str) -> ns.System:
         "neg": lambda t, u, p: (u.v, net(t, u, p) + p.F),
     }
     indicators = {
-        "vel": lambda t, u, p: u.v, "over": lambda t, u, p: net(t, u, p) - p.F,
+        "vel": lambda t, u, p: u.v,
+        "over": lambda t, u, p: net(t, u, p) - p.F,
         "under": lambda t, u, p: net(t, u, p) + p.F,
-    }  # fmt: skip
+    }
     off, on = lambda t, u, p: (u.x, 0.0), lambda t, u, p: (u.x,)
     T = ns.Transition
     return ns.System(
-        states=["x", "v"], parameters={"force": 1.0, "F": 0.3, "w": 0.8}, modes={first: modes[first], **modes},
+        states=["x", "v"],
+        parameters={"force": 1.0, "F": 0.3, "w": 0.8},
+        modes={first: modes[first], **modes},
         indicators=indicators,
         transitions=[
-            T("stick", "pos", when="over > 0", reset=off), T("stick", "neg", when="under < 0", reset=off),
-            T("pos", "neg", when="vel < 0 and under < 0"), T("neg", "pos", when="vel > 0 and over > 0"),
+            T("stick", "pos", when="over > 0", reset=off),
+            T("stick", "neg", when="under < 0", reset=off),
+            T("pos", "neg", when="vel < 0 and under < 0"),
+            T("neg", "pos", when="vel > 0 and over > 0"),
             T("pos", "stick", when="vel < 0 and under > 0", reset=on),
             T("neg", "stick", when="vel > 0 and over < 0", reset=on),
         ],
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("first", ["stick", "pos"])
@@ -65,10 +70,11 @@ def test_the_derivative_in_the_start_goes_through_the_first_transition():
 def test_a_reset_that_moves_a_state_is_a_stop():
     """A stop beside fewer states: what the source has is moved, so the start lies beyond it."""
     system = ns.System(
-        states=["x", "v"], parameters={"g": 1.0},
+        states=["x", "v"],
+        parameters={"g": 1.0},
         modes={"rest": ns.Mode(lambda t, u, p: (-p.g,), states=["x"]), "fly": lambda t, u, p: (u.v, -p.g)},
         indicators={"low": lambda t, u, p: u.x + 1.0},
         transitions=[ns.Transition("rest", "fly", when="low < 0", reset=lambda t, u, p: (-1.0, 0.5))],
-    )  # fmt: skip
+    )
     with pytest.raises(ns.SolveError, match="beyond a stop"):
         ns.simulate(system, duration=1.0, start={"x": -2.0})

@@ -33,7 +33,13 @@ def back(t, u, p):
 GOOD = {
     "states": {"x": "m", "v": "m/s"},
     "parameters": {
-        "m": (0.8, "kg"), "k": 8.0, "k_s": (100.0, "N/m"), "g": 0.01, "rho": 0.4, "omega": 3.0, "c_s": (0.6, "", "c_s"),
+        "m": (0.8, "kg"),
+        "k": 8.0,
+        "k_s": (100.0, "N/m"),
+        "g": 0.01,
+        "rho": 0.4,
+        "omega": 3.0,
+        "c_s": (0.6, "", "c_s"),
     },
     "modes": {"free": free, "contact": stopped},
     "indicators": {"overlap": overlap, "back": back},
@@ -42,7 +48,7 @@ GOOD = {
         Transition("contact", "free", when="back > 0"),
     ],
     "name": "plain",
-}  # fmt: skip
+}
 
 
 def make(**changed):
@@ -185,7 +191,7 @@ def jump(*arguments, **options):
         (lambda: make(transitions=[Surface("overlap", below="free", above="free")]), "must be two modes"),
         (lambda: make(transitions=[Surface("over", below="free", above="contact")]), "`over` is not an indicator"),
     ],
-)  # fmt: skip
+)
 def test_what_does_not_fit_together_is_refused(build, sentence):
     with pytest.raises(SystemDefinitionError, match=f"(?s){sentence}"):
         build()
@@ -216,9 +222,7 @@ def stick_slip():
         parameters={"V": 0.59, "c": 0.04, "omega": 0.92, "e": 0.8, "n": 3.17},
         modes={
             "stick": Mode(lambda t, u, p: (u.y3, force(t, *u, p)), states=["y2", "y3"]),
-            "slip": lambda t, u, p: (
-                -p.n - force(t, u.y2, u.y3, p) / 5, u.y3, p.n + 6 * force(t, u.y2, u.y3, p) / 5
-            ),
+            "slip": lambda t, u, p: (-p.n - force(t, u.y2, u.y3, p) / 5, u.y3, p.n + 6 * force(t, u.y2, u.y3, p) / 5),
         },
         indicators={"wall": lambda t, u, p: u.y2 - 0.5, "slider": lambda t, u, p: u.y1},
         transitions=[
@@ -227,7 +231,7 @@ def stick_slip():
             ),
             Transition("slip", "stick", when="slider < 0"),
         ],
-    )  # fmt: skip
+    )
 
 
 def test_modes_with_fewer_states():
@@ -285,8 +289,9 @@ def test_surfaces_are_kept_for_sliding():
     (surface,) = system.surfaces
     assert (surface.indicator, surface.below, surface.above) == (0, 0, 1)
     assert [jump.label for jump in system.declared.transitions] == [
-        "slip_left -> slip_right", "slip_right -> slip_left",
-    ]  # fmt: skip
+        "slip_left -> slip_right",
+        "slip_right -> slip_left",
+    ]
     assert system.modes == ("slip_left", "slip_right", "slip_sliding")
     assert "crossed or slid on" in repr(system)
     assert system.smoothed(1e-3).surfaces == ()
@@ -302,11 +307,13 @@ def test_a_symmetry_may_exchange_modes():
         modes={"free": lambda t, u, p: (u.v, p.A * np.cos(p.w * t) - u.x), "left": wall(-1), "right": wall(1)},
         indicators={"right_of": lambda t, u, p: u.x - p.d, "left_of": lambda t, u, p: -u.x - p.d},
         transitions=[
-            Transition("free", "right", when="right_of > 0"), Transition("right", "free", when="right_of < 0"),
-            Transition("free", "left", when="left_of > 0"), Transition("left", "free", when="left_of < 0"),
+            Transition("free", "right", when="right_of > 0"),
+            Transition("right", "free", when="right_of < 0"),
+            Transition("free", "left", when="left_of > 0"),
+            Transition("left", "free", when="left_of < 0"),
         ],
         symmetry=(lambda u: (-u.x, -u.v), 0.5, {"left": "right", "right": "left"}),
-    )  # fmt: skip
+    )
     assert system.symmetry.modes == (0, 2, 1)
     assert system.symmetry.shift == 0.5
 

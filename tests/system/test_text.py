@@ -34,7 +34,10 @@ def everything():
             Surface("speed", below="one", above="two"),
             Transition("one", "held", when="level > 0 and speed < 0"),
             Transition(
-                "held", "two", at=0.25, reset=lambda t, u, p: (u.x, -p.b * u.v, p.kept),
+                "held",
+                "two",
+                at=0.25,
+                reset=lambda t, u, p: (u.x, -p.b * u.v, p.kept),
                 write={"kept": lambda t, u, p: u.x},
             ),
         ],
@@ -44,7 +47,7 @@ def everything():
         },
         scale={"x": 1e-3},
         period=lambda p: 4 * np.pi / p.omega,
-    )  # fmt: skip
+    )
 
 
 SYSTEMS = {name: getattr(models, name) for name in models.names()} | {
@@ -133,12 +136,32 @@ def test_floats_survive_to_the_last_bit():
 @pytest.mark.parametrize(
     "text",
     [
-        "__import__('os').system('true')", "().__class__", "u.x.real", "[1]", "lambda: 1", "print(1)", "p.unknown", "x",
-        "'a'", "1 if u.x else 2", "(1, 2)", "sin(*[1])", "9**9**9**9", "10.0**1e9", "sin()", "1e999", "u.x +",
-        "f'{1}'", "1j",
-        "u[0]", "", "(" * 500 + "1" + ")" * 500, "where(1, 2)", "nan",
+        "__import__('os').system('true')",
+        "().__class__",
+        "u.x.real",
+        "[1]",
+        "lambda: 1",
+        "print(1)",
+        "p.unknown",
+        "x",
+        "'a'",
+        "1 if u.x else 2",
+        "(1, 2)",
+        "sin(*[1])",
+        "9**9**9**9",
+        "10.0**1e9",
+        "sin()",
+        "1e999",
+        "u.x +",
+        "f'{1}'",
+        "1j",
+        "u[0]",
+        "",
+        "(" * 500 + "1" + ")" * 500,
+        "where(1, 2)",
+        "nan",
     ],
-)  # fmt: skip
+)
 def test_only_the_white_list_is_read(text):
     with pytest.raises(ValueError, match=r"expression"):
         read_expression(text, {"u.x": sp.Symbol("u_x", real=True)})

@@ -14,13 +14,25 @@ from nonsmooth.system.units import product, read_unit, unit_of, write_unit
 @pytest.mark.parametrize(
     ("text", "unit", "written"),
     [
-        ("N", {"kg": 1, "m": 1, "s": -2}, "N"), ("kg m/s^2", {"kg": 1, "m": 1, "s": -2}, "N"),
-        ("N s/m", {"kg": 1, "s": -1}, "kg/s"), ("kg/(m s**2)", {"kg": 1, "m": -1, "s": -2}, "kg/(m s^2)"),
-        ("kg m²", {"kg": 1, "m": 2}, "kg m^2"), ("rad/s", {"s": -1}, "1/s"), ("Hz", {"s": -1}, "1/s"), ("1", {}, "1"),
-        ("mm", {"mm": 1}, "mm"), ("N m", {"kg": 1, "m": 2, "s": -2}, "J"), ("m/s/s", {"m": 1, "s": -2}, "m/s^2"),
-        ("", None, ""), ("m/", None, ""), ("(m", None, ""), ("m)", None, ""), ("2 m", None, ""), ("?", None, ""),
+        ("N", {"kg": 1, "m": 1, "s": -2}, "N"),
+        ("kg m/s^2", {"kg": 1, "m": 1, "s": -2}, "N"),
+        ("N s/m", {"kg": 1, "s": -1}, "kg/s"),
+        ("kg/(m s**2)", {"kg": 1, "m": -1, "s": -2}, "kg/(m s^2)"),
+        ("kg m²", {"kg": 1, "m": 2}, "kg m^2"),
+        ("rad/s", {"s": -1}, "1/s"),
+        ("Hz", {"s": -1}, "1/s"),
+        ("1", {}, "1"),
+        ("mm", {"mm": 1}, "mm"),
+        ("N m", {"kg": 1, "m": 2, "s": -2}, "J"),
+        ("m/s/s", {"m": 1, "s": -2}, "m/s^2"),
+        ("", None, ""),
+        ("m/", None, ""),
+        ("(m", None, ""),
+        ("m)", None, ""),
+        ("2 m", None, ""),
+        ("?", None, ""),
     ],
-)  # fmt: skip
+)
 def test_units_are_read_and_written(text: str, unit: dict[str, float] | None, written: str) -> None:
     assert read_unit(text) == unit
     assert write_unit(unit) == written
@@ -42,20 +54,32 @@ def test_products_and_expressions() -> None:
 def test_forces_of_elements_have_the_units_of_their_system() -> None:
     def forces(m, unit, elements=None):
         elements = elements or {"rub": Coulomb(at="q", friction=0.1)}
-        return dict(ns.mechanical(m, 0.0, 0.0, parameters={"m": (2.0, unit)}, coordinates={"q": "m"},
-                                  elements=elements).outputs)  # fmt: skip
+        return dict(
+            ns.mechanical(m, 0.0, 0.0, parameters={"m": (2.0, unit)}, coordinates={"q": "m"}, elements=elements).outputs
+        )
 
     assert forces("m", "kg") == {"rub_force": "N"} and forces(2.0, "kg") == {"rub_force": ""}
     assert forces("m", "") == {"rub_force": ""}  # a mass without a unit
-    turning = ns.mechanical("J", 0.0, 0.0, parameters={"J": (2.0, "kg m^2")}, coordinates={"a": "rad"},
-                            elements={"stop": Stop(at="a", position=1.0)})  # fmt: skip
+    turning = ns.mechanical(
+        "J",
+        0.0,
+        0.0,
+        parameters={"J": (2.0, "kg m^2")},
+        coordinates={"a": "rad"},
+        elements={"stop": Stop(at="a", position=1.0)},
+    )
     assert turning.outputs["stop_force"] == "N m"
     run = ns.simulate(turning, duration=2.0, start={"v_a": 1.0})
     units = {name: run[f"stop_{name}"].attrs["units"] for name in ("force", "impulse", "impact_speed", "energy_lost")}
     assert units == {"force": "N m", "impulse": "N m s", "impact_speed": "1/s", "energy_lost": "J"}
     assert run["stop_energy_lost"].values == pytest.approx([1.0])  # 1/2 J v^2
     driven = ns.mechanical(
-        "m", 0.1, 1.0, parameters={"m": (2.0, "kg"), "w": 1.0}, coordinates={"q": "m"},
-        forcing={"q": lambda t, p: np.cos(p.w * t)}, elements={"s": Stop(at="q", position=1.0)},
-    )  # fmt: skip
+        "m",
+        0.1,
+        1.0,
+        parameters={"m": (2.0, "kg"), "w": 1.0},
+        coordinates={"q": "m"},
+        forcing={"q": lambda t, p: np.cos(p.w * t)},
+        elements={"s": Stop(at="q", position=1.0)},
+    )
     assert dict(ns.System.from_text(driven.to_text()).outputs) == dict(driven.outputs) == {"s_force": "N"}

@@ -11,12 +11,14 @@ E = ns.elements
 def follower(first, second, bound):
     """v1' = first + a, v2' = second + a/2 + b: friction a, within 1, acts on v2 too; b, within a bound, on v2 only."""
     return ns.System(
-        states=["v1", "v2"], parameters={}, modes={"all": lambda t, u, p: (first + 0 * u.v1, second + 0 * u.v2)},
+        states=["v1", "v2"],
+        parameters={},
+        modes={"all": lambda t, u, p: (first + 0 * u.v1, second + 0 * u.v2)},
         elements={
             "a": E.Coulomb(speed=lambda t, u, p: u.v1, friction=1.0, on={"v1": 1.0, "v2": 0.5}),
             "b": E.Coulomb(speed=lambda t, u, p: u.v2, friction=bound, on={"v2": 1.0}),
         },
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(

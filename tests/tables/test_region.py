@@ -12,22 +12,30 @@ import nonsmooth as ns
 @pytest.fixture(scope="module")
 def forced():
     return ns.mechanical(
-        1.0, 0.5, 1.0, coordinates={"q": "m"}, parameters={"F": (2.0, "N"), "w": (1.0, "rad/s")},
+        1.0,
+        0.5,
+        1.0,
+        coordinates={"q": "m"},
+        parameters={"F": (2.0, "N"), "w": (1.0, "rad/s")},
         forcing={"q": lambda t, p: p.F * np.cos(p.w * t)},
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="module")
 def struck():
     """A chart of an oscillator between two stops with loads, 5 x 4 points."""
     rig = ns.mechanical(
-        1.0, 0.2, 1.0, coordinates={"q": "m"}, parameters={"F": (1.0, "N"), "w": (1.0, "rad/s")},
+        1.0,
+        0.2,
+        1.0,
+        coordinates={"q": "m"},
+        parameters={"F": (1.0, "N"), "w": (1.0, "rad/s")},
         forcing={"q": lambda t, p: p.F * np.cos(p.w * t)},
         elements={
             "left": ns.elements.Stop(at="q", position=-1.5, side=-1, restitution=0.6),
             "right": ns.elements.Stop(at="q", position=1.0, restitution=0.6),
         },
-    )  # fmt: skip
+    )
     plane = {"w": np.linspace(0.7, 1.5, 5), "F": np.linspace(0.2, 1.1, 4)}
     return ns.chart(rig, plane, loads=True, progress=False)
 
@@ -120,6 +128,8 @@ def test_it_is_drawn(struck) -> None:
     cells = np.pad(inside.values, 1)
     edges = int((cells[1:] != cells[:-1]).sum() + (cells[:, 1:] != cells[:, :-1]).sum())
     assert len(outline.get_segments()) == edges
-    assert (ns.plot.chart(struck, show="amplitude", y="v_q").collections[0].get_array().ravel()
-            == 0.5 * (struck.maximum - struck.minimum).sel(state="v_q").values.T.ravel()).all()  # fmt: skip
+    assert (
+        ns.plot.chart(struck, show="amplitude", y="v_q").collections[0].get_array().ravel()
+        == 0.5 * (struck.maximum - struck.minimum).sel(state="v_q").values.T.ravel()
+    ).all()
     plt.close("all")

@@ -24,10 +24,12 @@ def swinging():
 def bouncing():
     """A ball under unit gravity on a table, e = 1/2, from height 1/2: impacts at 1, 2, 2.5, ..."""
     return ns.System(
-        states={"x": "m", "v": "m/s"}, parameters={"g": 1.0}, modes={"fly": lambda t, u, p: (u.v, -p.g)},
+        states={"x": "m", "v": "m/s"},
+        parameters={"g": 1.0},
+        modes={"fly": lambda t, u, p: (u.v, -p.g)},
         indicators={"below": lambda t, u, p: -u.x},
         transitions=[ns.Transition("fly", "fly", when="below > 0", reset=lambda t, u, p: (u.x, -0.5 * u.v))],
-    )  # fmt: skip
+    )
 
 
 def test_a_run_at_even_instants_is_computed_not_interpolated(swinging) -> None:
@@ -79,9 +81,13 @@ def test_a_ramp_and_a_transient_are_run_again() -> None:
 
 def test_a_sweep_has_a_row_for_each_point_and_names_for_all(swinging) -> None:
     forced = ns.mechanical(
-        1.0, 0.5, 1.0, coordinates={"q": "m"}, parameters={"F": (2.0, "N"), "w": (1.0, "rad/s")},
+        1.0,
+        0.5,
+        1.0,
+        coordinates={"q": "m"},
+        parameters={"F": (2.0, "N"), "w": (1.0, "rad/s")},
         forcing={"q": lambda t, p: p.F * np.cos(p.w * t)},
-    )  # fmt: skip
+    )
     w = np.linspace(0.5, 2.0, 4)
     found = ns.table(ns.frequency_response(forced, w, parameter="w", progress=False))
     assert found["direction"].tolist() == ["up", "down"] * 4
@@ -181,5 +187,6 @@ def test_parameters_with_their_uncertainties() -> None:
 
     found = ns.table(ns.ParameterSet({"k": Estimate(8.0, 0.1, "N/m"), "m": Estimate(2.0, 0.2, "kg")}, np.eye(2)))
     assert found[["parameter", "value", "uncertainty", "unit"]].to_numpy().tolist() == [
-        ["k", 8.0, 0.1, "N/m"], ["m", 2.0, 0.2, "kg"],
-    ]  # fmt: skip
+        ["k", 8.0, 0.1, "N/m"],
+        ["m", 2.0, 0.2, "kg"],
+    ]

@@ -102,9 +102,7 @@ def basin_fractions(
         seen |= {k: replace(item, tree=None) for k, item in last.items()}
         per_value[i] = last
         labels[i] = np.append(ids, [-2, -1])[label] if len(ids) else label
-    return _dataset(
-        system, settler.engine.name, asked, per_value, labels, status, len(seen)
-    )
+    return _dataset(system, settler.engine.name, asked, per_value, labels, status, len(seen))
 
 
 def _starts(system: System, box: Mapping[str, tuple[float, float]] | None, n_starts: int, seed: int) -> Any:
@@ -116,9 +114,14 @@ def _starts(system: System, box: Mapping[str, tuple[float, float]] | None, n_sta
 
 
 def _dataset(
-    system: System, method: str, asked: Mapping[str, Any], per_value: list[dict[int, Attractor]], labels: IntArray,
-    status: IntArray, n_attractors: int,
-) -> xr.Dataset:  # fmt: skip
+    system: System,
+    method: str,
+    asked: Mapping[str, Any],
+    per_value: list[dict[int, Attractor]],
+    labels: IntArray,
+    status: IntArray,
+    n_attractors: int,
+) -> xr.Dataset:
     from nonsmooth.results.global_schema import basin_fractions as build
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
@@ -137,13 +140,21 @@ def _dataset(
             exponent[i, k], spread[i, k] = item.exponent, item.exponent_error
             maximum[i, k], minimum[i, k], section[i, k] = item.maximum, item.minimum, item.points[0]
     arrays = {
-        "fraction": fraction, "fraction_error": error, "period_number": period, "lyapunov": exponent,
-        "lyapunov_error": spread, "chaotic": chaotic, "name": kind.astype(str),
-        "maximum": maximum, "minimum": minimum, "section": section,
-        "not_converged": (labels == -1).mean(axis=1), "diverged": (labels == -2).mean(axis=1),
+        "fraction": fraction,
+        "fraction_error": error,
+        "period_number": period,
+        "lyapunov": exponent,
+        "lyapunov_error": spread,
+        "chaotic": chaotic,
+        "name": kind.astype(str),
+        "maximum": maximum,
+        "minimum": minimum,
+        "section": section,
+        "not_converged": (labels == -1).mean(axis=1),
+        "diverged": (labels == -2).mean(axis=1),
         "failed": (failed(status) & (labels == -1)).mean(axis=1),
         "n_starts_99": np.array([starts_needed(row) for row in fraction], dtype=np.int64),
-    }  # fmt: skip
+    }
     named = labels_of(system)
     record = provenance(named, "basin_fractions", asked, method=method, seed=asked["seed"])
     return build(named, record, asked["parameter"], numbers, arrays)

@@ -128,25 +128,35 @@ def basins(
     others = [k for k in range(len(names)) if k not in at]
     shocks = [
         minimal_shock(
-            label, x / scale[at[0]], y / scale[at[1]], item.points[:, at] / scale[at], k,
+            label,
+            x / scale[at[0]],
+            y / scale[at[1]],
+            item.points[:, at] / scale[at],
+            k,
             np.linalg.norm((item.points - rest)[:, others] / scale[others], axis=1),
         )
         for k, item in enumerate(found)
-    ]  # fmt: skip
+    ]
     entropy, boundary = basin_entropy(label)
     steps, parts = uncertain_part(label)
     named = labels_of(system)
     return build(
-        named, provenance(named, "basins", asked, method=settler.engine.name), values, label, found,
+        named,
+        provenance(named, "basins", asked, method=settler.engine.name),
+        values,
+        label,
+        found,
         status=status.reshape(label.shape),
         fixed={name: rest[names.index(name)] for name in names if name not in values},
         per_attractor={"fraction": fraction, "fraction_error": error, "minimal_shock": np.array(shocks)},
         measures={
-            "entropy": entropy, "boundary_entropy": boundary, "boundary_dimension": boundary_dimension(label),
+            "entropy": entropy,
+            "boundary_entropy": boundary,
+            "boundary_dimension": boundary_dimension(label),
             "n_starts_99": starts_needed(fraction),
         },
         uncertain=(steps, parts),
-    )  # fmt: skip
+    )
 
 
 def settler_of(system: System, verb: str, options: Campaign) -> tuple[Settler, int]:

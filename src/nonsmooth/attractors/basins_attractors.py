@@ -115,9 +115,10 @@ def _on_cycle(attractor: Attractor, runs: Settled) -> Any:
     gap = np.abs(np.nan_to_num(runs.last[:, None, :n] - attractor.points) / attractor.size).max(axis=2)
     k = gap.argmin(axis=1)
     return (
-        (runs.period_number == attractor.period_number) & (gap[np.arange(len(k)), k] <= SAME)
+        (runs.period_number == attractor.period_number)
+        & (gap[np.arange(len(k)), k] <= SAME)
         & (runs.mode == attractor.modes[k])
-    )  # fmt: skip
+    )
 
 
 def _held(runs: Settled) -> Any:
@@ -141,9 +142,20 @@ def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:
         else:
             cycle = Cycle(place[None, :n], run.mode[:1], float(run.multiplier[0]), np.nan, place, mode)
     return Attractor(
-        p, cycle.points, cycle.modes, cycle.end, cycle.mode, run.maximum[0], run.minimum[0], cycle.multiplier,
-        exponent_on(cycle), 0.0, least, confirmed, held=held,
-    )  # fmt: skip
+        p,
+        cycle.points,
+        cycle.modes,
+        cycle.end,
+        cycle.mode,
+        run.maximum[0],
+        run.minimum[0],
+        cycle.multiplier,
+        exponent_on(cycle),
+        0.0,
+        least,
+        confirmed,
+        held=held,
+    )
 
 
 def _join(

@@ -99,9 +99,21 @@ class Search:
                 points, modes, multiplier = cycle.points, cycle.modes, cycle.multiplier
                 exponent, error = exponent_on(cycle), 0.0
             return Attractor(
-                p, points, modes, end, last, maximum, minimum, multiplier, exponent, error, least, cycle is not None,
-                near=ON_CYCLE, tree=cKDTree(points / size),
-            )  # fmt: skip
+                p,
+                points,
+                modes,
+                end,
+                last,
+                maximum,
+                minimum,
+                multiplier,
+                exponent,
+                error,
+                least,
+                cycle is not None,
+                near=ON_CYCLE,
+                tree=cKDTree(points / size),
+            )
         half = len(long.points) // 2
         points, tree = long.points[half:], cKDTree(long.points[half:] / size)
         gap, _ = tree.query(long.points[:half] / size, p=np.inf)
@@ -110,9 +122,21 @@ class Search:
             return None  # so many points do not show where it is
         near = float(np.clip(SPREAD * spread, 1e-9, 2.0 * FARTHEST))
         item = Attractor(
-            0, points, long.modes[half:], end, last, maximum, minimum, np.nan, exponent, error, least,
-            chaotic=exponent > doubt, near=near, tree=tree,
-        )  # fmt: skip
+            0,
+            points,
+            long.modes[half:],
+            end,
+            last,
+            maximum,
+            minimum,
+            np.nan,
+            exponent,
+            error,
+            least,
+            chaotic=exponent > doubt,
+            near=near,
+            tree=tree,
+        )
         if not self._attracts(item) or (item.chaotic and self._keeps_areas(item)):
             self.repelled += 1
             return None

@@ -32,9 +32,13 @@ def distance(a: Attractor, b: Attractor) -> float:
 
 
 def numbered(
-    settler: Settler, point: FloatArray, found: list[Attractor], before: FloatArray, last: Mapping[int, Attractor],
+    settler: Settler,
+    point: FloatArray,
+    found: list[Attractor],
+    before: FloatArray,
+    last: Mapping[int, Attractor],
     seen: Mapping[int, Attractor],
-) -> list[int]:  # fmt: skip
+) -> list[int]:
     """The number of each attractor found at ``point``; attractors that only a carried run meets are added to ``found``.
 
     Parameters
@@ -63,9 +67,11 @@ def numbered(
             numbers[k] = number
     others = sorted(
         (distance(item, found[k]), number, k)
-        for k in range(len(found)) if k not in numbers
-        for number, item in seen.items() if number not in numbers.values()
-    )  # fmt: skip
+        for k in range(len(found))
+        if k not in numbers
+        for number, item in seen.items()
+        if number not in numbers.values()
+    )
     for gap, number, k in others:
         if gap <= CLOSE and k not in numbers and number not in numbers.values():
             numbers[k] = number
@@ -82,9 +88,12 @@ def _carried(settler: Settler, point: FloatArray, begin: list[Attractor], found:
     if not begin:
         return []
     runs = settler.run(
-        point, np.zeros(len(begin), dtype=np.int64), np.stack([item.end for item in begin]),
-        modes=[item.mode for item in begin], begin=settler.section_phase,
-    )  # fmt: skip
+        point,
+        np.zeros(len(begin), dtype=np.int64),
+        np.stack([item.end for item in begin]),
+        modes=[item.mode for item in begin],
+        begin=settler.section_phase,
+    )
     after, labels, _ = find_attractors(settler, point, runs, Patience(), found)
     found.extend(after[len(found) :])
     return [int(k) for k in labels]

@@ -34,9 +34,16 @@ class Mapper:
     """
 
     def __init__(
-        self, settler: Settler, tables: Any, rows: IntArray, places: FloatArray, modes: IntArray | None = None,
-        begin: float = 0.0, kept: Kept | None = None, into: IntArray | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        settler: Settler,
+        tables: Any,
+        rows: IntArray,
+        places: FloatArray,
+        modes: IntArray | None = None,
+        begin: float = 0.0,
+        kept: Kept | None = None,
+        into: IntArray | None = None,
+    ) -> None:
         from nonsmooth.kernels.judging.judge import ROUNDS
 
         engine, plan, memory = settler.engine, settler.plan, settler.system.memory_vector()
@@ -133,12 +140,26 @@ class Mapper:
         kept = [Block(records.KEPT, blocks.put_kept) for _ in self.rooms]
         self.blocks = Block(records.CALL, blocks.put_call), *kept
         found = [
-            march.system.address, march.log.address, march.growth.address, march.kept.address, march.call.address,
+            march.system.address,
+            march.log.address,
+            march.growth.address,
+            march.kept.address,
+            march.call.address,
             *(block.put(record) for block, record in zip(self.blocks, (second, *self.rooms), strict=True)),
-        ]  # fmt: skip
+        ]
         return Runs(
             addresses(compiled(self.engine.module().run)),
             np.array(found, dtype=np.int64) if isinstance(found[0], int) else found,  # else nothing is compiled
-            march.orders, march.reals, plan.every, int(plan.extremes), work.tally, tables.period, self.memory,
-            flag(), first.motion, second.motion, self.kept, *self.rooms,
-        )  # fmt: skip
+            march.orders,
+            march.reals,
+            plan.every,
+            int(plan.extremes),
+            work.tally,
+            tables.period,
+            self.memory,
+            flag(),
+            first.motion,
+            second.motion,
+            self.kept,
+            *self.rooms,
+        )

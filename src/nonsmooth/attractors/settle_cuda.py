@@ -75,17 +75,32 @@ class Rounds:
             self._probe(under_way[wanted[under_way] == PROBE])
             last = self.single or self.kept
             self.gpu.launch(
-                self.gpu.module.decide, under_way, self.given, tuple(self.jobs), self.kept.status, last.status,
-                self.kept.section, last.high, last.low, self.mu, self.states.u,
-            )  # fmt: skip
+                self.gpu.module.decide,
+                under_way,
+                self.given,
+                tuple(self.jobs),
+                self.kept.status,
+                last.status,
+                self.kept.section,
+                last.high,
+                last.low,
+                self.mu,
+                self.states.u,
+            )
 
     def _run(self, jobs: IntArray) -> None:
         transient, settled = self.jobs.transient.copy_to_host(), self.jobs.settled.copy_to_host()
         for returns in np.unique(transient[jobs]):
             self.gpu.run(
-                jobs[transient[jobs] == returns], self.states, int(returns), self.rules.keep, self.kept, settled,
-                extremes=self.single is None, one_more=self.single,
-            )  # fmt: skip
+                jobs[transient[jobs] == returns],
+                self.states,
+                int(returns),
+                self.rules.keep,
+                self.kept,
+                settled,
+                extremes=self.single is None,
+                one_more=self.single,
+            )
 
     def _probe(self, jobs: IntArray) -> None:
         """The cycle of each job from where it stands, and neighbours that show its multipliers."""
@@ -102,15 +117,29 @@ class Rounds:
             self._beside(jobs, state + 1, state, self.rules.difference)
         gpu.run_beside(jobs, self.others, period, self.cycle, self.arrived, self.extremes)
         gpu.launch(
-            gpu.module.measure, jobs, len(period), self.rules.difference, sizes, self.states.u, self.others.u,
-            self.cycle.status, self.arrived.status, self.mu,
-        )  # fmt: skip
+            gpu.module.measure,
+            jobs,
+            len(period),
+            self.rules.difference,
+            sizes,
+            self.states.u,
+            self.others.u,
+            self.cycle.status,
+            self.arrived.status,
+            self.mu,
+        )
 
     def _beside(self, jobs: IntArray, leg: int, state: int, factor: float) -> None:
         self.gpu.launch(
-            self.gpu.module.beside, jobs, leg * len(self.states.rows), state, factor, self.jobs.size,
-            self.states.all(), self.others.all(),
-        )  # fmt: skip
+            self.gpu.module.beside,
+            jobs,
+            leg * len(self.states.rows),
+            state,
+            factor,
+            self.jobs.size,
+            self.states.all(),
+            self.others.all(),
+        )
 
     def _contractions(self, jobs: IntArray, period: IntArray) -> None:
         from nonsmooth.kernels.judging.judge import ROUNDS
@@ -121,9 +150,16 @@ class Rounds:
             some, run = jobs[period[jobs] == p], gpu.buffers(len(period), ROUNDS * int(p) + 2)
             gpu.run(some, self.others, 0, ROUNDS * int(p) + 2, run, False)
             gpu.launch(
-                gpu.module.contract, some, int(p), self.rules.tolerance, self.jobs.size, self.kept.section,
-                run.section, run.status, self.mu,
-            )  # fmt: skip
+                gpu.module.contract,
+                some,
+                int(p),
+                self.rules.tolerance,
+                self.jobs.size,
+                self.kept.section,
+                run.section,
+                run.status,
+                self.mu,
+            )
 
     def found(self, width: int) -> Settled:
         """Results; counts and extremes over one whole cycle where there is one, else over the kept window, or as
@@ -176,9 +212,14 @@ def _states_at(gpu: Any, places: FloatArray, memory: FloatArray, rows: IntArray,
 
 
 def settle_on_gpu(
-    settler: Settler, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, begin: float,
+    settler: Settler,
+    points: FloatArray,
+    rows: IntArray,
+    starts: FloatArray,
+    modes: IntArray,
+    begin: float,
     attempts: int,
-) -> Settled:  # fmt: skip
+) -> Settled:
     """Jobs settled and judged, as ``Settler.run`` describes."""
     system, planar = settler.system, isinstance(settler.engine, PlanarEngine)
     found = Settled.empty(len(rows), len(system.states), settler.width)
@@ -194,8 +235,12 @@ def settle_on_gpu(
 
 
 def sweep_on_gpu(
-    settler: Settler, points: FloatArray, start: FloatArray, chain: Kept, advance: Callable[[int], Any],
-) -> Settled:  # fmt: skip
+    settler: Settler,
+    points: FloatArray,
+    start: FloatArray,
+    chain: Kept,
+    advance: Callable[[int], Any],
+) -> Settled:
     """Settle every parameter point from one start; the kept returns go into ``chain``."""
     parts = []
     for some, own, rows in batches(points, np.arange(len(points)), _batch(settler.engine)):
@@ -219,16 +264,30 @@ def _into(chain: Kept, some: slice, kept: Kept, gpu: Any) -> None:
 
 
 def separate_on_gpu(
-    settler: Settler, points: FloatArray, rows: IntArray, starts: FloatArray, modes: IntArray, returns: int, batch: int,
-    sizes: FloatArray, offsets: FloatArray, sums: FloatArray,
-) -> IntArray:  # fmt: skip
+    settler: Settler,
+    points: FloatArray,
+    rows: IntArray,
+    starts: FloatArray,
+    modes: IntArray,
+    returns: int,
+    batch: int,
+    sizes: FloatArray,
+    offsets: FloatArray,
+    sums: FloatArray,
+) -> IntArray:
     """Growth of neighbours of jobs, taken into their sums (``kernels.judging.exponent``); their statuses."""
     plan, status = settler.plan, np.zeros(len(rows), dtype=np.int64)
     separate = _separate_in_threads if isinstance(settler.engine, PlanarEngine) else _separate_in_rounds
     for some, own, own_rows in batches(points, rows, _batch(settler.engine)):
         gpu = _on_gpu(settler.engine, own, plan)
-        states = _states_at(gpu, starts[some], settler.system.memory_vector(), own_rows, modes[some],
-                            plan.phase if plan.indicator < 0 else 0.0)  # fmt: skip
+        states = _states_at(
+            gpu,
+            starts[some],
+            settler.system.memory_vector(),
+            own_rows,
+            modes[some],
+            plan.phase if plan.indicator < 0 else 0.0,
+        )
         on_gpu = [gpu.cuda.to_device(np.ascontiguousarray(part[some])) for part in (sizes, offsets, sums, status)]
         separate(gpu, states, returns, batch, *on_gpu)
         sums[some], status[some] = (part.copy_to_host() for part in on_gpu[2:])
@@ -242,10 +301,20 @@ def _separate_in_threads(
     jobs = np.arange(len(states.rows))
     for begin in range(0, returns, SLICE // 2):
         gpu.launch(
-            gpu.module.neighbours, jobs, states.rows, gpu.tables, gpu.net, states.place(),
-            (begin, min(begin + SLICE // 2, returns), batch), sizes, (offsets, sums), gpu.plans[0], gpu.phase,
-            gpu.limit, status,
-        )  # fmt: skip
+            gpu.module.neighbours,
+            jobs,
+            states.rows,
+            gpu.tables,
+            gpu.net,
+            states.place(),
+            (begin, min(begin + SLICE // 2, returns), batch),
+            sizes,
+            (offsets, sums),
+            gpu.plans[0],
+            gpu.phase,
+            gpu.limit,
+            status,
+        )
         jobs = jobs[status.copy_to_host()[jobs] == codes.OK]
         if not len(jobs):
             return

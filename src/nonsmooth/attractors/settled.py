@@ -69,9 +69,18 @@ class Settled:
             return np.full((jobs, size), np.nan)
 
         return cls(
-            whole(), whole(), one(), one(), one(), one(), state(), state(), state(width or n), whole(),
             whole(),
-        )  # fmt: skip
+            whole(),
+            one(),
+            one(),
+            one(),
+            one(),
+            state(),
+            state(),
+            state(width or n),
+            whole(),
+            whole(),
+        )
 
     @classmethod
     def joined(cls, parts: Sequence[Settled]) -> Settled:

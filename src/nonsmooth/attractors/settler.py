@@ -150,9 +150,19 @@ class Settler:
         scale = self.system.scale_vector()
         least, rounded = least_sizes(self.engine.name, scale)
         return Rules(
-            self.transient, self.keep, self.max_period, FIRST_LOOK if self.stop_early else 0, attempts, beyond,
-            self.tolerance, max(DIFFERENCE, 1e2 * self.tolerance, clear), least, rounded, LEAST * scale, ROUNDED,
-        )  # fmt: skip
+            self.transient,
+            self.keep,
+            self.max_period,
+            FIRST_LOOK if self.stop_early else 0,
+            attempts,
+            beyond,
+            self.tolerance,
+            max(DIFFERENCE, 1e2 * self.tolerance, clear),
+            least,
+            rounded,
+            LEAST * scale,
+            ROUNDED,
+        )
 
     @property
     def least(self) -> FloatArray:
@@ -216,9 +226,15 @@ class Settler:
         return columns
 
     def exponents(
-        self, points: FloatArray, rows: Any, starts: FloatArray, modes: Any, n_returns: int, maximum: FloatArray,
+        self,
+        points: FloatArray,
+        rows: Any,
+        starts: FloatArray,
+        modes: Any,
+        n_returns: int,
+        maximum: FloatArray,
         minimum: FloatArray,
-    ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    ) -> tuple[FloatArray, FloatArray]:
         """Largest Lyapunov exponents (per unit time) of J jobs that begin on the section, and their errors.
 
         Two neighbours over ``n_returns`` returns, put back to a small distance after each, in units of the motion's
@@ -246,9 +262,7 @@ class Settler:
         return rates(sums, status)
 
 
-def settler_for(
-    system: System, verb: str, options: Settling, *, carried: bool = False, **changes: Any
-) -> Settler:  # fmt: skip
+def settler_for(system: System, verb: str, options: Settling, *, carried: bool = False, **changes: Any) -> Settler:
     """The attractor mapper that a verb's options describe; what cannot be done on the device asked for is refused.
 
     Parameters

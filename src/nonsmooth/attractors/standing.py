@@ -27,9 +27,14 @@ TRIES = 20  # states of a nonlinear system beside which equilibria are looked fo
 
 
 def label_standing(
-    settler: Settler, point: FloatArray, runs: Settled, which: IntArray, found: list[Attractor], labels: IntArray,
+    settler: Settler,
+    point: FloatArray,
+    runs: Settled,
+    which: IntArray,
+    found: list[Attractor],
+    labels: IntArray,
     status: IntArray,
-) -> None:  # fmt: skip
+) -> None:
     """Label the runs that ended at equilibria; sets of them not met before become attractors."""
     system, tolerance = settler.system, STANDS * settler.tolerance
     u = runs.last[:, : len(system.states)]
@@ -82,9 +87,14 @@ def standing_in_sweep(
 
 
 def _stands(
-    system: System, tolerance: float, u: FloatArray, maximum: FloatArray, minimum: FloatArray, period: IntArray,
+    system: System,
+    tolerance: float,
+    u: FloatArray,
+    maximum: FloatArray,
+    minimum: FloatArray,
+    period: IntArray,
     status: IntArray,
-) -> Any:  # fmt: skip
+) -> Any:
     """Marks of runs that do not move any more, or hardly, at places u (..., n)."""
     with np.errstate(invalid="ignore"):
         still = (maximum - minimum <= tolerance * (system.scale_vector() + np.abs(u))).all(axis=-1)
@@ -95,9 +105,15 @@ def _stands(
 
 
 def _label(
-    stood: EquilibriumSet, number: int, u: FloatArray, still: Any, near: FloatArray, which: IntArray,
-    labels: IntArray, status: IntArray,
-) -> None:  # fmt: skip
+    stood: EquilibriumSet,
+    number: int,
+    u: FloatArray,
+    still: Any,
+    near: FloatArray,
+    which: IntArray,
+    labels: IntArray,
+    status: IntArray,
+) -> None:
     here = still.copy()
     here[still] = stood.holds(u[still], near[still])
     labels[which[here]], status[which[here]] = number, codes.OK
@@ -117,7 +133,18 @@ def _attractor(settler: Settler, point: FloatArray, run: Settled, stood: Equilib
         with np.errstate(divide="ignore"):
             exponent = float(np.log(multiplier) / period)
     return Attractor(
-        1, points, np.array([mode] * len(points)), run.last[0], int(run.mode[0]), stood.upper, stood.lower, multiplier,
-        exponent, 0.0, settler.least_at(run.last[0, : len(system.states)], run.last[0, : len(system.states)]), True,
-        name=stood.name(system.modes), standing=stood,
-    )  # fmt: skip
+        1,
+        points,
+        np.array([mode] * len(points)),
+        run.last[0],
+        int(run.mode[0]),
+        stood.upper,
+        stood.lower,
+        multiplier,
+        exponent,
+        0.0,
+        settler.least_at(run.last[0, : len(system.states)], run.last[0, : len(system.states)]),
+        True,
+        name=stood.name(system.modes),
+        standing=stood,
+    )

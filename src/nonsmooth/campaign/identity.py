@@ -32,9 +32,12 @@ def described(work: Work) -> dict[str, Any]:
     """Everything that the content of a work's chunks depends on, but for the processor."""
     columns = {name: [item.dtype, list(item.shape)] for name, item in work.columns().items()}
     return {
-        **work.describe(), "columns": columns, "chunks": work.n_chunks(), "places": work.bounds(work.n_chunks() - 1)[1],
+        **work.describe(),
+        "columns": columns,
+        "chunks": work.n_chunks(),
+        "places": work.bounds(work.n_chunks() - 1)[1],
         "kernels": _kernel_version(),
-    }  # fmt: skip
+    }
 
 
 def difference(record: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:

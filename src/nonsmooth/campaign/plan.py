@@ -98,9 +98,15 @@ def plan(work: Work, *, seconds: float = SECONDS, seed: int = 0, kept: int | Non
     first, last = work.bounds(0)
     together = [samples[chunk] for chunk in sorted(samples)]
     return Plan(
-        places, n, len(per_place), places * float(np.mean(per_place)), error, places * width,
-        stored_bytes(work, together, kept or last - first) if find_spec("zarr") else None, _resident(),
-    )  # fmt: skip
+        places,
+        n,
+        len(per_place),
+        places * float(np.mean(per_place)),
+        error,
+        places * width,
+        stored_bytes(work, together, kept or last - first) if find_spec("zarr") else None,
+        _resident(),
+    )
 
 
 def _spread(n: int, seed: int) -> Any:

@@ -15,9 +15,15 @@ from nonsmooth.results.progress import progress as progress_bar
 
 
 def run(
-    work: Work, *, threads: int | None = None, progress: Progress = True, label: str = "", store: Any = None,
-    client: Any = None, any_cpu: bool = False,
-) -> dict[str, NDArray[Any]]:  # fmt: skip
+    work: Work,
+    *,
+    threads: int | None = None,
+    progress: Progress = True,
+    label: str = "",
+    store: Any = None,
+    client: Any = None,
+    any_cpu: bool = False,
+) -> dict[str, NDArray[Any]]:
     """Compute every chunk of ``work`` that is not in the store yet, and return its columns over all places.
 
     Parameters

@@ -87,10 +87,15 @@ class ChunkStore:
             kept = {name: np.ascontiguousarray(arrays[name], item.dtype) for name, item in work.columns().items()}
             _put(group, kept, first, last)
             mark = {
-                "chunk": chunk, "key": self._key(chunk), "content": _content(kept),
-                "cpu": processor_type(work.device), "host": socket.gethostname(), "process": os.getpid(),
-                "seconds": round(seconds, 4), "ended": time.time(),
-            }  # fmt: skip
+                "chunk": chunk,
+                "key": self._key(chunk),
+                "content": _content(kept),
+                "cpu": processor_type(work.device),
+                "host": socket.gethostname(),
+                "process": os.getpid(),
+                "seconds": round(seconds, 4),
+                "ended": time.time(),
+            }
             write_whole(self.path / "run" / f"{chunk:06d}.json", json.dumps(seal(mark)).encode())
 
     def read(self, work: Work) -> dict[str, NDArray[Any]]:
@@ -253,9 +258,13 @@ def _create(group: Any, work: Work, places: int, chunk: int) -> None:
 
     for name, item in work.columns().items():
         group.create_array(
-            name, shape=(places, *item.shape), chunks=(chunk, *item.shape), dtype=item.dtype,
-            compressors=ZstdCodec(level=LEVEL), config={"write_empty_chunks": True},
-        )  # fmt: skip
+            name,
+            shape=(places, *item.shape),
+            chunks=(chunk, *item.shape),
+            dtype=item.dtype,
+            compressors=ZstdCodec(level=LEVEL),
+            config={"write_empty_chunks": True},
+        )
 
 
 def _put(group: Any, arrays: Mapping[str, NDArray[Any]], first: int, last: int) -> None:

@@ -71,6 +71,8 @@ def inputs(system: System, verb: str, options: Mapping[str, Any]) -> dict[str, A
     from nonsmooth.results.provenance import options_as_data
 
     return {
-        "verb": verb, "system": system.to_text(), "parameters": {k: float(v) for k, v in system.values.items()},
+        "verb": verb,
+        "system": system.to_text(),
+        "parameters": {k: float(v) for k, v in system.values.items()},
         "options": options_as_data(options),
-    }  # fmt: skip
+    }

@@ -17,12 +17,18 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _TABLES: dict[str, Any] = {
-    "system": SYSTEM, "identified": {"data": TEXT, "session": TEXT},
+    "system": SYSTEM,
+    "identified": {"data": TEXT, "session": TEXT},
     "measured": {
-        "session": TEXT, "procedure": TEXT, "run": ANY, "crank_force": ANY, "gap_offset": ANY, "referred": ANY,
+        "session": TEXT,
+        "procedure": TEXT,
+        "run": ANY,
+        "crank_force": ANY,
+        "gap_offset": ANY,
+        "referred": ANY,
     },
     "output": dict.fromkeys(("data", "figure", "picture", "x", "y"), TEXT),
-}  # fmt: skip
+}
 #: Pictures by what is compared: the functions ``comparison_NAME`` of ``nonsmooth.plot``, the usual one first.
 _PICTURES = {
     "motion": ("phase_portrait", "time", "section", "distances"),

@@ -14,10 +14,14 @@ from nonsmooth.system.names import check_keys, unknown
 
 _TABLES = {
     "identify": {
-        "session": TEXT, "model": TEXT, "parameters": NAMES, "crank_length": LENGTH, "apparatus": QUANTITIES,
+        "session": TEXT,
+        "model": TEXT,
+        "parameters": NAMES,
+        "crank_length": LENGTH,
+        "apparatus": QUANTITIES,
     },
     "output": dict.fromkeys(("data", "table", "figures", "format"), TEXT),
-}  # fmt: skip
+}
 _FORMATS = ("pdf", "png", "svg")
 
 
@@ -112,13 +116,17 @@ def _study(path: Path, asked: Mapping[str, Any], output: Mapping[str, Any]) -> _
     if style not in _FORMATS:
         raise ValueError(f"{path}, table [output]: {unknown(style, 'a format', 'figures', _FORMATS)}")
     return _Study(
-        session, load_model(asked["model"], folder) if "model" in asked else None, tuple(asked.get("parameters", [])),
-        None if crank is None else float(crank), {
+        session,
+        load_model(asked["model"], folder) if "model" in asked else None,
+        tuple(asked.get("parameters", [])),
+        None if crank is None else float(crank),
+        {
             name: (value.get("value"), value.get("uncertainty", 0.0)) if isinstance(value, dict) else value
             for name, value in apparatus.items()
         },
-        **{key: folder / output[key] if key in output else None for key in ("data", "table", "figures")}, format=style,
-    )  # fmt: skip
+        **{key: folder / output[key] if key in output else None for key in ("data", "table", "figures")},
+        format=style,
+    )
 
 
 def _write(found: Any, study: _Study, data: Path | None) -> list[Path]:

@@ -158,10 +158,21 @@ def _example(option: Option, system: Any) -> Any:
     parameter = _parameters(system, 1)[0] if system.values else "name"
     section = {"indicator": system.indicators[0]} if system.indicators else {"phase": 0.25}
     examples: Mapping[str, Any] = {
-        "periods": 50, "duration": 100.0, "start": state, "mode": system.modes[0], "samples": 1001, "step": 0.001,
-        "ramps": {parameter: list(_around(system.values.get(parameter, 0.0)))}, "rtol": 1e-9, "atol": 1e-12,
-        "section": section if system.period() is None else {"phase": 0.25}, "max_period": 8, "threads": 1,
-        "order": 20, "carry": {parameter: "up"}, "fixed": dict.fromkeys(list(system.states)[2:], 0.0),
+        "periods": 50,
+        "duration": 100.0,
+        "start": state,
+        "mode": system.modes[0],
+        "samples": 1001,
+        "step": 0.001,
+        "ramps": {parameter: list(_around(system.values.get(parameter, 0.0)))},
+        "rtol": 1e-9,
+        "atol": 1e-12,
+        "section": section if system.period() is None else {"phase": 0.25},
+        "max_period": 8,
+        "threads": 1,
+        "order": 20,
+        "carry": {parameter: "up"},
+        "fixed": dict.fromkeys(list(system.states)[2:], 0.0),
         "box": {name: [-size, size] for name, size in system.scale.items()},
-    }  # fmt: skip
+    }
     return examples[option.name]

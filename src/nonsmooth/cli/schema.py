@@ -16,10 +16,14 @@ from nonsmooth.cli.files import with_folder
 from nonsmooth.cli.verb_options import VERBS, Option, options_of
 
 _TYPES: dict[str, dict[str, Any]] = {
-    "bool": {"type": "boolean"}, "int": {"type": "integer"}, "float": {"type": "number"}, "str": {"type": "string"},
-    "Stroboscopic": {"$ref": "#/definitions/stroboscopic"}, "Poincare": {"$ref": "#/definitions/poincare"},
+    "bool": {"type": "boolean"},
+    "int": {"type": "integer"},
+    "float": {"type": "number"},
+    "str": {"type": "string"},
+    "Stroboscopic": {"$ref": "#/definitions/stroboscopic"},
+    "Poincare": {"$ref": "#/definitions/poincare"},
     "tuple": {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2},
-}  # fmt: skip
+}
 #: Options that a file writes in a way of its own.
 _WRITTEN: dict[str, dict[str, Any]] = {
     "values": {"allOf": [{"$ref": "#/definitions/values"}]},  # beside a $ref nothing else would count
@@ -97,18 +101,26 @@ def study_schema() -> dict[str, Any]:
         **_table(tables, ["system"]),
         "oneOf": [{"required": [verb]} for verb in VERBS],
         "definitions": {
-            "values": {"anyOf": [
-                _NUMBERS,
-                _table({"from": {"type": "number"}, "to": {"type": "number"}, "n": {"type": "integer", "minimum": 1}},
-                       ["from", "to", "n"]),
-            ]},
-            "start": {"anyOf": [
-                _STATE, {"type": "array", "items": _STATE},
-                _arguments(nonsmooth.random_starts, low=_STATE, high=_STATE),
-            ]},
-            "stroboscopic": _arguments(nonsmooth.Stroboscopic), "poincare": _arguments(nonsmooth.Poincare),
+            "values": {
+                "anyOf": [
+                    _NUMBERS,
+                    _table(
+                        {"from": {"type": "number"}, "to": {"type": "number"}, "n": {"type": "integer", "minimum": 1}},
+                        ["from", "to", "n"],
+                    ),
+                ]
+            },
+            "start": {
+                "anyOf": [
+                    _STATE,
+                    {"type": "array", "items": _STATE},
+                    _arguments(nonsmooth.random_starts, low=_STATE, high=_STATE),
+                ]
+            },
+            "stroboscopic": _arguments(nonsmooth.Stroboscopic),
+            "poincare": _arguments(nonsmooth.Poincare),
         },
-    }  # fmt: skip
+    }
 
 
 def _table(properties: dict[str, Any], required: Iterable[str] = ()) -> dict[str, Any]:

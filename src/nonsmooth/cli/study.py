@@ -32,9 +32,14 @@ OUTPUT = {"data": (".nc", ".zarr"), "figure": _FORMATS, "store": (".zarr",), "x"
 #: Verbs whose work is cut into chunks.
 _IN_CHUNKS = ("chart", "basins", "basin_fractions")
 _FIGURES = {
-    "simulate": "phase_portrait", "sweep": "bifurcation", "frequency_response": "frequency_response",
-    "poincare": "section", "chart": "chart", "basins": "basins", "basin_fractions": "basin_fractions",
-}  # fmt: skip
+    "simulate": "phase_portrait",
+    "sweep": "bifurcation",
+    "frequency_response": "frequency_response",
+    "poincare": "section",
+    "chart": "chart",
+    "basins": "basins",
+    "basin_fractions": "basin_fractions",
+}
 
 
 @dataclass(frozen=True)
@@ -88,9 +93,12 @@ class Study:
         axes = {axis: self.output[axis] for axis in ("x", "y") if axis in self.output}
         figure = _figure(self.verb, self.options)
         return write(
-            result, self.output, self.path.parent, self.path.with_suffix(".nc"),
+            result,
+            self.output,
+            self.path.parent,
+            self.path.with_suffix(".nc"),
             lambda plot: getattr(plot, figure)(result, **axes),
-        )  # fmt: skip
+        )
 
 
 def read_study(path: Path) -> Study:

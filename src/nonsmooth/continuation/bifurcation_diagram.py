@@ -167,9 +167,16 @@ def _swept(system: System, name: str, values: FloatArray, start: Any, transient:
 
     at = system.with_parameters({name: float(values[0])})
     return sweep(
-        at, name, values, direction="both", start=start, transient=transient, keep=2 * most, max_period=most,
+        at,
+        name,
+        values,
+        direction="both",
+        start=start,
+        transient=transient,
+        keep=2 * most,
+        max_period=most,
         progress=False,
-    )  # fmt: skip
+    )
 
 
 def _periodic(swept: xr.Dataset, name: str) -> list[tuple[float, int, FloatArray]]:
@@ -188,9 +195,7 @@ def _periodic(swept: xr.Dataset, name: str) -> list[tuple[float, int, FloatArray
     return [(value, number, u) for _, number, value, u in found]
 
 
-def _switched(
-    found: list[_Branch], depth: int, most: int, search: Search, more: dict[str, Any], near: float
-) -> bool:
+def _switched(found: list[_Branch], depth: int, most: int, search: Search, more: dict[str, Any], near: float) -> bool:
     """Follow the branches that leave the last one, and those that leave these; False where the budget ends it."""
     todo = [len(found) - 1]
     for at in todo:

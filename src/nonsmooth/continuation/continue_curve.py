@@ -27,9 +27,12 @@ if TYPE_CHECKING:
 
 @checked
 def continue_curve(
-    special_point: Any, ranges: Mapping[str, Range], *, step: LargestStep = 0.05,
+    special_point: Any,
+    ranges: Mapping[str, Range],
+    *,
+    step: LargestStep = 0.05,
     points: Annotated[int, at_least(1)] = 1000,
-) -> xr.Dataset:  # fmt: skip
+) -> xr.Dataset:
     """Follow a fold, flip, Neimark-Sacker or grazing point in two parameters.
 
     Parameters
@@ -85,9 +88,11 @@ def continue_curve(
     within = Limits(allowed, step, points, locus.landmark(first))
     record = both_ways(policy, within, first.turned(), [record_of(Row(first))], first)
     options = {
-        "ranges": {name: list(ends) for name, ends in zip(names, box, strict=True)}, "step": step, "points": points,
+        "ranges": {name: list(ends) for name, ends in zip(names, box, strict=True)},
+        "step": step,
+        "points": points,
         "kind": kind,
-    }  # fmt: skip
+    }
     more = {
         "kind": ((), kind, {"long_name": "kind of the special point that is followed"}),
         "period_number": ((), np.int64(period_number), {"long_name": f"{labels_of(system).turn}s (0: autonomous)"}),
@@ -105,8 +110,7 @@ def _box(system: System, ranges: Mapping[str, Range]) -> tuple[tuple[str, str], 
             f"not {shortened(ranges)}"
         )
     box = [
-        limits(system, name, ends, system.values.get(name), what="the special point")
-        for name, ends in ranges.items()
+        limits(system, name, ends, system.values.get(name), what="the special point") for name, ends in ranges.items()
     ]
     first, second = ranges
     return (str(first), str(second)), box

@@ -97,9 +97,13 @@ def continue_equilibrium(
     policy, ahead = AlongEquilibria(), first.facing(1.0)
     record = both_ways(policy, Limits(box, step, points), first.facing(-1.0), [record_of(Row(ahead))], ahead)
     options = {
-        "parameter": parameter, "range": (low, high), "step": step, "points": points, "mode": mode,
+        "parameter": parameter,
+        "range": (low, high),
+        "step": step,
+        "points": points,
+        "mode": mode,
         "start": [float(x) for x in state.u],
-    }  # fmt: skip
+    }
     values, tables = {parameter: [point.value for point in record.points]}, (EQUILIBRIUM, SPECIAL_EQUILIBRIUM)
     attrs, method = {"parameter": parameter}, "pseudo-arclength"
     return dataset(system, "continue_equilibrium", values, tables, record, policy, options, {}, attrs, method)

@@ -105,8 +105,10 @@ def _from_orbit(orbit: Orbit, name: str | None, asked: Asked) -> xr.Dataset:
     curve, X = curve_of(orbit, name, branch.width)
     first = curve.nearest(X / curve.scale, system.values[name])
     if first is None:
-        raise SolveError("Newton's method did not converge at the orbit itself: give its parameter another value",
-                         status="no_convergence")  # fmt: skip
+        raise SolveError(
+            "Newton's method did not converge at the orbit itself: give its parameter another value",
+            status="no_convergence",
+        )
     ahead = first.facing(1.0)
     middle = [record_of(Row(ahead))]
     return branch.result(orbit.period_number, first.facing(-1.0), middle, ahead, closed=curve.landmark(first))

@@ -47,9 +47,7 @@ class Guard:
         if not phase > self._phase:
             raise self.stopped(f"the phase of the drive went from {self._phase:.6g} to {phase:.6g}: it must count on")
         if not self.low <= position <= self.high:
-            raise self.stopped(
-                f"the position {position:.6g} is beyond its limit, {self.low:.6g} to {self.high:.6g}"
-            )
+            raise self.stopped(f"the position {position:.6g} is beyond its limit, {self.low:.6g} to {self.high:.6g}")
         if position != self._shown:
             self._shown, self._since = position, phase
         elif phase - self._since >= 1.0:

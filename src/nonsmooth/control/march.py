@@ -132,9 +132,13 @@ class March:
         return np.asarray(tangent / np.linalg.norm(self.plane @ tangent))
 
     def _correct(
-        self, y: FloatArray, across: FloatArray, target: FloatArray, longest: float,
+        self,
+        y: FloatArray,
+        across: FloatArray,
+        target: FloatArray,
+        longest: float,
         before: tuple[FloatArray, FloatArray],
-    ) -> Point | None:  # fmt: skip
+    ) -> Point | None:
         """Measure and correct, on the plane through ``target`` across a direction, until the control force vanishes.
 
         No correction is longer than ``longest``; ``before`` is another place with its mismatch.

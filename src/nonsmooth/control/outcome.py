@@ -45,9 +45,14 @@ class Names:
 
 
 def branch_dataset(
-    march: March, points: Sequence[Point], released: Sequence[tuple[int, float]], names: Names, parameter: str,
-    ending: str, record: Mapping[str, Any],
-) -> xr.Dataset:  # fmt: skip
+    march: March,
+    points: Sequence[Point],
+    released: Sequence[tuple[int, float]],
+    names: Names,
+    parameter: str,
+    ending: str,
+    record: Mapping[str, Any],
+) -> xr.Dataset:
     """The points in the order in which they were measured."""
     import xarray as xr
 

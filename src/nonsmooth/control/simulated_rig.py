@@ -145,10 +145,11 @@ class SimulatedRig:
 
             names = list(self._system.states)
             raise solve_error(
-                log.status, time=float(clock[1] * self._period + clock[0]),
+                log.status,
+                time=float(clock[1] * self._period + clock[0]),
                 state={name: float(value) for name, value in zip(names, self._state.u, strict=True)},
                 mode=self._system.modes[int(self._state.counters[0])],
-            )  # fmt: skip
+            )
         phase = clock[1] + (clock[0] - late) / self._period  # by the even clock of the interface
         return float(phase), self.reading(float(self._state.u[self._place]))
 

@@ -147,9 +147,7 @@ def _period_number(system: System, engine: Engine, section: Any, start: Any, tra
     return int(found.period_number[0])
 
 
-def _stretch(
-    system: System, start: Any, section: Any, transient: int, length: int, how: Solver
-) -> tuple[float, float]:
+def _stretch(system: System, start: Any, section: Any, transient: int, length: int, how: Solver) -> tuple[float, float]:
     """Begin and duration of so many periods, or section returns."""
     period = system.period()
     if period is not None and not isinstance(section, Poincare):
@@ -158,9 +156,7 @@ def _stretch(
     return float(times[0]), float(times[-1] - times[0])
 
 
-def _sampled(
-    system: System, start: Any, begin: float, span: float, number: int, how: Solver
-) -> FloatArray:  # fmt: skip
+def _sampled(system: System, start: Any, begin: float, span: float, number: int, how: Solver) -> FloatArray:
     """The states at ``number`` even instants, and at the end of the record, where a periodic motion is back."""
     times = begin + np.linspace(0.0, span, number + 1)
     run = simulate(system, duration=span * (1.0 + 1e-12), transient=begin, start=start, samples=times, **how)
@@ -172,9 +168,14 @@ def _sampled(
 
 
 def _dataset(
-    system: System, method: str, options: dict[str, Any], frequency: FloatArray, amplitude: FloatArray, base: float,
+    system: System,
+    method: str,
+    options: dict[str, Any],
+    frequency: FloatArray,
+    amplitude: FloatArray,
+    base: float,
     count: int,
-) -> xr.Dataset:  # fmt: skip
+) -> xr.Dataset:
     import xarray as xr
 
     from nonsmooth.results.labels import labels_of
@@ -183,16 +184,23 @@ def _dataset(
 
     labels = labels_of(system)
     per = "per iterate" if labels.is_map else "Hz" if labels.time_unit == "s" else f"1/{labels.time_unit}"
-    return with_short_record(xr.Dataset(
-        {
-            "amplitude": (("frequency", "state"), amplitude, {"long_name": "amplitude"}),
-            "base_frequency": ((), base, {"long_name": "frequency of the forcing, or of the returns", "units": per}),
-            "period_number": ((), np.int64(count), {"long_name": "period number (0: none found)"}),
-        },
-        {
-            "frequency": ("frequency", frequency, {"long_name": "frequency", "units": per}),
-            "order": ("frequency", frequency / base, {"long_name": "frequency over the base frequency"}),
-            **state_coords(labels), **parameter_coords(labels),
-        },
-        provenance(labels, "amplitude_spectrum", options, method=method),
-    ))  # fmt: skip
+    return with_short_record(
+        xr.Dataset(
+            {
+                "amplitude": (("frequency", "state"), amplitude, {"long_name": "amplitude"}),
+                "base_frequency": (
+                    (),
+                    base,
+                    {"long_name": "frequency of the forcing, or of the returns", "units": per},
+                ),
+                "period_number": ((), np.int64(count), {"long_name": "period number (0: none found)"}),
+            },
+            {
+                "frequency": ("frequency", frequency, {"long_name": "frequency", "units": per}),
+                "order": ("frequency", frequency / base, {"long_name": "frequency over the base frequency"}),
+                **state_coords(labels),
+                **parameter_coords(labels),
+            },
+            provenance(labels, "amplitude_spectrum", options, method=method),
+        )
+    )

@@ -121,9 +121,14 @@ def chart(
     labels = labels_of(system)
     record = provenance(labels, "chart", asked | {"grid": planned.values}, method=work.settler.engine.name)
     return build(
-        labels, record, planned.values, arrays,
-        starts=work.starts, one_start=is_one_start(start) or len(work.starts) == 1, loads=planned.loads,
-    )  # fmt: skip
+        labels,
+        record,
+        planned.values,
+        arrays,
+        starts=work.starts,
+        one_start=is_one_start(start) or len(work.starts) == 1,
+        loads=planned.loads,
+    )
 
 
 @dataclass(frozen=True)
@@ -150,17 +155,27 @@ def plan_chart(system: System, grid: Mapping[str, Any], **options: Any) -> Plann
     # attractors are told apart by extremes; neighbours are as near as the motion is wide
     extremes = options["extremes"] or len(starts) > 1 or n_exponent > 0
     settler = settler_for(
-        system, "chart", cast(Campaign, options), carried=along is not None, stop_early=options["stop_early"],
+        system,
+        "chart",
+        cast(Campaign, options),
+        carried=along is not None,
+        stop_early=options["stop_early"],
         extremes=extremes,
-    )  # fmt: skip
+    )
     if settler.plan.indicator >= 0:
         refuse_resting(system, starts, _corners(system, values), "chart")
     measured = checked_loads(system, options["loads"], "chart")
     axes, order = _axes(values, along)
     work = ChartWork(
-        settler, axes, starts, along is not None, n_exponent, tuple(measured),
-        chunk=CHUNK if settler.device == "cpu" else BATCH, described=inputs(system, "chart", asked | {"grid": values}),
-    )  # fmt: skip
+        settler,
+        axes,
+        starts,
+        along is not None,
+        n_exponent,
+        tuple(measured),
+        chunk=CHUNK if settler.device == "cpu" else BATCH,
+        described=inputs(system, "chart", asked | {"grid": values}),
+    )
     return PlannedChart(work, values, order, measured)
 
 

@@ -74,9 +74,10 @@ def refined(
 
 
 def confidence_of(
-    classes: tuple[NDArray[Any], NDArray[Any]], computed: NDArray[np.bool_],
+    classes: tuple[NDArray[Any], NDArray[Any]],
+    computed: NDArray[np.bool_],
     rates: dict[tuple[int, int], tuple[int, int]],
-) -> NDArray[np.float64]:  # fmt: skip
+) -> NDArray[np.float64]:
     """The chance that a label is right: (n + 1 - errors) / (n + 2) by the probes of its class, 1 if computed.
 
     A class is a pair of numbers for each point; ``rates`` has (errors, n) of those that were probed. Nothing is known

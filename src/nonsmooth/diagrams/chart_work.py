@@ -72,9 +72,11 @@ class ChartWork:
         many = () if len(self.starts) == 1 else (len(self.starts),)
         n = self.starts.shape[1]
         found = {
-            "period_number": Column("i2", many), "status": Column("i1", many),
-            "crossings_per_period": Column("f8", many), "contacts_per_period": Column("f8", many),
-        }  # fmt: skip
+            "period_number": Column("i2", many),
+            "status": Column("i1", many),
+            "crossings_per_period": Column("f8", many),
+            "contacts_per_period": Column("f8", many),
+        }
         if self.settler.extremes:
             found |= {"maximum": Column("f8", (*many, n)), "minimum": Column("f8", (*many, n))}
         if self.lyapunov:
@@ -110,10 +112,13 @@ class ChartWork:
         else:
             found = self.settler.run(points, rows, np.tile(self.starts, (n_places, 1)))
         arrays = {
-            "period_number": found.period_number, "status": found.status,
-            "crossings_per_period": found.crossings, "contacts_per_period": found.contacts,
-            "maximum": found.maximum, "minimum": found.minimum,
-        }  # fmt: skip
+            "period_number": found.period_number,
+            "status": found.status,
+            "crossings_per_period": found.crossings,
+            "contacts_per_period": found.contacts,
+            "maximum": found.maximum,
+            "minimum": found.minimum,
+        }
         if self.loads:
             arrays |= self.settler.loads(points, rows, found)
         if self.lyapunov:

@@ -191,9 +191,15 @@ def _length(system: System, periods: int | None, duration: float | None, transie
 
 
 def _along(
-    system: System, engine: Engine, points: FloatArray, order: IntArray, first: State, length: _Length, carry: bool,
+    system: System,
+    engine: Engine,
+    points: FloatArray,
+    order: IntArray,
+    first: State,
+    length: _Length,
+    carry: bool,
     advance: Callable[..., None],
-) -> tuple[list[Spectrum], list[FloatArray]]:  # fmt: skip
+) -> tuple[list[Spectrum], list[FloatArray]]:
     """The spectrum at each point, in the order in which a state is carried along; with the sizes of states met."""
     tables, sizes = engine.prepare(points), []
     found: dict[int, Spectrum] = {}
@@ -237,10 +243,19 @@ def _on_gpu(
             continue
         total, demanded = float(logs.sum()), float(sums[i, 0] + sums[i, 1])
         defect = 0.0 if total == demanded else total - demanded
-        found.append(evaluated(
-            2, logs.sum(axis=0) / (count * unit), logs if count >= BATCHES else None, count, unit, defect,
-            float(sums[i, 3]), int(status[i]), True,
-        ))  # fmt: skip
+        found.append(
+            evaluated(
+                2,
+                logs.sum(axis=0) / (count * unit),
+                logs if count >= BATCHES else None,
+                count,
+                unit,
+                defect,
+                float(sums[i, 3]),
+                int(status[i]),
+                True,
+            )
+        )
     return found
 
 
@@ -256,13 +271,20 @@ def _dataset(
     if note := _note(system, parameter, numbers, found):
         attrs = {**attrs, "note": note}
     return spectrum(
-        labels, attrs, parameter, numbers,
+        labels,
+        attrs,
+        parameter,
+        numbers,
         equilibrium=[EQUILIBRIA.index(one.rest.kind) if one.rest else 0 for one in found],
-        exponents=[one.exponents for one in found], standard_error=[one.error for one in found],
-        running=[one.running for one in found], trace_defect=[one.defect for one in found],
-        kaplan_yorke=[one.dimension for one in found], nearest_graze=[one.nearest for one in found],
-        elapsed=[one.elapsed for one in found], status=[result_status(one.status) for one in found],
-    )  # fmt: skip
+        exponents=[one.exponents for one in found],
+        standard_error=[one.error for one in found],
+        running=[one.running for one in found],
+        trace_defect=[one.defect for one in found],
+        kaplan_yorke=[one.dimension for one in found],
+        nearest_graze=[one.nearest for one in found],
+        elapsed=[one.elapsed for one in found],
+        status=[result_status(one.status) for one in found],
+    )
 
 
 def _note(system: System, parameter: str | None, numbers: FloatArray | None, found: list[Spectrum]) -> str:

@@ -15,9 +15,16 @@ from nonsmooth.kernels.hybrid.kept import Section
 
 
 def growth_on_gpu(
-    engine: PlanarEngine, points: FloatArray, start: FloatArray, mode: int, scale: FloatArray, align: int, wait: int,
-    edges: IntArray, advance: Any,
-) -> tuple[FloatArray, FloatArray, IntArray]:  # fmt: skip
+    engine: PlanarEngine,
+    points: FloatArray,
+    start: FloatArray,
+    mode: int,
+    scale: FloatArray,
+    align: int,
+    wait: int,
+    edges: IntArray,
+    advance: Any,
+) -> tuple[FloatArray, FloatArray, IntArray]:
     """Growth of the frames of P trajectories that begin at one start, at the phase 0 of the forcing.
 
     Parameters
@@ -47,9 +54,15 @@ def growth_on_gpu(
 
 
 def _batch(
-    engine: PlanarEngine, points: FloatArray, start: FloatArray, mode: int, scale: FloatArray, align: int, wait: int,
+    engine: PlanarEngine,
+    points: FloatArray,
+    start: FloatArray,
+    mode: int,
+    scale: FloatArray,
+    align: int,
+    wait: int,
     edges: IntArray,
-) -> tuple[FloatArray, FloatArray, IntArray]:  # fmt: skip
+) -> tuple[FloatArray, FloatArray, IntArray]:
     n = len(points)
     gpu = PlanarOnGpu(engine, points, Section())
     module, to_device = gpu.growth(), gpu.cuda.to_device
@@ -68,9 +81,18 @@ def _batch(
         while count > 0 and len(jobs):
             some = min(count, module.UNITS)
             gpu.launch(
-                module.frames, jobs, states.rows, gpu.tables, gpu.net, states.place(), some, gpu.periods, gpu.limit,
-                lengths, (frame, growth, sums, on_device),
-            )  # fmt: skip
+                module.frames,
+                jobs,
+                states.rows,
+                gpu.tables,
+                gpu.net,
+                states.place(),
+                some,
+                gpu.periods,
+                gpu.limit,
+                lengths,
+                (frame, growth, sums, on_device),
+            )
             status[:] = on_device.copy_to_host()
             jobs = jobs[status[jobs] == 0]
             count -= some

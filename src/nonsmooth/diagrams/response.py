@@ -74,17 +74,31 @@ def frequency_response(
             heights[output] = 0.5 * range_.expand_dims(added).transpose(*[dim for dim, _ in full[:3]]).values
     x = np.asarray(swept[parameter].values, dtype=float)
     rows = [
-        {"variable": name, "value": 0.5 * (x[a] + x[b]), "step": abs(x[b] - x[a]), "direction": str(word), "start": k,
-         "before": height[d, k, a], "after": height[d, k, b]}
+        {
+            "variable": name,
+            "value": 0.5 * (x[a] + x[b]),
+            "step": abs(x[b] - x[a]),
+            "direction": str(word),
+            "start": k,
+            "before": height[d, k, a],
+            "after": height[d, k, b],
+        }
         for name, height in heights.items()
         for d, word in enumerate(np.atleast_1d(swept["direction"].values))
         for k in range(height.shape[1])
         for order in [np.argsort(-x if word == "down" else x, kind="stable")]
         for i in jumps_in(height[d, k, order])
         for a, b in [(order[i], order[i + 1])]
-    ]  # fmt: skip
-    kinds = {"variable": str, "value": float, "step": float, "direction": str, "start": int, "before": float,
-             "after": float}  # fmt: skip
+    ]
+    kinds = {
+        "variable": str,
+        "value": float,
+        "step": float,
+        "direction": str,
+        "start": int,
+        "before": float,
+        "after": float,
+    }
     jumps: dict[str, Any] = {key: np.array([row[key] for row in rows], dtype=kind) for key, kind in kinds.items()}
     result = response(swept, amplitude=amplitude, jumps=jumps)
     record = read_provenance(swept) | {"verb": "frequency_response"}

@@ -41,9 +41,17 @@ class Spectrum:
 
 
 def spectrum_along(
-    system: System, engine: Engine, tables: Any, i: int, values: FloatArray, state: State, period: float | None,
-    unit: float, count: int, wait: int,
-) -> Spectrum:  # fmt: skip
+    system: System,
+    engine: Engine,
+    tables: Any,
+    i: int,
+    values: FloatArray,
+    state: State,
+    period: float | None,
+    unit: float,
+    count: int,
+    wait: int,
+) -> Spectrum:
     """Run row i (parameters ``values``) from ``state`` on: the transient, its end with the frame, ``count`` units."""
     if period is not None:
         state.keep_phase(period, 0.0)
@@ -136,9 +144,16 @@ def failed_spectrum(n: int, elapsed: float, status: int) -> Spectrum:
 
 
 def evaluated(
-    n: int, mean: FloatArray, batches: FloatArray | None, count: int, unit: float, defect: float, nearest: float,
-    status: int, forced: bool,
-) -> Spectrum:  # fmt: skip
+    n: int,
+    mean: FloatArray,
+    batches: FloatArray | None,
+    count: int,
+    unit: float,
+    defect: float,
+    nearest: float,
+    status: int,
+    forced: bool,
+) -> Spectrum:
     """Exponents from the mean growth per unit time, their errors from that of the batches."""
     used = len(mean)
     exponents, error, running = np.full(n, np.nan), np.full(n, np.nan), np.full((BATCHES, n), np.nan)
@@ -155,9 +170,15 @@ def evaluated(
     # In an autonomous system one exponent is zero, and its estimate of the order of 1/t.
     zero = 0.0 if forced else float(np.nanmax([0.0, *(3 * error[:used])]) + 3.0 / (count * unit))
     return Spectrum(
-        exponents, error, running, defect / (count * unit), kaplan_yorke(exponents[:used], zero), nearest,
-        count * unit, status,
-    )  # fmt: skip
+        exponents,
+        error,
+        running,
+        defect / (count * unit),
+        kaplan_yorke(exponents[:used], zero),
+        nearest,
+        count * unit,
+        status,
+    )
 
 
 def _run_on(

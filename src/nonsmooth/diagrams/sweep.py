@@ -38,8 +38,11 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 DIRECTIONS: dict[str | None, tuple[str, ...]] = {
-    "up": ("up",), "down": ("down",), "both": ("up", "down"), None: ("none",),
-}  # fmt: skip
+    "up": ("up",),
+    "down": ("down",),
+    "both": ("up", "down"),
+    None: ("none",),
+}
 
 
 @checked(keep=100)
@@ -142,18 +145,28 @@ def sweep(
         refuse_resting(system, starts, points, "sweep")
     ranges = {} if density is False else given_ranges(system, density)
     work = _Sweep(
-        settler, parameter, numbers, points, DIRECTIONS[direction], starts, 0 if density is False else bins,
+        settler,
+        parameter,
+        numbers,
+        points,
+        DIRECTIONS[direction],
+        starts,
+        0 if density is False else bins,
         checked_loads(system, loads, "sweep"),
-    )  # fmt: skip
+    )
     work.room()
     if density is not False:
         coarse = None
         if len(ranges) < len(system.states):
             few = min(settler.keep, 1000)
             shorter: Settling = {"keep": few, "max_period": min(settler.max_period, few - 1), "progress": False}
-            coarse = sweep(
-                system, parameter, coarse_values(numbers), direction=direction, start=start, **options | shorter
-            )["section"].transpose(..., "state").values  # fmt: skip
+            coarse = (
+                sweep(system, parameter, coarse_values(numbers), direction=direction, start=start, **options | shorter)[
+                    "section"
+                ]
+                .transpose(..., "state")
+                .values
+            )
         work.edges = bin_edges(system, ranges, bins, coarse)
     if gpu:
         run_on_gpu(points, starts, work.slots, options["progress"], parameter)
@@ -279,9 +292,17 @@ class _Sweep:
         labels = labels_of(system)
         record = provenance(labels, "sweep", asked, method=settler.engine.name)
         return build(
-            labels, record, self.parameter, self.numbers, arrays, directions=self.directions,
-            starts=self.starts, squeeze=squeeze, edges=self.edges, loads=loads,
-        )  # fmt: skip
+            labels,
+            record,
+            self.parameter,
+            self.numbers,
+            arrays,
+            directions=self.directions,
+            starts=self.starts,
+            squeeze=squeeze,
+            edges=self.edges,
+            loads=loads,
+        )
 
 
 def armed_signs(system: System) -> np.ndarray:

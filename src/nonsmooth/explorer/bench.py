@@ -99,10 +99,18 @@ class Bench:
         if not ticked:
             raise ValueError("tick the parameters that are to be found")
         self._told = []
-        self._start("fitting", {
-            "view": "fit", "text": self.page.text, "values": dict(state.values), "method": "auto", "eta": 0.0,
-            "parameters": ticked, "samples": samples,
-        })  # fmt: skip
+        self._start(
+            "fitting",
+            {
+                "view": "fit",
+                "text": self.page.text,
+                "values": dict(state.values),
+                "method": "auto",
+                "eta": 0.0,
+                "parameters": ticked,
+                "samples": samples,
+            },
+        )
 
     def _remove(self, name: str, value: Any) -> None:
         self._stop()
@@ -202,9 +210,14 @@ class Bench:
             return None
         state = self.page.state
         return {
-            **orbit, "view": "recording", "samples": samples, "period": period, "periods": periods_shown(period),
-            "phase": state.phase, "shown": state.x,
-        }  # fmt: skip
+            **orbit,
+            "view": "recording",
+            "samples": samples,
+            "period": period,
+            "periods": periods_shown(period),
+            "phase": state.phase,
+            "shown": state.x,
+        }
 
     def response(self, over: str, state: str) -> tuple[Any, Any]:
         """Measured points of the frequency response; see :func:`nonsmooth.explorer.recorded.response_points`."""

@@ -47,9 +47,16 @@ def first_state(model: str, system: System) -> State:
     y = next(name for name in likely if name in (states[1:] or states))
     start = tuple(0.0 if system.period() is not None else 0.1 * s for s in system.scale_vector())
     return State(
-        model=model, values=values, over=over, low=low, high=high, start=start, x=states[0], y=y,
+        model=model,
+        values=values,
+        over=over,
+        low=low,
+        high=high,
+        start=start,
+        x=states[0],
+        y=y,
         shown=y if model == PAPER else states[0],
-    )  # fmt: skip
+    )
 
 
 def slider_range(value: float, also: tuple[float, ...] = ()) -> tuple[float, float]:

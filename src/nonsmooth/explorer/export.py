@@ -20,9 +20,15 @@ from nonsmooth.results.provenance import read_provenance
 
 #: Kinds of files.
 KINDS = {
-    "pdf": "PDF", "png": "PNG", "svg": "SVG", "nc": "NetCDF", "py": "Python script", "toml": "study file",
-    "gif": "GIF, moving", "html": "HTML, moving",
-}  # fmt: skip
+    "pdf": "PDF",
+    "png": "PNG",
+    "svg": "SVG",
+    "nc": "NetCDF",
+    "py": "Python script",
+    "toml": "study file",
+    "gif": "GIF, moving",
+    "html": "HTML, moving",
+}
 
 
 def exported(view: str, kind: str, results: Mapping[str, Any], state: Any) -> tuple[str, bytes]:

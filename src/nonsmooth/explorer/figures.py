@@ -27,20 +27,35 @@ def theme(dark: bool, large: bool) -> Theme:
         ("#171B20", "#E8E8E8", "#2C3239", "#8A929B") if dark else ("#FFFFFF", "#1B1F24", "#E4E7EB", "#6B7280")
     )
     size = 20 if large else 13
-    return Theme(json={"attrs": {
-        "Plot": {"background_fill_color": paper, "border_fill_color": None, "outline_line_color": line},
-        "Grid": {"grid_line_color": faint},
-        "BasicTicker": {"desired_num_ticks": 4 if large else 6},
-        "Title": {"text_color": ink, "text_font": "system-ui, sans-serif", "text_font_style": "normal",
-                  "text_font_size": f"{size + 2}px", "standoff": 4},
-        "Axis": {
-            "axis_line_color": line, "major_tick_line_color": line, "minor_tick_line_color": None,
-            "axis_label_text_color": ink, "axis_label_text_font_style": "normal",
-            "axis_label_text_font_size": f"{size + 2}px", "axis_label_text_font": "system-ui, sans-serif",
-            "major_label_text_color": ink, "major_label_text_font_size": f"{size}px",
-            "major_label_text_font": "system-ui, sans-serif", "axis_label_standoff": 6,
-        },
-    }})  # fmt: skip
+    return Theme(
+        json={
+            "attrs": {
+                "Plot": {"background_fill_color": paper, "border_fill_color": None, "outline_line_color": line},
+                "Grid": {"grid_line_color": faint},
+                "BasicTicker": {"desired_num_ticks": 4 if large else 6},
+                "Title": {
+                    "text_color": ink,
+                    "text_font": "system-ui, sans-serif",
+                    "text_font_style": "normal",
+                    "text_font_size": f"{size + 2}px",
+                    "standoff": 4,
+                },
+                "Axis": {
+                    "axis_line_color": line,
+                    "major_tick_line_color": line,
+                    "minor_tick_line_color": None,
+                    "axis_label_text_color": ink,
+                    "axis_label_text_font_style": "normal",
+                    "axis_label_text_font_size": f"{size + 2}px",
+                    "axis_label_text_font": "system-ui, sans-serif",
+                    "major_label_text_color": ink,
+                    "major_label_text_font_size": f"{size}px",
+                    "major_label_text_font": "system-ui, sans-serif",
+                    "axis_label_standoff": 6,
+                },
+            }
+        }
+    )
 
 
 @dataclass
@@ -71,9 +86,15 @@ class Panel:
 
     def __init__(self, name: str, **options: Any) -> None:
         self.plot: Any = figure(
-            name=name, tools="pan,box_zoom,wheel_zoom,reset", toolbar_location="right", sizing_mode="stretch_both",
-            min_border=4, x_range=Range1d(0, 1), y_range=Range1d(0, 1), **options,
-        )  # fmt: skip
+            name=name,
+            tools="pan,box_zoom,wheel_zoom,reset",
+            toolbar_location="right",
+            sizing_mode="stretch_both",
+            min_border=4,
+            x_range=Range1d(0, 1),
+            y_range=Range1d(0, 1),
+            **options,
+        )
         self.plot.toolbar.logo = None
         self.plot.toolbar.autohide = True
         for axis in self.plot.axis[:] if "y_axis_type" not in options else self.plot.xaxis:

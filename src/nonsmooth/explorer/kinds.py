@@ -121,20 +121,28 @@ _PLANE = {"x": "x", "y": "y"}
 KINDS: Mapping[str, Kind] = {
     "recording": Kind(quick=("recording",)),
     "portrait": Kind("Phase plane", "plane", ("orbit",), saved=("run", "phase_portrait"), axes=_PLANE),
-    "diagram": Kind(
-        "Bifurcation", "upper", ("first look",), ("diagram",), ("diagram", "bifurcation"), {"y": "shown"}
-    ),
+    "diagram": Kind("Bifurcation", "upper", ("first look",), ("diagram",), ("diagram", "bifurcation"), {"y": "shown"}),
     "section": Kind(quick=("section",), saved=("section", "section"), axes=_PLANE),
     "readout": Kind(slow=("stability",)),
     "history": Kind("Time history", "lower", saved=("run", "time_history"), axes={"y": "x"}),
-    "branches": Kind(slow=("branches",), saved=("branches", "bifurcation_diagram"), axes={"y": "shown"}, settings={
-        "branches.show": Setting(
-            "branches", lambda system, state: "no", lambda system, state: {"no": "hidden", "yes": "shown"}
-        ),
-    }),
+    "branches": Kind(
+        slow=("branches",),
+        saved=("branches", "bifurcation_diagram"),
+        axes={"y": "shown"},
+        settings={
+            "branches.show": Setting(
+                "branches", lambda system, state: "no", lambda system, state: {"no": "hidden", "yes": "shown"}
+            ),
+        },
+    ),
     "response": Kind(
-        "Frequency response", "upper", ("first response",), ("response",), ("response", "frequency_response"),
-        {"y": "shown"}, {
+        "Frequency response",
+        "upper",
+        ("first response",),
+        ("response",),
+        ("response", "frequency_response"),
+        {"y": "shown"},
+        {
             "response.over": Setting(
                 "over", lambda system, state: _frequency(system), _parameters, ("response.low", "response.high")
             ),
@@ -143,17 +151,30 @@ KINDS: Mapping[str, Kind] = {
         },
     ),
     "chart": Kind(
-        "Chart", "upper", ("first chart",), ("chart", "exponents", "fine chart"), ("chart", "chart"), settings={
+        "Chart",
+        "upper",
+        ("first chart",),
+        ("chart", "exponents", "fine chart"),
+        ("chart", "chart"),
+        settings={
             "chart.across": Setting("and", _other, _others, ("chart.low", "chart.high")),
-            "chart.low": Setting("from", _across(-0.4)), "chart.high": Setting("to", _across(0.4)),
+            "chart.low": Setting("from", _across(-0.4)),
+            "chart.high": Setting("to", _across(0.4)),
         },
     ),
-    "basins": Kind("Basins", "plane", ("first basins",), ("basins", "fine basins"), ("basins", "basins"), settings={
-        f"basins.{end}": Setting("", lambda system, state: None) for end in ("left", "right", "bottom", "top")
-    }),
+    "basins": Kind(
+        "Basins",
+        "plane",
+        ("first basins",),
+        ("basins", "fine basins"),
+        ("basins", "basins"),
+        settings={
+            f"basins.{end}": Setting("", lambda system, state: None) for end in ("left", "right", "bottom", "top")
+        },
+    ),
     "mechanism": Kind(quick=("sketch",)),
     "spectrum": Kind("Spectrum", "lower", ("spectrum",), (), ("spectrum", "amplitude_spectrum"), {"y": "x"}),
-}  # fmt: skip
+}
 PANELS: dict[str, dict[str, str]] = {
     panel: {name: kind.title for name, kind in KINDS.items() if kind.panel == panel}
     for panel in ("upper", "plane", "lower")

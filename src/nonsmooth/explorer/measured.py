@@ -91,9 +91,12 @@ def laid_over(job: Job) -> dict[str, Any]:
     far, shift = strand_distance(recorded, motion, size, closed=bool(job["period"]))
     own = states.index(job["shown"]) if job["shown"] in states else 0
     found["distance"] = {
-        "of": states[own], "rms": float(far[own]), "part": float(far[own] / size[own]), "shift": shift,
+        "of": states[own],
+        "rms": float(far[own]),
+        "part": float(far[own] / size[own]),
+        "shift": shift,
         "periods": len(recorded),
-    }  # fmt: skip
+    }
     known = [state for state in curve if np.isfinite(curve[state]).any()]
     aligned = phase - shift
     points = fold(aligned - job["phase"], np.column_stack([curve[state] for state in known]), 8)[:, 0]
@@ -155,11 +158,17 @@ def strand_distance(
     def squares(shift: float) -> FloatArray:
         """Mean squares over phase, (recorded periods, the motion's periods, states)."""
         b = fold(phase - phase[0] + shift, u, grid)[: whole if closed else None] / size
-        return np.stack([
-            (np.mean(a[:, :, i] ** 2, axis=1)[:, None] + np.mean(b[:, :, i] ** 2, axis=1)[None]
-             - 2 * a[:, :, i] @ b[:, :, i].T / grid).clip(0)
-            for i in range(len(size))
-        ], axis=-1)  # fmt: skip
+        return np.stack(
+            [
+                (
+                    np.mean(a[:, :, i] ** 2, axis=1)[:, None]
+                    + np.mean(b[:, :, i] ** 2, axis=1)[None]
+                    - 2 * a[:, :, i] @ b[:, :, i].T / grid
+                ).clip(0)
+                for i in range(len(size))
+            ],
+            axis=-1,
+        )
 
     def nearest(shift: float) -> FloatArray:
         each = squares(shift)

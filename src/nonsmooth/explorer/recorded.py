@@ -162,8 +162,11 @@ def matched(recorded: Recorded, system: System, run: str = "") -> Setup:
         if same:
             found[state] = same[0]
     for state, unit in system.states.items():
-        alike = [name for name in free if name not in found.values() and unit not in ("", "1")
-                 and _factor(channels[name].unit, unit)]  # fmt: skip
+        alike = [
+            name
+            for name in free
+            if name not in found.values() and unit not in ("", "1") and _factor(channels[name].unit, unit)
+        ]
         if state not in found and alike:
             found[state] = alike[0]
     if not found and free:

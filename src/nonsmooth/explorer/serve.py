@@ -71,12 +71,18 @@ def explore(
     # No pings: on one machine nothing closes a silent socket, and one that fails takes the session from a connection
     # whose last messages Bokeh has still to read.
     server: Any = Server(
-        application, port=number, address="127.0.0.1", auth_provider=access, index=None,
+        application,
+        port=number,
+        address="127.0.0.1",
+        auth_provider=access,
+        index=None,
         allow_websocket_origin=[f"127.0.0.1:{number}", f"localhost:{number}"],
-        websocket_max_message_size=256 * 1024 * 1024, keep_alive_milliseconds=0,
-        unused_session_lifetime_milliseconds=5_000, check_unused_sessions_milliseconds=2_000,
+        websocket_max_message_size=256 * 1024 * 1024,
+        keep_alive_milliseconds=0,
+        unused_session_lifetime_milliseconds=5_000,
+        check_unused_sessions_milliseconds=2_000,
         session_token_expiration=3600,
-    )  # fmt: skip
+    )
     access.listen_at(number)
     server.start()
     origin = f"http://127.0.0.1:{number}"

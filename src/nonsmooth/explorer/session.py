@@ -39,9 +39,16 @@ CHANNELS = ("ui", "readout", "busy", "notes", "file", "recording", "building", "
 MOST_TABS = 8  # that compute at a time
 #: Files that make the page; what a part of the page does comes before the page itself.
 TEXTS = (
-    "page.html", "recording.html", "building.html", "page.css", "recording.js", "building.js", "tour.js", "sketch.js",
+    "page.html",
+    "recording.html",
+    "building.html",
+    "page.css",
+    "recording.js",
+    "building.js",
+    "tour.js",
+    "sketch.js",
     "page.js",
-)  # fmt: skip
+)
 
 
 class Session:
@@ -182,11 +189,19 @@ class Session:
             self._heard = message["n"]
             action, name, value = message["do"], str(message.get("name", "")), message.get("value")
             known: dict[str, Callable[[str, Any], object]] = {
-                "set": self._set, "model": lambda _, value: self.show_model(value), "preset": self._preset,
-                "end": lambda *_: self.past.end_step(), "undo": lambda *_: self.past.undo(), "look": self._look,
-                "redo": lambda *_: self.past.redo(), "reset": lambda *_: self.show_model(self.state.model),
-                "begin": lambda *_: None, "save": self._save, **self.bench.actions, **self.workshop.actions,
-            }  # fmt: skip
+                "set": self._set,
+                "model": lambda _, value: self.show_model(value),
+                "preset": self._preset,
+                "end": lambda *_: self.past.end_step(),
+                "undo": lambda *_: self.past.undo(),
+                "look": self._look,
+                "redo": lambda *_: self.past.redo(),
+                "reset": lambda *_: self.show_model(self.state.model),
+                "begin": lambda *_: None,
+                "save": self._save,
+                **self.bench.actions,
+                **self.workshop.actions,
+            }
             if action not in known:
                 raise ValueError(f"the page asked for {str(action)[:40]!r}, which does not exist")
             self.notes.pop("page", None)
@@ -276,14 +291,27 @@ class Session:
         state, done, results = self.state, self.work.done, self.sheet.results
         begin = list(self.catalogue.first_state(state.model).start)
         common = {
-            "text": self.text, "values": dict(state.values), "method": state.method, "transient": state.transient,
-            "eta": state.eta if state.method == "smoothed" else 0.0, "keep": state.keep,
-        }  # fmt: skip
+            "text": self.text,
+            "values": dict(state.values),
+            "method": state.method,
+            "transient": state.transient,
+            "eta": state.eta if state.method == "smoothed" else 0.0,
+            "keep": state.keep,
+        }
         orbit: dict[str, Any] = {**common, "view": "orbit", "start": list(state.start)}
-        base: dict[str, dict[str, Any]] = {"orbit": orbit, "first look": {
-            **common, "view": "first look", "values": {**state.values, state.over: state.low}, "over": state.over,
-            "low": state.low, "high": state.high, "columns": state.columns, "begin": begin,
-        }}  # fmt: skip
+        base: dict[str, dict[str, Any]] = {
+            "orbit": orbit,
+            "first look": {
+                **common,
+                "view": "first look",
+                "values": {**state.values, state.over: state.low},
+                "over": state.over,
+                "low": state.low,
+                "high": state.high,
+                "columns": state.columns,
+                "begin": begin,
+            },
+        }
         if "judged" in results and done.get("orbit") == key_of(orbit):  # its period number, and the time of its record
             time, period = results["run"]["time"].values, int(results["judged"]["period_number"].values[0])
             base["motion"] = {**orbit, "period": period, "span": float(time[-1] - time[0])}

@@ -23,8 +23,19 @@ if TYPE_CHECKING:
 
 #: Drawing of each of ``KINDS``; what draws into another's figure comes behind it.
 _VIEWS = (
-    Portrait, Diagram, Section, Readout, History, Branches, Response, Chart, Basins, Spectrum, Mechanism, Recording,
-)  # fmt: skip
+    Portrait,
+    Diagram,
+    Section,
+    Readout,
+    History,
+    Branches,
+    Response,
+    Chart,
+    Basins,
+    Spectrum,
+    Mechanism,
+    Recording,
+)
 
 
 class Sheet:

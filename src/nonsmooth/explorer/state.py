@@ -14,11 +14,15 @@ from nonsmooth.explorer.kinds import PANELS, SETTINGS
 #: Fields that hold one of these words, with what a person reads for it.
 CHOICES: dict[str, dict[str, str]] = {
     "direction": {
-        "both": "up and down", "up": "up", "down": "down", "rest": "each from rest", "many": "8 starts each",
+        "both": "up and down",
+        "up": "up",
+        "down": "down",
+        "rest": "each from rest",
+        "many": "8 starts each",
     },
     "method": {"auto": "exact or Taylor", "smoothed": "smoothed switch", "rkf45": "RKF45"},
     **PANELS,
-}  # fmt: skip
+}
 #: Whole numbers, with their limits.
 _WHOLE = {"transient": (0, 100_000), "keep": (4, 2000), "columns": (10, 4000)}
 

@@ -122,9 +122,13 @@ def _section(job: Job) -> dict[str, Any]:
     job.heard(0.0)
     exact = engine_for(job.system, **job.options).name == "exact"
     found = ns.poincare(
-        job.system, section=job.section(job["phase"]), n=_POINTS if exact else _POINTS // 5,
-        transient=job["transient"], start=job["start"], **job.options,
-    )  # fmt: skip
+        job.system,
+        section=job.section(job["phase"]),
+        n=_POINTS if exact else _POINTS // 5,
+        transient=job["transient"],
+        start=job["start"],
+        **job.options,
+    )
     return {"section": found, "apart": distinct(found["section"].values)}
 
 
@@ -157,9 +161,13 @@ def _stability(job: Job) -> dict[str, Any]:
     """Floquet multipliers of a periodic orbit, or the Lyapunov exponents of a motion without a period."""
     if job["period"]:
         orbit = ns.find_orbit(
-            job.system, start=job["start"], period_number=job["period"] if job.forced else None,
-            transient=job["transient"], budget=10.0, progress=job.heard,
-        )  # fmt: skip
+            job.system,
+            start=job["start"],
+            period_number=job["period"] if job.forced else None,
+            transient=job["transient"],
+            budget=10.0,
+            progress=job.heard,
+        )
         return {"multipliers": np.asarray(orbit.floquet_multipliers)}
     span: dict[str, Any] = (
         {"transient": job["transient"], "periods": _MEASURED}
@@ -249,8 +257,18 @@ def _spectrum(job: Job) -> dict[str, Any]:
 
 
 _WORK: dict[str, Callable[[Job], dict[str, Any]]] = {
-    "orbit": _orbit, "section": _section, "sketch": _sketch, "stability": _stability, "first look": _first_look,
-    "diagram": _diagram, "branches": _branches, "first response": _response, "response": _response,
-    **dict.fromkeys(_CHARTS, _chart), **dict.fromkeys(_BASINS, _basins), "spectrum": _spectrum, "recording": laid_over,
+    "orbit": _orbit,
+    "section": _section,
+    "sketch": _sketch,
+    "stability": _stability,
+    "first look": _first_look,
+    "diagram": _diagram,
+    "branches": _branches,
+    "first response": _response,
+    "response": _response,
+    **dict.fromkeys(_CHARTS, _chart),
+    **dict.fromkeys(_BASINS, _basins),
+    "spectrum": _spectrum,
+    "recording": laid_over,
     "fit": fitted,
-}  # fmt: skip
+}

@@ -165,9 +165,12 @@ def main() -> None:
 
 
 def _answer(
-    number: int, job: dict[str, Any], compute: Callable[..., dict[str, Any]], cancelled: _Cancelled,
+    number: int,
+    job: dict[str, Any],
+    compute: Callable[..., dict[str, Any]],
+    cancelled: _Cancelled,
     send: Callable[[Answer], None],
-) -> Answer:  # fmt: skip
+) -> Answer:
     last = time.monotonic()
 
     def heard(fraction: float) -> bool:

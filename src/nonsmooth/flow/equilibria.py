@@ -55,9 +55,14 @@ class Equilibrium:
 
 
 def equilibrium_at(
-    system: System, u: FloatArray, mode: int, *, values: FloatArray | None = None, memory: FloatArray | None = None,
+    system: System,
+    u: FloatArray,
+    mode: int,
+    *,
+    values: FloatArray | None = None,
+    memory: FloatArray | None = None,
     near: float = AT_REST,
-) -> Equilibrium | None:  # fmt: skip
+) -> Equilibrium | None:
     """The equilibrium of a mode at the state u, or nearer to it than ``near`` of its size; None where there is none."""
     traced = system.traced
     values = system.parameter_vector() if values is None else values

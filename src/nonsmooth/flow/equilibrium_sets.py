@@ -90,9 +90,13 @@ class EquilibriumSet:
 
 
 def equilibrium_sets(
-    system: System, near: FloatArray, *, values: FloatArray | None = None, memory: FloatArray | None = None,
+    system: System,
+    near: FloatArray,
+    *,
+    values: FloatArray | None = None,
+    memory: FloatArray | None = None,
     modes: Sequence[int] | None = None,
-) -> list[EquilibriumSet]:  # fmt: skip
+) -> list[EquilibriumSet]:
     """The sets of equilibria of a system: all of them where its modes are affine, else those beside a state; none where
     it has more modes than can be looked at."""
     values = system.parameter_vector() if values is None else values
@@ -165,7 +169,7 @@ def _conditions(
         ]
         for jump in traced.transitions
         if jump.source == mode and jump.rows and jump.fires
-    ]  # fmt: skip
+    ]
 
 
 def _peaks(at: FloatArray) -> FloatArray:

@@ -65,9 +65,11 @@ def _beyond_stop(system: System, u: FloatArray, time: float, least: float = 0.0)
     if not (gaps < -least * sizes).any():
         return ""
     load = meter.elements[meter.striking[int(gaps.argmin())]]
-    sides = "" if "at=" not in load.text else (
-        "; side=1, where none is given, is a stop above the motion, side=-1 one below it"
-    )  # fmt: skip
+    sides = (
+        ""
+        if "at=" not in load.text
+        else ("; side=1, where none is given, is a stop above the motion, side=-1 one below it")
+    )
     return (
         f"the start lies beyond a stop: {load.name!r}, {load.text}, has a gap of {gaps.min():.6g} there{sides}. Start "
         "on its other side, or correct its position or side"

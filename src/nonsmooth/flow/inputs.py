@@ -159,9 +159,14 @@ class Course:
         return found
 
     def jump(
-        self, flow: VariationalFlow, time: float, z: FloatArray, before: FloatArray, after: FloatArray,
+        self,
+        flow: VariationalFlow,
+        time: float,
+        z: FloatArray,
+        before: FloatArray,
+        after: FloatArray,
         then: Jump | None = None,
-    ) -> Jump:  # fmt: skip
+    ) -> Jump:
         """A change of inputs as a jump to z, from the rates before it to those behind it and the transitions that it
         brings about (``then``), which happen at its time whatever their conditions.
 

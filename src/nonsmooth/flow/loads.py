@@ -109,11 +109,12 @@ class Meter:
 
         t = self.description.traced
         every = [
-            *self.gaps, *(load.rate for load in self.elements),
+            *self.gaps,
+            *(load.rate for load in self.elements),
             *(load.moved(t.u) for load in self.elements),
             *(self.elements[k].direction[i] for k in self.striking for i in self.elements[k].direction),
             *self.loads.powers.values(),
-        ]  # fmt: skip
+        ]
         function: Callable[..., Any] = lambdify([t.t, *t.u, *t.m, *t.p], every, modules="numpy", cse=True)
         return function
 
@@ -160,9 +161,14 @@ class Meter:
     # Impacts
 
     def impacts(
-        self, parameters: FloatArray, time: FloatArray, before: FloatArray, after: FloatArray, memory: FloatArray,
+        self,
+        parameters: FloatArray,
+        time: FloatArray,
+        before: FloatArray,
+        after: FloatArray,
+        memory: FloatArray,
         size: FloatArray,
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:  # fmt: skip
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Impulses, approach speeds (NaN where there is no impact), energies lost and energies taken from the masses,
         each (C, striking elements); ``size`` are the largest states on the motion."""
         gap, rate, moved, D, _ = self.values(parameters, time, before, memory)
@@ -185,9 +191,7 @@ class Meter:
         one = self.striking
         approach = np.where(self.rubs, np.abs(rate[:, one]), np.maximum(-rate[:, one], 0.0))
         speed = np.where(impulses != 0.0, approach, np.nan)
-        lost, taken = (
-            -0.5 * impulses * (a + b)[:, one] for a, b in ((rate, rate_after), (moved, moved_after))
-        )  # fmt: skip
+        lost, taken = (-0.5 * impulses * (a + b)[:, one] for a, b in ((rate, rate_after), (moved, moved_after)))
         return impulses, speed, lost + 0.0, taken + 0.0
 
     # Work

@@ -36,9 +36,15 @@ def output_values(
 
 
 def _shared(
-    traced: Traced, decider: Any, parameters: FloatArray, time: FloatArray, u: FloatArray, memory: FloatArray,
-    mode: Any, forces: FloatArray,
-) -> FloatArray:  # fmt: skip
+    traced: Traced,
+    decider: Any,
+    parameters: FloatArray,
+    time: FloatArray,
+    u: FloatArray,
+    memory: FloatArray,
+    mode: Any,
+    forces: FloatArray,
+) -> FloatArray:
     """The forces of elements (N, elements), those that are not unique within their bounds."""
     from sympy import lambdify
 

@@ -87,8 +87,12 @@ def poincare(
 
     labels = labels_of(system)
     return section_points(
-        labels, provenance(labels, "poincare", asked, method=engine.name),
-        section=out.section, time=out.section_time, mode=out.section_mode,
-        status=[result_status(code) for code in out.status], starts=starts,
+        labels,
+        provenance(labels, "poincare", asked, method=engine.name),
+        section=out.section,
+        time=out.section_time,
+        mode=out.section_mode,
+        status=[result_status(code) for code in out.status],
+        starts=starts,
         squeeze=("start",) if is_one_start(start) else (),
-    )  # fmt: skip
+    )

@@ -169,12 +169,11 @@ def _beside(a: Jump, b: Jump) -> Jump:
         warnings.warn(
             "two transitions happen at one instant, each by itself, and which of them a neighbouring motion meets "
             "first matters: derivatives are those for one order. Start a little off for another.",
-            RuntimeWarning, stacklevel=2,
-        )  # fmt: skip
+            RuntimeWarning,
+            stacklevel=2,
+        )
     fields = np.array([a.fields[0], b.fields[1], b.R @ a.fields[2] + b.fields[2]])
-    return Jump(
-        b.z_after, b.R @ a.R, fields, a.h, a.h_z, a.h_t, a.h_p, b.S @ a.S, a.instant, a.row, a.indicator
-    )  # fmt: skip
+    return Jump(b.z_after, b.R @ a.R, fields, a.h, a.h_z, a.h_t, a.h_p, b.S @ a.S, a.instant, a.row, a.indicator)
 
 
 def _then(a: Jump, b: Jump) -> Jump:

@@ -46,9 +46,16 @@ class Variation:
     """
 
     def __init__(
-        self, flow: VariationalFlow, values: FloatArray, log: Log, start: tuple[int, FloatArray], t_begin: float,
-        t_end: float, course: Course | None = None, changes: Sequence[float] = (),
-    ) -> None:  # fmt: skip
+        self,
+        flow: VariationalFlow,
+        values: FloatArray,
+        log: Log,
+        start: tuple[int, FloatArray],
+        t_begin: float,
+        t_end: float,
+        course: Course | None = None,
+        changes: Sequence[float] = (),
+    ) -> None:
         first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
         flow.catch_up()
         self.start = settled(flow, values, start, first, t_begin)
@@ -86,9 +93,12 @@ class Variation:
 
 
 def apart(
-    flow: VariationalFlow, log: Log, first: tuple[int, FloatArray], t_begin: float,
+    flow: VariationalFlow,
+    log: Log,
+    first: tuple[int, FloatArray],
+    t_begin: float,
     changes: Sequence[tuple[float, int]] = (),
-) -> tuple[list[int], list[FloatArray], list[float], list[tuple[int, ...]], list[FloatArray]]:  # fmt: skip
+) -> tuple[list[int], list[FloatArray], list[float], list[tuple[int, ...]], list[FloatArray]]:
     """Segments of a run that begins in ``first`` = (mode, z): their modes, starts and times; the transitions between
     them, those at one instant as one, and the state before each.
 
@@ -133,9 +143,15 @@ def apart(
 
 
 def jump_between(
-    flow: VariationalFlow, values: FloatArray, chain: tuple[int, ...], t: float, before: FloatArray, after: FloatArray,
-    rates: tuple[FloatArray, FloatArray], course: Course | None,
-) -> Jump:  # fmt: skip
+    flow: VariationalFlow,
+    values: FloatArray,
+    chain: tuple[int, ...],
+    t: float,
+    before: FloatArray,
+    after: FloatArray,
+    rates: tuple[FloatArray, FloatArray],
+    course: Course | None,
+) -> Jump:
     """The jump between two segments that :func:`apart` names; ``rates`` are those at the end and beginning of these."""
     if chain[0] != CHANGE:
         return flow.jump(values, chain, t, before)
@@ -273,12 +289,19 @@ def sensitivity(
         if chain[-1] != CHANGE
     ]
     return derivatives_of_run(
-        labels, provenance(labels, "sensitivity", asked, method="variational"), names,
-        Phi=found.Phi, P=parameter_part, end=found.segments.z[-1], crossing_time=[t for t, _, _ in crossings],
+        labels,
+        provenance(labels, "sensitivity", asked, method="variational"),
+        names,
+        Phi=found.Phi,
+        P=parameter_part,
+        end=found.segments.z[-1],
+        crossing_time=[t for t, _, _ in crossings],
         crossing_transition=[k for _, k, _ in crossings],
         saltation=np.array([jump.saltation for _, _, jump in crossings]).reshape(-1, n, n),
         log_det_saltation=[jump.log_determinant for _, _, jump in crossings],
         transversality=[jump.transversality for _, _, jump in crossings],
-        log_det=found.log_determinant, divergence=float(found.segments.divergence.sum()), trace=found.trace,
+        log_det=found.log_determinant,
+        divergence=float(found.segments.divergence.sum()),
+        trace=found.trace,
         status=log.status,
-    )  # fmt: skip
+    )

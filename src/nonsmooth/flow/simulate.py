@@ -207,15 +207,24 @@ def check_complete(log: Log, system: System, state: State, period: float | None)
     time = state.clock[0] + (state.clock[1] * period if period is not None else 0.0)
     where = dict(zip(system.states, map(float, state.u), strict=True))
     raise solve_error(
-        log.status, wrong_way(system, log), begun=(system, state.u), time=float(time), state=where,
+        log.status,
+        wrong_way(system, log),
+        begun=(system, state.u),
+        time=float(time),
+        state=where,
         mode=system.modes[int(state.counters[0])],
-    )  # fmt: skip
+    )
 
 
 def _dataset(
-    system: System, traced: Any, method: str, options: Mapping[str, Any], log: Log, instants: FloatArray,
+    system: System,
+    traced: Any,
+    method: str,
+    options: Mapping[str, Any],
+    log: Log,
+    instants: FloatArray,
     period: float | None,
-) -> xr.Dataset:  # fmt: skip
+) -> xr.Dataset:
     from nonsmooth.flow.outputs import output_values
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
@@ -226,9 +235,16 @@ def _dataset(
     source = np.array([jump.source for jump in traced.transitions], dtype=np.int64)
     target = np.array([jump.target for jump in traced.transitions], dtype=np.int64)
     merged = with_crossings(
-        instants, log.sample_u, log.sample_mode, log.sample_segment, log.crossing_time, log.u_before, log.u_after,
-        source[log.crossing_transition], target[log.crossing_transition],
-    )  # fmt: skip
+        instants,
+        log.sample_u,
+        log.sample_mode,
+        log.sample_segment,
+        log.crossing_time,
+        log.u_before,
+        log.u_after,
+        source[log.crossing_transition],
+        target[log.crossing_transition],
+    )
     memory = None
     if traced.memory_names:  # constant within a segment
         first = system.memory_vector()[None, :] if not len(log.sample_memory) else log.sample_memory[:1]
@@ -238,9 +254,21 @@ def _dataset(
         kept = np.zeros((len(merged.time), 0)) if memory is None else memory
         outputs = output_values(traced, system.parameter_vector(), merged.time, merged.u, kept, merged.mode)
     return trajectory(
-        labels, provenance(labels, "simulate", options, method=method),
-        time=merged.time, u=merged.u, mode=merged.mode, segment=merged.segment,
-        crossing_time=log.crossing_time, crossing_transition=log.crossing_transition,
-        u_before=log.u_before, u_after=log.u_after, touch_time=log.touch_time, touch_indicator=log.touch_indicator,
-        touch_u=log.touch_u, touch_clearance=log.touch_clearance, outputs=outputs, memory=memory, status=log.status,
-    )  # fmt: skip
+        labels,
+        provenance(labels, "simulate", options, method=method),
+        time=merged.time,
+        u=merged.u,
+        mode=merged.mode,
+        segment=merged.segment,
+        crossing_time=log.crossing_time,
+        crossing_transition=log.crossing_transition,
+        u_before=log.u_before,
+        u_after=log.u_after,
+        touch_time=log.touch_time,
+        touch_indicator=log.touch_indicator,
+        touch_u=log.touch_u,
+        touch_clearance=log.touch_clearance,
+        outputs=outputs,
+        memory=memory,
+        status=log.status,
+    )

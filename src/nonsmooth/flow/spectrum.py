@@ -98,10 +98,23 @@ class Frame:
         noted = len(engine.traced.transitions) if series or not self.active.all() else 0
         none, square = np.zeros(0), np.zeros((n, n))
         record = Record(
-            self.scale, self.Q, np.zeros((count, columns)), np.ones(columns), np.array([0.0, 0.0, 0.0, 1.0, 0.0]),
-            square, square.copy(), square.copy(), np.zeros((4, n)), np.zeros(n), np.zeros(n),
-            np.zeros(noted, dtype=np.int64), np.zeros(0, dtype=np.int64), 0, none, none,
-        )  # fmt: skip
+            self.scale,
+            self.Q,
+            np.zeros((count, columns)),
+            np.ones(columns),
+            np.array([0.0, 0.0, 0.0, 1.0, 0.0]),
+            square,
+            square.copy(),
+            square.copy(),
+            np.zeros((4, n)),
+            np.zeros(n),
+            np.zeros(n),
+            np.zeros(noted, dtype=np.int64),
+            np.zeros(0, dtype=np.int64),
+            0,
+            none,
+            none,
+        )
         if series:
             record = self._followed(record)
         here, row = engine.enter(self.tables, self.i, state)
@@ -127,9 +140,12 @@ class Frame:
             tolerance = max(min(FINER * self.engine.rtol, FINEST), 1e-16)
             flow.catch_up()
             self.behind = (
-                Block(FOLLOWER, put_follower), addresses(compiled(frame_along), compiled(frame_across)), flow,
-                flow.steps(order_for(tolerance), tolerance), np.zeros(flow.n_out),
-            )  # fmt: skip
+                Block(FOLLOWER, put_follower),
+                addresses(compiled(frame_along), compiled(frame_across)),
+                flow,
+                flow.steps(order_for(tolerance), tolerance),
+                np.zeros(flow.n_out),
+            )
         block, functions, flow, steps, out = self.behind
         record = record._replace(functions=functions, follower=block.address, u=steps.u, q=steps.q)
         block.put((flow.equations, record, steps, out))

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @checked
 def random_starts(
     n: Annotated[int, at_least(1), "the number of starts"], low: Any, high: Any, seed: Annotated[int, at_least(0)]
-) -> list[Any]:  # fmt: skip
+) -> list[Any]:
     """``n`` states drawn uniformly from a box, the same for the same seed.
 
     Parameters

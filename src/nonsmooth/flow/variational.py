@@ -62,12 +62,14 @@ class VariationalFlow:
         self.traced = traced
         self.model, stands = self._compiled()
         self.equations = Equations(
-            addresses(self.model.jet, self.model.field, self.model.switch), self.model.entries, self.model.kinds,
+            addresses(self.model.jet, self.model.field, self.model.switch),
+            self.model.entries,
+            self.model.kinds,
             np.array(
                 [(t.source, t.target, len(t.rows), k) for t, k in zip(traced.transitions, stands, strict=True)],
                 dtype=np.int64,
             ).reshape(-1, 4),
-        )  # fmt: skip
+        )
         rows = max([0, *(len(jump.rows) for jump in traced.transitions)])
         n, a = self.n, self.n_active
         self.n_out = n + n * n + n + n * a + rows * (2 + n + a)
@@ -188,9 +190,18 @@ class VariationalFlow:
         at = n + n * n + n + n * a + row * (2 + n + a)
         h = out[at : at + 2 + n + a] if row >= 0 else np.zeros(2 + n + a)
         return Jump(
-            out[:n], seen.reset, seen.fields, float(h[0]), h[1 : 1 + n], float(h[1 + n]), h[2 + n :], seen.step,
-            seen.t_z, row, self.traced.transitions[k].rows[row].indicator if row >= 0 else -1,
-        )  # fmt: skip
+            out[:n],
+            seen.reset,
+            seen.fields,
+            float(h[0]),
+            h[1 : 1 + n],
+            float(h[1 + n]),
+            h[2 + n :],
+            seen.step,
+            seen.t_z,
+            row,
+            self.traced.transitions[k].rows[row].indicator if row >= 0 else -1,
+        )
 
     def indicator(self, values: Any, i: int, mode: int, t: float, z: Any) -> Touch:
         """Indicator ``i`` at (t, z) with its first two derivatives along the flow of ``mode``, and gradients of all."""
@@ -255,11 +266,22 @@ class VariationalFlow:
 
         n, columns, width = self.n_moving, self.n + self.n_active, order + 1
         rows, changes = 2 * n + len(self.model.entries), np.zeros((max(n, 2), columns))
-        return Steps._make([*one_block(
-            np.zeros((rows, width)), np.zeros((width, columns, -(-columns // FOUR) * FOUR)),
-            np.zeros((self.model.n_scratch, width)), changes[:n], changes, changes[:n],
-            np.zeros(width), np.zeros(n), np.zeros(self.n_p + len(self.traced.m)),
-        ), accuracy])  # fmt: skip
+        return Steps._make(
+            [
+                *one_block(
+                    np.zeros((rows, width)),
+                    np.zeros((width, columns, -(-columns // FOUR) * FOUR)),
+                    np.zeros((self.model.n_scratch, width)),
+                    changes[:n],
+                    changes,
+                    changes[:n],
+                    np.zeros(width),
+                    np.zeros(n),
+                    np.zeros(self.n_p + len(self.traced.m)),
+                ),
+                accuracy,
+            ]
+        )
 
 
 def _floats(x: Any) -> FloatArray:

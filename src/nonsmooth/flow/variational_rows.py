@@ -169,10 +169,14 @@ class LinearFlow(RowsFlow):
             q, n, tables = self.empty.copy(), self.n, []
             for d in range(1 + self.n_active):
                 fields, conditions, maps = self._views(q, d)
-                tables.append({
-                    "omega": np.zeros(1), **_tables("Abcs", fields, n), **_tables(("ra", "rb", "rc", "rs"), maps, n),
-                    **dict(zip(("ia", "ib", "ic", "is_"), apart(conditions[None], n), strict=True)),
-                })  # fmt: skip
+                tables.append(
+                    {
+                        "omega": np.zeros(1),
+                        **_tables("Abcs", fields, n),
+                        **_tables(("ra", "rb", "rc", "rs"), maps, n),
+                        **dict(zip(("ia", "ib", "ic", "is_"), apart(conditions[None], n), strict=True)),
+                    }
+                )
             found = self._local.buffer = q, tables
         return found
 

@@ -151,15 +151,24 @@ def amplitude_dependent(
     data = _data(fit, grid, *rows)
     ends = [
         Estimate(float(values[i]), float(errors[i]), unit)
-        for i in (0, -1) for (values, errors), unit in zip(rows, ("Hz", ""), strict=True)
-    ]  # fmt: skip
+        for i in (0, -1)
+        for (values, errors), unit in zip(rows, ("Hz", ""), strict=True)
+    ]
     f_n, *rest = ends
     others = dict(zip(("zeta", "f_n at the largest amplitude", "zeta at the largest amplitude"), rest, strict=True))
     others |= _others(fit)
     finding = Finding(
-        "f_n", f_n, _METHOD, sum(len(c.frequency) for c in curves), tuple(c.name for c in curves),
-        tuple(_notes(fit)), others, None, data, "backbone",
-    )  # fmt: skip
+        "f_n",
+        f_n,
+        _METHOD,
+        sum(len(c.frequency) for c in curves),
+        tuple(c.name for c in curves),
+        tuple(_notes(fit)),
+        others,
+        None,
+        data,
+        "backbone",
+    )
     return finding, mode
 
 
@@ -175,16 +184,21 @@ def _data(
         "frequency": ("point", fit.omega / (2 * np.pi), {"units": "Hz"}),
         "response": ("point", np.abs(fit.measured), {"units": "m"}),
         "modal_amplitude": ("point", fit.amplitude, {"units": "m"}),
-        "curve": ("point", fit.curve), "slope": labelled("point", slope, "d ln F / d ln a"),
+        "curve": ("point", fit.curve),
+        "slope": labelled("point", slope, "d ln F / d ln a"),
         "unstable": ("point", slope < 0),
         "f_n": labelled("amplitude", f, "natural frequency", "Hz"),
         "f_n_error": ("amplitude", f_error, {"units": "Hz"}),
-        "zeta": labelled("amplitude", zeta, "damping ratio"), "zeta_error": ("amplitude", zeta_error),
-        "curve_f_n": ("curves", own[0], {"units": "Hz"}), "curve_zeta": ("curves", own[1]),
+        "zeta": labelled("amplitude", zeta, "damping ratio"),
+        "zeta_error": ("amplitude", zeta_error),
+        "curve_f_n": ("curves", own[0], {"units": "Hz"}),
+        "curve_zeta": ("curves", own[1]),
         "curve_amplitude": ("curves", own[2], {"units": "m"}),
-    }  # fmt: skip
-    coords = {"amplitude": labelled("amplitude", grid, "amplitude of the mode", "m"),
-              "curves": ("curves", list(fit.names))}  # fmt: skip
+    }
+    coords = {
+        "amplitude": labelled("amplitude", grid, "amplitude of the mode", "m"),
+        "curves": ("curves", list(fit.names)),
+    }
     return xr.Dataset(rows, coords, {"scatter": fit.sigma})
 
 

@@ -122,9 +122,13 @@ def inverted(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def settle(
-    problem: Fittable, theta: FloatArray, starts: FloatArray, used: Any = None, known: FloatArray | None = None,
+    problem: Fittable,
+    theta: FloatArray,
+    starts: FloatArray,
+    used: Any = None,
+    known: FloatArray | None = None,
     rough: bool = False,
-) -> tuple[FloatArray, FloatArray, State]:  # fmt: skip
+) -> tuple[FloatArray, FloatArray, State]:
     """Levenberg and Marquardt's iteration: parameters, starts, and the state there.
 
     With ``rough`` it ends where it makes little way, or has taken all its iterations: a start for another fit.
@@ -179,8 +183,12 @@ def settle(
                 raise Unsettled(
                     f"the fit over {len(problem.pieces)} pieces did not settle: no step lowers the sum of squares, "
                     f"though its minimum should be {far:.2g} standard uncertainties away; look at the records for "
-                    "jumps", distance, rest, theta, starts,
-                )  # fmt: skip
+                    "jumps",
+                    distance,
+                    rest,
+                    theta,
+                    starts,
+                )
         theta, starts, gain, best = theta + step, moved, best - found, found
         state = problem.derivatives(theta, starts)
         # by the undamped step: a damped one is short wherever it is taken
@@ -193,8 +201,11 @@ def settle(
         return theta, starts, state
     raise Unsettled(
         f"the fit over {len(problem.pieces)} pieces did not settle in {iterations} iterations",
-        distance, rest, theta, starts,
-    )  # fmt: skip
+        distance,
+        rest,
+        theta,
+        starts,
+    )
 
 
 def _distance(

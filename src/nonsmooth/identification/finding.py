@@ -47,9 +47,12 @@ class Estimate:
         """The product with a number of its own standard uncertainty: c = m b."""
         value = self.value * size
         return Estimate(
-            value, float(np.hypot(self.uncertainty * size, self.value * error)), self.unit if unit is None else unit,
-            self.half_width * abs(size), self.logarithmic,
-        )  # fmt: skip
+            value,
+            float(np.hypot(self.uncertainty * size, self.value * error)),
+            self.unit if unit is None else unit,
+            self.half_width * abs(size),
+            self.logarithmic,
+        )
 
     @property
     def relative(self) -> float:

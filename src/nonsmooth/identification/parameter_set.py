@@ -69,9 +69,12 @@ class ParameterSet(Mapping[str, float]):
         mappings = {"estimates": estimates, "extra": extra, "identifiability": identifiability}
         held = {
             **{name: MappingProxyType(dict(given or {})) for name, given in mappings.items()},
-            "findings": tuple(findings), "notes": tuple(notes), "anomalies": tuple(anomalies),
-            "synthetic": bool(synthetic), "_covariance": matrix,
-        }  # fmt: skip
+            "findings": tuple(findings),
+            "notes": tuple(notes),
+            "anomalies": tuple(anomalies),
+            "synthetic": bool(synthetic),
+            "_covariance": matrix,
+        }
         for name, value in held.items():
             object.__setattr__(self, name, value)
 
@@ -163,11 +166,15 @@ class ParameterSet(Mapping[str, float]):
         every = [*self.estimates, *self.extra]
         order = [every.index(name) for name in (*kept, *moved, *self.extra)]
         return ParameterSet(
-            {name: self.estimates[name] for name in kept}, self._covariance[np.ix_(order, order)],
-            extra={**{name: self.estimates[name] for name in moved}, **self.extra}, findings=self.findings,
-            identifiability=self.identifiability, notes=[*self.notes, note] if note else self.notes,
-            anomalies=self.anomalies, synthetic=self.synthetic,
-        )  # fmt: skip
+            {name: self.estimates[name] for name in kept},
+            self._covariance[np.ix_(order, order)],
+            extra={**{name: self.estimates[name] for name in moved}, **self.extra},
+            findings=self.findings,
+            identifiability=self.identifiability,
+            notes=[*self.notes, note] if note else self.notes,
+            anomalies=self.anomalies,
+            synthetic=self.synthetic,
+        )
 
     def draw(self, n: int, seed: int = 0) -> dict[str, FloatArray]:
         """``n`` sets of the model's parameters, correlated as known; those known to a factor are log-normal.
@@ -193,12 +200,16 @@ class ParameterSet(Mapping[str, float]):
         columns = ("value", "uncertainty", "half_width", "logarithmic")
         data = {name: ("parameter", [getattr(row, name) for row in rows.values()]) for name in columns}
         record = {
-            "version": package_version(), "verb": "identify", "synthetic": self.synthetic, "notes": list(self.notes),
+            "version": package_version(),
+            "verb": "identify",
+            "synthetic": self.synthetic,
+            "notes": list(self.notes),
             "anomalies": list(self.anomalies),
-            "n_parameters": len(self.estimates), "identifiability": dict(self.identifiability),
+            "n_parameters": len(self.estimates),
+            "identifiability": dict(self.identifiability),
             "units": [row.unit for row in rows.values()],
             "findings": [_as_record(finding) for finding in self.findings],
-        }  # fmt: skip
+        }
         found = xr.Dataset(
             {**data, "covariance": (("parameter", "other"), self._covariance.copy())},
             {"parameter": [*rows], "other": [*rows]},
@@ -227,12 +238,15 @@ class ParameterSet(Mapping[str, float]):
         }
         names, n = list(rows), record["n_parameters"]
         return cls(
-            {name: rows[name] for name in names[:n]}, dataset["covariance"].values,
+            {name: rows[name] for name in names[:n]},
+            dataset["covariance"].values,
             extra={name: rows[name] for name in names[n:]},
             findings=[_from_record(item) for item in record["findings"]],
-            identifiability=record["identifiability"], notes=record["notes"],
-            anomalies=record.get("anomalies", ()), synthetic=record["synthetic"],
-        )  # fmt: skip
+            identifiability=record["identifiability"],
+            notes=record["notes"],
+            anomalies=record.get("anomalies", ()),
+            synthetic=record["synthetic"],
+        )
 
     def to_dataframe(self, level: float = 0.95) -> Any:  # a pandas.DataFrame
         """Return a table with a row for each parameter, then for each quantity in ``extra``.
@@ -262,11 +276,12 @@ class ParameterSet(Mapping[str, float]):
         columns: dict[str, Any] = {
             "value": [row.value for row in rows.values()],
             "uncertainty": [row.uncertainty for row in rows.values()],
-            "low": list(low), "high": list(high),
+            "low": list(low),
+            "high": list(high),
             "unit": np.array([row.unit for row in rows.values()], dtype=object),
             "parameter_of_the_model": [name in self.estimates for name in rows],
             "identifiability": np.array([self.identifiability.get(name, "") for name in rows], dtype=object),
-        }  # fmt: skip
+        }
         names = np.array(list(rows), dtype=object)
         return xr.Dataset({key: ("name", values) for key, values in columns.items()}, {"name": names}).to_dataframe()
 
@@ -302,10 +317,15 @@ class ParameterSet(Mapping[str, float]):
 
 def _as_record(finding: Finding) -> dict[str, Any]:
     return {
-        "name": finding.name, "estimate": list(astuple(finding.estimate)), "method": finding.method,
-        "samples_used": finding.samples_used, "runs": list(finding.runs), "notes": list(finding.notes),
-        "others": {name: list(astuple(other)) for name, other in finding.others.items()}, "plot": finding.plot,
-    }  # fmt: skip
+        "name": finding.name,
+        "estimate": list(astuple(finding.estimate)),
+        "method": finding.method,
+        "samples_used": finding.samples_used,
+        "runs": list(finding.runs),
+        "notes": list(finding.notes),
+        "others": {name: list(astuple(other)) for name, other in finding.others.items()},
+        "plot": finding.plot,
+    }
 
 
 def _from_record(item: Mapping[str, Any]) -> Finding:
@@ -314,6 +334,12 @@ def _from_record(item: Mapping[str, Any]) -> Finding:
         return Estimate(float(value), float(uncertainty), unit, float(half_width), logarithmic)  # "inf" is a text there
 
     return Finding(
-        item["name"], estimate(item["estimate"]), item["method"], item["samples_used"], tuple(item["runs"]),
-        tuple(item["notes"]), {name: estimate(row) for name, row in item["others"].items()}, plot=item["plot"],
-    )  # fmt: skip
+        item["name"],
+        estimate(item["estimate"]),
+        item["method"],
+        item["samples_used"],
+        tuple(item["runs"]),
+        tuple(item["notes"]),
+        {name: estimate(row) for name, row in item["others"].items()},
+        plot=item["plot"],
+    )

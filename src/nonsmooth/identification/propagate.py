@@ -234,10 +234,12 @@ def to_first_order(
     sources, covariance = [sources[i] for i in some], covariance[np.ix_(some, some)]
     own = str(branch.attrs["parameter"])
     table = special_points(branch)
-    slope = np.array([
-        [0.0 if name == own else _slope(table.isel(special=i), name) for name, _ in sources]
-        for i in range(table.sizes["special"])
-    ]).reshape(table.sizes["special"], len(sources))  # fmt: skip
+    slope = np.array(
+        [
+            [0.0 if name == own else _slope(table.isel(special=i), name) for name, _ in sources]
+            for i in range(table.sizes["special"])
+        ]
+    ).reshape(table.sizes["special"], len(sources))
     for i, (name, error) in enumerate(sources):
         if (lost := np.isnan(slope[:, i])).any():  # of equilibria: by differences of whole branches
             value, h = system.values[name], DIFFERENCE * error

@@ -67,12 +67,20 @@ def bilinear_oscillator(**parameters: float) -> System:
     from nonsmooth.system.derived.mechanical import mechanical
 
     system = mechanical(
-        1.0, _damping, 1.0, name="bilinear oscillator", coordinates="x", base=_base,
+        1.0,
+        _damping,
+        1.0,
+        name="bilinear oscillator",
+        coordinates="x",
+        base=_base,
         parameters={
-            "zeta": (0.05, "", r"\zeta"), "beta": (10.0, "", r"\beta"), "g": 1.0, "A": 2.0,
+            "zeta": (0.05, "", r"\zeta"),
+            "beta": (10.0, "", r"\beta"),
+            "g": 1.0,
+            "A": 2.0,
             "omega": (0.7, "", r"\omega"),
         },
         elements={"springs": Backlash(at="x", half_width="g", stiffness="beta")},
         symmetry=(_mirror, 0.5, {"springs_above": "springs_below", "springs_below": "springs_above"}),
-    )  # fmt: skip
+    )
     return system.with_parameters(parameters) if parameters else system

@@ -51,9 +51,12 @@ def border_collision(**parameters: float) -> Map:
         name="border-collision normal form",
         states={"x": "", "y": ""},
         parameters={
-            "tau_l": (0.5, "", r"\tau_L"), "delta_l": (0.0, "", r"\delta_L"), "tau_r": (-1.5, "", r"\tau_R"),
-            "delta_r": (0.0, "", r"\delta_R"), "mu": (0.1, "", r"\mu"),
+            "tau_l": (0.5, "", r"\tau_L"),
+            "delta_l": (0.0, "", r"\delta_L"),
+            "tau_r": (-1.5, "", r"\tau_R"),
+            "delta_r": (0.0, "", r"\delta_R"),
+            "mu": (0.1, "", r"\mu"),
         },
         branches=[Branch(_left, when="x < 0"), Branch(_right, when="x > 0")],
-    )  # fmt: skip
+    )
     return system.with_parameters(parameters) if parameters else system

@@ -60,9 +60,15 @@ def buck_converter(**parameters: float) -> System:
         name="buck converter",
         states={"v": "V", "i": "A", "ramp": "V"},
         parameters={
-            "V_in": (24.0, "V", r"V_{\mathrm{in}}"), "R": (22.0, "ohm"), "L": (20e-3, "H"), "C": (47e-6, "F"),
-            "T": (400e-6, "s"), "V_ref": (11.3, "V", r"V_{\mathrm{ref}}"), "gain": 8.4,
-            "V_low": (3.8, "V", r"V_{\mathrm{low}}"), "V_high": (8.2, "V", r"V_{\mathrm{high}}"),
+            "V_in": (24.0, "V", r"V_{\mathrm{in}}"),
+            "R": (22.0, "ohm"),
+            "L": (20e-3, "H"),
+            "C": (47e-6, "F"),
+            "T": (400e-6, "s"),
+            "V_ref": (11.3, "V", r"V_{\mathrm{ref}}"),
+            "gain": 8.4,
+            "V_low": (3.8, "V", r"V_{\mathrm{low}}"),
+            "V_high": (8.2, "V", r"V_{\mathrm{high}}"),
         },
         modes={"open": _open, "closed": _closed},
         indicators={"sawtooth_above": _sawtooth_above},
@@ -74,5 +80,5 @@ def buck_converter(**parameters: float) -> System:
         ],
         period=lambda p: p.T,
         scale={"v": 10.0, "i": 1.0, "ramp": 10.0},
-    )  # fmt: skip
+    )
     return system.with_parameters(parameters) if parameters else system

@@ -108,8 +108,14 @@ def discontinuous_support(**parameters: float) -> System:
         name="discontinuous support",
         states={"x": "m", "v": "m/s"},
         parameters={
-            "m": (0.838, "kg"), "k": (8.47, "N/m"), "k_s": (1210.0, "N/m"), "c": (0.87, "N s/m"),
-            "c_s": (0.60, "N s/m"), "g": (-0.0045, "m"), "rho": (0.45, "N"), "omega": (3.69, "rad/s"),
+            "m": (0.838, "kg"),
+            "k": (8.47, "N/m"),
+            "k_s": (1210.0, "N/m"),
+            "c": (0.87, "N s/m"),
+            "c_s": (0.60, "N s/m"),
+            "g": (-0.0045, "m"),
+            "rho": (0.45, "N"),
+            "omega": (3.69, "rad/s"),
         },
         modes={"free": _free, "contact": _contact},
         indicators={"penetration": _penetration, "separation": _separation},
@@ -125,5 +131,5 @@ def discontinuous_support(**parameters: float) -> System:
             ),
             "separation": Band(_leaving, outputs={"contact_force": _leaving_force}),
         },
-    )  # fmt: skip
+    )
     return system.with_parameters(parameters) if parameters else system

@@ -65,14 +65,24 @@ def double_impact_oscillator(**parameters: float) -> System:
     from nonsmooth.system.derived.mechanical import mechanical
 
     system = mechanical(
-        1.0, _damping, 1.0, name="double impact oscillator", coordinates="x", forcing={"x": _force},
+        1.0,
+        _damping,
+        1.0,
+        name="double impact oscillator",
+        coordinates="x",
+        forcing={"x": _force},
         parameters={"c": 0.0, "g": 0.5, "e": 0.6, "omega": (1.5, "", r"\omega")},
         elements={
             "right": Stop(at="x", position="g", restitution="e"),
             "left": Stop(at="x", position=_left, side=-1, restitution="e"),
         },
-        symmetry=(_mirror, 0.5, {
-            "left_open_right_rest": "left_rest_right_open", "left_rest_right_open": "left_open_right_rest",
-        }),
-    )  # fmt: skip
+        symmetry=(
+            _mirror,
+            0.5,
+            {
+                "left_open_right_rest": "left_rest_right_open",
+                "left_rest_right_open": "left_open_right_rest",
+            },
+        ),
+    )
     return system.with_parameters(parameters) if parameters else system

@@ -97,7 +97,8 @@ def drifting_impact_oscillator(**parameters: float) -> System:
     from nonsmooth.system.system import System
 
     system = System(
-        name="drifting impact oscillator", states=["x", "y", "q"],
+        name="drifting impact oscillator",
+        states=["x", "y", "q"],
         parameters={"a": 0.3, "b": 0.1, "xi": (0.1, "", r"\xi"), "omega": (0.1, "", r"\omega"), "g": 0.02},
         modes={"free": _free, "contact": _contact, "progress": _progress},
         indicators={"gap": _gap, "force": _force, "excess": _excess},
@@ -111,5 +112,5 @@ def drifting_impact_oscillator(**parameters: float) -> System:
             "contact_force": {"free": _none, "contact": _force, "progress": _one},
             "slider_velocity": {"free": _none, "contact": _none, "progress": _slider},
         },
-    )  # fmt: skip
+    )
     return system.with_parameters(parameters) if parameters else system

@@ -62,10 +62,18 @@ def gear_pair(**parameters: float) -> System:
     from nonsmooth.system.derived.mechanical import mechanical
 
     system = mechanical(
-        1.0, _damping, 0.0, name="gear pair", forcing={"q": _load},
+        1.0,
+        _damping,
+        0.0,
+        name="gear pair",
+        forcing={"q": _load},
         parameters={
-            "zeta": (0.05, "", r"\zeta"), "F_m": 0.1, "F_a": 0.05, "b": 1.0, "omega": (0.5, "", r"\omega"),
+            "zeta": (0.05, "", r"\zeta"),
+            "F_m": 0.1,
+            "F_a": 0.05,
+            "b": 1.0,
+            "omega": (0.5, "", r"\omega"),
         },
         elements={"teeth": Backlash(at="q", half_width="b", stiffness=1.0)},
-    )  # fmt: skip
+    )
     return system.with_parameters(parameters) if parameters else system

@@ -78,17 +78,31 @@ def impact_damper(**parameters: float) -> System:
     from nonsmooth.system.derived.mechanical import mechanical
 
     system = mechanical(
-        _masses, _damping, np.diag([1.0, 0.0]), name="impact damper", coordinates=["x", "y"], forcing={"x": _force},
+        _masses,
+        _damping,
+        np.diag([1.0, 0.0]),
+        name="impact damper",
+        coordinates=["x", "y"],
+        forcing={"x": _force},
         parameters={
-            "zeta": (0.01, "", r"\zeta"), "mu": (0.1, "", r"\mu"), "e": 0.75, "d": 1.0, "F": 0.05,
+            "zeta": (0.01, "", r"\zeta"),
+            "mu": (0.1, "", r"\mu"),
+            "e": 0.75,
+            "d": 1.0,
+            "F": 0.05,
             "omega": (1.0, "", r"\omega"),
         },
         elements={
             "right": Stop(at={"y": 1, "x": -1}, position=_right, restitution="e"),
             "left": Stop(at={"y": 1, "x": -1}, position=_left, side=-1, restitution="e"),
         },
-        symmetry=(_mirror, 0.5, {
-            "left_open_right_rest": "left_rest_right_open", "left_rest_right_open": "left_open_right_rest",
-        }),
-    )  # fmt: skip
+        symmetry=(
+            _mirror,
+            0.5,
+            {
+                "left_open_right_rest": "left_rest_right_open",
+                "left_rest_right_open": "left_open_right_rest",
+            },
+        ),
+    )
     return system.with_parameters(parameters) if parameters else system

@@ -77,15 +77,24 @@ def impact_duffing(**parameters: float) -> System:
     from nonsmooth.system.system import System
 
     system = System(
-        name="impact Duffing", states=["x1", "x2", "v1", "v2"], modes={"motion": _motion},
+        name="impact Duffing",
+        states=["x1", "x2", "v1", "v2"],
+        modes={"motion": _motion},
         parameters={
-            "mu": (0.1, "", r"\mu"), "r": 0.8, "zeta": (0.05, "", r"\zeta"), "xi": (0.05, "", r"\xi"),
-            "phi": (1.0, "", r"\varphi"), "eta_1": (0.01, "", r"\eta_1"), "eta_2": (0.01, "", r"\eta_2"),
-            "delta_1": (4.0, "", r"\delta_1"), "delta_2": (4.0, "", r"\delta_2"), "omega": (0.9, "", r"\omega"),
+            "mu": (0.1, "", r"\mu"),
+            "r": 0.8,
+            "zeta": (0.05, "", r"\zeta"),
+            "xi": (0.05, "", r"\xi"),
+            "phi": (1.0, "", r"\varphi"),
+            "eta_1": (0.01, "", r"\eta_1"),
+            "eta_2": (0.01, "", r"\eta_2"),
+            "delta_1": (4.0, "", r"\delta_1"),
+            "delta_2": (4.0, "", r"\delta_2"),
+            "omega": (0.9, "", r"\omega"),
         },
         elements={
             "upper": Stop(gap=_upper, on={"v1": 1.0, "v2": _on_second_back}, restitution="r"),
             "lower": Stop(gap=_lower, on={"v1": -1.0, "v2": _on_second}, restitution="r"),
         },
-    )  # fmt: skip
+    )
     return system.with_parameters(parameters) if parameters else system

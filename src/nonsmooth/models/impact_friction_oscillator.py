@@ -57,10 +57,16 @@ def impact_friction_oscillator(**parameters: float) -> System:
     from nonsmooth.system.derived.mechanical import mechanical
 
     system = mechanical(
-        1.0, _damping, 1.0, name="impact-friction oscillator", coordinates="x", forcing={"x": _force},
+        1.0,
+        _damping,
+        1.0,
+        name="impact-friction oscillator",
+        coordinates="x",
+        forcing={"x": _force},
         parameters={"zeta": (0.0, "", r"\zeta"), "f": 0.2, "g": 1.0, "e": 0.7, "omega": (0.8, "", r"\omega")},
         elements={
-            "support": Coulomb(at="x", friction="f"), "stop": Stop(at="x", position="g", restitution="e"),
+            "support": Coulomb(at="x", friction="f"),
+            "stop": Stop(at="x", position="g", restitution="e"),
         },
-    )  # fmt: skip
+    )
     return system.with_parameters(parameters) if parameters else system

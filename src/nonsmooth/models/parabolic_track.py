@@ -68,10 +68,16 @@ def parabolic_track(**parameters: float) -> System:
     from nonsmooth.system.system import System
 
     system = System(
-        name="parabolic track", states=["x", "v"], modes={"cart": _cart},
+        name="parabolic track",
+        states=["x", "v"],
+        modes={"cart": _cart},
         parameters={
-            "zeta": (0.02, "", r"\zeta"), "A": 0.2, "omega": (0.8, "", r"\omega"), "d": 0.2, "e": 0.6,
+            "zeta": (0.02, "", r"\zeta"),
+            "A": 0.2,
+            "omega": (0.8, "", r"\omega"),
+            "d": 0.2,
+            "e": 0.6,
         },
         elements={"stop": Stop(gap=_gap, on={"v": _stop}, restitution="e")},
-    )  # fmt: skip
+    )
     return system.with_parameters(parameters) if parameters else system

@@ -67,11 +67,15 @@ def relief_valve(**parameters: float) -> System:
         name="relief valve",
         states={"y1": "", "y2": "", "y3": ""},
         parameters={
-            "k": (1.25, "", r"\kappa"), "delta": 10.0, "beta": 20.0, "r": 0.8, "q": 5.0,
+            "k": (1.25, "", r"\kappa"),
+            "delta": 10.0,
+            "beta": 20.0,
+            "r": 0.8,
+            "q": 5.0,
         },
         modes={"open": _open},
         indicators={"seat": _seat, "lift_velocity": _lift_velocity},
         transitions=[Transition("open", "open", when="seat < 0", reset=_rebound)],
         scale={"y1": 1.0, "y2": 1.0, "y3": 10.0},
-    )  # fmt: skip
+    )
     return system.with_parameters(parameters) if parameters else system

@@ -23,9 +23,11 @@ def _disc(t: Any, u: Any, p: Any) -> Any:
     x, y, v_x, v_y = u
     pull = p.omega**2
     return (
-        v_x, v_y, pull * np.cos(p.omega * t) - 2 * p.zeta * v_x - p.beta * x,
+        v_x,
+        v_y,
+        pull * np.cos(p.omega * t) - 2 * p.zeta * v_x - p.beta * x,
         pull * np.sin(p.omega * t) - 2 * p.zeta * v_y - p.beta * y,
-    )  # fmt: skip
+    )
 
 
 def _radius(u: Any) -> Any:
@@ -83,11 +85,16 @@ def rubbing_rotor(**parameters: float) -> System:
     from nonsmooth.system.system import System
 
     system = System(
-        name="rubbing rotor", states=["x", "y", "v_x", "v_y"], modes={"disc": _disc},
+        name="rubbing rotor",
+        states=["x", "y", "v_x", "v_y"],
+        modes={"disc": _disc},
         parameters={
-            "zeta": (0.05, "", r"\zeta"), "beta": (0.04, "", r"\beta"), "R_0": 1.05, "mu": (0.2, "", r"\mu"),
+            "zeta": (0.05, "", r"\zeta"),
+            "beta": (0.04, "", r"\beta"),
+            "R_0": 1.05,
+            "mu": (0.2, "", r"\mu"),
             "omega": (0.2, "", r"\omega"),
         },
         elements={"stator": ElasticStop(gap=_gap, on={"v_x": _on_x, "v_y": _on_y}, stiffness=1.0)},
-    )  # fmt: skip
+    )
     return system.with_parameters(parameters) if parameters else system

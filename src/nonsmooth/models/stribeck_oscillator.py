@@ -64,11 +64,22 @@ def stribeck_oscillator(**parameters: float) -> System:
     from nonsmooth.system.derived.mechanical import mechanical
 
     system = mechanical(
-        1.0, _damping, 1.0, name="Stribeck oscillator", coordinates="x", forcing={"x": _force},
+        1.0,
+        _damping,
+        1.0,
+        name="Stribeck oscillator",
+        coordinates="x",
+        forcing={"x": _force},
         parameters={
-            "D": 0.0, "mu_s": (0.4, "", r"\mu_s"), "mu_k": (0.1, "", r"\mu_k"), "kappa": (1.42, "", r"\kappa"),
-            "mu_v": (0.01, "", r"\mu_v"), "v_b": 1.0, "u_0": 0.5, "omega": (0.6, "", r"\omega"),
+            "D": 0.0,
+            "mu_s": (0.4, "", r"\mu_s"),
+            "mu_k": (0.1, "", r"\mu_k"),
+            "kappa": (1.42, "", r"\kappa"),
+            "mu_v": (0.01, "", r"\mu_v"),
+            "v_b": 1.0,
+            "u_0": 0.5,
+            "omega": (0.6, "", r"\omega"),
         },
         elements={"belt": Coulomb(at="x", belt="v_b", friction=_stribeck)},
-    )  # fmt: skip
+    )
     return system.with_parameters(parameters) if parameters else system

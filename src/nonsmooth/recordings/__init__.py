@@ -6,6 +6,12 @@ from nonsmooth.recordings.recording import Recording, RecordingWarning
 from nonsmooth.recordings.session import Quantity, Session, load_session
 
 __all__ = [
-    "Quantity", "Recording", "RecordingWarning", "Session", "load_recording", "load_session", "write_cap",
+    "Quantity",
+    "Recording",
+    "RecordingWarning",
+    "Session",
+    "load_recording",
+    "load_session",
+    "write_cap",
     "write_capstone_csv",
-]  # fmt: skip
+]

@@ -49,9 +49,13 @@ def assemble(reading: Reading, source: Source, options: Mapping[str, Any], axis:
             sensors[label] = _sensor(group, source, axis, remarks)
         runs[node] = sensors
     record = {
-        "file": source.name, "format": source.format, "bytes": source.size, "sha256": source.sha256,
-        "options": dict(options), "header": reading.header,
-    }  # fmt: skip
+        "file": source.name,
+        "format": source.format,
+        "bytes": source.size,
+        "sha256": source.sha256,
+        "options": dict(options),
+        "header": reading.header,
+    }
     return Recording.from_runs(
         runs, synthetic=reading.synthetic, source=record, warnings=remarks.sentences(), run_attrs=run_attrs
     )
@@ -100,18 +104,20 @@ def _sensor(group: list[Trace], source: Source, axis: str, remarks: Remarks) -> 
         if total:
             at = f"{axis} = {trace.axis[start]:.9g} {trace.axis_unit}".rstrip()
             remarks.of(
-                trace.run, trace.name,
+                trace.run,
+                trace.name,
                 f"{total} of {len(trace.values)} values are not finite numbers, "
                 f"the longest run of them {longest} from {at} on; they are kept as they are",
-            )  # fmt: skip
+            )
         name = _fit(trace.name or "channel", [*variables, axis])
         if name != trace.name and name != _clean(trace.name):
             sentence = f"the name stands there twice, or is the axis; this one is called {name!r}"
             remarks.of(trace.run, trace.name, sentence)
         variables[name] = (
-            axis, trace.values,
+            axis,
+            trace.values,
             {"long_name": trace.name, "units": trace.unit, "origin": trace.origin, **trace.attrs},
-        )  # fmt: skip
+        )
     coordinate = (axis, first.axis, {"long_name": axis, "units": first.axis_unit})
     return xr.Dataset(variables, {axis: coordinate}, attrs)
 
@@ -160,10 +166,11 @@ def _compare_units(traces: list[Trace], remarks: Remarks) -> None:
             remarks.of(run, name, f"the file gives no unit; say it with units={{{name!r}: ...}}")
         if len(found) > 1:
             remarks.of(
-                "", name,
+                "",
+                name,
                 f"has units {mixed_units(found)}; nothing was converted: take each run's own unit, or read the runs "
                 "one by one",
-            )  # fmt: skip
+            )
 
 
 def _clean(name: str) -> str:

@@ -80,16 +80,43 @@ def _sentence(run: str, channels: list[str], text: str) -> str:
 
 #: What instruments call the time column, lower case, in the languages their programs speak.
 TIME_WORDS = frozenset(
-    ["time", "t", "timestamp", "datetime", "zeit", "temps", "tiempo", "tempo", "tid", "tijd", "aika", "czas", "čas",
-     "laiks", "laikas",
-     "время", "时间", "時間", "시간"]
-)  # fmt: skip
+    [
+        "time",
+        "t",
+        "timestamp",
+        "datetime",
+        "zeit",
+        "temps",
+        "tiempo",
+        "tempo",
+        "tid",
+        "tijd",
+        "aika",
+        "czas",
+        "čas",
+        "laiks",
+        "laikas",
+        "время",
+        "时间",
+        "時間",
+        "시간",
+    ]
+)
 
 #: Time units and their length in seconds. The empty unit is taken for seconds, with a remark.
 TIME_SCALES = {
-    "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9, "min": 60.0,
-    "h": 3600.0, "d": 86400.0,
-}  # fmt: skip
+    "s": 1.0,
+    "sec": 1.0,
+    "seconds": 1.0,
+    "ms": 1e-3,
+    "us": 1e-6,
+    "µs": 1e-6,
+    "μs": 1e-6,
+    "ns": 1e-9,
+    "min": 60.0,
+    "h": 3600.0,
+    "d": 86400.0,
+}
 
 #: A column of a file: its name there or its place (from 0), and its unit where the file does not say it.
 Column = str | int | tuple[str | int, str]
@@ -262,9 +289,11 @@ class Group(dict[str, Any]):
     """Arrays by name: their units and attributes, the rate at which they were sampled, the run they belong to."""
 
     def __init__(
-        self, members: Mapping[str, Any] | None = None, units: Mapping[str, str] | None = None,
+        self,
+        members: Mapping[str, Any] | None = None,
+        units: Mapping[str, str] | None = None,
         rate: float | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(members or {})
         self.units, self.rate, self.run = dict(units or {}), rate, ""
         self.attrs: dict[str, dict[str, str]] = {}

@@ -192,9 +192,12 @@ class Recording:
             runs[run][sensor] = xr.Dataset(data, {dim: (dim, axis.values, own)}, attrs)
         record = read_provenance(dataset)
         return cls.from_runs(
-            runs, synthetic=record["synthetic"], source=record["source"], warnings=tuple(record["warnings"]),
+            runs,
+            synthetic=record["synthetic"],
+            source=record["source"],
+            warnings=tuple(record["warnings"]),
             run_attrs=run_attrs,
-        )  # fmt: skip
+        )
 
     def __repr__(self) -> str:
         rows = self._rows()

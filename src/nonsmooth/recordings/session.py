@@ -26,37 +26,50 @@ from nonsmooth.system.names import check_keys, unknown
 NOTEBOOK = "session.toml"
 
 #: What may stand in ``[apparatus]``: unit and meaning.
-APPARATUS: Mapping[str, tuple[str, str]] = MappingProxyType({
-    "distance_per_turn": ("m", "travel of the car per turn of the rotary sensor's wheel"),
-    "counts_per_turn": ("", "counts of the rotary sensor per turn"),
-    "sample_rate": ("Hz", "rate of the sensors"),
-    "turn_resolution": ("s", "resolution of the photogate's times"),
-    "force_gain_limit": ("", "the force sensor's gain lies within 1 +- this (uniform, type B)"),
-    "force_resolution": ("N", "step of the force sensor"),
-    "force_range": ("N", "the force sensor saturates at +- this"),
-    "mass": ("kg", "mass of the car, weighed"),
-    "test_mass": ("kg", "mass hung on the support's spring in the drop test, weighed"),
-    "string_length": ("m", "string between crank and driven spring"),
-})  # fmt: skip
+APPARATUS: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "distance_per_turn": ("m", "travel of the car per turn of the rotary sensor's wheel"),
+        "counts_per_turn": ("", "counts of the rotary sensor per turn"),
+        "sample_rate": ("Hz", "rate of the sensors"),
+        "turn_resolution": ("s", "resolution of the photogate's times"),
+        "force_gain_limit": ("", "the force sensor's gain lies within 1 +- this (uniform, type B)"),
+        "force_resolution": ("N", "step of the force sensor"),
+        "force_range": ("N", "the force sensor saturates at +- this"),
+        "mass": ("kg", "mass of the car, weighed"),
+        "test_mass": ("kg", "mass hung on the support's spring in the drop test, weighed"),
+        "string_length": ("m", "string between crank and driven spring"),
+    }
+)
 
 #: Each procedure, and the settings that its runs must state.
-PROCEDURES: Mapping[str, tuple[str, ...]] = MappingProxyType({
-    "springs": (), "support": (), "impulse": (), "drop": (),
-    "response": ("crank_length",), "voltage": ("voltage",), "crank": ("crank_length",),
-    "grazing": ("crank_length", "gap"), "contact": ("crank_length", "gap"),
-    "rise": ("crank_length", "crank_length_end", "gap"), "section": ("crank_length", "gap"),
-})  # fmt: skip
+PROCEDURES: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "springs": (),
+        "support": (),
+        "impulse": (),
+        "drop": (),
+        "response": ("crank_length",),
+        "voltage": ("voltage",),
+        "crank": ("crank_length",),
+        "grazing": ("crank_length", "gap"),
+        "contact": ("crank_length", "gap"),
+        "rise": ("crank_length", "crank_length_end", "gap"),
+        "section": ("crank_length", "gap"),
+    }
+)
 
 #: What may be set in a run: the type, the unit, the meaning.
-SETTINGS: Mapping[str, tuple[type, str, str]] = MappingProxyType({
-    "voltage": (float, "V", "motor voltage"),
-    "crank_length": (float, "m", "length of the crank (at the beginning, where it changes)"),
-    "crank_length_end": (float, "m", "length of the crank at the end of a slow rise"),
-    "gap": (float, "m", "gap of the support as read at its screw"),
-    "direction": (str, "", "up or down: how the steps follow one another"),
-    "figure": (int, "", "number of the published figure whose setting this is"),
-    "note": (str, "", "a remark"),
-})  # fmt: skip
+SETTINGS: Mapping[str, tuple[type, str, str]] = MappingProxyType(
+    {
+        "voltage": (float, "V", "motor voltage"),
+        "crank_length": (float, "m", "length of the crank (at the beginning, where it changes)"),
+        "crank_length_end": (float, "m", "length of the crank at the end of a slow rise"),
+        "gap": (float, "m", "gap of the support as read at its screw"),
+        "direction": (str, "", "up or down: how the steps follow one another"),
+        "figure": (int, "", "number of the published figure whose setting this is"),
+        "note": (str, "", "a remark"),
+    }
+)
 
 
 @dataclass(frozen=True)

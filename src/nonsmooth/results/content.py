@@ -46,9 +46,13 @@ def content(attributes: Mapping[Any, Any], variables: Iterable[tuple[str, bool, 
     for name, coordinate, variable in variables:
         where = f"variable {_text(name, 'a name')!r}"
         found[where] = [
-            coordinate, [_text(dim, "a name") for dim in variable.dims], _kind(where, variable.dtype),
-            list(variable.shape), _attributes(where, variable.attrs), _values(where, variable),
-        ]  # fmt: skip
+            coordinate,
+            [_text(dim, "a name") for dim in variable.dims],
+            _kind(where, variable.dtype),
+            list(variable.shape),
+            _attributes(where, variable.attrs),
+            _values(where, variable),
+        ]
     return found
 
 

@@ -44,9 +44,14 @@ def progress(total: int, label: str, enabled: Progress = True, done: int = 0) ->
         yield _nothing
         return
     with _bar_type()(
-        total=total, desc=label, initial=done, leave=False, miniters=1,
-        bar_format="{desc}: {percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt} [{elapsed}<{remaining}]", **_place(),
-    ) as bar:  # fmt: skip
+        total=total,
+        desc=label,
+        initial=done,
+        leave=False,
+        miniters=1,
+        bar_format="{desc}: {percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt} [{elapsed}<{remaining}]",
+        **_place(),
+    ) as bar:
 
         def advance(n: int = 1) -> None:
             with lock:

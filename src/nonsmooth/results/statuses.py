@@ -32,60 +32,70 @@ class Status:
 STATUSES: tuple[Status, ...] = (
     Status(codes.OK, "ok", "The run ended as asked.", ""),
     Status(
-        codes.SLOW, "slow",
+        codes.SLOW,
+        "slow",
         "The motion was still approaching its attractor when the transient ended, so its period number is not known.",
         "Raise `transient`, or find the orbit with `find_orbit`.",
     ),
     Status(
-        codes.NOT_PERIODIC, "not_periodic",
+        codes.NOT_PERIODIC,
+        "not_periodic",
         "No period was found up to `max_period` section returns: chaotic, quasi-periodic or of a longer period.",
         "Raise `max_period` and `keep` to look for longer periods; `lyapunov` tells chaos from the rest.",
     ),
     Status(
-        codes.DIVERGED, "diverged",
+        codes.DIVERGED,
+        "diverged",
         "The state grew beyond 1e9 times its scale or became infinite.",
         "Check the signs of stiffness and damping in every mode, the start, and the `scale` of the states.",
     ),
     Status(
-        codes.CHATTER, "chatter",
+        codes.CHATTER,
+        "chatter",
         "Transitions followed each other in ever shorter times without end (an infinite number in finite time).",
         "Check the signs of the reset first: after it the state must move away from the surface. Where impacts do "
         "accumulate, write the stop as ns.elements.Stop, which ends them in rest, or a mode that sticks.",
     ),
     Status(
-        codes.TOO_MANY_CROSSINGS, "too_many_crossings",
+        codes.TOO_MANY_CROSSINGS,
+        "too_many_crossings",
         "More than 1000 transitions took place within one section return.",
         "Check that a transition does not lead straight back to where it came from, or use a section met more often.",
     ),
     Status(
-        codes.NOT_GUARANTEED, "not_guaranteed",
+        codes.NOT_GUARANTEED,
+        "not_guaranteed",
         "On some steps it could not be proved that no crossing was missed (no bound on the indicator exists there).",
         "Compare with a smaller `rtol` or a fixed `step`; an indicator without corners can be bounded.",
     ),
     Status(
-        codes.NO_CONVERGENCE, "no_convergence",
+        codes.NO_CONVERGENCE,
+        "no_convergence",
         "The trajectory did not return to the section (it may have reached an equilibrium), it began beyond a stop, or "
         "an equation did not converge.",
         "Check that the start lies on the admissible side of every stop, and that the motion meets the section's "
         "surface in the direction asked for; otherwise lower `rtol`.",
     ),
     Status(
-        codes.INTERRUPTED, "interrupted",
+        codes.INTERRUPTED,
+        "interrupted",
         "The work was stopped before this point was computed.",
         "Run it again; finished points are whole.",
     ),
     Status(
-        codes.NOT_UNIQUE, "not_unique",
+        codes.NOT_UNIQUE,
+        "not_unique",
         "Motion is not unique from there on: sliding reached a point where its surface stops attracting from both "
         "sides at once (a two-fold), or contacts with friction allow several motions (Painleve's paradox).",
         "Change the model there, or start elsewhere.",
     ),
     Status(
-        codes.NO_MOTION, "no_motion",
+        codes.NO_MOTION,
+        "no_motion",
         "No motion satisfies the laws of contacts with friction there (Painleve's paradox).",
         "Lower the friction, or replace a rigid contact by an elastic one.",
     ),
-)  # fmt: skip
+)
 
 #: What a run can rest at; "undecided": an equilibrium whose eigenvalues do not say whether it is stable.
 EQUILIBRIA = ("none", "stable", "unstable", "undecided")

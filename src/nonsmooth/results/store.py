@@ -254,8 +254,9 @@ def _plain(result: xr.Dataset) -> dict[str, str]:
         record = {}
     units = {
         name: (float(one), str(one.attrs["units"]))
-        for name, one in result.coords.items() if not one.dims and one.dtype.kind == "f" and "units" in one.attrs
-    }  # fmt: skip
+        for name, one in result.coords.items()
+        if not one.dims and one.dtype.kind == "f" and "units" in one.attrs
+    }
     told: dict[str, str] = {key: str(record[key]) for key in ("verb", "version") if key in record}
     if isinstance(system := record.get("system"), dict):
         told["system"] = str(system.get("name"))

@@ -79,10 +79,13 @@ def told(path: Path, remedy: str) -> Iterator[None]:
         yield
     except OSError as error:
         why = {
-            errno.ENOSPC: "the disk is full", errno.EDQUOT: "the quota of the disk is used up",
-            errno.EROFS: "the disk is read-only", errno.EACCES: "it may not be written",
-            errno.EPERM: "it may not be written", errno.EFBIG: "the file would be larger than the disk allows",
-        }.get(error.errno or 0)  # fmt: skip
+            errno.ENOSPC: "the disk is full",
+            errno.EDQUOT: "the quota of the disk is used up",
+            errno.EROFS: "the disk is read-only",
+            errno.EACCES: "it may not be written",
+            errno.EPERM: "it may not be written",
+            errno.EFBIG: "the file would be larger than the disk allows",
+        }.get(error.errno or 0)
         if why is None:
             raise
         raise DataFileError(f"{path}: {why} ({error}); {remedy}") from error

@@ -38,9 +38,15 @@ class Found:
 def attractors_of(system: System, search: Box, parameter: str, value: float) -> list[Found]:
     """Attractors that the starts reach at one value of a parameter."""
     found = basin_fractions(
-        system, parameter, [value], n_starts=search.n_starts, box=search.box, section=search.section,
-        seed=search.seed, progress=False,
-    ).isel({parameter: 0})  # fmt: skip
+        system,
+        parameter,
+        [value],
+        n_starts=search.n_starts,
+        box=search.box,
+        section=search.section,
+        seed=search.seed,
+        progress=False,
+    ).isel({parameter: 0})
     return [
         Found(int(one.period_number), np.array([one.maximum.values, one.minimum.values]))
         for k in range(found.sizes["attractor"])
@@ -58,8 +64,10 @@ def matched(own: Sequence[Found], others: Sequence[Found]) -> tuple[int, int]:
     size = np.where(size > 0, size, 1.0)
     pairs = sorted(
         (float(np.abs((a.extremes - b.extremes) / size).max()), i, j)
-        for i, a in enumerate(own) for j, b in enumerate(others) if a.period_number == b.period_number
-    )  # fmt: skip
+        for i, a in enumerate(own)
+        for j, b in enumerate(others)
+        if a.period_number == b.period_number
+    )
     left, free = set(range(len(own))), set(range(len(others)))
     for distance, i, j in pairs:
         if distance < ALIKE and i in left and j in free:

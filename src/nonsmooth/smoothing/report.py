@@ -146,9 +146,15 @@ def smoothing_report(
     asked |= {"etas": widths, "band": bands, "orbit": None if sharp.orbit is None else sharp.orbit.u, **sharp.length}
     labels = labels_of(system)
     return report(
-        labels, provenance(labels, "smoothing_report", asked, method="events", seed=seed), bands, widths, reference,
-        rows, scale=system.scale_vector(), forced=system.period() is not None,
-    )  # fmt: skip
+        labels,
+        provenance(labels, "smoothing_report", asked, method="events", seed=seed),
+        bands,
+        widths,
+        reference,
+        rows,
+        scale=system.scale_vector(),
+        forced=system.period() is not None,
+    )
 
 
 @dataclass
@@ -170,9 +176,13 @@ class _Sharp:
     def of(self, orbit: Orbit) -> dict[str, Any]:
         """The compared parts of an orbit; multipliers of memory, which only a band has, are the least and left out."""
         return {
-            "section": orbit.u, "maximum": orbit.maximum, "minimum": orbit.minimum, "period": orbit.period,
-            "floquet_multipliers": orbit.floquet_multipliers[: len(self.system.states)], "stable": orbit.stable,
-        }  # fmt: skip
+            "section": orbit.u,
+            "maximum": orbit.maximum,
+            "minimum": orbit.minimum,
+            "period": orbit.period,
+            "floquet_multipliers": orbit.floquet_multipliers[: len(self.system.states)],
+            "stable": orbit.stable,
+        }
 
     def row(self, smooth: System, eta: float, near: Any) -> tuple[dict[str, Any], Any]:
         """The smoothed system's orbit near a state, exponents and attractors; with the state to look near next."""

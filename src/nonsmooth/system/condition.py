@@ -51,6 +51,4 @@ def read_condition(text: object, indicators: Sequence[str], label: str) -> tuple
 
 def condition_text(rows: Sequence[tuple[str, int, bool]]) -> str:
     """Return the condition as the user would write it; inverse of `read_condition`."""
-    return " and ".join(
-        f"{name} {'>' if sign > 0 else '<'}{'' if strict else '='} 0" for name, sign, strict in rows
-    )
+    return " and ".join(f"{name} {'>' if sign > 0 else '<'}{'' if strict else '='} 0" for name, sign, strict in rows)

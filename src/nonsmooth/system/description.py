@@ -135,7 +135,10 @@ def describe(
         raise SystemDefinitionError(f"{name!r}: a system needs at least one mode")
     remembered = {key: _memory(key, given) for key, given in _units(memory or {}, "memory", name, raw=True).items()}
     symbols = Symbols(
-        name, units, {k: v.unit for k, v in known.items()}, {k: unit for k, (_, unit) in remembered.items()},
+        name,
+        units,
+        {k: v.unit for k, v in known.items()},
+        {k: unit for k, (_, unit) in remembered.items()},
         tuple(input_states(driven)),
     )
     ranges: Sequence[tuple[sp.Expr, str]] = ()
@@ -150,9 +153,15 @@ def describe(
         from nonsmooth.system.derived.combinations import assembled
 
         given = {
-            "indicators": indicators, "transitions": transitions, "outputs": outputs, "memory": memory,
-            "symmetry": symmetry, "bands": bands, "period": period, "impacts": impacts,
-        }  # fmt: skip
+            "indicators": indicators,
+            "transitions": transitions,
+            "outputs": outputs,
+            "memory": memory,
+            "symmetry": symmetry,
+            "bands": bands,
+            "period": period,
+            "impacts": impacts,
+        }
         if relays is None:
             made = assembled(symbols, modes, elements, given, _scale(scale, units, name), now)
         else:
@@ -172,12 +181,18 @@ def describe(
     slid = [(item, sliding_mode(item, transitions)) for item in _surfaces(transitions)]
     check_names(
         {
-            "state": [key for key in units if key not in input_states(driven)], "input": input_states(driven),
-            "parameter": known, "memory": remembered, "mode": modes, "indicator": indicators,
-            "output": shown, "memory of a band": sorted(inside), "sliding mode": [mode for _, mode in slid],
+            "state": [key for key in units if key not in input_states(driven)],
+            "input": input_states(driven),
+            "parameter": known,
+            "memory": remembered,
+            "mode": modes,
+            "indicator": indicators,
+            "output": shown,
+            "memory of a band": sorted(inside),
+            "sliding mode": [mode for _, mode in slid],
         },
         name,
-    )  # fmt: skip
+    )
     kinds = {key: _mode(mode, key, units) for key, mode in modes.items()}
     traced = trace_system(name, symbols, kinds, indicators, transitions, shown)
     _check_phases(traced)
@@ -198,14 +213,23 @@ def describe(
         loads = loads_of(made["make"])
         units_out |= {f"{load.name}_force": "" for load in loads.elements}
     description = Description(
-        name=name, states=units, parameters=known, memory=remembered,
+        name=name,
+        states=units,
+        parameters=known,
+        memory=remembered,
         scale=_scale(scale, units, name),
-        outputs=units_out, traced=traced, surfaces=surfaces,
+        outputs=units_out,
+        traced=traced,
+        surfaces=surfaces,
         bands=tuple(trace_band(key, band, traced, symbols, shown, known) for key, band in bands.items()),
         symmetry=None if symmetry is None else trace_symmetry(symmetry, traced, symbols, values),
-        explicit_time=explicit, ranges=tuple(ranges), plain=plain, relays=relays is not None, loads=loads,
+        explicit_time=explicit,
+        ranges=tuple(ranges),
+        plain=plain,
+        relays=relays is not None,
+        loads=loads,
         inputs=driven,
-    )  # fmt: skip
+    )
     return description if loads is None else description.with_loads(loads)
 
 

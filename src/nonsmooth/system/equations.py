@@ -95,13 +95,24 @@ def trace_system(
                 'write ns.Transition("free", "contact", when="gap > 0")'
             )
     return Traced(
-        name=name, t=symbols.t, u=tuple(symbols.u.values()), p=tuple(symbols.p.values()),
-        m=tuple(symbols.m.values()), state_names=everything, parameter_names=tuple(symbols.p),
-        memory_names=tuple(symbols.m), mode_names=tuple(modes), indicator_names=tuple(indicators),
-        output_names=tuple(outputs), fields=tuple(fields), lacking=tuple(lacking),
-        indicators=tuple(surfaces_of), transitions=tuple(jumps),
-        outputs=tuple(_trace_output(k, f, symbols, time, owned) for k, (f, _) in outputs.items()), period=None,
-    )  # fmt: skip
+        name=name,
+        t=symbols.t,
+        u=tuple(symbols.u.values()),
+        p=tuple(symbols.p.values()),
+        m=tuple(symbols.m.values()),
+        state_names=everything,
+        parameter_names=tuple(symbols.p),
+        memory_names=tuple(symbols.m),
+        mode_names=tuple(modes),
+        indicator_names=tuple(indicators),
+        output_names=tuple(outputs),
+        fields=tuple(fields),
+        lacking=tuple(lacking),
+        indicators=tuple(surfaces_of),
+        transitions=tuple(jumps),
+        outputs=tuple(_trace_output(k, f, symbols, time, owned) for k, (f, _) in outputs.items()),
+        period=None,
+    )
 
 
 def _mode_index(name: str, label: str, modes: Mapping[str, Any]) -> int:

@@ -219,8 +219,16 @@ def in_words(what: Any) -> str:
         held = in_words(parts[-1])
         return {Mapping: "a mapping", Sequence: "a list"}[origin] + (f" of {held}" if held else "")
     known: dict[Any, str] = {
-        bool: "True, False", int: "a whole number", float: "a real number", str: "text", Mapping: "a mapping",
-        Callable: "a function", PathLike: "a path", tuple: "two numbers", NoneType: "None", Any: "",
-    }  # fmt: skip
+        bool: "True, False",
+        int: "a whole number",
+        float: "a real number",
+        str: "text",
+        Mapping: "a mapping",
+        Callable: "a function",
+        PathLike: "a path",
+        tuple: "two numbers",
+        NoneType: "None",
+        Any: "",
+    }
     kind = origin or what
     return known.get(kind, f"ns.{kind.__name__}(...)")

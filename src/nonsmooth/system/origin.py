@@ -49,9 +49,9 @@ def system_of(result: Any) -> System:
         raise ValueError(f"this result (of {record.get('verb')!r}) was not computed with a system, so it holds none")
     system = recorded_system(record)
     here = {name: result.coords[name] for name in system.values if name in result.coords}
-    return system.with_parameters({
-        name: float(array) for name, array in here.items() if array.ndim == 0 and np.isfinite(array)
-    })  # fmt: skip
+    return system.with_parameters(
+        {name: float(array) for name, array in here.items() if array.ndim == 0 and np.isfinite(array)}
+    )
 
 
 def recorded_system(record: dict[str, Any]) -> System:

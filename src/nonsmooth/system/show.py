@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 def _plain(traced: Traced) -> dict[sp.Symbol, str]:
     names = {traced.t: "t"}
     for symbols, known in (
-        (traced.u, traced.state_names), (traced.p, traced.parameter_names), (traced.m, traced.memory_names),
-    ):  # fmt: skip
+        (traced.u, traced.state_names),
+        (traced.p, traced.parameter_names),
+        (traced.m, traced.memory_names),
+    ):
         names |= dict(zip(symbols, known, strict=True))
     return names
 

@@ -99,10 +99,22 @@ class System:
         name: str = "system",
     ) -> None:
         description = describe(
-            name=name, states=states, parameters=parameters, modes=modes, indicators=indicators,
-            transitions=transitions, memory=memory, outputs=outputs, symmetry=symmetry, scale=scale,
-            period=period, bands=bands, elements=elements, impacts=impacts, inputs=inputs,
-        )  # fmt: skip
+            name=name,
+            states=states,
+            parameters=parameters,
+            modes=modes,
+            indicators=indicators,
+            transitions=transitions,
+            memory=memory,
+            outputs=outputs,
+            symmetry=symmetry,
+            scale=scale,
+            period=period,
+            bands=bands,
+            elements=elements,
+            impacts=impacts,
+            inputs=inputs,
+        )
         values = {key: parameter.value for key, parameter in description.parameters.items()}
         self._set(description, values, variant_of(description, SHARP))
         self._variant.domain.check(values)

@@ -155,10 +155,13 @@ def _content(d: Description) -> dict[str, Any]:
 def _element_content(element: Mapping[str, Any], text: Callable[[sp.Expr], str]) -> dict[str, Any]:
     """Return an element with its expressions as text."""
     return {
-        key: text(e) if isinstance(e, sp.Expr) else {k: text(v) if isinstance(v, sp.Expr) else v for k, v in e.items()}
-        if isinstance(e, Mapping) else e
+        key: text(e)
+        if isinstance(e, sp.Expr)
+        else {k: text(v) if isinstance(v, sp.Expr) else v for k, v in e.items()}
+        if isinstance(e, Mapping)
+        else e
         for key, e in element.items()
-    }  # fmt: skip
+    }
 
 
 def _loads_content(loads: Loads, d: Description, text: Callable[[sp.Expr], str]) -> dict[str, Any]:
@@ -168,15 +171,18 @@ def _loads_content(loads: Loads, d: Description, text: Callable[[sp.Expr], str])
     def element(load: Load) -> dict[str, Any]:
         known = {"where": load.where, "rate": load.rate}
         return {
-            "kind": load.kind, "given": load.text, **{key: text(e) for key, e in known.items() if e is not None},
+            "kind": load.kind,
+            "given": load.text,
+            **{key: text(e) for key, e in known.items() if e is not None},
             "on": {states[i]: text(e) for i, e in load.direction.items()},
-        }  # fmt: skip
+        }
 
     return {
         "elements": {load.name: element(load) for load in loads.elements},
         "modes": {mode: dict(zip(states, map(text, field), strict=True)) for mode, field in loads.fields.items()},
-        "powers": {key: text(power) for key, power in loads.powers.items()}, "energy": loads.energy,
-    }  # fmt: skip
+        "powers": {key: text(power) for key, power in loads.powers.items()},
+        "energy": loads.energy,
+    }
 
 
 def _surface_content(surface: TracedSurface, t: Traced, names: Mapping[sp.Symbol, str]) -> dict[str, Any]:
@@ -326,9 +332,11 @@ class _Reader:
             return lambda v, p: Scalar(expression.subs(SPEED, v.expression))
 
         return kind(
-            **entry["options"], **{key: law(text) for key, text in entry["laws"].items()},
-            **{kind.kinematics: law(entry[kind.kinematics])}, on={key: law(text) for key, text in entry["on"].items()},
-        )  # fmt: skip
+            **entry["options"],
+            **{key: law(text) for key, text in entry["laws"].items()},
+            **{kind.kinematics: law(entry[kind.kinematics])},
+            on={key: law(text) for key, text in entry["on"].items()},
+        )
 
     def within_ranges(self, system: System) -> System:
         """The system with what its parameters must fulfil beyond what its equations say."""
@@ -353,10 +361,16 @@ class _Reader:
             return None if text is None else self.expression(text)
 
         elements = tuple(
-            Load(str(name), self.kind(e["kind"]).__name__, str(e["given"]), read(e["where"]), read(e.get("rate")),
-                 {states.index(state): read(one) for state, one in e["on"].items()})
+            Load(
+                str(name),
+                self.kind(e["kind"]).__name__,
+                str(e["given"]),
+                read(e["where"]),
+                read(e.get("rate")),
+                {states.index(state): read(one) for state, one in e["on"].items()},
+            )
             for name, e in c["elements"].items()
-        )  # fmt: skip
+        )
         fields = {mode: tuple(read(e[state]) for state in states) for mode, e in c["modes"].items()}
         powers = {name: read(power) for name, power in c["powers"].items()}
         description = system._description.with_loads(Loads(elements, fields, powers, str(c["energy"])))
@@ -365,10 +379,13 @@ class _Reader:
     def transition(self, entry: Mapping[str, Any]) -> Transition | Surface:
         if "surface" in entry:
             return Surface(
-                entry["surface"], below=entry["below"], above=entry["above"], mode=entry.get("mode"),
+                entry["surface"],
+                below=entry["below"],
+                above=entry["above"],
+                mode=entry.get("mode"),
                 static=self.function(entry["static"]) if "static" in entry else None,
                 field=self.own(entry["field"]) if "field" in entry else None,
-            )  # fmt: skip
+            )
         return Transition(
             entry["source"],
             entry["target"],

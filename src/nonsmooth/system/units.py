@@ -16,13 +16,21 @@ if TYPE_CHECKING:
 Unit = dict[str, float]
 
 _DERIVED: dict[str, Unit] = {
-    "N": {"kg": 1, "m": 1, "s": -2}, "J": {"kg": 1, "m": 2, "s": -2}, "W": {"kg": 1, "m": 2, "s": -3},
-    "Pa": {"kg": 1, "m": -1, "s": -2}, "Hz": {"s": -1}, "rad": {}, "1": {},
-}  # fmt: skip
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "J": {"kg": 1, "m": 2, "s": -2},
+    "W": {"kg": 1, "m": 2, "s": -3},
+    "Pa": {"kg": 1, "m": -1, "s": -2},
+    "Hz": {"s": -1},
+    "rad": {},
+    "1": {},
+}
 _NAMED = {
-    "N": _DERIVED["N"], "J": _DERIVED["J"], "W": _DERIVED["W"], "N s": {"kg": 1, "m": 1, "s": -1},
+    "N": _DERIVED["N"],
+    "J": _DERIVED["J"],
+    "W": _DERIVED["W"],
+    "N s": {"kg": 1, "m": 1, "s": -1},
     "N m s": {"kg": 1, "m": 2, "s": -1},
-}  # fmt: skip
+}
 _RAISED = {"\N{SUPERSCRIPT TWO}": 2, "\N{SUPERSCRIPT THREE}": 3}
 _HIGH = "".join(_RAISED)
 _TOKEN = re.compile(

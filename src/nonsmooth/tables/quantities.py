@@ -113,9 +113,7 @@ def _parts(array: xr.DataArray) -> list[tuple[str, xr.DataArray]]:
 
 def coordinates_of(result: xr.Dataset, rows: tuple[str, ...]) -> dict[str, xr.DataArray]:
     """The coordinates over the rows: what is varied."""
-    return {
-        str(name): array for name, array in result.coords.items() if array.dims and set(array.dims) <= set(rows)
-    }  # fmt: skip
+    return {str(name): array for name, array in result.coords.items() if array.dims and set(array.dims) <= set(rows)}
 
 
 def quantity(result: xr.Dataset, name: str, known: Mapping[str, xr.DataArray] | None = None) -> xr.DataArray:
@@ -125,8 +123,10 @@ def quantity(result: xr.Dataset, name: str, known: Mapping[str, xr.DataArray] | 
         return known[name]
     if name in result.coords and result[name].dtype.kind in "iuf":
         return result[name]
-    hint = "" if any(one.endswith("_impulse") for one in known) or "status" not in result else (
-        "; loads of elements (forces, impact speeds, energies) are there with loads=True"
-    )  # fmt: skip
+    hint = (
+        ""
+        if any(one.endswith("_impulse") for one in known) or "status" not in result
+        else ("; loads of elements (forces, impact speeds, energies) are there with loads=True")
+    )
     every = [*known, *coordinates_of(result, rows_of(result))]
     raise ValueError(unknown(name, "a quantity", "this result", every) + hint)

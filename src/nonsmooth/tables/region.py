@@ -22,9 +22,13 @@ if TYPE_CHECKING:
 
 _LONGEST = 2000  # characters of a condition
 _COMPARE: dict[Any, Callable[[Any, Any], Any]] = {
-    sp.StrictLessThan: operator.lt, sp.LessThan: operator.le, sp.StrictGreaterThan: operator.gt,
-    sp.GreaterThan: operator.ge, sp.Eq: operator.eq, sp.Ne: operator.ne,
-}  # fmt: skip
+    sp.StrictLessThan: operator.lt,
+    sp.LessThan: operator.le,
+    sp.StrictGreaterThan: operator.gt,
+    sp.GreaterThan: operator.ge,
+    sp.Eq: operator.eq,
+    sp.Ne: operator.ne,
+}
 #: Loads that are asked for without their element: then of each of them.
 _OF_ELEMENTS = ("force", "friction_force", "impact_speed", "impacts", "impulse", "energy")
 _FORM = 'a condition such as "abs(q) < 2e-3 and impact_speed < 0.1"'

@@ -88,9 +88,13 @@ def test_letters_are_seven_points_and_lie_on_the_sheet(drawn: Mapping[str, Any],
 
 @pytest.mark.parametrize(
     ("name", "numbers"),
-    [("fig09", ("period 2 near", "jump rising", "jump falling")), ("fig09_rig", ("jump rising", "jump falling")),
-     ("fig11", ("period 4 from", "period 2 from", "period 1 from")), ("fig11_rig", ("period 1 from",))],
-)  # fmt: skip
+    [
+        ("fig09", ("period 2 near", "jump rising", "jump falling")),
+        ("fig09_rig", ("jump rising", "jump falling")),
+        ("fig11", ("period 4 from", "period 2 from", "period 1 from")),
+        ("fig11_rig", ("period 1 from",)),
+    ],
+)
 def test_printed_values_have_their_numbers(drawn: Mapping[str, Any], name: str, numbers: tuple[str, ...]) -> None:
     for ax in drawn[name].axes:
         at = {round(text.xy[0], 9): text.get_text() for text in ax.texts if isinstance(text, Annotation)}
@@ -123,26 +127,31 @@ def gaps() -> dict[str, xr.Dataset]:
     return {
         f"{g:g}": xr.Dataset(
             {
-                "theory_orbit": (("phase", "state"), circle), "measured_orbit": (("phase", "state"), 1.1 * circle),
+                "theory_orbit": (("phase", "state"), circle),
+                "measured_orbit": (("phase", "state"), 1.1 * circle),
                 "theory_section": (("theory_iterate", "state"), circle[:1]),
                 "measured_section": (("measured_iterate", "state"), 1.1 * circle[:1]),
-                "measured_period_number": number, "theory_period_number": 1, "g": g,
+                "measured_period_number": number,
+                "theory_period_number": 1,
+                "g": g,
             },
             {"phase": angle, "state": ["x", "v"], "state_unit": ("state", ["m", "m/s"])},
         )
         for g, number in FIGURE_14.items()
-    }  # fmt: skip
+    }
 
 
 def attractor() -> dict[str, xr.Dataset]:
     points = np.tile(np.array([[0.001, 0.02], [0.002, -0.03]]), (4, 1, 1))
-    return {"attractor": xr.Dataset(
-        {
-            "theory_section": (("section_phase", "theory_iterate", "state"), points),
-            "measured_section": (("section_phase", "measured_iterate", "state"), 1.1 * points),
-        },
-        {"state": ["x", "v"], "state_unit": ("state", ["m", "m/s"])},
-    )}  # fmt: skip
+    return {
+        "attractor": xr.Dataset(
+            {
+                "theory_section": (("section_phase", "theory_iterate", "state"), points),
+                "measured_section": (("section_phase", "measured_iterate", "state"), 1.1 * points),
+            },
+            {"state": ["x", "v"], "state_unit": ("state", ["m", "m/s"])},
+        )
+    }
 
 
 @pytest.mark.parametrize(("name", "data"), [("fig14_rig", gaps()), ("fig16", attractor())])

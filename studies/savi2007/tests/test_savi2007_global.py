@@ -90,8 +90,10 @@ def test_a_full_run_goes_on_from_its_store(tmp_path: Path) -> None:
     for one in rays:
         ratio = one["g"].values / one["rho"].values
         assert ratio == pytest.approx(ratio[0], rel=1e-6)
-    ratios = [(str(one["kind"].values), int(one["period_number"]), round(float(one["g"][0] / one["rho"][0]), 9))
-              for one in rays]  # fmt: skip
+    ratios = [
+        (str(one["kind"].values), int(one["period_number"]), round(float(one["g"][0] / one["rho"][0]), 9))
+        for one in rays
+    ]
     assert len(set(ratios)) == len(ratios)  # each curve once
     assert figure.compute(settings)["chart"].identical(data["chart"])
     assert {file: file.read_bytes() for file in marks} == marks

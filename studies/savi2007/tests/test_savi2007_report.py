@@ -26,9 +26,34 @@ from nonsmooth_savi2007.study import figures_of_the_study
 NUMBERS = {2, *range(4, 19)}
 MEASURED = {*range(4, 15), 16, 17, 18}
 CLAIM_IDS = {
-    "M1", "M2", "M3", "M4", "R1", "R2", "P1", "P2", "P3", "P4", "P5", "P6", "P7", "P8", "F9a", "F9b", "F9c", "F10",
-    "F11", "F12", "F13", "F14", "F15", "F16", "F17", "F18", "C1",
-}  # fmt: skip
+    "M1",
+    "M2",
+    "M3",
+    "M4",
+    "R1",
+    "R2",
+    "P1",
+    "P2",
+    "P3",
+    "P4",
+    "P5",
+    "P6",
+    "P7",
+    "P8",
+    "F9a",
+    "F9b",
+    "F9c",
+    "F10",
+    "F11",
+    "F12",
+    "F13",
+    "F14",
+    "F15",
+    "F16",
+    "F17",
+    "F18",
+    "C1",
+}
 
 
 def test_the_study_has_all_figures_and_claims() -> None:
@@ -145,8 +170,11 @@ def test_what_a_figure_needs_is_all_that_is_measured(quick: Reproduction, tmp_pa
     session = load_session(tmp_path / "rig" / "identification")
     assert set(session.procedures) == {"springs", "support", "impulse", "response", "drop", "contact"}
     assert {path.name for path in (tmp_path / "rig").iterdir()} == {
-        "fig11_300_s", "identification", "log.txt", "truth.toml",
-    }  # fmt: skip
+        "fig11_300_s",
+        "identification",
+        "log.txt",
+        "truth.toml",
+    }
     (key,) = alone.data["fig11_rig"]
     mine, beside = (one.data["fig11_rig"][key] for one in (alone, quick))
     for name in mine.data_vars:

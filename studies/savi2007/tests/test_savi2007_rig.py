@@ -84,10 +84,11 @@ def test_the_sections_of_figure_16_agree_below_twice_the_halves() -> None:
     far = xr.Dataset(
         {
             "energy_distance_matched": ("section_phase", [0.1, 0.1]),
-            "measured_halves_p95": ("section_phase", [0.1, 0.06]), "measured_period_number": 0,
+            "measured_halves_p95": ("section_phase", [0.1, 0.06]),
+            "measured_period_number": 0,
             "measured_section": (("section_phase", "measured_iterate"), np.zeros((2, 7))),
         }
-    )  # fmt: skip
+    )
     (row,) = claims_rig.f16({"fig16": {"attractor": far}})
     assert (row.rig, row.rig_verdict) == ("no period, 7 turns", "agrees")
     worse = far.assign(measured_halves_p95=("section_phase", [0.1, 0.04]))
@@ -106,9 +107,15 @@ def test_a_cell_beside_a_printed_number() -> None:
 def test_a_finding_is_kept_with_its_numbers(tmp_path) -> None:
     picture = xr.Dataset({"x": ("time", [1.0, 2.0])}, {"time": [0.0, 0.1]}, {"synthetic": "yes"})
     finding = Finding(
-        "slope", Estimate(16.94, 0.04, "N/m"), "by hand", 200, ("Run #1", "Run #2"), ("a note",),
-        {"slope_a": Estimate(16.94, 0.01, "N/m")}, data=picture,
-    )  # fmt: skip
+        "slope",
+        Estimate(16.94, 0.04, "N/m"),
+        "by hand",
+        200,
+        ("Run #1", "Run #2"),
+        ("a note",),
+        {"slope_a": Estimate(16.94, 0.01, "N/m")},
+        data=picture,
+    )
     back = ns.load(ns.save(kept(finding), tmp_path / "finding.nc"))
     found = found_in(back)
     assert back["x"].identical(picture["x"])

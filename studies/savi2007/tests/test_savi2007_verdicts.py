@@ -49,7 +49,7 @@ def _known(value: float, expanded: float) -> Interval:
         ("0.1", 0.14, 0.005, "agrees"),  # within half a unit of the last digit, 0.05: coarser than 2 %
         ("0.1", 0.16, 0.005, "differs"),
     ],
-)  # fmt: skip
+)
 def test_the_rule(printed: str, value: float, expanded: float, verdict: str) -> None:
     row = against_printed("F1", "a number", Printed(printed, "N", "here"), _known(value, expanded), None)
     assert row.verdict == verdict
@@ -101,8 +101,19 @@ def test_plus_minus_is_the_standard_uncertainty() -> None:
 
 def _row(claim: str, verdict: Verdict, rig: Verdict, cause: Cause | None = None) -> Row:
     beside = Beside(1.0, 0.005, 1.01, 0.001) if verdict is Verdict.AGREES else None
-    row = Row(claim, "here", f"{claim} says", "exact", "smoothed", "off", verdict, "Reason.", cause=cause,
-              exact_beside=beside, smoothed_beside=beside)  # fmt: skip
+    row = Row(
+        claim,
+        "here",
+        f"{claim} says",
+        "exact",
+        "smoothed",
+        "off",
+        verdict,
+        "Reason.",
+        cause=cause,
+        exact_beside=beside,
+        smoothed_beside=beside,
+    )
     return row.measured(Cell("rig", rig))
 
 
@@ -135,9 +146,11 @@ def test_the_page_says_it_in_three_lines_whose_totals_add_up(tmp_path: Path) -> 
         assert sentence in text
     causes = re.findall(r"^\| (\w+) \| \w+ says \| \w+ \| \w* \| ([a-z ]+) \| ([^|]+) \| Reason. \|$", text, re.M)
     assert causes == [
-        ("F14", "model", "misprint"), ("F9b", "model", "Table 1 inconsistent with itself"),
-        ("F11", "model and rig", "real"), ("F12", "rig", "the virtual rig"),
-    ]  # fmt: skip
+        ("F14", "model", "misprint"),
+        ("F9b", "model", "Table 1 inconsistent with itself"),
+        ("F11", "model and rig", "real"),
+        ("F12", "rig", "the virtual rig"),
+    ]
 
 
 def test_the_page_is_whole_by_itself(tmp_path: Path) -> None:

@@ -26,9 +26,15 @@ def test_a_band_follows_the_draws_whichever_of_three_periods_they_begin_with() -
     )
     for transient in (300, 301, 302):
         found = ns.compare(
-            record, MODEL, settings={**run, "k": (8.47, 1e-7)}, noise={"x": 1e-6, "v": 1e-6}, draws=4, grid=32,
-            splits=20, transient=transient,
-        )  # fmt: skip
+            record,
+            MODEL,
+            settings={**run, "k": (8.47, 1e-7)},
+            noise={"x": 1e-6, "v": 1e-6},
+            draws=4,
+            grid=32,
+            splits=20,
+            transient=transient,
+        )
         assert int(found["theory_period_number"]) == 3 and float(found["band_share"]) == 1.0
         size = np.ptp(found["theory_orbit"].values, axis=0)
         for word in ("low", "median", "high"):

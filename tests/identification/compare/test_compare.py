@@ -26,12 +26,13 @@ def record(system: ns.System, seconds: float = 120.0, seed: int = 0) -> xr.Datas
     omega = system.values["omega"]
     return xr.Dataset(
         {
-            "u": (("time", "state"), u), "u_error": (("time", "state"), np.tile(NOISE, (len(time), 1))),
+            "u": (("time", "state"), u),
+            "u_error": (("time", "state"), np.tile(NOISE, (len(time), 1))),
             "phase": ("time", time * omega / (2 * np.pi)),
         },
         {"time": time, "state": ["x", "v"], "state_unit": ("state", ["m", "m/s"])},
         {"synthetic": "yes", "title": "a test"},
-    )  # fmt: skip
+    )
 
 
 class Known(dict):

@@ -24,9 +24,13 @@ def logistic(first: float, last: float, n: int, seed: int = 1) -> tuple[np.ndarr
     return r, points + NOISE * rng.standard_normal(points.shape)
 
 
-@pytest.mark.parametrize(("first", "last", "word", "flip"), [
-    (3.3, 2.8, "1-2", 3.0), (3.53, 3.3, "2-4", 1 + np.sqrt(6)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("first", "last", "word", "flip"),
+    [
+        (3.3, 2.8, "1-2", 3.0),
+        (3.53, 3.3, "2-4", 1 + np.sqrt(6)),
+    ],
+)
 def test_the_delay_is_taken_out(first: float, last: float, word: str, flip: float) -> None:
     late = []
     for n in (300, 1000, 3000):

@@ -51,8 +51,9 @@ def test_a_motion_is_what_was_put_in() -> None:
     inner = slice(20, -20)
     assert 0.5 < np.sqrt(np.mean(error[inner, 0] ** 2)) < 1.6
     assert 0.5 < np.sqrt(np.mean(error[inner, 1] ** 2)) < 1.6
-    np.testing.assert_allclose(found["phase"].values - found["phase"].values[0], (t - t[0]) * OMEGA / (2 * np.pi),
-                               atol=1e-9)  # fmt: skip
+    np.testing.assert_allclose(
+        found["phase"].values - found["phase"].values[0], (t - t[0]) * OMEGA / (2 * np.pi), atol=1e-9
+    )
     assert float(found["phase"].values[0]) % 1 == pytest.approx(t[0] * OMEGA / (2 * np.pi) % 1, abs=1e-9)
     assert float(found["omega"]) == pytest.approx(OMEGA, rel=1e-9)
     assert found.attrs["synthetic"] == "yes" and found.attrs["run"] == "Run #1"
@@ -202,9 +203,11 @@ def test_a_sampled_position_of_another_rig_is_compared() -> None:
     measured = motion_of(t, xr.DataArray(q, attrs={"units": "m"}), w * t / (2 * np.pi), states=("q", "r"))
     assert measured["state_unit"].values.tolist() == ["m", "m/s"]
     system = ns.System(
-        name="forced oscillator", states={"q": "m", "r": "m/s"}, parameters={"c": 1.5},
+        name="forced oscillator",
+        states={"q": "m", "r": "m/s"},
+        parameters={"c": 1.5},
         modes={"free": lambda t, u, p: (u.r, (F * np.cos(w * t) - k * u.q - p.c * u.r) / m)},
-    )  # fmt: skip
+    )
     found = ns.compare(measured, system)
     assert int(found["period_agrees"]) == 1 and float(found["orbit_distance"]) < 2e-3
     other = ns.compare(measured, system, settings={"c": 4.5})
@@ -228,10 +231,18 @@ def test_a_recording_is_compared_in_the_states_that_it_shows() -> None:
 
     q = np.real(amplitudes(k)[1] * np.exp(1j * w * (t + 0.3))) + noise * np.random.default_rng(0).normal(size=len(t))
     system = ns.System(
-        name="two masses", states=["a", "b", "v_a", "v_b"], parameters={"k": k},
-        modes={"free": lambda t, u, p: (
-            u.v_a, u.v_b, F * np.cos(w * t) - p.k * (2 * u.a - u.b) - c * u.v_a, p.k * (u.a - u.b) - c * u.v_b)},
-    )  # fmt: skip
+        name="two masses",
+        states=["a", "b", "v_a", "v_b"],
+        parameters={"k": k},
+        modes={
+            "free": lambda t, u, p: (
+                u.v_a,
+                u.v_b,
+                F * np.cos(w * t) - p.k * (2 * u.a - u.b) - c * u.v_a,
+                p.k * (u.a - u.b) - c * u.v_b,
+            )
+        },
+    )
     record = {"sensor": (t, 100.0 * q + 7.0)}
     channels = {"b": ns.Sensor("sensor", gain=100.0, offset=7.0, delay=-0.3)}
     found = ns.compare(record, system, channels=channels)

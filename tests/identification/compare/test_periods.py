@@ -138,8 +138,9 @@ def test_a_parameter_known_to_a_factor_stays_positive() -> None:
 def test_settings_are_checked() -> None:
     model = ns.models.discontinuous_support()
     assert read_settings({"g": 0.001, "rho": {"value": 0.3, "uncertainty": 0.01}}, model) == {
-        "g": (0.001, 0.0), "rho": (0.3, 0.01),
-    }  # fmt: skip
+        "g": (0.001, 0.0),
+        "rho": (0.3, 0.01),
+    }
     with pytest.raises(ValueError, match="`gap` is not a parameter.*nearest: g"):
         read_settings({"gap": 0.0}, model)
     with pytest.raises(ValueError, match="zero or more"):

@@ -111,9 +111,13 @@ def test_order_of_interpolation(with_a: bool, order_x: int, order_v: int) -> Non
         passing = poincare(motion.t, motion.x, motion.v, level=0.3, a=a).time.values
         k = np.round((5 * passing - 1 + np.arccos(0.3)) / TURN)
         true = (1 - np.arccos(0.3) + TURN * k) / 5
-        errors.append([
-            np.abs(x - np.cos(5 * t - 1)).max(), np.abs(v + 5 * np.sin(5 * t - 1)).max(), np.abs(passing - true).max(),
-        ])  # fmt: skip
+        errors.append(
+            [
+                np.abs(x - np.cos(5 * t - 1)).max(),
+                np.abs(v + 5 * np.sin(5 * t - 1)).max(),
+                np.abs(passing - true).max(),
+            ]
+        )
     orders = np.log2(np.array(errors)[:-1] / np.array(errors)[1:])
     assert (orders[:, 0] > order_x - 0.6).all() and (orders[:, 1] > order_v - 0.6).all()
     assert (orders[:, 2] > order_x - 0.6).all()

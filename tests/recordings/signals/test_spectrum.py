@@ -19,8 +19,14 @@ def tones(noise: float, n: int = 40, seed: int = 1) -> list[tuple[float, np.ndar
     found = []
     for _ in range(n):
         f, phase = 1.5 + rng.uniform(-0.05, 0.05), rng.uniform(0, 2 * np.pi)
-        found.append((f, 0.3 * np.cos(2 * np.pi * f * t + phase) + rng.normal(0, noise, N) if noise else
-                      0.3 * np.cos(2 * np.pi * f * t + phase)))  # fmt: skip
+        found.append(
+            (
+                f,
+                0.3 * np.cos(2 * np.pi * f * t + phase) + rng.normal(0, noise, N)
+                if noise
+                else 0.3 * np.cos(2 * np.pi * f * t + phase),
+            )
+        )
     return found
 
 

@@ -60,8 +60,12 @@ def _at_the_start(policy: Policy, first: Any, back: March, ahead: March) -> list
     if not all(march.rows and march.rows[0].point.curve is first.curve for march in both):
         return []
     before, after = back.rows[0].point.turned(), ahead.rows[0].point  # the march back has its tangents the other way
-    seen = {row.kind for march in both for row in march.special
-            if row.point.curve is first.curve and np.abs(row.point.Y - first.Y).max() < BESIDE}  # fmt: skip
+    seen = {
+        row.kind
+        for march in both
+        for row in march.special
+        if row.point.curve is first.curve and np.abs(row.point.Y - first.Y).max() < BESIDE
+    }
     step, found = Step(before, after, ([], []), ([], [])), []
     for kind in policy.kinds:
         here, was, now = (kind.number(point) for point in (first, before, after))
@@ -72,9 +76,17 @@ def _at_the_start(policy: Policy, first: Any, back: March, ahead: March) -> list
 
 
 def dataset(
-    system: System, verb: str, parameters: dict[str, list[float]], tables: Any, record: BranchRecord, policy: Policy,
-    options: dict[str, Any], more: dict[str, Any], attrs: dict[str, str], method: str = "multiple shooting",
-) -> xr.Dataset:  # fmt: skip
+    system: System,
+    verb: str,
+    parameters: dict[str, list[float]],
+    tables: Any,
+    record: BranchRecord,
+    policy: Policy,
+    options: dict[str, Any],
+    more: dict[str, Any],
+    attrs: dict[str, str],
+    method: str = "multiple shooting",
+) -> xr.Dataset:
     """A branch or a curve as a Dataset.
 
     Raises
@@ -142,9 +154,14 @@ class Following:
         return curve.near(X / curve.scale, border / np.linalg.norm(border))
 
     def result(
-        self, period_number: int, back: Start, middle: Sequence[PointRecord], ahead: Start,
-        closed: Place | None = None, origin: str | None = None,
-    ) -> xr.Dataset:  # fmt: skip
+        self,
+        period_number: int,
+        back: Start,
+        middle: Sequence[PointRecord],
+        ahead: Start,
+        closed: Place | None = None,
+        origin: str | None = None,
+    ) -> xr.Dataset:
         """The branch of a march back, the points in the middle, and a march ahead; ``closed``: where it would close.
 
         ``origin`` is the kind of the special point that it leaves.
@@ -181,16 +198,23 @@ def orbits_dataset(
     for point in points:
         point.layout, point.cycle = layouts[point.signature], numbers[point.signature]
     options = {
-        "parameter": branch.name, "range": branch.range, "step": asked.step, "points": asked.points,
-        "virtual": asked.virtual, **origin,
-    }  # fmt: skip
+        "parameter": branch.name,
+        "range": branch.range,
+        "step": asked.step,
+        "points": asked.points,
+        "virtual": asked.virtual,
+        **origin,
+    }
     texts = [one.text(system.traced) for one in cycles.values()]
     more = {
-        "signature": ("point", np.array([point.cycle for point in points], np.int32),
-                      {"long_name": "signature", **flag_attributes(texts, dtype=np.int32)}),
+        "signature": (
+            "point",
+            np.array([point.cycle for point in points], np.int32),
+            {"long_name": "signature", **flag_attributes(texts, dtype=np.int32)},
+        ),
         "period_number": ((), np.int64(period_number), {"long_name": f"{labels_of(system).turn}s (0: autonomous)"}),
         "status": ("point", np.zeros(len(points), np.int8), status_attributes()),
-    }  # fmt: skip
+    }
     attrs = {"parameter": branch.name, **layout_attributes(layouts, system)}
     values = {branch.name: [point.value for point in points]}
     tables = ORBIT, SPECIAL_ORBIT

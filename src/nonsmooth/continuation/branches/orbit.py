@@ -105,9 +105,13 @@ class Orbit:
 
         state = self._begin()
         return simulate(
-            self.system, duration=self.period, start=self._start(state), mode=self.system.modes[state.counters[0]],
-            samples=samples or 1025, rtol=RTOL,
-        )  # fmt: skip
+            self.system,
+            duration=self.period,
+            start=self._start(state),
+            mode=self.system.modes[state.counters[0]],
+            samples=samples or 1025,
+            rtol=RTOL,
+        )
 
     def with_loads(self) -> Orbit:
         """The same orbit with its ``loads``.
@@ -170,8 +174,10 @@ class Orbit:
         if (short := cut(signature)) != signature:
             short += f" ({crossings} transitions)"
         return f"Orbit of {self.system.name!r}: {name}, {words}, period {self.period:.9g}", [
-            ("section", f"{cut(state)} (mode {self.mode!r})"), ("multipliers", cut(numbers)), ("signature", short),
-        ]  # fmt: skip
+            ("section", f"{cut(state)} (mode {self.mode!r})"),
+            ("multipliers", cut(numbers)),
+            ("signature", short),
+        ]
 
     def to_dataset(self) -> xr.Dataset:
         """The orbit as a Dataset that can be saved; ``from_dataset`` reads it back."""
@@ -192,9 +198,12 @@ class Orbit:
                 variables[name] = ((), self.loads[name], {"long_name": words, "units": unit})
         names = np.array([*self.system.states, *self.system.memory], dtype=str)
         coords = {
-            **state_coords(labels), **parameter_coords(labels), "component": ("component", names),
-            "column": ("column", names), "indicator": ("indicator", np.array(list(self.clearance), dtype=str)),
-        }  # fmt: skip
+            **state_coords(labels),
+            **parameter_coords(labels),
+            "component": ("component", names),
+            "column": ("column", names),
+            "indicator": ("indicator", np.array(list(self.clearance), dtype=str)),
+        }
         return with_short_record(xr.Dataset(variables, coords, attrs))
 
     @classmethod
@@ -230,9 +239,20 @@ def orbit_of(point: OrbitPoint, virtual: bool) -> Orbit:
     u, memory = np.split(once.states[0], [len(system.states)])
     clearance = point.curve.walk.clearance(path, len(system.indicators))
     return Orbit(
-        system=system, u=u, mode=system.modes[shooting.at_section], memory=memory, period=once.period,
-        period_number=shooting.period_number, signature=shooting.signature, crossing_times=once.times,
-        crossing_states=once.states[1:], monodromy_matrix=point.M, floquet_multipliers=mu,
-        stable=stable_by(mu, shooting.forced), maximum=path.maximum.copy(), minimum=path.minimum.copy(),
-        clearance=dict(zip(system.indicators, map(float, clearance), strict=True)), virtual=virtual,
-    )  # fmt: skip
+        system=system,
+        u=u,
+        mode=system.modes[shooting.at_section],
+        memory=memory,
+        period=once.period,
+        period_number=shooting.period_number,
+        signature=shooting.signature,
+        crossing_times=once.times,
+        crossing_states=once.states[1:],
+        monodromy_matrix=point.M,
+        floquet_multipliers=mu,
+        stable=stable_by(mu, shooting.forced),
+        maximum=path.maximum.copy(),
+        minimum=path.minimum.copy(),
+        clearance=dict(zip(system.indicators, map(float, clearance), strict=True)),
+        virtual=virtual,
+    )

@@ -79,8 +79,9 @@ def fields_of(dataset: xr.Dataset, table: Sequence[Column], dim: str = "") -> It
         variable = dataset[column.name if column.name in dataset else STEMS[column.name]]
         every.append(typed(column, variable.values if dim in variable.dims else variable.values[None]))
     for values in zip(*every, strict=True):
-        yield {column.field: value if column.dims else value.item()
-               for column, value in zip(table, values, strict=True)}  # fmt: skip
+        yield {
+            column.field: value if column.dims else value.item() for column, value in zip(table, values, strict=True)
+        }
 
 
 def read_branch(dataset: xr.Dataset) -> tuple[System, BranchRecord]:

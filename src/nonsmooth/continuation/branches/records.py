@@ -76,9 +76,14 @@ def record_of(row: Row) -> Any:
     point = row.point
     if isinstance(point, Rest):
         record: Any = RestRecord(
-            point.value, point.u, point.lower, point.upper, point.eigenvalues, point.curve.stable(point),
+            point.value,
+            point.u,
+            point.lower,
+            point.upper,
+            point.eigenvalues,
+            point.curve.stable(point),
             point.curve.mode,
-        )  # fmt: skip
+        )
     else:
         record = _of_orbit(row)
     if row.mark:
@@ -91,8 +96,19 @@ def _of_orbit(row: Row) -> PointRecord:
     shooting, path = curve.shooting, point.path
     crossings, contacts = shooting.signature.rates(shooting.system.traced.transitions, shooting.period_number)
     return PointRecord(
-        point.value, shooting.signature, point.X, point.tangent * curve.scale, shooting.at_section,
-        point.X[: len(path.maximum)], path.maximum, path.minimum, point.period, point.multipliers,
-        stable_by(point.multipliers, shooting.forced), curve.walk.clearance(path, len(shooting.system.indicators)),
-        crossings, contacts, row.virtual,
-    )  # fmt: skip
+        point.value,
+        shooting.signature,
+        point.X,
+        point.tangent * curve.scale,
+        shooting.at_section,
+        point.X[: len(path.maximum)],
+        path.maximum,
+        path.minimum,
+        point.period,
+        point.multipliers,
+        stable_by(point.multipliers, shooting.forced),
+        curve.walk.clearance(path, len(shooting.system.indicators)),
+        crossings,
+        contacts,
+        row.virtual,
+    )

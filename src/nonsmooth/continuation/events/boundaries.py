@@ -79,8 +79,11 @@ class Crossed(Boundary):
         visit, shooting = self.visit(point), point.shooting
         k, z, fires = self.crossing(point, visit)
         t = float(point.solved.times[min(visit + 1, shooting.m)])
-        near = [(abs(shooting.flow.jump(point.values, k, t, z, r).h), row.indicator)
-                for r, row in enumerate(shooting.system.traced.transitions[k].rows) if r != fires]  # fmt: skip
+        near = [
+            (abs(shooting.flow.jump(point.values, k, t, z, r).h), row.indicator)
+            for r, row in enumerate(shooting.system.traced.transitions[k].rows)
+            if r != fires
+        ]
         return min(near)[1] if near else -1
 
 

@@ -81,9 +81,10 @@ def _answers(traced: Traced, k: int) -> list[int]:
     if jump.kind != ASKED:
         return [k]
     return [
-        j for j, other in enumerate(traced.transitions)
+        j
+        for j, other in enumerate(traced.transitions)
         if other.kind == FOUND and other.source == jump.source and other.rows == jump.rows
-    ]  # fmt: skip
+    ]
 
 
 def without(point: OrbitPoint, place: int, count: int) -> list[Change]:
@@ -124,8 +125,9 @@ def by_others(point: OrbitPoint, place: int, indicator: int) -> list[Change]:
     fired = own.rows[visit.row]
     found = []
     for k, other in enumerate(jumps):
-        turned = any(a.indicator == b.indicator == indicator and a.sign * b.sign < 0.0
-                     for a in own.rows for b in other.rows)  # fmt: skip
+        turned = any(
+            a.indicator == b.indicator == indicator and a.sign * b.sign < 0.0 for a in own.rows for b in other.rows
+        )
         if turned and (other.source, other.target) == (own.source, own.target) and fired in other.rows:
             new = replace(visit, transition=k, row=other.rows.index(fired))
             signature = Signature((*visits[:place], new, *visits[place + 1 :]))

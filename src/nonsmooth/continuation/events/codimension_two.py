@@ -189,20 +189,43 @@ def _with_contact(place: OrbitPoint, sign: float) -> float:
 #: The kinds that have curves, each with the point at which its curve meets a graze, the points of codimension two that
 #: it is searched for, and those of forced orbits besides.
 KINDS: dict[str, tuple[str, tuple[Event, ...], tuple[Event, ...]]] = {
-    "fold": ("grazing_fold", (
-        CodimensionTwo("fold_flip", _polynomial, -1.0, 0), CodimensionTwo("resonance_1_1", _polynomial, 1.0, 1),
-        CodimensionTwo("fold_neimark_sacker", _others, 1.0), Cusp(),
-    ), ()),
-    "flip": ("grazing_flip", (
-        CodimensionTwo("fold_flip", _polynomial, 1.0, 0), CodimensionTwo("resonance_1_2", _polynomial, -1.0, 1),
-        CodimensionTwo("flip_neimark_sacker", _others, -1.0),
-    ), (Coefficient("generalised_flip", _coefficient),)),
-    "neimark_sacker": ("grazing_neimark_sacker", (
-        OfPair("resonance_1_1", _sum_and, -2.0), OfPair("resonance_1_2", _sum_and, 2.0),
-        OfPair("resonance_1_3", _sum_and, 1.0), OfPair("resonance_1_4", _sum_and, 0.0),
-        OfPair("fold_neimark_sacker", _rest, -1.0), OfPair("flip_neimark_sacker", _rest, 1.0),
-    ), (Coefficient("chenciner", _coefficient),)),
-    "grazing": ("double_grazing", (
-        CodimensionTwo("grazing_fold", _polynomial, 1.0, 0), CodimensionTwo("grazing_flip", _polynomial, -1.0, 0),
-    ), (CodimensionTwo("grazing_fold", _with_contact, -1.0), CodimensionTwo("grazing_flip", _with_contact, 1.0))),
-}  # fmt: skip
+    "fold": (
+        "grazing_fold",
+        (
+            CodimensionTwo("fold_flip", _polynomial, -1.0, 0),
+            CodimensionTwo("resonance_1_1", _polynomial, 1.0, 1),
+            CodimensionTwo("fold_neimark_sacker", _others, 1.0),
+            Cusp(),
+        ),
+        (),
+    ),
+    "flip": (
+        "grazing_flip",
+        (
+            CodimensionTwo("fold_flip", _polynomial, 1.0, 0),
+            CodimensionTwo("resonance_1_2", _polynomial, -1.0, 1),
+            CodimensionTwo("flip_neimark_sacker", _others, -1.0),
+        ),
+        (Coefficient("generalised_flip", _coefficient),),
+    ),
+    "neimark_sacker": (
+        "grazing_neimark_sacker",
+        (
+            OfPair("resonance_1_1", _sum_and, -2.0),
+            OfPair("resonance_1_2", _sum_and, 2.0),
+            OfPair("resonance_1_3", _sum_and, 1.0),
+            OfPair("resonance_1_4", _sum_and, 0.0),
+            OfPair("fold_neimark_sacker", _rest, -1.0),
+            OfPair("flip_neimark_sacker", _rest, 1.0),
+        ),
+        (Coefficient("chenciner", _coefficient),),
+    ),
+    "grazing": (
+        "double_grazing",
+        (
+            CodimensionTwo("grazing_fold", _polynomial, 1.0, 0),
+            CodimensionTwo("grazing_flip", _polynomial, -1.0, 0),
+        ),
+        (CodimensionTwo("grazing_fold", _with_contact, -1.0), CodimensionTwo("grazing_flip", _with_contact, 1.0)),
+    ),
+}

@@ -43,9 +43,12 @@ def graze(first: OrbitPoint, change: Change) -> dict[str, Any]:
     if not point.shooting.forced:  # its own multiplier 1 makes det(I - M) vanish: the parameter's turn tells the side
         same = point.rise * (first.value - point.value) > 0.0
     return {
-        "grazing": "persistence" if same else "non_smooth_fold", "bounded": bounded, "determinants": determinants,
-        "contact": multipliers_of(M_plus), "doubled": bool(determinants[2] * determinants[3] < 0.0),
-    }  # fmt: skip
+        "grazing": "persistence" if same else "non_smooth_fold",
+        "bounded": bounded,
+        "determinants": determinants,
+        "contact": multipliers_of(M_plus),
+        "doubled": bool(determinants[2] * determinants[3] < 0.0),
+    }
 
 
 def both_sides(change: Change) -> list[FloatArray]:

@@ -39,9 +39,7 @@ SAME = 1e-9  # in scaled unknowns: two solutions as near as this are one
 AGAIN = 3  # times that Newton's method is begun with one signature
 
 
-def beside(
-    point: OrbitPoint, contacts: Sequence[Change] = (), passed: Sequence[OrbitPoint] = ()
-) -> OrbitPoint | None:
+def beside(point: OrbitPoint, contacts: Sequence[Change] = (), passed: Sequence[OrbitPoint] = ()) -> OrbitPoint | None:
     """The orbit with which a branch goes on at ``point``, where its signature ends, on a curve of its own.
 
     ``contacts`` are those that may begin or end there, ``passed`` the points of the branch so far. Its tangent leads

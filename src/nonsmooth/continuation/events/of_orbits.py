@@ -174,8 +174,9 @@ class AlongOrbits(Policy):
         warnings.warn(
             f"a simulation of the orbit at {shooting.active[-1]} = {met.point.value!r} takes other transitions than "
             "the branch: its points from here on are not confirmed",
-            RuntimeWarning, stacklevel=2,
-        )  # fmt: skip
+            RuntimeWarning,
+            stacklevel=2,
+        )
         self._unwatched = shooting
         return None
 
@@ -279,10 +280,12 @@ def _completes(met: list[Met], beyond: OrbitPoint) -> bool:
         return True
     passed = [one.kind for one in met if is_tolerance(point, one.kind.surface(point, beyond))]
     return any(
-        not isinstance(kind, Crossed) or beyond.shooting.m == point.shooting.m
+        not isinstance(kind, Crossed)
+        or beyond.shooting.m == point.shooting.m
         or rest_after(side, kind.visit(point)) is not None
-        for kind in passed for side in (point, beyond)
-    )  # fmt: skip
+        for kind in passed
+        for side in (point, beyond)
+    )
 
 
 def _but_completed(*sides: OrbitPoint) -> bool:
@@ -293,12 +296,14 @@ def _but_completed(*sides: OrbitPoint) -> bool:
     for side in sides:
         visits, times = side.signature.visits, side.solved.times[1:]
         slow = {v.transition: completes(side, v) for v in visits[:-1]}
-        words.append([
-            "slow" if slow[v.transition] else (v.transition, v.row)
-            for before, v, after, t in zip((visits[-1], *visits), visits[:-1], visits[1:], times, strict=False)
-            if not (v.row == AT_ONCE and slow.get(before.transition))
-            and (v.mode != after.mode or slow[v.transition] or not any(0.0 <= rest - t < soon for rest in rests))
-        ])  # fmt: skip
+        words.append(
+            [
+                "slow" if slow[v.transition] else (v.transition, v.row)
+                for before, v, after, t in zip((visits[-1], *visits), visits[:-1], visits[1:], times, strict=False)
+                if not (v.row == AT_ONCE and slow.get(before.transition))
+                and (v.mode != after.mode or slow[v.transition] or not any(0.0 <= rest - t < soon for rest in rests))
+            ]
+        )
     return bool(rests) and words[0] == words[1]
 
 

@@ -59,8 +59,10 @@ def _round(point: OrbitPoint) -> list[_Stay]:
     if len(visits) == 1:
         return [_Stay(visits[0].mode, float(lengths[0]))]
     lengths[0] += lengths[-1]
-    return [_Stay(v.mode, float(length), v.transition, v.row, float(t), z)
-            for v, length, t, z in zip(visits[:-1], lengths, times[1:], before, strict=False)]  # fmt: skip
+    return [
+        _Stay(v.mode, float(length), v.transition, v.row, float(t), z)
+        for v, length, t, z in zip(visits[:-1], lengths, times[1:], before, strict=False)
+    ]
 
 
 def _without(stays: list[_Stay], i: int) -> list[_Stay]:

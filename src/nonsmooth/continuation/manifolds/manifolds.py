@@ -131,10 +131,16 @@ def manifolds(
                     q = once.forward(q[None, :])[0]
                     q = u + (q - u) * (delta / np.linalg.norm(q - u))
                 arcs.append((one, side, j, mu, Arc(step, view, length, distance, angle, points).grow(u, q)))
-    options = {"length": length, "kind": kind, "distance": distance, "angle": angle, "delta": delta, "points": points,
-               "section": f"Stroboscopic(phase={phase!r})"}  # fmt: skip
+    options = {
+        "length": length,
+        "kind": kind,
+        "distance": distance,
+        "angle": angle,
+        "delta": delta,
+        "points": points,
+        "section": f"Stroboscopic(phase={phase!r})",
+    }
     return _dataset(orbit, size, view(np.array(cycle)), arcs, options)
-
 
 
 def _checked(orbit: Orbit) -> FloatArray:
@@ -172,9 +178,12 @@ def _direction(orbit: Orbit, kind: str, size: FloatArray) -> tuple[float, FloatA
 
 
 def _dataset(
-    orbit: Orbit, size: FloatArray, cycle: FloatArray, arcs: list[tuple[str, int, int, float, Arc]],
+    orbit: Orbit,
+    size: FloatArray,
+    cycle: FloatArray,
+    arcs: list[tuple[str, int, int, float, Arc]],
     options: dict[str, Any],
-) -> xr.Dataset:  # fmt: skip
+) -> xr.Dataset:
     from nonsmooth.results.branches import manifolds as build
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
@@ -185,9 +194,21 @@ def _dataset(
     numbers = np.repeat(np.arange(len(arcs)), [sum(len(part[0]) for part in parts) for parts in of_arcs])
     attrs = provenance(labels, "manifolds", options, method="images of a fundamental segment")
     return build(
-        labels, attrs,
-        {"section": x * size, "arc_length": lengths, "iterate": iterates, "piece": pieces, "arc": numbers,
-         "side": [side for _, side, *_ in arcs], "orbit_point": [j for _, _, j, _, _ in arcs],
-         "multiplier": [mu for _, _, _, mu, _ in arcs], "orbit_section": cycle * size, "size": size},
-        kinds=[one for one, *_ in arcs], endings=ENDS, ended=[arc.ending for *_, arc in arcs],
-    )  # fmt: skip
+        labels,
+        attrs,
+        {
+            "section": x * size,
+            "arc_length": lengths,
+            "iterate": iterates,
+            "piece": pieces,
+            "arc": numbers,
+            "side": [side for _, side, *_ in arcs],
+            "orbit_point": [j for _, _, j, _, _ in arcs],
+            "multiplier": [mu for _, _, _, mu, _ in arcs],
+            "orbit_section": cycle * size,
+            "size": size,
+        },
+        kinds=[one for one, *_ in arcs],
+        endings=ENDS,
+        ended=[arc.ending for *_, arc in arcs],
+    )

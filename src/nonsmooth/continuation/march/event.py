@@ -230,8 +230,9 @@ def first_met(step: Step, boundaries: Sequence[Event]) -> list[Met] | None:
         known = [(kind.number(met.point), met) for met in located]
         # Both are infinite where a visit has turned negative: it is not followed.
         largest = max((abs(x) for x in (was, now) if np.isfinite(x)), default=0.0)
-        same = [Met(kind, met.s, met.point, kind.name) for value, met in known
-                if abs(value) < max(SAME * largest, ROUNDING)]  # fmt: skip
+        same = [
+            Met(kind, met.s, met.point, kind.name) for value, met in known if abs(value) < max(SAME * largest, ROUNDING)
+        ]
         if same or any(value > 0.0 for value, _ in known):  # met at the same place, or farther on
             located += same[:1]
             continue
@@ -265,8 +266,9 @@ def special_on(step: Step, kinds: Sequence[Event]) -> list[Met]:
                 warnings.warn(
                     f"a {kind.name.replace('_', '-')} between the parameter's values {a.value!r} and {b.value!r} was "
                     "met but not located, and is not listed",
-                    RuntimeWarning, stacklevel=2,
-                )  # fmt: skip
+                    RuntimeWarning,
+                    stacklevel=2,
+                )
         elif (
             there[0] <= stop
             and kind.confirmed(there[1], was, now)

@@ -201,8 +201,11 @@ class _Marching:
                 fallen = np.nan_to_num(self.curve.margins(row.point)) - np.nan_to_num(self.margins)
                 s = np.where(fallen > 0.0, float(np.abs(point.Y - row.point.Y).max()), np.inf)
                 near = np.fmin(near, np.abs(self.margins) * s / np.abs(fallen))
-        return [Met(kind, 0.0, point, kind.name) for kind, s in zip(self.policy.boundaries, near, strict=True)
-                if s < AT_LIMIT]  # fmt: skip
+        return [
+            Met(kind, 0.0, point, kind.name)
+            for kind, s in zip(self.policy.boundaries, near, strict=True)
+            if s < AT_LIMIT
+        ]
 
     def _begin(self, point: Any) -> None:
         """Go on from a point of a curve."""
@@ -241,9 +244,14 @@ class _Marching:
                 reached, s = last, there
         numbers, margins = self._watched(reached)
         return Step(
-            self.point, reached, (self.numbers, numbers), (self.margins, margins), not self.found.rows,
-            self.limits.virtual, "" if reached is new else "range",
-        )  # fmt: skip
+            self.point,
+            reached,
+            (self.numbers, numbers),
+            (self.margins, margins),
+            not self.found.rows,
+            self.limits.virtual,
+            "" if reached is new else "range",
+        )
 
     def _close(self, step: Step) -> None:
         """End a step where the branch comes back to its beginning."""
@@ -268,8 +276,11 @@ class _Marching:
 
     def _beyond(self, point: Any) -> list[tuple[int, float]]:
         """The edges of the range that a point lies beyond: places of parameters, each with its edge."""
-        return [(which, low if point.X[which] < low else high) for which, low, high in self.limits.box
-                if not low <= point.X[which] <= high]  # fmt: skip
+        return [
+            (which, low if point.X[which] < low else high)
+            for which, low, high in self.limits.box
+            if not low <= point.X[which] <= high
+        ]
 
     def _ended(self, step: Step) -> bool:
         """Take the step; True where the branch ends with it."""

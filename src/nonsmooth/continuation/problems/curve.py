@@ -169,9 +169,15 @@ class Curve(ABC, Generic[P]):
         return matrix
 
     def correct(
-        self, Y: FloatArray, border: FloatArray, level: float, *, tolerance: float | None = None,
-        most: int | None = None, singular: bool = False,
-    ) -> tuple[Any, FloatArray, int] | None:  # fmt: skip
+        self,
+        Y: FloatArray,
+        border: FloatArray,
+        level: float,
+        *,
+        tolerance: float | None = None,
+        most: int | None = None,
+        singular: bool = False,
+    ) -> tuple[Any, FloatArray, int] | None:
         """Newton for F = 0 and border . Y = level, from Y; None where it does not converge.
 
         ``singular`` takes the shortest step where the matrix has no inverse: at a crossing of branches.
@@ -260,9 +266,11 @@ class Curve(ABC, Generic[P]):
         # Hermite's cubic through both points and tangents.
         slope = end / max(float(a.tangent @ b.tangent), 1e-3)
         Y = (
-            a.Y * (1 + 2 * x) * (1 - x) ** 2 + a.tangent * (end * x * (1 - x) ** 2)
-            + b.Y * x * x * (3 - 2 * x) - b.tangent * (slope * x * x * (1 - x))
-        )  # fmt: skip
+            a.Y * (1 + 2 * x) * (1 - x) ** 2
+            + a.tangent * (end * x * (1 - x) ** 2)
+            + b.Y * x * x * (3 - 2 * x)
+            - b.tangent * (slope * x * x * (1 - x))
+        )
         level = float(a.tangent @ a.Y) + s
         found = self.correct(Y, a.tangent, level, tolerance=CLOSE, most=2 * self.most)
         if found is None or np.abs(found[1] - Y).max() > 0.1 * abs(end):

@@ -108,12 +108,18 @@ class Equilibria(Curve[Rest]):
         return self._measured(point, u, point.solved.J[:, :-1] / self.scale[:-1], margins, u, u)
 
     def _measured(
-        self, point: Point, u: FloatArray, jacobian: FloatArray, margins: FloatArray, lower: FloatArray,
+        self,
+        point: Point,
+        u: FloatArray,
+        jacobian: FloatArray,
+        margins: FloatArray,
+        lower: FloatArray,
         upper: FloatArray,
-    ) -> Rest:  # fmt: skip
+    ) -> Rest:
         eigenvalues = sorted_eigenvalues(jacobian)
-        return Rest(**vars(point), u=u, jacobian=jacobian, eigenvalues=eigenvalues, margins=margins, lower=lower,
-                    upper=upper)  # fmt: skip
+        return Rest(
+            **vars(point), u=u, jacobian=jacobian, eigenvalues=eigenvalues, margins=margins, lower=lower, upper=upper
+        )
 
     def stable(self, rest: Rest) -> bool:
         """Return whether all eigenvalues have negative real parts."""

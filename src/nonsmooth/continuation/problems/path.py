@@ -55,10 +55,16 @@ class Path:
         The shortest visit, the slowest crossing, the other rows of the conditions that fire, the nearest touch, the
         conditions that do not fire, those that hold where a visit begins (behind a reset); see ``boundaries``.
         """
-        return np.array([
-            self.tau.min(), self.slope.min(initial=np.inf), self.own.min(initial=np.inf), -self.touch,
-            -self.others.max(initial=-np.inf), -self.landed.max(),
-        ])  # fmt: skip
+        return np.array(
+            [
+                self.tau.min(),
+                self.slope.min(initial=np.inf),
+                self.own.min(initial=np.inf),
+                -self.touch,
+                -self.others.max(initial=-np.inf),
+                -self.landed.max(),
+            ]
+        )
 
     @property
     def virtual(self) -> bool:
@@ -85,9 +91,11 @@ class Walk:
         self.weight = system.scale_vector() * 1e-3
         rows = n + len(traced.indicators) + len(traced.outputs)
         self.scratch = (
-            np.zeros((rows, ORDER + 1)), np.zeros((n_scratch, ORDER + 1)), np.zeros(n),
+            np.zeros((rows, ORDER + 1)),
+            np.zeros((n_scratch, ORDER + 1)),
+            np.zeros(n),
             np.zeros(len(traced.indicators)),
-        )  # fmt: skip
+        )
         self.memory, self.shape, self.n = len(traced.m), (m, len(jumps)), n
         sources = np.array([jump.source for jump in jumps], dtype=np.int64)
         fires = np.array([jump.fires for jump in jumps], dtype=bool) & (self.net.at < 0)
@@ -144,11 +152,18 @@ class Walk:
         q = self.shooting.flow.on_path(solved.values, self.modes)
         *room, sizes = self.scratch
         status = follow(
-            self.functions, ORDER, RTOL, self.weight, self.lacking, self.net, q,
+            self.functions,
+            ORDER,
+            RTOL,
+            self.weight,
+            self.lacking,
+            self.net,
+            q,
             Visits(self.modes, solved.times[:-1], tau, np.ascontiguousarray(states), self.fired, self.fired_row),
-            (*room, np.zeros(len(q) + self.memory), sizes), extremes,
+            (*room, np.zeros(len(q) + self.memory), sizes),
+            extremes,
             Margins(inner, place, which, begin, begin_row, size, end, slope),
-        )  # fmt: skip
+        )
         if status:
             return None
         # Beside a boundary that has just been crossed only what is solved for tells which side is meant.
@@ -179,10 +194,21 @@ class Walk:
         landing = held.argmax(axis=1)
         extremes[~np.isfinite(extremes)] = np.nan  # states that no visit has
         return Path(
-            extremes[0], extremes[1], inner, place, which, float(inner[touched]) if n_t else -np.inf, touched,
-            own, others, other, slope[self.conditional, 0], np.where(self.fixed, np.inf, tau),
-            held[self.every, landing], landing,
-        )  # fmt: skip
+            extremes[0],
+            extremes[1],
+            inner,
+            place,
+            which,
+            float(inner[touched]) if n_t else -np.inf,
+            touched,
+            own,
+            others,
+            other,
+            slope[self.conditional, 0],
+            np.where(self.fixed, np.inf, tau),
+            held[self.every, landing],
+            landing,
+        )
 
     def _held(self, begin: FloatArray, zero: NDArray[np.bool_]) -> FloatArray:
         """Margins where the visits begin; -inf for those that are ``zero`` there."""

@@ -70,8 +70,11 @@ class Rounds:
         """The transitions but for impacts that another one follows at once: how many come before rest is rounding."""
         jumps = self.system.traced.transitions
         follows = np.diff(times, append=np.inf) < SHORT * period
-        return [k for k, at_once in zip(transitions, follows, strict=True)
-                if not (at_once and jumps[k].source == jumps[k].target)]  # fmt: skip
+        return [
+            k
+            for k, at_once in zip(transitions, follows, strict=True)
+            if not (at_once and jumps[k].source == jumps[k].target)
+        ]
 
     @cached_property
     def second(self) -> Engine:
@@ -91,9 +94,15 @@ class Rounds:
         return i, begin + into, led(self.flow, values, shooting.modes[i], begin, into, states[i]), period
 
     def _run(
-        self, values: FloatArray, z: FloatArray, mode: int, begin: float, until: float, at: Any,
+        self,
+        values: FloatArray,
+        z: FloatArray,
+        mode: int,
+        begin: float,
+        until: float,
+        at: Any,
         engine: Engine | None = None,
-    ) -> Log | None:  # fmt: skip
+    ) -> Log | None:
         n = len(self.system.states)
         state = State(z[:n].copy(), z[n:].copy())
         state.counters[0], state.settled = mode, True
@@ -133,9 +142,10 @@ class Rounds:
         if not visits:
             return Round(0, period, Signature((Visit(mode),)), np.empty(0), z[None, :])
         again = [
-            j for j in range(1, len(visits))
+            j
+            for j in range(1, len(visits))
             if visits[j] == visits[0] and abs(instants[j] - instants[0] - period) < LATE * period
-        ]  # fmt: skip
+        ]
         if not again:
             return None
         j = min(again, key=lambda j: float(np.abs(after[j] - after[0]).max()))

@@ -266,8 +266,9 @@ class Shooting:
         D[:, :, 1 : n + 1], D[:, :, n + 1], D[:, :, n + 2 :] = segments.Phi, segments.f_end, segments.P
         F, J = np.zeros(size), np.zeros((size, len(X)))
         instants = t.tolist()
-        jumps = [self.flow.jump(values, self.jumps[i][0], instants[i], segments.z[i], self.jumps[i][1])
-                 for i in range(m)]  # fmt: skip
+        jumps = [
+            self.flow.jump(values, self.jumps[i][0], instants[i], segments.z[i], self.jumps[i][1]) for i in range(m)
+        ]
         blocks = self._transitions(jumps, D[:m]) if m else D
         for i, (k, _, at, turn) in enumerate(self.jumps):
             r, first, jump = self.t_at[i], self.z_at[i] - 1, jumps[i]

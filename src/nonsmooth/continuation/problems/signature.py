@@ -112,26 +112,32 @@ class Round:
         """With further visits that interrupt visit ``place`` at t, and the states after them."""
         old, times, states = self.signature.visits, self.times, self.states
         return replace(
-            self, signature=Signature((*old[:place], *visits, *old[place:])),
+            self,
+            signature=Signature((*old[:place], *visits, *old[place:])),
             times=np.concatenate([times[:place], np.full(len(visits), t), times[place:]]),
             states=np.concatenate([states[: place + 1], after, states[place + 1 :]]),
-        )  # fmt: skip
+        )
 
     def without(self, first: int, count: int) -> Self:
         """Without ``count`` visits from ``first`` on: what remains is one visit where they stood."""
         visits, gone = self.signature.visits, np.arange(first, first + count)
         return replace(
-            self, signature=Signature((*visits[:first], *visits[first + count :])), times=np.delete(self.times, gone),
+            self,
+            signature=Signature((*visits[:first], *visits[first + count :])),
+            times=np.delete(self.times, gone),
             states=np.delete(self.states, gone + 1, axis=0),
-        )  # fmt: skip
+        )
 
     def begun(self, i: int, begin: float, z: FloatArray) -> Self:
         """The same round from visit i on: its section lies at the time ``begin``, in the state z."""
         visits, times, turns = self.signature.visits, self.times, self.period_number
-        moved = [v if v.row != -1 else replace(v, turn=v.turn + turns * ((j < i) - (begin > 0.0)))
-                 for j, v in enumerate(visits[:-1])]  # fmt: skip
+        moved = [
+            v if v.row != -1 else replace(v, turn=v.turn + turns * ((j < i) - (begin > 0.0)))
+            for j, v in enumerate(visits[:-1])
+        ]
         return replace(
-            self, signature=Signature((*moved[i:], *moved[:i], Visit(visits[i].mode))),
+            self,
+            signature=Signature((*moved[i:], *moved[:i], Visit(visits[i].mode))),
             times=np.concatenate([times[i:] - begin, times[:i] + (self.period - begin)]),
             states=np.concatenate([z[None, :], self.states[i + 1 :], self.states[1 : i + 1]]),
-        )  # fmt: skip
+        )

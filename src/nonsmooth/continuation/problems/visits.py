@@ -59,9 +59,16 @@ def _size(flow: VariationalFlow, jump: Jump, z: FloatArray) -> float:
 
 
 def round_of(
-    flow: VariationalFlow, values: FloatArray, log: Log, z: FloatArray, mode: int, period: float,
-    period_number: int = 0, first: int = 0, begin: float = 0.0,
-) -> Round | None:  # fmt: skip
+    flow: VariationalFlow,
+    values: FloatArray,
+    log: Log,
+    z: FloatArray,
+    mode: int,
+    period: float,
+    period_number: int = 0,
+    first: int = 0,
+    begin: float = 0.0,
+) -> Round | None:
     """A log as once round from a time on, in the state z of a mode, before the transition ``first``.
 
     None where it ends in another mode."""

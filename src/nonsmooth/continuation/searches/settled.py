@@ -102,9 +102,7 @@ def forced_guesses(
     return [guess for guess in guesses if guess is not None]
 
 
-def _read_round(
-    system: System, engine: Engine, settled: Settled, p: int, i: int, gaps: FloatArray
-) -> Guess | None:
+def _read_round(system: System, engine: Engine, settled: Settled, p: int, i: int, gaps: FloatArray) -> Guess | None:
     """The motion over p forcing periods from section point i, as an orbit; None where it ends in another mode."""
     state = settled.state.copy()
     if i < len(settled.points) - 1:
@@ -260,6 +258,7 @@ def _by_level(interval: _Interval, most: int, given: int | None) -> list[Guess]:
         if gap <= NEAR:
             z = np.concatenate([points[-1], interval.log.sample_memory[-1]])[None, :]
             signature = Signature((Visit(int(interval.modes[-1])),))
-            guesses.append(Guess(0, float(times[-1] - times[-1 - p]), signature, np.empty(0), z, max(gap, 1e-3),
-                                 interval.size))  # fmt: skip
+            guesses.append(
+                Guess(0, float(times[-1] - times[-1 - p]), signature, np.empty(0), z, max(gap, 1e-3), interval.size)
+            )
     return guesses

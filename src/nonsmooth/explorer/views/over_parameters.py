@@ -58,9 +58,16 @@ class Diagram(View):
         plot.image_rgba("image", "x", "y", "dw", "dh", source=self._image)
         self._columns = self.figure.source("value", "low", "high", "words", "period", "status", name="columns")
         bars = plot.segment(
-            "value", "low", "value", "high", source=self._columns, line_alpha=0.0, line_width=4, hover_line_alpha=0.25,
+            "value",
+            "low",
+            "value",
+            "high",
+            source=self._columns,
+            line_alpha=0.0,
+            line_width=4,
+            hover_line_alpha=0.25,
             hover_line_color=COLORS["muted"],
-        )  # fmt: skip
+        )
         self.figure.tell(bars, mode="vline", line_policy="interp", attachment="right", point_policy="follow_mouse")
         self._here = self.figure.mark()
         self._shown: dict[str, Any] = {}  # the request of what is drawn
@@ -91,10 +98,13 @@ class Diagram(View):
             words.append(f"{number(float(value), unit)}: {' / '.join(kinds)}")
         low, high = self.figure.plot.y_range.start, self.figure.plot.y_range.end
         self._columns.data = {
-            "value": values, "low": np.full(len(values), low - 10 * (high - low)),
-            "high": np.full(len(values), high + 10 * (high - low)), "words": words,
-            "period": periods[:, 0], "status": [str(row) for row in names[:, 0]],
-        }  # fmt: skip
+            "value": values,
+            "low": np.full(len(values), low - 10 * (high - low)),
+            "high": np.full(len(values), high + 10 * (high - low)),
+            "words": words,
+            "period": periods[:, 0],
+            "status": [str(row) for row in names[:, 0]],
+        }
 
     def clear(self) -> None:
         """Show nothing, as when another model or parameter was chosen."""
@@ -121,10 +131,14 @@ class Diagram(View):
         low, high = self.figure.plot.y_range.start, self.figure.plot.y_range.end
         step = (values[-1] - values[0]) / max(len(values) - 1, 1) or 1.0
         self._image.data = {
-            "image": [drawn(self._layers(points), low, high, self._pixels)], "x": [values[0] - step / 2], "y": [low],
-            "dw": [step * len(values)], "dh": [high - low], "of": [key_of(self._shown)],
+            "image": [drawn(self._layers(points), low, high, self._pixels)],
+            "x": [values[0] - step / 2],
+            "y": [low],
+            "dw": [step * len(values)],
+            "dh": [high - low],
+            "of": [key_of(self._shown)],
             "stage": ["judged" if self._shown["view"] == "diagram" else "first look"],
-        }  # fmt: skip
+        }
         self.name_axes(state.over, state.shown)
 
     def _fits(self, points: Any) -> bool:

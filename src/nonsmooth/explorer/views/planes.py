@@ -59,9 +59,15 @@ class Cells(View):
             plot.scatter("x", "y", marker="cross", source=self.here, size=18, line_color=color, line_width=width)
 
     def put(
-        self, x: NDArray[np.float64], y: NDArray[np.float64], classes: NDArray[Any], entries: Sequence[tuple[str, str]],
-        stage: str, more: NDArray[np.float64] | None = None, unit: str = "1",
-    ) -> None:  # fmt: skip
+        self,
+        x: NDArray[np.float64],
+        y: NDArray[np.float64],
+        classes: NDArray[Any],
+        entries: Sequence[tuple[str, str]],
+        stage: str,
+        more: NDArray[np.float64] | None = None,
+        unit: str = "1",
+    ) -> None:
         """Draw classes (y, x), numbers of ``entries`` (words, colour); ``more`` are exponents in a unit."""
         self._mapper.update(palette=[color for _, color in entries], low=-0.5, high=len(entries) - 0.5)
         self._words.args = {"words": [words for words, _ in entries]}
@@ -70,9 +76,12 @@ class Cells(View):
         self._image.data = {
             "image": [classes.astype(np.float64)],
             "more": [np.full(classes.shape, _NOTHING) if more is None else np.nan_to_num(more, nan=_NOTHING)],
-            "x": [x[0] - steps[0] / 2], "y": [y[0] - steps[1] / 2], "dw": [steps[0] * len(x)],
-            "dh": [steps[1] * len(y)], "stage": [stage],
-        }  # fmt: skip
+            "x": [x[0] - steps[0] / 2],
+            "y": [y[0] - steps[1] / 2],
+            "dw": [steps[0] * len(x)],
+            "dh": [steps[1] * len(y)],
+            "stage": [stage],
+        }
 
     def name_axes(self, x: str, y: str, of: str = "") -> None:
         """Label the axes, in the prefixes that the words below the mouse have too."""
@@ -177,12 +186,16 @@ class Basins(Cells):
         """Each finer than the one before it; initial values of states outside the plane are the page's."""
         state = self.state
         start = zip(self.system.states, state.start, strict=True)
-        return self.each({
-            **{key: base["orbit"][key] for key in ("text", "values", "method", "eta", "transient")},
-            "x": state.x, "y": state.y, "begin": base["first look"]["begin"],
-            "fixed": {name: value for name, value in start if name not in (state.x, state.y)},
-            "window": [self.setting(end) for end in _ENDS],
-        })  # fmt: skip
+        return self.each(
+            {
+                **{key: base["orbit"][key] for key in ("text", "values", "method", "eta", "transient")},
+                "x": state.x,
+                "y": state.y,
+                "begin": base["first look"]["begin"],
+                "fixed": {name: value for name, value in start if name not in (state.x, state.y)},
+                "window": [self.setting(end) for end in _ENDS],
+            }
+        )
 
     def build(self) -> None:
         """The image of the labels."""
@@ -208,10 +221,14 @@ class Basins(Cells):
         points, of = result["section_points"].sel(state=[first, second]).values, result["point_attractor"].values
         size, periods = np.array([np.ptp(x), np.ptp(y)]), result["period_number"].values
         numbers = self._numbers([(int(period), points[of == k] / size) for k, period in enumerate(periods)])
-        entries = [("diverged", palette.DIVERGED), ("none reached", palette.UNKNOWN), *(
-            (f"{name}: {100 * share:.3g} %", palette.attractor_color(number))
-            for name, share, number in zip(names_of(result), result["fraction"].values, numbers, strict=True)
-        )]  # fmt: skip
+        entries = [
+            ("diverged", palette.DIVERGED),
+            ("none reached", palette.UNKNOWN),
+            *(
+                (f"{name}: {100 * share:.3g} %", palette.attractor_color(number))
+                for name, share, number in zip(names_of(result), result["fraction"].values, numbers, strict=True)
+            ),
+        ]
         classes = np.maximum(result["label"].transpose(second, first).values, -2) + 2
         self.put(x, y, classes, entries, self._stage)
         self._legend: list[tuple[str, ...]] = [entries[k] for k in np.unique(classes)]

@@ -27,16 +27,24 @@ class Recording(View):
         places = {"curve": "portrait", **{name: name for name in figures}}
         self._sources = {key: figures[name].source("x", "y", name=f"recorded {key}") for key, name in places.items()}
         for key in ("curve", "history"):
-            self.ink(GREY, figures[places[key]].plot.line(
-                "x", "y", source=self._sources[key], line_width=1, line_alpha=0.6, level="underlay"
-            ))  # fmt: skip
+            self.ink(
+                GREY,
+                figures[places[key]].plot.line(
+                    "x", "y", source=self._sources[key], line_width=1, line_alpha=0.6, level="underlay"
+                ),
+            )
         self._rings = [
             figures[key].plot.scatter(
-                "x", "y", source=self._sources[key], fill_color=None, line_width=1.2, line_alpha=0.7,
+                "x",
+                "y",
+                source=self._sources[key],
+                fill_color=None,
+                line_width=1.2,
+                line_alpha=0.7,
                 level="annotation" if key == "diagram" else "underlay",
             )
             for key in ("diagram", "portrait", "section")
-        ]  # fmt: skip
+        ]
         self.ink(GREY, *self._rings)
         self._figures = figures
 

@@ -73,6 +73,13 @@ class OnGpu:
         """Room for ``keep`` section points of each of n trajectories."""
         array, whole, keep = self.cuda.device_array, np.int64, max(keep, 1)
         return Kept(
-            array((n, keep, self.n)), array((n, self.rows)), array((n, self.rows)), array(n, whole), array(n, whole),
-            array(n), array((n, keep)), array((n, keep), whole), array(n, whole),
-        )  # fmt: skip
+            array((n, keep, self.n)),
+            array((n, self.rows)),
+            array((n, self.rows)),
+            array(n, whole),
+            array(n, whole),
+            array(n),
+            array((n, keep)),
+            array((n, keep), whole),
+            array(n, whole),
+        )

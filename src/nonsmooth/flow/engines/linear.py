@@ -81,9 +81,24 @@ class LinearEngine(Engine):
 
         lacking = np.hstack([self.lacking, np.ones((n_modes, len(self.traced.m)), dtype=np.int64)])
         form = Form(
-            t.A, t.b, t.c, t.s, multiples, t.omega, t.period,
-            t.ia, t.ib, t.ic, t.is_, *outputs, t.ra, t.rb, t.rc, t.rs, lacking,
-        )  # fmt: skip
+            t.A,
+            t.b,
+            t.c,
+            t.s,
+            multiples,
+            t.omega,
+            t.period,
+            t.ia,
+            t.ib,
+            t.ic,
+            t.is_,
+            *outputs,
+            t.ra,
+            t.rb,
+            t.rc,
+            t.rs,
+            lacking,
+        )
         if self.is_planar and n_h == 0:  # a forcing of no size
             form = _with_harmonic(form)
         if n_points > 1:  # threads may share them

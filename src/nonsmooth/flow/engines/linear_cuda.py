@@ -60,9 +60,17 @@ class PlanarOnGpu(OnGpu):
         return np.delete(found, self.void, axis=1)
 
     def run(
-        self, jobs: IntArray, states: States, transient: int, keep: Any, out: Kept, settled: Any = False, *,
-        extremes: bool = False, one_more: Kept | None = None,
-    ) -> IntArray:  # fmt: skip
+        self,
+        jobs: IntArray,
+        states: States,
+        transient: int,
+        keep: Any,
+        out: Kept,
+        settled: Any = False,
+        *,
+        extremes: bool = False,
+        one_more: Kept | None = None,
+    ) -> IntArray:
         """March jobs by ``transient`` returns, then ``keep`` more into ``out`` (a number, or one for each trajectory).
 
         Parameters
@@ -95,15 +103,34 @@ class PlanarOnGpu(OnGpu):
         self._advance(jobs, others, 0, period, whole, extremes, arrived, False, 3, len(period))
 
     def _advance(
-        self, jobs: IntArray, states: States, transient: int, keep: Any, out: Kept, extremes: bool = False,
-        other: Kept | None = None, after: bool = False, legs: int = 2, apart: int = 0,
-    ) -> IntArray:  # fmt: skip
+        self,
+        jobs: IntArray,
+        states: States,
+        transient: int,
+        keep: Any,
+        out: Kept,
+        extremes: bool = False,
+        other: Kept | None = None,
+        after: bool = False,
+        legs: int = 2,
+        apart: int = 0,
+    ) -> IntArray:
         counts = tuple(self.cuda.to_device(np.atleast_1d(np.asarray(n, dtype=np.int64))) for n in (transient, keep))
         self.launch(
-            self.module.advance, jobs, states.rows, self.tables, self.net, states.place(), counts,
-            (self.plans[extremes], self.plans[after]), (1 if other is None else legs, apart), self.phase, self.limit,
-            tuple(out), tuple(out if other is None else other),
-        )  # fmt: skip
+            self.module.advance,
+            jobs,
+            states.rows,
+            self.tables,
+            self.net,
+            states.place(),
+            counts,
+            (self.plans[extremes], self.plans[after]),
+            (1 if other is None else legs, apart),
+            self.phase,
+            self.limit,
+            tuple(out),
+            tuple(out if other is None else other),
+        )
         return jobs[out.status.copy_to_host()[jobs] == codes.OK]
 
 

@@ -182,9 +182,17 @@ class Engine(ABC):
         return model, net, own, work
 
     def chain(
-        self, tables: Any, first: int, last: int, state: State, starts: FloatArray | None,
-        plan: Section, transient: int, keep: int, out: Kept,
-    ) -> None:  # fmt: skip
+        self,
+        tables: Any,
+        first: int,
+        last: int,
+        state: State,
+        starts: FloatArray | None,
+        plan: Section,
+        transient: int,
+        keep: int,
+        out: Kept,
+    ) -> None:
         """Points ``first <= i < last``: run ``transient`` section returns, then ``keep`` more into ``out``.
 
         With ``starts`` None each point goes on from ``state`` (carried along, left at the end of the last point); else
@@ -232,9 +240,14 @@ class Engine(ABC):
         return [_crossings(1024, n_u, n_m), _touches(1024, n_u)]
 
     def record(
-        self, tables: Any, state: State, until: float, samples: FloatArray, room: Any = None,
+        self,
+        tables: Any,
+        state: State,
+        until: float,
+        samples: FloatArray,
+        room: Any = None,
         changes: Changes | None = None,
-    ) -> Log:  # fmt: skip
+    ) -> Log:
         """Point 0: march ``state`` to the time ``until``, with dense samples at the increasing absolute times
         ``samples`` (a sample exactly at a crossing is the limit after it). A state that a mode lacks is NaN.
 
@@ -268,9 +281,21 @@ class Engine(ABC):
             before[lacking[[t.source for t in jumps]][transitions]] = np.nan
             after[lacking[[t.target for t in jumps]][transitions]] = np.nan
         return Log(
-            sample_u, sample_memory, sample_mode, sample_segment, times, transitions, before, after, memory,
-            touch_times, indicators, touch_u, clearances, int(code),
-        )  # fmt: skip
+            sample_u,
+            sample_memory,
+            sample_mode,
+            sample_segment,
+            times,
+            transitions,
+            before,
+            after,
+            memory,
+            touch_times,
+            indicators,
+            touch_u,
+            clearances,
+            int(code),
+        )
 
 
 def end_if_not_wanted() -> None:
@@ -283,17 +308,23 @@ def _samples(instants: FloatArray, n: int, n_memory: int) -> list[Any]:
     """Instants, and room for states, memory, mode and number of crossings there."""
     size = len(instants)
     return [
-        np.ascontiguousarray(instants, dtype=float), np.full((size, n), np.nan), np.full((size, n_memory), np.nan),
-        np.full(size, -1, dtype=np.int64), np.zeros(size, dtype=np.int64),
-    ]  # fmt: skip
+        np.ascontiguousarray(instants, dtype=float),
+        np.full((size, n), np.nan),
+        np.full((size, n_memory), np.nan),
+        np.full(size, -1, dtype=np.int64),
+        np.zeros(size, dtype=np.int64),
+    ]
 
 
 def _crossings(size: int, n: int, n_memory: int) -> list[Any]:
     """Room for crossings: time, transition, states before and after, memory after."""
     return [
-        np.zeros(size), np.zeros(size, dtype=np.int64), np.zeros((size, n)), np.zeros((size, n)),
+        np.zeros(size),
+        np.zeros(size, dtype=np.int64),
+        np.zeros((size, n)),
+        np.zeros((size, n)),
         np.zeros((size, n_memory)),
-    ]  # fmt: skip
+    ]
 
 
 def _touches(size: int, n: int) -> list[Any]:
@@ -335,13 +366,16 @@ def pack_net(traced: Traced) -> Any:
     transitions = np.array(
         [
             (
-                -1 if t.kind in (ASKED, TOGETHER) else t.target, _change(traced, t),
-                DEAD_END if traced.ends(t) else t.contact, j, KINDS.get(t.kind, 0),
+                -1 if t.kind in (ASKED, TOGETHER) else t.target,
+                _change(traced, t),
+                DEAD_END if traced.ends(t) else t.contact,
+                j,
+                KINDS.get(t.kind, 0),
             )
             for j, t in zip(maps, jumps, strict=True)
         ],
         dtype=integer,
-    ).reshape(-1, 5)  # fmt: skip
+    ).reshape(-1, 5)
     rows = [(r.indicator, r.sign, r.strict) for t in jumps for r in t.rows if t.fires]
     row_start = np.cumsum([0] + [len(t.rows) if t.fires else 0 for t in jumps], dtype=integer)
     leaving = [[j for j, t in enumerate(jumps) if t.source == m and t.fires] for m in modes]
@@ -356,8 +390,14 @@ def pack_net(traced: Traced) -> Any:
     asked = {t.source: j for j, t in enumerate(jumps) if t.kind == TOGETHER}
     meets = [[row.indicator for row in jumps[asked[m]].rows] if m in asked else [] for m in modes]
     return Net(
-        transitions, both, row_start, mode_start, mode_list, phases(traced), changed,
+        transitions,
+        both,
+        row_start,
+        mode_start,
+        mode_list,
+        phases(traced),
+        changed,
         np.array([f for one in meets for f in one], dtype=integer),
         np.cumsum([0] + [len(one) for one in meets], dtype=integer),
         np.array([asked.get(m, -1) for m in modes], dtype=integer),
-    )  # fmt: skip
+    )

@@ -29,14 +29,32 @@ class March:
         self.orders, self.reals = np.zeros(records.N_ORDERS, dtype=np.int64), np.zeros(records.N_REALS)
 
     def returns(
-        self, first: int, last: int, state: State, starts: FloatArray | None, plan: Section, transient: int,
-        keep: int, out: Kept,
-    ) -> None:  # fmt: skip
+        self,
+        first: int,
+        last: int,
+        state: State,
+        starts: FloatArray | None,
+        plan: Section,
+        transient: int,
+        keep: int,
+        out: Kept,
+    ) -> None:
         """Ask for section returns of some points; see :class:`nonsmooth.flow.engines.loop.Engine`."""
         self.orders[:] = (
-            first, last, RETURNS_OF_SECTION, transient, keep, PATIENCE, plan.indicator, plan.rising, plan.mode,
-            plan.after, plan.every, plan.extremes, -1,
-        )  # fmt: skip
+            first,
+            last,
+            RETURNS_OF_SECTION,
+            transient,
+            keep,
+            PATIENCE,
+            plan.indicator,
+            plan.rising,
+            plan.mode,
+            plan.after,
+            plan.every,
+            plan.extremes,
+            -1,
+        )
         phase = plan.phase if plan.indicator < 0 else -1.0
         self.reals[:] = 0.0, 0.0, phase, min(plan.t_max, 1e300)
         self.kept.put(out)

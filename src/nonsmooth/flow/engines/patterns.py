@@ -91,9 +91,17 @@ class PatternEngine(Engine):
         return True
 
     def chain(
-        self, tables: Points, first: int, last: int, state: State, starts: FloatArray | None,
-        plan: Section, transient: int, keep: int, out: Kept,
-    ) -> None:  # fmt: skip
+        self,
+        tables: Points,
+        first: int,
+        last: int,
+        state: State,
+        starts: FloatArray | None,
+        plan: Section,
+        transient: int,
+        keep: int,
+        out: Kept,
+    ) -> None:
         for i in range(first, last):
             here, _ = self.enter(tables, i, state)
             one = Kept(*[part[i : i + 1] for part in out])
@@ -108,9 +116,14 @@ class PatternEngine(Engine):
         """None: a pattern that is met for the first time changes the memory."""
 
     def record(
-        self, tables: Points, state: State, until: float, samples: FloatArray, room: Any = None,
+        self,
+        tables: Points,
+        state: State,
+        until: float,
+        samples: FloatArray,
+        room: Any = None,
         changes: Changes | None = None,
-    ) -> Log:  # fmt: skip
+    ) -> Log:
         here, _ = self.enter(tables, 0, state)
         log = super().record(here, state, until, samples, changes=changes)
         here.leave(state)
@@ -334,9 +347,10 @@ class PatternTables:
         of_one = table_bytes(n, self.harmonics, 1) + 8 * (conditions + n + outputs) * 13 * width
         self.capacity = 2 * self.capacity or max(8, min(MOST, (free_memory() or 2**32) // (4 * of_one)))
         room_for(
-            float(of_one) * self.capacity, f"the tables of {self.capacity} patterns of {n} states",
+            float(of_one) * self.capacity,
+            f"the tables of {self.capacity} patterns of {n} states",
             "take fewer elements or a shorter run: it visits more patterns than there is memory for",
-        )  # fmt: skip
+        )
         most = 64 * len(self.rows.parts)
         own, work = scratch(n, self.harmonics, self.capacity, conditions, outputs, most, apart=True)
         if self.own is not None:
@@ -351,10 +365,15 @@ class PatternTables:
 
         n = self.rows.n
         return Form(
-            *_turned(flow[None, None], n), self.multiples, self.omega, self.period,
-            *_contiguous(conditions[None], n), *_contiguous(outputs[None, :, None], n), **self._maps()[0],
+            *_turned(flow[None, None], n),
+            self.multiples,
+            self.omega,
+            self.period,
+            *_contiguous(conditions[None], n),
+            *_contiguous(outputs[None, :, None], n),
+            **self._maps()[0],
             lacking=np.zeros((0, n), dtype=np.int64),
-        )  # fmt: skip
+        )
 
     def _maps(self) -> tuple[dict[str, FloatArray], IntArray]:
         """The maps of all transitions, as fields of a form; of each how many states it changes, and which."""
@@ -375,10 +394,15 @@ class PatternTables:
 
         whole = np.int64
         return Net(
-            self.transitions, np.concatenate([self.conditions, SECTION]), np.cumsum([0, *self.lengths], dtype=whole),
-            *_joined(self.lists), np.full(len(self.leads), -1.0), self._maps()[1], *_joined(self.meets)[::-1],
+            self.transitions,
+            np.concatenate([self.conditions, SECTION]),
+            np.cumsum([0, *self.lengths], dtype=whole),
+            *_joined(self.lists),
+            np.full(len(self.leads), -1.0),
+            self._maps()[1],
+            *_joined(self.meets)[::-1],
             np.array(self.together, dtype=whole),
-        )  # fmt: skip
+        )
 
 
 def _joined(lists: list[list[int]]) -> tuple[IntArray, IntArray]:

@@ -165,11 +165,24 @@ class SeriesEngine(Engine):
         traced = self.traced
         weight, absolute, _ = self.norms
         return Generated(
-            self.functions, tables.points, tables.period, self.lacking, self.kinds, weight, absolute, float(self.rtol),
-            0.0 if self.step is None else float(self.step), METHODS[self.name], self.series_order,
-            int(self.locate), int(self.layers.checked), int(not all(self.smooth_outputs)), self.layers.count,
-            len(traced.indicators), len(traced.outputs),
-        )  # fmt: skip
+            self.functions,
+            tables.points,
+            tables.period,
+            self.lacking,
+            self.kinds,
+            weight,
+            absolute,
+            float(self.rtol),
+            0.0 if self.step is None else float(self.step),
+            METHODS[self.name],
+            self.series_order,
+            int(self.locate),
+            int(self.layers.checked),
+            int(not all(self.smooth_outputs)),
+            self.layers.count,
+            len(traced.indicators),
+            len(traced.outputs),
+        )
 
     @cached_property
     def functions(self) -> Any:

@@ -25,16 +25,27 @@ def module_of(engine: SeriesEngine, tables: Tables) -> Any:
 
     net, form = engine.net, engine.generated(tables)
     sizes = {
-        "METHOD": METHODS[engine.name], "ORDER": form.order, "CHECKED": form.checked, "CORNERS": form.corners,
-        "N_GUARDS": form.guards, "N_PARAMETERS": len(engine.traced.p),
-        "N_INDICATORS": form.indicators, "N_OUTPUTS": form.outputs, "N_MEMORY": len(engine.traced.m),
+        "METHOD": METHODS[engine.name],
+        "ORDER": form.order,
+        "CHECKED": form.checked,
+        "CORNERS": form.corners,
+        "N_GUARDS": form.guards,
+        "N_PARAMETERS": len(engine.traced.p),
+        "N_INDICATORS": form.indicators,
+        "N_OUTPUTS": form.outputs,
+        "N_MEMORY": len(engine.traced.m),
         "N_SCRATCH_ROWS": engine.model.n_scratch,
-    }  # fmt: skip
+    }
     arrays = {
-        "TRANSITIONS": _filled(net.transitions, (1, 3)), "ROWS": net.rows, "ROW_START": net.row_start,
-        "MODE_START": net.mode_start, "MODE_LIST": _filled(net.mode_list, (1,)),
-        "AT": net.at if len(net.at) else np.full(1, -1.0), "LACKING": engine.lacking, "KINDS": engine.kinds,
-    }  # fmt: skip
+        "TRANSITIONS": _filled(net.transitions, (1, 3)),
+        "ROWS": net.rows,
+        "ROW_START": net.row_start,
+        "MODE_START": net.mode_start,
+        "MODE_LIST": _filled(net.mode_list, (1,)),
+        "AT": net.at if len(net.at) else np.full(1, -1.0),
+        "LACKING": engine.lacking,
+        "KINDS": engine.kinds,
+    }
     return cuda_series_module(cuda_series_source(model_source(engine.layers.model), sizes, arrays))
 
 
@@ -88,9 +99,17 @@ class SeriesOnGpu(OnGpu):
         return self._rooms[n]
 
     def run(
-        self, jobs: IntArray, states: States, transient: Any, keep: Any, out: Kept, settled: Any = False,
-        *, extremes: bool = True, one_more: None = None,
-    ) -> IntArray:  # fmt: skip
+        self,
+        jobs: IntArray,
+        states: States,
+        transient: Any,
+        keep: Any,
+        out: Kept,
+        settled: Any = False,
+        *,
+        extremes: bool = True,
+        one_more: None = None,
+    ) -> IntArray:
         """March jobs by ``transient`` returns, then ``keep`` more into ``out`` (numbers, or one for each trajectory).
 
         Parameters
@@ -111,9 +130,16 @@ class SeriesOnGpu(OnGpu):
         under_way, fresh = jobs, 1
         while len(under_way):
             self.launch(
-                self.module.advance, under_way, states.rows, *self.tables, states.all(), (begun, *counts),
-                (fresh, STEPS), self._between(n), tuple(out),
-            )  # fmt: skip
+                self.module.advance,
+                under_way,
+                states.rows,
+                *self.tables,
+                states.all(),
+                (begun, *counts),
+                (fresh, STEPS),
+                self._between(n),
+                tuple(out),
+            )
             under_way, fresh = under_way[out.status.copy_to_host()[under_way] == codes.PAUSED], 0
         return jobs[np.isin(out.status.copy_to_host()[jobs], (codes.OK, codes.NOT_GUARANTEED))]
 

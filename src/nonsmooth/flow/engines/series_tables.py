@@ -34,13 +34,33 @@ def work_of(
     width = max(order, 6) + 1
     vector, integers = np.zeros, lambda size: np.zeros(size, dtype=np.int64)
     jets = [np.zeros((size, width)) for size in (rows, n_scratch, rows, rows)]
-    return SeriesWork(*one_block(
-        *(vector(n) for _ in range(5)), vector(n_q), vector(n_q), *jets, tuple(vector(n) for _ in range(8)),
-        vector(width), vector(width), vector(width), vector(rows - n), vector(rows - n), vector(n_indicators),
-        vector(n_indicators), integers(n_indicators), integers(n_indicators), integers(n_rows), vector(n_modes),
-        vector(n_modes), integers(n_modes), vector(stack_size(width)), integers(2), vector(n),
-        integers(N_SERIES_TALLY), vector(N_SERIES_MEMO),
-    ))  # fmt: skip
+    return SeriesWork(
+        *one_block(
+            *(vector(n) for _ in range(5)),
+            vector(n_q),
+            vector(n_q),
+            *jets,
+            tuple(vector(n) for _ in range(8)),
+            vector(width),
+            vector(width),
+            vector(width),
+            vector(rows - n),
+            vector(rows - n),
+            vector(n_indicators),
+            vector(n_indicators),
+            integers(n_indicators),
+            integers(n_indicators),
+            integers(n_rows),
+            vector(n_modes),
+            vector(n_modes),
+            integers(n_modes),
+            vector(stack_size(width)),
+            integers(2),
+            vector(n),
+            integers(N_SERIES_TALLY),
+            vector(N_SERIES_MEMO),
+        )
+    )
 
 
 @lru_cache(maxsize=64)

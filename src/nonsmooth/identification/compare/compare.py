@@ -142,13 +142,24 @@ def compare(
         measured = recorded_motion(measured, nominal(theory, parameters, set_), channels, run, _phase_found(parameters))
     kind, states = _kind(measured, parameter), _states(measured, theory)
     model = Model(
-        theory, states, parameters, set_, options["transient"], draws, options["level"], options["seed"],
+        theory,
+        states,
+        parameters,
+        set_,
+        options["transient"],
+        draws,
+        options["level"],
+        options["seed"],
         solver_of(options),
-    )  # fmt: skip
+    )
     given = {
         "settings": {key: ["follows" if one.follows else one.value, one.uncertainty] for key, one in set_.items()},
-        "parameter": parameter, "direction": direction, "section_phase": section_phase, **options, "draws": draws,
-    }  # fmt: skip
+        "parameter": parameter,
+        "direction": direction,
+        "section_phase": section_phase,
+        **options,
+        "draws": draws,
+    }
     variables = _laid(kind, measured, model, states, {**given, "noise": noise, "start": start, "values": values})
     result = _dataset(variables, measured, model, kind, given)
     return result.squeeze("section_phase") if kind == "motion" and np.ndim(section_phase) == 0 else result
@@ -181,16 +192,27 @@ def _laid(kind: str, measured: xr.Dataset, model: Model, states: list[str], aske
         from nonsmooth.identification.compare.diagram import compare_diagram
 
         return compare_diagram(
-            measured, model, name=_parameter(asked["parameter"] or _swept(measured), model.theory), noise=noise,
-            direction=asked["direction"], values=asked["values"], phase=real_number(phase, "section_phase"),
+            measured,
+            model,
+            name=_parameter(asked["parameter"] or _swept(measured), model.theory),
+            noise=noise,
+            direction=asked["direction"],
+            values=asked["values"],
+            phase=real_number(phase, "section_phase"),
             max_period=longest,
-        )  # fmt: skip
+        )
     from nonsmooth.identification.compare.motion import compare_motion
 
     return compare_motion(
-        measured, model, noise=noise, start=asked["start"], phases=_phases(phase, "u" in measured),
-        grid=asked["grid"], max_period=longest, splits=asked["splits"],
-    )  # fmt: skip
+        measured,
+        model,
+        noise=noise,
+        start=asked["start"],
+        phases=_phases(phase, "u" in measured),
+        grid=asked["grid"],
+        max_period=longest,
+        splits=asked["splits"],
+    )
 
 
 def _draws(given: int | None, theory: Any, parameters: Any, settings: Mapping[str, Any]) -> int:

@@ -23,9 +23,16 @@ KEEP = 64
 
 
 def compare_diagram(
-    measured: xr.Dataset, model: Model, *, name: str, noise: FloatArray, direction: str, values: FloatArray | None,
-    phase: float, max_period: int,
-) -> dict[str, Any]:  # fmt: skip
+    measured: xr.Dataset,
+    model: Model,
+    *,
+    name: str,
+    noise: FloatArray,
+    direction: str,
+    values: FloatArray | None,
+    phase: float,
+    max_period: int,
+) -> dict[str, Any]:
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
     at, points, numbers = _measured(measured, name, noise, max_period)
     unit = measured[name].attrs.get("units", "1")

@@ -87,7 +87,11 @@ def settled(settings: Settings, values: Mapping[str, float]) -> dict[str, float]
 
 
 def draw_systems(
-    system: System, parameters: Any, settings: Settings, draws: int, seed: int,
+    system: System,
+    parameters: Any,
+    settings: Settings,
+    draws: int,
+    seed: int,
     bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
 ) -> tuple[list[System], dict[str, np.ndarray]]:
     """Systems whose parameters are drawn from their joint law, and the draws by name.
@@ -169,10 +173,9 @@ def check_parameter(name: str, system: System) -> None:
 def drawn_variables(drawn: Mapping[str, np.ndarray], system: System) -> dict[str, Any]:
     """The draws as variables ``drawn_<name>`` over ``draw``, to be kept with a comparison."""
     return {
-        f"drawn_{name}": ("draw", column, {
-            "long_name": f"drawn {name}", "units": system.parameters[name].unit or "1"})
+        f"drawn_{name}": ("draw", column, {"long_name": f"drawn {name}", "units": system.parameters[name].unit or "1"})
         for name, column in drawn.items()
-    }  # fmt: skip
+    }
 
 
 def _identified(parameters: Any, count: int, seed: int) -> dict[str, np.ndarray]:

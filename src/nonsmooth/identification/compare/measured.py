@@ -22,9 +22,14 @@ PIECE = 75.0  # s
 
 
 def motion_of(
-    time: ArrayLike, x: Any, phase: ArrayLike, *, states: tuple[str, str] = ("x", "v"),
-    resolution: float | None = None, **smoothing: Any,
-) -> xr.Dataset:  # fmt: skip
+    time: ArrayLike,
+    x: Any,
+    phase: ArrayLike,
+    *,
+    states: tuple[str, str] = ("x", "v"),
+    resolution: float | None = None,
+    **smoothing: Any,
+) -> xr.Dataset:
     r"""The motion of any oscillator of which a position was sampled, with its rate and the errors of both.
 
     Parameters
@@ -78,9 +83,10 @@ def _motion(smoothed: xr.Dataset, phase: FloatArray, states: tuple[str, str] = (
         },
         {
             "time": labelled("time", smoothed["time"].values, "time", "s"),
-            "state": ("state", list(states)), "state_unit": ("state", units),
+            "state": ("state", list(states)),
+            "state_unit": ("state", units),
         },
-    )  # fmt: skip
+    )
 
 
 def recorded_motion(
@@ -204,10 +210,14 @@ def measured_motion(
     # Beyond the first and last turn the phase would be a guess.
     inside = (time >= turns[0]) & (time <= turns[-1])
     phase = (drive.phase(time[inside]) + mark % (2 * np.pi)) / (2 * np.pi)
-    return _motion(smoothed.isel(time=inside), phase).assign_attrs(_attributes(recording, name)).assign_coords(
-        omega=labelled((), drive.omega, "frequency of the drive", "rad/s"),
-        omega_error=labelled((), drive.omega_error, "standard error of it", "rad/s"),
-    )  # fmt: skip
+    return (
+        _motion(smoothed.isel(time=inside), phase)
+        .assign_attrs(_attributes(recording, name))
+        .assign_coords(
+            omega=labelled((), drive.omega, "frequency of the drive", "rad/s"),
+            omega_error=labelled((), drive.omega_error, "standard error of it", "rad/s"),
+        )
+    )
 
 
 def _smoothed(time: Any, x: xr.DataArray, step: float, omega: float, support: bool) -> xr.Dataset:
@@ -252,5 +262,7 @@ def _attributes(recording: Recording, run: str) -> dict[str, str]:
     return {
         "synthetic": "yes" if recording.synthetic else "no",
         "title": f"{source.get('file') or 'in memory'}, {run}",
-        "run": run, "file": str(source.get("file", "")), "sha256": str(source.get("sha256", "")),
-    }  # fmt: skip
+        "run": run,
+        "file": str(source.get("file", "")),
+        "sha256": str(source.get("sha256", "")),
+    }

@@ -27,9 +27,16 @@ MEASURED_STARTS = 4
 
 
 def compare_motion(
-    measured: xr.Dataset, model: Model, *, noise: FloatArray, start: Any, phases: list[float], grid: int,
-    max_period: int, splits: int,
-) -> dict[str, Any]:  # fmt: skip
+    measured: xr.Dataset,
+    model: Model,
+    *,
+    noise: FloatArray,
+    start: Any,
+    phases: list[float],
+    grid: int,
+    max_period: int,
+    splits: int,
+) -> dict[str, Any]:
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
     folded, sections = _measured(measured, phases, grid)
     scale = _scale(sections)
@@ -54,9 +61,17 @@ def compare_motion(
         both = ("measured_orbit", "theory_orbit")
         closed = tuple(variables[key][1] for key in both) if "phase" in variables else None
         variables |= motion_band(
-            systems, model, predicted.attractor, sections, phases, noise, scale, closed, grid=grid,
+            systems,
+            model,
+            predicted.attractor,
+            sections,
+            phases,
+            noise,
+            scale,
+            closed,
+            grid=grid,
             max_period=max_period,
-        )  # fmt: skip
+        )
         variables |= drawn
     named = {"long_name": "phase of the section", "units": "forcing periods"}
     return variables | {"section_phase": ("section_phase", np.array(phases), named)}
@@ -95,9 +110,13 @@ def _starts(points: FloatArray | None, folded: FloatArray | None, model: Model, 
 
 
 def _clouds(
-    sections: list[FloatArray], blurred: list[FloatArray], exact: list[FloatArray], scale: FloatArray, splits: int,
+    sections: list[FloatArray],
+    blurred: list[FloatArray],
+    exact: list[FloatArray],
+    scale: FloatArray,
+    splits: int,
     seed: int,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     from scipy.stats import wasserstein_distance
 
     size = min(len(points) for points in sections)
@@ -135,9 +154,10 @@ def _clouds(
     for side, key in (("measured", "halves"), ("theory", "other_halves")):
         for word, q in (("median", 0.5), ("p95", 0.95)):
             column(
-                f"{side}_halves_{word}", lambda c, k=key, level=q: np.quantile(getattr(c, k), level),
+                f"{side}_halves_{word}",
+                lambda c, k=key, level=q: np.quantile(getattr(c, k), level),
                 f"energy distance of random halves of the {side} cloud: {'median' if q == 0.5 else '95th percentile'}",
-            )  # fmt: skip
+            )
     column("block", lambda c: c.block, "successive section points kept together in random halves")
     return variables
 
@@ -237,9 +257,18 @@ POINTS = 500  # of the clouds whose distance is taken for each draw
 
 
 def motion_band(
-    systems: list[System], model: Model, nearest: Attractor, sections: list[FloatArray], phases: list[float],
-    noise: FloatArray, scale: FloatArray, closed: tuple[FloatArray, FloatArray] | None, *, grid: int, max_period: int,
-) -> dict[str, Any]:  # fmt: skip
+    systems: list[System],
+    model: Model,
+    nearest: Attractor,
+    sections: list[FloatArray],
+    phases: list[float],
+    noise: FloatArray,
+    scale: FloatArray,
+    closed: tuple[FloatArray, FloatArray] | None,
+    *,
+    grid: int,
+    max_period: int,
+) -> dict[str, Any]:
     """Carry the nearest motion on to each drawn system, and say how the prediction spreads.
 
     Parameters

@@ -275,9 +275,13 @@ def _one_fit(
         return _amplitude(growth, gain, z[4])[forward]
 
     found = least_squares(
-        lambda z: model(z) - size, start, x_scale=[0.1, *[1.0] * (len(start) - 1)], loss="soft_l1", f_scale=2.0,
+        lambda z: model(z) - size,
+        start,
+        x_scale=[0.1, *[1.0] * (len(start) - 1)],
+        loss="soft_l1",
+        f_scale=2.0,
         max_nfev=200,
-    )  # fmt: skip
+    )
     if not found.success:  # 200 evaluations and not there
         return None
     freedom = max(len(size) - len(start), 1)

@@ -74,8 +74,14 @@ class Motions:
         self.points = np.array([one.parameter_vector() for one in systems])
         keep = max(keep, max_period + 1)
         self.settler = Settler(
-            self.system, self.engine, self._plan(phase), model.transient, keep, longest_period(keep, max_period), False,
-        )  # fmt: skip
+            self.system,
+            self.engine,
+            self._plan(phase),
+            model.transient,
+            keep,
+            longest_period(keep, max_period),
+            False,
+        )
 
     def _plan(self, phase: float) -> Section:
         return section_plan(self.system, Stroboscopic(phase))[1]

@@ -95,9 +95,10 @@ def _runs(measured: xr.Dataset, name: str, state: str) -> dict[str, NDArray[Any]
             )
         value, heights = np.asarray(measured[name].values, dtype=float), np.asarray(amplitude.values, dtype=float)
         direction = (
-            np.asarray(measured["direction"].values, dtype=str) if "direction" in measured
+            np.asarray(measured["direction"].values, dtype=str)
+            if "direction" in measured
             else np.full(len(value), "up")
-        )  # fmt: skip
+        )
         has_error = "amplitude_error" in measured
         error = np.asarray(measured["amplitude_error"].values, float) if has_error else np.full(len(value), np.nan)
         known = "period_number" in measured
@@ -112,9 +113,14 @@ def _runs(measured: xr.Dataset, name: str, state: str) -> dict[str, NDArray[Any]
 
 
 def _curves(
-    system: System, model: Model, name: str, state: str, values: FloatArray, runs: dict[str, NDArray[Any]],
+    system: System,
+    model: Model,
+    name: str,
+    state: str,
+    values: FloatArray,
+    runs: dict[str, NDArray[Any]],
     directions: list[Any],
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+) -> tuple[FloatArray, FloatArray]:
     """The predicted curve on a regular grid, and at the runs: one carried sweep over both for each direction."""
     curves = np.empty((len(values), len(directions)))
     at_runs = np.full(len(runs["value"]), np.nan)
@@ -123,7 +129,7 @@ def _curves(
         every = np.union1d(values, runs["value"][mine])
         result = sweep(
             system, name, every, direction=word, transient=model.transient, keep=32, progress=False, **model.options
-        )  # fmt: skip
+        )
         heights = 0.5 * (result["maximum"] - result["minimum"]).sel(state=state).values
         curves[:, d] = heights[np.searchsorted(every, values)]
         at_runs[mine] = heights[np.searchsorted(every, runs["value"][mine])]

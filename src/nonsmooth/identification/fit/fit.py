@@ -136,9 +136,19 @@ def fit(
     from nonsmooth.identification.fit.posterior import posterior_of
 
     problem = problem_of(
-        system, recording, parameters, options["measured"], options["priors"], options["settings"], options["runs"],
-        options["time"], mode, loss, per_run, inputs,
-    )  # fmt: skip
+        system,
+        recording,
+        parameters,
+        options["measured"],
+        options["priors"],
+        options["settings"],
+        options["runs"],
+        options["time"],
+        mode,
+        loss,
+        per_run,
+        inputs,
+    )
     free, tries, seed, progress = options["free_start"], options["tries"], options["seed"], options["progress"]
     begin, profiles = _begun(problem, start, free, leave_out), _profiles(problem, profile)
     best, left = best_of(problem, begin, free, window or np.inf, tries, seed, progress), list[str]()
@@ -149,9 +159,14 @@ def fit(
     asked = {"parameters": list(problem.unknowns.names), "window": window, "tries": tries, "seed": seed}
     given = recording if isinstance(recording, list | tuple) else [recording]
     return outcome(
-        best, asked, synthetic=any(getattr(one, "synthetic", False) for one in given), profiles=profiles,
-        watched=progress, left=left, beside=[posterior_of(best, posterior, seed, progress)] if posterior else [],
-    )  # fmt: skip
+        best,
+        asked,
+        synthetic=any(getattr(one, "synthetic", False) for one in given),
+        profiles=profiles,
+        watched=progress,
+        left=left,
+        beside=[posterior_of(best, posterior, seed, progress)] if posterior else [],
+    )
 
 
 def _profiles(problem: Windows, given: Sequence[str]) -> list[str]:
@@ -174,10 +189,19 @@ def _begun(problem: Windows, start: Any, free: bool, leave_out: bool) -> FloatAr
 
 
 def problem_of(
-    system: System, recording: Any, parameters: Any, measured: Any = None, priors: Any = None, settings: Any = None,
-    runs: Any = None, time: str = "time", mode: Any = None, loss: Any = "linear", per_run: Sequence[str] = (),
+    system: System,
+    recording: Any,
+    parameters: Any,
+    measured: Any = None,
+    priors: Any = None,
+    settings: Any = None,
+    runs: Any = None,
+    time: str = "time",
+    mode: Any = None,
+    loss: Any = "linear",
+    per_run: Sequence[str] = (),
     inputs: Any = None,
-) -> Windows:  # fmt: skip
+) -> Windows:
     """The problem, without windows; the noise is the records' own irregularity."""
     check_system(system, "fit", inputs=True)
     from nonsmooth.identification.fit.first_level import read_modes
@@ -194,16 +218,27 @@ def problem_of(
     unknowns = read_unknowns(system, sensors, parameters, priors, labels, known, per_run)
     if system.inputs and (unknowns.phases or unknowns.clock):
         raise ValueError("inputs have the time of the recording: with them neither 'phase' nor 'clock' can be found")
-    within = [[record.values[sensor.limit(y) == 0, c] for record in records for y in [record.values[:, c]]]
-              for c, sensor in enumerate(sensors.values())]  # fmt: skip
-    irregular = np.array([
-        max(np.sqrt(np.mean([irregularity(y) ** 2 for y in readings])), sensor.floor, 1e-300)
-        for readings, sensor in zip(within, sensors.values(), strict=True)
-    ])  # fmt: skip
+    within = [
+        [record.values[sensor.limit(y) == 0, c] for record in records for y in [record.values[:, c]]]
+        for c, sensor in enumerate(sensors.values())
+    ]
+    irregular = np.array(
+        [
+            max(np.sqrt(np.mean([irregularity(y) ** 2 for y in readings])), sensor.floor, 1e-300)
+            for readings, sensor in zip(within, sensors.values(), strict=True)
+        ]
+    )
     return Windows(
-        system, Marcher(system, unknowns.active), records, sensors, unknowns, irregular,
-        read_modes(system, mode, labels), np.zeros(len(sensors)), _LOSSES[loss],
-    )  # fmt: skip
+        system,
+        Marcher(system, unknowns.active),
+        records,
+        sensors,
+        unknowns,
+        irregular,
+        read_modes(system, mode, labels),
+        np.zeros(len(sensors)),
+        _LOSSES[loss],
+    )
 
 
 def best_of(

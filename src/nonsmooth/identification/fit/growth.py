@@ -107,9 +107,14 @@ class Grown:
 
 
 def grow(
-    problem: Windows, theta: FloatArray, length: float, start: FloatArray | None, free: bool, longest: float,
+    problem: Windows,
+    theta: FloatArray,
+    length: float,
+    start: FloatArray | None,
+    free: bool,
+    longest: float,
     told: Callable[[], None],
-) -> Grown:  # fmt: skip
+) -> Grown:
     """Fit from a first guess.
 
     Parameters
@@ -217,9 +222,15 @@ def _joined(problem: Windows, starts: FloatArray, length: float) -> list[Window]
         behind = groups[k + 1][0][0] if k + 1 < len(groups) else head
         # samples between, of windows that could not be simulated, come back here
         last = behind.first if behind.record == head.record and behind is not head else len(record.time)
-        found.append(replace(
-            head, last=last, start=start, time=record.time[head.first:last], values=record.values[head.first:last]
-        ))  # fmt: skip
+        found.append(
+            replace(
+                head,
+                last=last,
+                start=start,
+                time=record.time[head.first : last],
+                values=record.values[head.first : last],
+            )
+        )
     return found
 
 

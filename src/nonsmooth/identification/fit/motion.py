@@ -67,9 +67,15 @@ class Marcher:
         self._tables: tuple[bytes, Any] = b"", None
 
     def run(
-        self, values: FloatArray, begin: float, times: FloatArray, z: FloatArray, mode: int, derivatives: bool = False,
+        self,
+        values: FloatArray,
+        begin: float,
+        times: FloatArray,
+        z: FloatArray,
+        mode: int,
+        derivatives: bool = False,
         drive: Driven | None = None,
-    ) -> Motion | None:  # fmt: skip
+    ) -> Motion | None:
         """March from (begin, z, mode) to the samples; None where the run does not come to its end."""
         period = self.system.period_at(values)
         n_u = len(self.traced.u)
@@ -101,9 +107,15 @@ class Marcher:
         return self._derived(plain, values, begin, z, mode, course, [*zip(cuts, places, strict=True)])
 
     def _derived(
-        self, plain: Motion, values: FloatArray, begin: float, z: FloatArray, mode: int, course: Course | None,
+        self,
+        plain: Motion,
+        values: FloatArray,
+        begin: float,
+        z: FloatArray,
+        mode: int,
+        course: Course | None,
         changes: list[tuple[float, int]],
-    ) -> Motion:  # fmt: skip
+    ) -> Motion:
         """The same with derivatives: products over the pieces between samples and transitions."""
         flow, log, n = self.flow, plain.log, self.flow.n
         size = n + flow.n_active

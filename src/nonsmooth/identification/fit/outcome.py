@@ -33,9 +33,14 @@ METHOD = (
 
 
 def outcome(
-    grown: Grown, options: Mapping[str, Any], synthetic: bool = False, profiles: Sequence[str] = (),
-    watched: Progress = False, left: Sequence[str] = (), beside: Sequence[Finding] = (),
-) -> ParameterSet:  # fmt: skip
+    grown: Grown,
+    options: Mapping[str, Any],
+    synthetic: bool = False,
+    profiles: Sequence[str] = (),
+    watched: Progress = False,
+    left: Sequence[str] = (),
+    beside: Sequence[Finding] = (),
+) -> ParameterSet:
     """The parameters, with what is known of how well."""
     problem, theta = grown.problem, grown.theta
     u = problem.unknowns
@@ -68,14 +73,25 @@ def outcome(
     beside = [*profiled(grown, known, normal, found.covariance, synthetic, watched), *beside]
     notes = [*left, *_notes(grown, found, data)] + [note for finding in beside for note in finding.notes]
     finding = Finding(
-        "fit", next(iter({**estimates, **extra}.values())), METHOD, data.sizes["sample"],
-        grown.runs, tuple(notes), data=data, plot="fit_residuals",
-    )  # fmt: skip
+        "fit",
+        next(iter({**estimates, **extra}.values())),
+        METHOD,
+        data.sizes["sample"],
+        grown.runs,
+        tuple(notes),
+        data=data,
+        plot="fit_residuals",
+    )
     return ParameterSet(
-        estimates, covariance, extra=extra, findings=[finding, *beside],
-        identifiability=_sentences(grown, covariance[:m, :m], loose, data), notes=notes,
-        anomalies=_anomalies(grown, data), synthetic=synthetic,
-    )  # fmt: skip
+        estimates,
+        covariance,
+        extra=extra,
+        findings=[finding, *beside],
+        identifiability=_sentences(grown, covariance[:m, :m], loose, data),
+        notes=notes,
+        anomalies=_anomalies(grown, data),
+        synthetic=synthetic,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,8 +221,10 @@ def _of_readings(grown: Grown, c: int, data: xr.Dataset) -> list[str]:
     if 0 < len(out) < _FEW * len(r):
         at = ", ".join(f"{t:.6g}" for t in time[out[:_NAMED]]) + (", ..." if len(out) > _NAMED else "")
         weighed = "has weighed them down" if np.isfinite(problem.loss) else "weighs such readings down"
-        notes.append(f"{len(out)} outliers of {name}, {OUTLYING:g} noise deviations off or more, at t = {at}; "
-                     f"loss='huber' {weighed}")  # fmt: skip
+        notes.append(
+            f"{len(out)} outliers of {name}, {OUTLYING:g} noise deviations off or more, at t = {at}; "
+            f"loss='huber' {weighed}"
+        )
     at_limits = sum(int(np.count_nonzero(problem.limits(w)[w.readings[1] == c])) for w in problem.pieces)
     if at_limits:
         notes.append(f"{at_limits} readings of {name} are at a limit of its sensor: they count as there or beyond")

@@ -150,9 +150,14 @@ def plan_experiment(
 
 
 def _information(
-    system: System, name: str, run: Mapping[str, Any], parameters: Sequence[str], sensors: Mapping[str, Any],
-    noise: FloatArray, known_before: Known,
-) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:  # fmt: skip
+    system: System,
+    name: str,
+    run: Mapping[str, Any],
+    parameters: Sequence[str],
+    sensors: Mapping[str, Any],
+    noise: FloatArray,
+    known_before: Known,
+) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:
     """Names of the unknowns that runs share, what the run tells of them, what is known before, and their values."""
     from nonsmooth.flow.simulate import simulate
     from nonsmooth.identification.fit.first_windows import first_windows

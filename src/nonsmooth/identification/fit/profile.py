@@ -68,7 +68,7 @@ METHOD = (
 
 def profiled(
     grown: Grown, names: list[str], normal: FloatArray, covariance: FloatArray, synthetic: bool, watched: Progress
-) -> list[Finding]:  # fmt: skip
+) -> list[Finding]:
     """A finding for each of these unknowns.
 
     Parameters
@@ -130,11 +130,16 @@ def _finding(grown: Grown, name: str, profile: Profile, estimate: Estimate, synt
     if not np.isfinite(list(ends.values())).all():
         note += "; the record does not bound it on both sides"
     return Finding(
-        f"{name}, profile", estimate, METHOD, grown.readings, grown.runs, (note,),
+        f"{name}, profile",
+        estimate,
+        METHOD,
+        grown.readings,
+        grown.runs,
+        (note,),
         data=xr.Dataset(
             {"cost": ("value", profile.cost), "best": ((), profile.best), **{k: ((), v) for k, v in ends.items()}},
             {"value": ("value", profile.values, {"units": estimate.unit})},
             {"parameter": name, "units": estimate.unit, "synthetic": "yes" if synthetic else "no"},
         ),
         plot="profile",
-    )  # fmt: skip
+    )

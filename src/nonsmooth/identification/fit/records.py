@@ -59,9 +59,15 @@ def irregularity(y: FloatArray) -> float:
 
 
 def read_records(
-    system: System, recording: Any, measured: Any, *, runs: Sequence[str] | None = None, time: str = "time",
-    settings: Any = None, inputs: Any = None,
-) -> tuple[dict[str, Sensor], list[Record]]:  # fmt: skip
+    system: System,
+    recording: Any,
+    measured: Any,
+    *,
+    runs: Sequence[str] | None = None,
+    time: str = "time",
+    settings: Any = None,
+    inputs: Any = None,
+) -> tuple[dict[str, Sensor], list[Record]]:
     """The sensors and the records of a recording.
 
     Raises

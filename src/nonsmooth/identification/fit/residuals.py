@@ -59,9 +59,11 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
     units = {**system.states, **system.outputs}
     unit = " ".join(units[q] for q in quantities) if len(quantities) == 1 else "that of the quantity"
     flags = {
-        "run": [record.name for record in problem.records], "quantity": quantities, "mode": list(system.modes),
+        "run": [record.name for record in problem.records],
+        "quantity": quantities,
+        "mode": list(system.modes),
         "place": labels,
-    }  # fmt: skip
+    }
     data = xr.Dataset({name: ("sample", values) for name, values in table.items()})
     data["residual"] = (data["measured"] - data["fitted"]) / data["noise"]
     for name, words in flags.items():

@@ -87,9 +87,15 @@ def select_model(
             raise TypeError(f"models[{name!r}] must be a pair (system, parameters), not {type(pair).__name__}")
         check_system(pair[0], "select_model")
         problems[str(name)] = problem_of(
-            pair[0], recording, pair[1], options["measured"], None, options["settings"],
-            options["runs"], options["time"],
-        )  # fmt: skip
+            pair[0],
+            recording,
+            pair[1],
+            options["measured"],
+            None,
+            options["settings"],
+            options["runs"],
+            options["time"],
+        )
     held = _held_out(next(iter(problems.values())), folds)
     found = np.empty((len(problems), folds))
     with watched(len(problems) * folds, "models", progress) as advance:

@@ -67,9 +67,14 @@ class Unknowns:
 
 
 def read_unknowns(
-    system: System, sensors: Mapping[str, Sensor], parameters: Any, priors: Any, runs: Sequence[str],
-    settings: Sequence[Mapping[str, float]], per_run: Sequence[str] = (),
-) -> Unknowns:  # fmt: skip
+    system: System,
+    sensors: Mapping[str, Sensor],
+    parameters: Any,
+    priors: Any,
+    runs: Sequence[str],
+    settings: Sequence[Mapping[str, float]],
+    per_run: Sequence[str] = (),
+) -> Unknowns:
     """Read the unknowns of a fit from names, bounds and priors, and those of which each run has its own.
 
     Raises
@@ -120,9 +125,19 @@ def read_unknowns(
             low[i], high[i] = _bounds(name, pair, guess[i])
     centre, precision = _known(tuple(names), priors, guess)
     return Unknowns(
-        tuple(names), active, of_sensors, clock, phases, tuple(allowed[name] for name in base), guess, low, high,
-        centre, precision, places,
-    )  # fmt: skip
+        tuple(names),
+        active,
+        of_sensors,
+        clock,
+        phases,
+        tuple(allowed[name] for name in base),
+        guess,
+        low,
+        high,
+        centre,
+        precision,
+        places,
+    )
 
 
 def _known_unknowns(system: System, sensors: Mapping[str, Sensor]) -> dict[str, tuple[float, str]]:

@@ -154,9 +154,15 @@ class Windows:
         return self.march(theta, window.record, window.begin, instants, start, window.mode, derivatives)
 
     def march(
-        self, theta: FloatArray, run: int, begin: float, times: FloatArray, start: FloatArray, mode: int,
+        self,
+        theta: FloatArray,
+        run: int,
+        begin: float,
+        times: FloatArray,
+        start: FloatArray,
+        mode: int,
         derivatives: bool = False,
-    ) -> Motion | None:  # fmt: skip
+    ) -> Motion | None:
         """A motion from an instant of a run to times of its corrected clock; None where it does not come to its end."""
         values, begin = self.values(theta, run), self.clock(theta, run) * begin
         if values is None or not np.isfinite(theta).all() or not np.isfinite(start).all():
@@ -165,9 +171,7 @@ class Windows:
             return None
         period = self.system.period_at(values)
         shift = 0.0 if period is None else self.phase(theta, run) * period
-        return self.marcher.run(
-            values, begin + shift, times + shift, start, mode, derivatives, self.records[run].drive
-        )
+        return self.marcher.run(values, begin + shift, times + shift, start, mode, derivatives, self.records[run].drive)
 
     def delays(self, theta: FloatArray, run: int) -> FloatArray:
         return np.array([sensor.delay for sensor in self.sensor_values(theta, run).values()])
@@ -231,9 +235,7 @@ class Windows:
         at = np.stack([sensor.limit(window.values[:, j]) for j, sensor in enumerate(self.sensors.values())], axis=1)
         return np.asarray(at[k, c])
 
-    def _censored(
-        self, window: Window, r: FloatArray, table: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    def _censored(self, window: Window, r: FloatArray, table: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residuals and derivatives where those at a limit are of the likelihood of being there or beyond."""
         side = self.limits(window)
         at = np.flatnonzero(side)

@@ -23,9 +23,7 @@ def joined(parts: Iterable[str], absent: Iterable[str] = ()) -> str:
     parts = tuple(parts)
     text = "\n".join(_ROOM.joinpath(*part.split(".")).with_suffix(".py").read_text(encoding="utf-8") for part in parts)
     own = "|".join(re.escape(part) for part in {*parts, *PLACES, *absent})
-    return re.sub(
-        rf"^from nonsmooth\.kernels\.(?:{own}) import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE
-    )  # fmt: skip
+    return re.sub(rf"^from nonsmooth\.kernels\.(?:{own}) import (\([^)]*\).*|[^(\n]*)$", "", text, flags=re.MULTILINE)
 
 
 def with_numbers(text: str, numbers: Mapping[str, int]) -> str:

@@ -55,9 +55,10 @@ def level() -> str:
     machine = platform.machine().lower()
     there = set(get_host_cpu_features().split(","))
     possible = [
-        name for name, needed in LEVELS.get(_SAME.get(machine, machine), {}).items()
+        name
+        for name, needed in LEVELS.get(_SAME.get(machine, machine), {}).items()
         if there.issuperset(f"+{feature}" for feature in needed.split())
-    ]  # fmt: skip
+    ]
     chosen = os.environ.get("NONSMOOTH_LEVEL", "")
     if chosen and chosen not in possible:
         raise ValueError(f"NONSMOOTH_LEVEL={chosen}: this processor has {', '.join(possible) or 'no level'}; unset it")

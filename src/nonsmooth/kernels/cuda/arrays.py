@@ -132,6 +132,24 @@ def arrays_of_thread(packed, multiples, i):
     lacking[0, 0] = 0
     form = Form(A, b, c, s, multiples, omega, period, ia, ib, ic, is_, oa, ob, oc, os_, ra, rb, rc, rs, lacking)
     work = Work(
-        w, w1, wn, wp, wq, end, there, before, row, scr, points, rates, zero, found, visited, twin, built, tally, memo,
-    )  # fmt: skip
+        w,
+        w1,
+        wn,
+        wp,
+        wq,
+        end,
+        there,
+        before,
+        row,
+        scr,
+        points,
+        rates,
+        zero,
+        found,
+        visited,
+        twin,
+        built,
+        tally,
+        memo,
+    )
     return form, (Tables(prop, rot, fun, tay, field, info, some, bands, lines), work)

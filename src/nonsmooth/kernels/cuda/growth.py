@@ -44,9 +44,23 @@ def frames(jobs, rows, point, net, place, count, units, limit, scale, found):
     motion.counters[1] = 0
     none, nothing = counters[j, 0:0], u[j, 0:0]
     seen = Growth(
-        scale, Q[j], logarithms, lengths, sums[j], step, reset, matrix, fields, t_z, turned, none, none, 0, nothing,
+        scale,
+        Q[j],
+        logarithms,
+        lengths,
+        sums[j],
+        step,
+        reset,
+        matrix,
+        fields,
+        t_z,
+        turned,
+        none,
+        none,
+        0,
         nothing,
-    )  # fmt: skip
+        nothing,
+    )
     goal = Goal(GROW, 0, count, 0.0, units[rows[j]], limit, 1 << 62)
     section = Section(0.0, -1, 0, -1, 0, 1, 0.0, 0)
     status[j] = march(0, form, Net(*net), section, goal, motion, Seen((), (), seen), scratch[0], scratch[1])

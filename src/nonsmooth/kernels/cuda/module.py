@@ -20,28 +20,53 @@ from nonsmooth.kernels.linear.module import STEPPER
 
 OBSERVERS = {
     "sections": (
-        "linear.extremes", "hybrid.sections", "hybrid.observers", "judging.judge", "judging.settle", "judging.exponent",
-        "cuda.arrays", "cuda.tables", "cuda.advance", "cuda.settle", "cuda.neighbours",
+        "linear.extremes",
+        "hybrid.sections",
+        "hybrid.observers",
+        "judging.judge",
+        "judging.settle",
+        "judging.exponent",
+        "cuda.arrays",
+        "cuda.tables",
+        "cuda.advance",
+        "cuda.settle",
+        "cuda.neighbours",
     ),
     "growth": (
-        "tangent.frame", "linear.growth", "hybrid.growth", "hybrid.observers", "cuda.arrays", "cuda.tables",
+        "tangent.frame",
+        "linear.growth",
+        "hybrid.growth",
+        "hybrid.observers",
+        "cuda.arrays",
+        "cuda.tables",
         "cuda.growth",
     ),
-}  # fmt: skip
+}
 ELSEWHERE = ("hybrid.growth", "hybrid.record", "hybrid.sections", "linear.sums", "series.generated")  # not for a GPU
 
 
 @cache
 def cuda_linear_module(
-    harmonics: int, modes: int, indicators: int, outputs: int, transitions: int, rows: int,
+    harmonics: int,
+    modes: int,
+    indicators: int,
+    outputs: int,
+    transitions: int,
+    rows: int,
     observer: str = "sections",
-) -> ModuleType:  # fmt: skip
+) -> ModuleType:
     """The module with the entries of the ``cuda`` texts of one observer; ``rows`` counts those of the section too."""
     sizes = {
-        "HARMONICS": harmonics, "N_MODES": modes, "N_INDICATORS": indicators, "N_OUTPUTS": outputs,
-        "N_TRANSITIONS": transitions, "N_ROWS": rows, "LOGS": 0, "GROWS": 2 if observer == "growth" else 0,
+        "HARMONICS": harmonics,
+        "N_MODES": modes,
+        "N_INDICATORS": indicators,
+        "N_OUTPUTS": outputs,
+        "N_TRANSITIONS": transitions,
+        "N_ROWS": rows,
+        "LOGS": 0,
+        "GROWS": 2 if observer == "growth" else 0,
         "MAY_WAIT": 0,
-    }  # fmt: skip
+    }
     text = with_numbers(joined((*STEPPER, *OBSERVERS[observer])), sizes)
     name = "_".join(map(str, (harmonics, modes, indicators, outputs, transitions, rows)))
     return load_module(text + stamp(), f"cuda_{observer}_{name}")

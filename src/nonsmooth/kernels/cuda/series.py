@@ -89,9 +89,37 @@ def arrays_of_thread():
     tally = cuda.local.array(N_SERIES_TALLY, int64)
     memo = cuda.local.array(N_SERIES_MEMO, float64)
     return SeriesWork(
-        w, end, before, wp, dense_, q, q_new, C, W, J0, J1, (K0, K1, K2, K3, K4, K5, K6, K7), powers, a, d, vals, near,
-        scale, measured, side, side_next, rise, usual, dwell, visited, stack, found, rest, tally, memo,
-    )  # fmt: skip
+        w,
+        end,
+        before,
+        wp,
+        dense_,
+        q,
+        q_new,
+        C,
+        W,
+        J0,
+        J1,
+        (K0, K1, K2, K3, K4, K5, K6, K7),
+        powers,
+        a,
+        d,
+        vals,
+        near,
+        scale,
+        measured,
+        side,
+        side_next,
+        rise,
+        usual,
+        dwell,
+        visited,
+        stack,
+        found,
+        rest,
+        tally,
+        memo,
+    )
 
 
 @once
@@ -151,9 +179,24 @@ def advance(jobs, rows, point, norms, plan, settings, place, counts, way, betwee
         for n in range(N_MEMORY):
             work.q[N_PARAMETERS + n] = memory[j, n]
     form = Generated(
-        periods, own[:, :N_PARAMETERS], periods[i : i + 1], LACKING, KINDS, norms[0], norms[1],
-        settings[0], settings[1], METHOD, ORDER, 1, CHECKED, CORNERS, N_GUARDS, N_INDICATORS, N_OUTPUTS,
-    )  # fmt: skip
+        periods,
+        own[:, :N_PARAMETERS],
+        periods[i : i + 1],
+        LACKING,
+        KINDS,
+        norms[0],
+        norms[1],
+        settings[0],
+        settings[1],
+        METHOD,
+        ORDER,
+        1,
+        CHECKED,
+        CORNERS,
+        N_GUARDS,
+        N_INDICATORS,
+        N_OUTPUTS,
+    )
     at = Section(settings[2] if plan[0] < 0 else -1.0, plan[0], plan[1], plan[2], plan[3], plan[4], settings[3], 1)
     returns = transient[min(j, transient.shape[0] - 1)], keep[min(j, keep.shape[0] - 1)]
     goal = Goal(RETURNS_OF_SECTION, returns[0], returns[1], 0.0, 0.0, norms[2], pause)

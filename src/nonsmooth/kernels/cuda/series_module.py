@@ -17,10 +17,25 @@ from nonsmooth.kernels.compile.cache import load_module
 from nonsmooth.kernels.cuda.module import joined, stamp
 
 PARTS = (
-    "circular", "series.polynomial", "series.crossing", "series.rkf45", "series.taylor", "series.trust", "series.step",
-    "series.watch", "series.instant", "series.stepper", "hybrid.loop", "hybrid.sections", "hybrid.observers",
-    "judging.judge", "judging.settle", "judging.exponent", "cuda.settle", "cuda.series",
-)  # fmt: skip
+    "circular",
+    "series.polynomial",
+    "series.crossing",
+    "series.rkf45",
+    "series.taylor",
+    "series.trust",
+    "series.step",
+    "series.watch",
+    "series.instant",
+    "series.stepper",
+    "hybrid.loop",
+    "hybrid.sections",
+    "hybrid.observers",
+    "judging.judge",
+    "judging.settle",
+    "judging.exponent",
+    "cuda.settle",
+    "cuda.series",
+)
 
 
 def cuda_series_source(model: str, sizes: Mapping[str, int], tables: Mapping[str, Any]) -> str:
@@ -36,8 +51,10 @@ def cuda_series_source(model: str, sizes: Mapping[str, int], tables: Mapping[str
         The arrays there.
     """
     text = joined(PARTS, model)
-    for names in (("METHOD", "ORDER", "CHECKED", "CORNERS", "N_GUARDS"),
-                  ("N_PARAMETERS", "N_MEMORY", "N_INDICATORS", "N_OUTPUTS", "N_SCRATCH_ROWS")):  # fmt: skip
+    for names in (
+        ("METHOD", "ORDER", "CHECKED", "CORNERS", "N_GUARDS"),
+        ("N_PARAMETERS", "N_MEMORY", "N_INDICATORS", "N_OUTPUTS", "N_SCRATCH_ROWS"),
+    ):
         line = f"{', '.join(names)} = {', '.join(str(int(sizes[name])) for name in names)}"
         text, found = re.subn(rf"^{', '.join(names)} = [\d, ]+$", line, text, flags=re.MULTILINE)
         assert found == 1, names

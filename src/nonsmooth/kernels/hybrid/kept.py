@@ -41,7 +41,13 @@ class Kept(NamedTuple):
         """Room for ``keep`` section points of each of so many runs."""
         whole, real = np.int64, np.nan
         return cls(
-            np.full((points, keep, n), real), np.full((points, rows), real), np.full((points, rows), real),
-            np.zeros(points, whole), np.zeros(points, whole), np.zeros(points), np.full((points, keep), real),
-            np.zeros((points, keep), whole), np.zeros(points, whole),
-        )  # fmt: skip
+            np.full((points, keep, n), real),
+            np.full((points, rows), real),
+            np.full((points, rows), real),
+            np.zeros(points, whole),
+            np.zeros(points, whole),
+            np.zeros(points),
+            np.full((points, keep), real),
+            np.zeros((points, keep), whole),
+            np.zeros(points, whole),
+        )

@@ -262,8 +262,9 @@ def march(i, form, net, section, goal, motion, seen, tables, work):
             stopped = t < 0 and sense == 0 and (step >= wait or memo[TIME] + step >= stop)
             if stopped and timed >= 0:
                 t = timed
-            state = observe(i, step, stop if stopped else -1.0, t >= 0 and t == timed, form, net, section, goal, seen,
-                            tables, work)  # fmt: skip
+            state = observe(
+                i, step, stop if stopped else -1.0, t >= 0 and t == timed, form, net, section, goal, seen, tables, work
+            )
             if state == CLOSED:
                 break
             tally[SOURCE], tally[NOTED] = tally[MODE], state

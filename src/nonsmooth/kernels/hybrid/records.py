@@ -259,17 +259,27 @@ UNTIL, UNIT, PHASE, T_MAX = range(4)
 N_ORDERS, N_REALS = 13, 4
 
 
-FORM = type_of(
-    Form, _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4, _i2
-)  # fmt: skip
+FORM = type_of(Form, _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4, _i2)
 TABLES = type_of(Tables, _f4, _f3, _f3, _f4, _f3, _f2, _i[:, :, :, ::1], _f3, _i[:, :, ::1])
 NET = type_of(Net, _i2, _i2, _i1, _i1, _i1, _f1, _i2, _i1, _i1, _i1)
 WORK = type_of(Work, *[_f1] * 8, _f2, _f2, _f1, _f1, *[_i1] * 6, _f1)
 GENERATED = type_of(Generated, _i1, _f2, _f1, _i2, _i1, _f1, _f1, _f, _f, *[_i] * 8)
 SERIES_WORK = type_of(
-    SeriesWork, *[_f1] * 7, *[_f2] * 4, types.UniTuple(_f1, 8), *[_f1] * 7, *[_i1] * 3, _f1, _f1, _i1, _f1, _i1, _f1,
-    _i1, _f1,
-)  # fmt: skip
+    SeriesWork,
+    *[_f1] * 7,
+    *[_f2] * 4,
+    types.UniTuple(_f1, 8),
+    *[_f1] * 7,
+    *[_i1] * 3,
+    _f1,
+    _f1,
+    _i1,
+    _f1,
+    _i1,
+    _f1,
+    _i1,
+    _f1,
+)
 MOTION = type_of(Motion, _f1, _f1, _f1, _i1)
 CALL = type_of(Call, _i1, _f1, _f1, _f2, MOTION)
 KEPT = type_of(Kept, _f3, _f2, _f2, _i1, _i1, _f1, _f2, _i2, _i1)

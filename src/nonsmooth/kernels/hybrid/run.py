@@ -83,9 +83,15 @@ def run(system, call, kept, log, growth):
     orders, reals, limit, starts, motion = call_at(call)
     kind, code = orders[KIND], OK
     section = Section(
-        reals[PHASE], orders[INDICATOR], orders[RISING], orders[OF_MODE], orders[AFTER], orders[EVERY], reals[T_MAX],
+        reals[PHASE],
+        orders[INDICATOR],
+        orders[RISING],
+        orders[OF_MODE],
+        orders[AFTER],
+        orders[EVERY],
+        reals[T_MAX],
         orders[EXTREMES],
-    )  # fmt: skip
+    )
     goal = Goal(kind, orders[TRANSIENT], orders[KEEP], reals[UNTIL], reals[UNIT], limit, orders[PATIENCE_LEFT])
     for i in range(orders[BEGIN], orders[END]):
         if work.tally[BEGUN] == 0 and work.tally[STARTS] == 0 and kind == RETURNS_OF_SECTION:

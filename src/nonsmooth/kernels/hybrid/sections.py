@@ -43,10 +43,16 @@ def stroboscopic_hit(s, s1, target, period):
 def window_of(kept, row):
     """The arrays of one run."""
     return Kept(
-        kept.section[row], kept.high[row], kept.low[row], kept.crossings[row : row + 1],
-        kept.contacts[row : row + 1], kept.elapsed[row : row + 1], kept.section_time[row], kept.section_mode[row],
+        kept.section[row],
+        kept.high[row],
+        kept.low[row],
+        kept.crossings[row : row + 1],
+        kept.contacts[row : row + 1],
+        kept.elapsed[row : row + 1],
+        kept.section_time[row],
+        kept.section_mode[row],
         kept.status[row : row + 1],
-    )  # fmt: skip
+    )
 
 
 @once
@@ -85,9 +91,18 @@ def hurry(i, form, net, section, goal, seen, tables, work, patience):
     T = form.period[i]
     began, turns = memo[TIME], memo[PERIODS]
     s, whole, counted, first, patience = stride(
-        tables, net, work, tally[MODE], began, turns, section.phase * T, T, returns,
-        goal.transient if returns < goal.transient else 0, patience,
-    )  # fmt: skip
+        tables,
+        net,
+        work,
+        tally[MODE],
+        began,
+        turns,
+        section.phase * T,
+        T,
+        returns,
+        goal.transient if returns < goal.transient else 0,
+        patience,
+    )
     if counted > returns:
         tally[RETURNS] = counted
         tally[JUMPS], tally[TRIES] = 0, 0

@@ -16,7 +16,7 @@ from nonsmooth.kernels.linear.tables import (
     states_of,
     times_generator,
     width_of,
-)  # fmt: skip
+)
 
 
 @device

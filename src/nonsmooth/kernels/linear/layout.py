@@ -19,7 +19,7 @@ LANES = 4  # numbers of a vector: columns of propagators are filled up to whole 
 
 def scratch(
     states: int, harmonics: int, n_modes: int, n_indicators: int, n_outputs: int, n_rows: int, apart: bool = False
-) -> tuple[Tables, Work]:  # fmt: skip
+) -> tuple[Tables, Work]:
     """Tables and working memory for one thread, in one block.
 
     ``apart``: each table by itself, which takes memory only where it is written."""
@@ -31,18 +31,25 @@ def scratch(
         return np.zeros(shape, dtype=np.int64)
 
     tables = (
-        np.zeros((n_modes, NODES + 1, m, filled)), np.zeros((n_modes, NODES + 1, 2 * harmonics + 1)),
-        np.zeros((n_modes, n_f, 2 * (m + n + 1))), np.zeros((n_modes, n_f, m, DEGREE + 1)),
-        np.zeros((n_modes, n, m)), np.zeros((n_modes, 2 + n)),
+        np.zeros((n_modes, NODES + 1, m, filled)),
+        np.zeros((n_modes, NODES + 1, 2 * harmonics + 1)),
+        np.zeros((n_modes, n_f, 2 * (m + n + 1))),
+        np.zeros((n_modes, n_f, m, DEGREE + 1)),
+        np.zeros((n_modes, n, m)),
+        np.zeros((n_modes, 2 + n)),
         whole(1, 1, 1, 1) if planar else whole(n_modes, n_f, 2, m + 1),
         np.zeros((n_modes, n + m, n) if n >= BANDED else (n_modes, 1, 1)),
         whole(n_modes, n + m if n >= BANDED else 1, 3),
-    )  # fmt: skip
+    )
     work = (
-        *(np.zeros(m + LANES) for _ in range(8)), np.zeros((max(TERMS, n) + 1, m)),
-        np.zeros((n_rows + n + 1, WIDTH)), np.zeros(4), np.zeros(harmonics),
-        *map(whole, (n_indicators, 4, n_modes, n_indicators, 2, N_TALLY)), np.zeros(N_MEMO),
-    )  # fmt: skip
+        *(np.zeros(m + LANES) for _ in range(8)),
+        np.zeros((max(TERMS, n) + 1, m)),
+        np.zeros((n_rows + n + 1, WIDTH)),
+        np.zeros(4),
+        np.zeros(harmonics),
+        *map(whole, (n_indicators, 4, n_modes, n_indicators, 2, N_TALLY)),
+        np.zeros(N_MEMO),
+    )
     if apart:
         return Tables(*tables), Work(*one_block(*work))
     block = one_block(*tables, *work)

@@ -9,13 +9,26 @@ from nonsmooth.kernels.compile.assembly import joined, with_numbers
 from nonsmooth.kernels.compile.cache import load_module
 
 STEPPER = (
-    "linear.tables", "linear.bands", "linear.build", "linear.polynomial", "linear.values", "linear.search",
-    "linear.limits", "linear.stepper", "hybrid.loop",
-)  # fmt: skip
+    "linear.tables",
+    "linear.bands",
+    "linear.build",
+    "linear.polynomial",
+    "linear.values",
+    "linear.search",
+    "linear.limits",
+    "linear.stepper",
+    "hybrid.loop",
+)
 OBSERVERS = (
-    "linear.extremes", "linear.touches", "linear.growth", "hybrid.sections", "hybrid.record", "hybrid.growth",
-    "hybrid.observers", "hybrid.run",
-)  # fmt: skip
+    "linear.extremes",
+    "linear.touches",
+    "linear.growth",
+    "hybrid.sections",
+    "hybrid.record",
+    "hybrid.growth",
+    "hybrid.observers",
+    "hybrid.run",
+)
 
 
 def is_planar(states: int, harmonics: int) -> bool:

@@ -23,7 +23,7 @@ from nonsmooth.kernels.linear.polynomial import (
     horner,
     next_upward,
     slope_at,
-)  # fmt: skip
+)
 from nonsmooth.kernels.linear.tables import DEGREE, NODES, states_of, width_of
 from nonsmooth.kernels.linear.values import (
     NODE,
@@ -36,7 +36,7 @@ from nonsmooth.kernels.linear.values import (
     slope_of,
     to_node,
     value_of,
-)  # fmt: skip
+)
 
 WIDTH = DEGREE + 1
 # Further places in ``work.found``: the functional that crossed last; whether all conditions are positive at a piece's

@@ -87,9 +87,11 @@ def ends_of(row, some, w, w1, n, m):
     if whole_at(some, 0) > FEW:
         slope = row + 8 * m
         return (
-            row_of(row, some, w, n, m), row_of(slope, some, w, n, m), row_of(row, some, w1, n, m),
+            row_of(row, some, w, n, m),
+            row_of(slope, some, w, n, m),
+            row_of(row, some, w1, n, m),
             row_of(slope, some, w1, n, m),
-        )  # fmt: skip
+        )
     g0, s0 = number_at(row, n), number_at(row, m + n)
     g1, s1 = g0, s0
     for j in range(n + 1, m):

@@ -41,9 +41,13 @@ def catch_up(seen, work):
     memo = work.memo
     along = frame_along_at(seen.functions[0])
     reach = along(
-        seen.follower, work.tally[MODE], memo[place.ANCHOR], memo[place.GONE], memo[place.REACH],
+        seen.follower,
+        work.tally[MODE],
+        memo[place.ANCHOR],
+        memo[place.GONE],
+        memo[place.REACH],
         work.tally[RETURNS],
-    )  # fmt: skip
+    )
     memo[place.REACH] = reach
     return reach >= 0.0
 

@@ -18,8 +18,19 @@ N_SERIES_TALLY = FIRST_COUNT + 11
 # will be at the end of the leg; the length that was planned; value and slope of the section's indicator at its end; the
 # longest time between two crossings; where a frame was carried to, the time since, and how far its series reach
 (
-    BASE, LENGTH, PART, CURSOR, AHEAD, PLANNED, VALUE_BEFORE, SLOPE_BEFORE, LONGEST, ANCHOR, GONE, REACH,
-) = range(FIRST_TIME, FIRST_TIME + 12)  # fmt: skip
+    BASE,
+    LENGTH,
+    PART,
+    CURSOR,
+    AHEAD,
+    PLANNED,
+    VALUE_BEFORE,
+    SLOPE_BEFORE,
+    LONGEST,
+    ANCHOR,
+    GONE,
+    REACH,
+) = range(FIRST_TIME, FIRST_TIME + 12)
 N_SERIES_MEMO = FIRST_TIME + 12
 
 AT_REST = 1000  # steps in a row near one place, before a state without forcing counts as an equilibrium

@@ -80,9 +80,18 @@ def next_pass(form, section, work):
             work.side_next[s] = 1 if low > 0.0 else -1
             return -1.0, 0
     x = section_crossing(
-        work.C, n + s, degree, section.rising, work.side[s] if cursor == 0.0 else 0, cursor, work.powers,
-        work.scale[s], work.a, work.stack, work.found,
-    )  # fmt: skip
+        work.C,
+        n + s,
+        degree,
+        section.rising,
+        work.side[s] if cursor == 0.0 else 0,
+        cursor,
+        work.powers,
+        work.scale[s],
+        work.a,
+        work.stack,
+        work.found,
+    )
     sense = work.found[1]
     work.side_next[s] = sense
     if x == NONE or (tally[place.PENDING] >= 0 and x * h >= part * (1.0 - 1e-10)):

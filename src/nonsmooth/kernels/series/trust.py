@@ -91,8 +91,13 @@ def misfits(form, work, tau, length):
     state and the time does to the equations does not count."""
     mode, t, u, q, n, C, m = work.tally[MODE], work.memo[TIME], work.w, work.q, work.w.shape[0], work.C, form.order
     n_indicators, weight, rtol, scale, vals, vals_near = (
-        form.indicators, form.weight, form.rtol, work.scale, work.vals, work.near,
-    )  # fmt: skip
+        form.indicators,
+        form.weight,
+        form.rtol,
+        work.scale,
+        work.vals,
+        work.near,
+    )
     at, slope, f, f_near, noise = work.K[0], work.K[1], work.K[2], work.K[3], work.K[4]
     field = field_of(form)
     values = values_of(form)

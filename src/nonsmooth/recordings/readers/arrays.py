@@ -43,9 +43,10 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     containers = list(_containers("", variables, 0))
     holds = _is_vector if options.rate is None else _is_series
     vectors = [
-        (path, node) for path, node in containers
+        (path, node)
+        for path, node in containers
         if any(map(_is_series if getattr(node, "rate", None) else holds, node.values()))
-    ]  # fmt: skip
+    ]
     found: list[tuple[str, Mapping[str, Any], str | None]] = []
     for path, node in vectors:
         key = _axis_of(node, options.axis)
@@ -113,9 +114,7 @@ def _note(value: Any) -> str:
     return str(value.ravel()[0]) if _is_array(value) and value.size == 1 else ""
 
 
-def _table(
-    run: str, path: str, node: Mapping[str, Any], key: str | None, options: Options, remarks: Remarks
-) -> Table:  # fmt: skip
+def _table(run: str, path: str, node: Mapping[str, Any], key: str | None, options: Options, remarks: Remarks) -> Table:
     arrays = {name: value for name, value in node.items() if _is_array(value) and value.size > 1}
     units = _units(node, list(arrays), remarks, run)
     lengths = [v.size for v in arrays.values() if _is_vector(v)] or [max(v.shape) for v in arrays.values()]

@@ -81,9 +81,12 @@ def write_capstone_csv(
                 columns.append(pd.Series(values, times, name=f"{array.attrs.get('long_name', name)}{unit} {label}"))
         tables.append(pd.concat(columns, axis=1).sort_index().rename_axis(f"Time (s) {label}").reset_index())
     text = pd.concat(tables, axis=1).to_csv(
-        sep=";" if decimal == "," else ",", decimal=decimal, float_format=f"%.{digits}f", index=False,
+        sep=";" if decimal == "," else ",",
+        decimal=decimal,
+        float_format=f"%.{digits}f",
+        index=False,
         lineterminator="\r\n",
-    )  # fmt: skip
+    )
     return _put(Path(path), text.encode("utf-8-sig" if byte_order_mark else "utf-8"))
 
 

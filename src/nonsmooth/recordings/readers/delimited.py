@@ -31,9 +31,15 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
 
 
 def read_lines(
-    stream: Iterable[str], run: str, source: Source, options: Options, reading: Reading, *, ends: bool = True,
+    stream: Iterable[str],
+    run: str,
+    source: Source,
+    options: Options,
+    reading: Reading,
+    *,
+    ends: bool = True,
     delimiter: str | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """Read a table line by line; where that fails, say which options its first lines ask for."""
     stream = iter(stream)
     top: list[str] = []
@@ -137,9 +143,9 @@ def _units(table: Iterator[Row], at: int, source: Source) -> tuple[list[str], It
 
 def _advice(head: list[str]) -> str:
     """Options that would fit a table whose numbers begin further down."""
+
     def fields(text: str) -> list[str]:
         return [field.strip().strip('"') for field in re.split(r"[\t;,]|\s+", text.strip())]
-
 
     def numeric(text: str) -> bool:
         found, some = fields(text), Numerals().some

@@ -152,9 +152,7 @@ def traces_of(table: Table, options: Options, source: Source, reading: Reading) 
             yield Trace(run, one.name, one.unit, taken, values, one.origin, unit, lines=lines, attrs=one.attrs)
 
 
-def places(
-    held: IntArray, axis: IntArray, lines: IntArray | None, source: Source, complaint: str
-) -> IntArray:
+def places(held: IntArray, axis: IntArray, lines: IntArray | None, source: Source, complaint: str) -> IntArray:
     """Place among the rows of the axis of each row in which a channel has a value; all must be there."""
     place = np.minimum(np.searchsorted(axis, held), max(len(axis) - 1, 0))
     missing = held[axis[place] != held] if len(axis) else held
@@ -179,9 +177,7 @@ def _unwrapped(field: Field, options: Options) -> Field:
     return replace(field, values=values)
 
 
-def _along(
-    axis: Field, table: Table, options: Options, source: Source, reading: Reading
-) -> tuple[FloatArray, str]:
+def _along(axis: Field, table: Table, options: Options, source: Source, reading: Reading) -> tuple[FloatArray, str]:
     """The axis and its unit: times in seconds."""
     axis = replace(axis, unit=options.units.get(options.axis, axis.unit))
     if options.axis != "time":
@@ -258,9 +254,7 @@ def _since(nanoseconds: IntArray) -> FloatArray:
     return np.asarray((nanoseconds - nanoseconds[:1]) * 1e-9, np.float64)
 
 
-def _unread(
-    texts: list[str], place: int, axis: Field, lines: IntArray | None, source: Source
-) -> Exception:
+def _unread(texts: list[str], place: int, axis: Field, lines: IntArray | None, source: Source) -> Exception:
     row = f"row {place + 1}" if lines is None else f"line {lines[place if axis.rows is None else axis.rows[place]]}"
     return source.error(
         row,

@@ -22,9 +22,7 @@ def load_hdf5(data: bytes, source: Source, remarks: Remarks, *, matlab: bool) ->
 
 
 class _Reader:
-    def __init__(
-        self, h5py: Any, opened: Any, source: Source, remarks: Remarks, limit: int, matlab: bool
-    ) -> None:  # fmt: skip
+    def __init__(self, h5py: Any, opened: Any, source: Source, remarks: Remarks, limit: int, matlab: bool) -> None:
         self._h5py, self._file, self._source, self._remarks, self._matlab = h5py, opened, source, remarks, matlab
         self._left = self._limit = limit
         self._members = 16 * MAX_COLUMNS
@@ -82,8 +80,10 @@ class _Reader:
         values = item[()]
         if refers:
             flat = np.asarray(values).ravel()
-            members = [self._value(self._file[ref], f"{place}({k})", depth + 1) if ref else None
-                       for k, ref in enumerate(flat, 1)]  # fmt: skip
+            members = [
+                self._value(self._file[ref], f"{place}({k})", depth + 1) if ref else None
+                for k, ref in enumerate(flat, 1)
+            ]
             if depth > MAX_DEPTH:
                 raise self._source.error(place, f"is nested deeper than {MAX_DEPTH}")
             return members if kind == "cell" else _Column(members)

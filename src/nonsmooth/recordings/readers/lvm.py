@@ -112,9 +112,7 @@ def _word(header: dict[str, list[str]], key: str, default: str) -> str:
     return values[0].strip() if len(values[0].strip()) else values[0][:1] or default
 
 
-def _segments(
-    lines: Lines, clocks: str, numerals: Numerals, source: Source, ends: bool
-) -> Iterator[_Segment]:
+def _segments(lines: Lines, clocks: str, numerals: Numerals, source: Source, ends: bool) -> Iterator[_Segment]:
     """Each segment: its header, the names of its columns, and the rows up to the next header."""
     count, channels, decimal = 0, 0, numerals.decimal or "."
     begun = next(((line, fields) for line, fields in lines if any(f.strip() for f in fields)), None)
@@ -130,8 +128,11 @@ def _segments(
         if channels > MAX_COLUMNS:
             held = f"its {count} segments hold {channels} channels so far"
             raise source.error(f"line {line}", f"{held}; at most {MAX_COLUMNS} are read")
-        labels = [text for name in names for text in (f"X_Value of {name}", name)] if clocks == "Multi" else (
-            ["X_Value", *names])  # fmt: skip
+        labels = (
+            [text for name in names for text in (f"X_Value of {name}", name)]
+            if clocks == "Multi"
+            else (["X_Value", *names])
+        )
         rows = _Rows(lines, len(labels), decimal)
         wanted = range(clocks == "No", len(labels))
         cells = read_cells(iter(rows), labels, wanted, numerals, source, Remarks(), ends_with_newline=True)
@@ -233,9 +234,7 @@ def _texts(segment: _Segment, key: str, n: int) -> list[str]:
     return ([text.strip() for text in segment.fields.get(key, [])] + [""] * n)[:n]
 
 
-def _numbers(
-    segment: _Segment, key: str, default: float, decimal: str, place: str, source: Source
-) -> FloatArray:
+def _numbers(segment: _Segment, key: str, default: float, decimal: str, place: str, source: Source) -> FloatArray:
     found = np.full(len(segment.names), default)
     for k, text in enumerate(_texts(segment, key, len(segment.names))):
         if text:

@@ -64,8 +64,10 @@ def _by_clock(group: Any, data: bytes, source: Source, remarks: Remarks) -> list
         values, properties = np.asarray(channel[:]), _plain(channel.properties)
         step, begin = (_number(properties.get(key)) for key in ("wf_increment", "wf_start_offset"))
         clock = (step, begin or 0.0, n) if step is not None and step > 0 else None
-        if values.ndim != 1 or values.dtype.kind not in "fiubM" or (
-            values.dtype.kind == "M" and (clock or not is_axis_name(channel.name, "time"))
+        if (
+            values.ndim != 1
+            or values.dtype.kind not in "fiubM"
+            or (values.dtype.kind == "M" and (clock or not is_axis_name(channel.name, "time")))
         ):
             remarks.of(group.name, channel.name, f"holds {values.dtype.name} values, no real numbers; left out")
             continue

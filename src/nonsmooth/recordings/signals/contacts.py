@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 _UNDECIDED = 0.01  # of the samples: at the edge of contact, of which none is used for the support
 
+
 def contacts(
     time: ArrayLike,
     x: Any,

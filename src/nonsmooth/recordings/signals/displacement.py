@@ -13,10 +13,18 @@ if TYPE_CHECKING:
 
 #: Turns per unit of angle.
 _TURNS = {
-    "rad": 0.5 / np.pi, "radian": 0.5 / np.pi, "radians": 0.5 / np.pi,
-    "deg": 1 / 360, "°": 1 / 360, "degree": 1 / 360, "degrees": 1 / 360,
-    "rev": 1.0, "turn": 1.0, "turns": 1.0, "rotations": 1.0,
-}  # fmt: skip
+    "rad": 0.5 / np.pi,
+    "radian": 0.5 / np.pi,
+    "radians": 0.5 / np.pi,
+    "deg": 1 / 360,
+    "°": 1 / 360,
+    "degree": 1 / 360,
+    "degrees": 1 / 360,
+    "rev": 1.0,
+    "turn": 1.0,
+    "turns": 1.0,
+    "rotations": 1.0,
+}
 
 
 def position(

@@ -164,9 +164,16 @@ def fit(
     )
     error = math.sqrt(C[-1, -1]) if refine else 0.0
     return HarmonicFit(
-        base * subharmonic, error, float(solution[0]), np.hypot(cos, sin), phases, covariance, math.sqrt(variance),
-        correlation, subharmonic,
-    )  # fmt: skip
+        base * subharmonic,
+        error,
+        float(solution[0]),
+        np.hypot(cos, sin),
+        phases,
+        covariance,
+        math.sqrt(variance),
+        correlation,
+        subharmonic,
+    )
 
 
 def _columns(tau: FloatArray, omega: float, n: int) -> FloatArray:

@@ -124,9 +124,7 @@ def filter_nodes(
         run_filter(n, step, y, r, jump, wide, q, u, P, work, sums)
 
 
-@kernel(
-    "void(int64, float64[::1], float64[::1], float64[:, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1])"
-)
+@kernel("void(int64, float64[::1], float64[::1], float64[:, :, ::1], float64[:, :, :, ::1], float64[:, :, ::1])")
 def smooth_nodes(n: Any, step: Any, q: Any, u: Any, P: Any, work: Any) -> None:
     """Turn the filtered states and covariances into smoothed ones, from the last node back."""
     u_p, u_f, P_p, P_f = u[0], u[1], P[0], P[1]

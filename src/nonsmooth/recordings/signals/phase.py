@@ -147,9 +147,16 @@ def drive_phase(
     error = float(found.phase_errors[0]) / found.omega
     scatter = found.residual / (found.omega * float(found.amplitudes[0]))
     return DrivePhase(
-        found.omega, found.omega_error, t_0, error, scatter, "fit", t_0 + turns * found.period, turns,
+        found.omega,
+        found.omega_error,
+        t_0,
+        error,
+        scatter,
+        "fit",
+        t_0 + turns * found.period,
+        turns,
         (float(t[0]), float(t[-1])) if span is None else span,
-    )  # fmt: skip
+    )
 
 
 def _by_gate(time: Any, resolution: float, span: tuple[float, float] | None) -> DrivePhase:
@@ -184,6 +191,13 @@ def _by_gate(time: Any, resolution: float, span: tuple[float, float] | None) -> 
     period, (period_error, t_0_error) = float(line[0]), (s * np.sqrt(np.diag(covariance))).tolist()
     omega = TURN / period
     return DrivePhase(
-        omega, omega * period_error / period, float(times[0]), t_0_error, scatter, "photogate", times, turns,
+        omega,
+        omega * period_error / period,
+        float(times[0]),
+        t_0_error,
+        scatter,
+        "photogate",
+        times,
+        turns,
         (float(times[0]), float(times[-1])) if span is None else span,
-    )  # fmt: skip
+    )

@@ -73,12 +73,15 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
     first, last = np.array(rows).T
     return xr.Dataset(
         {
-            "first": ("flight", first), "last": ("flight", last),
-            "begin": ("flight", t[first], {"units": "s"}), "end": ("flight", t[last], {"units": "s"}),
+            "first": ("flight", first),
+            "last": ("flight", last),
+            "begin": ("flight", t[first], {"units": "s"}),
+            "end": ("flight", t[last], {"units": "s"}),
             "acceleration": labelled((), acceleration, "acceleration in flight"),
-            "acceleration_error": ((), error), "noise": labelled((), noise, "standard deviation of a sample"),
+            "acceleration_error": ((), error),
+            "noise": labelled((), noise, "standard deviation of a sample"),
         }
-    )  # fmt: skip
+    )
 
 
 def restitution(
@@ -128,10 +131,15 @@ def restitution(
     noise = math.sqrt(sum(side.squares for pair in sides for side in pair) / freedom) if freedom else math.nan
     rows = [
         {
-            "flight": k, "impact_time": at, "duration": duration, "impact_height": height,
-            "v_before": left.slope(when, noise), "v_after": right.slope(when, noise),
-        } for (k, at, duration, height, when), (left, right) in zip(found, sides, strict=True)
-    ]  # fmt: skip
+            "flight": k,
+            "impact_time": at,
+            "duration": duration,
+            "impact_height": height,
+            "v_before": left.slope(when, noise),
+            "v_after": right.slope(when, noise),
+        }
+        for (k, at, duration, height, when), (left, right) in zip(found, sides, strict=True)
+    ]
     return impacts_of(rows, {"impact_height": (float, "height at the impact")}).assign_attrs(noise=noise)
 
 

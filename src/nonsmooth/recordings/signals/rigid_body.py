@@ -22,10 +22,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _COLUMNS = {
-    "corner": (int, "row of the corner"), "half_sample": (float, "change of the restitution by half a sample"),
-    "height": (float, "height of the corner"), "touching": (int, "corners at the ground"),
+    "corner": (int, "row of the corner"),
+    "half_sample": (float, "change of the restitution by half a sample"),
+    "height": (float, "height of the corner"),
+    "touching": (int, "corners at the ground"),
     "single": (bool, "one corner alone touches, and comes down"),
-}  # fmt: skip
+}
 
 
 def cube(half_width: float = 1.0) -> FloatArray:
@@ -128,11 +130,20 @@ def corner_restitution(
         v0, e0 = before.velocity(when, point)
         touching = int(np.count_nonzero(heights < heights[corner] + reach))
         same = corner == int(np.argmin(after.heights(when, points)))
-        rows.append({
-            "flight": k, "impact_time": when, "duration": end - begin, "v_before": (v0, e0),
-            "v_after": after.velocity(when, point), "corner": corner, "half_sample": 0.5 * abs(late - early),
-            "height": heights[corner], "touching": touching, "single": touching == 1 and same and v0 < -3.0 * e0,
-        })  # fmt: skip
+        rows.append(
+            {
+                "flight": k,
+                "impact_time": when,
+                "duration": end - begin,
+                "v_before": (v0, e0),
+                "v_after": after.velocity(when, point),
+                "corner": corner,
+                "half_sample": 0.5 * abs(late - early),
+                "height": heights[corner],
+                "touching": touching,
+                "single": touching == 1 and same and v0 < -3.0 * e0,
+            }
+        )
     left_out = max(flights.sizes["flight"] - 1, 0) - len(rows)
     return impacts_of(rows, _COLUMNS).assign_attrs(left_out=left_out)
 

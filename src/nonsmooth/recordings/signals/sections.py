@@ -73,9 +73,15 @@ def stroboscopic(
 
 
 def poincare(
-    time: ArrayLike, x: Any, v: ArrayLike, *, surface: str = "x", level: float = 0.0, rising: bool | None = True,
+    time: ArrayLike,
+    x: Any,
+    v: ArrayLike,
+    *,
+    surface: str = "x",
+    level: float = 0.0,
+    rising: bool | None = True,
     **known: Unpack[Known],
-) -> xr.Dataset:  # fmt: skip
+) -> xr.Dataset:
     """Position and velocity where x (or v) passes a level.
 
     Parameters
@@ -117,9 +123,15 @@ class _Between:
     """A motion between its samples."""
 
     def __init__(
-        self, time: ArrayLike, x: Any, v: ArrayLike, a: ArrayLike | None = None, x_error: ArrayLike | None = None,
-        v_error: ArrayLike | None = None, impacts: ArrayLike = (),
-    ) -> None:  # fmt: skip
+        self,
+        time: ArrayLike,
+        x: Any,
+        v: ArrayLike,
+        a: ArrayLike | None = None,
+        x_error: ArrayLike | None = None,
+        v_error: ArrayLike | None = None,
+        impacts: ArrayLike = (),
+    ) -> None:
         self.t, position = signal(time, x, least=4, purpose="section points")
         columns: list[FloatArray] = [position]
         for name, given in (("v", v), ("a", a), ("x_error", x_error), ("v_error", v_error)):
@@ -166,12 +178,14 @@ class _Between:
         a0, a1 = self.a[i] * h**2, self.a[i + 1] * h**2
         return np.column_stack(
             [
-                x0, v0, 0.5 * a0,
+                x0,
+                v0,
+                0.5 * a0,
                 10 * d - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1,
                 -15 * d + 8 * v0 + 7 * v1 + 1.5 * a0 - a1,
                 6 * d - 3 * v0 - 3 * v1 - 0.5 * a0 + 0.5 * a1,
             ]
-        )  # fmt: skip
+        )
 
     def _taylor(self, k: NDArray[np.intp], origin: FloatArray, h: FloatArray, terms: int) -> FloatArray:
         """x + v dt + a dt^2 / 2 about sample k, whose place in the step is ``origin`` (0 or 1)."""

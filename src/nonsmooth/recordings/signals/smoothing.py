@@ -133,9 +133,15 @@ class _Nodes:
     """Samples and places between them in units in which the typical step and the error of a sample are 1."""
 
     def __init__(
-        self, t: FloatArray, x: FloatArray, impacts: FloatArray, contacts: _Intervals, order: int,
-        resolution: float | None, noise: float,
-    ) -> None:  # fmt: skip
+        self,
+        t: FloatArray,
+        x: FloatArray,
+        impacts: FloatArray,
+        contacts: _Intervals,
+        order: int,
+        resolution: float | None,
+        noise: float,
+    ) -> None:
         self.t, self.order, self.impacts = t, order, impacts
         self.known = resolution is not None
         self.h = float(np.median(np.diff(t)))
@@ -199,9 +205,18 @@ class _Nodes:
         from nonsmooth.recordings.signals.kalman import filter_nodes
 
         filter_nodes(
-            self.order, self.step, self.y, self.r, self.jump, self.wide, np.where(self.inside, q[1], q[0]),
-            self.u, self.P, self.work, self.sums,
-        )  # fmt: skip
+            self.order,
+            self.step,
+            self.y,
+            self.r,
+            self.jump,
+            self.wide,
+            np.where(self.inside, q[1], q[0]),
+            self.u,
+            self.P,
+            self.work,
+            self.sums,
+        )
         if self.known:
             return float(self.sums[0] + self.sums[1])
         used = int(np.count_nonzero(np.isfinite(self.r)))
@@ -227,9 +242,11 @@ class _Nodes:
             return np.full(2, 10.0**one)
         start = np.array([[one, one], [one - 1.0, one], [one, one + 1.0]])
         both = minimize(
-            lambda g: self.cost(10.0 ** np.clip(g, low, high)), start[0], method="Nelder-Mead",
+            lambda g: self.cost(10.0 ** np.clip(g, low, high)),
+            start[0],
+            method="Nelder-Mead",
             options={"initial_simplex": start, "xatol": 0.02, "fatol": 0.02, "maxfev": 400},
-        )  # fmt: skip
+        )
         if not both.success:
             raise SolveError(
                 "the intensities of the motion outside and inside of contacts were not found in 400 evaluations; give "
@@ -262,10 +279,12 @@ class _Nodes:
             "v_after_error": ("impact", errors[after, 1], speed),
         }
         attrs = {
-            "method": "Kalman smoother (Rauch-Tung-Striebel)", "model": model,
-            "intensity": float(q[0]) * sigma**2 / self.h ** (2 * n - 1), "sample_error": sigma,
+            "method": "Kalman smoother (Rauch-Tung-Striebel)",
+            "model": model,
+            "intensity": float(q[0]) * sigma**2 / self.h ** (2 * n - 1),
+            "sample_error": sigma,
             "log_likelihood": -0.5 * cost,
-        }  # fmt: skip
+        }
         if self.inside.any():
             attrs["intensity_in_contact"] = float(q[1]) * sigma**2 / self.h ** (2 * n - 1)
         found = labelled_motion(self.t, states[sample].T[:3], errors[sample].T[:3], self.impacts, x)

@@ -133,9 +133,15 @@ def spectrum(
             "density": labelled("frequency", density, "power density", f"({unit or 1})^2/Hz"),
         },
         {"frequency": labelled("frequency", frequency, "frequency", "Hz")},
-        {"window": name, "rate": float(rate), "samples": n, "padding": padding, "grid_step": rate / n,
-         "signal": whose(x, "")},
-    )  # fmt: skip
+        {
+            "window": name,
+            "rate": float(rate),
+            "samples": n,
+            "padding": padding,
+            "grid_step": rate / n,
+            "signal": whose(x, ""),
+        },
+    )
 
 
 def peak(
@@ -317,8 +323,9 @@ class _Shape:
         how = "window" if interpolation == "none" else interpolation
         moved = [
             abs(self.interpolate(three + leak * e, how)[0] - self.interpolate(three, how)[0])
-            for three in threes[::5] for e in np.array([[1.0, 0, -1], [1, -1, 1], [-1, 1, -1]])
-        ]  # fmt: skip
+            for three in threes[::5]
+            for e in np.array([[1.0, 0, -1], [1, -1, 1], [-1, 1, -1]])
+        ]
         return own + min(max(moved), 0.5)
 
 

@@ -183,9 +183,18 @@ def steady_response(
         attrs={"signal": name, "frequency": by_fit, "rate": -decay, "rate_error": decay_error},
     )
     return SteadyResponse(
-        by_fit, error, methods, float(whole.amplitudes[0]), float(whole.amplitude_errors[0]), -decay, decay_error,
-        -decay > 3.0 * decay_error, length, name, table,
-    )  # fmt: skip
+        by_fit,
+        error,
+        methods,
+        float(whole.amplitudes[0]),
+        float(whole.amplitude_errors[0]),
+        -decay,
+        decay_error,
+        -decay > 3.0 * decay_error,
+        length,
+        name,
+        table,
+    )
 
 
 def _slope(t: FloatArray, y: FloatArray, errors: FloatArray) -> tuple[float, float]:

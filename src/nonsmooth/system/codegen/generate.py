@@ -140,9 +140,7 @@ def _inlined(lines: list[str]) -> list[str]:
     return [re.sub(r"\b(cos|sin)\(", lambda found: f"{_INLINED[found[1]]}(", line) for line in lines]
 
 
-def function_of(
-    name: str, options: str, arguments: str, branches: list[list[str]], always: Sequence[str] = ()
-) -> str:
+def function_of(name: str, options: str, arguments: str, branches: list[list[str]], always: Sequence[str] = ()) -> str:
     """The text of a function that does one of some branches, by its first argument, after what is ``always`` done.
 
     ``options`` are those of ``callback``."""

@@ -315,8 +315,21 @@ class _TablesCode:
         t = self.traced
         n, m, i, o, r = len(t.u) + len(t.m), len(t.fields), len(t.indicators), len(t.outputs), len(t.transitions)
         return {
-            "omega": (), "A": (m, n, n), "b": (m, n), "c": (m, h, n), "s": (m, h, n),
-            "ia": (i, n), "ib": (i,), "ic": (i, h), "is_": (i, h),
-            "oa": (o, m, n), "ob": (o, m), "oc": (o, m, h), "os": (o, m, h),
-            "ra": (r, n, n), "rb": (r, n), "rc": (r, h, n), "rs": (r, h, n),
-        }  # fmt: skip
+            "omega": (),
+            "A": (m, n, n),
+            "b": (m, n),
+            "c": (m, h, n),
+            "s": (m, h, n),
+            "ia": (i, n),
+            "ib": (i,),
+            "ic": (i, h),
+            "is_": (i, h),
+            "oa": (o, m, n),
+            "ob": (o, m),
+            "oc": (o, m, h),
+            "os": (o, m, h),
+            "ra": (r, n, n),
+            "rb": (r, n),
+            "rc": (r, h, n),
+            "rs": (r, h, n),
+        }

@@ -82,19 +82,27 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
         "from nonsmooth.kernels.compile.cache import callback",
         "from nonsmooth.kernels.compile.lanes import load, plus, store, times",
         f"from math import {', '.join(sorted(functions))}" if functions else "",
-        _function("jet", _JET, "mode, order, t, u, q, C, W, D", [
-            [*jet.lines, *_small_changes(entries, kind, n, len(wanted))] for jet, kind in zip(jets, kinds, strict=True)
-        ]),
+        _function(
+            "jet",
+            _JET,
+            "mode, order, t, u, q, C, W, D",
+            [
+                [*jet.lines, *_small_changes(entries, kind, n, len(wanted))]
+                for jet, kind in zip(jets, kinds, strict=True)
+            ],
+        ),
         _function("field", SIGNATURES["field"], "mode, t, u, q, du", [lines for lines, _ in fields]),
         _function("switch", _SWITCH, "transition, t, u, q, out", [lines for lines, _ in switches]),
     ]
     module = load_module("\n".join(part for part in parts if part) + "\n", "variations", lasting=False)
     return VariationalModel(
-        module.jet, module.field, module.switch,
+        module.jet,
+        module.field,
+        module.switch,
         np.array(entries, dtype=np.int64).reshape(-1, 2),
         np.array(kinds, dtype=np.int64).reshape(len(kinds), len(entries)),
         max([1, *(jet.n_scratch for jet in jets)]),
-    )  # fmt: skip
+    )
 
 
 def _function(name: str, signature: str, arguments: str, branches: list[list[str]]) -> str:

@@ -35,7 +35,12 @@ class Additions:
     def put_in(self, **more: Any) -> Traced:
         """The derived system; ``more``: its other fields that differ."""
         return replace(
-            self.traced, mode_names=tuple(self.modes), fields=tuple(self.fields),
-            indicator_names=tuple(self.indicator_names), indicators=tuple(self.indicators),
-            transitions=tuple(self.jumps), outputs=tuple(tuple(row) for row in self.outputs), **more,
-        )  # fmt: skip
+            self.traced,
+            mode_names=tuple(self.modes),
+            fields=tuple(self.fields),
+            indicator_names=tuple(self.indicator_names),
+            indicators=tuple(self.indicators),
+            transitions=tuple(self.jumps),
+            outputs=tuple(tuple(row) for row in self.outputs),
+            **more,
+        )

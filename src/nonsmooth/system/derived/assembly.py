@@ -274,9 +274,7 @@ class Assembler(ABC):
                     forces[r] = -side * self.constant(r, "friction") * forces[k]
         return f, {k: forces[k] for k in sorted(forces)}
 
-    def shared(
-        self, mode: str, pattern: Pattern, forces: FloatArray, value: Callable[[Any], FloatArray]
-    ) -> FloatArray:
+    def shared(self, mode: str, pattern: Pattern, forces: FloatArray, value: Callable[[Any], FloatArray]) -> FloatArray:
         """The forces (N, elements) in a combination, those that are not unique of least norm within their bounds;
         ``value`` gives a law's (N,) values."""
         held = self.held(pattern)
@@ -308,8 +306,9 @@ class Assembler(ABC):
         bounded = [i for i, j in enumerate(group) if bounds[i] is not None and j not in self.rubbing.values()]
         cones = [
             (i, group.index(r), self.constant(r, "friction"))
-            for i, r in enumerate(map(self.rubbing.get, group)) if r in group
-        ]  # fmt: skip
+            for i, r in enumerate(map(self.rubbing.get, group))
+            if r in group
+        ]
         found: list[Leaving] = []
         for weights in weakest(sums, bounded, cones):
             beyond = sum((p.item() * forces[j] for p, j in zip(weights, group, strict=True) if p), 0)

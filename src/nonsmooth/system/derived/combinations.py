@@ -61,9 +61,14 @@ def element_names(elements: Any) -> dict[str, Element]:
 
 
 def assembled(
-    symbols: Symbols, modes: Mapping[str, Any], elements: Any, given: Mapping[str, Any], scale: Mapping[str, float],
-    values: Mapping[sp.Symbol, float], named: Callable[[list[str]], str] | None = None,
-) -> dict[str, Any]:  # fmt: skip
+    symbols: Symbols,
+    modes: Mapping[str, Any],
+    elements: Any,
+    given: Mapping[str, Any],
+    scale: Mapping[str, float],
+    values: Mapping[sp.Symbol, float],
+    named: Callable[[list[str]], str] | None = None,
+) -> dict[str, Any]:
     """Modes, indicators, transitions and outputs of a system with elements, as a user would give them.
 
     ``given`` are those without elements: its transitions go from each combination of phases to the same of the target.
@@ -75,10 +80,14 @@ def assembled(
             raise SystemDefinitionError(f"mode {key!r}: a system with elements has all its states in every mode")
     arguments = Scalar(symbols.t), symbols.states(), symbols.parameters()
     base = {
-        key: call_vector(mode.field if isinstance(mode, Mode) else mode, arguments, tuple(symbols.u),
-                         f"the vector field of mode {key!r}")
+        key: call_vector(
+            mode.field if isinstance(mode, Mode) else mode,
+            arguments,
+            tuple(symbols.u),
+            f"the vector field of mode {key!r}",
+        )
         for key, mode in modes.items()
-    }  # fmt: skip
+    }
     resets = any(isinstance(item, Transition) and item.reset is not None for item in given["transitions"])
     make = Expressions(symbols, base, parts, scale, values)
     counts = [len(part.element.phases) for part in make.parts]
@@ -97,9 +106,12 @@ def assembled(
 
 
 def _written_out(
-    make: Expressions, base: Mapping[str, tuple[sp.Expr, ...]], given: Mapping[str, Any], counts: Sequence[int],
+    make: Expressions,
+    base: Mapping[str, tuple[sp.Expr, ...]],
+    given: Mapping[str, Any],
+    counts: Sequence[int],
     named: Callable[[list[str]], str] | None,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """A mode for each combination that may be."""
     every = product(base, product(*[range(count) for count in counts]))
     pairs = [pair for pair in every if make.may_hold(make.held(pair[1]), pair[0])]
@@ -157,12 +169,16 @@ def _written_out(
             function = {name(mode, pattern): function[mode] for mode, pattern in pairs}
         outputs[key] = function, unit
     return {
-        "modes": fields, "transitions": transitions,
+        "modes": fields,
+        "transitions": transitions,
         "indicators": {**(given["indicators"] or {}), **{key: Known(g) for key, g in make.indicators.items()}},
         "outputs": outputs if named else {**outputs, **{f"{key}_force": (row, "") for key, row in forces.items()}},
-        "ranges": make.ranges(next(iter(base))), "kinds": kinds, "asked": asked,
-        "decider": Decider(make, pairs, _affine(make, base, given)) if make.asks else None, "make": make,
-    }  # fmt: skip
+        "ranges": make.ranges(next(iter(base))),
+        "kinds": kinds,
+        "asked": asked,
+        "decider": Decider(make, pairs, _affine(make, base, given)) if make.asks else None,
+        "make": make,
+    }
 
 
 def _meetings(make: Expressions, mode: str, pattern: Pattern) -> str:
@@ -220,7 +236,11 @@ def _opened(
         )
     patterns = Patterns(make, next(iter(base)), why=why)
     return {
-        "modes": {key: Known(list(field)) for key, field in base.items()}, "transitions": (),
+        "modes": {key: Known(list(field)) for key, field in base.items()},
+        "transitions": (),
         "indicators": {key: Known(e) for key, e in zip(patterns.labels, patterns.expressions, strict=True)},
-        "outputs": given["outputs"], "ranges": make.ranges(patterns.mode), "patterns": patterns, "make": make,
-    }  # fmt: skip
+        "outputs": given["outputs"],
+        "ranges": make.ranges(patterns.mode),
+        "patterns": patterns,
+        "make": make,
+    }

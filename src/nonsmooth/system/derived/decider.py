@@ -94,10 +94,14 @@ class Decider:
                 reset = tuple(self.make.impact(struck, self.modes[question.source][0])) if struck else None
                 self._found[key] = len(written.transitions)
                 jump = TracedTransition(
-                    question.source, target, question.rows, reset=reset, kind=FOUND,
+                    question.source,
+                    target,
+                    question.rows,
+                    reset=reset,
+                    kind=FOUND,
                     contact=bool(struck) or question.source == 0,
                     label=f"{names[question.source]} -> {names[target]}",
-                )  # fmt: skip
+                )
                 self._written = replace(written, transitions=(*written.transitions, jump))
             return self._found[key]
 
@@ -136,9 +140,14 @@ class Decider:
         states change as from step to step."""
         if self.rows is None:
             return lambda mode, time, u, memory, step: SeriesNumbers(
-                self.code, self.modes[mode][0], time, u, np.concatenate([values, memory]), step,
+                self.code,
+                self.modes[mode][0],
+                time,
+                u,
+                np.concatenate([values, memory]),
+                step,
                 self.known().fields[mode],
-            )  # fmt: skip
+            )
         rows = self.rows.rows(self.rows.form.evaluate(values[None, :]), 0)
         return lambda mode, time, u, memory, step: RowNumbers(
             rows, rows.mode, rows.augmented(u, time), step, self.modes[mode][1]

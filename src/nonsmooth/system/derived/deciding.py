@@ -52,9 +52,7 @@ class Outcome:
     names: str = ""
 
 
-def decide(
-    numbers: Numbers, pattern: Pattern, met: Sequence[int] = (), some: Collection[int] | None = None
-) -> Outcome:
+def decide(numbers: Numbers, pattern: Pattern, met: Sequence[int] = (), some: Collection[int] | None = None) -> Outcome:
     """The phases and the states just behind an instant, with the numbers there; of ``some`` elements alone where no
     force of the others changes a rate of theirs.
 

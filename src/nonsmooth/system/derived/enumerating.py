@@ -97,7 +97,7 @@ def moving_by_trial(who: Candidates, G: FloatArray, begin: Any) -> tuple[dict[in
     may_be = [
         [states for states in _combined(block) if _followed(who, states, G, now, True, 1) is not None]
         for block in who.blocks(G)
-    ]  # fmt: skip
+    ]
     valid = [states for states in _combined(may_be) if _followed(who, states, G, begin(), True) is not None]
     if not valid:
         return {}, "no_motion"
@@ -190,9 +190,8 @@ def _followed(
     rows, count, effects = here.rows, len(here.weights), np.abs(G)
     own = np.maximum(np.diag(effects), 1e-300)
     moves = [
-        k for k, state in states.items()
-        if state != HELD and k not in who.slipping and (state or k in who.contacts)
-    ]  # fmt: skip
+        k for k, state in states.items() if state != HELD and k not in who.slipping and (state or k in who.contacts)
+    ]
     places, signs = [at[k] for k in moves], np.array([states[k] or 1 for k in moves])
     pending = np.ones(count + len(moves), dtype=bool)
     found: list[tuple[FloatArray, FloatArray]] = []

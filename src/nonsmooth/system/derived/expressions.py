@@ -28,9 +28,13 @@ class Expressions(Assembler):
     """The calculus of expressions: a vector is a list of them, one for each state."""
 
     def __init__(
-        self, symbols: Symbols, base: Mapping[str, tuple[sp.Expr, ...]], elements: Mapping[str, Element],
-        scale: Mapping[str, float], values: Mapping[sp.Symbol, float],
-    ) -> None:  # fmt: skip
+        self,
+        symbols: Symbols,
+        base: Mapping[str, tuple[sp.Expr, ...]],
+        elements: Mapping[str, Element],
+        scale: Mapping[str, float],
+        values: Mapping[sp.Symbol, float],
+    ) -> None:
         self.symbols, self.fields, self.scale, self.values, self.draws = symbols, base, scale, values, (1, OTHER)
         self.u = tuple(symbols.u.values())
         self.parts = [self._part(name, element) for name, element in elements.items()]
@@ -209,10 +213,12 @@ class Expressions(Assembler):
             options |= {name: value for name, value in named.items() if value in others}
             laws = {name: self.spoken(k, name) for name in e.laws if getattr(e, name) is not None}
             found[part.name] = {
-                "kind": type(e).__name__, "options": options, e.kinematics: part.where,
+                "kind": type(e).__name__,
+                "options": options,
+                e.kinematics: part.where,
                 "on": {self.names[i]: d for i, d in part.direction.items() if d != 0},
                 "laws": {name: law for name, law in laws.items() if name not in options},
-            }  # fmt: skip
+            }
         return found
 
     # What a user would have written

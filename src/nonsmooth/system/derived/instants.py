@@ -172,8 +172,10 @@ class SeriesCode:
         symbols = make.symbols
         self.names: dict[sp.Basic, str] = {s: f"q{i}" for i, s in enumerate([*symbols.p.values(), *symbols.m.values()])}
         self.own: dict[sp.Basic, str] = {
-            **self.names, symbols.t: "t", **{s: f"x{i}" for i, s in enumerate(make.u)},
-        }  # fmt: skip
+            **self.names,
+            symbols.t: "t",
+            **{s: f"x{i}" for i, s in enumerate(make.u)},
+        }
 
     @kept
     def value(self, expression: sp.Expr) -> Any:
@@ -207,10 +209,12 @@ class SeriesCode:
             field = make.moved(field, make.parts[k], law)
         rates = [make.along(make.rate(k, mode), field) for k in some]
         first, following = jet_steps(
-            make.symbols.t, (*make.u, *inputs), self.names,
+            make.symbols.t,
+            (*make.u, *inputs),
+            self.names,
             [*(e.xreplace(self.changes) for e in field), *([sp.S.Zero] * len(inputs))],
             [sp.sympify(e).xreplace(self.changes) for e in (*rates, *laws)],
-        )  # fmt: skip
+        )
         return tuple(compile("\n".join(lines), "<instant>", "exec") for lines in (first, following))
 
 
@@ -221,9 +225,15 @@ class SeriesNumbers(Numbers):
     that changes is their size, of which rounding is a small part."""
 
     def __init__(
-        self, code: SeriesCode, mode: str, t: float, u: FloatArray, constants: FloatArray, step: float = 0.0,
+        self,
+        code: SeriesCode,
+        mode: str,
+        t: float,
+        u: FloatArray,
+        constants: FloatArray,
+        step: float = 0.0,
         field: Sequence[Any] = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.make, self.code, self.mode, self.u, self.size = code.make, code, mode, u.copy(), np.abs(u)
         self.constants = np.array([t, *constants])
         self.known = {}

@@ -86,9 +86,11 @@ def _units(load: Load, u: list[sp.Symbol], known: Mapping[sp.Symbol, Unit | None
             force = product(known[u[i]], {"s": -1}, None if of is None else {k: -n for k, n in of.items()})
     turning = rate is not None and "m" not in rate
     return (
-        write_unit(force, turning), write_unit(rate), write_unit(product(force, second)),
+        write_unit(force, turning),
+        write_unit(rate),
+        write_unit(product(force, second)),
         write_unit(product(force, rate, second)),
-    )  # fmt: skip
+    )
 
 
 def loads_of(make: Expressions) -> Loads:
@@ -99,10 +101,16 @@ def loads_of(make: Expressions) -> Loads:
             rates = {sp.expand(make.rate(k, mode)) for mode in modes}
         except SystemDefinitionError:  # a force changes its place at once
             rates = set()
-        found.append(Load(
-            part.name, type(part.element).__name__, _text(make, k), part.where,
-            rates.pop() if len(rates) == 1 else None, part.direction,
-        ))  # fmt: skip
+        found.append(
+            Load(
+                part.name,
+                type(part.element).__name__,
+                _text(make, k),
+                part.where,
+                rates.pop() if len(rates) == 1 else None,
+                part.direction,
+            )
+        )
     return Loads(tuple(found), {mode: tuple(make.fields[mode]) for mode in modes})
 
 

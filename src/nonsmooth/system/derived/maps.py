@@ -112,10 +112,16 @@ class Map(System):
             nowhere = [pattern for pattern, holders in _patterns(regions).items() if not holders]
             transitions += [Transition(CHOOSE, HOLD, when=condition_text(one), reset=_escape) for one in nowhere]
         super().__init__(
-            name=name, states=states, parameters=parameters, modes=modes, indicators={**given, **borders},
-            transitions=transitions, outputs={key: _output(key, one) for key, one in (outputs or {}).items()},
-            scale=scale, period=1.0,
-        )  # fmt: skip
+            name=name,
+            states=states,
+            parameters=parameters,
+            modes=modes,
+            indicators={**given, **borders},
+            transitions=transitions,
+            outputs={key: _output(key, one) for key, one in (outputs or {}).items()},
+            scale=scale,
+            period=1.0,
+        )
         _check_regions(self, regions)
 
 
@@ -190,9 +196,7 @@ def _point_with(system: Map, pattern: Rows) -> list[float] | None:
     """A point at which the indicators have these signs, at the present values of the parameters; None where none is."""
     traced = system.traced
     values = dict(zip(traced.p, system.parameter_vector(), strict=True))
-    rows = [
-        sign * traced.indicators[traced.indicator_names.index(key)].subs(values) for key, sign, _ in pattern
-    ]
+    rows = [sign * traced.indicators[traced.indicator_names.index(key)].subs(values) for key, sign, _ in pattern]
     scale = system.scale_vector()
     slopes = [[row.diff(symbol) for symbol in traced.u] for row in rows]
     if all(slope.is_number for row in slopes for slope in row):

@@ -128,9 +128,18 @@ def mechanical(
         for key, element in element_names(elements or {}).items()
     }
     system = System(
-        name=name, states=states, parameters=given, modes={"all": field}, outputs=outputs, scale=scale,
-        symmetry=symmetry, period=period, elements=parts or None, impacts=impacts, inputs=inputs,
-    )  # fmt: skip
+        name=name,
+        states=states,
+        parameters=given,
+        modes={"all": field},
+        outputs=outputs,
+        scale=scale,
+        symmetry=symmetry,
+        period=period,
+        elements=parts or None,
+        impacts=impacts,
+        inputs=inputs,
+    )
     d = system._description
     p = Symbols(name, d.states, dict.fromkeys(d.parameters, ""), {}, tuple(d.states)[2 * size :]).parameters()
     powers = _powers(*matrices(p)[1:], *outside(Scalar(d.traced.t), p), d.traced.u[: 2 * size])
@@ -145,17 +154,23 @@ def mechanical(
 
 
 def _powers(
-    damping: sp.Matrix, stiffness: sp.Matrix, mass: sp.Matrix, forcing: sp.Matrix, ride: sp.Expr,
+    damping: sp.Matrix,
+    stiffness: sp.Matrix,
+    mass: sp.Matrix,
+    forcing: sp.Matrix,
+    ride: sp.Expr,
     u: Sequence[sp.Symbol],
-) -> dict[str, sp.Expr]:  # fmt: skip
+) -> dict[str, sp.Expr]:
     """The powers that forcing and base give the masses, and those that they lose to damping and to what is not
     symmetric in a stiffness."""
     size = len(u) // 2
     at, speeds = sp.Matrix(u[:size]), sp.Matrix([u[size:]])
     powers = {
-        "forcing": speeds * forcing, "base": -ride * speeds * mass * sp.ones(size, 1),
-        "damping": speeds * damping * speeds.T, "stiffness": speeds * (stiffness - stiffness.T) * at / 2,
-    }  # fmt: skip
+        "forcing": speeds * forcing,
+        "base": -ride * speeds * mass * sp.ones(size, 1),
+        "damping": speeds * damping * speeds.T,
+        "stiffness": speeds * (stiffness - stiffness.T) * at / 2,
+    }
     return {key: power[0, 0] for key, power in powers.items() if key in ("forcing", "damping") or power[0, 0] != 0}
 
 

@@ -111,7 +111,7 @@ class Patterns:
         return [
             f"{parts[k].name}_{what}" + (f"_{names[i]}" if what == "on" and i is not None else sides[i])
             for k, what, i in self.at
-        ]  # fmt: skip
+        ]
 
     @cached_property
     def elements(self) -> dict[str, Any]:
@@ -207,12 +207,24 @@ class Patterns:
         elif callable(period):
             period = call_scalar(period, (symbols.parameters(),), "`period`")
         self.equations = Traced(
-            name="", t=symbols.t, u=self.make.u, p=tuple(symbols.p.values()), m=(), state_names=tuple(symbols.u),
-            parameter_names=tuple(symbols.p), memory_names=(), mode_names=(self.mode,),
-            indicator_names=tuple(self.labels), output_names=(), fields=fields,
-            lacking=((False,) * len(self.make.u),), indicators=tuple(self.expressions), transitions=(), outputs=(),
+            name="",
+            t=symbols.t,
+            u=self.make.u,
+            p=tuple(symbols.p.values()),
+            m=(),
+            state_names=tuple(symbols.u),
+            parameter_names=tuple(symbols.p),
+            memory_names=(),
+            mode_names=(self.mode,),
+            indicator_names=tuple(self.labels),
+            output_names=(),
+            fields=fields,
+            lacking=((False,) * len(self.make.u),),
+            indicators=tuple(self.expressions),
+            transitions=(),
+            outputs=(),
             period=None if period is None else sp.sympify(period),
-        )  # fmt: skip
+        )
         form = linear_form(self.equations)
         return form is not None and form.affine_indicators
 
@@ -318,12 +330,17 @@ class Patterns:
         field = tuple(unknown if i in acted else e for i, e in enumerate(traced.fields[0]))
         own = tuple((output[0],) * count for output in traced.outputs)
         return replace(
-            traced, patterns=self, mode_names=tuple(map(self.name, self.visited[:count])),
-            indicator_names=self.conditions, indicators=(unknown,) * len(self.conditions),
-            transitions=tuple(self.jumps[:jumps]), output_names=names,
-            outputs=(*own, *(((unknown,) * count,) * len(self.outputs))), fields=(field,) * count,
+            traced,
+            patterns=self,
+            mode_names=tuple(map(self.name, self.visited[:count])),
+            indicator_names=self.conditions,
+            indicators=(unknown,) * len(self.conditions),
+            transitions=tuple(self.jumps[:jumps]),
+            output_names=names,
+            outputs=(*own, *(((unknown,) * count,) * len(self.outputs))),
+            fields=(field,) * count,
             lacking=(traced.lacking[0],) * count,
-        )  # fmt: skip
+        )
 
     def forces(self, parameters: FloatArray, time: FloatArray, u: FloatArray, mode: Any) -> FloatArray:
         """Forces (N, elements) at N samples, each in the pattern of its mode."""

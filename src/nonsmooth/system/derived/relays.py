@@ -59,9 +59,13 @@ class Relays:
 
 
 def relays_of(
-    symbols: Symbols, modes: Mapping[str, Any], indicators: Mapping[str, Any] | None, transitions: Sequence[Any],
-    outputs: Mapping[str, Any] | None, values: Mapping[sp.Symbol, float],
-) -> Relays | None:  # fmt: skip
+    symbols: Symbols,
+    modes: Mapping[str, Any],
+    indicators: Mapping[str, Any] | None,
+    transitions: Sequence[Any],
+    outputs: Mapping[str, Any] | None,
+    values: Mapping[sp.Symbol, float],
+) -> Relays | None:
     """The relays that a system's surfaces are; None where they are not, or all have relative degree one.
 
     They push towards their surfaces at the present ``values`` of the parameters."""
@@ -88,8 +92,9 @@ def relays_of(
     for i in range(len(keys)):
         halves = {
             tuple(sp.expand((a - b) / 2) for a, b in zip(fields[sides], fields[_turned(sides, i)], strict=True))
-            for sides in fields if sides[i] > 0
-        }  # fmt: skip
+            for sides in fields
+            if sides[i] > 0
+        }
         if len(halves) != 1:
             return None
         pushes.append(halves.pop())

@@ -177,9 +177,7 @@ class Rows(Assembler):
     def moved(self, vector: FloatArray, part: Part, amount: Any) -> FloatArray:
         return vector + np.outer(part.direction, amount.values) if isinstance(amount, Row) else vector
 
-    def holding(
-        self, vector: FloatArray, rate: Row, value: Any, known: set[int], states: bool = False
-    ) -> FloatArray:
+    def holding(self, vector: FloatArray, rate: Row, value: Any, known: set[int], states: bool = False) -> FloatArray:
         slopes, waves = rate.values[: self.n], rate.values[self.n + 1 :]
         some = [i for i in np.flatnonzero(slopes).tolist() if i not in known]
         if len(some) == 1 and not waves.any():

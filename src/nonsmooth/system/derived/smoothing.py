@@ -216,10 +216,15 @@ class _Builder(Additions):
         their sum."""
         known = [sp.Dummy() for _ in pairs]
         weights = [
-            sp.Mul(*[q if mode == pair.inner else 1 - q for q, pair in zip(known, pairs, strict=True)
-                     if mode in (pair.inner, pair.outer)])
+            sp.Mul(
+                *[
+                    q if mode == pair.inner else 1 - q
+                    for q, pair in zip(known, pairs, strict=True)
+                    if mode in (pair.inner, pair.outer)
+                ]
+            )
             for mode in range(len(self.modes))
-        ]  # fmt: skip
+        ]
         shares = {q: sp.Mul(*[self.share(row) for row in pair.rows]) for q, pair in zip(known, pairs, strict=True)}
         total = sp.expand(sum(weights)).subs(shares)
         first, others = 0, [weight.subs(shares) / total for weight in weights[1:]]
@@ -280,10 +285,12 @@ def smooth(description: Description, single: bool, shape: str = "linear") -> Smo
             build.add(pair)
     n_bands = len(build.modes) - len(old.mode_names)
     traced = build.put_in(
-        p=old.p + tuple(symbols.values()), parameter_names=old.parameter_names + tuple(symbols),
-        m=tuple(build.m), memory_names=old.memory_names + tuple(name for name, _ in build.memory),
+        p=old.p + tuple(symbols.values()),
+        parameter_names=old.parameter_names + tuple(symbols),
+        m=tuple(build.m),
+        memory_names=old.memory_names + tuple(name for name, _ in build.memory),
         lacking=old.lacking + (((False,) * len(old.u)),) * n_bands,
-    )  # fmt: skip
+    )
     return Smoothed(traced, etas, tuple(build.memory), tuple(apart))
 
 

@@ -43,14 +43,25 @@ def without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]]
             if not rows:
                 continue
         source, target = kept.index(jump.source), kept.index(jump.target)
-        jumps.setdefault((source, target, rows), replace(
-            jump, source=source, target=target, rows=rows, contact=source == 0 or jump.reset is not None,
-        ))  # fmt: skip
+        jumps.setdefault(
+            (source, target, rows),
+            replace(
+                jump,
+                source=source,
+                target=target,
+                rows=rows,
+                contact=source == 0 or jump.reset is not None,
+            ),
+        )
     return replace(
-        traced, mode_names=tuple(traced.mode_names[i] for i in kept), fields=tuple(traced.fields[i] for i in kept),
-        lacking=tuple(traced.lacking[i] for i in kept), transitions=tuple(jumps.values()),
-        outputs=tuple(tuple(row[i] for i in kept) for row in traced.outputs), along=(),
-    ), apart  # fmt: skip
+        traced,
+        mode_names=tuple(traced.mode_names[i] for i in kept),
+        fields=tuple(traced.fields[i] for i in kept),
+        lacking=tuple(traced.lacking[i] for i in kept),
+        transitions=tuple(jumps.values()),
+        outputs=tuple(tuple(row[i] for i in kept) for row in traced.outputs),
+        along=(),
+    ), apart
 
 
 def _equal_friction(traced: Traced, mode: int, h: int, ends: Mapping[int, int]) -> list[tuple[sp.Expr, str]]:

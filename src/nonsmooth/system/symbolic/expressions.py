@@ -18,20 +18,45 @@ from nonsmooth.errors import shortened
 from nonsmooth.system.symbolic.scalar import to_expression
 
 _NAMES: dict[Any, str] = {
-    sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.asin: "arcsin", sp.acos: "arccos", sp.atan: "arctan",
-    sp.atan2: "arctan2", sp.sinh: "sinh", sp.cosh: "cosh", sp.tanh: "tanh", sp.asinh: "arcsinh",
-    sp.acosh: "arccosh", sp.atanh: "arctanh", sp.exp: "exp", sp.log: "log", sp.Abs: "abs", sp.sign: "sign",
-    sp.Max: "max", sp.Min: "min", sp.floor: "floor", sp.ceiling: "ceil",
-}  # fmt: skip
+    sp.sin: "sin",
+    sp.cos: "cos",
+    sp.tan: "tan",
+    sp.asin: "arcsin",
+    sp.acos: "arccos",
+    sp.atan: "arctan",
+    sp.atan2: "arctan2",
+    sp.sinh: "sinh",
+    sp.cosh: "cosh",
+    sp.tanh: "tanh",
+    sp.asinh: "arcsinh",
+    sp.acosh: "arccosh",
+    sp.atanh: "arctanh",
+    sp.exp: "exp",
+    sp.log: "log",
+    sp.Abs: "abs",
+    sp.sign: "sign",
+    sp.Max: "max",
+    sp.Min: "min",
+    sp.floor: "floor",
+    sp.ceiling: "ceil",
+}
 _FUNCTIONS: dict[str, Callable[..., Any]] = {name: function for function, name in _NAMES.items()} | {"sqrt": sp.sqrt}
 _RELATIONS: dict[Any, str] = {
-    sp.StrictLessThan: "<", sp.LessThan: "<=", sp.StrictGreaterThan: ">", sp.GreaterThan: ">=",
-    sp.Eq: "==", sp.Ne: "!=",
-}  # fmt: skip
+    sp.StrictLessThan: "<",
+    sp.LessThan: "<=",
+    sp.StrictGreaterThan: ">",
+    sp.GreaterThan: ">=",
+    sp.Eq: "==",
+    sp.Ne: "!=",
+}
 _COMPARE: dict[type, Callable[[Any, Any], Any]] = {
-    ast.Lt: sp.StrictLessThan, ast.LtE: sp.LessThan, ast.Gt: sp.StrictGreaterThan, ast.GtE: sp.GreaterThan,
-    ast.Eq: sp.Eq, ast.NotEq: sp.Ne,
-}  # fmt: skip
+    ast.Lt: sp.StrictLessThan,
+    ast.LtE: sp.LessThan,
+    ast.Gt: sp.StrictGreaterThan,
+    ast.GtE: sp.GreaterThan,
+    ast.Eq: sp.Eq,
+    ast.NotEq: sp.Ne,
+}
 _SUM, _PRODUCT, _SIGN, _POWER, _ATOM = range(5)
 # Text may come with a file of somebody else: what it asks for is bounded before SymPy works it out.
 _LONGEST = 200_000  # characters

@@ -132,10 +132,15 @@ class Traced:
         stands: list[int] = []
         for jump in self.transitions:
             same = (jump.source, jump.rows)
-            like = [
-                k for k, one in enumerate(kept)
-                if one.reset == jump.reset and not one.writes and (not rows or (one.source, one.rows) == same)
-            ] if jump.kind == FOUND else []  # fmt: skip
+            like = (
+                [
+                    k
+                    for k, one in enumerate(kept)
+                    if one.reset == jump.reset and not one.writes and (not rows or (one.source, one.rows) == same)
+                ]
+                if jump.kind == FOUND
+                else []
+            )
             stands.append(like[0] if like else len(kept))
             if not like:
                 kept.append(jump)

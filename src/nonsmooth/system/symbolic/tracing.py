@@ -33,9 +33,13 @@ class Symbols:
     """
 
     def __init__(
-        self, name: str, states: Mapping[str, str], parameters: Mapping[str, str], memory: Mapping[str, str],
+        self,
+        name: str,
+        states: Mapping[str, str],
+        parameters: Mapping[str, str],
+        memory: Mapping[str, str],
         inputs: Sequence[str] = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.name = name
         self.units = {**states, **parameters, **memory}
         self.t = sp.Symbol("t_", real=True)

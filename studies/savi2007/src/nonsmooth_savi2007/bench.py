@@ -44,9 +44,12 @@ class Bench:
             command = [sys.executable, "-P", "-c", run, str(folder), *(figure.name for figure in figures)]
             with open(folder / RIG / _LOG, "wb") as log:
                 self.process = subprocess.Popen(
-                    command + ["--quick"] * quick + ["--full"] * full, stdin=subprocess.DEVNULL, stdout=log,
-                    stderr=subprocess.STDOUT, start_new_session=True,
-                )  # fmt: skip
+                    command + ["--quick"] * quick + ["--full"] * full,
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    start_new_session=True,
+                )
 
     def __enter__(self) -> Bench:
         return self

@@ -69,10 +69,14 @@ def kept(finding: Finding) -> xr.Dataset:
 
     data = xr.Dataset(attrs={"synthetic": "yes"}) if finding.data is None else finding.data.copy()
     record = {
-        "name": finding.name, "number": _plain(finding.estimate), "method": finding.method,
-        "others": {name: _plain(other) for name, other in finding.others.items()}, "notes": list(finding.notes),
-        "samples": finding.samples_used, "runs": len(finding.runs),
-    }  # fmt: skip
+        "name": finding.name,
+        "number": _plain(finding.estimate),
+        "method": finding.method,
+        "others": {name: _plain(other) for name, other in finding.others.items()},
+        "notes": list(finding.notes),
+        "samples": finding.samples_used,
+        "runs": len(finding.runs),
+    }
     result = as_result(data, finding.name, "identify", synthetic=data.attrs.get("synthetic") == "yes")
     return result.assign_attrs(finding=json.dumps(record, ensure_ascii=False))
 
@@ -82,9 +86,14 @@ def found_in(data: xr.Dataset) -> Found:
     record = json.loads(data.attrs["finding"])
     others = {name: Number(*row) for name, row in record["others"].items()}
     return Found(
-        record["name"], Number(*record["number"]), others, record["method"], tuple(record["notes"]),
-        record["samples"], record["runs"],
-    )  # fmt: skip
+        record["name"],
+        Number(*record["number"]),
+        others,
+        record["method"],
+        tuple(record["notes"]),
+        record["samples"],
+        record["runs"],
+    )
 
 
 def estimates_of(dataset: xr.Dataset) -> dict[str, Number]:

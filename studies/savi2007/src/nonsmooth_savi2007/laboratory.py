@@ -34,7 +34,7 @@ _FEWER = {
     "impulse": {"velocities": (0.5, -0.35, 0.2)},
     "response": {"voltages": (3.9, 4.2, 4.4, 4.6, 4.8, 5.1, 5.6)},
     "contact": {"regimes": ((11.15, 0.039), (9.88, 0.027), (6.0, 0.0165)), "duration": 12.0},
-}  # fmt: skip
+}
 
 _Measured = TypeVar("_Measured")
 
@@ -117,11 +117,12 @@ class Laboratory:
             "force_step": (float(found_resolution(force)), "N", "step of the force sensor"),
             "force_used": (max(float(np.abs(one.values).max()) for one in pushed), "N", "largest force recorded"),
             "turning": (turning / (2 * np.pi), "1/s", "fastest turning of the rotary sensor after a tap"),
-            "volts_low": (min(volts), "V", "lowest motor voltage"), "volts_high": (max(volts), "V", "highest"),
-        }  # fmt: skip
+            "volts_low": (min(volts), "V", "lowest motor voltage"),
+            "volts_high": (max(volts), "V", "highest"),
+        }
         columns = {
             name: ((), value, {"units": unit, "long_name": text}) for name, (value, unit, text) in values.items()
-        }  # fmt: skip
+        }
         return as_result(xr.Dataset(columns), "what the files say of the sensors")
 
     def record(self, name: str, made: Mapping[str, Recording]) -> Session:

@@ -12,10 +12,20 @@ _AMPLITUDE = {**printed.FIGURE_11, "over": "rho", "low": 0.2, "high": 0.5, "show
 _FREQUENCY = {**printed.FIGURE_17, "over": "omega", "low": 8.4, "high": 10.4, "shown": "v"}
 _FIGURES: Mapping[str, Mapping[str, Any]] = {
     "Fig. 9": {
-        **printed.FIGURE_9, "omega": 4.8, "over": "omega", "low": 3.0, "high": 7.0, "shown": "x",
+        **printed.FIGURE_9,
+        "omega": 4.8,
+        "over": "omega",
+        "low": 3.0,
+        "high": 7.0,
+        "shown": "x",
     },
     "Fig. 10": {
-        **printed.FIGURE_10, "omega": 4.5, "over": "omega", "low": 2.4, "high": 7.4, "shown": "x",
+        **printed.FIGURE_10,
+        "omega": 4.5,
+        "over": "omega",
+        "low": 2.4,
+        "high": 7.4,
+        "shown": "x",
     },
     "Fig. 11": {**_AMPLITUDE, "rho": 0.45},
     **{f"Fig. 12 {'abcd'[i]}": {**_AMPLITUDE, "rho": rho} for i, rho in enumerate(printed.FIGURE_12)},
@@ -24,7 +34,7 @@ _FIGURES: Mapping[str, Mapping[str, Any]] = {
     "Fig. 15": {**_GAP, "g": 0.0018},
     "Fig. 17": {**_FREQUENCY, "omega": 9.55},
     **{f"Fig. 18 {'abc'[i]}": {**_FREQUENCY, "omega": omega} for i, omega in enumerate(printed.FIGURE_18)},
-}  # fmt: skip
+}
 
 #: By model.
 VIEWS = {"discontinuous_support": _FIGURES}

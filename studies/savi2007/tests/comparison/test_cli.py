@@ -94,9 +94,14 @@ def test_quiet_is_quiet(folder: Path, capsys: pytest.CaptureFixture[str]) -> Non
     ],
 )
 def test_what_a_study_gets_wrong_is_named(
-    old: str, new: str, message: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    old: str,
+    new: str,
+    message: str,
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+) -> None:
     import re
 
     monkeypatch.chdir(tmp_path)  # a result whose picture fails is kept in the current folder

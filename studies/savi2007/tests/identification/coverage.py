@@ -69,9 +69,12 @@ def one_rig(seed: int, folder: str, awkward: bool = False) -> dict[str, Any]:
         truth = load_truth(truth_file)
         cranks = [float(item.settings["crank_length"]) for item in runs]
     expected = {
-        **truth, "omega_0": float(np.sqrt(2 * truth["k"] / truth["m"])), "gain": truth["force_gain"],
-        "gap_at_rest": truth["g"], "g": truth["g"] - _moved(truth, max(cranks)),
-    }  # fmt: skip
+        **truth,
+        "omega_0": float(np.sqrt(2 * truth["k"] / truth["m"])),
+        "gain": truth["force_gain"],
+        "gap_at_rest": truth["g"],
+        "g": truth["g"] - _moved(truth, max(cranks)),
+    }
     known = [name for name in ASKED if name in result or name in result.extra]
     rows = {name: _row(expected[name], result.estimate(name)) for name in known}
     reading = float(shortest.settings["gap"]) - NOMINAL_GAP

@@ -19,10 +19,18 @@ __all__ = ["ANOMALIES", "ASKED", "BESIDE", "COMPARED", "misses", "page", "pooled
 #: What is counted, with the largest allowed median and maximum of the error: relative, or in m for a gap (None: by
 #: coverage only).
 ASKED: Mapping[str, tuple[float, float] | None] = {
-    "k": (0.01, 0.03), "k_s": (0.01, 0.03), "m": (0.01, 0.03), "omega_0": (0.01, 0.03), "c": (0.02, 0.05),
-    "g": (1e-4, 1e-4), "gap_at_rest": (1e-4, 1e-4), "gap of compare": (1e-4, 1e-4), "c_s": None, "friction": None,
+    "k": (0.01, 0.03),
+    "k_s": (0.01, 0.03),
+    "m": (0.01, 0.03),
+    "omega_0": (0.01, 0.03),
+    "c": (0.02, 0.05),
+    "g": (1e-4, 1e-4),
+    "gap_at_rest": (1e-4, 1e-4),
+    "gap of compare": (1e-4, 1e-4),
+    "c_s": None,
+    "friction": None,
     "gain": None,
-}  # fmt: skip
+}
 #: The gap that ``compare`` uses for the run with the shortest crank.
 COMPARED = "gap of compare"
 #: What may be wrong with a rig: whether it is, by the truth, and the words of the note that names it.
@@ -120,8 +128,12 @@ def unnamed(result: Mapping[str, Any]) -> dict[str, bool]:
 
 def _anomalies(results: Sequence[Mapping[str, Any]]) -> list[str]:
     wrong = [unnamed(result) for result in results]
-    lines = ["## Anomalies in the notes", "", "| anomaly | rigs that have it | named | named where it is not |",
-             "|---|---|---|---|"]  # fmt: skip
+    lines = [
+        "## Anomalies in the notes",
+        "",
+        "| anomaly | rigs that have it | named | named where it is not |",
+        "|---|---|---|---|",
+    ]
     for name, (has, _) in ANOMALIES.items():
         there = sum(has(result["truth"]) for result in results)
         lines.append(
@@ -131,21 +143,24 @@ def _anomalies(results: Sequence[Mapping[str, Any]]) -> list[str]:
     inside, n = pooled(results)
     met = POOLED[0] <= inside / n <= POOLED[1]
     return [
-        *lines, "",
+        *lines,
+        "",
         f"Pooled over parameters and rigs {inside} of {n} truths lie in their 95 % intervals, {100 * inside / n:.1f} % "
-        f"(asked: 92 to 98 %: {'met' if met else 'not met'}).", "",
-    ]  # fmt: skip
+        f"(asked: 92 to 98 %: {'met' if met else 'not met'}).",
+        "",
+    ]
 
 
 def page(results: Sequence[Mapping[str, Any]], *, awkward: bool = False) -> str:
     """The tables and what they say, as Markdown; ``awkward`` rigs have one more."""
     n = len(results)
     lines = [
-        f"{n} virtual rigs (synthetic), seeds {results[0]['seed']} to {results[-1]['seed']}.", "",
+        f"{n} virtual rigs (synthetic), seeds {results[0]['seed']} to {results[-1]['seed']}.",
+        "",
         "| parameter | in the 95 % interval | rms of normalised errors | median error | largest | "
         "median stated uncertainty |",
         "|---|---|---|---|---|---|",
-    ]  # fmt: skip
+    ]
     for name in ASKED:
         if not (rows := _rows(name, results)):
             lines.append(f"| {name} | not identified | | | | |")
@@ -161,13 +176,15 @@ def page(results: Sequence[Mapping[str, Any]], *, awkward: bool = False) -> str:
         "Asked: at least 34 of 40; rms 0.5 to 1.6; median and largest relative error 1 % and 3 % for k, k_s, m, "
         "omega_0, 2 % and 5 % for c; gaps to 0.1 mm. "
         + ("All met." if not wrong else "Not met: " + "; ".join(wrong) + "."),
-        *_said(results), "",
+        *_said(results),
+        "",
         *(_anomalies(results) if awkward else ()),
-        "## Findings beside the parameters", "",
+        "## Findings beside the parameters",
+        "",
         "| finding | in its 95 % interval | rms of normalised errors | median error | largest | bias (median) | "
         "median stated uncertainty |",
         "|---|---|---|---|---|---|---|",
-    ]  # fmt: skip
+    ]
     for label in BESIDE:
         rows = [result["beside"][label] for result in results if label in result["beside"]]
         if rows:

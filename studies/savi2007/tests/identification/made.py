@@ -27,9 +27,14 @@ def run(procedure, time, x=None, *, force=None, turns=None, name="Run #1", **set
         return xr.DataArray(np.asarray(values), {"time": np.asarray(time)}, ("time",), attrs=attrs)
 
     return Run(
-        procedure, name, settings, None if x is None else channel(x, "Angle"),
-        None if force is None else channel(force, "Force"), None if turns is None else np.asarray(turns), True,
-    )  # fmt: skip
+        procedure,
+        name,
+        settings,
+        None if x is None else channel(x, "Angle"),
+        None if force is None else channel(force, "Force"),
+        None if turns is None else np.asarray(turns),
+        True,
+    )
 
 
 def decay_of(omega_0, b, f, zero=0.0, error=1e-6):
@@ -75,8 +80,16 @@ def driven(omega, crank, duration=16.0, *, start=(0.0, 0.0), transient=4.0, gap=
     at, x = time + np.abs(5e-5 * rng.standard_normal(len(time))), np.zeros(len(time))
     t, u, touching, done = 0.0, np.array(start), False, 0
     while done < len(at):
-        solved = solve_ivp(rate(touching), (t, duration + 0.1), u, "DOP853", events=ends if touching else begins,
-                           rtol=1e-10, atol=1e-13, dense_output=True)  # fmt: skip
+        solved = solve_ivp(
+            rate(touching),
+            (t, duration + 0.1),
+            u,
+            "DOP853",
+            events=ends if touching else begins,
+            rtol=1e-10,
+            atol=1e-13,
+            dense_output=True,
+        )
         t, u = solved.t[-1], solved.y[:, -1]
         inside = (at >= solved.t[0]) & (at <= t)
         x[inside], done = solved.sol(at[inside])[0], done + np.count_nonzero(inside)

@@ -29,8 +29,9 @@ class Made:
     apparatus: dict[str, Any] = field(default_factory=dict)
 
     def copy(self) -> Made:
-        return Made(self.rig, {p: [(dict(s), dict(t)) for s, t in rows] for p, rows in self.runs.items()},
-                    dict(self.apparatus))  # fmt: skip
+        return Made(
+            self.rig, {p: [(dict(s), dict(t)) for s, t in rows] for p, rows in self.runs.items()}, dict(self.apparatus)
+        )
 
     def identify(self) -> ns.ParameterSet:
         given = {}
@@ -47,10 +48,13 @@ def session(seed: int) -> Made:
     """Springs, support, taps, drop, response and contact of a virtual rig, few runs of each."""
     rig = VirtualRig(seed)
     made = {
-        "springs": rig.springs(n=2), "support": rig.support(n=2), "impulse": rig.impulse(velocities=(0.5, -0.35, 0.2)),
-        "drop": rig.drop(n=2), "contact": rig.contact(regimes=((11.15, 0.039), (6.0, 0.0165), (8.0, 0.03))),
+        "springs": rig.springs(n=2),
+        "support": rig.support(n=2),
+        "impulse": rig.impulse(velocities=(0.5, -0.35, 0.2)),
+        "drop": rig.drop(n=2),
+        "contact": rig.contact(regimes=((11.15, 0.039), (6.0, 0.0165), (8.0, 0.03))),
         "response": rig.response(voltages=tuple(np.linspace(3.0, 7.3, 8).round(3).tolist())),
-    }  # fmt: skip
+    }
     runs = {}
     for procedure, recording in made.items():
         runs[procedure] = [
@@ -59,12 +63,17 @@ def session(seed: int) -> Made:
                 {k: v for k, v in recording.tree[run].attrs.items() if k in STATED},
             )
             for run in recording.runs
-        ]  # fmt: skip
+        ]
     t = rig.truth
     known = {
-        "distance_per_turn": 0.0789, "counts_per_turn": 1440, "force_gain_limit": 0.01, "force_resolution": 0.03,
-        "mass": (t["m"], 0.001), "test_mass": (t["test_mass"], 0.001), "string_length": (t["string_length"], 0.005),
-    }  # fmt: skip
+        "distance_per_turn": 0.0789,
+        "counts_per_turn": 1440,
+        "force_gain_limit": 0.01,
+        "force_resolution": 0.03,
+        "mass": (t["m"], 0.001),
+        "test_mass": (t["test_mass"], 0.001),
+        "string_length": (t["string_length"], 0.005),
+    }
     return Made(rig, runs, known)
 
 
@@ -146,9 +155,13 @@ def turns(factor: float, *procedures: str) -> Callable[[Made], None]:
                 gate = sensors["Turn"]
                 time = gate["time"].values
                 at = np.interp(np.arange(0, len(time) - 1 + 1e-9, factor), np.arange(len(time)), time)
-                sensors["Turn"] = ns.Recording.from_runs(
-                    {"a": {"Turn": gate.isel(time=np.zeros(len(at), int)).assign_coords(time=at)}}, synthetic=True
-                ).tree["a/Turn"].to_dataset()  # fmt: skip
+                sensors["Turn"] = (
+                    ns.Recording.from_runs(
+                        {"a": {"Turn": gate.isel(time=np.zeros(len(at), int)).assign_coords(time=at)}}, synthetic=True
+                    )
+                    .tree["a/Turn"]
+                    .to_dataset()
+                )
 
     return changed
 
@@ -208,7 +221,7 @@ ABSURD: Mapping[str, Callable[[Made], None]] = {
     "every second turn": turns(2.0, "response", "contact"),
     "taps of another rig": taps_of_another_rig,
     "driven motion for taps": driven_for_taps,
-}  # fmt: skip
+}
 
 
 def wrong(found: ns.ParameterSet, truth: Mapping[str, float]) -> list[str]:

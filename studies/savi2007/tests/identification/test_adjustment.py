@@ -61,10 +61,14 @@ def test_the_birge_ratio_of_a_gain_told_twice_is_its_closed_form(gain):
 def test_the_birge_ratio_of_a_frequency_told_twice_is_its_closed_form():
     # k_s / M by the drop and by k_s / m of contacts: gain known from nothing, one degree of freedom
     found = adjust(
-        [one("mass", 0.84, 1e-6), one("test_mass", 1.33, 1e-6), one("kappa", 1440.0, 2.0),
-         Observation(("omega_s", "b_s"), np.array([30.2, 0.45]), np.diag([0.01**2, 0.01**2]))],
+        [
+            one("mass", 0.84, 1e-6),
+            one("test_mass", 1.33, 1e-6),
+            one("kappa", 1440.0, 2.0),
+            Observation(("omega_s", "b_s"), np.array([30.2, 0.45]), np.diag([0.01**2, 0.01**2])),
+        ],
         gain_limit=0.01,
-    )  # fmt: skip
+    )
     by_drop, by_contact = 1.33 * 30.2**2, 0.84 * 1440.0
     error = np.hypot(1.33 * 2 * 30.2 * 0.01, 0.84 * 2.0)
     assert found.freedom == 1
@@ -79,8 +83,12 @@ def test_without_redundancy_there_is_no_birge_ratio():
 
 def test_an_adjustment_that_does_not_converge_is_refused():
     # k_s / m says 8.4 N/m, the sensor 1200: no gain near 1 brings them together
-    given = [one("mass", 0.84, 1e-3), one("omega_0", 4.5, 1e-6), one("kappa", 10.0, 1e-5),
-             one("support_slope", 1200.0, 1e-3)]  # fmt: skip
+    given = [
+        one("mass", 0.84, 1e-3),
+        one("omega_0", 4.5, 1e-6),
+        one("kappa", 10.0, 1e-5),
+        one("support_slope", 1200.0, 1e-3),
+    ]
     with pytest.raises(SolveError, match=r"not converged after 50 rounds: 'gain' still changes .* look at the mass"):
         adjust(given, gain_limit=0.01)
 
@@ -95,9 +103,12 @@ def test_a_parameter_set_goes_through_a_file_and_draws_what_it_says(tmp_path):
 
     covariance = np.array([[0.01, 0.004, 0.0], [0.004, 0.04, 0.0], [0.0, 0.0, 1e-4]])
     given = ParameterSet(
-        {"k": Estimate(8.0, 0.1, "N/m"), "c_s": Estimate(0.6, 0.2, "N s/m", logarithmic=True)}, covariance,
-        extra={"omega_0": Estimate(4.5, 0.01, "rad/s")}, identifiability={"c_s": "hardly"}, synthetic=True,
-    )  # fmt: skip
+        {"k": Estimate(8.0, 0.1, "N/m"), "c_s": Estimate(0.6, 0.2, "N s/m", logarithmic=True)},
+        covariance,
+        extra={"omega_0": Estimate(4.5, 0.01, "rad/s")},
+        identifiability={"c_s": "hardly"},
+        synthetic=True,
+    )
     back = ParameterSet.from_dataset(load(save(given.to_dataset(), tmp_path / "p.nc")))
     assert dict(back) == dict(given) and back.interval("c_s") == given.interval("c_s")
     assert np.array_equal(back.full_covariance.values, covariance) and back.synthetic

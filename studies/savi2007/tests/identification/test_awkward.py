@@ -15,11 +15,13 @@ from nonsmooth_savi2007.rig.motor import mean_position
 
 pytestmark = pytest.mark.filterwarnings("ignore::nonsmooth.recordings.RecordingWarning")
 OPTIONS = {
-    "springs": {"n": 3}, "support": {"n": 3}, "drop": {"n": 3},
+    "springs": {"n": 3},
+    "support": {"n": 3},
+    "drop": {"n": 3},
     "impulse": {"velocities": (0.5, -0.5, 0.35, -0.35, 0.2, -0.2), "duration": 8.0},
     "response": {"voltages": (4.0, 5.0, 7.0, 8.5), "duration": 8.0},
     "contact": {"regimes": ((11.15, 0.039), (9.55, 0.027), (6.0, 0.0165)), "duration": 9.0},
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")

@@ -41,9 +41,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     text = NOTEBOOK
     for procedure in ("springs", "impulse"):
         made = rig.record(procedure)
-        chosen = {
-            run: {name: node.to_dataset() for name, node in made.tree[run].children.items()} for run in RUNS
-        }  # fmt: skip
+        chosen = {run: {name: node.to_dataset() for name, node in made.tree[run].children.items()} for run in RUNS}
         write_capstone_csv(Recording.from_runs(chosen, synthetic=True), folder / f"{procedure}.csv")
         runs = ", ".join(f'{{ run = "{run}" }}' for run in RUNS)
         text += f'[[recording]]\nfile = "{procedure}.csv"\nprocedure = "{procedure}"\nruns = [{runs}]\n'

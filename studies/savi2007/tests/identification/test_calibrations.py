@@ -80,8 +80,14 @@ def test_a_crank_read_from_a_wrong_zero_is_an_intercept():
 
 def test_a_run_of_less_than_two_turns_is_refused():
     runs = held(LENGTHS[:3])
-    short = run("crank", runs[0].force["time"].values[:300], force=runs[0].force.values[:300],
-                turns=[0.0, 1.57, 3.14], name="Run #9", crank_length=0.01)  # fmt: skip
+    short = run(
+        "crank",
+        runs[0].force["time"].values[:300],
+        force=runs[0].force.values[:300],
+        turns=[0.0, 1.57, 3.14],
+        name="Run #9",
+        crank_length=0.01,
+    )
     with pytest.raises(ValueError, match=r"crank Run #9: holds 1 whole turns"):
         crank_force([short, *runs])
 

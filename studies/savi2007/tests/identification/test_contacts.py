@@ -18,7 +18,7 @@ from studies.savi2007.tests.identification.made import (
     decay_of,
     driven,
     run,
-)  # fmt: skip
+)
 
 from nonsmooth.recordings.session import Quantity
 from nonsmooth_savi2007.identification.contact_findings import contact_finding, one_contact
@@ -53,8 +53,14 @@ def test_the_gates_mark_may_be_anywhere(mark):
     # the crank stands at `mark` when the gate sees it: a motor on the other side is a mark at half a turn
     runs = [driven(8.0, 0.030, phase=lambda t: 8.0 * t)]
     period = 2 * np.pi / 8.0
-    turned = run("contact", runs[0].time, runs[0].positions, turns=runs[0].turns[:-1] + period * mark / (2 * np.pi),
-                 crank_length=0.030, gap=GAP)  # fmt: skip
+    turned = run(
+        "contact",
+        runs[0].time,
+        runs[0].positions,
+        turns=runs[0].turns[:-1] + period * mark / (2 * np.pi),
+        crank_length=0.030,
+        gap=GAP,
+    )
     found = shoot_contacts([turned], decay_of(W, B, F, PLACE), resolution=COUNT, kappa=KAPPA, gamma=GAMMA, mark=mark)
     error = np.sqrt(np.diag(found.covariance))
     assert abs(found.values[7] - 0.030) < 4 * error[7] and abs(found.values[8] - mark) < 4 * error[8] + 1e-3
@@ -129,7 +135,13 @@ def test_a_run_whose_gap_disagrees_is_named_and_left_out():
 
 def test_records_without_contact_are_refused():
     time = np.arange(0, 10, 0.01)
-    free = run("contact", time, counted(-0.01 + 1e-3 * np.cos(8 * time)), turns=np.arange(0.1, 10, np.pi / 4),
-               crank_length=0.01, gap=0.0018)  # fmt: skip
+    free = run(
+        "contact",
+        time,
+        counted(-0.01 + 1e-3 * np.cos(8 * time)),
+        turns=np.arange(0.1, 10, np.pi / 4),
+        crank_length=0.01,
+        gap=0.0018,
+    )
     with pytest.raises(ValueError, match="no run shows a contact"):
         shoot_contacts([free], decay_of(W, B, F), resolution=COUNT, kappa=KAPPA, gamma=GAMMA)

@@ -72,10 +72,16 @@ def test_a_photogate_that_counts_backwards_is_named():
             "Angle": (TIME, 1e-3 * np.cos(4 * TIME), "rad"),
             "Turn": (np.arange(8) * 1.4, count * np.arange(8.0), "turns"),
         }
-        return Recording.from_runs({"Run #1": {
-            name: xr.Dataset({name: ("time", values, {"units": unit})}, {"time": time})
-            for name, (time, values, unit) in sensors.items()
-        }}, synthetic=True, run_attrs={"Run #1": {"crank_length": 0.0165}})  # fmt: skip
+        return Recording.from_runs(
+            {
+                "Run #1": {
+                    name: xr.Dataset({name: ("time", values, {"units": unit})}, {"time": time})
+                    for name, (time, values, unit) in sensors.items()
+                }
+            },
+            synthetic=True,
+            run_attrs={"Run #1": {"crank_length": 0.0165}},
+        )
 
     known = {"distance_per_turn": 0.0789, "mass": (0.838, 1e-3)}
     ahead, back = (gather({"response": recording(sign)}, apparatus=known) for sign in (1, -1))

@@ -20,8 +20,9 @@ def recording(unit="rad", n=200, channels=("Angle",), turns=5, **attrs):
             time, values, own = np.arange(n) / 100, np.zeros(n), unit if name == "Angle" else "N"
         dataset = xr.Dataset(
             {name: ("time", values.astype(float), {"units": own, "long_name": name})},
-            {"time": ("time", time, {"units": "s"})}, {"rate": 100.0, "sampling": "regular"},
-        )  # fmt: skip
+            {"time": ("time", time, {"units": "s"})},
+            {"rate": 100.0, "sampling": "regular"},
+        )
         sensors[name] = dataset
     return Recording.from_runs({"Run #1": sensors}, synthetic=True, source={}, run_attrs={"Run #1": attrs})
 

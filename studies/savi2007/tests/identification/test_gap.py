@@ -15,8 +15,9 @@ from nonsmooth_savi2007.identification.steady import steady
 W, B, F, KAPPA = 4.5, 1.04, 0.01, 1400.0
 
 
-@pytest.mark.parametrize(("a", "length", "ripple", "beta"), [(0.039, 0.5, 0.0, 0.0), (0.06, 0.5, 0.02, 0.7),
-                                                             (0.0165, 2.0, 0.02, 3.0)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("a", "length", "ripple", "beta"), [(0.039, 0.5, 0.0, 0.0), (0.06, 0.5, 0.02, 0.7), (0.0165, 2.0, 0.02, 3.0)]
+)
 def test_the_mean_of_the_drive(a, length, ripple, beta):
     theta = np.arange(4096) * 2 * np.pi / 4096
     phi = theta + ripple * np.sin(theta + beta)
@@ -33,10 +34,13 @@ def test_fig_13_with_half_a_metre_of_string_is_off_by_0_4_mm():
 def moved(length, ripple_part, zero, n=6, seed=0, cranks=(0.0165, 0.035)):
     """Steady runs whose mean is moved by a string of this length; a negative one: the motor is on the other side."""
     rng = np.random.default_rng(seed)
-    return steady([
-        swinging(omega, 0.01, 0.3, zero + a**2 / (8 * length) + ripple_part * a, crank=a, rng=rng)
-        for a in cranks for omega in np.linspace(3, 7, n)
-    ])  # fmt: skip
+    return steady(
+        [
+            swinging(omega, 0.01, 0.3, zero + a**2 / (8 * length) + ripple_part * a, crank=a, rng=rng)
+            for a in cranks
+            for omega in np.linspace(3, 7, n)
+        ]
+    )
 
 
 def test_the_shift_is_that_of_string_and_ripple():

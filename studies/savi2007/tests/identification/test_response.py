@@ -123,11 +123,14 @@ def test_stated_uncertainties_are_neither_too_small_nor_too_large():
         seen, decay = responding(f, seed=seed), decay_of(W, B, f)
         both, whole = amplitude_fit(seen, decay, Quantity(M))[1], receptance_fit(seen, decay, Quantity(M))
         told = [
-            ("c_response", both.estimate, M * B), ("its friction", both.others["friction"], M * f),
-            ("c", whole.estimate, M * B), ("omega_0", whole.others["omega_0"], W),
-            ("friction", whole.others["friction"], M * f), ("scale", whole.others["drive_scale"], 1.0),
+            ("c_response", both.estimate, M * B),
+            ("its friction", both.others["friction"], M * f),
+            ("c", whole.estimate, M * B),
+            ("omega_0", whole.others["omega_0"], W),
+            ("friction", whole.others["friction"], M * f),
+            ("scale", whole.others["drive_scale"], 1.0),
             ("mark", whole.others["mark"], 0.0),
-        ]  # fmt: skip
+        ]
         for name, one, truth in told:
             rows.setdefault(name, []).append((one.value - truth) / one.uncertainty)
     spread = {name: np.sqrt(np.mean(np.square(z))) for name, z in rows.items()}

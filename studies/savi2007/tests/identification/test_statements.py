@@ -27,10 +27,14 @@ def found():
     matrix = np.array([[4.0, 1.0, 0.5], [1.0, 9.0, 0.2], [0.5, 0.2, 16.0]]) * 1e-4
     finding = Finding("k", Estimate(8.0, 0.02, "N/m"), "pulled", 100, ("Run #1",), ("a note",), {"b": Estimate(1, 0.1)})
     return ParameterSet(
-        {"k": Estimate(8.0, 0.02, "N/m"), "g": Estimate(2e-3, 0.03, "m")}, matrix,
-        extra={"omega_0": Estimate(4.5, 0.04, "rad/s")}, findings=[finding], identifiability={"k": "rests on springs"},
-        notes=["no recordings of: drop, contact"], synthetic=True,
-    )  # fmt: skip
+        {"k": Estimate(8.0, 0.02, "N/m"), "g": Estimate(2e-3, 0.03, "m")},
+        matrix,
+        extra={"omega_0": Estimate(4.5, 0.04, "rad/s")},
+        findings=[finding],
+        identifiability={"k": "rests on springs"},
+        notes=["no recordings of: drop, contact"],
+        synthetic=True,
+    )
 
 
 class Model:
@@ -73,9 +77,15 @@ def test_what_is_required_must_be_there():
 
 def test_the_report_has_all_of_it():
     text = report(found())
-    for part in ("(synthetic recordings)", "| k | 8.000 ± 0.020 | 7.9608 to 8.0392 | N/m | rests on springs |",
-                 "### k = 8.000 ± 0.020 N/m", "pulled; from 100 samples of 1 runs", "- a note", "| k | +1.00 | +0.17 |",
-                 "no recordings of: drop, contact"):  # fmt: skip
+    for part in (
+        "(synthetic recordings)",
+        "| k | 8.000 ± 0.020 | 7.9608 to 8.0392 | N/m | rests on springs |",
+        "### k = 8.000 ± 0.020 N/m",
+        "pulled; from 100 samples of 1 runs",
+        "- a note",
+        "| k | +1.00 | +0.17 |",
+        "no recordings of: drop, contact",
+    ):
         assert part in text
 
 
@@ -87,10 +97,14 @@ def results(bias=0.0, n=40, seed=0):
             value = truth + error * (rng.standard_normal() + bias)
             return [truth, value, error, value - 1.96 * error, value + 1.96 * error]
 
-        rows.append({
-            "seed": i, "rows": {name: row(1.0, 1e-6 if name == "g" or "gap" in name else 1e-3) for name in ASKED},
-            "beside": {label: row(1.0, 1e-3) for label in BESIDE}, "truth": {"friction": rng.uniform(0, 0.02)},
-        })  # fmt: skip
+        rows.append(
+            {
+                "seed": i,
+                "rows": {name: row(1.0, 1e-6 if name == "g" or "gap" in name else 1e-3) for name in ASKED},
+                "beside": {label: row(1.0, 1e-3) for label in BESIDE},
+                "truth": {"friction": rng.uniform(0, 0.02)},
+            }
+        )
     return rows
 
 
@@ -123,18 +137,28 @@ def test_what_no_rig_or_not_every_rig_tells_is_said():
     text = page(rows)
     assert "| c_s | not identified |" in text and "of 3 |" in text and "c_s is known within" not in text
     assert [line for line in misses(rows) if "not identified" in line] == [
-        "c: not identified on 1 of 4 rigs", "c_s: not identified on 4 of 4 rigs",
-    ]  # fmt: skip
+        "c: not identified on 1 of 4 rigs",
+        "c_s: not identified on 4 of 4 rigs",
+    ]
     assert pooled(rows)[1] == 4 * len(ASKED) - 5
 
 
 def test_an_awkward_rig_has_its_anomalies_counted_in_the_notes():
     truth = {
-        "sensor_zero": 4e-4, "motor_side": -1.0, "motor_wander": 0.0, "slipped_tap": 3.0, "angle_sign": 1.0,
-        "force_sign": 1.0, "turn_sign": 1.0, "friction": 0.01,
-    }  # fmt: skip
-    notes = ["impulse: run 'Run #3', channel 'Angle': left out: ...", "it rests ..., and not where it was zeroed",
-             "the photogate counts backwards in 3 runs"]  # fmt: skip
+        "sensor_zero": 4e-4,
+        "motor_side": -1.0,
+        "motor_wander": 0.0,
+        "slipped_tap": 3.0,
+        "angle_sign": 1.0,
+        "force_sign": 1.0,
+        "turn_sign": 1.0,
+        "friction": 0.01,
+    }
+    notes = [
+        "impulse: run 'Run #3', channel 'Angle': left out: ...",
+        "it rests ..., and not where it was zeroed",
+        "the photogate counts backwards in 3 runs",
+    ]
     one = {"truth": truth, "notes": notes}
     assert unnamed(one) == {"motor on the other side": True, "photogate reversed": False}
     rows = [row | one for row in results()]

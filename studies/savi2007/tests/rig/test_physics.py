@@ -17,9 +17,15 @@ from nonsmooth_savi2007.rig.physics import AT_REST, car, crank_angle, friction, 
 from nonsmooth_savi2007.rig.sampled import simulated
 
 OFF = {
-    "ripple": False, "string": False, "friction": False, "support_relaxation": False, "jitter": False, "noise": False,
-    "quantisation": False, "gain_error": False,
-}  # fmt: skip
+    "ripple": False,
+    "string": False,
+    "friction": False,
+    "support_relaxation": False,
+    "jitter": False,
+    "noise": False,
+    "quantisation": False,
+    "gain_error": False,
+}
 
 
 @pytest.mark.parametrize(
@@ -30,12 +36,8 @@ def test_without_its_features_the_rig_is_the_model(omega: float, rho: float, g: 
     p = rig.named_parameters(omega=omega, g=g, crank_length=rho / rig.truth["k"])
     instants = np.linspace(0.0, 12 * 2 * np.pi / omega, 2001)
     start = {"x": min(g, 0.0)}
-    ours = ns.simulate(
-        rig.system().with_parameters(vars(p)), periods=12, samples=instants, start=start, rtol=1e-13
-    )  # fmt: skip
-    model = ns.models.discontinuous_support(
-        m=p.m, k=p.k, k_s=p.k_s, c=p.c, c_s=p.c_s, g=g, rho=rho, omega=omega
-    )  # fmt: skip
+    ours = ns.simulate(rig.system().with_parameters(vars(p)), periods=12, samples=instants, start=start, rtol=1e-13)
+    model = ns.models.discontinuous_support(m=p.m, k=p.k, k_s=p.k_s, c=p.c, c_s=p.c_s, g=g, rho=rho, omega=omega)
     theirs = ns.simulate(model, periods=12, samples=instants, start=start, method="exact")
     assert ours.sizes["crossing"] == theirs.sizes["crossing"]
     np.testing.assert_allclose(ours["crossing_time"], theirs["crossing_time"], atol=1e-8)
@@ -114,9 +116,12 @@ def test_a_string_cannot_push() -> None:
         returns = np.arccos((slack + slack) / (1.8 * slack + slack)) / w  # from 1.8 slack to slack, about -slack
         t = np.linspace(0.0, 0.999 * returns, 200)
         run = ns.simulate(
-            rig.system().with_parameters(values), duration=2 * returns, start={"x": start},
-            samples=np.append(t, 2 * returns), rtol=1e-12,
-        )  # fmt: skip
+            rig.system().with_parameters(values),
+            duration=2 * returns,
+            start={"x": start},
+            samples=np.append(t, 2 * returns),
+            rtol=1e-12,
+        )
         expected = side * (-slack + 2.8 * slack * np.cos(w * t))
         np.testing.assert_allclose(run["u"].sel(state="x").values[: len(t)], expected, atol=1e-10)
         assert run["mode"].attrs["flag_meanings"].split()[int(run["mode"][0])] == mode
@@ -160,6 +165,6 @@ def test_friction_is_followed_through_its_steep_piece(velocity: float) -> None:
     other = solve_ivp(field, (0, 3), (0, velocity), method="DOP853", rtol=1e-12, atol=1e-15, max_step=1e-3, t_eval=t)
     ours, _ = simulated(
         rig.system().with_parameters(vars(p)), "Run #1", instants=t, duration=3.0, start={"v": velocity}
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(ours[0], other.y[0], rtol=0, atol=3e-9)
     np.testing.assert_allclose(ours[1], other.y[1], rtol=0, atol=3e-8)

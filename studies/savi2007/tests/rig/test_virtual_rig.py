@@ -17,12 +17,18 @@ from nonsmooth_savi2007.rig.truth import published
 
 PERFECT = dict.fromkeys(FEATURES, False)
 SHORT = {
-    "springs": {"n": 2}, "support": {"n": 2}, "impulse": {"velocities": (0.3, -0.2), "duration": 3.0},
-    "drop": {"n": 2, "duration": 3.0}, "voltage": {"voltages": (4.0, 8.0)}, "crank": {"lengths": (0.01, 0.03)},
+    "springs": {"n": 2},
+    "support": {"n": 2},
+    "impulse": {"velocities": (0.3, -0.2), "duration": 3.0},
+    "drop": {"n": 2, "duration": 3.0},
+    "voltage": {"voltages": (4.0, 8.0)},
+    "crank": {"lengths": (0.01, 0.03)},
     "response": {"voltages": (4.0, 5.0), "crank_lengths": (0.0165,), "duration": 3.0},
-    "grazing": {"half_width": 0.1, "duration": 3.0}, "contact": {"regimes": ((6.0, 0.0165),), "duration": 3.0},
-    "rise": {"duration": 30.0}, "section": {"figure": 12, "periods": 3},
-}  # fmt: skip
+    "grazing": {"half_width": 0.1, "duration": 3.0},
+    "contact": {"regimes": ((6.0, 0.0165),), "duration": 3.0},
+    "rise": {"duration": 30.0},
+    "section": {"figure": 12, "periods": 3},
+}
 
 
 def position(recording: ns.Recording, run: str) -> np.ndarray:
@@ -362,9 +368,14 @@ def test_the_sensor_counts_from_where_it_was_zeroed() -> None:
     np.testing.assert_allclose(position(shifted, "Run #1"), position(plain, "Run #1") - 4e-4, atol=1e-12)
 
 
-@pytest.mark.parametrize(("sign", "channel", "procedure"), [
-    ("angle_sign", "Angle", "springs"), ("force_sign", "Force", "springs"), ("turn_sign", "Turn", "voltage"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("sign", "channel", "procedure"),
+    [
+        ("angle_sign", "Angle", "springs"),
+        ("force_sign", "Force", "springs"),
+        ("turn_sign", "Turn", "voltage"),
+    ],
+)
 def test_a_sensor_counts_the_other_way(sign: str, channel: str, procedure: str) -> None:
     usual, other = (
         VirtualRig(2, quantisation=False, truth={sign: s}).record(procedure, **SHORT[procedure]) for s in (1.0, -1.0)
@@ -408,8 +419,16 @@ def test_one_tap_slips_and_the_others_do_not() -> None:
 def test_an_awkward_rig_is_its_seed_and_the_car_of_that_seed() -> None:
     one, again, plain = VirtualRig.awkward(5), VirtualRig.awkward(5), VirtualRig(5)
     assert one.truth == again.truth and one.holding
-    beside = ("sensor_zero", "motor_side", "motor_wander", "slipped_tap", "angle_sign", "force_sign", "turn_sign",
-              "creep_velocity")  # fmt: skip
+    beside = (
+        "sensor_zero",
+        "motor_side",
+        "motor_wander",
+        "slipped_tap",
+        "angle_sign",
+        "force_sign",
+        "turn_sign",
+        "creep_velocity",
+    )
     assert all(one.truth[name] == plain.truth[name] for name in UNITS if name not in beside)
     drawn = [VirtualRig.awkward(seed).truth for seed in range(40)]
     for name in ("motor_side", "angle_sign", "force_sign", "turn_sign"):

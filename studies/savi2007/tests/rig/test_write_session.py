@@ -18,9 +18,13 @@ pytestmark = pytest.mark.filterwarnings("ignore::nonsmooth.recordings.RecordingW
 
 #: Shorter than what identification would want.
 OPTIONS: dict[str, dict[str, Any]] = {
-    "springs": {"n": 2}, "support": {"n": 2}, "drop": {"n": 2}, "impulse": {"velocities": (0.5, -0.3), "duration": 5.0},
-    "response": {"voltages": (4.0, 7.0), "duration": 5.0}, "contact": {"regimes": ((9.55, 0.027),), "duration": 5.0},
-}  # fmt: skip
+    "springs": {"n": 2},
+    "support": {"n": 2},
+    "drop": {"n": 2},
+    "impulse": {"velocities": (0.5, -0.3), "duration": 5.0},
+    "response": {"voltages": (4.0, 7.0), "duration": 5.0},
+    "contact": {"regimes": ((9.55, 0.027),), "duration": 5.0},
+}
 
 
 @pytest.fixture(scope="module")

@@ -49,8 +49,14 @@ class Coulomb(Element):
     phases = ("stick", "forward", "back")
     laws = ("friction", "static", "normal")
     conditions = (
-        "speed", "speed_above", "speed_below", "over", "under", "turned_forward", "turned_back",
-    )  # fmt: skip
+        "speed",
+        "speed_above",
+        "speed_below",
+        "over",
+        "under",
+        "turned_forward",
+        "turned_back",
+    )
     held = ("stick",)
     sides = ("forward", "back")
 
@@ -104,10 +110,14 @@ class Coulomb(Element):
         over, under = hold - most, hold + most
         if here.phase == "stick":
             off = SMALL * here.size(v)
-            begins = [
-                Leaving("forward", [Condition(v - off, 1, "speed_above")]),
-                Leaving("back", [Condition(v + off, -1, "speed_below")]),
-            ] if here.begins_alone() else []  # fmt: skip
+            begins = (
+                [
+                    Leaving("forward", [Condition(v - off, 1, "speed_above")]),
+                    Leaving("back", [Condition(v + off, -1, "speed_below")]),
+                ]
+                if here.begins_alone()
+                else []
+            )
             ends = Condition(over, 1, "over"), Condition(under, -1, "under")
             return [*begins, Leaving("back", [ends[0]]), Leaving("forward", [ends[1]])]
         other, sign = ("back", -1) if here.phase == "forward" else ("forward", 1)
@@ -124,6 +134,8 @@ class Coulomb(Element):
         off = -sign * CREEP * here.size(v)
         slow, turned = (Condition(v + off, one * sign, f"turned_{here.phase}") for one in (-1, 1))
         return [
-            Leaving("stick", [stopped, slow, *within], still), Leaving(other, [stopped, torn]),
-            Leaving(other, [turned]), Leaving("stick", [stopped, slow], still),
-        ]  # fmt: skip
+            Leaving("stick", [stopped, slow, *within], still),
+            Leaving(other, [stopped, torn]),
+            Leaving(other, [turned]),
+            Leaving("stick", [stopped, slow], still),
+        ]

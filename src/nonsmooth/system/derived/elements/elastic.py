@@ -96,8 +96,9 @@ class Backlash(Displaced):
         upper, lower = here.where - here.law("half_width"), here.where + here.law("half_width")
         if here.phase == "free":
             return [
-                Leaving("above", [Condition(upper, 1, "upper")]), Leaving("below", [Condition(lower, -1, "lower")]),
-            ]  # fmt: skip
+                Leaving("above", [Condition(upper, 1, "upper")]),
+                Leaving("below", [Condition(lower, -1, "lower")]),
+            ]
         back = Condition(upper, -1, "upper") if here.phase == "above" else Condition(lower, 1, "lower")
         return [Leaving("free", [back])]
 

@@ -126,20 +126,22 @@ class Stop(Contact):
                 ways += [
                     Leaving("open", [Condition(here.where - off, 1, "off")]),
                     Leaving("open", [Condition(here.where + off, -1, "beyond")], here.back_on(still)),
-                ]  # fmt: skip
+                ]
             return ways
         w, restitution = here.rate(), here.law("restitution")
         closed = Condition(here.where, -1, "gap")
         closing = [closed, Condition(w, -1, "closing")]
         if here.vanishes(restitution):
             return [
-                Leaving("rest", [*closing, presses], still), Leaving("open", [*closing, lifts], still),
+                Leaving("rest", [*closing, presses], still),
+                Leaving("open", [*closing, lifts], still),
                 Leaving("rest", closing, still),  # neither, to all orders: it holds
             ]
         speed, rebound = w + (self.creep if self.creep is not None else CREEP * here.size(w)), here.struck(restitution)
         slow = [*closing, Condition(speed, 1, "slow")]
         return [
             Leaving("open", [closed, Condition(speed, -1, "slow")], rebound),
-            Leaving("rest", [*slow, presses], still), Leaving("open", [*slow, lifts], rebound),
+            Leaving("rest", [*slow, presses], still),
+            Leaving("open", [*slow, lifts], rebound),
             Leaving("rest", slow, still),
         ]

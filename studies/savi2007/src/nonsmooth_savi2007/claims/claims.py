@@ -52,8 +52,7 @@ CLAIMS = (
     Claim("F9b", ("fig09", "fig09_rig"), response.f9b, response.f9b_rig),
     Claim("F9c", ("fig09", "fig09_rig"), response.f9c, response.f9c_rig),
     Claim("F10", ("fig10", "fig10_rig"), response.f10, response.f10_rig),
-    Claim("F10", ("fig09", "fig09_rig", "fig10"), response.grazing_behind_both,
-          response.grazing_behind_both_rig),
+    Claim("F10", ("fig09", "fig09_rig", "fig10"), response.grazing_behind_both, response.grazing_behind_both_rig),
     Claim("F11", ("fig11", "fig11_rig"), diagrams.f11, rig.f11),
     Claim("F12", ("fig12", "fig12_rig"), diagrams.f12, rig.f12),
     Claim("F13", ("fig13", "fig13_rig"), diagrams.f13, rig.f13),
@@ -67,7 +66,7 @@ CLAIMS = (
     Claim("F18", ("fig18", "fig18_rig"), diagrams.f18, rig.f18),
     Claim("C1", ("fig09_rig", "fig10_rig", "fig11_rig", "fig16", "fig09", "fig10", "fig11", "fig15"), model.c1, rig.c1),
     Claim("C1", ("eta",), model.c1_other_systems, _model(1)),
-)  # fmt: skip
+)
 
 
 def measure_claims(data: Data) -> tuple[Row, ...]:

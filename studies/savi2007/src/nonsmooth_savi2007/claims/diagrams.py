@@ -32,7 +32,7 @@ from nonsmooth_savi2007.measure import (
     range_of,
     regimes,
     separation_rate,
-)  # fmt: skip
+)
 from nonsmooth_savi2007.printed import FIGURE_12, FIGURE_14, FIGURE_14_TEXT, FIGURE_17_TEXT, FIGURE_18, NUMBERS
 
 if TYPE_CHECKING:
@@ -61,11 +61,15 @@ def f11(data: Data) -> list[Row]:
     windows = sorted({int(n) for n in inside if n > 0})
     rows.append(
         against_printed(
-            "F11", f"chaos for rho of at most {printed}", printed, edges[0], edges[1],
+            "F11",
+            f"chaos for rho of at most {printed}",
+            printed,
+            edges[0],
+            edges[1],
             f"No period up to 16 at {int((inside == APERIODIC).sum())} of {len(inside)} values below; windows of "
             f"period {', '.join(map(str, windows)) or '(none)'} between.",
         )
-    )  # fmt: skip
+    )
     return rows
 
 
@@ -122,11 +126,16 @@ def f12(data: Data) -> list[Row]:
     wanted = ", ".join(f"{rho:g}: period {period}" for rho, period in FIGURE_12.items())
     return [
         Row(
-            "F12", "Fig. 12 with the ranges of Fig. 11", f"orbits and section points at rho = {wanted}",
-            _reached(surveys[0], FIGURE_12), _reached(surveys[1], FIGURE_12), _apart(data, "fig12", FIGURE_12),
-            agreed(met), "The phase of the paper's section is not stated; 0 here.",
+            "F12",
+            "Fig. 12 with the ranges of Fig. 11",
+            f"orbits and section points at rho = {wanted}",
+            _reached(surveys[0], FIGURE_12),
+            _reached(surveys[1], FIGURE_12),
+            _apart(data, "fig12", FIGURE_12),
+            agreed(met),
+            "The phase of the paper's section is not stated; 0 here.",
         )
-    ]  # fmt: skip
+    ]
 
 
 def f13(data: Data) -> list[Row]:
@@ -140,11 +149,26 @@ def f13(data: Data) -> list[Row]:
         texts.append(", ".join(part for part in parts if part))
         others.append(_coexisting(data["fig13"][f"{flow}_starts"], data["fig13"][flow]))
     return [
-        Row("F13", "Section 4, on Fig. 13", "periodic and chaotic responses as the gap varies", texts[0], texts[1],
-            "none in kind", agreed("no period" in texts[0])),
-        Row("F13", "not in the paper", "coexisting motions (several starts)", others[0], others[1], "none in kind",
-            Verdict.ADDS, "One sweep follows one motion; the paper shows one at each gap."),
-    ]  # fmt: skip
+        Row(
+            "F13",
+            "Section 4, on Fig. 13",
+            "periodic and chaotic responses as the gap varies",
+            texts[0],
+            texts[1],
+            "none in kind",
+            agreed("no period" in texts[0]),
+        ),
+        Row(
+            "F13",
+            "not in the paper",
+            "coexisting motions (several starts)",
+            others[0],
+            others[1],
+            "none in kind",
+            Verdict.ADDS,
+            "One sweep follows one motion; the paper shows one at each gap.",
+        ),
+    ]
 
 
 def _span(values: np.ndarray, regime: np.ndarray, n: int) -> str:
@@ -173,21 +197,31 @@ def f14(data: Data) -> list[Row]:
         verdict = agreed(period in reached)
         why = "" if alone else "Motions coexist here; which is met depends on the start."
         rows.append(
-            Row("F14", "Fig. 14, caption", f"g = {g:g} m: {_name(period)}", words_of(reached),
-                words_of(periods_reached(smoothed, g)), "none" if period in reached else "other period", verdict, why)
-        )  # fmt: skip
+            Row(
+                "F14",
+                "Fig. 14, caption",
+                f"g = {g:g} m: {_name(period)}",
+                words_of(reached),
+                words_of(periods_reached(smoothed, g)),
+                "none" if period in reached else "other period",
+                verdict,
+                why,
+            )
+        )
     right = [g for g, period in FIGURE_14_TEXT.items() if period in periods_reached(exact, g)]
     rows.append(
         Row(
-            "F14", "Section 4, on Fig. 14", "the text's gaps: "
-            + ", ".join(f"{g:g}: {_name(period)}" for g, period in FIGURE_14_TEXT.items()),
-            _reached(exact, FIGURE_14_TEXT), _reached(smoothed, FIGURE_14_TEXT),
+            "F14",
+            "Section 4, on Fig. 14",
+            "the text's gaps: " + ", ".join(f"{g:g}: {_name(period)}" for g, period in FIGURE_14_TEXT.items()),
+            _reached(exact, FIGURE_14_TEXT),
+            _reached(smoothed, FIGURE_14_TEXT),
             f"{len(right)} of {len(FIGURE_14_TEXT)} as printed",
             agreed(len(right) == len(FIGURE_14_TEXT)),
             "The text prints other gaps than the caption; the caption's are those that show what is claimed.",
             cause=Cause.MISPRINT if all(row.verdict is Verdict.AGREES for row in rows) else None,
         )
-    )  # fmt: skip
+    )
     return rows
 
 
@@ -211,17 +245,20 @@ def f15(data: Data) -> list[Row]:
     texts = [
         f"neighbouring trajectories separate by a factor exp({rate:.3f} ± {error:.3f}) per period"
         for rate, error in rates
-    ]  # fmt: skip
+    ]
     chaotic = all(rate > 5 * error for rate, error in rates)
     return [
         Row(
-            "F15", "Fig. 15", "g = 0.0018 m: a strange attractor, sections at four phases",
-            texts[0], texts[1],
+            "F15",
+            "Fig. 15",
+            "g = 0.0018 m: a strange attractor, sections at four phases",
+            texts[0],
+            texts[1],
             f"99 % of the smoothed points within {100 * worst:.2f} % of the attractor's size of an exact point",
             agreed(chaotic and worst < 0.05),
             "A mean over the first returns of pairs of neighbours; not a Lyapunov exponent with its error.",
         )
-    ]  # fmt: skip
+    ]
 
 
 def f17(data: Data) -> list[Row]:
@@ -241,11 +278,16 @@ def _response_at(data: Data, omega: float, says: str) -> Row:
     swapped = not chaos and (contacts[0] > 0) != ("with contact" in says)
     difference = "another motion" if not right_kind else "contact and no contact swapped" if swapped else "none"
     return Row(
-        "F17", "Section 4, on Fig. 17", f"omega = {omega:g} rad/s: {says}", texts[0], texts[1], difference,
+        "F17",
+        "Section 4, on Fig. 17",
+        f"omega = {omega:g} rad/s: {says}",
+        texts[0],
+        texts[1],
+        difference,
         agreed(difference == "none"),
         "Rising sweep; other motions coexist (Fig. 18)." if chaos else _without_support(data, omega, swapped),
         cause=Cause.MISPRINT if right_kind and swapped else None,
-    )  # fmt: skip
+    )
 
 
 def _without_support(data: Data, omega: float, swapped: bool) -> str:
@@ -276,11 +318,15 @@ def _abrupt(data: Data) -> Row:
             f"after {up:.4f}, falling into it at {down:.4f} rad/s"
         )
     return Row(
-        "F17", "Section 4, on Fig. 17", "abrupt transitions from periodic to chaotic and from chaotic to periodic",
-        texts[0], texts[1], "one of two is abrupt",
+        "F17",
+        "Section 4, on Fig. 17",
+        "abrupt transitions from periodic to chaotic and from chaotic to periodic",
+        texts[0],
+        texts[1],
+        "one of two is abrupt",
         Verdict.DIFFERS if "not found" in texts else Verdict.IN_PART,
         f"{_lasting(data)} The other is a cascade of flips that looks abrupt on the scale of the figure.",
-    )  # fmt: skip
+    )
 
 
 def _lasting(data: Data) -> str:
@@ -301,12 +347,14 @@ def f17_grazing(data: Data) -> list[Row]:
     exact, smoothed = (data["fig17"][flow] for flow in FLOWS)
     return [
         against_closed_form(
-            "F17", "closed form, not printed", "the abrupt transition is grazing (falling)",
+            "F17",
+            "closed form, not printed",
+            "the abrupt transition is grazing (falling)",
             (grazing_of(exact)[-1], grazing_of(smoothed)[-1]),
-
-            highest(changes(exact, 1, APERIODIC, "down")), highest(changes(smoothed, 1, APERIODIC, "down")),
+            highest(changes(exact, 1, APERIODIC, "down")),
+            highest(changes(smoothed, 1, APERIODIC, "down")),
         )
-    ]  # fmt: skip
+    ]
 
 
 def f18(data: Data) -> list[Row]:
@@ -317,12 +365,17 @@ def f18(data: Data) -> list[Row]:
     wanted = ", ".join(f"{omega:g}: {_name(period)}" for omega, period in FIGURE_18.items())
     return [
         Row(
-            "F18", "Fig. 18, caption", f"orbits at omega = {wanted}", _reached(surveys[0], FIGURE_18),
-            _reached(surveys[1], FIGURE_18), _apart(data, "fig18", FIGURE_18), agreed(met),
+            "F18",
+            "Fig. 18, caption",
+            f"orbits at omega = {wanted}",
+            _reached(surveys[0], FIGURE_18),
+            _reached(surveys[1], FIGURE_18),
+            _apart(data, "fig18", FIGURE_18),
+            agreed(met),
             "Neighbouring trajectories on the chaotic orbit separate by a factor "
             f"exp({rate:.2f} ± {error:.2f}) per period (exact).",
         )
-    ]  # fmt: skip
+    ]
 
 
 def f13_basins(data: Data) -> list[Row]:
@@ -349,8 +402,12 @@ def _row(data: Data, figure: str, claim: str, place: str, says: str, period: int
     )
     others = ", ".join(name for name, number in zip(names, periods, strict=True) if number != period)
     return Row(
-        claim, place, says, f"attractors of {starts} starts: {'; '.join(names)}; none reached by {lost}",
-        "not asked: of the exact flow", "none" if alone else f"not alone: {others}",
+        claim,
+        place,
+        says,
+        f"attractors of {starts} starts: {'; '.join(names)}; none reached by {lost}",
+        "not asked: of the exact flow",
+        "none" if alone else f"not alone: {others}",
         Verdict.DIFFERS if period not in periods else Verdict.AGREES if alone else Verdict.IN_PART,
         f"Starts at phase 0 with {ranges}; the shares, with their binomial standard errors, are those of this plane.",
-    )  # fmt: skip
+    )

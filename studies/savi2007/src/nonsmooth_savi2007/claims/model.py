@@ -36,13 +36,18 @@ def m1(data: Data) -> list[Row]:
     stated, printed_formula = (float(np.sqrt(n * p["k"] / p["m"])) for n in (2, 1))
     return [
         Row(
-            "M1", "Eqs. 1-2", "two modes; the support's force f_s < 0 in contact, and zero at release", texts[0],
-            texts[1], "none", agreed(max(pulls) < 1e-6),
+            "M1",
+            "Eqs. 1-2",
+            "two modes; the support's force f_s < 0 in contact, and zero at release",
+            texts[0],
+            texts[1],
+            "none",
+            agreed(max(pulls) < 1e-6),
             f"Over the orbits of Fig. 12. By Eq. 2 the natural frequency is sqrt(2k/m) = {stated:.3f} rad/s, the "
             f"paper's {NUMBERS['natural frequency'].text}; "
             f"the formula printed in Section 3.1, sqrt(k/m), gives {printed_formula:.2f}.",
         )
-    ]  # fmt: skip
+    ]
 
 
 def _indicators(orbit: xr.Dataset) -> tuple[FloatArray, FloatArray]:
@@ -62,11 +67,16 @@ def m2(data: Data) -> list[Row]:
         total += int(clear.sum())
     return [
         Row(
-            "M2", "Eqs. 3-5, Fig. 2a", "in contact exactly where h_a > 0 and h_b < 0",
-            f"mode = region at {right} of {total} samples", "see M3", "none", agreed(right == total),
+            "M2",
+            "Eqs. 3-5, Fig. 2a",
+            "in contact exactly where h_a > 0 and h_b < 0",
+            f"mode = region at {right} of {total} samples",
+            "see M3",
+            "none",
+            agreed(right == total),
             "The mode is stored and changed by transitions, not computed from the state: this is a check.",
         )
-    ]  # fmt: skip
+    ]
 
 
 def m3(data: Data) -> list[Row]:
@@ -86,13 +96,17 @@ def m3(data: Data) -> list[Row]:
         total += int(clear.sum())
     return [
         Row(
-            "M3", "Eqs. 6-10, Fig. 2b", "smoothed: bands of half width eta, S_a and S_b, between G- and G+", "see M2",
-            f"mode = region of Eqs. 9-10 at {right} of {total} "
-            "samples", "none", agreed(right == total),
+            "M3",
+            "Eqs. 6-10, Fig. 2b",
+            "smoothed: bands of half width eta, S_a and S_b, between G- and G+",
+            "see M2",
+            f"mode = region of Eqs. 9-10 at {right} of {total} samples",
+            "none",
+            agreed(right == total),
             "S_a holds the velocity at its entry (Eq. 8a) as memory. Eq. 8a interpolates the forces at the band's "
             "ends; it is not the (1 - q) f- + q f+ of the text above it.",
         )
-    ]  # fmt: skip
+    ]
 
 
 def m4(data: Data) -> list[Row]:
@@ -106,28 +120,38 @@ def m4(data: Data) -> list[Row]:
     narrow = float(grazing["grazing"][0] - grazing["closed_form"][0])
     return [
         Row(
-            "M4", "Section 4", "Runge-Kutta-Fehlberg with eta = 1e-5 in all simulations", "reference",
+            "M4",
+            "Section 4",
+            "Runge-Kutta-Fehlberg with eta = 1e-5 in all simulations",
+            "reference",
             f"after 4 periods off by at most {coarse:.1e} (in 1 mm, 1 cm/s) at rtol 1e-6, {fine:.1e} by eta alone",
-            f"at most {1e3 * coarse:.2f} micrometres or {1e4 * coarse:.1f} micrometres/s", Verdict.INPUT,
+            f"at most {1e3 * coarse:.2f} micrometres or {1e4 * coarse:.1f} micrometres/s",
+            Verdict.INPUT,
             "The paper names no tolerance; rtol 1e-6 here. On orbits that cross transversally.",
         ),
         Row(
-            "M4", "Section 4", "the choice of eta is important", "reference",
+            "M4",
+            "Section 4",
+            "the choice of eta is important",
+            "reference",
             f"error proportional to eta^{order.mean():.2f} for eta between "
             f"{max(FITTED[0], float(errors['eta'].min())):.0e} "
             f"and {FITTED[1]:.0e}",
-            f"order {order.min():.3f} ... "
-            f"{order.max():.3f}", agreed(bool((np.abs(order - 2) < 0.1).all())),
+            f"order {order.min():.3f} ... {order.max():.3f}",
+            agreed(bool((np.abs(order - 2) < 0.1).all())),
             "Away from grazing it matters little: a tenth of the band makes a hundredth of the error.",
         ),
         Row(
-            "M4", "closed form, not printed", f"near grazing contact begins at g - eta: Fig. 9's falling jump moves by "
-            f"{closed:+.2e} rad/s at eta = "
-            "1e-5", f"{narrow:+.1e} rad/s off the closed form of g", f"moves by {shift:+.2e} rad/s",
-            f"{shift - closed:+.1e} rad/s", agreed(abs(shift - closed) < 1e-6),
+            "M4",
+            "closed form, not printed",
+            f"near grazing contact begins at g - eta: Fig. 9's falling jump moves by {closed:+.2e} rad/s at eta = 1e-5",
+            f"{narrow:+.1e} rad/s off the closed form of g",
+            f"moves by {shift:+.2e} rad/s",
+            f"{shift - closed:+.1e} rad/s",
+            agreed(abs(shift - closed) < 1e-6),
             "Near grazing the effect is proportional to eta itself. Bisected on both models to 1e-7 rad/s.",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def c1(data: Data) -> list[Row]:
@@ -150,15 +174,27 @@ def c1(data: Data) -> list[Row]:
         at_grazing.append(sum(judge_step(w, met) is Verdict.AGREES for met, w in pairs))
     counted = [f"{n} of 3 within one step of the closed-form grazing" for n in at_grazing]
     return [
-        Row("C1", "Section 5", "dynamical jumps, bifurcations and chaos", texts[0], texts[1], "none in kind",
-            agreed(all(seen))),
         Row(
-            "C1", "Section 5", "grazing causes abrupt changes (falling jumps of Figs. 9 and 10, small rising one)",
-            counted[0], counted[1], "none", Verdict.AGREES if min(at_grazing) == 3 else Verdict.IN_PART,
+            "C1",
+            "Section 5",
+            "dynamical jumps, bifurcations and chaos",
+            texts[0],
+            texts[1],
+            "none in kind",
+            agreed(all(seen)),
+        ),
+        Row(
+            "C1",
+            "Section 5",
+            "grazing causes abrupt changes (falling jumps of Figs. 9 and 10, small rising one)",
+            counted[0],
+            counted[1],
+            "none",
+            Verdict.AGREES if min(at_grazing) == 3 else Verdict.IN_PART,
             "The support is soft: grazing as such is passed continuously, and the jump is a fold that follows closer "
             "than the steps of these sweeps.",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def c1_other_systems(data: Data) -> list[Row]:
@@ -166,9 +202,14 @@ def c1_other_systems(data: Data) -> list[Row]:
     order = order_in_eta(data["eta"]["error"], "general")
     return [
         Row(
-            "C1", "Section 5", "the procedure may be useful for other non-smooth systems", "not a number",
+            "C1",
+            "Section 5",
+            "the procedure may be useful for other non-smooth systems",
+            "not a number",
             f"the general form, (1 - q) f- + q f+, converges with order {order.min():.2f} ... {order.max():.2f} on "
-            "this oscillator", "none", Verdict.IN_PART if order.min() > 1 else Verdict.DIFFERS,
+            "this oscillator",
+            "none",
+            Verdict.IN_PART if order.min() > 1 else Verdict.DIFFERS,
             "Shown here on the paper's oscillator only, with the general form in place of Eq. 8.",
         )
-    ]  # fmt: skip
+    ]

@@ -60,14 +60,18 @@ def r1(data: Data) -> list[Row]:
     good = abs(step - 0.25) < 1e-6 and turning < 30 and volts <= 12
     return [
         _row(
-            "R1", "Fig. 3", "car, two springs and strings, motor 0-12 V with crank, magnetic damper, support, rotary "
+            "R1",
+            "Fig. 3",
+            "car, two springs and strings, motor 0-12 V with crank, magnetic damper, support, rotary "
             "sensor: 0.25 degrees, up to 30 rev/s",
-            Cell(f"built so: steps of {step:g} degrees in its files, at most {turning:.1f} rev/s, up to {volts:g} V",
-                 _built(good)),
+            Cell(
+                f"built so: steps of {step:g} degrees in its files, at most {turning:.1f} rev/s, up to {volts:g} V",
+                _built(good),
+            ),
             "By construction. Beyond the model it has strings of finite length that cannot push, an uneven motor, dry "
             "friction, a support that takes time to come back, and the errors of its sensors.",
         )
-    ]  # fmt: skip
+    ]
 
 
 def r2(data: Data) -> list[Row]:
@@ -77,11 +81,13 @@ def r2(data: Data) -> list[Row]:
     good = abs(rate - 100) < 0.1 and abs(step - 0.03) < 1e-6 and used <= 50
     return [
         _row(
-            "R2", "Section 3.1", "100 Hz; force sensor to 50 N, 1 %, resolution 0.03 N",
+            "R2",
+            "Section 3.1",
+            "100 Hz; force sensor to 50 N, 1 %, resolution 0.03 N",
             Cell(f"{rate:.2f} Hz; steps of {step:g} N, {used:.1f} N used", _built(good)),
             "By construction. The 1 % is a gain, the same in all forces: it enters every uncertainty as one.",
         )
-    ]  # fmt: skip
+    ]
 
 
 def p1(data: Data) -> list[Row]:
@@ -89,11 +95,23 @@ def p1(data: Data) -> list[Row]:
     car, support = (found_in(data["fig04"][key]) for key in ("oscillator", "support"))
     why = "The slope on the car is 2k: both springs pull. Nearly all of the uncertainty is the force sensor's gain."
     return [
-        _row("P1", TABLE_1["k"].place, f"slope of force over displacement: k = {TABLE_1['k']}",
-             _back(TABLE_1["k"], car.number.times(0.5)), why, _GIVEN),
-        _row("P1", TABLE_1["k_s"].place, f"slope of force over displacement: k_s = {TABLE_1['k_s']}",
-             _back(TABLE_1["k_s"], support.number), "", _GIVEN),
-    ]  # fmt: skip
+        _row(
+            "P1",
+            TABLE_1["k"].place,
+            f"slope of force over displacement: k = {TABLE_1['k']}",
+            _back(TABLE_1["k"], car.number.times(0.5)),
+            why,
+            _GIVEN,
+        ),
+        _row(
+            "P1",
+            TABLE_1["k_s"].place,
+            f"slope of force over displacement: k_s = {TABLE_1['k_s']}",
+            _back(TABLE_1["k_s"], support.number),
+            "",
+            _GIVEN,
+        ),
+    ]
 
 
 def p2(data: Data) -> list[Row]:
@@ -105,12 +123,16 @@ def p2(data: Data) -> list[Row]:
     natural = Number(value, u, value - 1.96 * u, value + 1.96 * u, "")
     printed = NUMBERS["natural frequency"]
     return [
-        _row("P2", TABLE_1["m"].place, f"m = {TABLE_1['m']} by weighing",
-             _back(TABLE_1["m"], mass), "", _GIVEN),
-        _closed("P2", f"natural frequency from stiffness and mass: {printed}", printed, NATURAL_FREQUENCY,
-                _back(printed, natural, ", from the slope of Fig. 4"),
-                "sqrt(2k/m), by Eq. 2; the formula printed is sqrt(k/m)."),
-    ]  # fmt: skip
+        _row("P2", TABLE_1["m"].place, f"m = {TABLE_1['m']} by weighing", _back(TABLE_1["m"], mass), "", _GIVEN),
+        _closed(
+            "P2",
+            f"natural frequency from stiffness and mass: {printed}",
+            printed,
+            NATURAL_FREQUENCY,
+            _back(printed, natural, ", from the slope of Fig. 4"),
+            "sqrt(2k/m), by Eq. 2; the formula printed is sqrt(k/m).",
+        ),
+    ]
 
 
 def p3(data: Data) -> list[Row]:
@@ -122,7 +144,10 @@ def p3(data: Data) -> list[Row]:
     top = grid.value / (2 * math.pi)
     return [
         _closed(
-            "P3", f"impulsive response: peak of the DFT at {line}", line, nearest,
+            "P3",
+            f"impulsive response: peak of the DFT at {line}",
+            line,
+            nearest,
             _back(line, Interval(top - step / 2, top + step / 2), ", largest line"),
             f"A DFT of 2048 samples at 100 Hz has a line every {step:.4f} Hz; closed form: the line nearest to "
             f"sqrt(2k/m), {NATURAL_FREQUENCY / (2 * math.pi):.4f} Hz. Damping moves the peak down, on the rig to "
@@ -130,12 +155,15 @@ def p3(data: Data) -> list[Row]:
             "begins.",
         ),
         _closed(
-            "P3", f"natural frequency from it: {TABLE_1['omega_0']}", TABLE_1["omega_0"], NATURAL_FREQUENCY,
+            "P3",
+            f"natural frequency from it: {TABLE_1['omega_0']}",
+            TABLE_1["omega_0"],
+            NATURAL_FREQUENCY,
             _back(TABLE_1["omega_0"], found.number, ", fitted in the time domain"),
             f"The paper's 4.60 is 2 pi times its line, known to half a step, {math.pi * step:.2f} rad/s: 4.50 is "
             "within that resolution.",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def p4(data: Data) -> list[Row]:
@@ -145,24 +173,36 @@ def p4(data: Data) -> list[Row]:
     per = 1 / (2 * TABLE_1["m"].value * NATURAL_FREQUENCY)
     return [
         _closed(
-            "P4", f"c = {printed} by fitting the amplitude over frequency (viscous damping alone)", printed,
-            2 * ratio.value * TABLE_1["m"].value * NATURAL_FREQUENCY, _back(printed, viscous.number),
+            "P4",
+            f"c = {printed} by fitting the amplitude over frequency (viscous damping alone)",
+            printed,
+            2 * ratio.value * TABLE_1["m"].value * NATURAL_FREQUENCY,
+            _back(printed, viscous.number),
             "Closed form: 2 xi m omega_0 with the printed xi and omega_0 = 4.50 rad/s. "
-            + viscous.notes[0][0].upper() + viscous.notes[0][1:] + ".",
+            + viscous.notes[0][0].upper()
+            + viscous.notes[0][1:]
+            + ".",
         ),
         _closed(
-            "P4", f"xi = {ratio}", ratio, printed.value * per,
-            _back(ratio, viscous.number.times(per, " ")), "c / (2 m omega_0).",
+            "P4",
+            f"xi = {ratio}",
+            ratio,
+            printed.value * per,
+            _back(ratio, viscous.number.times(per, " ")),
+            "c / (2 m omega_0).",
         ),
         _row(
-            "P4", "Section 3.1", "in the considered range the dry friction may be neglected",
+            "P4",
+            "Section 3.1",
+            "in the considered range the dry friction may be neglected",
             Cell(
                 f"with it c = {both.number} ({100 * (both.number.value / printed.value - 1):+.1f} %), without "
-                f"{viscous.number}", agreed(not _apart(viscous, both)),
+                f"{viscous.number}",
+                agreed(not _apart(viscous, both)),
             ),
             "The rig's friction is 5 mN, 3.6 % of the forcing of Fig. 6; that of the paper's rig is not known.",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _apart(one: Found, other: Found) -> bool:
@@ -175,11 +215,23 @@ def p5(data: Data) -> list[Row]:
     printed, ratio = TABLE_1["c_s"], NUMBERS["damping ratio of the support"]
     per = 1 / (2 * math.sqrt(TABLE_1["k_s"].value * TEST_MASS))
     return [
-        _closed("P5", f"support with 1.33 kg, free decay: xi_s = {ratio}", ratio, printed.value * per,
-                _back(ratio, found.others["damping_ratio"]), "Closed form: c_s / (2 sqrt(k_s M))."),
-        _closed("P5", f"logarithmic decrement: c_s = {printed}", printed, ratio.value / per,
-                _back(printed, found.number), "Closed form: from the printed xi_s."),
-    ]  # fmt: skip
+        _closed(
+            "P5",
+            f"support with 1.33 kg, free decay: xi_s = {ratio}",
+            ratio,
+            printed.value * per,
+            _back(ratio, found.others["damping_ratio"]),
+            "Closed form: c_s / (2 sqrt(k_s M)).",
+        ),
+        _closed(
+            "P5",
+            f"logarithmic decrement: c_s = {printed}",
+            printed,
+            ratio.value / per,
+            _back(printed, found.number),
+            "Closed form: from the printed xi_s.",
+        ),
+    ]
 
 
 def _line(data: Data, key: str) -> tuple[float, Cell]:
@@ -197,18 +249,28 @@ def p6(data: Data) -> list[Row]:
     """Frequency over voltage."""
     offset = found_in(data["fig08"]["voltage"]).others["offset"]
     return [
-        _row("P6", "Fig. 8a", "frequency over motor voltage: a line is fitted (no number printed)",
-             _line(data, "voltage")[1], f"The motor turns from {offset} on: the line does not pass through zero.")
-    ]  # fmt: skip
+        _row(
+            "P6",
+            "Fig. 8a",
+            "frequency over motor voltage: a line is fitted (no number printed)",
+            _line(data, "voltage")[1],
+            f"The motor turns from {offset} on: the line does not pass through zero.",
+        )
+    ]
 
 
 def p7(data: Data) -> list[Row]:
     """Forcing over crank length."""
     return [
-        _row("P7", "Fig. 8b", "forcing amplitude over crank length: a line is fitted (no number printed)",
-             _line(data, "crank")[1], "Its slope is k, to first order in the crank: only one of the springs is driven.",
-             "rho = k a")
-    ]  # fmt: skip
+        _row(
+            "P7",
+            "Fig. 8b",
+            "forcing amplitude over crank length: a line is fitted (no number printed)",
+            _line(data, "crank")[1],
+            "Its slope is k, to first order in the crank: only one of the springs is driven.",
+            "rho = k a",
+        )
+    ]
 
 
 def p8(data: Data) -> list[Row]:

@@ -58,17 +58,25 @@ def f9a(data: Data) -> list[Row]:
         )
     return [
         Row(
-            "F9a", _9, f"rising frequency: a small period-2 region near {printed}", _range(exact, "up"),
-            _range(smoothed, "up"), f"{printed.text} lies {'inside' if inside else 'outside'}",
-            agreed(inside), why,
+            "F9a",
+            _9,
+            f"rising frequency: a small period-2 region near {printed}",
+            _range(exact, "up"),
+            _range(smoothed, "up"),
+            f"{printed.text} lies {'inside' if inside else 'outside'}",
+            agreed(inside),
+            why,
         ),
         against_printed(
-            "F9a", f"rising frequency: dynamical jump near {rising}", rising, main_jump(exact, "up"),
+            "F9a",
+            f"rising frequency: dynamical jump near {rising}",
+            rising,
+            main_jump(exact, "up"),
             main_jump(smoothed, "up"),
             "The motion with contact ends in a fold there. Both flows jump at the same place; the printed value "
             "comes out of neither.",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _with_printed_frequency() -> list[list[float]]:
@@ -89,7 +97,10 @@ def f9b(data: Data) -> list[Row]:
     found = range_of(exact, 2, "down")
     return [
         against_printed(
-            "F9b", f"falling frequency: dynamical jump at {falling}", falling, main_jump(exact, "down"),
+            "F9b",
+            f"falling frequency: dynamical jump at {falling}",
+            falling,
+            main_jump(exact, "down"),
             main_jump(smoothed, "down"),
             f"Falling, the motion without contact ends where it meets the support. With Table 1 that is {closed:.5f} "
             "rad/s, in closed form and without any integration; both flows jump there. Table 1 also prints omega_0 = "
@@ -101,15 +112,24 @@ def f9b(data: Data) -> list[Row]:
             cause=Cause.TABLE_1 if Verdict.AGREES in met else None,
         ),
         against_closed_form(
-            "F9b", "closed form, not printed", "falling jump at grazing", (closed, grazing_of(smoothed)[-1]),
-            main_jump(exact, "down"), main_jump(smoothed, "down"),
+            "F9b",
+            "closed form, not printed",
+            "falling jump at grazing",
+            (closed, grazing_of(smoothed)[-1]),
+            main_jump(exact, "down"),
+            main_jump(smoothed, "down"),
             "Within one step of the sweep; read from its amplitudes alone.",
         ),
         Row(
-            "F9b", _9, "falling frequency: period 2 appears again", _range(exact, "down"), _range(smoothed, "down"),
-            "none", agreed(found is not None),
+            "F9b",
+            _9,
+            "falling frequency: period 2 appears again",
+            _range(exact, "down"),
+            _range(smoothed, "down"),
+            "none",
+            agreed(found is not None),
         ),
-    ]  # fmt: skip
+    ]
 
 
 def f9c(data: Data) -> list[Row]:
@@ -151,10 +171,16 @@ def f9c(data: Data) -> list[Row]:
     )
     return [
         Row(
-            "F9c", _9, "an unstable region between the jumps with rising and falling frequency", texts[0], texts[1],
-            "none in kind", Verdict.AGREES if two and unstable else Verdict.IN_PART if two else Verdict.DIFFERS, why,
+            "F9c",
+            _9,
+            "an unstable region between the jumps with rising and falling frequency",
+            texts[0],
+            texts[1],
+            "none in kind",
+            Verdict.AGREES if two and unstable else Verdict.IN_PART if two else Verdict.DIFFERS,
+            why,
         )
-    ]  # fmt: skip
+    ]
 
 
 def f10(data: Data) -> list[Row]:
@@ -166,29 +192,51 @@ def f10(data: Data) -> list[Row]:
     small = small_jump(exact, "up")
     return [
         Row(
-            "F10", _10, "jumps as in Fig. 9, elsewhere with rising than with falling frequency",
-            _both(exact), _both(smoothed), "no number printed",
+            "F10",
+            _10,
+            "jumps as in Fig. 9, elsewhere with rising than with falling frequency",
+            _both(exact),
+            _both(smoothed),
+            "no number printed",
             agreed(None not in (main_jump(exact, "up"), main_jump(exact, "down"))),
         ),
         against_closed_form(
-            "F10", "closed form, not printed", "falling jump at grazing", grazing[-1], main_jump(exact, "down"),
+            "F10",
+            "closed form, not printed",
+            "falling jump at grazing",
+            grazing[-1],
+            main_jump(exact, "down"),
             main_jump(smoothed, "down"),
         ),
         Row(
-            "F10", _10, "no period-2 response", f"{doubled[0]} of {count[0]} points with period 2",
-            f"{doubled[1]} of {count[1]} points with period 2", "none", agreed(not any(doubled)),
+            "F10",
+            _10,
+            "no period-2 response",
+            f"{doubled[0]} of {count[0]} points with period 2",
+            f"{doubled[1]} of {count[1]} points with period 2",
+            "none",
+            agreed(not any(doubled)),
         ),
         Row(
-            "F10", _10, "a small jump instead", _small(exact), _small(smoothed), "no number printed",
+            "F10",
+            _10,
+            "a small jump instead",
+            _small(exact),
+            _small(smoothed),
+            "no number printed",
             agreed(small is not None),
             "With rising frequency at the grazing of the motion without contact, with falling at a fold of the "
             "motion with contact.",
         ),
         against_closed_form(
-            "F10", "closed form, not printed", "small jump, rising, at grazing", grazing[0], small,
+            "F10",
+            "closed form, not printed",
+            "small jump, rising, at grazing",
+            grazing[0],
+            small,
             small_jump(smoothed, "up"),
         ),
-    ]  # fmt: skip
+    ]
 
 
 def grazing_behind_both(data: Data) -> list[Row]:
@@ -196,13 +244,17 @@ def grazing_behind_both(data: Data) -> list[Row]:
     exact, smoothed = data["fig09"]["exact"], data["fig09"]["smoothed"]
     return [
         against_closed_form(
-            "F10", _10, "both (period 2 in Fig. 9, the small jump in Fig. 10) are probably related to grazing; closed "
-            "form of Fig. 9's lower grazing", (grazing_of(exact)[0], grazing_of(smoothed)[0]),
-            lowest(changes(exact, 1, 2, "up")), lowest(changes(smoothed, 1, 2, "up")),
+            "F10",
+            _10,
+            "both (period 2 in Fig. 9, the small jump in Fig. 10) are probably related to grazing; closed "
+            "form of Fig. 9's lower grazing",
+            (grazing_of(exact)[0], grazing_of(smoothed)[0]),
+            lowest(changes(exact, 1, 2, "up")),
+            lowest(changes(smoothed, 1, 2, "up")),
             "The period-2 range of Fig. 9 begins where the motion without contact grazes, as does the small jump of "
             "Fig. 10.",
         )
-    ]  # fmt: skip
+    ]
 
 
 def _range(response: xr.Dataset, direction: str) -> str:
@@ -267,9 +319,10 @@ def f9b_rig(data: Data) -> list[Cell]:
     runs = data["fig09_rig"]["runs"]
     falling = main_jump(runs, "down")
     return [
-        printed_cell(NUMBERS["jump falling"], falling), against(falling, grazing_of_paper(FIGURE_9)[-1]),
+        printed_cell(NUMBERS["jump falling"], falling),
+        against(falling, grazing_of_paper(FIGURE_9)[-1]),
         _range_cell(runs, "down"),
-    ]  # fmt: skip
+    ]
 
 
 def f9c_rig(data: Data) -> list[Cell]:
@@ -288,11 +341,10 @@ def f9c_rig(data: Data) -> list[Cell]:
     apart = 1 - values["down"].max() / values["up"].min()
     return [
         Cell(
-            f"{down.value:.3f} ... {up.value:.3f} rad/s: two motions, amplitudes apart by {100 * apart:.0f} % at "
-            "least",
+            f"{down.value:.3f} ... {up.value:.3f} rad/s: two motions, amplitudes apart by {100 * apart:.0f} % at least",
             Verdict.IN_PART if apart > _FEWEST_APART else Verdict.DIFFERS,
         )
-    ]  # fmt: skip
+    ]
 
 
 def f10_rig(data: Data) -> list[Cell]:

@@ -89,12 +89,17 @@ def f13(data: Data) -> list[Cell]:
     several = [g for g, one in numbers.items() if len(one) > 1]
     starts = max(sum(one.values()) for one in numbers.values())
     return [
-        Cell("; ".join(f"{g:g}: {_words(one)}" for g, one in numbers.items()),
-             agreed(APERIODIC in reached and len(reached) > 1)),
-        Cell(f"more than one motion at {len(several)} of {len(numbers)} gaps, {starts} starts each",
-             Verdict.ADDS if several else Verdict.NOT_ASKED)
-        if starts > 1 else Cell("one start at each gap"),
-    ]  # fmt: skip
+        Cell(
+            "; ".join(f"{g:g}: {_words(one)}" for g, one in numbers.items()),
+            agreed(APERIODIC in reached and len(reached) > 1),
+        ),
+        Cell(
+            f"more than one motion at {len(several)} of {len(numbers)} gaps, {starts} starts each",
+            Verdict.ADDS if several else Verdict.NOT_ASKED,
+        )
+        if starts > 1
+        else Cell("one start at each gap"),
+    ]
 
 
 def _counted(numbers: np.ndarray) -> dict[int, int]:
@@ -125,14 +130,19 @@ def f16(data: Data) -> list[Row]:
     alike = number == APERIODIC and worst < 2
     return [
         Row(
-            "F16", "Fig. 16", "the same attractor from the apparatus, at four phases", "see F15", "see F15",
+            "F16",
+            "Fig. 16",
+            "the same attractor from the apparatus, at four phases",
+            "see F15",
+            "see F15",
             f"energy distance {', '.join(f'{r:.2f}' for r in ratio)} of the 95th percentile of the record's halves",
             Verdict.NOT_ASKED,
             "At phases 0, pi/2, pi, 3 pi/2, to the exact model with the parameters identified; below 2 the clouds can "
             "hardly be told apart by a record of this length.",
-            f"{period_word(number)}, {result.sizes['measured_iterate']} turns", agreed(alike),
+            f"{period_word(number)}, {result.sizes['measured_iterate']} turns",
+            agreed(alike),
         )
-    ]  # fmt: skip
+    ]
 
 
 def f17(data: Data) -> list[Cell]:
@@ -188,8 +198,12 @@ def c1(data: Data) -> list[Cell]:
     near = sum(against(found, truth).verdict is Verdict.AGREES for found, truth in pairs)
     kind = "no period" if chaos else "a period"
     return [
-        Cell(f"{count} jumps in Figs. 9-10, {flips} flips in Fig. 11, {kind} in Fig. 16",
-             Verdict.AGREES if count and flips and chaos else Verdict.IN_PART),
-        Cell(f"{near} of 3 within {CLOSE:g} % of the closed-form grazing",
-             Verdict.AGREES if near == 3 else Verdict.IN_PART if near else Verdict.UNDECIDED),
-    ]  # fmt: skip
+        Cell(
+            f"{count} jumps in Figs. 9-10, {flips} flips in Fig. 11, {kind} in Fig. 16",
+            Verdict.AGREES if count and flips and chaos else Verdict.IN_PART,
+        ),
+        Cell(
+            f"{near} of 3 within {CLOSE:g} % of the closed-form grazing",
+            Verdict.AGREES if near == 3 else Verdict.IN_PART if near else Verdict.UNDECIDED,
+        ),
+    ]

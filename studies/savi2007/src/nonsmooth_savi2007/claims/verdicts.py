@@ -53,7 +53,7 @@ RULE = (
     "A jump agrees with a closed form when that lies in the step of the jump or within half a step beside it.",
     "A value that was put into the rig and comes back is an input, not an agreement; where it does not come back, it "
     "differs.",
-)  # fmt: skip
+)
 
 
 class Cause(StrEnum):
@@ -220,10 +220,18 @@ def against_printed(
     found = [Beside.of(printed.value, printed.resolution, one) for one in (exact, smoothed)]
     words = [str(one) if one is not None else "not found" for one in found]
     return Row(
-        claim, printed.place, says, _with_unit(exact, printed.unit), _with_unit(smoothed, printed.unit),
-        f"exact {words[0]}, smoothed {words[1]}", judge(printed.value, exact, printed.resolution), why, cause=cause,
-        exact_beside=found[0], smoothed_beside=found[1],
-    )  # fmt: skip
+        claim,
+        printed.place,
+        says,
+        _with_unit(exact, printed.unit),
+        _with_unit(smoothed, printed.unit),
+        f"exact {words[0]}, smoothed {words[1]}",
+        judge(printed.value, exact, printed.resolution),
+        why,
+        cause=cause,
+        exact_beside=found[0],
+        smoothed_beside=found[1],
+    )
 
 
 def against_closed_form(
@@ -244,9 +252,15 @@ def against_closed_form(
     verdicts = [judge_step(truth, found) for found, truth in pairs]
     verdict = verdicts[0] if len(set(verdicts)) == 1 else Verdict.IN_PART
     return Row(
-        claim, place, f"{says}: {closed[0]:.5f} rad/s (gap g - eta: {closed[1]:.5f})", _with_unit(exact, "rad/s"),
-        _with_unit(smoothed, "rad/s"), f"exact {off[0]}, smoothed {off[1]}", verdict, why,
-    )  # fmt: skip
+        claim,
+        place,
+        f"{says}: {closed[0]:.5f} rad/s (gap g - eta: {closed[1]:.5f})",
+        _with_unit(exact, "rad/s"),
+        _with_unit(smoothed, "rad/s"),
+        f"exact {off[0]}, smoothed {off[1]}",
+        verdict,
+        why,
+    )
 
 
 def _with_unit(found: Known | None, unit: str) -> str:

@@ -87,11 +87,16 @@ def session_measurement(
     travel = reference.direction * float(apparatus["distance_per_turn"])
     motions = [
         measured_motion(
-            item.recording, item.run, distance_per_turn=travel,
-            counts_per_turn=counts, zero=shift, mark=reference.mark, support="gap" in item.settings,
+            item.recording,
+            item.run,
+            distance_per_turn=travel,
+            counts_per_turn=counts,
+            zero=shift,
+            mark=reference.mark,
+            support="gap" in item.settings,
         )
         for item in chosen
-    ]  # fmt: skip
+    ]
     settings: dict[str, Any] = {"rho": _force(length, crank_force)}
     first = chosen[0].settings
     if "gap" in first:

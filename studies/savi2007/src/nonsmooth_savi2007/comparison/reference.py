@@ -129,9 +129,10 @@ def gap_reference(
     decay = None
     if taps := evidence.runs.get("impulse", ()):
         decay = free_decay(
-            [(run.time, run.positions) for run in taps], resolution=evidence.resolution,
+            [(run.time, run.positions) for run in taps],
+            resolution=evidence.resolution,
             names=[run.name for run in taps],
-        )  # fmt: skip
+        )
         notes += [f"impulse: {note}" for note in decay.notes]
     free = [run for run in evidence.runs.get("response", ()) if "gap" not in run.settings]
     seen, mark = steady(free), 0.0

@@ -129,16 +129,31 @@ _SHOWN: dict[str, Any] = {"parameter": "rho", "shown": FIGURE_12}
 
 FIGURES = (
     Figure(
-        "fig11", 11, "Bifurcation diagram over the forcing amplitude",
+        "fig11",
+        11,
+        "Bifurcation diagram over the forcing amplitude",
         partial(diagrams, figure="fig11", steps=(600, 300), also=FIGURE_12),
-        partial(draw_both, values=PRINTED, words=_WORDS), _caption_11,
+        partial(draw_both, values=PRINTED, words=_WORDS),
+        _caption_11,
     ),
     Figure(
-        "fig12", 12, "Phase portraits over the forcing amplitude",
-        partial(portraits, parameters=FIGURE_11, **_SHOWN), partial(draw_portraits, **_SHOWN), _caption_12,
+        "fig12",
+        12,
+        "Phase portraits over the forcing amplitude",
+        partial(portraits, parameters=FIGURE_11, **_SHOWN),
+        partial(draw_portraits, **_SHOWN),
+        _caption_12,
         sheet_size(FIGURE_12),
     ),
     Figure("fig11_rig", 11, "Slow rise of the forcing", _rise, _draw_rise, _caption_rise, (0.72, 0.56), rig=True),
-    Figure("fig12_rig", 12, "State space over the forcing amplitude", _records, partial(draw_pairs, **_SHOWN),
-           _caption_records, sheet_size(FIGURE_12), rig=True),
-)  # fmt: skip
+    Figure(
+        "fig12_rig",
+        12,
+        "State space over the forcing amplitude",
+        _records,
+        partial(draw_pairs, **_SHOWN),
+        _caption_records,
+        sheet_size(FIGURE_12),
+        rig=True,
+    ),
+)

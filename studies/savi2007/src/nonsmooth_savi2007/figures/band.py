@@ -63,7 +63,7 @@ def _errors(settings: Settings) -> xr.Dataset:
             "slowest_contact": ("orbit", slowest, {"long_name": "least speed at a transition", "units": "m/s"}),
         },
         {"form": ["paper", "paper, coarse", "general"], "orbit": list(ORBITS), "eta": ("eta", etas, {"units": "m"})},
-    )  # fmt: skip
+    )
     return as_result(found, f"error after {PERIODS} periods at rtol {FINE:g}", "simulate", synthetic=False)
 
 
@@ -125,9 +125,10 @@ def _draw(canvas: Canvas, data: Datasets) -> None:
     left.plot([], [], ":", color="black", label="general form")
     left.axvline(1e6 * ETA, color="black", linewidth=0.6, linestyle="--", zorder=0, label=_PAPERS)
     left.set(
-        xlabel=_AXIS, title="(a) error of the smoothed switch after 4 periods",
+        xlabel=_AXIS,
+        title="(a) error of the smoothed switch after 4 periods",
         ylabel=r"$[(\Delta x / 1\,\mathrm{mm})^2 + (\Delta v / 10\,\mathrm{mm/s})^2]^{1/2}$",
-    )  # fmt: skip
+    )
     at = grazing["eta"].values > 0
     base = float(grazing["closed_form"][0])
     fine = np.geomspace(grazing["eta"].values[at].min() / 2, grazing["eta"].values[at].max() * 2, 50)
@@ -135,14 +136,18 @@ def _draw(canvas: Canvas, data: Datasets) -> None:
     closed = [grazing_frequencies({**sharp, "g": FIGURE_9["g"] - e})[-1] - base for e in fine]
     right.loglog(1e6 * fine, closed, color=plot.COLORS["third"], label=r"closed form, gap $g - \eta$")
     right.loglog(
-        1e6 * grazing["eta"].values[at], grazing["grazing"].values[at] - base, "o", color=plot.COLORS["first"],
+        1e6 * grazing["eta"].values[at],
+        grazing["grazing"].values[at] - base,
+        "o",
+        color=plot.COLORS["first"],
         label="smoothed model, bisected",
-    )  # fmt: skip
+    )
     right.axvline(1e6 * ETA, color="black", linewidth=0.6, linestyle="--", zorder=0, label=_PAPERS)
     right.set(
-        xlabel=_AXIS, ylabel="shift of the grazing frequency (rad/s)",
+        xlabel=_AXIS,
+        ylabel="shift of the grazing frequency (rad/s)",
         title="(b) grazing of Fig. 9, falling frequency",
-    )  # fmt: skip
+    )
     for ax in (left, right):
         ax.xaxis.set_major_formatter("{x:g}")
     shared_legend(canvas, columns=4)

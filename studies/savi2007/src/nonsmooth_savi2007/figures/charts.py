@@ -57,9 +57,13 @@ def _compute(settings: Settings, name: str) -> Datasets:
     plane = CHARTS[name]
     store = None if settings.folder is None else settings.folder / f"{name}_store.zarr"
     found = chart(
-        EXACT.system(**plane.parameters), grid_of(plane, _QUICK if settings.quick else _FULL), extremes=False,
-        store=store, progress=settings.progress, **EXACT.options,
-    )  # fmt: skip
+        EXACT.system(**plane.parameters),
+        grid_of(plane, _QUICK if settings.quick else _FULL),
+        extremes=False,
+        store=store,
+        progress=settings.progress,
+        **EXACT.options,
+    )
     return {"chart": found} | {f"curve_{k}": one for k, one in enumerate(curves(plane))}
 
 
@@ -151,10 +155,19 @@ def _caption(data: Datasets) -> str:
 
 
 FIGURES = tuple(
-    Figure(name, None, f"Chart over {words}", partial(_compute, name=name), _draw, _caption, (1.0, 0.42),
-           beside=beside, full=True)
+    Figure(
+        name,
+        None,
+        f"Chart over {words}",
+        partial(_compute, name=name),
+        _draw,
+        _caption,
+        (1.0, 0.42),
+        beside=beside,
+        full=True,
+    )
     for name, words, beside in (
         ("chart09", "frequency and amplitude at the gap of Fig. 9", 9),
         ("chart13", "gap and amplitude at the frequency of Fig. 13", 13),
     )
-)  # fmt: skip
+)

@@ -34,9 +34,11 @@ def _compute(settings: Settings, name: str) -> Datasets:
     n = _QUICK if settings.quick else _FULL if settings.full else _POINTS
     system = EXACT.system(**BASINS[name])
     found = basins(
-        system, {state: np.linspace(*ends, n) for state, ends in _PLANE.items()}, progress=settings.progress,
+        system,
+        {state: np.linspace(*ends, n) for state, ends in _PLANE.items()},
+        progress=settings.progress,
         **EXACT.options,
-    )  # fmt: skip
+    )
     data = {"basins": found}
     for k in range(found.sizes["attractor"]):
         periods = int(found["period_number"][k]) or _WANDERING
@@ -78,9 +80,13 @@ def _draw(canvas: Canvas, data: Datasets) -> None:
     right.set_title("(b) attractors", y=1.0, pad=9)
     zone = Patch(facecolor=plot.COLORS["zone"], alpha=0.18, linewidth=0)
     canvas.legend(
-        [*handles, zone], [*names_of(found), ZONE], loc="outside lower center", ncols=4,
-        handler_map={tuple: HandlerTuple(ndivide=1)}, title="attractors with their section points, and basins",
-    )  # fmt: skip
+        [*handles, zone],
+        [*names_of(found), ZONE],
+        loc="outside lower center",
+        ncols=4,
+        handler_map={tuple: HandlerTuple(ndivide=1)},
+        title="attractors with their section points, and basins",
+    )
 
 
 def _caption(data: Datasets) -> str:
@@ -108,6 +114,7 @@ def _caption(data: Datasets) -> str:
 FIGURES = tuple(
     Figure(name, None, f"Basins at {words}", partial(_compute, name=name), _draw, _caption, beside=beside)
     for name, words, beside in (
-        ("basins13", "g = 1.4 mm", 13), ("basins17", "omega = 9.55 rad/s", 17),
+        ("basins13", "g = 1.4 mm", 13),
+        ("basins17", "omega = 9.55 rad/s", 17),
     )
-)  # fmt: skip
+)

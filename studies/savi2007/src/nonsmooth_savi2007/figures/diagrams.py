@@ -45,23 +45,33 @@ def diagrams(
         n = settings.of(flow, exact=steps[0], smoothed=steps[1], quick=70)
         transient = settings.of(flow, exact=600, smoothed=200, quick=100)
         data[flow.key] = sweep(
-            system, begin.parameter, grid(n), direction="both", progress=settings.progress, transient=transient,
-            keep=settings.of(flow, exact=200, smoothed=64, quick=40), **flow.options,
-        ).assign_attrs(transient=transient)  # fmt: skip
+            system,
+            begin.parameter,
+            grid(n),
+            direction="both",
+            progress=settings.progress,
+            transient=transient,
+            keep=settings.of(flow, exact=200, smoothed=64, quick=40),
+            **flow.options,
+        ).assign_attrs(transient=transient)
         fewer = 2 if patience <= 600 else 4
         n = settings.of(flow, exact=steps[0] // fewer, smoothed=steps[1] // 4, quick=10)
         transient = settings.of(flow, exact=patience, smoothed=150, quick=80)
         data[f"{flow.key}_starts"] = sweep(
-            system, begin.parameter, grid(n), direction=None,
-            start=starts(settings.of(flow, exact=12, smoothed=8, quick=4)), progress=settings.progress,
-            transient=transient, keep=32, **flow.options,
-        ).assign_attrs(transient=transient)  # fmt: skip
+            system,
+            begin.parameter,
+            grid(n),
+            direction=None,
+            start=starts(settings.of(flow, exact=12, smoothed=8, quick=4)),
+            progress=settings.progress,
+            transient=transient,
+            keep=32,
+            **flow.options,
+        ).assign_attrs(transient=transient)
     return data | branches(figure)
 
 
-def draw_diagram(
-    ax: Axes, data: Datasets, key: str, y: str, *, values: Mapping[float, str], words: str
-) -> None:
+def draw_diagram(ax: Axes, data: Datasets, key: str, y: str, *, values: Mapping[float, str], words: str) -> None:
     """One diagram: up, down over it, and in grey what other starts lead to; ``values`` of the paper as dotted lines.
 
     On that of the exact flow the branches of periodic orbits. Other starts that reached no period are told apart: chaos
@@ -112,19 +122,33 @@ def mark_values(ax: Axes, values: Mapping[float, str], words: str, foot: bool = 
     for i, (value, text) in enumerate(values.items()):
         ax.axvline(value, color="black", linewidth=0.7, linestyle=":", zorder=2.5, label=words if i == 0 else None)
         ax.annotate(
-            text, (value, 0.0 if foot else 1.0), (-1.5, 3 if foot else -3), xycoords=ax.get_xaxis_transform(),
-            textcoords="offset points", rotation=90, ha="right", va="bottom" if foot else "top", fontsize=small(ax),
-            path_effects=halo(), zorder=6,
-        )  # fmt: skip
+            text,
+            (value, 0.0 if foot else 1.0),
+            (-1.5, 3 if foot else -3),
+            xycoords=ax.get_xaxis_transform(),
+            textcoords="offset points",
+            rotation=90,
+            ha="right",
+            va="bottom" if foot else "top",
+            fontsize=small(ax),
+            path_effects=halo(),
+            zorder=6,
+        )
 
 
 def mark_grazing(ax: Axes, places: Sequence[float]) -> None:
     """A short line at the foot for each grazing in closed form, so that it hides no jump that begins there."""
     for i, place in enumerate(places):
         ax.plot(
-            [place, place], [0.0, 0.07], color=plot.COLORS["third"], linewidth=2.0, transform=ax.get_xaxis_transform(),
-            zorder=1, label="grazing, closed form" if i == 0 else None, solid_capstyle="butt",
-        )  # fmt: skip
+            [place, place],
+            [0.0, 0.07],
+            color=plot.COLORS["third"],
+            linewidth=2.0,
+            transform=ax.get_xaxis_transform(),
+            zorder=1,
+            label="grazing, closed form" if i == 0 else None,
+            solid_capstyle="butt",
+        )
 
 
 def draw_branches(ax: Axes, data: Datasets, *, y: str) -> None:

@@ -93,9 +93,12 @@ def only_outer(grid: Any) -> None:
 
 
 def two_rows(
-    canvas: Canvas, rows: Sequence[str], titles: Sequence[str], cell: Callable[[Axes, int, int], object],
+    canvas: Canvas,
+    rows: Sequence[str],
+    titles: Sequence[str],
+    cell: Callable[[Axes, int, int], object],
     sharey: bool | Literal["col"] = True,
-) -> None:  # fmt: skip
+) -> None:
     """Draw a sheet of two rows with names and of titled columns; ``cell(ax, i, j)`` draws a place."""
     grid = canvas.subplots(2, len(titles), sharex="col", sharey=sharey, squeeze=False)
     for i, name in enumerate(rows):

@@ -30,7 +30,7 @@ from nonsmooth_savi2007.figures.motions import (
     runs_of,
     said,
     without_flips,
-)  # fmt: skip
+)
 from nonsmooth_savi2007.figures.portraits import (
     chosen_start,
     describe,
@@ -38,7 +38,7 @@ from nonsmooth_savi2007.figures.portraits import (
     portraits,
     sheet_size,
     twins,
-)  # fmt: skip
+)
 from nonsmooth_savi2007.figures.resonance import grazing_of
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Settings, starts
 from nonsmooth_savi2007.printed import FIGURE_17, FIGURE_18
@@ -58,9 +58,16 @@ def _compute_17(settings: Settings) -> Datasets:
     data = diagrams(settings, "fig17", (800, 300), FIGURE_18, patience=_PATIENCE)
     for word, transient in {"short": 600, "long": 50_000}.items():  # how long chaos lasts just above grazing
         data[f"exact_{word}"] = sweep(
-            EXACT.system(**FIGURE_17), "omega", [_JUST_ABOVE], direction=None, start=starts(16), transient=transient,
-            keep=64, progress=settings.progress, **EXACT.options,
-        ).assign_attrs(transient=transient)  # fmt: skip
+            EXACT.system(**FIGURE_17),
+            "omega",
+            [_JUST_ABOVE],
+            direction=None,
+            start=starts(16),
+            transient=transient,
+            keep=64,
+            progress=settings.progress,
+            **EXACT.options,
+        ).assign_attrs(transient=transient)
     return data
 
 
@@ -96,9 +103,15 @@ def _name_windows(ax: Axes, data: Datasets, state: str) -> None:
     for period, (low, high) in _windows(data).items():
         top = many["section"].sel(state=state, omega=slice(low, high)).where(many["period_number"] == period).max()
         ax.annotate(
-            f"period {period}", (0.5 * (low + high), float(top)), (0, 3), textcoords="offset points", ha="center",
-            fontsize=small(ax), path_effects=halo(), zorder=6,
-        )  # fmt: skip
+            f"period {period}",
+            (0.5 * (low + high), float(top)),
+            (0, 3),
+            textcoords="offset points",
+            ha="center",
+            fontsize=small(ax),
+            path_effects=halo(),
+            zorder=6,
+        )
 
 
 def _caption_17(data: Datasets) -> str:
@@ -174,9 +187,11 @@ def _caption_rig_17(data: Datasets) -> str:
 
 def _measure_18(settings: Settings) -> Datasets:
     return compared(
-        settings.bench, motions(settings.bench, 18, tuple(FIGURE_18), periods=60 if settings.quick else 200),
-        grid=GRID, transient=600 if settings.quick else _PATIENCE,
-    )  # fmt: skip
+        settings.bench,
+        motions(settings.bench, 18, tuple(FIGURE_18), periods=60 if settings.quick else 200),
+        grid=GRID,
+        transient=600 if settings.quick else _PATIENCE,
+    )
 
 
 def _draw_rig_18(canvas: Canvas, data: Datasets) -> None:
@@ -201,10 +216,26 @@ FIGURES = (
     Figure(
         "fig17", 17, "Bifurcation diagrams over the forcing frequency", _compute_17, _draw_17, _caption_17, (1.0, 0.76)
     ),
-    Figure("fig18", 18, "Phase portraits over the forcing frequency", _compute_18, partial(draw_portraits, **_SHOWN),
-           _caption_18, sheet_size(FIGURE_18)),
-    Figure("fig17_rig", 17, "Sections over the forcing frequency", _measure_17, _draw_rig_17, _caption_rig_17,
-           rig=True),
-    Figure("fig18_rig", 18, "State space over the forcing frequency", _measure_18, _draw_rig_18, _caption_rig_18,
-           (1.0, 0.44), rig=True),
-)  # fmt: skip
+    Figure(
+        "fig18",
+        18,
+        "Phase portraits over the forcing frequency",
+        _compute_18,
+        partial(draw_portraits, **_SHOWN),
+        _caption_18,
+        sheet_size(FIGURE_18),
+    ),
+    Figure(
+        "fig17_rig", 17, "Sections over the forcing frequency", _measure_17, _draw_rig_17, _caption_rig_17, rig=True
+    ),
+    Figure(
+        "fig18_rig",
+        18,
+        "State space over the forcing frequency",
+        _measure_18,
+        _draw_rig_18,
+        _caption_rig_18,
+        (1.0, 0.44),
+        rig=True,
+    ),
+)

@@ -38,7 +38,7 @@ from nonsmooth_savi2007.figures.motions import (
     runs_of,
     said,
     without_flips,
-)  # fmt: skip
+)
 from nonsmooth_savi2007.figures.portraits import describe, draw_portraits, portraits, sheet_size, twins
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Settings, starts
 from nonsmooth_savi2007.printed import FIGURE_13, FIGURE_14, FIGURE_14_TEXT
@@ -92,9 +92,10 @@ def _draw_attractor(canvas: Canvas, rows: list[str], cell: Callable[[Axes, int, 
 def _draw_15(canvas: Canvas, data: Datasets) -> None:
     keys = list(PHASES)
     _draw_attractor(
-        canvas, [flow.short for flow in FLOWS],
+        canvas,
+        [flow.short for flow in FLOWS],
         lambda ax, i, j: plot.section(data[f"{FLOWS[i].key}_{keys[j]}"], ax, size=0.7),
-    )  # fmt: skip
+    )
 
 
 def _caption_15(data: Datasets) -> str:
@@ -124,9 +125,16 @@ def _coexisting(settings: Settings, set_: Mapping[str, Any]) -> xr.Dataset:
     """The model's motions from several starts, with the parameters identified."""
     points, count, transient = (21, 4, 80) if settings.quick else (141, 12, 600)
     return sweep(
-        model_at(settings.bench, set_), "g", np.linspace(*BEGINNINGS["fig13"].range, points), direction=None,
-        start=starts(count), transient=transient, keep=32, progress=False, **EXACT.options,
-    )  # fmt: skip
+        model_at(settings.bench, set_),
+        "g",
+        np.linspace(*BEGINNINGS["fig13"].range, points),
+        direction=None,
+        start=starts(count),
+        transient=transient,
+        keep=32,
+        progress=False,
+        **EXACT.options,
+    )
 
 
 def _draw_rig_13(canvas: Canvas, data: Datasets) -> None:
@@ -138,10 +146,16 @@ def _draw_rig_13(canvas: Canvas, data: Datasets) -> None:
     if over.any():
         points = compared.isel(sample=over)
         ax.plot(
-            points["measured_g"].values, points["measured_section"].sel(state="v").values, "_", markersize=4,
-            color=plot.COLORS["muted"], markeredgewidth=0.3, rasterized=True, zorder=1,
+            points["measured_g"].values,
+            points["measured_section"].sel(state="v").values,
+            "_",
+            markersize=4,
+            color=plot.COLORS["muted"],
+            markeredgewidth=0.3,
+            rasterized=True,
+            zorder=1,
             label="virtual rig (synthetic), transient",
-        )  # fmt: skip
+        )
     mark_values(ax, GAPS, "gaps of Fig. 14 (mm)")
     shared_legend(canvas, columns=3)
 
@@ -197,9 +211,14 @@ def _draw_16(canvas: Canvas, data: Datasets) -> None:
     def cell(ax: Axes, i: int, j: int) -> None:
         points = result[f"{list(SIDES)[i]}_section"].isel(section_phase=j).values
         ax.plot(
-            points[:, 0], points[:, 1], ".", color=(THEORY, MEASURED)[i], markersize=1.4, markeredgewidth=0,
+            points[:, 0],
+            points[:, 1],
+            ".",
+            color=(THEORY, MEASURED)[i],
+            markersize=1.4,
+            markeredgewidth=0,
             rasterized=True,
-        )  # fmt: skip
+        )
         name_axes(ax, name_and_unit(result, "x"), name_and_unit(result, "v"))
 
     _draw_attractor(canvas, list(SIDES.values()), cell)
@@ -221,20 +240,51 @@ _SHOWN: dict[str, Any] = {"parameter": "g", "shown": FIGURE_14}
 
 FIGURES = (
     Figure(
-        "fig13", 13, "Bifurcation diagram over the gap",
+        "fig13",
+        13,
+        "Bifurcation diagram over the gap",
         partial(diagrams, figure="fig13", steps=(700, 280), also=FIGURE_14),
-        partial(draw_both, values=GAPS, words="gaps of Fig. 14 (mm)"), _caption_13,
+        partial(draw_both, values=GAPS, words="gaps of Fig. 14 (mm)"),
+        _caption_13,
     ),
     Figure(
-        "fig14", 14, "Phase portraits over the gap",
+        "fig14",
+        14,
+        "Phase portraits over the gap",
         partial(portraits, parameters=FIGURE_13, others=tuple(FIGURE_14_TEXT), **_SHOWN),
-        partial(draw_portraits, **_SHOWN), _caption_14, sheet_size(FIGURE_14),
+        partial(draw_portraits, **_SHOWN),
+        _caption_14,
+        sheet_size(FIGURE_14),
     ),
     Figure("fig15", 15, "Strange attractor at four section phases", _compute_15, _draw_15, _caption_15, (1.0, 0.56)),
-    Figure("fig13_rig", 13, "Sections at four gaps over the bifurcation diagram", _measure_13, _draw_rig_13,
-           _caption_rig_13, (0.72, 0.56), rig=True),
-    Figure("fig14_rig", 14, "State space over the gap", _measure_14, partial(draw_pairs, **_SHOWN), _caption_rig_14,
-           sheet_size(FIGURE_14), rig=True),
-    Figure("fig16", 16, "Strange attractor at four section phases", _measure_16, _draw_16, _caption_16, (1.0, 0.56),
-           rig=True),
-)  # fmt: skip
+    Figure(
+        "fig13_rig",
+        13,
+        "Sections at four gaps over the bifurcation diagram",
+        _measure_13,
+        _draw_rig_13,
+        _caption_rig_13,
+        (0.72, 0.56),
+        rig=True,
+    ),
+    Figure(
+        "fig14_rig",
+        14,
+        "State space over the gap",
+        _measure_14,
+        partial(draw_pairs, **_SHOWN),
+        _caption_rig_14,
+        sheet_size(FIGURE_14),
+        rig=True,
+    ),
+    Figure(
+        "fig16",
+        16,
+        "Strange attractor at four section phases",
+        _measure_16,
+        _draw_16,
+        _caption_16,
+        (1.0, 0.56),
+        rig=True,
+    ),
+)

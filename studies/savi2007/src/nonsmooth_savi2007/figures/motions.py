@@ -95,7 +95,7 @@ def runs_of(found: Motions, parameter: str) -> xr.Dataset:
             "period_number": ("run", np.array(numbers, dtype=np.int64)),
             "contact": ("run", np.array(touches, dtype=np.int8)),
         }
-    )  # fmt: skip
+    )
     return as_result(runs, f"steady runs over {parameter}")
 
 
@@ -136,9 +136,11 @@ def draw_pairs(canvas: Canvas, data: Datasets, *, parameter: str, shown: Mapping
     """Draw the motion at each value (columns): the model above, the rig below, in the same axes."""
     results = [chosen(data, value, wanted) for value, wanted in shown.items()]
     two_rows(
-        canvas, list(SIDES.values()), titles(parameter, shown),
+        canvas,
+        list(SIDES.values()),
+        titles(parameter, shown),
         lambda ax, i, j: _portrait(ax, results[j], list(SIDES)[i]),
-    )  # fmt: skip
+    )
     shared_legend(canvas)
 
 
@@ -152,15 +154,29 @@ def _portrait(ax: Axes, result: xr.Dataset, side: str) -> None:
     ax.plot(orbit[:, 0], orbit[:, 1], color=color, linewidth=0.7 if closed else 0.35, label=word)
     points = result[f"{side}_section"].values.reshape(-1, 2)
     ax.plot(
-        points[:, 0], points[:, 1], "o", color=plot.COLORS["second"], markersize=3.0 if closed else 1.4,
-        markeredgewidth=0, rasterized=True, zorder=5, label=None if side == "theory" else "section points",
-    )  # fmt: skip
+        points[:, 0],
+        points[:, 1],
+        "o",
+        color=plot.COLORS["second"],
+        markersize=3.0 if closed else 1.4,
+        markeredgewidth=0,
+        rasterized=True,
+        zorder=5,
+        label=None if side == "theory" else "section points",
+    )
     n = int(result["theory_period_number"])
     if n and side == "measured":
         expected = result["theory_section"].values.reshape(-1, 2)[:n]
         ax.plot(
-            expected[:, 0], expected[:, 1], "x", color=THEORY, markersize=7, markeredgewidth=1.0, linestyle="none",
-            zorder=4, label="section points of the model",
-        )  # fmt: skip
+            expected[:, 0],
+            expected[:, 1],
+            "x",
+            color=THEORY,
+            markersize=7,
+            markeredgewidth=1.0,
+            linestyle="none",
+            zorder=4,
+            label="section points of the model",
+        )
     shade_zone(ax, float(result["g"]))
     name_axes(ax, name_and_unit(result, "x"), name_and_unit(result, "v"))

@@ -23,10 +23,15 @@ if TYPE_CHECKING:
 
 #: What Table 1 holds and what identification adds to it, with units and symbols.
 NAMES = {
-    "k": ("N/m", "$k$"), "k_s": ("N/m", "$k_s$"), "c": ("N s/m", "$c$"), "c_s": ("N s/m", "$c_s$"),
-    "m": ("kg", "$m$"), "omega_0": ("rad/s", r"$\omega_0$"), "gap_at_rest": ("m", "gap at rest"),
+    "k": ("N/m", "$k$"),
+    "k_s": ("N/m", "$k_s$"),
+    "c": ("N s/m", "$c$"),
+    "c_s": ("N s/m", "$c_s$"),
+    "m": ("kg", "$m$"),
+    "omega_0": ("rad/s", r"$\omega_0$"),
+    "gap_at_rest": ("m", "gap at rest"),
     "friction": ("N", "dry friction"),
-}  # fmt: skip
+}
 
 
 def _findings(settings: Settings, names: Mapping[str, str]) -> Datasets:
@@ -115,11 +120,15 @@ def _compute_table(settings: Settings) -> Datasets:
     units = [UNITS.get(name, NAMES.get(name, ("",))[0]) for name in truth]
     return {
         "identified": identified,
-        "truth": as_result(xr.Dataset(
-            {"value": ("name", list(truth.values())), "unit": ("name", units)}, {"name": list(truth)},
-        ), "truth of the virtual rig"),
+        "truth": as_result(
+            xr.Dataset(
+                {"value": ("name", list(truth.values())), "unit": ("name", units)},
+                {"name": list(truth)},
+            ),
+            "truth of the virtual rig",
+        ),
         "sensors": bench.sensors(),
-    }  # fmt: skip
+    }
 
 
 def table_rows(data: Datasets) -> dict[str, tuple[str, Number, float]]:
@@ -140,16 +149,30 @@ def _draw_table(canvas: Canvas, data: Datasets) -> None:
     for i, (name, (printed, number, truth)) in enumerate(rows.items()):
         middle, half = (100 * (v / truth) for v in (number.value - truth, number.expanded))
         ax.errorbar(
-            middle, i + 0.12, xerr=half, fmt="o", color=plot.COLORS["first"], markersize=3, capsize=1.5,
-            elinewidth=0.8, label="identified on the virtual rig (synthetic), 95 %" if i == 0 else None,
-        )  # fmt: skip
+            middle,
+            i + 0.12,
+            xerr=half,
+            fmt="o",
+            color=plot.COLORS["first"],
+            markersize=3,
+            capsize=1.5,
+            elinewidth=0.8,
+            label="identified on the virtual rig (synthetic), 95 %" if i == 0 else None,
+        )
         if printed:
             value, rounding = TABLE_1[name].value, TABLE_1[name].rounding
             ax.errorbar(
-                100 * (value / truth - 1), i - 0.2, xerr=100 * rounding / truth, fmt="s", markersize=3,
-                color="black", markerfacecolor="white", capsize=1.5, elinewidth=0.6,
+                100 * (value / truth - 1),
+                i - 0.2,
+                xerr=100 * rounding / truth,
+                fmt="s",
+                markersize=3,
+                color="black",
+                markerfacecolor="white",
+                capsize=1.5,
+                elinewidth=0.6,
                 label="printed in the paper, with its rounding" if i == 0 else None,
-            )  # fmt: skip
+            )
     ax.set_yticks(range(len(rows)), [NAMES[name][1] for name in rows])
     ax.set_ylim(len(rows) - 0.5, -0.5)
     ax.set_xlabel("difference from the rig's truth (%)")
@@ -168,42 +191,84 @@ def _caption_table(data: Datasets) -> str:
 
 
 def _procedure(
-    number: int, title: str, caption: Callable[[Datasets], str], procedures: tuple[str, ...], names: Mapping[str, str],
-    *parts: tuple[str, Callable[..., Any], str], size: tuple[float, float] = (1.0, 0.5),
-) -> Figure:  # fmt: skip
+    number: int,
+    title: str,
+    caption: Callable[[Datasets], str],
+    procedures: tuple[str, ...],
+    names: Mapping[str, str],
+    *parts: tuple[str, Callable[..., Any], str],
+    size: tuple[float, float] = (1.0, 0.5),
+) -> Figure:
     """A figure of findings: ``names`` by key of the dataset; ``parts`` as for `_side_by_side`."""
     return Figure(
-        f"fig{number:02d}", number, title, partial(_findings, names=names),
-        lambda canvas, data: _side_by_side(canvas, data, *parts), caption, size, rig=True, procedures=procedures,
-    )  # fmt: skip
+        f"fig{number:02d}",
+        number,
+        title,
+        partial(_findings, names=names),
+        lambda canvas, data: _side_by_side(canvas, data, *parts),
+        caption,
+        size,
+        rig=True,
+        procedures=procedures,
+    )
 
 
 FIGURES = (
     _procedure(
-        4, "Spring stiffness: force against displacement", _caption_4, ("springs", "support"),
+        4,
+        "Spring stiffness: force against displacement",
+        _caption_4,
+        ("springs", "support"),
         {"oscillator": "spring_slope", "support": "support_slope"},
         ("oscillator", pictures.force_displacement, "(a) oscillator"),
         ("support", pictures.force_displacement, "(b) support"),
     ),
     _procedure(
-        5, "Natural frequency from an impulsive response", _caption_5, ("impulse",), {"tap": "omega_0"},
-        ("tap", pictures.impulse_history, "(a) displacement"), ("tap", _spectrum, "(b) magnitude of the DFT"),
+        5,
+        "Natural frequency from an impulsive response",
+        _caption_5,
+        ("impulse",),
+        {"tap": "omega_0"},
+        ("tap", pictures.impulse_history, "(a) displacement"),
+        ("tap", _spectrum, "(b) magnitude of the DFT"),
     ),
     _procedure(
-        6, "Damping from the amplitude over frequency", _caption_6, ("impulse", "response"),
+        6,
+        "Damping from the amplitude over frequency",
+        _caption_6,
+        ("impulse", "response"),
         {"viscous": "c_viscous_only", "amplitudes": "c_response"},
-        ("amplitudes", pictures.amplitude_fit, ""), size=(0.62, 0.5),
+        ("amplitudes", pictures.amplitude_fit, ""),
+        size=(0.62, 0.5),
     ),
     _procedure(
-        7, "Damping of the support from a free decay", _caption_7, ("drop",), {"drop": "c_s_drop"},
+        7,
+        "Damping of the support from a free decay",
+        _caption_7,
+        ("drop",),
+        {"drop": "c_s_drop"},
         ("drop", pictures.impulse_history, "(a) displacement of the test mass"),
-        ("drop", pictures.drop_decay, "(b) turning points"), size=(1.0, 0.42),
+        ("drop", pictures.drop_decay, "(b) turning points"),
+        size=(1.0, 0.42),
     ),
     _procedure(
-        8, "Calibrations of the drive", _caption_8, ("springs", "voltage", "crank"),
+        8,
+        "Calibrations of the drive",
+        _caption_8,
+        ("springs", "voltage", "crank"),
         {"voltage": "voltage_frequency", "crank": "crank_force"},
-        ("voltage", pictures.calibration, "(a) motor"), ("crank", pictures.calibration, "(b) crank"),
+        ("voltage", pictures.calibration, "(a) motor"),
+        ("crank", pictures.calibration, "(b) crank"),
     ),
-    Figure("table1", None, "Table 1: parameters identified", _compute_table, _draw_table, _caption_table, (1.0, 0.36),
-           rig=True, procedures=IDENTIFICATION),
-)  # fmt: skip
+    Figure(
+        "table1",
+        None,
+        "Table 1: parameters identified",
+        _compute_table,
+        _draw_table,
+        _caption_table,
+        (1.0, 0.36),
+        rig=True,
+        procedures=IDENTIFICATION,
+    ),
+)

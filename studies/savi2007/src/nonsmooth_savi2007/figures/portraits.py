@@ -39,16 +39,26 @@ def portraits(
         first = starts(settings.of(flow, exact=16, smoothed=16, quick=8))
         system = flow.system(**parameters)
         survey = sweep(
-            system, parameter, sorted({*shown, *others}), direction=None, start=first, transient=transient, keep=64,
-            progress=settings.progress, **flow.options,
-        )  # fmt: skip
+            system,
+            parameter,
+            sorted({*shown, *others}),
+            direction=None,
+            start=first,
+            transient=transient,
+            keep=64,
+            progress=settings.progress,
+            **flow.options,
+        )
         data[flow.key] = survey
         for value, wanted in shown.items():
             periods = 2 * wanted if wanted != APERIODIC else CHAOTIC_PERIODS
             data[f"{flow.key}_{value:g}"] = simulate(
-                system.with_parameters({parameter: value}), start=first[chosen_start(survey, value, wanted)],
-                transient=transient, periods=periods, **flow.options,
-            )  # fmt: skip
+                system.with_parameters({parameter: value}),
+                start=first[chosen_start(survey, value, wanted)],
+                transient=transient,
+                periods=periods,
+                **flow.options,
+            )
     return data
 
 
@@ -77,9 +87,7 @@ def draw_portraits(canvas: Canvas, data: Datasets, *, parameter: str, shown: Map
     def cell(ax: Axes, i: int, j: int) -> None:
         (value, wanted), key = rows[j], FLOWS[i].key
         points = data[key].sel({parameter: value}, method="nearest").isel(start=chosen_start(data[key], value, wanted))
-        plot.phase_portrait(
-            data[f"{key}_{value:g}"], ax, section=points if wanted != APERIODIC else None, zone="g"
-        )  # fmt: skip
+        plot.phase_portrait(data[f"{key}_{value:g}"], ax, section=points if wanted != APERIODIC else None, zone="g")
         if wanted == APERIODIC:
             for line in ax.get_lines():
                 line.set(linewidth=0.35)

@@ -40,10 +40,14 @@ def _compute(settings: Settings, name: str) -> Datasets:
     for flow in FLOWS:
         step = settings.of(flow, exact=0.0025, smoothed=0.005, quick=0.02)
         data[flow.key] = frequency_response(
-            flow.system(**BEGINNINGS[name].parameters), np.linspace(low, high, round((high - low) / step) + 1),
-            transient=settings.of(flow, exact=300, smoothed=150, quick=60), keep=16, max_period=4,
-            progress=settings.progress, **flow.options,
-        )  # fmt: skip
+            flow.system(**BEGINNINGS[name].parameters),
+            np.linspace(low, high, round((high - low) / step) + 1),
+            transient=settings.of(flow, exact=300, smoothed=150, quick=60),
+            keep=16,
+            max_period=4,
+            progress=settings.progress,
+            **flow.options,
+        )
     return data | branches(name)
 
 
@@ -66,9 +70,17 @@ def _mark(ax: Axes, response: xr.Dataset, printed: Mapping[str, float]) -> None:
     doubled = (response["period_number"] == 2).any("direction").values
     if doubled.any():
         ax.fill_between(
-            omega, 0, 1, where=doubled, transform=ax.get_xaxis_transform(), color=plot.COLORS["zone"], alpha=0.25,
-            linewidth=0, zorder=0, label="period 2",
-        )  # fmt: skip
+            omega,
+            0,
+            1,
+            where=doubled,
+            transform=ax.get_xaxis_transform(),
+            color=plot.COLORS["zone"],
+            alpha=0.25,
+            linewidth=0,
+            zorder=0,
+            label="period 2",
+        )
     mark_printed(ax, printed)
     ax.margins(y=0.12)
 
@@ -77,13 +89,25 @@ def mark_printed(ax: Axes, printed: Mapping[str, float]) -> None:
     """The paper's numbers at the upper edge."""
     for i, value in enumerate(printed.values()):
         ax.plot(
-            value, 1.0, "v", transform=ax.get_xaxis_transform(), color="black", markersize=4, clip_on=False,
-            label="printed in the paper (rad/s)" if i == 0 else None, linestyle="none",
-        )  # fmt: skip
+            value,
+            1.0,
+            "v",
+            transform=ax.get_xaxis_transform(),
+            color="black",
+            markersize=4,
+            clip_on=False,
+            label="printed in the paper (rad/s)" if i == 0 else None,
+            linestyle="none",
+        )
         ax.annotate(
-            f"{value:.2f}", (value, 1.0), (0, 3.5), xycoords=ax.get_xaxis_transform(), textcoords="offset points",
-            ha="center", fontsize=small(ax),
-        )  # fmt: skip
+            f"{value:.2f}",
+            (value, 1.0),
+            (0, 3.5),
+            xycoords=ax.get_xaxis_transform(),
+            textcoords="offset points",
+            ha="center",
+            fontsize=small(ax),
+        )
 
 
 def _caption(data: Datasets, printed: str) -> str:
@@ -156,11 +180,25 @@ _SHOWN: tuple[tuple[int, str, dict[str, float], str], ...] = (
 )
 
 FIGURES = tuple(
-    Figure(f"fig{number:02d}", number, title, partial(_compute, name=f"fig{number:02d}"),
-           partial(_draw, printed=printed), partial(_caption, printed=words))
+    Figure(
+        f"fig{number:02d}",
+        number,
+        title,
+        partial(_compute, name=f"fig{number:02d}"),
+        partial(_draw, printed=printed),
+        partial(_caption, printed=words),
+    )
     for number, title, printed, words in _SHOWN
 ) + tuple(
-    Figure(f"fig{number:02d}_rig", number, title, partial(_measure, number=number),
-           partial(_draw_rig, printed=printed), _caption_rig, (0.72, 0.6), rig=True)
+    Figure(
+        f"fig{number:02d}_rig",
+        number,
+        title,
+        partial(_measure, number=number),
+        partial(_draw_rig, printed=printed),
+        _caption_rig,
+        (0.72, 0.6),
+        rig=True,
+    )
     for number, title, printed, _ in _SHOWN
-)  # fmt: skip
+)

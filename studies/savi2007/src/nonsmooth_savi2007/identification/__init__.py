@@ -19,8 +19,28 @@ from nonsmooth_savi2007.identification.steady import Steady, steady
 from nonsmooth_savi2007.identification.stiffness import stiffness
 
 __all__ = [
-    "ContactFit", "DecayFit", "Evidence", "Run", "Steady", "amplitude_fit", "crank_force", "decay_damping",
-    "free_decay", "gather", "grazing_gap", "half_power", "identify", "mean_of_drive", "mean_shift",
-    "natural_frequency", "receptance_fit", "require", "shoot_contacts", "steady", "stiffness", "support_damping",
-    "viscous_bias", "voltage_frequency",
-]  # fmt: skip
+    "ContactFit",
+    "DecayFit",
+    "Evidence",
+    "Run",
+    "Steady",
+    "amplitude_fit",
+    "crank_force",
+    "decay_damping",
+    "free_decay",
+    "gather",
+    "grazing_gap",
+    "half_power",
+    "identify",
+    "mean_of_drive",
+    "mean_shift",
+    "natural_frequency",
+    "receptance_fit",
+    "require",
+    "shoot_contacts",
+    "steady",
+    "stiffness",
+    "support_damping",
+    "viscous_bias",
+    "voltage_frequency",
+]

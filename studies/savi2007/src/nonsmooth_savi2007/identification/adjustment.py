@@ -33,8 +33,15 @@ _CONVERGED = 1e-6  # of a standard uncertainty
 
 #: The unknowns of the adjustment, with units.
 UNKNOWNS: Mapping[str, str] = {
-    "m": "kg", "k": "N/m", "k_s": "N/m", "c": "N s/m", "c_s": "N s/m", "friction": "N", "test_mass": "kg", "gain": "",
-}  # fmt: skip
+    "m": "kg",
+    "k": "N/m",
+    "k_s": "N/m",
+    "c": "N s/m",
+    "c_s": "N s/m",
+    "friction": "N",
+    "test_mass": "kg",
+    "gain": "",
+}
 
 #: What is observed, as a function of the unknowns.
 LAWS: Mapping[str, Callable[[Any], Any]] = {
@@ -134,9 +141,9 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
         at = dict(zip(names, u, strict=True))
         left = (y - np.array([LAWS[label](at) for label in labels])) / size
         beside = u + 1e-30j * np.diag(scale)  # derivatives by imaginary parts
-        jacobian = np.array([
-            [LAWS[label](dict(zip(names, row, strict=True))).imag for row in beside] for label in labels
-        ]) / (1e-30 * size[:, None])  # fmt: skip
+        jacobian = np.array(
+            [[LAWS[label](dict(zip(names, row, strict=True))).imag for row in beside] for label in labels]
+        ) / (1e-30 * size[:, None])
         normal = jacobian.T @ weight @ jacobian + prior
         change = np.linalg.solve(normal, jacobian.T @ weight @ left - prior @ ((u - known) / scale))
         u = u + change * scale

@@ -62,16 +62,20 @@ def voltage_frequency(runs: Sequence[Run]) -> Finding:
     notes = [f"the motor turns from {offset:.3f} V on; omega = {slope:.5g} rad/(s V) x (V - {offset:.4g} V)"]
     notes += _scatter(scatter, error, "rad/s")
     return Finding(
-        "voltage_frequency", Estimate(slope, float(errors[0]), "rad/(s V)"),
+        "voltage_frequency",
+        Estimate(slope, float(errors[0]), "rad/(s V)"),
         "straight line with an offset through the frequencies that the photogate tells (Fig. 8a)",
-        int(sum(len(run.passages) for run in runs)), tuple(run.name for run in runs), tuple(notes),
+        int(sum(len(run.passages) for run in runs)),
+        tuple(run.name for run in runs),
+        tuple(notes),
         {
             "offset": Estimate(offset, float(errors[1]), "V"),
             "intercept": Estimate(intercept, float(errors[2]), "rad/s"),
         },
-        covariance, _data(volts, omega, np.hypot(error, scatter), line, ("motor voltage", "V"),
-                          ("frequency", "rad/s"), runs), "calibration",
-    )  # fmt: skip
+        covariance,
+        _data(volts, omega, np.hypot(error, scatter), line, ("motor voltage", "V"), ("frequency", "rad/s"), runs),
+        "calibration",
+    )
 
 
 def crank_force(runs: Sequence[Run], *, gain_limit: float = 0.01, k: Estimate | None = None) -> Finding:
@@ -114,16 +118,21 @@ def crank_force(runs: Sequence[Run], *, gain_limit: float = 0.01, k: Estimate | 
         notes.append(f"k = {k} from elsewhere: {100 * (line.slope / k.value - 1):+.2f} %, {abs(off):.1f} uncertainties")
     notes += _scatter(scatter, error, "N")
     return Finding(
-        "crank_force", Estimate(line.slope, total, "N/m", half_width=half),
+        "crank_force",
+        Estimate(line.slope, total, "N/m", half_width=half),
         "straight line through the fundamentals of the force on the held car (Fig. 8b)",
-        int(sum(run.force.size for run in runs)), tuple(run.name for run in runs), tuple(notes),
+        int(sum(run.force.size for run in runs)),
+        tuple(run.name for run in runs),
+        tuple(notes),
         {
             "slope_a": Estimate(line.slope, type_a, "N/m"),
             "intercept": Estimate(line.intercept, float(np.sqrt(line.covariance[1, 1])), "N"),
         },
-        data=_data(length, force, np.hypot(error, scatter), line, ("crank length", "m"),
-                   ("forcing amplitude", "N"), runs), plot="calibration",
-    )  # fmt: skip
+        data=_data(
+            length, force, np.hypot(error, scatter), line, ("crank length", "m"), ("forcing amplitude", "N"), runs
+        ),
+        plot="calibration",
+    )
 
 
 def _enough(settings: FloatArray, what: str) -> None:
@@ -142,9 +151,14 @@ def _scatter(scatter: float, error: FloatArray, unit: str) -> list[str]:
 
 
 def _data(
-    setting: FloatArray, reading: FloatArray, error: FloatArray, line: StraightLine,
-    named: tuple[str, str], read: tuple[str, str], runs: Sequence[Run],
-) -> xr.Dataset:  # fmt: skip
+    setting: FloatArray,
+    reading: FloatArray,
+    error: FloatArray,
+    line: StraightLine,
+    named: tuple[str, str],
+    read: tuple[str, str],
+    runs: Sequence[Run],
+) -> xr.Dataset:
     import xarray as xr
 
     low = min(float(setting.min()), 0.0)
@@ -156,12 +170,16 @@ def _data(
     return xr.Dataset(
         {
             "setting": ("run", setting, {"units": named[1], "long_name": named[0]}),
-            "reading": ("run", reading, unit), "reading_error": ("run", error, unit),
-            "fitted": ("setting_fine", fitted, unit), "fitted_low": ("setting_fine", fitted - reach, unit),
+            "reading": ("run", reading, unit),
+            "reading_error": ("run", error, unit),
+            "fitted": ("setting_fine", fitted, unit),
+            "fitted_low": ("setting_fine", fitted - reach, unit),
             "fitted_high": ("setting_fine", fitted + reach, unit),
-            "slope": ((), line.slope), "slope_error": ((), errors[0]),
-            "intercept": ((), line.intercept, unit), "intercept_error": ((), errors[1], unit),
+            "slope": ((), line.slope),
+            "slope_error": ((), errors[0]),
+            "intercept": ((), line.intercept, unit),
+            "intercept_error": ((), errors[1], unit),
         },
         {"setting_fine": ("setting_fine", fine, {"units": named[1], "long_name": named[0]})},
         {"synthetic": "yes" if any(run.synthetic for run in runs) else "no"},
-    )  # fmt: skip
+    )

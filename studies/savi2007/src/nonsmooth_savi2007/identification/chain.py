@@ -42,8 +42,12 @@ from nonsmooth_savi2007.identification.steady import Steady, steady
 from nonsmooth_savi2007.identification.stiffness import stiffness
 
 #: The findings that name the runs of a procedure which were used.
-_FOUND_BY = {"impulse": ("omega_0", "c_decay"), "drop": ("c_s_drop",), "springs": ("spring_slope",),
-             "support": ("support_slope",)}  # fmt: skip
+_FOUND_BY = {
+    "impulse": ("omega_0", "c_decay"),
+    "drop": ("c_s_drop",),
+    "springs": ("spring_slope",),
+    "support": ("support_slope",),
+}
 
 
 @one_blas_thread()
@@ -120,10 +124,14 @@ def identify(
     chain.checks(adjusted, decay, contacts, grazing)
     chain.doubts(adjusted, contacts)
     found = joined(
-        adjusted, gap, findings=chain.findings, identifiability=identifiability(adjusted, contacts, single),
-        notes=[*agreement(adjusted, chain.evidence), *chain.notes], anomalies=chain.anomalies,
+        adjusted,
+        gap,
+        findings=chain.findings,
+        identifiability=identifiability(adjusted, contacts, single),
+        notes=[*agreement(adjusted, chain.evidence), *chain.notes],
+        anomalies=chain.anomalies,
         synthetic=chain.evidence.synthetic,
-    )  # fmt: skip
+    )
     return found if model is None else for_model(found, model)
 
 
@@ -219,7 +227,7 @@ class _Chain:
         used = {
             procedure: {name for finding in self.findings if finding.name in names for name in finding.runs}
             for procedure, names in _FOUND_BY.items()
-        }  # fmt: skip
+        }
         used["contact"] = set() if contacts is None else {run.name for run in contacts.runs}
         for procedure, kept in used.items():
             given = [run.name for run in self.runs(procedure)]
@@ -287,15 +295,20 @@ class _Chain:
 
     def forces(self) -> None:
         for procedure, law, mass, friction in (
-            ("springs", "spring_slope", self.mass.value, True), ("support", "support_slope", 0.0, False),
-        ):  # fmt: skip
+            ("springs", "spring_slope", self.mass.value, True),
+            ("support", "support_slope", 0.0, False),
+        ):
             runs = self.runs(procedure)
             if not runs:
                 continue
             found = stiffness(
-                runs, resolution=self.evidence.resolution, mass=mass, gain_limit=self.gain_limit, friction=friction,
+                runs,
+                resolution=self.evidence.resolution,
+                mass=mass,
+                gain_limit=self.gain_limit,
+                friction=friction,
                 name=law,
-            )  # fmt: skip
+            )
             self.findings.append(found)
             error = found.others["slope_a"].uncertainty
             self.observe((law,), np.array([found.value]), np.array([[error**2]]), procedure)
@@ -326,9 +339,13 @@ class _Chain:
             else:
                 at_rest = Estimate(counted.value - float(decay.values[3]), counted.error, "m")
         found = cross_checks(
-            self.findings, masses, gain=adjusted.estimate("gain") if "gain" in adjusted.names else None,
-            gain_limit=self.gain_limit, k=adjusted.estimate("k") if "k" in adjusted.names else None, gap=at_rest,
-        )  # fmt: skip
+            self.findings,
+            masses,
+            gain=adjusted.estimate("gain") if "gain" in adjusted.names else None,
+            gain_limit=self.gain_limit,
+            k=adjusted.estimate("k") if "k" in adjusted.names else None,
+            gap=at_rest,
+        )
         agree, disagree = sentences(found)
         self.notes += agree
         for sentence in disagree:
@@ -347,10 +364,8 @@ class _Chain:
             return None
         return self.beside(
             "gap by the grazing frequency",
-            lambda: grazing_gap(
-                runs, decay, resolution=self.evidence.resolution, kappa=rough["k_s"] / rough["m"]
-            ),
-        )  # fmt: skip
+            lambda: grazing_gap(runs, decay, resolution=self.evidence.resolution, kappa=rough["k_s"] / rough["m"]),
+        )
 
     def mark(self, decay: DecayFit | None, seen: Steady) -> float:
         """The crank's angle at the photogate (rad), from steady runs without support or the first ones of the graze."""

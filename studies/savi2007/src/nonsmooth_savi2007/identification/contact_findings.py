@@ -55,16 +55,23 @@ def contact_finding(found: ContactFit, mass: Quantity, *, resolution: float) -> 
         "one contact is 8 samples at 100 Hz: what is known of c_s comes from many fitted together",
         *found.left,
     ]
-    notes += [f"{run.name}: {note}" for run, one in zip(found.runs, found.fits, strict=True)
-              for note in (*one.notes, *one.anomalies) if note.startswith(("left out", "the fit stands"))]  # fmt: skip
+    notes += [
+        f"{run.name}: {note}"
+        for run, one in zip(found.runs, found.fits, strict=True)
+        for note in (*one.notes, *one.anomalies)
+        if note.startswith(("left out", "the fit stands"))
+    ]
     return Finding(
         "c_s_contact",
         Estimate(value, float(error[_GAMMA]), logarithmic=value > 0).times(mass.value, mass.uncertainty, "N s/m"),
-        f"multiple shooting over {found.n_contacts} contacts", found.samples,
-        tuple(run.name for run in found.runs), tuple(notes),
+        f"multiple shooting over {found.n_contacts} contacts",
+        found.samples,
+        tuple(run.name for run in found.runs),
+        tuple(notes),
         {"k_s": stiff, **gaps},
-        data=_data(found, resolution), plot="multiple_shooting",
-    )  # fmt: skip
+        data=_data(found, resolution),
+        plot="multiple_shooting",
+    )
 
 
 def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: float, kappa_error: float) -> Finding:
@@ -95,9 +102,12 @@ def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: 
     for i, first, last in windows[:: max(len(windows) // _TRIED, 1)]:
         run, drive = found.runs[i], drive_phase(found.runs[i].passages)
         known = known_before(
-            run, decay, float(found.values[found.place(i, 3)]),
-            kappa=Estimate(kappa, kappa_error), gamma=Estimate(gamma, 10 * gamma),
-        )  # fmt: skip
+            run,
+            decay,
+            float(found.values[found.place(i, 3)]),
+            kappa=Estimate(kappa, kappa_error),
+            gamma=Estimate(gamma, 10 * gamma),
+        )
         try:
             one = fit_contact(
                 run, drive, not drive.wander()[1], known, known, resolution, (first, last), profile=["gamma"]
@@ -117,16 +127,18 @@ def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: 
     shown = data.assign({name: data[name] * mass for name in ("best", "low", "high")})
     shown = shown.assign_coords(value=("value", mass * data["value"].values, {"units": "N s/m"}))
     return Finding(
-        "c_s_one_contact", Estimate(best, error, "N s/m", logarithmic=bounded),
+        "c_s_one_contact",
+        Estimate(best, error, "N s/m", logarithmic=bounded),
         "profile likelihood of one contact, its gap, place and drive found with it",
-        int(one.residuals.sizes["sample"]), (run.name,),
+        int(one.residuals.sizes["sample"]),
+        (run.name,),
         (
             (f"95 % limits {low:.3g} to {high:.3g} N s/m" if bounded else "the profile does not bound it on both sides")
             + f"; the window is the median one of {len(alone)}",
         ),
         data=shown.assign_attrs(parameter="c_s", units="N s/m", synthetic="yes" if run.synthetic else "no"),
         plot="profile",
-    )  # fmt: skip
+    )
 
 
 def _data(found: ContactFit, resolution: float) -> xr.Dataset:
@@ -141,10 +153,16 @@ def _data(found: ContactFit, resolution: float) -> xr.Dataset:
     gap_error = float(np.sqrt(found.covariance[found.place(which, 0), found.place(which, 0)]))
     return picture_data(
         [run],
-        {"time": {
-            "time": time, "x": x, "x_error": np.full(len(x), resolution / np.sqrt(12)), "fitted": fitted,
-            "residual": x - fitted, "segment": segment,
-            "in_contact": (np.where(np.isfinite(fitted), fitted, -np.inf) > gap).astype(np.int8),
-        }},
+        {
+            "time": {
+                "time": time,
+                "x": x,
+                "x_error": np.full(len(x), resolution / np.sqrt(12)),
+                "fitted": fitted,
+                "residual": x - fitted,
+                "segment": segment,
+                "in_contact": (np.where(np.isfinite(fitted), fitted, -np.inf) > gap).astype(np.int8),
+            }
+        },
         gap=Estimate(gap, gap_error, "m"),
-    ).assign_attrs(run=run.name)  # fmt: skip
+    ).assign_attrs(run=run.name)

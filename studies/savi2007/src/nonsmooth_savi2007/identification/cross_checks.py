@@ -39,27 +39,67 @@ class Check(NamedTuple):
 #: What is compared: its name, finding and which of its others ("" for itself), the same of the other, the mass that
 #: both share, and what to look at.
 PAIRS: Sequence[tuple[str, tuple[str, str], tuple[str, str], str, str]] = (
-    ("omega_0: free decay, complex response", ("omega_0", ""), ("c_frequency_response", "omega_0"), "",
-     "the photogate's times or the springs: were they changed between the procedures?"),
-    ("c: free decay, complex response", ("c_decay", ""), ("c_frequency_response", ""), "mass",
-     "the damper, or friction that is not dry: was anything changed between taps and response?"),
-    ("c: free decay, amplitude over frequency", ("c_decay", ""), ("c_response", ""), "mass",
-     "the damper, or the crank's lengths"),
-    ("friction: free decay, complex response", ("c_decay", "friction"), ("c_frequency_response", "friction"), "mass",
-     "friction that is not dry, or a bearing that was moved"),
-    ("c_s: drop by decrement, drop by fit", ("c_s_drop", ""), ("c_s_drop", "c_s_fit"), "test_mass",
-     "damping of the support that depends on amplitude"),
-    ("c_s: drop, contacts", ("c_s_drop", ""), ("c_s_contact", ""), "",
-     "the support's damping, its mounting, or the mass that was hung on it"),
-    ("c_s: one contact, all contacts", ("c_s_one_contact", ""), ("c_s_contact", ""), "mass",
-     "the record of that piece"),
-)  # fmt: skip
+    (
+        "omega_0: free decay, complex response",
+        ("omega_0", ""),
+        ("c_frequency_response", "omega_0"),
+        "",
+        "the photogate's times or the springs: were they changed between the procedures?",
+    ),
+    (
+        "c: free decay, complex response",
+        ("c_decay", ""),
+        ("c_frequency_response", ""),
+        "mass",
+        "the damper, or friction that is not dry: was anything changed between taps and response?",
+    ),
+    (
+        "c: free decay, amplitude over frequency",
+        ("c_decay", ""),
+        ("c_response", ""),
+        "mass",
+        "the damper, or the crank's lengths",
+    ),
+    (
+        "friction: free decay, complex response",
+        ("c_decay", "friction"),
+        ("c_frequency_response", "friction"),
+        "mass",
+        "friction that is not dry, or a bearing that was moved",
+    ),
+    (
+        "c_s: drop by decrement, drop by fit",
+        ("c_s_drop", ""),
+        ("c_s_drop", "c_s_fit"),
+        "test_mass",
+        "damping of the support that depends on amplitude",
+    ),
+    (
+        "c_s: drop, contacts",
+        ("c_s_drop", ""),
+        ("c_s_contact", ""),
+        "",
+        "the support's damping, its mounting, or the mass that was hung on it",
+    ),
+    (
+        "c_s: one contact, all contacts",
+        ("c_s_one_contact", ""),
+        ("c_s_contact", ""),
+        "mass",
+        "the record of that piece",
+    ),
+)
 
 
 def cross_checks(
-    findings: Sequence[Finding], masses: Mapping[str, Quantity], *, gain: Estimate | None = None,
-    gain_limit: float = 0.0, k: Estimate | None = None, gap: Estimate | None = None,
-) -> list[Check]:  # fmt: skip
+    findings: Sequence[Finding],
+    masses: Mapping[str, Quantity],
+    *,
+    gain: Estimate | None = None,
+    gain_limit: float = 0.0,
+    k: Estimate | None = None,
+    gap: Estimate | None = None,
+) -> list[Check]:
     """All checks that these findings allow.
 
     Parameters
@@ -83,24 +123,38 @@ def cross_checks(
             found.append(Check(name, one, other, _off(one, other, common), remedy))
     if (scale := _taken(known, "c_frequency_response", "drive_scale")) is not None:
         unit = Estimate(1.0, 0.0)
-        found.append(Check(
-            "drive: complex response over what the crank's length says, 1", scale, unit, _off(scale, unit),
-            "the crank's lengths, or springs that are not equal",
-        ))  # fmt: skip
+        found.append(
+            Check(
+                "drive: complex response over what the crank's length says, 1",
+                scale,
+                unit,
+                _off(scale, unit),
+                "the crank's lengths, or springs that are not equal",
+            )
+        )
     if (seen := _taken(known, "crank_force", "")) is not None and k is not None:
         found.append(Check("k: crank's force, all others", seen, k, _off(seen, k), "the crank's lengths"))
     if gain is not None and gain_limit:
         beyond = float(np.sign(gain.value - 1)) * max(abs(gain.value - 1) - gain_limit, 0.0)
-        found.append(Check(
-            f"gain: force sensor against motions and masses, 1 within ±{100 * gain_limit:g} %", gain,
-            Estimate(1.0, uniform(gain_limit), half_width=gain_limit), _over(beyond, gain.uncertainty**2),
-            "the force sensor's calibration, the mass, or the wheel",
-        ))  # fmt: skip
+        found.append(
+            Check(
+                f"gain: force sensor against motions and masses, 1 within ±{100 * gain_limit:g} %",
+                gain,
+                Estimate(1.0, uniform(gain_limit), half_width=gain_limit),
+                _over(beyond, gain.uncertainty**2),
+                "the force sensor's calibration, the mass, or the wheel",
+            )
+        )
     if (graze := _taken(known, "gap_grazing", "at_rest")) is not None and gap is not None:
-        found.append(Check(
-            "gap at rest: graze, contacts", graze, gap, _off(graze, gap),
-            "the screw: was it turned between the two? a string that slipped, or steps that are too coarse",
-        ))  # fmt: skip
+        found.append(
+            Check(
+                "gap at rest: graze, contacts",
+                graze,
+                gap,
+                _off(graze, gap),
+                "the screw: was it turned between the two? a string that slipped, or steps that are too coarse",
+            )
+        )
     return found
 
 
@@ -111,8 +165,9 @@ def sentences(checks: Sequence[Check]) -> tuple[list[str], list[str]]:
     return agree, [
         f"{check.name} disagree: {check.one} and {check.other}, {abs(check.off):.1f} uncertainties of the difference "
         f"apart. Look at {check.remedy}"
-        for check in checks if not check.agrees
-    ]  # fmt: skip
+        for check in checks
+        if not check.agrees
+    ]
 
 
 def _taken(known: Mapping[str, Finding], name: str, other: str) -> Estimate | None:

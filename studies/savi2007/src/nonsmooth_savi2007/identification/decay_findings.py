@@ -147,19 +147,26 @@ def natural_frequency(runs: Sequence[Run], decay: DecayFit) -> Finding:
             "frequency": {"frequency": frequency, "magnitude": magnitude},
             "fine_frequency": {"fine_frequency": fine, "fine_magnitude": between / rate},
         },
-        grid_step=grid_step, grid_peak=frequency[top], peak_frequency=Estimate(peak, spread, "Hz"),
+        grid_step=grid_step,
+        grid_peak=frequency[top],
+        peak_frequency=Estimate(peak, spread, "Hz"),
         decay_frequency=Estimate(value, error).times(1 / (2 * np.pi), unit="Hz"),
-    )  # fmt: skip
+    )
     return Finding(
-        "omega_0", Estimate(value, error, "rad/s"), "free decay in the time domain, viscous damping and dry friction",
-        decay.samples, tuple(r.name for r in used), notes,
+        "omega_0",
+        Estimate(value, error, "rad/s"),
+        "free decay in the time domain, viscous damping and dry friction",
+        decay.samples,
+        tuple(r.name for r in used),
+        notes,
         {
             "dft_grid": Estimate(2 * np.pi * float(frequency[top]), grid / np.sqrt(12), "rad/s", half_width=grid / 2),
             "dft_peak": Estimate(at_peak, peak_error, "rad/s"),
             "dft_undamped": Estimate(undamped, peak_error * at_peak / undamped, "rad/s"),
         },
-        data=data, plot="impulse_response",
-    )  # fmt: skip
+        data=data,
+        plot="impulse_response",
+    )
 
 
 def envelope(time: FloatArray, first: float, omega_0: float, b: float, f: float) -> FloatArray:
@@ -213,14 +220,20 @@ def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: Quantity, *, resol
         *decay.notes,
     ]
     return Finding(
-        "c_decay", c, "free decays, viscous damping and dry friction at once",
-        decay.samples, tuple(runs[i].name for i in decay.runs), tuple(notes),
+        "c_decay",
+        c,
+        "free decays, viscous damping and dry friction at once",
+        decay.samples,
+        tuple(runs[i].name for i in decay.runs),
+        tuple(notes),
         {
             "friction": friction,
             "c_viscous_only": Estimate(rate, rate_error).times(mass.value, mass.uncertainty, "N s/m"),
         },
-        covariance, _data(runs, decay, peaks, c, friction), "free_decay",
-    )  # fmt: skip
+        covariance,
+        _data(runs, decay, peaks, c, friction),
+        "free_decay",
+    )
 
 
 def _peaks(run: Run, span: tuple[int, int], decay: DecayFit, resolution: float) -> tuple[FloatArray, ...]:
@@ -255,8 +268,9 @@ def _data(
             "time": {"time": time - time[0], "x": x - rest, "fitted": fitted},
             "fine_time": {"fine_time": fine, "envelope_both": both, "envelope_viscous": plain},
         },
-        c=c, friction_force=friction,
-    )  # fmt: skip
+        c=c,
+        friction_force=friction,
+    )
 
 
 def log_decrement(time: FloatArray, x: FloatArray, rest: float, *, resolution: float) -> tuple[FloatArray, ...]:
@@ -301,9 +315,12 @@ def support_damping(runs: Sequence[Run], *, resolution: float, test_mass: Quanti
         Its mass (kg).
     """
     decay = free_decay(
-        [(run.time, run.positions) for run in runs], resolution=resolution, slowest=_SLOWEST, friction=False,
+        [(run.time, run.positions) for run in runs],
+        resolution=resolution,
+        slowest=_SLOWEST,
+        friction=False,
         names=[run.name for run in runs],
-    )  # fmt: skip
+    )
     slopes, weights, data = [], [], None
     notes = list(decay.notes)
     for i, (begin, end) in zip(decay.runs, decay.spans, strict=True):
@@ -323,13 +340,17 @@ def support_damping(runs: Sequence[Run], *, resolution: float, test_mass: Quanti
                 {
                     "time": {"time": runs[i].time, "x": runs[i].positions - decay.values[3]},
                     "peak": {
-                        "peak_time": t, "peak_height": height, "log_height": np.log(height),
-                        "log_height_error": error / height, "used": np.ones(len(t), dtype=np.int8),
+                        "peak_time": t,
+                        "peak_height": height,
+                        "log_height": np.log(height),
+                        "log_height_error": error / height,
+                        "used": np.ones(len(t), dtype=np.int8),
                     },
                 },
-                intercept=intercept, slope=Estimate(slope, spread, "1/s"),
+                intercept=intercept,
+                slope=Estimate(slope, spread, "1/s"),
                 damping_ratio=Estimate(ratio, spread / decay.values[0]),
-            )  # fmt: skip
+            )
     mass = test_mass.value
     if not slopes:
         raise ValueError("no drop has four turning points above ten counts: drop it from higher, or record longer")
@@ -339,14 +360,18 @@ def support_damping(runs: Sequence[Run], *, resolution: float, test_mass: Quanti
     value = -2 * mass * rate
     error_total = abs(value) * float(np.hypot(rate_error / rate, test_mass.uncertainty / mass))
     finding = Finding(
-        "c_s_drop", Estimate(value, error_total, "N s/m", logarithmic=value > 0),
-        "logarithmic decrement, regression over all turning points (Fig. 7)", decay.samples,
-        tuple(runs[i].name for i in decay.runs), tuple(notes),
+        "c_s_drop",
+        Estimate(value, error_total, "N s/m", logarithmic=value > 0),
+        "logarithmic decrement, regression over all turning points (Fig. 7)",
+        decay.samples,
+        tuple(runs[i].name for i in decay.runs),
+        tuple(notes),
         others={
             "c_s_fit": Estimate(float(decay.values[1]), decay.error("b")).times(mass, test_mass.uncertainty, "N s/m"),
             "omega_s": Estimate(float(decay.values[0]), decay.error("omega_0"), "rad/s"),
             "damping_ratio": Estimate(-rate / float(decay.values[0]), rate_error / float(decay.values[0])),
         },
-        data=data, plot="drop_decay",
-    )  # fmt: skip
+        data=data,
+        plot="drop_decay",
+    )
     return finding, decay

@@ -19,10 +19,18 @@ from nonsmooth_savi2007.identification.directions import oriented
 
 #: Channels that a procedure cannot do without.
 _NEEDS: Mapping[str, tuple[str, ...]] = {
-    "springs": ("Angle", "Force"), "support": ("Angle", "Force"), "impulse": ("Angle",), "drop": ("Angle",),
-    "response": ("Angle", "Turn"), "voltage": ("Turn",), "crank": ("Force", "Turn"), "grazing": ("Angle", "Turn"),
-    "contact": ("Angle", "Turn"), "rise": ("Angle", "Turn"), "section": ("Angle", "Turn"),
-}  # fmt: skip
+    "springs": ("Angle", "Force"),
+    "support": ("Angle", "Force"),
+    "impulse": ("Angle",),
+    "drop": ("Angle",),
+    "response": ("Angle", "Turn"),
+    "voltage": ("Turn",),
+    "crank": ("Force", "Turn"),
+    "grazing": ("Angle", "Turn"),
+    "contact": ("Angle", "Turn"),
+    "rise": ("Angle", "Turn"),
+    "section": ("Angle", "Turn"),
+}
 _ANGLES = ("rad", "deg", "°", "rev", "turn", "turns", "degrees", "radians", "rotations", "counts")
 _PASSAGES = 3  # of the photogate: fewer give no frequency and no scatter
 
@@ -107,9 +115,11 @@ class Evidence:
 
 
 def gather(
-    recordings: Session | str | os.PathLike[str] | Mapping[str, Any], *, apparatus: Mapping[str, Any] | None = None,
+    recordings: Session | str | os.PathLike[str] | Mapping[str, Any],
+    *,
+    apparatus: Mapping[str, Any] | None = None,
     procedures: Sequence[str] | None = None,
-) -> Evidence:  # fmt: skip
+) -> Evidence:
     """Take the channels of all runs out of a session or a mapping of recordings, sensors brought to one direction.
 
     Parameters

@@ -220,10 +220,14 @@ def _fit(
     names = [_NAMES[i] for i in used[:-1]]
     system = _oscillator(friction).with_parameters(dict(zip(names, first[used[:-1]].tolist(), strict=True)))
     found = fit(
-        system, [{"x": (r.time, r.x)} for r in records], [*names, "x.offset"],
+        system,
+        [{"x": (r.time, r.x)} for r in records],
+        [*names, "x.offset"],
         measured={"x": Sensor(resolution=resolution, offset=float(first[3]))},
-        mode="dry_stick" if friction else None, tries=1, progress=False,
-    )  # fmt: skip
+        mode="dry_stick" if friction else None,
+        tries=1,
+        progress=False,
+    )
     values, covariance = np.zeros(4), np.zeros((4, 4))
     names.append("x.offset")
     values[used] = [found.estimate(name).value for name in names]
@@ -234,9 +238,13 @@ def _fit(
 
 
 def _doubt(
-    records: Sequence[_Record], runs: Sequence[tuple[Any, Any]], resolution: float, slowest: float, friction: bool,
+    records: Sequence[_Record],
+    runs: Sequence[tuple[Any, Any]],
+    resolution: float,
+    slowest: float,
+    friction: bool,
     values: FloatArray,
-) -> FloatArray:  # fmt: skip
+) -> FloatArray:
     """Covariance of the law: how far the values move when half of the speed is let in."""
     slower = _records([runs[r.number] for r in records], resolution, slowest / 2, None)[0]
     moved = _fit(slower, friction, resolution, values)[0] - values
@@ -265,17 +273,21 @@ def _agreeing(
     typical = float(np.median(list(left.values()))) if left else 1.0
     good = [i for i, noise in left.items() if noise <= _UNFITTING * typical]
     if 2 * len(good) <= len(records):
-        return list(range(len(records))), None, [
-            f"{len(records) - len(good)} of {len(records)} decays are not those of the law, and no majority is: "
-            "see whether the string slips on the wheel, and tap again"
-        ]  # fmt: skip
+        return (
+            list(range(len(records))),
+            None,
+            [
+                f"{len(records) - len(good)} of {len(records)} decays are not those of the law, and no majority is: "
+                "see whether the string slips on the wheel, and tap again"
+            ],
+        )
     for i, r in enumerate(records):
         if i not in good:
             by = (
-                "no decay fits it" if i not in left else
-                f"it is {left[i] / typical:.1f} times as far from a decay as the others are "
-                "(root of chi^2)"
-            )  # fmt: skip
+                "no decay fits it"
+                if i not in left
+                else f"it is {left[i] / typical:.1f} times as far from a decay as the others are (root of chi^2)"
+            )
             said.append(f"{r.name}: left out: {by}; see whether the string slipped on the wheel")
     if len(good) < 2:
         return good, None, said

@@ -123,9 +123,11 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
     total = float(np.hypot(normal, uniform(half)))
     width = 0.5 * float(np.ptp(ends))
     return Finding(
-        "gap_grazing", Estimate(gap, total, "m", half_width=half),
+        "gap_grazing",
+        Estimate(gap, total, "m", half_width=half),
         "largest free motion between the last run without contact and the first with it",
-        seen.samples, seen.names,
+        seen.samples,
+        seen.names,
         (
             f"contact begins between {ends.min():.3f} and {ends.max():.3f} rad/s: the gap lies within "
             f"±{1e6 * half:.1f} µm {by}",
@@ -136,8 +138,9 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
             "at_rest": Estimate(gap + place - zero, at_rest, "m", half_width=half),
             "grazing_frequency": Estimate(float(ends.mean()), uniform(width), "rad/s", half_width=width),
         },
-        data=_data(seen, contact, place, ends, gap, total), plot="grazing",
-    )  # fmt: skip
+        data=_data(seen, contact, place, ends, gap, total),
+        plot="grazing",
+    )
 
 
 def _touching(seen: Steady, resolution: float) -> tuple[NDArray[np.bool_], float]:
@@ -249,10 +252,17 @@ def _data(
 ) -> xr.Dataset:
     return picture_data(
         seen.runs,
-        {"run": {
-            "setting": seen.omega, "amplitude": seen.highest - place,
-            "amplitude_error": np.hypot(seen.error, seen.mean_error), "contact": contact.astype(np.int8),
-            "mean": seen.mean - place,
-        }},
-        grazing_setting=ends.mean(), grazing_low=ends.min(), grazing_high=ends.max(), gap=Estimate(gap, error, "m"),
-    )  # fmt: skip
+        {
+            "run": {
+                "setting": seen.omega,
+                "amplitude": seen.highest - place,
+                "amplitude_error": np.hypot(seen.error, seen.mean_error),
+                "contact": contact.astype(np.int8),
+                "mean": seen.mean - place,
+            }
+        },
+        grazing_setting=ends.mean(),
+        grazing_low=ends.min(),
+        grazing_high=ends.max(),
+        gap=Estimate(gap, error, "m"),
+    )

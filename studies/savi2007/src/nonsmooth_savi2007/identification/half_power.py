@@ -114,19 +114,35 @@ def half_power(seen: Steady, mass: Quantity) -> Finding:
     if others:
         notes.append("a c that falls as the crank grows is dry friction, not damping")
     return Finding(
-        "c_half_power", c,
-        "half-power bandwidth of the frequency response", part.samples, part.names, tuple(notes),
+        "c_half_power",
+        c,
+        "half-power bandwidth of the frequency response",
+        part.samples,
+        part.names,
+        tuple(notes),
         {
             "damping_ratio": ratio,
-            "omega_0": Estimate(float(value[1]), float(error[1]), "rad/s"), **others,
+            "omega_0": Estimate(float(value[1]), float(error[1]), "rad/s"),
+            **others,
         },
         data=picture_data(
             part.runs,
-            {"run": {"omega": part.omega, "amplitude": part.amplitude, "amplitude_error": part.error,
-                     "direction": part.direction}},
-            omega_low=value[2], omega_high=value[3], largest=value[4], damping_ratio=ratio, c=c,
-        ), plot="half_power",
-    )  # fmt: skip
+            {
+                "run": {
+                    "omega": part.omega,
+                    "amplitude": part.amplitude,
+                    "amplitude_error": part.error,
+                    "direction": part.direction,
+                }
+            },
+            omega_low=value[2],
+            omega_high=value[3],
+            largest=value[4],
+            damping_ratio=ratio,
+            c=c,
+        ),
+        plot="half_power",
+    )
 
 
 def _c(value: FloatArray, error: FloatArray, mass: Quantity) -> Estimate:

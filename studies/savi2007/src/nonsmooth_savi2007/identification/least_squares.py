@@ -107,9 +107,15 @@ def nonlinear_fit(
     begin = np.asarray(start, dtype=np.float64)
     size = np.where(begin != 0, np.abs(begin), 1.0)  # the steps of its differences are relative to numbers of order 1
     found = least_squares(
-        lambda scaled: residual(scaled * size), begin / size, jac="3-point", bounds=(np.asarray(lower) / size, np.inf),
-        x_scale="jac", ftol=1e-12, xtol=1e-12, gtol=1e-12,
-    )  # fmt: skip
+        lambda scaled: residual(scaled * size),
+        begin / size,
+        jac="3-point",
+        bounds=(np.asarray(lower) / size, np.inf),
+        x_scale="jac",
+        ftol=1e-12,
+        xtol=1e-12,
+        gtol=1e-12,
+    )
     n, p = found.jac.shape
     if not found.success or n <= p:
         return None

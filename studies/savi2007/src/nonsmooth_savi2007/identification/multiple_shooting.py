@@ -105,14 +105,19 @@ def _rig(wanders: bool) -> System:
     units = ("rad/s", "1/s", "N/kg", "1/s^2", "1/s", "m", "m", "m", "rad", "m", "m", "rad/s", "rad")
     names = (*SHARED, *OWN) if wanders else (*SHARED, *OWN, *_TURNING)
     return mechanical(
-        1.0, "b", lambda p: [[p.omega_0**2]], coordinates={"x": "m"}, forcing={"x": push},
+        1.0,
+        "b",
+        lambda p: [[p.omega_0**2]],
+        coordinates={"x": "m"},
+        forcing={"x": push},
         inputs={"phi": "rad"} if wanders else None,
         parameters={name: (1.0, unit) for name, unit in zip(names, units, strict=False)},
         elements={
             "dry": elements.Coulomb(at="x", friction="f"),
             "support": elements.ElasticStop(at="x", position="g", stiffness="kappa", damping="gamma"),
-        }, name="car with support",
-    )  # fmt: skip
+        },
+        name="car with support",
+    )
 
 
 def known_before(run: Run, decay: DecayFit, mark: float = 0.0, **also: Estimate) -> ParameterSet:
@@ -132,9 +137,15 @@ def known_before(run: Run, decay: DecayFit, mark: float = 0.0, **also: Estimate)
 
 
 def fit_contact(
-    run: Run, drive: DrivePhase, wanders: bool, known: ParameterSet, first: Mapping[str, float], resolution: float,
-    span: tuple[float, float], **options: Any,
-) -> ParameterSet:  # fmt: skip
+    run: Run,
+    drive: DrivePhase,
+    wanders: bool,
+    known: ParameterSet,
+    first: Mapping[str, float],
+    resolution: float,
+    span: tuple[float, float],
+    **options: Any,
+) -> ParameterSet:
     """Fit a run, or its part between two times (s), from first values; ``options`` of :func:`nonsmooth.fit`."""
     inside = (run.time >= span[0]) & (run.time <= span[1])
     recorded, set_to = {"x": (run.time[inside], run.positions[inside])}, {}
@@ -145,10 +156,17 @@ def fit_contact(
     else:
         set_to = dict(zip(_TURNING, np.polyfit(drive.turn_times, 2 * np.pi * drive.turns, 1).tolist(), strict=True))
     return fit(
-        _rig(wanders).with_parameters({**first, **set_to}), recorded,
-        dict.fromkeys([*SHARED, *OWN]) | {"gamma": (0.0, None)}, measured={"x": Sensor(resolution=resolution)},
-        priors=known, window=_WINDOW, tries=1, progress=False, mode="dry_stick_support_open", **options,
-    )  # fmt: skip
+        _rig(wanders).with_parameters({**first, **set_to}),
+        recorded,
+        dict.fromkeys([*SHARED, *OWN]) | {"gamma": (0.0, None)},
+        measured={"x": Sensor(resolution=resolution)},
+        priors=known,
+        window=_WINDOW,
+        tries=1,
+        progress=False,
+        mode="dry_stick_support_open",
+        **options,
+    )
 
 
 def shoot_contacts(
@@ -200,17 +218,24 @@ def shoot_contacts(
         left += [
             f"contact {row[0].name}: left out: its residuals are {_excess(row[1], decay):.3g} times the sensor's "
             "noise; look at its crank length, photogate and string"
-            for row in rows if _excess(row[1], decay) > _FAR
-        ]  # fmt: skip
+            for row in rows
+            if _excess(row[1], decay) > _FAR
+        ]
         rows = good
     if not rows:
         raise SolveError("; ".join(left))
     excess = [_excess(row[1], decay) for row in rows]
     values, covariance, moved = _joined([row[1:] for row in rows])
     return ContactFit(
-        values, covariance + np.outer(moved, moved), tuple(row[0] for row in rows), tuple(row[1] for row in rows),
-        moved, float(np.median(excess)), tuple(left), poor,
-    )  # fmt: skip
+        values,
+        covariance + np.outer(moved, moved),
+        tuple(row[0] for row in rows),
+        tuple(row[1] for row in rows),
+        moved,
+        float(np.median(excess)),
+        tuple(left),
+        poor,
+    )
 
 
 def _touches(run: Run, rest: float) -> bool:

@@ -14,17 +14,37 @@ if TYPE_CHECKING:
 #: Variables by unit; those that are not here are ratios, counts or logarithms.
 _MEASURED = {
     "m": (
-        "amplitude", "crank", "crank_length", "displacement", "envelope_both", "envelope_viscous", "fitted", "gap",
-        "joint_amplitude", "largest", "mean", "peak_height", "residual", "viscous_amplitude", "x",
+        "amplitude",
+        "crank",
+        "crank_length",
+        "displacement",
+        "envelope_both",
+        "envelope_viscous",
+        "fitted",
+        "gap",
+        "joint_amplitude",
+        "largest",
+        "mean",
+        "peak_height",
+        "residual",
+        "viscous_amplitude",
+        "x",
     ),
     "m s": ("magnitude", "fine_magnitude"),
     "rad/s": (
-        "grazing_high", "grazing_low", "grazing_setting", "omega", "omega_fine", "omega_high", "omega_low", "setting",
+        "grazing_high",
+        "grazing_low",
+        "grazing_setting",
+        "omega",
+        "omega_fine",
+        "omega_high",
+        "omega_low",
+        "setting",
     ),
     "Hz": ("fine_frequency", "grid_peak", "grid_step"),
     "s": ("peak_time",),
     "N": ("force",),
-}  # fmt: skip
+}
 _UNITS = {name: unit for unit, names in _MEASURED.items() for name in names}
 _WORDS = {"setting": "frequency", "force": "force without the hand's inertia"}
 

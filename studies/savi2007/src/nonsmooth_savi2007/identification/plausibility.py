@@ -131,9 +131,10 @@ def _gaps(runs: Mapping[str, Sequence[Run]]) -> Iterator[str]:
 def not_driven(seen: Steady, count: float) -> str:
     """A sentence on steady runs whose motion does not repeat with the crank; empty where all do."""
     loose = [
-        run.label for run, size, rest in zip(seen.runs, seen.amplitude, seen.rest, strict=True)
+        run.label
+        for run, size, rest in zip(seen.runs, seen.amplitude, seen.rest, strict=True)
         if _travel(run) > 20 * count and rest > 0.5 * size
-    ]  # fmt: skip
+    ]
     if not loose:
         return ""
     return (

@@ -94,9 +94,14 @@ def mean_of_drive(crank_length: float, string_length: float, ripple: float = 0.0
 
 
 def mean_shift(
-    seen: Steady, zero: float, zero_error: float, *, string_length: float | None, string_error: float = 0.0,
+    seen: Steady,
+    zero: float,
+    zero_error: float,
+    *,
+    string_length: float | None,
+    string_error: float = 0.0,
     dry: float = 0.0,
-) -> MeanShift:  # fmt: skip
+) -> MeanShift:
     r"""Fit the mean positions of steady runs without contact, together with the place of rest.
 
     The string's length says how large :math:`\alpha = \pm 1/(8L)` is and not which sign it has: the motor pulls the
@@ -148,9 +153,14 @@ def mean_shift(
 
 
 def _fitted(
-    seen: Steady, zero: float, zero_error: float, string_length: float | None, alpha: float, alpha_error: float,
+    seen: Steady,
+    zero: float,
+    zero_error: float,
+    string_length: float | None,
+    alpha: float,
+    alpha_error: float,
     dry: float,
-) -> MeanShift:  # fmt: skip
+) -> MeanShift:
     """Rest, alpha and beta by least squares; alpha is known beforehand to its error, beta to a ripple of 0.03 rad."""
     # of the string's term the next order too, 0.1 % at a = 39 mm and L = 0.5 m
     further = 3 * seen.crank**2 / (16 * string_length**2) if string_length else np.zeros(len(seen))
@@ -167,9 +177,14 @@ def _fitted(
         spread = max(float(np.sqrt(left @ left / max(len(y) - 2, 1))), 1e-6)
     rest, curved, straight = (float(value) for value in found)
     return MeanShift(
-        rest, curved, straight, np.asarray(covariance, dtype=np.float64), covariance[:, 0] * known[0], len(y),
+        rest,
+        curved,
+        straight,
+        np.asarray(covariance, dtype=np.float64),
+        covariance[:, 0] * known[0],
+        len(y),
         string_length,
-    )  # fmt: skip
+    )
 
 
 _MOUNTED = 0.15  # rad: within which a mark is taken as put where it should be
@@ -202,8 +217,9 @@ def counted_gap(contacts: ContactFit, reading: float) -> CountedGap | None:
         f"contact {contacts.runs[i].name}: left out of the gap, which differs there by "
         f"{1e6 * (contacts.values[j] - apart.mean[0]):+.0f} µm ({apart.off(contacts.values[[j]], [[e]])[0]:+.1f} "
         "uncertainties) from that of the other runs: see whether the string slipped on the wheel"
-        for i, j, e, keep in zip(rows, index, own, apart.used, strict=True) if not keep
-    ]  # fmt: skip
+        for i, j, e, keep in zip(rows, index, own, apart.used, strict=True)
+        if not keep
+    ]
     index = [j for j, keep in zip(index, apart.used, strict=True) if keep]
     block = contacts.covariance[np.ix_(index, index)]
     solved = np.linalg.solve(block, np.ones(len(index)))
@@ -264,9 +280,15 @@ class Referred:
         ]
         others = {"gap_at_rest": self.at_rest, "mean_shift": self.shift, "rest_position": self.rest}
         return Finding(
-            "g", self.gap, "multiple shooting over records with contact, referred to the mean position",
-            contacts.samples, tuple(run.name for run in contacts.runs), tuple(notes), others, self.covariance,
-        )  # fmt: skip
+            "g",
+            self.gap,
+            "multiple shooting over records with contact, referred to the mean position",
+            contacts.samples,
+            tuple(run.name for run in contacts.runs),
+            tuple(notes),
+            others,
+            self.covariance,
+        )
 
 
 def places(evidence: Evidence, decay: DecayFit | None, seen: Steady, *, held: float | None = None) -> MeanShift:
@@ -289,9 +311,13 @@ def places(evidence: Evidence, decay: DecayFit | None, seen: Steady, *, held: fl
         error = float(np.hypot(uniform(_HELD if held is None else held), uniform(evidence.resolution / 2)))
     length = evidence.apparatus.get("string_length")
     found = mean_shift(
-        seen, zero, error, string_length=length.value if length else None,
-        string_error=length.uncertainty if length else 0.0, dry=dry,
-    )  # fmt: skip
+        seen,
+        zero,
+        error,
+        string_length=length.value if length else None,
+        string_error=length.uncertainty if length else 0.0,
+        dry=dry,
+    )
     if decay is None or abs(found.rest) < evidence.resolution:
         return found
     said = (
@@ -319,9 +345,13 @@ def mark_of(seen: Steady, decay: DecayFit) -> tuple[float, str]:
 
 
 def refer(
-    evidence: Evidence, decay: DecayFit, contacts: ContactFit, adjusted: Adjusted, seen: Steady,
+    evidence: Evidence,
+    decay: DecayFit,
+    contacts: ContactFit,
+    adjusted: Adjusted,
+    seen: Steady,
     crank_length: float | None,
-) -> Referred:  # fmt: skip
+) -> Referred:
     """The gap at the most frequent screw reading, referred to the mean position at ``crank_length``.
 
     Parameters

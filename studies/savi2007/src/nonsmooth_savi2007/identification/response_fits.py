@@ -95,33 +95,49 @@ def amplitude_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> list[Finding
     data = picture_data(
         some.runs,
         {
-            "run": {"omega": some.omega, "amplitude": some.amplitude, "amplitude_error": some.error,
-                    "direction": some.direction},
+            "run": {
+                "omega": some.omega,
+                "amplitude": some.amplitude,
+                "amplitude_error": some.error,
+                "direction": some.direction,
+            },
             "omega_fine": {"omega_fine": fine, "joint_amplitude": joint, "viscous_amplitude": plain},
         },
-        c_joint=c_both, friction_joint=dry, c_viscous=c_viscous, crank_length=some.crank[0],
-    )  # fmt: skip
+        c_joint=c_both,
+        friction_joint=dry,
+        c_viscous=c_viscous,
+        crank_length=some.crank[0],
+    )
     bias = 100 * (c_viscous.value / (mass.value * float(decay.values[1])) - 1)
     b, f = float(decay.values[1]), float(decay.values[2])
     alone = {a: viscous_bias(natural, b, f, a, seen.omega[seen.crank == a]) for a in np.unique(seen.crank).tolist()}
     expected = [f"{1e3 * a:.1f} mm {100 * off:+.1f} %" for a, off in alone.items()]
     return [
         Finding(
-            "c_viscous_only", c_viscous, "maximum amplitude over frequency, viscous only (Fig. 6)",
-            seen.samples, seen.names,
+            "c_viscous_only",
+            c_viscous,
+            "maximum amplitude over frequency, viscous only (Fig. 6)",
+            seen.samples,
+            seen.names,
             (
                 f"an equivalent, not the damper's c: dry friction of {1e3 * mass.value * decay.values[2]:.1f} mN adds "
                 f"4 F_C/(pi omega A) to it; {bias:+.1f} % against the free decay",
                 f"what friction of this size does to such a fit by itself, at a crank of: {', '.join(expected)}",
             ),
-            data=data, plot="amplitude_fit",
+            data=data,
+            plot="amplitude_fit",
         ),
         Finding(
-            "c_response", c_both,
-            "amplitude over frequency, viscous damping and dry friction in first harmonic", seen.samples, seen.names,
-            others={"friction": dry}, data=data, plot="amplitude_fit",
+            "c_response",
+            c_both,
+            "amplitude over frequency, viscous damping and dry friction in first harmonic",
+            seen.samples,
+            seen.names,
+            others={"friction": dry},
+            data=data,
+            plot="amplitude_fit",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def viscous_bias(omega_0: float, b: float, f: float, crank_length: float, omega: Any = None) -> float:
@@ -157,9 +173,15 @@ def _predicted(omega: FloatArray, crank: FloatArray, natural: float, b: float, f
 
 
 def _fit(
-    omega: FloatArray, crank: FloatArray, amplitude: FloatArray, spread: FloatArray, natural: float,
-    start: tuple[float, float], *, friction: bool,
-) -> dict[str, tuple[float, float]]:  # fmt: skip
+    omega: FloatArray,
+    crank: FloatArray,
+    amplitude: FloatArray,
+    spread: FloatArray,
+    natural: float,
+    start: tuple[float, float],
+    *,
+    friction: bool,
+) -> dict[str, tuple[float, float]]:
     """Values of b and f, each with its standard error; f is 0 where the fit is without friction."""
 
     def residual(p: FloatArray) -> FloatArray:
@@ -234,16 +256,20 @@ def receptance_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> Finding:
     units = ("N s/m", "rad/s", "N", "", "rad")
     rows = [Estimate(float(v), float(e), unit) for v, e, unit in zip(values, errors, units, strict=True)]
     return Finding(
-        "c_frequency_response", rows[0],
+        "c_frequency_response",
+        rows[0],
         "complex frequency response, amplitude and phase against the photogate, with dry friction",
-        seen.samples, seen.names,
+        seen.samples,
+        seen.names,
         (
             f"the drive is {values[3]:.4f} times what the crank's length says, its mark stands at {values[4]:+.4f} rad",
             f"uncertainty by the residuals' own scatter; friction in first harmonic only{doubt}",
         ),
-        dict(zip(("omega_0", "friction", "drive_scale", "mark"), rows[1:], strict=True)), covariance,
-        _complex_data(seen, rows, mass.value), "nyquist",
-    )  # fmt: skip
+        dict(zip(("omega_0", "friction", "drive_scale", "mark"), rows[1:], strict=True)),
+        covariance,
+        _complex_data(seen, rows, mass.value),
+        "nyquist",
+    )
 
 
 def _complex_fit(seen: Steady, decay: DecayFit) -> tuple[FloatArray, FloatArray]:
@@ -283,14 +309,19 @@ def _complex_data(seen: Steady, rows: list[Estimate], mass: float) -> Any:
         seen.runs,
         {
             "run": {
-                "omega": seen.omega, "crank": seen.crank, "real": ratio.real, "imaginary": ratio.imag,
+                "omega": seen.omega,
+                "crank": seen.crank,
+                "real": ratio.real,
+                "imaginary": ratio.imag,
                 "error": seen.error / seen.crank,
             },
             ("crank_length", "omega_fine"): {"fitted_real": curves.real, "fitted_imaginary": curves.imag},
-            "omega_fine": {"omega_fine": fine}, "crank_length": {"crank_length": lengths},
+            "omega_fine": {"omega_fine": fine},
+            "crank_length": {"crank_length": lengths},
         },
-        omega_0=rows[1], c=rows[0],
-    )  # fmt: skip
+        omega_0=rows[1],
+        c=rows[0],
+    )
 
 
 def _enough(seen: Steady, least: int) -> None:

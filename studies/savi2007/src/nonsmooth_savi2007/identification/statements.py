@@ -18,9 +18,13 @@ from nonsmooth_savi2007.identification.referral import Referred
 
 #: What must have been recorded to know a parameter.
 _RESTS_ON = {
-    "m": "the notebook's mass", "k": "impulse (taps) or springs (pulls)", "c": "impulse (taps)",
-    "k_s": "support (pushes), drop or contact", "c_s": "drop or contact", "g": "contact, impulse, and support or drop",
-}  # fmt: skip
+    "m": "the notebook's mass",
+    "k": "impulse (taps) or springs (pulls)",
+    "c": "impulse (taps)",
+    "k_s": "support (pushes), drop or contact",
+    "c_s": "drop or contact",
+    "g": "contact, impulse, and support or drop",
+}
 _NEEDED = ("springs", "support", "impulse", "drop", "response", "contact")
 
 
@@ -70,14 +74,15 @@ def identifiability(adjusted: Adjusted, contacts: ContactFit | None, single: Fin
     moved = "omega_0" in adjusted.labels
     said = {
         "m": "weighed; no recording tells it but through the force sensor, whose gain is known to a percent",
-        "k": "from omega_0 and m; the force sensor's slope tells its gain" if moved else
-        "from the force sensor, whose gain is known to a percent only: taps of the car would tell it better",
+        "k": "from omega_0 and m; the force sensor's slope tells its gain"
+        if moved
+        else "from the force sensor, whose gain is known to a percent only: taps of the car would tell it better",
         "c": "from the shape of the free decay, together with the dry friction: the rig's own viscous part",
         "k_s": "from the frequency of the test mass and of contacts; the force sensor's slope but for its gain",
         "c_s": "from the decay of the drop; a contact lasts 8 samples at 100 Hz and c_s/k_s is 0.5 ms, so no sample "
         "shows it: a single contact tells it by the speed that it takes",
         "g": "from where contacts begin, referred to the mean position under the drive",
-    }  # fmt: skip
+    }
     if contacts is not None:
         relative = float(np.sqrt(contacts.covariance[4, 4]) / abs(contacts.values[4]))
         said["c_s"] += (
@@ -142,9 +147,15 @@ _BESIDE = ("friction", "gain")
 
 
 def joined(
-    adjusted: Adjusted, gap: Referred | None, *, findings: Sequence[Finding], identifiability: Mapping[str, str],
-    notes: Sequence[str], synthetic: bool, anomalies: Sequence[str] = (),
-) -> ParameterSet:  # fmt: skip
+    adjusted: Adjusted,
+    gap: Referred | None,
+    *,
+    findings: Sequence[Finding],
+    identifiability: Mapping[str, str],
+    notes: Sequence[str],
+    synthetic: bool,
+    anomalies: Sequence[str] = (),
+) -> ParameterSet:
     """The model's parameters, then what is beside them: rows over the unknowns of the adjustment, and the gap as it is.
 
     Parameters
@@ -179,6 +190,12 @@ def joined(
         estimates["g"] = gap.gap
         extra |= {"gap_at_rest": gap.at_rest, "mean_shift": gap.shift, "rest_position": gap.rest}
     return ParameterSet(
-        estimates, covariance, extra=extra, findings=findings, identifiability=identifiability, notes=notes,
-        anomalies=anomalies, synthetic=synthetic,
+        estimates,
+        covariance,
+        extra=extra,
+        findings=findings,
+        identifiability=identifiability,
+        notes=notes,
+        anomalies=anomalies,
+        synthetic=synthetic,
     )

@@ -110,10 +110,21 @@ def steady(runs: Sequence[Run]) -> Steady:
         response = amplitude * np.exp(1j * (omega * mark - float(fitted.phases[0])))
         order = np.arange(1, HARMONICS + 1)
         shape = np.cos(np.multiply.outer(turn, order) - fitted.phases) @ fitted.amplitudes
-        rows.append((
-            omega, omega_error, float(run.settings["crank_length"]), amplitude, float(fitted.amplitude_errors[0]),
-            response, fitted.mean, fitted.mean_error, fitted.mean + float(shape.max()), fitted.residual, _lean(fitted),
-        ))  # fmt: skip
+        rows.append(
+            (
+                omega,
+                omega_error,
+                float(run.settings["crank_length"]),
+                amplitude,
+                float(fitted.amplitude_errors[0]),
+                response,
+                fitted.mean,
+                fitted.mean_error,
+                fitted.mean + float(shape.max()),
+                fitted.residual,
+                _lean(fitted),
+            )
+        )
     columns = [np.array(column) for column in zip(*rows, strict=True)] or [np.zeros(0)] * (len(fields(Steady)) - 1)
     return Steady(tuple(runs), *columns)
 

@@ -108,11 +108,16 @@ def stiffness(
     if mass:
         notes.append(f"the inertia of {mass:.4g} kg under the hand is put back")
     return Finding(
-        name, Estimate(slope, float(np.hypot(error, uniform(half))), "N/m", half_width=half),
+        name,
+        Estimate(slope, float(np.hypot(error, uniform(half))), "N/m", half_width=half),
         "force against displacement, errors in both axes by effective variance, loop and inertia as terms (Fig. 4)",
-        len(force), tuple(run.name for run in runs), tuple(notes), others,
-        data=_data(runs, rows, law.values, law.covariance, width, friction), plot="force_displacement",
-    )  # fmt: skip
+        len(force),
+        tuple(run.name for run in runs),
+        tuple(notes),
+        others,
+        data=_data(runs, rows, law.values, law.covariance, width, friction),
+        plot="force_displacement",
+    )
 
 
 def _columns(run: Run, resolution: float, mass: float, friction: bool) -> tuple[FloatArray, FloatArray]:
@@ -156,8 +161,9 @@ def _data(
                 "slope": np.full(len(lines), values[0]),
                 "slope_error": np.full(len(lines), np.sqrt(covariance[0, 0])),
                 "intercept": np.array([values[width + i] + s * loop for i, s in lines]),
-                "line_run": np.array([i for i, _ in lines]), "line_pull": np.array([s for _, s in lines]),
+                "line_run": np.array([i for i, _ in lines]),
+                "line_pull": np.array([s for _, s in lines]),
             },
         },
         **({"friction_force": Estimate(loop, float(np.sqrt(covariance[2, 2])), "N")} if friction else {}),
-    )  # fmt: skip
+    )

@@ -27,7 +27,7 @@ from nonsmooth_savi2007.report.pages import (
     Tally,
     to_html,
     to_markdown,
-)  # fmt: skip
+)
 from nonsmooth_savi2007.report.special import SpecialPoint, ratios, special_table, table_of_points
 
 REPORTS = ("claims.json", "report.md", "report.html")
@@ -39,9 +39,11 @@ _PAPER = (
 )
 #: The long table in parts, by the first letter of a statement's id.
 _PARTS = {
-    "M": "The model (Section 2)", "RP": "Apparatus and parameters (Section 3)", "F": "Results (Section 4)",
+    "M": "The model (Section 2)",
+    "RP": "Apparatus and parameters (Section 3)",
+    "F": "Results (Section 4)",
     "C": "Conclusions (Section 5)",
-}  # fmt: skip
+}
 _MODEL, _RIG = "model", "virtual rig (synthetic)"
 
 
@@ -112,9 +114,7 @@ def _in_short(rows: Sequence[Row]) -> tuple[tuple[str, str], ...]:
     if any(model[verdict] for verdict in _DECIDING):
         text = f"{_spread(model)}. Its parameters are those of Table 1, none tuned."
         pairs = [(row.exact_beside, row.smoothed_beside) for row in rows]
-        both = [
-            judge(a.printed, a, a.resolution) is judge(b.printed, b, b.resolution) for a, b in pairs if a and b
-        ]  # fmt: skip
+        both = [judge(a.printed, a, a.resolution) is judge(b.printed, b, b.resolution) for a, b in pairs if a and b]
         if both:
             text += f" The paper's smoothed switch: the same verdict on {sum(both)} of {len(both)} printed numbers."
         lines.append(("The model", text))
@@ -190,14 +190,28 @@ def _differences(rows: Sequence[Row]) -> list[Block]:
 def _table(rows: Sequence[Row]) -> Table:
     """The long table: a row per statement, its reasons below."""
     header = (
-        "claim", "the paper says", "exact flow", "smoothed switch", "difference", "verdict, model",
-        "virtual rig (synthetic)", "verdict, rig",
-    )  # fmt: skip
+        "claim",
+        "the paper says",
+        "exact flow",
+        "smoothed switch",
+        "difference",
+        "verdict, model",
+        "virtual rig (synthetic)",
+        "verdict, rig",
+    )
     cells = tuple(
-        (row.id, f"{row.says} ({row.place})", row.exact, row.smoothed, row.difference, str(row.verdict), row.rig,
-         str(row.rig_verdict))
+        (
+            row.id,
+            f"{row.says} ({row.place})",
+            row.exact,
+            row.smoothed,
+            row.difference,
+            str(row.verdict),
+            row.rig,
+            str(row.rig_verdict),
+        )
         for row in rows
-    )  # fmt: skip
+    )
     return Table(header, cells, tuple(row.why for row in rows))
 
 
@@ -208,14 +222,28 @@ def _parameters(data: Data) -> Table:
         off = 100 * (number.value / truth - 1)
         inside = "in it" if number.low <= truth <= number.high else "outside"
         interval = f"{number.low:.6g} ... {number.high:.6g}"
-        rows.append((
-            name, NAMES[name][0], printed or "not printed", f"{number.value:.6g} ± {number.uncertainty:.2g}", interval,
-            f"{truth:.6g}", inside, f"{off:+.3f} %",
-        ))  # fmt: skip
+        rows.append(
+            (
+                name,
+                NAMES[name][0],
+                printed or "not printed",
+                f"{number.value:.6g} ± {number.uncertainty:.2g}",
+                interval,
+                f"{truth:.6g}",
+                inside,
+                f"{off:+.3f} %",
+            )
+        )
     header = (
-        "parameter", "unit", "paper", "identified ± standard uncertainty (synthetic)", "95 % interval",
-        "truth of the rig", "truth is", "identified from truth",
-    )  # fmt: skip
+        "parameter",
+        "unit",
+        "paper",
+        "identified ± standard uncertainty (synthetic)",
+        "95 % interval",
+        "truth of the rig",
+        "truth is",
+        "identified from truth",
+    )
     return Table(header, tuple(rows))
 
 

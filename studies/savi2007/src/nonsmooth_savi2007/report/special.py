@@ -65,10 +65,16 @@ def _points(figure: str, branch: xr.Dataset) -> list[SpecialPoint]:
                 closed = _closed(branch, value)
         found.append(
             SpecialPoint(
-                figure, int(branch["period_number"]), kind, parameter, value,
-                _largest(row["floquet_multipliers"].values), contact, closed,
+                figure,
+                int(branch["period_number"]),
+                kind,
+                parameter,
+                value,
+                _largest(row["floquet_multipliers"].values),
+                contact,
+                closed,
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -86,20 +92,31 @@ def _closed(branch: xr.Dataset, value: float) -> float:
 def special_table(points: Sequence[SpecialPoint]) -> Table:
     """The points as a table of the report."""
     header = (
-        "figure", "period of the orbit", "point", "at", "largest multiplier", "with the contact, in the limit",
-        "closed form", "distance",
-    )  # fmt: skip
+        "figure",
+        "period of the orbit",
+        "point",
+        "at",
+        "largest multiplier",
+        "with the contact, in the limit",
+        "closed form",
+        "distance",
+    )
     rows, last = [], ("", 0)
     for one in points:
         unit, decimals = _UNITS[one.parameter]
         here = (one.figure, one.period)
-        rows.append((
-            f"Fig. {int(one.figure[3:])}" if one.figure != last[0] else "", str(one.period) if here != last else "",
-            _NAMES.get(one.kind, one.kind), f"{one.parameter} = {one.value:.{decimals}f} {unit}",
-            _number(one.multiplier), "" if one.contact is None else _number(one.contact),
-            "" if one.closed is None else f"{one.closed:.{decimals}f} {unit}",
-            "" if one.closed is None else f"{abs(one.value - one.closed):.0e} {unit}",
-        ))  # fmt: skip
+        rows.append(
+            (
+                f"Fig. {int(one.figure[3:])}" if one.figure != last[0] else "",
+                str(one.period) if here != last else "",
+                _NAMES.get(one.kind, one.kind),
+                f"{one.parameter} = {one.value:.{decimals}f} {unit}",
+                _number(one.multiplier),
+                "" if one.contact is None else _number(one.contact),
+                "" if one.closed is None else f"{one.closed:.{decimals}f} {unit}",
+                "" if one.closed is None else f"{abs(one.value - one.closed):.0e} {unit}",
+            )
+        )
         last = here
     return Table(header, tuple(rows))
 

@@ -19,9 +19,11 @@ GRAVITY = 9.81  # m/s^2
 
 
 def impulse(
-    rig: VirtualRig, *, velocities: tuple[float, ...] = (0.5, -0.5, 0.35, -0.35, 0.2, -0.2, 0.1, -0.1),
+    rig: VirtualRig,
+    *,
+    velocities: tuple[float, ...] = (0.5, -0.5, 0.35, -0.35, 0.2, -0.2, 0.1, -0.1),
     duration: float = 20.0,
-) -> Recording:  # fmt: skip
+) -> Recording:
     """Tap the resting car, no support, and let it stop: about these velocities (m/s), one run each: Fig. 5."""
     system = rig.system().with_parameters(rig.parameters(crank_length=0.0, g=NO_SUPPORT))
     runs = []
@@ -58,9 +60,15 @@ def drop(rig: VirtualRig, *, n: int = 6, duration: float = 20.0) -> Recording:
 
 
 def _decay(
-    rig: VirtualRig, rng: np.random.Generator, name: str, system: System, start: dict[str, float], duration: float, *,
+    rig: VirtualRig,
+    rng: np.random.Generator,
+    name: str,
+    system: System,
+    start: dict[str, float],
+    duration: float,
+    *,
     slips: bool = False,
-) -> tuple[str, dict[str, Any], dict[str, Any]]:  # fmt: skip
+) -> tuple[str, dict[str, Any], dict[str, Any]]:
     """A run that begins to record a little before the motion begins."""
     begin = float(rng.uniform(0.4, 1.0))
     time, at = sensors.instants(rig, rng, begin + duration)

@@ -56,9 +56,14 @@ def records(
 
 
 def _steady(
-    rig: VirtualRig, rng: np.random.Generator, name: str, setting: Setting, settle: float, last: xr.Dataset | None,
+    rig: VirtualRig,
+    rng: np.random.Generator,
+    name: str,
+    setting: Setting,
+    settle: float,
+    last: xr.Dataset | None,
     wander: Wander,
-) -> tuple[Mapping[str, Any], xr.Dataset]:  # fmt: skip
+) -> tuple[Mapping[str, Any], xr.Dataset]:
     omega = frequency(rig, setting.voltage)
     gap = NO_SUPPORT if setting.gap is None else rig.true_gap(setting.gap)
     set_to = rig.parameters(omega=omega, crank_length=setting.crank_length, g=gap) | named(wander)
@@ -71,17 +76,27 @@ def _steady(
     begin = (before + phase) * period
     start = _at_rest(gap, setting.release or 0.0) if last is None else last
     (x, v), result = simulated(
-        system, name, instants=begin + at, end=_end(omega, before, recorded), start=start, side=rig.truth["motor_side"],
+        system,
+        name,
+        instants=begin + at,
+        end=_end(omega, before, recorded),
+        start=start,
+        side=rig.truth["motor_side"],
         **_length(system, before, recorded, period),
-    )  # fmt: skip
+    )
     crossed = passages(rig, omega, begin, begin + setting.duration, wander) - begin
     return rig.channels(rng, name, time, x, v, crossed=crossed), result
 
 
 def rise(
-    rig: VirtualRig, *, voltage: float, crank_length: tuple[float, float], gap: float, duration: float,
+    rig: VirtualRig,
+    *,
+    voltage: float,
+    crank_length: tuple[float, float],
+    gap: float,
+    duration: float,
     settle: float = 30.0,
-) -> Recording:  # fmt: skip
+) -> Recording:
     """The forcing rises slowly: the crank grows evenly from one length to the other (m) in ``duration`` seconds."""
     rng, name = rig.generator("rise", 0), "Run #1"
     omega = frequency(rig, voltage)
@@ -95,19 +110,33 @@ def rise(
     start: Any = {**_at_rest(rig.true_gap(gap)), "a": first}
     side = rig.truth["motor_side"]
     _, settled = simulated(
-        system, name, instants=np.array([0.0]), end=_end(omega, 0, whole), start=start, side=side,
+        system,
+        name,
+        instants=np.array([0.0]),
+        end=_end(omega, 0, whole),
+        start=start,
+        side=side,
         **_length(system, 0, whole, period),
-    )  # fmt: skip
+    )
     time, at = sensors.instants(rig, rng, duration)
     x, v = simulated(
-        system.with_parameters(crank_rate=rate), name, instants=at, duration=duration + 1 / sensors.RATE, start=settled,
+        system.with_parameters(crank_rate=rate),
+        name,
+        instants=at,
+        duration=duration + 1 / sensors.RATE,
+        start=settled,
         side=side,
-    )[0]  # fmt: skip
+    )[0]
     channels = rig.channels(rng, name, time, x, v, crossed=passages(rig, omega, 0.0, duration, wander))
     note = f"crank grows evenly, {rate:.3e} m/s, {rate * period:.3e} m per turn"
     stated = {
-        "crank_length": first, "crank_length_end": last, "voltage": voltage, "gap": gap, "figure": 11, "note": note,
-    }  # fmt: skip
+        "crank_length": first,
+        "crank_length_end": last,
+        "voltage": voltage,
+        "gap": gap,
+        "figure": 11,
+        "note": note,
+    }
     return rig.recording("rise", [(name, channels, stated)])
 
 

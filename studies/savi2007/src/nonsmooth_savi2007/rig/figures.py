@@ -39,10 +39,16 @@ _STEPS = {9: (3.0, 6.6), 10: (2.4, 7.4)}  # rad/s
 #: What each figure needs. Those with the support mounted also need a few runs without it, in ``response``, and taps:
 #: where the car swings about, from which the gap is counted, and where it rests, from which the screw counts.
 FIGURES: dict[int, tuple[str, ...]] = {
-    4: ("springs", "support"), 5: ("impulse",), 6: ("response",), 7: ("drop",), 8: ("voltage", "crank"),
-    9: ("response", "impulse"), 10: ("response", "impulse"), 11: ("rise", "response", "impulse"),
+    4: ("springs", "support"),
+    5: ("impulse",),
+    6: ("response",),
+    7: ("drop",),
+    8: ("voltage", "crank"),
+    9: ("response", "impulse"),
+    10: ("response", "impulse"),
+    11: ("rise", "response", "impulse"),
     **dict.fromkeys(SECTIONS, ("section", "response", "impulse")),
-}  # fmt: skip
+}
 #: Velocities (m/s) of the taps that show where the car rests.
 TAPS = (0.3, -0.3, 0.2)
 
@@ -59,9 +65,14 @@ def screw_for(rig: VirtualRig, gap: float, crank_length: float, *, referred: boo
 
 
 def section(
-    rig: VirtualRig, *, figure: int = 14, periods: int | None = None, referred: bool = True,
-    releases: Sequence[float] | None = None, settle: float = 60.0,
-) -> Recording:  # fmt: skip
+    rig: VirtualRig,
+    *,
+    figure: int = 14,
+    periods: int | None = None,
+    referred: bool = True,
+    releases: Sequence[float] | None = None,
+    settle: float = 60.0,
+) -> Recording:
     """Long steady records at the settings of Figs. 12 to 18, ``periods`` turns of the crank each.
 
     First all settings from rest, then all again for each of ``releases`` (m), the places where the car is let go
@@ -85,9 +96,13 @@ def section(
 
 
 def rise(
-    rig: VirtualRig, *, crank_length: tuple[float, float] | None = None, voltage: float | None = None,
-    gap: float | None = None, duration: float = 900.0,
-) -> Recording:  # fmt: skip
+    rig: VirtualRig,
+    *,
+    crank_length: tuple[float, float] | None = None,
+    voltage: float | None = None,
+    gap: float | None = None,
+    duration: float = 900.0,
+) -> Recording:
     """The slow rise of the forcing of Fig. 11, in ``duration`` seconds; the gap is the screw's reading."""
     omega, low, high, at_rest = _RISE
     lengths = (crank_for(rig, low), crank_for(rig, high)) if crank_length is None else crank_length
@@ -131,8 +146,12 @@ def figure(rig: VirtualRig, number: int, **options: Any) -> dict[str, Recording]
         length = crank_for(rig, rho)
         steps: Sequence[float] = np.arange(*_STEPS[number], 0.05).tolist()
         options = {
-            "crank_lengths": (length,), "gap": screw_for(rig, gap, length), "duration": 20.0,
-            "voltages": [voltage_for(rig, omega) for omega in steps], "after": without_support(rig, number), **options,
-        }  # fmt: skip
+            "crank_lengths": (length,),
+            "gap": screw_for(rig, gap, length),
+            "duration": 20.0,
+            "voltages": [voltage_for(rig, omega) for omega in steps],
+            "after": without_support(rig, number),
+            **options,
+        }
         return {"response": rig.record("response", **options), "impulse": rig.impulse(velocities=TAPS)}
     return {procedure: rig.record(procedure, **options) for procedure in FIGURES[number]}

@@ -32,9 +32,13 @@ def springs(rig: VirtualRig, *, reach: float = 0.12, n: int = 6) -> Recording:
     if reach * 1.01 > limit:
         raise ValueError(f"reach = {reach!r} m would slacken a string; stay below {limit:.3f} m")
     return _by_hand(
-        rig, "springs", (40.0, 60.0), [(-1.0 if i % 2 else 1.0) * reach for i in range(n)], 0.9,
+        rig,
+        "springs",
+        (40.0, 60.0),
+        [(-1.0 if i % 2 else 1.0) * reach for i in range(n)],
+        0.9,
         lambda x, v, acceleration: p.m * acceleration + 2 * p.k * x + friction(v, p),
-    )  # fmt: skip
+    )
 
 
 def support(rig: VirtualRig, *, force: float = 35.0, n: int = 6) -> Recording:
@@ -44,9 +48,13 @@ def support(rig: VirtualRig, *, force: float = 35.0, n: int = 6) -> Recording:
 
 
 def _by_hand(
-    rig: VirtualRig, procedure: str, lasting: tuple[float, float], reaches: Sequence[float], least: float,
+    rig: VirtualRig,
+    procedure: str,
+    lasting: tuple[float, float],
+    reaches: Sequence[float],
+    least: float,
     force: Callable[[FloatArray, FloatArray, FloatArray], FloatArray],
-) -> Recording:  # fmt: skip
+) -> Recording:
     """One run to about each of ``reaches``, from a share ``least`` of it on; ``force`` on position and its rates."""
     runs: list[Run] = []
     for i, reach in enumerate(reaches):

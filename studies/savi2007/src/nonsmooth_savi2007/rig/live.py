@@ -43,10 +43,14 @@ class LiveRig(SimulatedRig):
         at_rest = rig.true_gap(screw)
         super().__init__(
             rig.system().with_parameters(rig.parameters(omega=omega, crank_length=crank_length, g=at_rest)),
-            amplitude="crank_length", rate=RATE, resolution=COUNT if rig.quantisation else 0.0,
-            jitter=rig.truth["clock_jitter"], seed=rig.seed + 1000 * run, start={"x": min(0.0, at_rest)},
+            amplitude="crank_length",
+            rate=RATE,
+            resolution=COUNT if rig.quantisation else 0.0,
+            jitter=rig.truth["clock_jitter"],
+            seed=rig.seed + 1000 * run,
+            start={"x": min(0.0, at_rest)},
             method=METHOD["method"],
-        )  # fmt: skip
+        )
         self.units["force"] = "N"
 
     def set_drive(self, frequency: float, amplitude: float) -> tuple[float, float]:

@@ -87,9 +87,12 @@ def voltage(
 
 
 def crank(
-    rig: VirtualRig, *, lengths: Sequence[float] = (0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06),
-    voltage: float = 4.0, duration: float = 20.0,
-) -> Recording:  # fmt: skip
+    rig: VirtualRig,
+    *,
+    lengths: Sequence[float] = (0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.06),
+    voltage: float = 4.0,
+    duration: float = 20.0,
+) -> Recording:
     """The car held at x = 0 by the force sensor, at one crank length (m) per run, feels k d(phi): Fig. 8b."""
     runs = []
     omega = frequency(rig, voltage)

@@ -63,9 +63,10 @@ def truth_path(folder: Path, truth: str | os.PathLike[str] | None = None) -> Pat
 
 
 _ROTARY = {
-    "Name": "Rotary Motion Sensor", "DistanceForFullRotation": str(sensors.DISTANCE_PER_TURN),
+    "Name": "Rotary Motion Sensor",
+    "DistanceForFullRotation": str(sensors.DISTANCE_PER_TURN),
     "SamplePeriod": str(1 / sensors.RATE),
-}  # fmt: skip
+}
 
 
 def _apparatus(rig: VirtualRig) -> list[str]:

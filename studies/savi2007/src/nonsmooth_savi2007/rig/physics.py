@@ -187,10 +187,20 @@ def car(*, relaxing: bool = True, rising: bool = False, wandering: bool = False,
     else:
         transitions.append(Transition("contact", "free", when="separation > 0"))
     parameters = {
-        "m": (0.838, "kg"), "k": (8.47, "N/m"), "k_s": (1210.0, "N/m"), "c": (0.87, "N s/m"), "c_s": (0.60, "N s/m"),
-        "g": (0.0018, "m"), "friction": (0.01, "N"), "creep_velocity": (1e-3, "m/s"), "pretension": (2.0, "N"),
-        "curvature": (1.0, "1/m"), "omega": (4.5, "rad/s"), "ripple": (0.01, "rad"), "ripple_phase": (0.0, "rad"),
-    }  # fmt: skip
+        "m": (0.838, "kg"),
+        "k": (8.47, "N/m"),
+        "k_s": (1210.0, "N/m"),
+        "c": (0.87, "N s/m"),
+        "c_s": (0.60, "N s/m"),
+        "g": (0.0018, "m"),
+        "friction": (0.01, "N"),
+        "creep_velocity": (1e-3, "m/s"),
+        "pretension": (2.0, "N"),
+        "curvature": (1.0, "1/m"),
+        "omega": (4.5, "rad/s"),
+        "ripple": (0.01, "rad"),
+        "ripple_phase": (0.0, "rad"),
+    }
     parameters |= {"crank_rate": (0.0, "m/s")} if rising else {"crank_length": (0.0165, "m")}
     for j in range(1, WANDERING + 1) if wandering else ():
         parameters |= {f"wander_{j}": (0.0, "rad"), f"wander_phase_{j}": (0.0, "rad")}

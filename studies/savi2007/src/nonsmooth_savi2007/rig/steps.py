@@ -22,19 +22,49 @@ if TYPE_CHECKING:
 
 #: Relative to the natural frequency, dense where the curve bends.
 RELATIVE = (
-    0.55, 0.7, 0.8, 0.86, 0.9, 0.93, 0.95, 0.97, 0.985, 1.0, 1.015, 1.03, 1.05, 1.07, 1.1, 1.14, 1.2, 1.3, 1.45, 1.7,
-)  # fmt: skip
+    0.55,
+    0.7,
+    0.8,
+    0.86,
+    0.9,
+    0.93,
+    0.95,
+    0.97,
+    0.985,
+    1.0,
+    1.015,
+    1.03,
+    1.05,
+    1.07,
+    1.1,
+    1.14,
+    1.2,
+    1.3,
+    1.45,
+    1.7,
+)
 #: Regimes with contact: frequency (rad/s) and crank length (m), periodic and chaotic ones among them.
 REGIMES = (
-    (11.15, 0.039), (9.55, 0.027), (9.88, 0.027), (6.0, 0.0165), (4.6, 0.0165), (3.69, 0.034), (10.3, 0.039),
+    (11.15, 0.039),
+    (9.55, 0.027),
+    (9.88, 0.027),
+    (6.0, 0.0165),
+    (4.6, 0.0165),
+    (3.69, 0.034),
+    (10.3, 0.039),
     (8.0, 0.030),
-)  # fmt: skip
+)
 
 
 def response(
-    rig: VirtualRig, *, crank_lengths: Sequence[float] = (0.0165, 0.035), voltages: Sequence[float] | None = None,
-    gap: float | None = None, duration: float = 12.0, after: Sequence[Setting] = (),
-) -> Recording:  # fmt: skip
+    rig: VirtualRig,
+    *,
+    crank_lengths: Sequence[float] = (0.0165, 0.035),
+    voltages: Sequence[float] | None = None,
+    gap: float | None = None,
+    duration: float = 12.0,
+    after: Sequence[Setting] = (),
+) -> Recording:
     """Frequency steps up and then down at each crank length (m), one run per step, the motion carried along: Fig. 6.
 
     With a ``gap`` (m) Figs. 9 and 10. ``after``: runs that follow, for figures with the support mounted those without
@@ -52,9 +82,14 @@ def response(
 
 
 def grazing(
-    rig: VirtualRig, *, crank_length: float = 0.010, gap: float = NOMINAL_GAP, half_width: float = 0.5,
-    step: float = 0.05, duration: float = 15.0,
-) -> Recording:  # fmt: skip
+    rig: VirtualRig,
+    *,
+    crank_length: float = 0.010,
+    gap: float = NOMINAL_GAP,
+    half_width: float = 0.5,
+    step: float = 0.05,
+    duration: float = 15.0,
+) -> Recording:
     """Frequency steps down through the first contact, ``step`` rad/s apart, the motion carried along."""
     rng = rig.generator("grazing", 9999)
     centre = graze_frequency(rig, crank_length, gap) + float(rng.uniform(-2, 2)) * step
@@ -82,9 +117,12 @@ def graze_frequency(rig: VirtualRig, crank_length: float, gap: float) -> float:
 
 
 def contact(
-    rig: VirtualRig, *, regimes: Sequence[tuple[float, float]] = REGIMES, gap: float = NOMINAL_GAP,
+    rig: VirtualRig,
+    *,
+    regimes: Sequence[tuple[float, float]] = REGIMES,
+    gap: float = NOMINAL_GAP,
     duration: float = 20.0,
-) -> Recording:  # fmt: skip
+) -> Recording:
     """Records with contact at (frequency in rad/s, crank length in m), each begun at rest."""
     settings = [Setting(voltage_for(rig, omega), length, gap, duration) for omega, length in regimes]
     for setting in settings:

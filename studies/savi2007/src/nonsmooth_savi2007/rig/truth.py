@@ -19,34 +19,53 @@ NOMINAL_GAP = 0.0018
 
 #: Of all that a truth holds: the paper's value (Table 1 and 3.1, typical ones where it prints none), unit, and range.
 _TABLE: Mapping[str, tuple[float, str, str]] = {
-    "m": (0.838, "kg", "positive"), "k": (8.47, "N/m", "positive"), "k_s": (1210.0, "N/m", "positive"),
-    "c": (0.87, "N s/m", "zero or more"), "c_s": (0.60, "N s/m", "positive"), "g": (NOMINAL_GAP, "m", "finite"),
-    "friction": (0.005, "N", "zero or more"), "creep_velocity": (1e-3, "m/s", "positive"),
-    "pretension": (2.0, "N", "positive"), "string_length": (1.0, "m", "positive"),
-    "test_mass": (1.33, "kg", "positive"), "motor_slope": (1.25, "rad/(s V)", "positive"),
-    "motor_offset": (1.0, "V", "finite"), "ripple": (0.01, "rad", "zero or more"),
-    "ripple_phase": (0.7, "rad", "finite"), "force_gain": (1.0, "", "zero or more"),
-    "force_noise": (0.02, "N", "zero or more"), "clock_jitter": (5e-5, "s", "zero or more"),
-    "encoder_zero": (0.0, "counts", "finite"), "sensor_zero": (0.0, "m", "finite"), "motor_side": (1.0, "", "1 or -1"),
-    "motor_wander": (0.0, "", "finite"), "angle_sign": (1.0, "", "1 or -1"), "force_sign": (1.0, "", "1 or -1"),
-    "turn_sign": (1.0, "", "1 or -1"), "slipped_tap": (0.0, "", "zero or more"),
-}  # fmt: skip
+    "m": (0.838, "kg", "positive"),
+    "k": (8.47, "N/m", "positive"),
+    "k_s": (1210.0, "N/m", "positive"),
+    "c": (0.87, "N s/m", "zero or more"),
+    "c_s": (0.60, "N s/m", "positive"),
+    "g": (NOMINAL_GAP, "m", "finite"),
+    "friction": (0.005, "N", "zero or more"),
+    "creep_velocity": (1e-3, "m/s", "positive"),
+    "pretension": (2.0, "N", "positive"),
+    "string_length": (1.0, "m", "positive"),
+    "test_mass": (1.33, "kg", "positive"),
+    "motor_slope": (1.25, "rad/(s V)", "positive"),
+    "motor_offset": (1.0, "V", "finite"),
+    "ripple": (0.01, "rad", "zero or more"),
+    "ripple_phase": (0.7, "rad", "finite"),
+    "force_gain": (1.0, "", "zero or more"),
+    "force_noise": (0.02, "N", "zero or more"),
+    "clock_jitter": (5e-5, "s", "zero or more"),
+    "encoder_zero": (0.0, "counts", "finite"),
+    "sensor_zero": (0.0, "m", "finite"),
+    "motor_side": (1.0, "", "1 or -1"),
+    "motor_wander": (0.0, "", "finite"),
+    "angle_sign": (1.0, "", "1 or -1"),
+    "force_sign": (1.0, "", "1 or -1"),
+    "turn_sign": (1.0, "", "1 or -1"),
+    "slipped_tap": (0.0, "", "zero or more"),
+}
 _ALLOWED: Mapping[str, Callable[[float], bool]] = {
-    "positive": lambda value: value > 0, "zero or more": lambda value: value >= 0,
-    "1 or -1": lambda value: abs(value) == 1, "finite": lambda value: True,
-}  # fmt: skip
+    "positive": lambda value: value > 0,
+    "zero or more": lambda value: value >= 0,
+    "1 or -1": lambda value: abs(value) == 1,
+    "finite": lambda value: True,
+}
 UNITS: Mapping[str, str] = MappingProxyType({name: unit for name, (_, unit, _) in _TABLE.items()})
 #: Each feature of the rig that can be switched off, and what the truth is without it.
-FEATURES: Mapping[str, Mapping[str, float]] = MappingProxyType({
-    "ripple": {"ripple": 0.0},
-    "string": {"string_length": math.inf},
-    "friction": {"friction": 0.0},
-    "support_relaxation": {},
-    "jitter": {"clock_jitter": 0.0},
-    "noise": {"force_noise": 0.0},
-    "quantisation": {"encoder_zero": 0.0},
-    "gain_error": {"force_gain": 1.0},
-})  # fmt: skip
+FEATURES: Mapping[str, Mapping[str, float]] = MappingProxyType(
+    {
+        "ripple": {"ripple": 0.0},
+        "string": {"string_length": math.inf},
+        "friction": {"friction": 0.0},
+        "support_relaxation": {},
+        "jitter": {"clock_jitter": 0.0},
+        "noise": {"force_noise": 0.0},
+        "quantisation": {"encoder_zero": 0.0},
+        "gain_error": {"force_gain": 1.0},
+    }
+)
 
 #: Creep velocity (m/s) of a friction that holds: 2 µm in a record of 20 s, a thirtieth of a count.
 HOLDING = 1e-7
@@ -89,9 +108,11 @@ def awkward(seed: int) -> dict[str, float]:
     truth = drawn(seed)
     held = truth["friction"] / (2 * truth["k"])
     found = {
-        "sensor_zero": rng.uniform(-0.9, 0.9) * held, "motor_side": rng.choice([-1.0, 1.0]), "motor_wander": 1e-3,
+        "sensor_zero": rng.uniform(-0.9, 0.9) * held,
+        "motor_side": rng.choice([-1.0, 1.0]),
+        "motor_wander": 1e-3,
         "slipped_tap": rng.integers(1, 7),
-    } | {name: rng.choice([-1.0, 1.0]) for name in ("angle_sign", "force_sign", "turn_sign")}  # fmt: skip
+    } | {name: rng.choice([-1.0, 1.0]) for name in ("angle_sign", "force_sign", "turn_sign")}
     return {name: float(value) for name, value in found.items()}
 
 

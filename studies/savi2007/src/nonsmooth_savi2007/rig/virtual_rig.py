@@ -25,8 +25,16 @@ if TYPE_CHECKING:
 
 #: The procedures of Section 3.1 and those for the gap: what identification needs.
 IDENTIFICATION = (
-    "springs", "support", "impulse", "response", "drop", "voltage", "crank", "grazing", "contact",
-)  # fmt: skip
+    "springs",
+    "support",
+    "impulse",
+    "response",
+    "drop",
+    "voltage",
+    "crank",
+    "grazing",
+    "contact",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +138,18 @@ class VirtualRig:
     def parameters(self, *, rising: bool = False, **settings: float) -> dict[str, float]:
         """Values of the system's parameters: the truth, and the settings of a run (omega, crank_length, g)."""
         shared = (
-            "m", "k", "k_s", "c", "c_s", "g", "friction", "creep_velocity", "pretension", "ripple", "ripple_phase",
-        )  # fmt: skip
+            "m",
+            "k",
+            "k_s",
+            "c",
+            "c_s",
+            "g",
+            "friction",
+            "creep_velocity",
+            "pretension",
+            "ripple",
+            "ripple_phase",
+        )
         values = {name: self.truth[name] for name in shared}
         values |= {"curvature": 1.0 / self.truth["string_length"], "omega": 4.5}
         values |= {"crank_rate": 0.0} if rising else {"crank_length": 0.0}
@@ -168,9 +186,12 @@ class VirtualRig:
         from nonsmooth import Recording
 
         record = {
-            "file": "", "format": "virtual rig", "procedure": procedure, "seed": self.seed,
+            "file": "",
+            "format": "virtual rig",
+            "procedure": procedure,
+            "seed": self.seed,
             "features": [name for name in (*FEATURES, *(("holding",) if self.holding else ())) if getattr(self, name)],
-        }  # fmt: skip
+        }
         return Recording.from_runs(
             {name: dict(channels) for name, channels, _ in runs},
             synthetic=True,
@@ -222,9 +243,13 @@ class VirtualRig:
     figure = figures.figure
 
     def write_session(
-        self, folder: str | os.PathLike[str], procedures: Sequence[str] | None = None, *,
-        truth: str | os.PathLike[str] | None = None, options: Mapping[str, Mapping[str, Any]] | None = None,
-    ) -> Path:  # fmt: skip
+        self,
+        folder: str | os.PathLike[str],
+        procedures: Sequence[str] | None = None,
+        *,
+        truth: str | os.PathLike[str] | None = None,
+        options: Mapping[str, Mapping[str, Any]] | None = None,
+    ) -> Path:
         """Record and write a session folder; the truth goes to a file beside it, ``<folder>.truth.toml``.
 
         Parameters
@@ -251,9 +276,13 @@ class VirtualRig:
         return self._write(folder, made, truth, f"virtual rig, seed {self.seed}")
 
     def write_figure(
-        self, number: int, folder: str | os.PathLike[str], *, truth: str | os.PathLike[str] | None = None,
+        self,
+        number: int,
+        folder: str | os.PathLike[str],
+        *,
+        truth: str | os.PathLike[str] | None = None,
         **options: Any,
-    ) -> Path:  # fmt: skip
+    ) -> Path:
         """Record and write what stands behind one of the paper's Figs. 4 to 18; see :meth:`write_session`.
 
         The options are those of the figure's procedure, as for :meth:`figure`.
