@@ -114,7 +114,7 @@ class Costs:
     def _keep(self, nodeid: str) -> None:
         for code in self.seen:
             if code.co_filename.startswith(SOURCES):
-                self.called[f"{code.co_filename.removeprefix(SOURCES)}:{code.co_firstlineno}"].add(nodeid)
+                self.called[f"{code.co_filename.removeprefix(SOURCES)}:{code.co_qualname}"].add(nodeid)
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
         write = terminalreporter.write_line

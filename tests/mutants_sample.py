@@ -50,16 +50,19 @@ class Mutant:
     line: int
     words: str
     text: str  # of the whole file
-    function: int  # its first line, as a code object has it; 0 outside functions
+    function: str  # its name with those around it, as a code object has it; nothing outside functions
 
 
-Place = tuple[ast.AST, str, ast.AST, ast.stmt | None, int]
+Place = tuple[ast.AST, str, ast.AST, ast.stmt | None, str]
 
 
-def places(node: ast.AST, around: ast.stmt | None = None, function: int = 0) -> Iterator[Place]:
-    """(node, field, what stands there instead, statement around it, first line of the function) of each change."""
+def places(node: ast.AST, around: ast.stmt | None = None, function: str = "", inside: str = "") -> Iterator[Place]:
+    """(node, field, what stands there instead, statement around it, name of the function) of each change."""
     if isinstance(node, ast.FunctionDef):
-        function = min([node.lineno, *(one.lineno for one in node.decorator_list)])
+        function = inside + node.name
+        inside = f"{function}.<locals>."
+    elif isinstance(node, ast.ClassDef):
+        inside += f"{node.name}."
     around = node if isinstance(node, ast.stmt) else around
     for name, value in ast.iter_fields(node):
         if name in ("annotation", "returns", "decorator_list"):
@@ -77,7 +80,7 @@ def places(node: ast.AST, around: ast.stmt | None = None, function: int = 0) -> 
                 yield node, where, ast.UnaryOp(ast.Not(), child), around, function
             elif function and isinstance(child, DROPPED):
                 yield node, where, ast.Pass(), around, function
-            yield from places(child, around, function)
+            yield from places(child, around, function, inside)
 
 
 def _is_text(node: ast.AST) -> bool:
