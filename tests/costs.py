@@ -8,6 +8,7 @@ writes the tests that run each function of the package, for ``tests/mutants_samp
 from __future__ import annotations
 
 import builtins
+import cProfile
 import json
 import os
 import sys
@@ -96,12 +97,14 @@ class Costs:
         next(counting)
         if self.into:
             self.seen = set()
-            sys.setprofile(self._profile)
+            profiler = cProfile.Profile(builtins=False)  # a function of Python's takes thrice as long
+            profiler.enable()
             threading.setprofile(self._profile)
         result = yield
         if self.into:
-            sys.setprofile(None)
-            threading.setprofile(None)  # type: ignore[arg-type]
+            profiler.disable()
+            threading.setprofile(None)
+            self.seen |= {entry.code for entry in profiler.getstats()}
             self._keep(item.nodeid)
         next(counting, None)
         self.took[item.nodeid] = round(time.process_time() - begun, 3)
