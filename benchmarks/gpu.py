@@ -134,13 +134,13 @@ def compared(plane: str, side: int) -> list[str]:
 
 def one_launch(plane: str, side: int, returns: int = 256) -> float:
     """Forcing periods per second while all trajectories of a chart are marched, tables included."""
-    from nonsmooth.flow.engines.launches import States
+    from nonsmooth.flow.engines.launches import StatesOnGpu
     from nonsmooth.flow.engines.linear_cuda import PlanarOnGpu
 
     _, settler, points, starts = settlers(side, plane)
     gpu = PlanarOnGpu(settler.engine, points, settler.plan)
     jobs = np.arange(len(points))
-    states = States.of(gpu.cuda, jobs, starts, np.zeros((len(jobs), 0)), 0, np.zeros((len(jobs), 3)))
+    states = StatesOnGpu.of(gpu.cuda, jobs, starts, np.zeros((len(jobs), 0)), 0, np.zeros((len(jobs), 3)))
     out = gpu.buffers(len(jobs), 1)
     best = np.inf
     for _ in range(4):

@@ -144,7 +144,7 @@ def compared(n: int = 400) -> list[str]:
 
 def march(inflows: np.ndarray, transient: int, keep: int) -> tuple[np.ndarray, np.ndarray]:
     """March the valve at each inflow: codes, and the seconds of each of three runs."""
-    from nonsmooth.flow.engines.launches import States
+    from nonsmooth.flow.engines.launches import StatesOnGpu
     from nonsmooth.flow.engines.series_cuda import SeriesOnGpu
 
     engine, points = engine_and_points(inflows)
@@ -152,7 +152,9 @@ def march(inflows: np.ndarray, transient: int, keep: int) -> tuple[np.ndarray, n
     n = len(inflows)
     jobs, out, seconds = np.arange(n), gpu.buffers(n, keep), []
     for _ in range(3):
-        states = States.of(gpu.cuda, jobs, np.tile(list(START.values()), (n, 1)), np.zeros((n, 0)), 0, np.zeros((n, 3)))
+        states = StatesOnGpu.of(
+            gpu.cuda, jobs, np.tile(list(START.values()), (n, 1)), np.zeros((n, 0)), 0, np.zeros((n, 3))
+        )
         gpu.cuda.synchronize()
         began = perf_counter()
         gpu.run(jobs, states, transient, keep, out)

@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 
 from nonsmooth.results import schema
-from nonsmooth.results.labels import Labels, Quantity
+from nonsmooth.results.labels import Labels, QuantityLabel
 from nonsmooth.results.provenance import provenance
 from nonsmooth.results.statuses import by_name
 
@@ -69,16 +69,16 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 def labels() -> Labels:
     return Labels(
         name="oscillator",
-        states={"x": Quantity("m"), "v": Quantity("m/s", r"\dot x")},
+        states={"x": QuantityLabel("m"), "v": QuantityLabel("m/s", r"\dot x")},
         parameters={
-            "rho": Quantity("N", r"\rho", 0.3),
-            "omega": Quantity("rad/s", r"\omega", 1.0),
-            "g": Quantity("m", "g", GAP),
+            "rho": QuantityLabel("N", r"\rho", 0.3),
+            "omega": QuantityLabel("rad/s", r"\omega", 1.0),
+            "g": QuantityLabel("m", "g", GAP),
         },
         modes=("free", "contact"),
         transitions=((0, 1), (1, 0)),
         indicators=("penetration", "separation"),
-        outputs={"contact_force": Quantity("N")},
+        outputs={"contact_force": QuantityLabel("N")},
         text="the system as text",
     )
 

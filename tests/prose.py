@@ -1,7 +1,8 @@
 """Check of the project's prose, run by ``make check``: how docstrings begin, and which words they and the pages use.
 
 A docstring begins with what it returns or does, not with a question word. The words below were this project's own for
-things that the field has a term for; the term stands beside each. Code (between backticks) is left alone.
+things that the field has a term for; the term stands beside each. Code (between backticks) is left alone. The name of a
+class means one thing: the sources, those of the studies included, define it once.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import ast
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -84,6 +85,17 @@ def of_source(path: Path, words_too: bool = True) -> Iterator[str]:
                 yield f"{path.relative_to(ROOT)}:{node.lineno}: {complaint}"
 
 
+def classes(paths: Iterable[Path]) -> Iterator[str]:
+    """The complaints about classes of the same name."""
+    places: dict[str, str] = {}
+    for path in paths:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                place = f"{path.relative_to(ROOT)}:{node.lineno}"
+                if (other := places.setdefault(node.name, place)) != place:
+                    yield f"{place}: the class {node.name} is defined at {other} too: a class name means one thing"
+
+
 def unmerged(text: str) -> bool:
     """True where both sides of a merge are left in a text."""
     return bool(re.search(r"^(<{7}|>{7}) ", text, re.MULTILINE))
@@ -94,6 +106,7 @@ def complaints() -> Iterator[str]:
     for sources in (ROOT / "src", ROOT / "studies"):
         for path in sorted(sources.rglob("*.py")):
             yield from of_source(path, words_too="tests" not in path.parts)
+    yield from classes(path for root in ("src", "studies/*/src") for path in sorted(ROOT.glob(f"{root}/**/*.py")))
     for folder in ("benchmarks", "docs", "examples", "tests"):
         for path in sorted((ROOT / folder).rglob("*.py")):
             yield from of_source(path, words_too=folder != "tests")  # the words are data there

@@ -33,5 +33,16 @@ def test_strings_of_a_source_are_read(tmp_path: Path, monkeypatch: pytest.Monkey
     assert len(found) == 2 and "a.py:1: the docstring begins with 'How'" in found[0] and "before any" in found[1]
 
 
+def test_a_class_name_that_is_defined_twice_is_named_with_both_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(prose, "ROOT", tmp_path)
+    first, second = tmp_path / "a.py", tmp_path / "b.py"
+    first.write_text("class Row:\n    class _Cell: ...\n")
+    second.write_text("class Rows: ...\n\n\ndef f():\n    class _Cell: ...\n")
+    assert [one.split(":")[:2] for one in prose.classes([first, second])] == [["b.py", "5"]]
+    assert "_Cell is defined at a.py:2 too" in next(prose.classes([first, second]))
+
+
 def test_both_sides_of_a_merge_are_named() -> None:
     assert prose.unmerged("a\n<<<<<<< HEAD\nb\n") and not prose.unmerged("a\n=======\nb << c")

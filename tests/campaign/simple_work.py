@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.campaign.work import Column
+from nonsmooth.campaign.work import ColumnType
 
 
 @dataclass(frozen=True)
@@ -23,8 +23,8 @@ class Squares:
     fails_at: int = -1
     device: str = "cpu"
 
-    def columns(self) -> dict[str, Column]:
-        return {"square": Column("f8"), "pair": Column("i4", (2,))}
+    def columns(self) -> dict[str, ColumnType]:
+        return {"square": ColumnType("f8"), "pair": ColumnType("i4", (2,))}
 
     def n_chunks(self) -> int:
         return -(-self.size // self.step)

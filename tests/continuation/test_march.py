@@ -11,7 +11,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.continuation.branches.following import curve_of
-from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Step, locate
+from nonsmooth.continuation.march.event import BranchPoint, Event, Fold, Met, Step, locate
 from nonsmooth.continuation.march.march import Limits, March, Policy, march
 from nonsmooth.continuation.problems.curve import Curve, Point, tangents
 from nonsmooth.continuation.problems.equilibrium import Equilibria
@@ -73,7 +73,7 @@ class Plane(Curve[Point]):
 
 
 class Along(Policy):
-    kinds = (Fold(), Crossing(), Zero())
+    kinds = (Fold(), BranchPoint(), Zero())
     boundaries = (Half(),)
 
     def behind(self, found: March, met: list[Met]) -> Point | None:

@@ -20,7 +20,7 @@ from bokeh.models import ColumnDataSource
 
 from nonsmooth.explorer import session as sessions
 from nonsmooth.explorer.catalogue import Catalogue
-from nonsmooth.explorer.session import Session
+from nonsmooth.explorer.session import Page
 
 FEW = "columns=10&transient=20&keep=8&low=0.2&high=0.3"
 PATIENCE = 120.0
@@ -29,8 +29,8 @@ PATIENCE = 120.0
 class Tab:
     """A page whose document calls back when it is asked to (a server does it by itself)."""
 
-    def __init__(self, tabs: list[Session], query: str = FEW) -> None:
-        self.session = Session(Document(), Catalogue.of(None), query, tabs)
+    def __init__(self, tabs: list[Page], query: str = FEW) -> None:
+        self.session = Page(Document(), Catalogue.of(None), query, tabs)
         self.calls: queue.Queue[Callable[[], None]] = queue.Queue()
         self.session.later = lambda act, *given: self.calls.put(lambda: act(*given))  # type: ignore[method-assign]
         self.busy: list[dict[str, Any]] = []
@@ -72,14 +72,14 @@ class Tab:
 
 
 @pytest.fixture
-def tabs() -> Iterator[list[Session]]:
-    found: list[Session] = []
+def tabs() -> Iterator[list[Page]]:
+    found: list[Page] = []
     yield found
     for one in [*found]:
         one._close()
 
 
-def test_nothing_of_a_model_stands_under_the_name_of_the_next(tabs: list[Session]) -> None:
+def test_nothing_of_a_model_stands_under_the_name_of_the_next(tabs: list[Page]) -> None:
     """The figures, the line above them and the names of the axes are blank until the new motion is there."""
     tab = Tab(tabs)
     tab.say("begin")
@@ -95,7 +95,7 @@ def test_nothing_of_a_model_stands_under_the_name_of_the_next(tabs: list[Session
         assert (plot.xaxis[0].axis_label, plot.title.text) == (None, "")
 
 
-def test_a_compile_is_said(tabs: list[Session], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_compile_is_said(tabs: list[Page], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path))
     tab = Tab(tabs, f"model=stick_slip_belt&{FEW}")
     tab.say("begin")
@@ -103,7 +103,7 @@ def test_a_compile_is_said(tabs: list[Session], tmp_path: Path, monkeypatch: pyt
     assert tab.busy[-1] | {"view": ""} == {"view": "", "fraction": 0, "long": True, "compiling": True}
 
 
-def test_a_process_that_cannot_start_is_given_up(tabs: list[Session], tmp_path: Path, monkeypatch: Any) -> None:
+def test_a_process_that_cannot_start_is_given_up(tabs: list[Page], tmp_path: Path, monkeypatch: Any) -> None:
     broken, log = tmp_path / "python", tmp_path / "starts"
     broken.write_text(f"#!/bin/sh\necho start >> {log}\nexit 3\n")
     broken.chmod(0o700)
@@ -118,7 +118,7 @@ def test_a_process_that_cannot_start_is_given_up(tabs: list[Session], tmp_path: 
     assert tab.told("busy") == {"view": ""}
 
 
-def test_a_note_on_a_value_goes_when_the_values_are_good_again(tabs: list[Session]) -> None:
+def test_a_note_on_a_value_goes_when_the_values_are_good_again(tabs: list[Page]) -> None:
     tab = Tab(tabs)
     tab.say("set", "low", 0.3)  # as the other end
     assert "equal" in tab.told("notes")["low"]
@@ -128,7 +128,7 @@ def test_a_note_on_a_value_goes_when_the_values_are_good_again(tabs: list[Sessio
     assert tab.told("notes") == {}
 
 
-def test_a_note_on_a_computation_goes_when_its_values_do(tabs: list[Session]) -> None:
+def test_a_note_on_a_computation_goes_when_its_values_do(tabs: list[Page]) -> None:
     """Also on the way back to values whose results are there, for which nothing is computed."""
     tab = Tab(tabs, f"{FEW}&upper=diagram")
     tab.say("begin")
@@ -144,7 +144,7 @@ def test_a_note_on_a_computation_goes_when_its_values_do(tabs: list[Session]) ->
     assert "diagram" not in tab.told("notes")
 
 
-def test_so_many_tabs_compute_and_no_more(tabs: list[Session], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_so_many_tabs_compute_and_no_more(tabs: list[Page], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sessions, "MOST_TABS", 2)
     first, second, third = Tab(tabs), Tab(tabs), Tab(tabs)
     for one in (first, second, third):

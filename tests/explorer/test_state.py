@@ -13,7 +13,7 @@ import nonsmooth as ns
 from nonsmooth.explorer.catalogue import first_state, presets_of, slider_range
 from nonsmooth.explorer.labels import axis_label, html_of, number, plain_of
 from nonsmooth.explorer.raster import drawn
-from nonsmooth.explorer.state import CHOICES, History, State, changed, from_query, to_query
+from nonsmooth.explorer.state import CHOICES, History, PageState, changed, from_query, to_query
 
 SYSTEM = ns.models.discontinuous_support()
 STATES = list(SYSTEM.states)
@@ -84,7 +84,7 @@ def test_every_model_has_a_first_view_and_the_paper_all_its_figures() -> None:
 
 def test_fields_come_as_numbers_too() -> None:
     assert changed(FIRST, "phase", 1.25, STATES).phase == 0.25
-    assert isinstance(changed(FIRST, "columns", 100.0, STATES), State)
+    assert isinstance(changed(FIRST, "columns", 100.0, STATES), PageState)
 
 
 def test_symbols_and_units_as_text() -> None:

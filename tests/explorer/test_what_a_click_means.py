@@ -14,23 +14,23 @@ pytest.importorskip("bokeh", reason="the explorer needs bokeh")
 
 from nonsmooth.explorer.catalogue import Catalogue
 from nonsmooth.explorer.schedule import Schedule, key_of
-from nonsmooth.explorer.session import MOST_TABS, History, Session
+from nonsmooth.explorer.session import MOST_TABS, History, Page
 
 
 @pytest.fixture(scope="module")
-def one_page() -> Iterator[Session]:
+def one_page() -> Iterator[Page]:
     """A page whose work never begins."""
     from bokeh.document import Document
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Schedule, "begin", lambda self, hear: False)
-        session = Session(Document(), Catalogue.of(None), "columns=10&transient=20&keep=8&low=0.2&high=0.3", [])
+        session = Page(Document(), Catalogue.of(None), "columns=10&transient=20&keep=8&low=0.2&high=0.3", [])
         yield session
         session._close()
 
 
 @pytest.fixture
-def page(one_page: Session) -> Session:
+def page(one_page: Page) -> Page:
     """The same in its first state."""
     one_page.past = History(one_page._first("columns=10&transient=20&keep=8&low=0.2&high=0.3"))
     one_page.notes.clear()
@@ -38,7 +38,7 @@ def page(one_page: Session) -> Session:
     return one_page
 
 
-def say(page: Session, what: str, name: str = "", value: Any = None, n: int = 1) -> None:
+def say(page: Page, what: str, name: str = "", value: Any = None, n: int = 1) -> None:
     page._told(json.dumps({"do": what, "name": name, "value": value, "n": n}))
 
 
@@ -50,7 +50,7 @@ def over(x0: float, x1: float, y0: float = 0.0, y1: float = 1.0) -> Any:
     return SimpleNamespace(x0=x0, x1=x1, y0=y0, y1=y1)
 
 
-def test_a_click_in_the_plane_is_a_start(page: Session) -> None:
+def test_a_click_in_the_plane_is_a_start(page: Page) -> None:
     """x of the click belongs to the state on the x axis; the other states stay as they are."""
     names = list(page.system.states)
     page.past.put(replace(page.state, x=names[1], y=names[0], start=(0.0, 0.0)))
@@ -58,7 +58,7 @@ def test_a_click_in_the_plane_is_a_start(page: Session) -> None:
     assert dict(zip(names, page.state.start, strict=True)) == {names[1]: 0.3, names[0]: -0.2}
 
 
-def test_a_zoom_is_the_range_of_the_diagram_and_can_be_undone(page: Session) -> None:
+def test_a_zoom_is_the_range_of_the_diagram_and_can_be_undone(page: Page) -> None:
     page._zoom(page.sheet.views["diagram"], over(0.22, 0.27))
     assert (page.state.low, page.state.high) == (0.22, 0.27)
     for empty in (over(0.25, 0.25), over(0.27, 0.22)):
@@ -68,7 +68,7 @@ def test_a_zoom_is_the_range_of_the_diagram_and_can_be_undone(page: Session) -> 
     assert (page.state.low, page.state.high) == (0.2, 0.3)
 
 
-def test_a_range_keeps_its_order_and_has_a_length(page: Session) -> None:
+def test_a_range_keeps_its_order_and_has_a_length(page: Page) -> None:
     say(page, "set", "low", 0.5)
     assert (page.state.low, page.state.high) == (0.3, 0.5)
     say(page, "set", "low", page.state.high)
@@ -78,7 +78,7 @@ def test_a_range_keeps_its_order_and_has_a_length(page: Session) -> None:
     assert "low" not in page.notes and (page.state.low, page.state.high) == (0.1, 0.5)
 
 
-def test_another_parameter_of_the_diagram_brings_its_range(page: Session) -> None:
+def test_another_parameter_of_the_diagram_brings_its_range(page: Page) -> None:
     """From 0.6 to 1.4 of its value where that is positive; else about it."""
     values = page.state.values
     name = next(name for name, value in values.items() if value > 0 and name != page.state.over)
@@ -92,7 +92,7 @@ def test_another_parameter_of_the_diagram_brings_its_range(page: Session) -> Non
         assert page.state.low < values[other] < page.state.high
 
 
-def test_reset_is_the_first_state_of_the_same_model(page: Session) -> None:
+def test_reset_is_the_first_state_of_the_same_model(page: Page) -> None:
     other = [*page.catalogue][-1]
     assert other not in (page.state.model, next(iter(page.catalogue)))
     say(page, "model", value=other)
@@ -104,7 +104,7 @@ def test_reset_is_the_first_state_of_the_same_model(page: Session) -> None:
     assert page.state == first
 
 
-def test_only_what_is_shown_is_asked_for(page: Session) -> None:
+def test_only_what_is_shown_is_asked_for(page: Page) -> None:
     assert {"diagram", "first look"} <= set(page.wanted())
     page.work.done["diagram"] = key_of(page.wanted()["diagram"])
     assert "first look" not in page.wanted() and "diagram" in page.wanted()
@@ -112,7 +112,7 @@ def test_only_what_is_shown_is_asked_for(page: Session) -> None:
     assert not {"diagram", "first look"} & set(page.wanted())
 
 
-def test_a_message_that_is_none_says_so_and_changes_nothing(page: Session) -> None:
+def test_a_message_that_is_none_says_so_and_changes_nothing(page: Page) -> None:
     before = page.state
     say(page, "explode")
     assert "'explode', which does not exist" in page.notes["page"] and page.state == before
@@ -122,7 +122,7 @@ def test_a_message_that_is_none_says_so_and_changes_nothing(page: Session) -> No
     assert (page.dark, page.large, page._heard) == (True, False, 7) and "page" not in page.notes
 
 
-def test_as_many_tabs_as_may_compute(page: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_as_many_tabs_as_may_compute(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
     """The last one that may begins; with all of them at work the next waits and says why."""
     began = []
     monkeypatch.setattr(type(page.work), "begin", lambda self, hear: bool(began.append(1)))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.engines.engine import Log, State
+from nonsmooth.flow.engines.engine import State, TrajectoryLog
 from nonsmooth.flow.engines.series import SeriesEngine, order_for
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept, Section
@@ -25,7 +25,7 @@ def engine(system: System, method: str = "taylor", **options: Any) -> SeriesEngi
 
 def record(
     system: System, start: list[float], until: float, samples: Any = (), method: str = "taylor", **options: Any
-) -> tuple[Log, State]:
+) -> tuple[TrajectoryLog, State]:
     e = engine(system, method, **options)
     tables = e.prepare(system.parameter_vector()[None])
     state = State(np.array(start, dtype=float), system.memory_vector())

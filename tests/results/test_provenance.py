@@ -17,7 +17,7 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.results import schema
-from nonsmooth.results.labels import Labels, Quantity, labels_of
+from nonsmooth.results.labels import Labels, QuantityLabel, labels_of
 from nonsmooth.results.provenance import ATTRIBUTE, COORDINATE, package_version, provenance, read_provenance
 from nonsmooth.results.store import load, save
 
@@ -121,7 +121,7 @@ def swept_over(labels: Labels, values: np.ndarray, starts: np.ndarray, **options
 def test_the_attribute_is_short_and_its_record_whole() -> None:
     """Twenty masses, 5000 values, 300 initial conditions: 260 kB of JSON."""
     system = chain_of_masses(20)
-    labels = replace(labels_of(system), parameters={"rho": Quantity("N", "", 0.3)})
+    labels = replace(labels_of(system), parameters={"rho": QuantityLabel("N", "", 0.3)})
     rng = np.random.default_rng(0)
     values, starts = rng.normal(size=5000), rng.normal(size=(300, 40))
     result = swept_over(labels, values, starts)

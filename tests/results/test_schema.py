@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from nonsmooth.results import schema
-from nonsmooth.results.labels import Labels, Quantity
+from nonsmooth.results.labels import Labels, QuantityLabel
 from nonsmooth.results.statuses import STATUSES, by_code, by_name
 
 
@@ -116,7 +116,7 @@ def test_section_points_from_one_start_have_no_start_dim(labels: Labels) -> None
 
 
 def test_two_transitions_between_the_same_modes_are_told_apart() -> None:
-    labels = Labels("s", {"x": Quantity()}, {}, ("a", "b"), ((0, 1), (0, 1), (1, 0)), ("h",))
+    labels = Labels("s", {"x": QuantityLabel()}, {}, ("a", "b"), ((0, 1), (0, 1), (1, 0)), ("h",))
     assert labels.transition_labels == ("a_to_b_1", "a_to_b_2", "b_to_a")
 
 

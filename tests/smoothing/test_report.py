@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
-from nonsmooth.smoothing.attractors import Found, matched
+from nonsmooth.smoothing.attractors import FoundAttractor, matched
 
 ETA = 1e-2
 SHARES = {
@@ -108,8 +108,8 @@ def test_exponents_of_chaos_are_those_of_long_runs() -> None:
 
 
 def test_counterparts_are_the_nearest_of_the_same_period() -> None:
-    def found(number: int, high: float) -> Found:
-        return Found(number, np.array([[high, 1.0], [-1.0, -1.0]]))
+    def found(number: int, high: float) -> FoundAttractor:
+        return FoundAttractor(number, np.array([[high, 1.0], [-1.0, -1.0]]))
 
     assert matched([found(1, 1.0), found(2, 2.0)], [found(2, 2.01), found(1, 1.02)]) == (0, 0)
     assert matched([found(1, 1.0)], [found(1, 1.5)]) == (1, 1)

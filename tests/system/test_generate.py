@@ -11,7 +11,7 @@ import sympy as sp
 
 from nonsmooth import models
 from nonsmooth.system.codegen.generate import compile_model, model_source
-from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
+from nonsmooth.system.symbolic.traced import Traced, TracedCondition, TracedTransition
 
 T = sp.Symbol("t_", real=True)
 X, Y = sp.symbols("u_x u_lambda", real=True)
@@ -43,10 +43,10 @@ SMOOTH = (
 @pytest.fixture(scope="module")
 def traced():
     transitions = (
-        TracedTransition(0, 1, (Row(0, 1),)),
-        TracedTransition(1, 0, (Row(0, 1),), reset=(Y, -A * X + M), writes=((0, X * B),)),
+        TracedTransition(0, 1, (TracedCondition(0, 1),)),
+        TracedTransition(1, 0, (TracedCondition(0, 1),), reset=(Y, -A * X + M), writes=((0, X * B),)),
         TracedTransition(1, 0, (), at=0.5, writes=((0, M + 1),)),
-        TracedTransition(1, 1, (Row(0, -1),), reset=(sp.Abs(X), Y)),
+        TracedTransition(1, 1, (TracedCondition(0, -1),), reset=(sp.Abs(X), Y)),
     )
     outputs = tuple((corner, smooth) for corner, smooth in zip(CORNERS, SMOOTH, strict=False))
     return Traced(

@@ -8,7 +8,7 @@ import sympy as sp
 
 from nonsmooth import models
 from nonsmooth.system.codegen.linear import linear_form
-from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
+from nonsmooth.system.symbolic.traced import Traced, TracedCondition, TracedTransition
 
 T = sp.Symbol("t", real=True)
 X, Y, Z, V = sp.symbols("x y z v", real=True)
@@ -36,7 +36,8 @@ def make(*fields, indicators=(), outputs=(), resets=(), period=None, u=(X, Y), m
         lacking=tuple((False,) * len(u) for _ in modes),
         indicators=tuple(map(sympify, indicators)),
         transitions=tuple(
-            TracedTransition(0, 0, (Row(0, 1),), reset=None if r is None else tuple(map(sympify, r))) for r in resets
+            TracedTransition(0, 0, (TracedCondition(0, 1),), reset=None if r is None else tuple(map(sympify, r)))
+            for r in resets
         ),
         outputs=tuple(tuple(map(sympify, o)) for o in outputs),
         period=period,

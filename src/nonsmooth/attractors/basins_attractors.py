@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.attractors.basins_candidate import Search, among
+from nonsmooth.attractors.basins_candidate import CandidateSearch, among
 from nonsmooth.attractors.basins_found import Attractor, Patience
 from nonsmooth.attractors.basins_newton import Cycle, confirmed_cycle, exponent_on
 from nonsmooth.attractors.settled import Settled
@@ -56,7 +56,7 @@ def find_attractors(
     _label_cycles(settler, point, runs, every, found, labels)
     wandering = np.flatnonzero(np.isin(status, STILL))
     places, modes = runs.last[wandering].copy(), runs.mode[wandering].copy()
-    search = Search(replace(settler, device="cpu"), point, patience, found)  # it makes single runs
+    search = CandidateSearch(replace(settler, device="cpu"), point, patience, found)  # it makes single runs
     for _ in range(patience.rounds):
         places, modes, wandering = _join(search, places, modes, wandering, labels, status)
         if search.hopeless:  # motion that nothing draws in, as without damping: waiting changes nothing
@@ -159,7 +159,7 @@ def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:
 
 
 def _join(
-    search: Search, places: FloatArray, modes: IntArray, which: IntArray, labels: IntArray, status: IntArray
+    search: CandidateSearch, places: FloatArray, modes: IntArray, which: IntArray, labels: IntArray, status: IntArray
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Label runs whose next points lie on an attractor that is no short cycle; try new candidates; return the rest."""
     found, left = search.found, np.ones(len(which), dtype=bool)

@@ -14,7 +14,7 @@ import numpy as np
 from nonsmooth.attractors.basins_found import Attractor, Patience
 from nonsmooth.attractors.basins_newton import confirmed_cycle, exponent_on
 from nonsmooth.attractors.settler import Settler
-from nonsmooth.attractors.trace import Trace
+from nonsmooth.attractors.trace import SectionTrace
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.kernels.hybrid import codes
 
@@ -46,7 +46,7 @@ def among(points: FloatArray, found: list[Attractor]) -> int | None:
 
 
 @dataclass
-class Search:
+class CandidateSearch:
     """Candidates at one parameter point (1, n_parameters); ``found`` is the list of attractors, which grows."""
 
     settler: Settler
@@ -185,7 +185,7 @@ class Search:
             place, mode = here.end, here.mode
         return abs(total) / AREAS < LEAST_EXPONENT
 
-    def _on(self, place: FloatArray, mode: int, transient: int, keep: int) -> Trace:
+    def _on(self, place: FloatArray, mode: int, transient: int, keep: int) -> SectionTrace:
         return self.settler.trace(self.point, place, mode, transient, keep)
 
 

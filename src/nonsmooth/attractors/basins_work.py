@@ -10,7 +10,7 @@ import numpy as np
 
 from nonsmooth.attractors.settled import Settled
 from nonsmooth.attractors.settler import Settler
-from nonsmooth.campaign.work import CHUNK, Column
+from nonsmooth.campaign.work import CHUNK, ColumnType
 from nonsmooth.flow.engines.engine import FloatArray
 
 
@@ -28,11 +28,11 @@ class StartsWork:
     def device(self) -> str:
         return self.settler.device
 
-    def columns(self) -> dict[str, Column]:
+    def columns(self) -> dict[str, ColumnType]:
         n = self.starts.shape[1]
         kinds = {"period_number": "i8", "status": "i8", "mode": "i8", "returns": "i8"}
         wide = {"maximum": (n,), "minimum": (n,), "last": (self.settler.width,)}
-        return {item.name: Column(kinds.get(item.name, "f8"), wide.get(item.name, ())) for item in fields(Settled)}
+        return {item.name: ColumnType(kinds.get(item.name, "f8"), wide.get(item.name, ())) for item in fields(Settled)}
 
     def n_chunks(self) -> int:
         return -(-len(self.points) * len(self.starts) // self.chunk)

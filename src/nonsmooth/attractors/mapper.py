@@ -11,7 +11,7 @@ import numpy as np
 from nonsmooth.attractors.settled import Settled
 from nonsmooth.flow.engines.engine import FloatArray, IntArray, State
 from nonsmooth.flow.engines.loop import end_if_not_wanted
-from nonsmooth.flow.engines.march import March
+from nonsmooth.flow.engines.march import KernelMarch
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept
 from nonsmooth.kernels.hybrid.places import BEGUN, STARTS, WAITS
@@ -59,7 +59,7 @@ class Mapper:
         self.runs: Any = None
         self.system: Any = None
         self.found: Settled | None = None
-        self.march = March(engine.module(), engine.limit)
+        self.march = KernelMarch(engine.module(), engine.limit)
 
     def settle(self, rules: Rules, carried: int, extremes: bool) -> Callable[[int], None]:
         """Return a function that settles the jobs before a number; see ``kernels.judging.driver.settle_many``."""

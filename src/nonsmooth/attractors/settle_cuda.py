@@ -15,7 +15,7 @@ import numpy as np
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.flow.engines.devices import batch_size
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
-from nonsmooth.flow.engines.launches import States, batches
+from nonsmooth.flow.engines.launches import StatesOnGpu, batches
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.linear_cuda import SLICE, PlanarOnGpu
 from nonsmooth.flow.engines.loop import Engine
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
     from nonsmooth.kernels.judging.settle import Rules
 
 
-class Rounds:
+class JobsOnGpu:
     """J jobs on a GPU, as they are settled under some rules.
 
     Parameters
     ----------
     gpu : PlanarOnGpu or SeriesOnGpu
-    states : States
+    states : StatesOnGpu
         Where the jobs begin, and are left.
     extremes : bool
         Whether those over a whole cycle are wanted.
@@ -48,7 +48,7 @@ class Rounds:
         The last ``keep`` section points of each job, one return behind them (where the rules say so), its cycle.
     """
 
-    def __init__(self, gpu: Any, states: States, rules: Rules, extremes: bool = True) -> None:
+    def __init__(self, gpu: Any, states: StatesOnGpu, rules: Rules, extremes: bool = True) -> None:
         from nonsmooth.kernels.judging.settle import begin_job, new_jobs
 
         n, to_device = len(states.rows), gpu.cuda.to_device
@@ -199,7 +199,9 @@ def _batch(engine: Engine) -> int:
     return batch_size() if isinstance(engine, PlanarEngine) else int(PART * batch_size())
 
 
-def _states_at(gpu: Any, places: FloatArray, memory: FloatArray, rows: IntArray, modes: Any, begin: float) -> States:
+def _states_at(
+    gpu: Any, places: FloatArray, memory: FloatArray, rows: IntArray, modes: Any, begin: float
+) -> StatesOnGpu:
     """States at places (see ``trace``); what they do not say is as at a fresh start, at the phase ``begin``."""
     n, n_memory, period = gpu.n, gpu.n_memory, gpu.period[rows]
     memory, clock = np.tile(memory, (len(rows), 1)), np.zeros((len(rows), 3))
@@ -208,7 +210,7 @@ def _states_at(gpu: Any, places: FloatArray, memory: FloatArray, rows: IntArray,
     forced = period < np.inf
     clock[forced, 0] = places[forced, -1] if places.shape[1] > n + n_memory else begin * period[forced]
     clock[forced, 2] = period[forced]
-    return States.of(gpu.cuda, rows, places[:, :n], memory, modes, clock)
+    return StatesOnGpu.of(gpu.cuda, rows, places[:, :n], memory, modes, clock)
 
 
 def settle_on_gpu(
@@ -226,7 +228,7 @@ def settle_on_gpu(
     for some, own, own_rows in batches(points, rows, _batch(settler.engine)):
         gpu = _on_gpu(settler.engine, own, settler.plan)
         states = _states_at(gpu, starts[some], system.memory_vector(), own_rows, modes[some], begin)
-        rounds = Rounds(gpu, states, settler.rules(attempts, int(planar)), settler.extremes or not planar)
+        rounds = JobsOnGpu(gpu, states, settler.rules(attempts, int(planar)), settler.extremes or not planar)
         rounds.run()
         part = rounds.found(settler.width)
         for item in fields(found):
@@ -246,7 +248,7 @@ def sweep_on_gpu(
     for some, own, rows in batches(points, np.arange(len(points)), _batch(settler.engine)):
         gpu = _on_gpu(settler.engine, own, settler.plan)
         states = _states_at(gpu, np.tile(start, (len(rows), 1)), settler.system.memory_vector(), rows, 0, 0.0)
-        rounds = Rounds(gpu, states, settler.rules(), extremes=False)
+        rounds = JobsOnGpu(gpu, states, settler.rules(), extremes=False)
         rounds.run()
         _into(chain, some, rounds.kept, gpu)
         parts.append(rounds.found(len(start)))
@@ -295,7 +297,7 @@ def separate_on_gpu(
 
 
 def _separate_in_threads(
-    gpu: PlanarOnGpu, states: States, returns: int, batch: int, sizes: Any, offsets: Any, sums: Any, status: Any
+    gpu: PlanarOnGpu, states: StatesOnGpu, returns: int, batch: int, sizes: Any, offsets: Any, sums: Any, status: Any
 ) -> None:
     """Each thread follows its job and the neighbour over some returns."""
     jobs = np.arange(len(states.rows))
@@ -321,7 +323,7 @@ def _separate_in_threads(
 
 
 def _separate_in_rounds(
-    gpu: SeriesOnGpu, states: States, returns: int, batch: int, sizes: Any, offsets: Any, sums: Any, status: Any
+    gpu: SeriesOnGpu, states: StatesOnGpu, returns: int, batch: int, sizes: Any, offsets: Any, sums: Any, status: Any
 ) -> None:
     """Both are run to their next return, one after the other."""
     jobs = every = np.arange(len(states.rows))

@@ -17,7 +17,7 @@ from nonsmooth.attractors.exponents import rates, separation_sizes
 from nonsmooth.attractors.mapper import Mapper
 from nonsmooth.attractors.settle_cuda import separate_on_gpu, settle_on_gpu
 from nonsmooth.attractors.settled import ROUNDED, Settled, least_sizes, usable
-from nonsmooth.attractors.trace import Trace, mode_at
+from nonsmooth.attractors.trace import SectionTrace, mode_at
 from nonsmooth.flow.engines.devices import engine_on_gpu, on_gpu
 from nonsmooth.flow.engines.engine import FloatArray, State
 from nonsmooth.flow.engines.loop import Engine
@@ -179,7 +179,7 @@ class Settler:
         """Phase of the forcing at which the section stands; 0 where it is no phase."""
         return self.plan.phase if self.plan.indicator < 0 else 0.0
 
-    def trace(self, point: FloatArray, place: FloatArray, mode: int, transient: int, keep: int) -> Trace:
+    def trace(self, point: FloatArray, place: FloatArray, mode: int, transient: int, keep: int) -> SectionTrace:
         """Section points of one run at one parameter point (1, n_parameters), from a place on the section."""
         tables, n = self.engine.prepare(point), len(self.system.states)
         state = self._state(place, mode, float(tables.period[0]))
@@ -187,9 +187,11 @@ class Settler:
         self.engine.chain(tables, 0, 1, state, None, self.plan._replace(extremes=False), transient, keep, out)
         if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
             none = np.zeros(0)
-            return Trace(np.zeros((0, n)), np.zeros(0, dtype=np.int64), none, place, mode)
+            return SectionTrace(np.zeros((0, n)), np.zeros(0, dtype=np.int64), none, place, mode)
         end = np.concatenate([state.u, state.memory, state.clock[:1]])[: self.width]
-        return Trace(out.section[0], out.section_mode[0], out.section_time[0] - begin, end, int(state.counters[0]))
+        return SectionTrace(
+            out.section[0], out.section_mode[0], out.section_time[0] - begin, end, int(state.counters[0])
+        )
 
     def _state(self, place: FloatArray, mode: int, period: float) -> State:
         """The state of a run that goes on from a place."""

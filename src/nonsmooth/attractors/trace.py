@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Trace:
+class SectionTrace:
     """Section points of one run; none where it failed."""
 
     points: FloatArray  # (keep, n)

@@ -13,7 +13,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from nonsmooth.campaign.store import ChunkStore
-from nonsmooth.campaign.work import Work
+from nonsmooth.campaign.work import ChunkedWork
 from nonsmooth.errors import not_installed
 
 MISSING = f"a cluster needs {not_installed('distributed', 'cluster')}"
@@ -47,7 +47,7 @@ def connect(address: str) -> Any:
         ) from error
 
 
-def compute_chunk(work: Work, chunk: int, path: str | None, key: str) -> Mapping[str, NDArray[Any]] | None:
+def compute_chunk(work: ChunkedWork, chunk: int, path: str | None, key: str) -> Mapping[str, NDArray[Any]] | None:
     """Compute one chunk on a worker, into the store where there is one."""
     if path is None:
         return work.compute(chunk)
@@ -61,7 +61,7 @@ def compute_chunk(work: Work, chunk: int, path: str | None, key: str) -> Mapping
 
 
 def on_cluster(
-    work: Work,
+    work: ChunkedWork,
     chunks: Iterable[int],
     done: Callable[[int, Mapping[str, NDArray[Any]] | None], None],
     client: Any,

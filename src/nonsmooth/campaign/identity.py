@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from nonsmooth.campaign.work import Work
+from nonsmooth.campaign.work import ChunkedWork
 
 ROOMS = ("kernels", "system", "flow", "attractors", "diagrams")  # whose text decides what a chunk holds
 
@@ -28,7 +28,7 @@ def _kernel_version() -> str:
     return digest.hexdigest()[:16]
 
 
-def described(work: Work) -> dict[str, Any]:
+def described(work: ChunkedWork) -> dict[str, Any]:
     """Everything that the content of a work's chunks depends on, but for the processor."""
     columns = {name: [item.dtype, list(item.shape)] for name, item in work.columns().items()}
     return {

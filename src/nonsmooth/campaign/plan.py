@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.campaign.threads import cores
-from nonsmooth.campaign.work import Work
+from nonsmooth.campaign.work import ChunkedWork
 from nonsmooth.errors import not_installed
 
 SECONDS = 5.0  # of sampling
@@ -65,7 +65,7 @@ class Plan:
         return "\n".join(lines)
 
 
-def plan(work: Work, *, seconds: float = SECONDS, seed: int = 0, kept: int | None = None) -> Plan:
+def plan(work: ChunkedWork, *, seconds: float = SECONDS, seed: int = 0, kept: int | None = None) -> Plan:
     """Run some chunks for some seconds of processor time, one after the other, and scale up.
 
     The first chunk is run once before the clock: it compiles and loads what all need.

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from nonsmooth.campaign.processors import clock
 from nonsmooth.campaign.threads import on_threads
-from nonsmooth.campaign.work import Work, check_room, empty_columns
+from nonsmooth.campaign.work import ChunkedWork, check_room, empty_columns
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 
 
 def run(
-    work: Work,
+    work: ChunkedWork,
     *,
     threads: int | None = None,
     progress: Progress = True,
@@ -74,7 +74,7 @@ def run(
     return columns if keeper is None else keeper.read(work)
 
 
-def _places(work: Work, chunk: int) -> int:
+def _places(work: ChunkedWork, chunk: int) -> int:
     first, last = work.bounds(chunk)
     return last - first
 
@@ -82,7 +82,7 @@ def _places(work: Work, chunk: int) -> int:
 class _Kept:
     """A work whose chunks go into a store as soon as they are computed, in the thread that computed them."""
 
-    def __init__(self, work: Work, keeper: Any) -> None:
+    def __init__(self, work: ChunkedWork, keeper: Any) -> None:
         self.work, self.keeper, self.device = work, keeper, work.device
         self.columns, self.n_chunks, self.bounds = work.columns, work.n_chunks, work.bounds
         self.describe, self.load = work.describe, work.load

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from nonsmooth.campaign.identity import described, difference
 from nonsmooth.campaign.marks import mark_in, marks_of, started
 from nonsmooth.campaign.processors import processor_type
-from nonsmooth.campaign.work import Work
+from nonsmooth.campaign.work import ChunkedWork
 from nonsmooth.errors import DataFileError
 from nonsmooth.results.content import digest, seal, sealed
 from nonsmooth.results.store import needs_zarr
@@ -73,7 +73,7 @@ class ChunkStore:
         with told(self.path, KEPT), open(self.path / "run" / "started.log", "a", encoding="utf-8") as log:
             log.write(line + "\n")
 
-    def write(self, work: Work, chunk: int, arrays: Mapping[str, NDArray[Any]], seconds: float) -> None:
+    def write(self, work: ChunkedWork, chunk: int, arrays: Mapping[str, NDArray[Any]], seconds: float) -> None:
         """Keep a chunk: its arrays first, then the mark that it is done.
 
         Raises
@@ -98,7 +98,7 @@ class ChunkStore:
             }
             write_whole(self.path / "run" / f"{chunk:06d}.json", json.dumps(seal(mark)).encode())
 
-    def read(self, work: Work) -> dict[str, NDArray[Any]]:
+    def read(self, work: ChunkedWork) -> dict[str, NDArray[Any]]:
         """All columns, over all places.
 
         Raises
@@ -122,7 +122,7 @@ class ChunkStore:
             )
         return columns or {name: np.asarray(group[name][...]) for name in work.columns()}
 
-    def _is_whole(self, work: Work, mark: Mapping[str, Any], columns: Any) -> bool:
+    def _is_whole(self, work: ChunkedWork, mark: Mapping[str, Any], columns: Any) -> bool:
         """Return whether a chunk's arrays are those that were written."""
         first, last = work.bounds(mark["chunk"])
         try:
@@ -137,7 +137,7 @@ class ChunkStore:
         return hashlib.sha256(f"{self.key}:{chunk}".encode()).hexdigest()
 
 
-def open_store(path: str | os.PathLike[str], work: Work, *, any_cpu: bool = False) -> ChunkStore:
+def open_store(path: str | os.PathLike[str], work: ChunkedWork, *, any_cpu: bool = False) -> ChunkStore:
     """The store at ``path`` for this work; it is made where there is none.
 
     Parameters
@@ -211,7 +211,7 @@ def describe_store(path: str | os.PathLike[str]) -> dict[str, Any]:
     return record
 
 
-def stored_bytes(work: Work, samples: Sequence[Mapping[str, NDArray[Any]]], kept: int) -> int:
+def stored_bytes(work: ChunkedWork, samples: Sequence[Mapping[str, NDArray[Any]]], kept: int) -> int:
     """Bytes that a store of the whole work takes, by what a sample of its places takes in a store in memory.
 
     ``kept``: places of a chunk of the store.
@@ -232,7 +232,7 @@ def stored_bytes(work: Work, samples: Sequence[Mapping[str, NDArray[Any]]], kept
     return heads + round(chunks * places / there) + -(-places // kept) * FACTS
 
 
-def _make(target: Path, work: Work, wanted: Mapping[str, Any], key: str) -> None:
+def _make(target: Path, work: ChunkedWork, wanted: Mapping[str, Any], key: str) -> None:
     """A whole empty store, or none."""
     import zarr
 
@@ -252,7 +252,7 @@ def _make(target: Path, work: Work, wanted: Mapping[str, Any], key: str) -> None
                 raise
 
 
-def _create(group: Any, work: Work, places: int, chunk: int) -> None:
+def _create(group: Any, work: ChunkedWork, places: int, chunk: int) -> None:
     """One array per column, in chunks of so many places."""
     from zarr.codecs import ZstdCodec
 
@@ -292,7 +292,7 @@ def _results(path: Path, mode: Any) -> Any:
         raise DataFileError(f"{path}: the description of its results is damaged ({error}); {ANEW}") from error
 
 
-def _check_columns(path: Path, group: Any, work: Work) -> None:
+def _check_columns(path: Path, group: Any, work: ChunkedWork) -> None:
     """Refuse columns whose description was altered: their type and shape follow from the work."""
     places = work.bounds(work.n_chunks() - 1)[1]
     for name, item in work.columns().items():
@@ -305,7 +305,7 @@ def _check_columns(path: Path, group: Any, work: Work) -> None:
             raise DataFileError(f"{path}: the description of column {name!r} was altered; {ANEW}")
 
 
-def _whole(group: Any, work: Work) -> dict[str, NDArray[Any]]:
+def _whole(group: Any, work: ChunkedWork) -> dict[str, NDArray[Any]]:
     """All columns; none where a chunk is damaged: that comes up as almost anything from the codecs."""
     try:
         return {name: np.asarray(group[name][...]) for name in work.columns()}

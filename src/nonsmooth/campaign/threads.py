@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.campaign.work import Work
+from nonsmooth.campaign.work import ChunkedWork
 from nonsmooth.kernels.hybrid.stopping import obey
 
 T = TypeVar("T")
@@ -26,7 +26,7 @@ def cores() -> int:
 
 
 def on_threads(
-    work: Work,
+    work: ChunkedWork,
     chunks: Iterable[int],
     done: Callable[[int, Mapping[str, NDArray[Any]]], None],
     threads: int | None = None,

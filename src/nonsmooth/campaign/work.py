@@ -20,14 +20,14 @@ LISTED = 40  # bytes of a chunk's number in a list
 
 
 @dataclass(frozen=True)
-class Column:
+class ColumnType:
     """One result per place: its type and the shape of one entry."""
 
     dtype: str
     shape: tuple[int, ...] = ()
 
 
-class Work(Protocol):
+class ChunkedWork(Protocol):
     """Places, cut into chunks; chunk k holds the places from ``bounds(k)[0]`` up to ``bounds(k)[1]``, from k alone.
 
     ``describe`` is everything that the outcome depends on, as plain data (JSON): two works with equal descriptions
@@ -38,7 +38,7 @@ class Work(Protocol):
     @property
     def device(self) -> str: ...
 
-    def columns(self) -> Mapping[str, Column]: ...
+    def columns(self) -> Mapping[str, ColumnType]: ...
 
     def n_chunks(self) -> int: ...
 
@@ -51,7 +51,7 @@ class Work(Protocol):
     def describe(self) -> Mapping[str, Any]: ...
 
 
-def check_room(work: Work, label: str) -> None:
+def check_room(work: ChunkedWork, label: str) -> None:
     """MemoryError where a work's columns over all places would not fit into memory."""
     chunks = work.n_chunks()
     width = sum(np.dtype(item.dtype).itemsize * int(np.prod(item.shape)) for item in work.columns().values())
@@ -59,7 +59,7 @@ def check_room(work: Work, label: str) -> None:
     room_for(width * size + LISTED * chunks, label or "the result", "ask for fewer points")
 
 
-def empty_columns(work: Work) -> dict[str, NDArray[Any]]:
+def empty_columns(work: ChunkedWork) -> dict[str, NDArray[Any]]:
     """Arrays for all places of a work."""
     chunks = work.n_chunks()
     size = work.bounds(chunks - 1)[1] if chunks else 0

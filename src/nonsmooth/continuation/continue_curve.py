@@ -12,7 +12,7 @@ from nonsmooth.continuation.branches.following import both_ways, dataset
 from nonsmooth.continuation.branches.reading import special_row
 from nonsmooth.continuation.branches.records import record_of
 from nonsmooth.continuation.events.codimension_two import KINDS, AlongCurve
-from nonsmooth.continuation.march.march import Limits, Row
+from nonsmooth.continuation.march.march import Limits, MarkedPoint
 from nonsmooth.continuation.problems.locus import Locus
 from nonsmooth.continuation.problems.orbits import size_of
 from nonsmooth.continuation.problems.shooting import Shooting
@@ -86,7 +86,7 @@ def continue_curve(
     allowed = tuple((i - 2, *allowed_range(start, names[i], *ends)) for i, ends in enumerate(box))
     policy = AlongCurve(kind, shooting.forced)
     within = Limits(allowed, step, points, locus.landmark(first))
-    record = both_ways(policy, within, first.turned(), [record_of(Row(first))], first)
+    record = both_ways(policy, within, first.turned(), [record_of(MarkedPoint(first))], first)
     options = {
         "ranges": {name: list(ends) for name, ends in zip(names, box, strict=True)},
         "step": step,

@@ -10,7 +10,7 @@ from nonsmooth.continuation.arguments import LargestStep, allowed_range, limits
 from nonsmooth.continuation.branches.following import both_ways, dataset
 from nonsmooth.continuation.branches.records import record_of
 from nonsmooth.continuation.events.of_equilibria import AlongEquilibria, beyond
-from nonsmooth.continuation.march.march import Limits, Row
+from nonsmooth.continuation.march.march import Limits, MarkedPoint
 from nonsmooth.continuation.problems.equilibrium import Rest, equilibria_near
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.mode_fields import MOST, every_mode
@@ -95,7 +95,7 @@ def continue_equilibrium(
         )
     box = ((-1, *allowed_range(system, parameter, low, high)),)
     policy, ahead = AlongEquilibria(), first.facing(1.0)
-    record = both_ways(policy, Limits(box, step, points), first.facing(-1.0), [record_of(Row(ahead))], ahead)
+    record = both_ways(policy, Limits(box, step, points), first.facing(-1.0), [record_of(MarkedPoint(ahead))], ahead)
     options = {
         "parameter": parameter,
         "range": (low, high),

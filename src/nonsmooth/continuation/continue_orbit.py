@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from nonsmooth.continuation.arguments import LargestStep
-from nonsmooth.continuation.branches.following import Asked, Start, curve_of
+from nonsmooth.continuation.branches.following import MarchOptions, Start, curve_of
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.branches.other_branches import born, straight_on, switched
 from nonsmooth.continuation.branches.reading import read_branch
 from nonsmooth.continuation.branches.records import record_of
-from nonsmooth.continuation.march.march import March, Row
+from nonsmooth.continuation.march.march import March, MarkedPoint
 from nonsmooth.errors import SolveError
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import Range, at_least
@@ -74,7 +74,7 @@ def continue_orbit(
     Pseudo-arclength continuation of the multiple-shooting equations in scaled unknowns. Special points are zeros of
     functions along the branch, found by Brent's method on orbits corrected to rounding.
     """
-    asked = Asked(range, step, points, virtual)
+    asked = MarchOptions(range, step, points, virtual)
     if isinstance(start, Orbit):
         return _from_orbit(start, parameter, asked)
     if hasattr(start, "data_vars"):
@@ -92,7 +92,7 @@ def continue_orbit(
     )
 
 
-def _from_orbit(orbit: Orbit, name: str | None, asked: Asked) -> xr.Dataset:
+def _from_orbit(orbit: Orbit, name: str | None, asked: MarchOptions) -> xr.Dataset:
     """The branch through an orbit, both ways."""
     system = orbit.system
     if name is None or asked.range is None:
@@ -110,11 +110,11 @@ def _from_orbit(orbit: Orbit, name: str | None, asked: Asked) -> xr.Dataset:
             status="no_convergence",
         )
     ahead = first.facing(1.0)
-    middle = [record_of(Row(ahead))]
+    middle = [record_of(MarkedPoint(ahead))]
     return branch.result(orbit.period_number, first.facing(-1.0), middle, ahead, closed=curve.landmark(first))
 
 
-def _go_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
+def _go_on(start: xr.Dataset, name: str | None, asked: MarchOptions) -> xr.Dataset:
     """Extend a branch at its open ends."""
     system, record = read_branch(start)
     if name is not None and name != record.parameter:

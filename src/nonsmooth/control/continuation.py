@@ -12,7 +12,7 @@ from nonsmooth.control.course import Course, course_of
 from nonsmooth.control.guard import Guard
 from nonsmooth.control.held import Held, Holder
 from nonsmooth.control.holding import Holding
-from nonsmooth.control.march import March, Point
+from nonsmooth.control.march import Continuation, MeasuredPoint
 from nonsmooth.control.outcome import Names, branch_dataset
 from nonsmooth.control.release import UNKNOWN
 from nonsmooth.control.release import release as let_go
@@ -132,7 +132,7 @@ def control_based_continuation(
     names = _names(rig)
     course = course_of(names, parameter, range, frequency, amplitude, direction)
     guard = Guard(rig, *holding.positions)
-    branch = _Branch(Holder(guard, holding, holding.mass_of(rig)), course, names)
+    branch = _MeasuredBranch(Holder(guard, holding, holding.mass_of(rig)), course, names)
     options = options_as_data({**asdict(course), "step": step, "points": points, "holding": asdict(holding)})
     record: dict[str, Any] = {"version": package_version(), "verb": "control_based_continuation"}
     record |= {"rig": type(rig).__name__, "options": options}
@@ -155,16 +155,16 @@ def control_based_continuation(
 
 
 @dataclass
-class _Branch:
+class _MeasuredBranch:
     """A branch as far as it has been measured, point by point."""
 
     holder: Holder
     course: Course
     names: Names
-    points: list[Point] = field(default_factory=list)
+    points: list[MeasuredPoint] = field(default_factory=list)
     released: list[tuple[int, float]] = field(default_factory=list)
     free: Held = field(init=False)
-    march: March = field(init=False)
+    march: Continuation = field(init=False)
 
     def begin(self) -> None:
         """Measure the motion at the beginning, without control."""
@@ -172,7 +172,7 @@ class _Branch:
         size, width = float(abs(self.free.position.c[1])), self.course.high - self.course.low
         self.holder.size = float(np.linalg.norm(self.free.position.c[1:]))
         tolerance = self.holder.holding.tolerance
-        self.march = March(self.holder, self.course.setting, self.course.of, width, size, tolerance)
+        self.march = Continuation(self.holder, self.course.setting, self.course.of, width, size, tolerance)
 
     def follow(self, step: float, most: int, advance: Callable[[], None]) -> str:
         """Measure points until the branch ends or there are enough; returns how it ended."""

@@ -12,7 +12,7 @@ SEEN = 4.0  # standard uncertainties
 
 
 @dataclass(frozen=True)
-class Series:
+class FourierSeries:
     """Coefficients c_0 ... c_H, and the standard uncertainty of each one's real and imaginary part."""
 
     c: ComplexArray
@@ -35,7 +35,7 @@ def mean_square(c: ComplexArray) -> float:
     return float(np.abs(c[0]) ** 2 + 0.5 * np.sum(np.abs(c[1:]) ** 2))
 
 
-def fitted(phase: FloatArray, values: FloatArray, harmonics: int) -> Series:
+def fitted(phase: FloatArray, values: FloatArray, harmonics: int) -> FourierSeries:
     """Fit the harmonics 0 ... H to samples over whole turns, by least squares.
 
     The uncertainties are from the scatter between turns, so that noise of any colour, drift, and motion that does not
@@ -54,4 +54,4 @@ def fitted(phase: FloatArray, values: FloatArray, harmonics: int) -> Series:
     rows[:, 1:] *= 2.0
     spread = np.sqrt(np.sum(np.abs(rows) ** 2, axis=0) / max(turns - 1, 1) / turns)
     spread[1:] /= np.sqrt(2.0)  # of each part
-    return Series(c, spread)
+    return FourierSeries(c, spread)

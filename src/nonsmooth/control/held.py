@@ -9,7 +9,7 @@ import numpy as np
 from nonsmooth.arrays import ComplexArray
 from nonsmooth.control.controller import Controller, Samples
 from nonsmooth.control.guard import Guard
-from nonsmooth.control.harmonics import Series, fitted, mean_square
+from nonsmooth.control.harmonics import FourierSeries, fitted, mean_square
 from nonsmooth.control.holding import Holding
 
 REPEATS = 0.01  # scatter of the first harmonic over its size: beyond it a motion is not of the drive's period
@@ -23,8 +23,8 @@ class Held:
     frequency: float
     amplitude: float
     reference: ComplexArray
-    position: Series
-    force: Series
+    position: FourierSeries
+    force: FourierSeries
     force_rms: float
 
     @property

@@ -26,7 +26,7 @@ NOISE = 1.5  # of the effort over that of noise alone, at convergence
 
 
 @dataclass(frozen=True)
-class Point:
+class MeasuredPoint:
     """A converged point: the unknowns (scaled), what was measured, and how it came about."""
 
     y: FloatArray  # parameter, c_0, real parts of c_1 ... c_H, imaginary parts
@@ -38,7 +38,7 @@ class Point:
 
 
 @dataclass
-class March:
+class Continuation:
     """A continuation: the scales of its unknowns, and the derivatives as they are known."""
 
     holder: Holder
@@ -69,7 +69,7 @@ class March:
         least = self.tolerance * self.holder.stiffness(held.frequency) * self.size
         return held.repeats and held.effort <= max(NOISE * held.effort_noise, least)
 
-    def start(self, free: Held) -> Point:
+    def start(self, free: Held) -> MeasuredPoint:
         """The first point, at a stable motion that was measured without control; measures the derivatives."""
         y = np.concatenate([[self.of(free) / self.scale], self.unknowns(free.position.c)])
         y, here, held = self.measure(y)
@@ -82,11 +82,11 @@ class March:
         first = held.effort
         self._probe(y, here, PROBE)
         found = self._correct(y, self.plane[0], y, LONGEST, (y, here))
-        return found or Point(y, here, held, 1, first, self.J.copy())
+        return found or MeasuredPoint(y, here, held, 1, first, self.J.copy())
 
     def points(
-        self, first: Point, step: float, inside: Callable[[float], bool], rising: bool
-    ) -> Generator[Point, None, str]:
+        self, first: MeasuredPoint, step: float, inside: Callable[[float], bool], rising: bool
+    ) -> Generator[MeasuredPoint, None, str]:
         """Points along the branch, until the parameter leaves its range or no step is small enough; returns which."""
         last = first
         tangent = self._tangent(1.0 if rising else -1.0)
@@ -107,7 +107,9 @@ class March:
             length = min(step, length * (1.5 if found.measurements <= 4 else 0.8))
         return "lost"
 
-    def _next(self, last: Point, target: FloatArray, tangent: FloatArray, length: float) -> Point | None:
+    def _next(
+        self, last: MeasuredPoint, target: FloatArray, tangent: FloatArray, length: float
+    ) -> MeasuredPoint | None:
         """The point on a plane through the target: first across the branch, then, past a corner, across the motion."""
         across = self.plane @ tangent
         found = self._correct(target, across @ self.plane, target, length, (last.y, last.mismatch))
@@ -138,7 +140,7 @@ class March:
         target: FloatArray,
         longest: float,
         before: tuple[FloatArray, FloatArray],
-    ) -> Point | None:
+    ) -> MeasuredPoint | None:
         """Measure and correct, on the plane through ``target`` across a direction, until the control force vanishes.
 
         No correction is longer than ``longest``; ``before`` is another place with its mismatch.
@@ -152,7 +154,7 @@ class March:
                 self.J += np.outer(change - self.J @ moved, moved) / size
             before = (y, mismatch)
             if self.converged(held):
-                return Point(y, mismatch, held, k + 1, first, self.J.copy())
+                return MeasuredPoint(y, mismatch, held, k + 1, first, self.J.copy())
             system = np.vstack([self.J, across])
             move = np.linalg.lstsq(system, np.append(-mismatch, across @ (target - y)), rcond=None)[0]
             y = y + move * min(1.0, longest / max(float(np.linalg.norm(self.plane @ move)), 1e-300))

@@ -10,7 +10,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.control.harmonics import values_at
-from nonsmooth.control.march import March, Point
+from nonsmooth.control.march import Continuation, MeasuredPoint
 from nonsmooth.control.release import STABLE, UNKNOWN, UNSTABLE
 from nonsmooth.results.labels import labelled
 
@@ -45,8 +45,8 @@ class Names:
 
 
 def branch_dataset(
-    march: March,
-    points: Sequence[Point],
+    march: Continuation,
+    points: Sequence[MeasuredPoint],
     released: Sequence[tuple[int, float]],
     names: Names,
     parameter: str,
@@ -141,7 +141,7 @@ def _motion(c: Any, frequency: float) -> tuple[FloatArray, FloatArray, FloatArra
     return np.array([x[0], v[0]]), np.array([x.max(), v.max()]), np.array([x.min(), v.min()])
 
 
-def _uncertainties(march: March, point: Point) -> tuple[float, float]:
+def _uncertainties(march: Continuation, point: MeasuredPoint) -> tuple[float, float]:
     """Standard uncertainties of the amplitude at this parameter, and of the parameter at this amplitude.
 
     What is left of the mismatch, and the noise of the measured harmonics, through the measured derivatives. At a fold
@@ -183,7 +183,7 @@ def _beside_folds(size: FloatArray, along: FloatArray, across: FloatArray) -> Fl
 
 
 def _folds(
-    march: March, points: Sequence[Point], along: FloatArray, across: FloatArray
+    march: Continuation, points: Sequence[MeasuredPoint], along: FloatArray, across: FloatArray
 ) -> list[tuple[float, float, int]]:
     """Turning points of the parameter: value, standard uncertainty, nearest point.
 

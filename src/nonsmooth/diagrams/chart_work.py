@@ -10,7 +10,7 @@ import numpy as np
 
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.attractors.settler import Settler
-from nonsmooth.campaign.work import CHUNK, Column
+from nonsmooth.campaign.work import CHUNK, ColumnType
 from nonsmooth.diagrams.chart_rows import along_rows
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.kernels.hybrid import codes
@@ -68,22 +68,22 @@ class ChartWork:
     def device(self) -> str:
         return self.settler.device
 
-    def columns(self) -> dict[str, Column]:
+    def columns(self) -> dict[str, ColumnType]:
         many = () if len(self.starts) == 1 else (len(self.starts),)
         n = self.starts.shape[1]
         found = {
-            "period_number": Column("i2", many),
-            "status": Column("i1", many),
-            "crossings_per_period": Column("f8", many),
-            "contacts_per_period": Column("f8", many),
+            "period_number": ColumnType("i2", many),
+            "status": ColumnType("i1", many),
+            "crossings_per_period": ColumnType("f8", many),
+            "contacts_per_period": ColumnType("f8", many),
         }
         if self.settler.extremes:
-            found |= {"maximum": Column("f8", (*many, n)), "minimum": Column("f8", (*many, n))}
+            found |= {"maximum": ColumnType("f8", (*many, n)), "minimum": ColumnType("f8", (*many, n))}
         if self.lyapunov:
-            found |= {"lyapunov": Column("f8", many), "lyapunov_error": Column("f8", many)}
-        found |= {name: Column("f8", many) for name in self.loads}
+            found |= {"lyapunov": ColumnType("f8", many), "lyapunov_error": ColumnType("f8", many)}
+        found |= {name: ColumnType("f8", many) for name in self.loads}
         if many:
-            found["n_attractors"] = Column("i2")
+            found["n_attractors"] = ColumnType("i2")
         return found
 
     def n_chunks(self) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.flow.engines.devices import batch_size
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
-from nonsmooth.flow.engines.launches import States
+from nonsmooth.flow.engines.launches import StatesOnGpu
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.linear_cuda import PlanarOnGpu
 from nonsmooth.kernels.hybrid.kept import Section
@@ -66,7 +66,7 @@ def _batch(
     n = len(points)
     gpu = PlanarOnGpu(engine, points, Section())
     module, to_device = gpu.growth(), gpu.cuda.to_device
-    states = States.of(gpu.cuda, np.arange(n), np.tile(start, (n, 1)), np.zeros((n, 0)), mode, np.zeros((n, 3)))
+    states = StatesOnGpu.of(gpu.cuda, np.arange(n), np.tile(start, (n, 1)), np.zeros((n, 0)), mode, np.zeros((n, 3)))
     status = np.zeros(n, dtype=np.int64)
     jobs = np.arange(n)
     if wait > align:

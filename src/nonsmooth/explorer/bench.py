@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from nonsmooth.explorer.labels import html_of, number, plain_of, symbols_of
 from nonsmooth.explorer.recorded import (
     LARGEST,
-    Recorded,
-    Samples,
+    RecordedFile,
+    RecordedStates,
     Setup,
     forcing_period,
     frequency_of,
@@ -26,15 +26,15 @@ from nonsmooth.explorer.work import periods_shown
 from nonsmooth.explorer.worker import Answer, Worker
 
 if TYPE_CHECKING:
-    from nonsmooth.explorer.session import Session
+    from nonsmooth.explorer.session import Page
 
 
 class Bench:
     """The recording of a page. Reading and fitting run in a process of their own, so that the views go on."""
 
-    def __init__(self, page: Session) -> None:
+    def __init__(self, page: Page) -> None:
         self.page = page
-        self.recorded: Recorded | None = None
+        self.recorded: RecordedFile | None = None
         self.setup: Setup | None = None
         self.laid: Mapping[str, Any] | None = None
         self.doing, self._fraction = "", 0.0
@@ -43,7 +43,7 @@ class Bench:
         self._worker: Worker | None = None
         self._unticked: set[str] = set()
         self._told: list[tuple[str, str]] = []
-        self._samples: tuple[Setup, Samples | None] | None = None
+        self._samples: tuple[Setup, RecordedStates | None] | None = None
 
     @property
     def actions(self) -> dict[str, Callable[[str, Any], object]]:
@@ -167,7 +167,7 @@ class Bench:
             self._has_fitted(content[0])
         self.page.refresh()
 
-    def _has_read(self, recorded: Recorded) -> None:
+    def _has_read(self, recorded: RecordedFile) -> None:
         self.recorded = recorded
         self.page.notes.pop("recording", None)
         self.arrange()
@@ -195,7 +195,7 @@ class Bench:
         self._unticked = set(times) | {name for name, one in system.parameters.items() if one.unit == "kg"}
         self.setup = None if self.recorded is None else matched(self.recorded, system)
 
-    def samples(self) -> Samples | None:
+    def samples(self) -> RecordedStates | None:
         """The recorded states in the units of the model."""
         if self.recorded is None or self.setup is None:
             return None

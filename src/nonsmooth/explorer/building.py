@@ -18,7 +18,7 @@ from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.explorer.state import number_of
 
 if TYPE_CHECKING:
-    from nonsmooth.explorer.session import Session
+    from nonsmooth.explorer.session import Page
     from nonsmooth.system.system import System
 
 _MOST = 4  # masses, and elements
@@ -26,7 +26,7 @@ _KEPT = 50  # models that a page may have made
 
 
 @dataclass(frozen=True)
-class Quantity:
+class FormNumber:
     """A number of the form: what a person reads, its unit, its first value, and the letter of its parameter."""
 
     label: str
@@ -38,42 +38,42 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Kind:
+class ElementKind:
     """A kind of element: what a person reads, its name in ``nonsmooth.elements``, and its arguments."""
 
     label: str
     element: str
-    arguments: Mapping[str, Quantity]
+    arguments: Mapping[str, FormNumber]
     sided: bool = False
 
 
 #: Of a mass: its own, and of the spring, the damper and the force at it.
-LINK: Mapping[str, Quantity] = {
-    "m": Quantity("mass", "kg", 1.0, "m", least=1e-12),
-    "k": Quantity("stiffness", "N/m", 1.0, "k", least=0.0),
-    "c": Quantity("damping", "N s/m", 0.1, "c", least=0.0),
-    "F": Quantity("force", "N", 0.0, "F"),
+LINK: Mapping[str, FormNumber] = {
+    "m": FormNumber("mass", "kg", 1.0, "m", least=1e-12),
+    "k": FormNumber("stiffness", "N/m", 1.0, "k", least=0.0),
+    "c": FormNumber("damping", "N s/m", 0.1, "c", least=0.0),
+    "F": FormNumber("force", "N", 0.0, "F"),
 }
-_OMEGA = Quantity("forcing frequency", "rad/s", 1.0, "omega", least=1e-9)
-_POSITION = {"position": Quantity("position", "m", 0.5, "d")}
-_STIFFNESS = {"stiffness": Quantity("stiffness", "N/m", 20.0, "s", least=0.0)}
-_RESTITUTION = {"restitution": Quantity("restitution", "1", 0.7, "e", least=0.0, most=1.0)}
-_DAMPING = {"damping": Quantity("damping", "N s/m", 0.1, "b", least=0.0)}
-_FRICTION = {"friction": Quantity("friction force", "N", 0.2, "f", least=0.0)}
-_BELT = {"belt": Quantity("speed of the ground", "m/s", 0.0, "w")}
-_PLAY = {"half_width": Quantity("half width", "m", 0.2, "h", least=0.0)}
-_PRELOAD = {"preload": Quantity("preload", "N", 0.2, "P")}
-KINDS: Mapping[str, Kind] = {
-    "stop": Kind("rigid stop", "Stop", _POSITION | _RESTITUTION, sided=True),
-    "elastic": Kind("elastic stop", "ElasticStop", _POSITION | _STIFFNESS | _DAMPING, sided=True),
-    "friction": Kind("dry friction", "Coulomb", _FRICTION | _BELT),
-    "backlash": Kind("backlash", "Backlash", _PLAY | _STIFFNESS),
-    "preloaded": Kind("preloaded spring", "PreloadedSpring", _PRELOAD | _STIFFNESS),
+_OMEGA = FormNumber("forcing frequency", "rad/s", 1.0, "omega", least=1e-9)
+_POSITION = {"position": FormNumber("position", "m", 0.5, "d")}
+_STIFFNESS = {"stiffness": FormNumber("stiffness", "N/m", 20.0, "s", least=0.0)}
+_RESTITUTION = {"restitution": FormNumber("restitution", "1", 0.7, "e", least=0.0, most=1.0)}
+_DAMPING = {"damping": FormNumber("damping", "N s/m", 0.1, "b", least=0.0)}
+_FRICTION = {"friction": FormNumber("friction force", "N", 0.2, "f", least=0.0)}
+_BELT = {"belt": FormNumber("speed of the ground", "m/s", 0.0, "w")}
+_PLAY = {"half_width": FormNumber("half width", "m", 0.2, "h", least=0.0)}
+_PRELOAD = {"preload": FormNumber("preload", "N", 0.2, "P")}
+KINDS: Mapping[str, ElementKind] = {
+    "stop": ElementKind("rigid stop", "Stop", _POSITION | _RESTITUTION, sided=True),
+    "elastic": ElementKind("elastic stop", "ElasticStop", _POSITION | _STIFFNESS | _DAMPING, sided=True),
+    "friction": ElementKind("dry friction", "Coulomb", _FRICTION | _BELT),
+    "backlash": ElementKind("backlash", "Backlash", _PLAY | _STIFFNESS),
+    "preloaded": ElementKind("preloaded spring", "PreloadedSpring", _PRELOAD | _STIFFNESS),
 }
 
 
 @dataclass(frozen=True)
-class Plan:
+class MassChain:
     """A chain of masses, each joined to the one before it (the first to the ground) by a spring and a damper.
 
     Attributes
@@ -166,7 +166,7 @@ class Plan:
         return "\n".join([*lines, f'    name="{self.name}",', ")"]) + "\n"
 
 
-def read_plan(form: Mapping[str, Any]) -> Plan:
+def read_plan(form: Mapping[str, Any]) -> MassChain:
     """The plan of a form: texts of ``masses``, ``elements`` and ``omega``.
 
     Raises
@@ -178,7 +178,7 @@ def read_plan(form: Mapping[str, Any]) -> Plan:
     elements = []
     for i, row in enumerate(form["elements"], 1):
         where, kind = f"element {i}", KINDS[row["kind"]]
-        at, other = (int(_number(row.get(key, 0), Quantity(key, "", 0, ""), where)) for key in ("at", "other"))
+        at, other = (int(_number(row.get(key, 0), FormNumber(key, "", 0, ""), where)) for key in ("at", "other"))
         if not (0 < at <= len(links) and 0 <= other <= len(links)):
             raise ValueError(f"{where}: there is no mass {max(at, other)}")
         if at == other:
@@ -187,14 +187,14 @@ def read_plan(form: Mapping[str, Any]) -> Plan:
         if kind.sided:
             given["side"] = -1 if row.get("side") == "below" else 1
         elements.append((row["kind"], given, _numbers(kind.arguments, row, where)))
-    return Plan(links, tuple(elements), _number(form["omega"], _OMEGA, "the force"))
+    return MassChain(links, tuple(elements), _number(form["omega"], _OMEGA, "the force"))
 
 
-def _numbers(quantities: Mapping[str, Quantity], row: Mapping[str, Any], where: str) -> dict[str, float]:
+def _numbers(quantities: Mapping[str, FormNumber], row: Mapping[str, Any], where: str) -> dict[str, float]:
     return {key: _number(row.get(key, one.value), one, where) for key, one in quantities.items()}
 
 
-def _number(value: Any, quantity: Quantity, where: str) -> float:
+def _number(value: Any, quantity: FormNumber, where: str) -> float:
     number = number_of(value, f"{where}, {quantity.label}")
     if not quantity.least <= number <= quantity.most:
         limits = f"at least {quantity.least:g}" + (f" and at most {quantity.most:g}" if quantity.most < np.inf else "")
@@ -228,7 +228,7 @@ class _Names:
 class Workshop:
     """Models that were made in a page, as "built 1", "built 2" and so on, and what stands in the form of the next."""
 
-    def __init__(self, page: Session) -> None:
+    def __init__(self, page: Page) -> None:
         self.page = page
         self._made: dict[str, str] = {}  # the name of a model, by its Python
         self._python, self._shown = "", 0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from nonsmooth import models
 from nonsmooth.explorer.kinds import USUAL
-from nonsmooth.explorer.state import State, from_query
+from nonsmooth.explorer.state import PageState, from_query
 from nonsmooth.studies import installed, study
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ GIVEN = "given"  # the name of a model of one's own
 
 
 @cache
-def presets_of(model: str) -> Mapping[str, State]:
+def presets_of(model: str) -> Mapping[str, PageState]:
     """Named views of a model, by the studies that are installed: the figures of the paper for its oscillator."""
     views = {name: view for one in installed() for name, view in study(one, "views").VIEWS.get(model, {}).items()}
     if not views:
@@ -34,7 +34,7 @@ def presets_of(model: str) -> Mapping[str, State]:
     return found
 
 
-def first_state(model: str, system: System) -> State:
+def first_state(model: str, system: System) -> PageState:
     """A view of a system at its own parameters, over the parameter that is usually varied."""
     names, states = list(system.parameters), list(system.states)
     values = {name: float(system.values[name]) for name in names}
@@ -46,7 +46,7 @@ def first_state(model: str, system: System) -> State:
     likely = (f"v_{states[0]}", states[0].replace("x", "v", 1), "v", *states[1:], states[0])
     y = next(name for name in likely if name in (states[1:] or states))
     start = tuple(0.0 if system.period() is not None else 0.1 * s for s in system.scale_vector())
-    return State(
+    return PageState(
         model=model,
         values=values,
         over=over,
@@ -118,11 +118,11 @@ class Catalogue:
             self._texts[name] = self.system(name).to_text()
         return self._texts[name]
 
-    def first_state(self, name: str) -> State:
+    def first_state(self, name: str) -> PageState:
         """The first view of a model."""
         return first_state(name, self.system(name))
 
-    def state_of(self, pairs: Sequence[tuple[str, str]]) -> State:
+    def state_of(self, pairs: Sequence[tuple[str, str]]) -> PageState:
         """The state that a page's address describes; the first model's first view where it says nothing."""
         default = GIVEN if GIVEN in self._makers else PAPER
         name = next((value for key, value in pairs if key == "model"), default)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from nonsmooth.explorer.labels import plain_of, symbols_of
 
 if TYPE_CHECKING:
-    from nonsmooth.explorer.state import State
+    from nonsmooth.explorer.state import PageState
     from nonsmooth.system.system import System
 
 #: What is varied first, where a model has it.
@@ -19,7 +19,7 @@ USUAL = ("rho", "omega", "A", "g", "alpha", "mu", "r", "q", "v_b", "V_in", "gamm
 
 
 @dataclass(frozen=True)
-class Setting:
+class ViewSetting:
     """A value that a page holds for one view.
 
     Attributes
@@ -35,8 +35,8 @@ class Setting:
     """
 
     label: str
-    default: Callable[[System, State], float | str | None]
-    choices: Callable[[System, State], Mapping[str, str]] | None = None
+    default: Callable[[System, PageState], float | str | None]
+    choices: Callable[[System, PageState], Mapping[str, str]] | None = None
     also: tuple[str, ...] = ()
 
 
@@ -65,26 +65,26 @@ class Kind:
     slow: tuple[str, ...] = ()
     saved: tuple[str, str] | None = None
     axes: Mapping[str, str] = field(default_factory=dict)
-    settings: Mapping[str, Setting] = field(default_factory=dict)
+    settings: Mapping[str, ViewSetting] = field(default_factory=dict)
 
 
-def _parameters(system: System, state: State) -> dict[str, str]:
+def _parameters(system: System, state: PageState) -> dict[str, str]:
     return {name: plain_of(symbols_of(system)[name]) for name in system.parameters}
 
 
-def _others(system: System, state: State) -> dict[str, str]:
+def _others(system: System, state: PageState) -> dict[str, str]:
     return {name: text for name, text in _parameters(system, state).items() if name != state.over}
 
 
-def _other(system: System, state: State) -> str:
+def _other(system: System, state: PageState) -> str:
     others = _others(system, state)
     return next((name for name in (*USUAL, *others) if name in others), "")
 
 
-def _across(factor: float) -> Callable[[System, State], float]:
+def _across(factor: float) -> Callable[[System, PageState], float]:
     """Around the model's own value, so that the range stays while the parameter is moved."""
 
-    def default(system: System, state: State) -> float:
+    def default(system: System, state: PageState) -> float:
         own = float(system.values.get(setting("chart.across", system, state), 0.0))
         return own + factor * (abs(own) or 1.0)
 
@@ -101,10 +101,10 @@ def _frequency(system: System) -> str:
     return str(next(iter(system.parameters)))
 
 
-def _response(factor: float, end: str) -> Callable[[System, State], float]:
+def _response(factor: float, end: str) -> Callable[[System, PageState], float]:
     """Around the value, by powers of two of the model's own: the range stays while the parameter is moved."""
 
-    def default(system: System, state: State) -> float:
+    def default(system: System, state: PageState) -> float:
         name = setting("response.over", system, state)
         if name == state.over:
             return float(getattr(state, end))
@@ -130,7 +130,7 @@ KINDS: Mapping[str, Kind] = {
         saved=("branches", "bifurcation_diagram"),
         axes={"y": "shown"},
         settings={
-            "branches.show": Setting(
+            "branches.show": ViewSetting(
                 "branches", lambda system, state: "no", lambda system, state: {"no": "hidden", "yes": "shown"}
             ),
         },
@@ -143,11 +143,11 @@ KINDS: Mapping[str, Kind] = {
         ("response", "frequency_response"),
         {"y": "shown"},
         {
-            "response.over": Setting(
+            "response.over": ViewSetting(
                 "over", lambda system, state: _frequency(system), _parameters, ("response.low", "response.high")
             ),
-            "response.low": Setting("from", _response(0.5, "low")),
-            "response.high": Setting("to", _response(1.5, "high")),
+            "response.low": ViewSetting("from", _response(0.5, "low")),
+            "response.high": ViewSetting("to", _response(1.5, "high")),
         },
     ),
     "chart": Kind(
@@ -157,9 +157,9 @@ KINDS: Mapping[str, Kind] = {
         ("chart", "exponents", "fine chart"),
         ("chart", "chart"),
         settings={
-            "chart.across": Setting("and", _other, _others, ("chart.low", "chart.high")),
-            "chart.low": Setting("from", _across(-0.4)),
-            "chart.high": Setting("to", _across(0.4)),
+            "chart.across": ViewSetting("and", _other, _others, ("chart.low", "chart.high")),
+            "chart.low": ViewSetting("from", _across(-0.4)),
+            "chart.high": ViewSetting("to", _across(0.4)),
         },
     ),
     "basins": Kind(
@@ -169,7 +169,7 @@ KINDS: Mapping[str, Kind] = {
         ("basins", "fine basins"),
         ("basins", "basins"),
         settings={
-            f"basins.{end}": Setting("", lambda system, state: None) for end in ("left", "right", "bottom", "top")
+            f"basins.{end}": ViewSetting("", lambda system, state: None) for end in ("left", "right", "bottom", "top")
         },
     ),
     "mechanism": Kind(quick=("sketch",)),
@@ -188,7 +188,7 @@ ORDER = {stage: name for name, kind in KINDS.items() for stage in kind.quick} | 
 }
 
 
-def setting(name: str, system: System, state: State) -> Any:
+def setting(name: str, system: System, state: PageState) -> Any:
     """The value of a setting; its default where the page holds none, or a word that is no choice."""
     one, value = SETTINGS[name], state.settings.get(name)
     if value is None or (one.choices is not None and value not in one.choices(system, state)):

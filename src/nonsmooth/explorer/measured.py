@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 from nonsmooth.errors import SolveError
-from nonsmooth.explorer.recorded import Channel, Recorded, Samples
+from nonsmooth.explorer.recorded import Channel, RecordedFile, RecordedStates
 from nonsmooth.identification.compare.orbits import fold
 from nonsmooth.identification.fit.first_windows import rates
 from nonsmooth.recordings.load import parse_recording
@@ -45,7 +45,7 @@ def read(job: Mapping[str, Any]) -> dict[str, Any]:
             for leaf in node.children.values()
             for channel, array in leaf.to_dataset().data_vars.items()
         }
-    return {"recorded": Recorded(name, runs, tuple(recording.warnings), recording.synthetic, axis)}
+    return {"recorded": RecordedFile(name, runs, tuple(recording.warnings), recording.synthetic, axis)}
 
 
 def laid_over(job: Job) -> dict[str, Any]:
@@ -191,7 +191,7 @@ def strand_distance(
 
 def fitted(job: Job) -> dict[str, Any]:
     """The parameters that the recording tells, by ``nonsmooth.fit``, with sentences on what it does not tell."""
-    samples: Samples = job["samples"]
+    samples: RecordedStates = job["samples"]
     step = -(-len(samples.time) // _FITTED)
     take = slice(None, None, step)
     table = {
@@ -214,7 +214,7 @@ def fitted(job: Job) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=2)
-def _with_rates(text: str, samples: Samples) -> dict[str, FloatArray]:
+def _with_rates(text: str, samples: RecordedStates) -> dict[str, FloatArray]:
     """Columns by state: those recorded, and velocities of recorded positions."""
     from nonsmooth.recordings.signals.smoothing import smooth
 

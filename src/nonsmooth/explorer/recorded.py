@@ -33,7 +33,7 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class RecordedFile:
     """A file that was dropped into the page, as the worker has read it.
 
     Attributes
@@ -84,7 +84,7 @@ class Setup:
         """State to channel, of those that are shown."""
         return {state: one.channel for state, one in self.states.items() if one.channel}
 
-    def changed(self, name: str, value: Any, recorded: Recorded, system: System) -> Setup:
+    def changed(self, name: str, value: Any, recorded: RecordedFile, system: System) -> Setup:
         """The same with another value of a field: ``run``, ``turns``, ``begin``, ``end``, ``channel.STATE``, ....
 
         Raises
@@ -119,7 +119,7 @@ class Setup:
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class RecordedStates:
     """Recorded states of a model, for the worker.
 
     Attributes
@@ -144,13 +144,13 @@ class Samples:
         object.__setattr__(self, "key", digest.hexdigest())
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Samples) and self.key == other.key
+        return isinstance(other, RecordedStates) and self.key == other.key
 
     def __hash__(self) -> int:
         return hash(self.key)
 
 
-def matched(recorded: Recorded, system: System, run: str = "") -> Setup:
+def matched(recorded: RecordedFile, system: System, run: str = "") -> Setup:
     """The setup that names and units suggest."""
     run = run or next(iter(recorded.runs))
     channels = recorded.runs[run]
@@ -180,7 +180,7 @@ def matched(recorded: Recorded, system: System, run: str = "") -> Setup:
     return Setup(run, shown, turns, float(begin), float(end))
 
 
-def samples_of(recorded: Recorded, setup: Setup) -> Samples | None:
+def samples_of(recorded: RecordedFile, setup: Setup) -> RecordedStates | None:
     """The piece in use, in the states' units; at most the last ``_MOST`` samples. None where no state is shown."""
     channels = recorded.runs[setup.run]
     if not setup.channels or recorded.axis != "time":
@@ -195,11 +195,11 @@ def samples_of(recorded: Recorded, setup: Setup) -> Samples | None:
         values = channels[name].values[inside]
         column[np.searchsorted(time, own[inside])] = setup.states[state].factor * values + setup.states[state].shift
         columns[state] = column
-    return Samples(time, columns, channels[setup.turns].time if setup.turns else np.empty(0))
+    return RecordedStates(time, columns, channels[setup.turns].time if setup.turns else np.empty(0))
 
 
 def response_points(
-    recorded: Recorded, setup: Setup, system: System, values: Mapping[str, float], over: str, state: str
+    recorded: RecordedFile, setup: Setup, system: System, values: Mapping[str, float], over: str, state: str
 ) -> tuple[FloatArray, FloatArray]:
     """Measured response of a state: values of the parameter that sets the forcing period, and amplitudes.
 
@@ -256,7 +256,7 @@ def forcing_period(system: System, values: Mapping[str, float]) -> float | None:
     return period if period is not None and 0 < period < math.inf else None
 
 
-def unlike(recorded: Recorded, setup: Setup, system: System) -> list[str]:
+def unlike(recorded: RecordedFile, setup: Setup, system: System) -> list[str]:
     """Sentences on channels whose unit is not the state's, while their factor is still 1."""
     channels = recorded.runs[setup.run]
     return [

@@ -12,7 +12,7 @@ from nonsmooth.explorer.kinds import ORDER, QUICK
 from nonsmooth.explorer.worker import Answer, Worker
 
 if TYPE_CHECKING:
-    from nonsmooth.explorer.session import Session
+    from nonsmooth.explorer.session import Page
 
 _PATIENCE = 1.0  # seconds after which short work is cancelled like any other
 _DEAF = 10.0  # seconds in which cancelled work must end by itself
@@ -41,9 +41,9 @@ class Asked:
 
 
 class Schedule:
-    """Requests of one page (a :class:`nonsmooth.explorer.session.Session`) and their answers."""
+    """Requests of one page (a :class:`nonsmooth.explorer.session.Page`) and their answers."""
 
-    def __init__(self, page: Session) -> None:
+    def __init__(self, page: Page) -> None:
         self.page = page
         self.done: dict[str, str] = {}  # of each view the key of the request whose answer is shown
         self._failed: dict[str, str] = {}

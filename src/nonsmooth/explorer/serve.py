@@ -15,7 +15,7 @@ from nonsmooth.errors import not_installed
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.catalogue import Catalogue
-    from nonsmooth.explorer.session import Session
+    from nonsmooth.explorer.session import Page
     from nonsmooth.system.system import System
 
 PORT = 5180
@@ -99,10 +99,10 @@ def explore(
             server.stop()
 
 
-def _open(catalogue: Catalogue, query: str, tabs: list[Session], document: Any) -> None:
-    from nonsmooth.explorer.session import Session
+def _open(catalogue: Catalogue, query: str, tabs: list[Page], document: Any) -> None:
+    from nonsmooth.explorer.session import Page
 
-    Session(document, catalogue.copy(), query, tabs)
+    Page(document, catalogue.copy(), query, tabs)
 
 
 def _free(port: int | None) -> int:

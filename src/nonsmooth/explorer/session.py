@@ -27,7 +27,7 @@ from nonsmooth.explorer.kinds import PANELS
 from nonsmooth.explorer.schedule import Schedule, key_of
 from nonsmooth.explorer.sheet import Sheet
 from nonsmooth.explorer.sketch import equations_of
-from nonsmooth.explorer.state import History, State, changed
+from nonsmooth.explorer.state import History, PageState, changed
 from nonsmooth.explorer.worker import Answer
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ TEXTS = (
 )
 
 
-class Session:
+class Page:
     """The page of one browser tab.
 
     Parameters
@@ -61,17 +61,17 @@ class Session:
         The models that it offers.
     query : str
         The view to begin with, where the page's own address holds none.
-    tabs : list of Session
+    tabs : list of Page
         The pages that are open, for each to say how many share the machine.
     """
 
-    def __init__(self, document: Any, catalogue: Catalogue, query: str, tabs: list[Session]) -> None:
+    def __init__(self, document: Any, catalogue: Catalogue, query: str, tabs: list[Page]) -> None:
         self.document, self.catalogue, self.tabs = document, catalogue, tabs
         self.dark = self.large = False
         self._saved = 0
         self._heard = 0  # number of the page's last message
         self.notes: dict[str, str] = {}
-        self._refused: dict[str, tuple[State, str]] = {}  # of a note on a wrong value the state that stayed
+        self._refused: dict[str, tuple[PageState, str]] = {}  # of a note on a wrong value the state that stayed
         self._say = {name: TextInput(name=name) for name in CHANNELS}
         self._act = TextInput(name="act")
         self.past = History(self._first(query))
@@ -83,7 +83,7 @@ class Session:
         self.refresh()
 
     @property
-    def state(self) -> State:
+    def state(self) -> PageState:
         """The state that the page shows."""
         return self.past.state
 
@@ -102,7 +102,7 @@ class Session:
         """The system's text, as the worker takes it."""
         return self.catalogue.text(self.state.model)
 
-    def _first(self, query: str) -> State:
+    def _first(self, query: str) -> PageState:
         context = self.document.session_context
         request = getattr(context, "request", None)
         arguments = getattr(request, "arguments", None) or {}
@@ -221,7 +221,7 @@ class Session:
         else:
             self.past.put(self._arranged(name, changed(self.state, name, value, list(self.system.states))), name)
 
-    def _arranged(self, name: str, state: State) -> State:
+    def _arranged(self, name: str, state: PageState) -> PageState:
         """Another parameter of the diagram takes a range of its own; a range keeps its order."""
         if name == "over":
             value = state.values[state.over]

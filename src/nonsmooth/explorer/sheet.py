@@ -11,37 +11,37 @@ from nonsmooth.explorer.catalogue import GIVEN, presets_of, slider_range
 from nonsmooth.explorer.kinds import KINDS, ORDER, SETTINGS, setting
 from nonsmooth.explorer.labels import html_of, plain_of, symbols_of
 from nonsmooth.explorer.state import CHOICES, to_query
-from nonsmooth.explorer.views.motion import History, Mechanism, Portrait, Readout, Section
+from nonsmooth.explorer.views.motion import Mechanism, Portrait, Readout, SectionPoints, TimeHistory
 from nonsmooth.explorer.views.over_parameters import Branches, Diagram, Response
 from nonsmooth.explorer.views.planes import Basins, Chart
-from nonsmooth.explorer.views.recording import Recording
-from nonsmooth.explorer.views.spectrum import Spectrum
+from nonsmooth.explorer.views.recording import RecordingOverlay
+from nonsmooth.explorer.views.spectrum import AmplitudeSpectrum
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.schedule import Asked
-    from nonsmooth.explorer.session import Session
+    from nonsmooth.explorer.session import Page
 
 #: Drawing of each of ``KINDS``; what draws into another's figure comes behind it.
 _VIEWS = (
     Portrait,
     Diagram,
-    Section,
+    SectionPoints,
     Readout,
-    History,
+    TimeHistory,
     Branches,
     Response,
     Chart,
     Basins,
-    Spectrum,
+    AmplitudeSpectrum,
     Mechanism,
-    Recording,
+    RecordingOverlay,
 )
 
 
 class Sheet:
     """Views and results of a page."""
 
-    def __init__(self, page: Session) -> None:
+    def __init__(self, page: Page) -> None:
         self.page, self.bench = page, Bench(page)
         self.views: dict[str, Any] = {}
         for one in _VIEWS:

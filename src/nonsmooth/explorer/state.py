@@ -32,7 +32,7 @@ _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\s*", re.ASCII | re.
 
 
 @dataclass(frozen=True)
-class State:
+class PageState:
     """The contents of a page.
 
     Attributes
@@ -53,7 +53,7 @@ class State:
     upper, plane, lower : str
         The view that each of these panels shows.
     settings : mapping
-        Of the views, by name (see :class:`nonsmooth.explorer.kinds.Setting`); what is not held is the default.
+        Of the views, by name (see :class:`nonsmooth.explorer.kinds.ViewSetting`); what is not held is the default.
     """
 
     model: str
@@ -77,22 +77,22 @@ class State:
     lower: str = "history"
     settings: Mapping[str, float | str] = field(default_factory=dict)
 
-    def with_value(self, name: str, value: float) -> State:
+    def with_value(self, name: str, value: float) -> PageState:
         """The same with another value of a parameter."""
         return replace(self, values={**self.values, name: value})
 
-    def but(self, field: str, value: Any) -> State:
+    def but(self, field: str, value: Any) -> PageState:
         """The same with another value of a field."""
         given: dict[str, Any] = {field: value}
         return replace(self, **given)
 
-    def with_settings(self, **values: float | str | None) -> State:
+    def with_settings(self, **values: float | str | None) -> PageState:
         """The same with other settings of views, ``view__setting``; None for the default."""
         found = {**self.settings, **{name.replace("__", "."): value for name, value in values.items()}}
         return replace(self, settings={name: value for name, value in found.items() if value is not None})
 
 
-def to_query(state: State) -> str:
+def to_query(state: PageState) -> str:
     """The state as the query of a URL; a parameter stands under its name with ``p.`` before it."""
     pairs: list[tuple[str, str]] = []
     for one in fields(state):
@@ -108,7 +108,7 @@ def to_query(state: State) -> str:
     return urlencode(pairs)
 
 
-def from_query(query: str | Sequence[tuple[str, str]], default: State, states: Sequence[str]) -> State:
+def from_query(query: str | Sequence[tuple[str, str]], default: PageState, states: Sequence[str]) -> PageState:
     """The state that a query describes; what it leaves out is that of ``default``, a state of the same model.
 
     Raises
@@ -122,7 +122,7 @@ def from_query(query: str | Sequence[tuple[str, str]], default: State, states: S
     return default
 
 
-def changed(state: State, name: str, value: Any, states: Sequence[str]) -> State:
+def changed(state: PageState, name: str, value: Any, states: Sequence[str]) -> PageState:
     """The state after one field, or a parameter ``p.NAME``, has been given a value in text or as a number.
 
     Raises
@@ -187,7 +187,7 @@ def number_of(value: Any, name: str) -> float:
     return number
 
 
-def _with_setting(state: State, name: str, value: Any) -> State:
+def _with_setting(state: PageState, name: str, value: Any) -> PageState:
     """Words that a setting has no choice of become its default where it is read."""
     setting = SETTINGS[name]
     found = {key: given for key, given in state.settings.items() if key not in setting.also}
@@ -200,13 +200,13 @@ class History:
 
     LONGEST = 200
 
-    def __init__(self, state: State) -> None:
+    def __init__(self, state: PageState) -> None:
         self.state = state
-        self._back: list[State] = []
-        self._forth: list[State] = []
+        self._back: list[PageState] = []
+        self._forth: list[PageState] = []
         self._field: str | None = None
 
-    def put(self, state: State, field: str | None = None) -> None:
+    def put(self, state: PageState, field: str | None = None) -> None:
         """Go on to a state; ``field`` names what a slider moves."""
         if state == self.state:
             return
@@ -234,7 +234,7 @@ class History:
         """A slider was let go: its next move is a step of its own."""
         self._field = None
 
-    def _move(self, source: list[State], target: list[State]) -> bool:
+    def _move(self, source: list[PageState], target: list[PageState]) -> bool:
         if not source:
             return False
         target.append(self.state)

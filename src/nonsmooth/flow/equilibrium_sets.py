@@ -36,7 +36,7 @@ TIMES = 64  # of a forcing period, at which conditions are asked
 INSTANTS = np.array([0.0, 0.137, 0.262, 0.419, 0.548, 0.683, 0.811, 0.943])  # and at which a field must vanish
 
 
-class Condition(NamedTuple):
+class LinearCondition(NamedTuple):
     """``sign * indicator > 0`` beside a state: ``slopes @ (u - there)`` and its greatest and least value there."""
 
     key: tuple[int, int]  # indicator, sign
@@ -151,7 +151,7 @@ def _equations(
 
 def _conditions(
     system: System, mode: int, u: FloatArray, values: FloatArray, memory: FloatArray
-) -> list[list[Condition]]:
+) -> list[list[LinearCondition]]:
     """The conditions of each way out of a mode, beside a state."""
     traced, field, period = system.traced, mode_field(system.traced, mode), system.period_at(values)
     h, h_u = field.indicators(u, values, memory)
@@ -162,7 +162,7 @@ def _conditions(
         both = np.array([-_peaks(-at), _peaks(at)])
     return [
         [
-            Condition(
+            LinearCondition(
                 (i, sign), sign * slopes[i], float((sign * both[:, i]).max()), float((sign * both[:, i]).min()), size[i]
             )
             for i, sign in ((row.indicator, row.sign) for row in jump.rows)

@@ -13,7 +13,7 @@ from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.derived.elements.element import SMALL
 
 if TYPE_CHECKING:
-    from nonsmooth.flow.engines.engine import Log
+    from nonsmooth.flow.engines.engine import TrajectoryLog
     from nonsmooth.system.symbolic.traced import TracedTransition
     from nonsmooth.system.system import System
 
@@ -93,7 +93,7 @@ def _not_unique(system: System, jump: TracedTransition) -> str:
     return ""
 
 
-def wrong_way(system: System, log: Log) -> str:
+def wrong_way(system: System, log: TrajectoryLog) -> str:
     """A sentence where the last reset of a failed run left the state on its way on through the surface, or where
     sliding had no unique way on; else nothing.
 

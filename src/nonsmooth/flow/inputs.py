@@ -94,13 +94,13 @@ class Driven:
     def __init__(self, system: System, inputs: Mapping[str, Input]) -> None:
         self.inputs = {name: inputs[name] for name in system.inputs}
         self.first = len(system.states) - 2 * len(system.inputs)
-        self._known: dict[tuple[float, ...], Course] = {}
+        self._known: dict[tuple[float, ...], DelayedInputs] = {}
 
-    def at(self, values: Mapping[str, float]) -> Course:
+    def at(self, values: Mapping[str, float]) -> DelayedInputs:
         """The inputs at values of the parameters, among which delays may be."""
         delays = tuple(values[one.delay] if isinstance(one.delay, str) else one.delay for one in self.inputs.values())
         if delays not in self._known:
-            self._known = {delays: Course(self, delays)}
+            self._known = {delays: DelayedInputs(self, delays)}
         return self._known[delays]
 
     def data(self) -> dict[str, Any]:
@@ -108,7 +108,7 @@ class Driven:
         return {name: one.data() for name, one in self.inputs.items()}
 
 
-class Course:
+class DelayedInputs:
     """The inputs of a run with known delays.
 
     Attributes

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, Log, State
+from nonsmooth.flow.engines.engine import FloatArray, State, TrajectoryLog
 from nonsmooth.flow.outputs import output_values
 from nonsmooth.kernels.hybrid import codes
 
@@ -204,13 +204,13 @@ class Meter:
         The window begins between two crossings, not at the section, so that none is counted at both of its ends."""
         traced, tables = engine.traced, engine.prepare(np.asarray(values, dtype=float)[None, :])
 
-        def marched(begun: State, until: float, samples: FloatArray | None = None) -> Log:
+        def marched(begun: State, until: float, samples: FloatArray | None = None) -> TrajectoryLog:
             log = engine.record(tables, begun, until, np.empty(0) if samples is None else samples)
             if log.status not in (codes.OK, codes.NOT_GUARANTEED):
                 raise _Failed
             return log
 
-        def parts(begin: float, log: Log) -> FloatArray:
+        def parts(begin: float, log: TrajectoryLog) -> FloatArray:
             return np.unique(np.concatenate([[begin], log.crossing_time, [begin + duration]]))
 
         def now(place: State) -> float:

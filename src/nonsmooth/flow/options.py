@@ -39,7 +39,7 @@ class Solver(TypedDict, total=False):
     locate: Annotated[bool, Default(True)]
 
 
-class Work(Solver, total=False):
+class Execution(Solver, total=False):
     """Independent work of a verb, and where it is done.
 
     Parameters
@@ -59,7 +59,7 @@ class Work(Solver, total=False):
     progress: Annotated[Progress, Default(True)]
 
 
-class Settling(Work, total=False):
+class Settling(Execution, total=False):
     """Section returns in which a motion settles, and by which it is judged.
 
     Parameters
@@ -104,7 +104,7 @@ LONGEST = 16  # period number looked for where none is given and as many points 
 _UNRECORDED = ("threads", "progress", "budget", "store", "client", "any_cpu")
 
 
-def workers_of(options: Work) -> int | None:
+def workers_of(options: Execution) -> int | None:
     """Threads for the work that options describe: one where a GPU runs it.
 
     Raises

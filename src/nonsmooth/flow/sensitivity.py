@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, Log, State
+from nonsmooth.flow.engines.engine import FloatArray, State, TrajectoryLog
 from nonsmooth.flow.engines.methods import engine_for
-from nonsmooth.flow.inputs import Course, driven
+from nonsmooth.flow.inputs import DelayedInputs, driven
 from nonsmooth.flow.options import Length, as_called
 from nonsmooth.flow.saltation import Jump
 from nonsmooth.flow.scales import warn_if_slow
@@ -49,11 +49,11 @@ class Variation:
         self,
         flow: VariationalFlow,
         values: FloatArray,
-        log: Log,
+        log: TrajectoryLog,
         start: tuple[int, FloatArray],
         t_begin: float,
         t_end: float,
-        course: Course | None = None,
+        course: DelayedInputs | None = None,
         changes: Sequence[float] = (),
     ) -> None:
         first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
@@ -94,7 +94,7 @@ class Variation:
 
 def apart(
     flow: VariationalFlow,
-    log: Log,
+    log: TrajectoryLog,
     first: tuple[int, FloatArray],
     t_begin: float,
     changes: Sequence[tuple[float, int]] = (),
@@ -150,7 +150,7 @@ def jump_between(
     before: FloatArray,
     after: FloatArray,
     rates: tuple[FloatArray, FloatArray],
-    course: Course | None,
+    course: DelayedInputs | None,
 ) -> Jump:
     """The jump between two segments that :func:`apart` names; ``rates`` are those at the end and beginning of these."""
     if chain[0] != CHANGE:
@@ -190,8 +190,8 @@ def settled(
 
 
 def variation(
-    system: System, flow: VariationalFlow, state: State, t_end: float, course: Course | None = None
-) -> tuple[Variation, Log]:
+    system: System, flow: VariationalFlow, state: State, t_end: float, course: DelayedInputs | None = None
+) -> tuple[Variation, TrajectoryLog]:
     """Run from ``state`` (t = 0) to ``t_end`` and take the run apart.
 
     Raises

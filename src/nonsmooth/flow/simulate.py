@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 import numpy as np
 
 from nonsmooth.flow.arguments import float_array, real_number
-from nonsmooth.flow.engines.engine import FloatArray, Log, State
+from nonsmooth.flow.engines.engine import FloatArray, State, TrajectoryLog
 from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
 from nonsmooth.flow.failure import refuse_beyond_stops, solve_error, wrong_way
@@ -147,7 +147,7 @@ def simulate(
     return found.assign_attrs(note=note) if note else found
 
 
-def _resting(system: System, begun: FloatArray, log: Log, state: State) -> str:
+def _resting(system: System, begun: FloatArray, log: TrajectoryLog, state: State) -> str:
     """The equilibrium at which a run begins and stays, in a sentence; a warning too where it is unstable."""
     if system.traced.patterns is not None:
         return ""
@@ -200,7 +200,7 @@ def _instants(samples: Any, t_begin: float, t_end: float, period: float | None, 
     return np.minimum(instants, t_end)
 
 
-def check_complete(log: Log, system: System, state: State, period: float | None) -> None:
+def check_complete(log: TrajectoryLog, system: System, state: State, period: float | None) -> None:
     """Raise for a run that stopped early, with the place where it did."""
     if log.status in (codes.OK, codes.NOT_GUARANTEED):
         return
@@ -221,7 +221,7 @@ def _dataset(
     traced: Any,
     method: str,
     options: Mapping[str, Any],
-    log: Log,
+    log: TrajectoryLog,
     instants: FloatArray,
     period: float | None,
 ) -> xr.Dataset:

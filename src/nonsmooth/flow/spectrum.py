@@ -33,7 +33,7 @@ FINEST = 1e-11  # and no coarser than this
 
 
 @dataclass
-class Growth:
+class FrameGrowth:
     """Growth of a frame over K units of time."""
 
     logarithms: FloatArray  # (K, n) by unit of time; minus infinity where a direction was lost
@@ -64,11 +64,11 @@ class Frame:
         self.active = np.full(len(self.scale), not (memory or self.lacking.any()))
         self.Q = np.ascontiguousarray(np.eye(len(self.scale))[:, self.active])
 
-    def advance(self, state: State, count: int, unit: float) -> Growth:
+    def advance(self, state: State, count: int, unit: float) -> FrameGrowth:
         """March ``count`` units of time. ``state`` is left at the end; its clock may be set back by whole periods."""
         if not np.isfinite(self.tables.period[self.i]) and not self.system.depends_on_time:
             state.clock[0] = 0.0  # no digits are lost in long runs
-        total = Growth(np.zeros((count, len(self.scale))), 0.0, 0.0, 1.0, codes.OK)
+        total = FrameGrowth(np.zeros((count, len(self.scale))), 0.0, 0.0, 1.0, codes.OK)
         done = 0
         while done < count and total.status in (codes.OK, codes.NOT_GUARANTEED):
             # Where a direction is new the part is done again: the first parts are short.
@@ -91,13 +91,12 @@ class Frame:
 
     def _march(self, state: State, count: int, unit: float) -> tuple[int, Any]:
         """Status, and record of the growth (``kernels.records.Growth``)."""
-        from nonsmooth.kernels.hybrid.records import TRANSIENT
-        from nonsmooth.kernels.hybrid.records import Growth as Record
+        from nonsmooth.kernels.hybrid.records import TRANSIENT, Growth
 
         engine, (n, columns), series = self.engine, self.Q.shape, isinstance(self.engine, SeriesEngine)
         noted = len(engine.traced.transitions) if series or not self.active.all() else 0
         none, square = np.zeros(0), np.zeros((n, n))
-        record = Record(
+        record = Growth(
             self.scale,
             self.Q,
             np.zeros((count, columns)),

@@ -17,7 +17,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.variational_rows import NONE, SIZES, RowsFlow
 from nonsmooth.system.derived.deciding import decide
 from nonsmooth.system.derived.instants import RowNumbers
-from nonsmooth.system.derived.patterns import STEP, Change, Patterns
+from nonsmooth.system.derived.patterns import STEP, Patterns, Reset
 from nonsmooth.system.derived.rows import Rows
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ class Packed:
                 return found[slot]
         return np.full(rows.field.shape[1], np.nan, dtype=rows.field.dtype)
 
-    def _states(self, rows: Rows, mode: int, change: Change | None) -> FloatArray:
+    def _states(self, rows: Rows, mode: int, change: Reset | None) -> FloatArray:
         """The map of the states by a transition, but for an impact that rubs."""
         if change is None:
             return rows.identity()
@@ -145,7 +145,7 @@ class Packed:
         states: FloatArray = self.patterns.ways_of(rows, pattern, k)[0][change.way].leaving.states
         return states
 
-    def _rubbed(self, rows: Rows, mode: int, change: Change, w: FloatArray) -> FloatArray:
+    def _rubbed(self, rows: Rows, mode: int, change: Reset, w: FloatArray) -> FloatArray:
         """The map of an impact that rubs at an instant: its impulses are homogeneous functions of the rates."""
         numbers = RowNumbers(rows, self.patterns.mode, w.copy())
         concerned = rows.with_group_of(max(change.elements[0], ~change.elements[0]))

@@ -28,7 +28,7 @@ _ACCURACY = 0.05  # of a standard uncertainty: how near the minimum is told wher
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class Residuals:
     """Residuals and derivatives of all pieces at one point, not weighted."""
 
     fitted: list[FloatArray]
@@ -53,13 +53,13 @@ class Fittable(Protocol):
     def unknowns(self) -> Any:
         """With the bounds ``low`` and ``high``, and the ``precision`` of what is known about ``centre``."""
 
-    def residuals(self, theta: FloatArray, starts: FloatArray) -> State:
+    def residuals(self, theta: FloatArray, starts: FloatArray) -> Residuals:
         """Residuals of all pieces."""
 
-    def derivatives(self, theta: FloatArray, starts: FloatArray) -> State:
+    def derivatives(self, theta: FloatArray, starts: FloatArray) -> Residuals:
         """The same with derivatives in the parameters of each piece and in its start."""
 
-    def weights(self, state: State) -> list[FloatArray]:
+    def weights(self, state: Residuals) -> list[FloatArray]:
         """One over each residual's standard deviation."""
 
 
@@ -78,7 +78,7 @@ class Unsettled(SolveError):
 
 
 def reduced(
-    problem: Fittable, state: State, weights: list[FloatArray], p: int, used: Any = None, damping: float = 0.0
+    problem: Fittable, state: Residuals, weights: list[FloatArray], p: int, used: Any = None, damping: float = 0.0
 ) -> tuple[Any, ...]:
     """Normal equations without the starts, and what gives the starts' steps back; ``damping`` is that of the starts.
 
@@ -128,7 +128,7 @@ def settle(
     used: Any = None,
     known: FloatArray | None = None,
     rough: bool = False,
-) -> tuple[FloatArray, FloatArray, State]:
+) -> tuple[FloatArray, FloatArray, Residuals]:
     """Levenberg and Marquardt's iteration: parameters, starts, and the state there.
 
     With ``rough`` it ends where it makes little way, or has taken all its iterations: a start for another fit.
@@ -145,7 +145,7 @@ def settle(
     state = problem.derivatives(theta, starts)
     weights = problem.weights(state)
 
-    def cost(now: State, at: FloatArray) -> float:
+    def cost(now: Residuals, at: FloatArray) -> float:
         return now.chi2(weights, used) + float((at - u.centre) @ prior @ (at - u.centre))
 
     best = cost(state, theta)
@@ -209,7 +209,7 @@ def settle(
 
 
 def _distance(
-    problem: Fittable, state: State, weights: list[FloatArray], used: Any, theta: FloatArray, prior: FloatArray
+    problem: Fittable, state: Residuals, weights: list[FloatArray], used: Any, theta: FloatArray, prior: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Undamped steps in standard uncertainties: the largest of the parameters, then of each start; the parameters'."""
     normal, right, back = reduced(problem, state, weights, len(theta), used)
@@ -233,12 +233,12 @@ def _free(problem: Fittable, theta: FloatArray, pull: FloatArray) -> Any:
 
 
 class Sandwich(NamedTuple):
-    """State at the best fit, covariance (p, p), chi^2 per degree of freedom, samples that share an error.
+    """Residuals at the best fit, covariance (p, p), chi^2 per degree of freedom, samples that share an error.
 
     ``normal`` and ``back`` are those of `reduced` there.
     """
 
-    state: State
+    state: Residuals
     covariance: FloatArray
     reduced: float
     correlation: float

@@ -10,7 +10,7 @@ from nonsmooth.results.progress import Progress
 from nonsmooth.system.kinds import Default, at_least
 
 
-class Known(TypedDict, total=False):
+class Prior(TypedDict, total=False):
     """Knowledge from before a recording.
 
     Parameters
@@ -56,11 +56,11 @@ class Recorded(TypedDict, total=False):
     progress: Annotated[Progress, Default(True)]
 
 
-class Fitting(Known, Recorded, total=False):
+class Fitting(Prior, Recorded, total=False):
     """All that a fit is told beside the model and the readings."""
 
 
-class Prediction(Solver, total=False):
+class Comparing(Solver, total=False):
     """The way the theory is computed and laid over a measurement.
 
     Parameters

@@ -26,10 +26,12 @@ _LONGEST = 18  # characters of a label that is drawn
 
 def scheme_of(system: System) -> Scheme:
     """The masses and links of a system; ValueError where it has none on a line."""
-    return _Reader(system).read()
+    return _SchemeReader(system).read()
 
 
-class _Reader:
+class _SchemeReader:
+    """The equations of a system, from which its masses and links are read."""
+
     def __init__(self, system: System) -> None:
         self.system = system
         self.loads = system._description.loads

@@ -12,7 +12,7 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Quantity:
+class QuantityLabel:
     """A unit and a LaTeX symbol (without dollar signs); a value where it is a parameter."""
 
     unit: str = "1"
@@ -25,13 +25,13 @@ class Labels:
     """Names in the order of the arrays' columns, with units; ``text`` is the system's data-only text form."""
 
     name: str
-    states: Mapping[str, Quantity]
-    parameters: Mapping[str, Quantity]
+    states: Mapping[str, QuantityLabel]
+    parameters: Mapping[str, QuantityLabel]
     modes: tuple[str, ...]
     transitions: tuple[tuple[int, int], ...]
     indicators: tuple[str, ...]
-    outputs: Mapping[str, Quantity] = field(default_factory=dict)
-    memory: Mapping[str, Quantity] = field(default_factory=dict)
+    outputs: Mapping[str, QuantityLabel] = field(default_factory=dict)
+    memory: Mapping[str, QuantityLabel] = field(default_factory=dict)
     time_unit: str = "s"
     is_map: bool = False  # the time counts iterates
     text: str = ""
@@ -53,16 +53,16 @@ class Labels:
 
 def labels_of(system: Any) -> Labels:
     """The labels of a ``System`` with its present parameter values."""
-    states = {name: Quantity(unit or "1") for name, unit in system.states.items()}
+    states = {name: QuantityLabel(unit or "1") for name, unit in system.states.items()}
     return Labels(
         name=system.name,
         states=states,
-        parameters={name: Quantity(p.unit or "1", p.symbol, p.value) for name, p in system.parameters.items()},
+        parameters={name: QuantityLabel(p.unit or "1", p.symbol, p.value) for name, p in system.parameters.items()},
         modes=tuple(system.modes),
         transitions=tuple((item.source, item.target) for item in system.transitions),
         indicators=tuple(system.indicators),
-        outputs={name: Quantity(unit or "1") for name, unit in system.outputs.items()},
-        memory={name: Quantity(unit or "1") for name, unit in system.memory.items()},
+        outputs={name: QuantityLabel(unit or "1") for name, unit in system.outputs.items()},
+        memory={name: QuantityLabel(unit or "1") for name, unit in system.memory.items()},
         # A system whose states have no units is written in a scaled time; that of a map counts iterates.
         time_unit="s" if any(quantity.unit != "1" for quantity in states.values()) and not system.is_map else "1",
         is_map=system.is_map,

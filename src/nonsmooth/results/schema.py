@@ -33,7 +33,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from nonsmooth.results.labels import Labels, Quantity, labelled
+from nonsmooth.results.labels import Labels, QuantityLabel, labelled
 from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.statuses import EQUILIBRIA, flag_attributes, status_attributes
 
@@ -327,7 +327,7 @@ def varied(d: Labels, name: str, values: ArrayLike, dim: str | None = None) -> d
     return {name: (dim or name, floats(values), quantity_attributes(name, d.parameters[name]))}
 
 
-def quantity_attributes(name: str, quantity: Quantity) -> dict[str, str]:
+def quantity_attributes(name: str, quantity: QuantityLabel) -> dict[str, str]:
     """Long name, unit and symbol of a quantity."""
     attributes = {"long_name": name, "units": quantity.unit}
     return attributes | ({"symbol": quantity.symbol} if quantity.symbol else {})

@@ -28,14 +28,14 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundAttractor:
     """An attractor: its period number (0 without a period), and its extremes."""
 
     period_number: int
     extremes: Any  # (2, n) maxima, minima
 
 
-def attractors_of(system: System, search: Box, parameter: str, value: float) -> list[Found]:
+def attractors_of(system: System, search: Box, parameter: str, value: float) -> list[FoundAttractor]:
     """Attractors that the starts reach at one value of a parameter."""
     found = basin_fractions(
         system,
@@ -48,13 +48,13 @@ def attractors_of(system: System, search: Box, parameter: str, value: float) -> 
         progress=False,
     ).isel({parameter: 0})
     return [
-        Found(int(one.period_number), np.array([one.maximum.values, one.minimum.values]))
+        FoundAttractor(int(one.period_number), np.array([one.maximum.values, one.minimum.values]))
         for k in range(found.sizes["attractor"])
         if (one := found.isel(attractor=k)).period_number >= 0
     ]
 
 
-def matched(own: Sequence[Found], others: Sequence[Found]) -> tuple[int, int]:
+def matched(own: Sequence[FoundAttractor], others: Sequence[FoundAttractor]) -> tuple[int, int]:
     """Numbers of attractors without a counterpart: of the first, of the others.
 
     Pairs are taken in the order of their distances."""

@@ -17,7 +17,7 @@ from nonsmooth.flow.options import Length, as_called
 from nonsmooth.flow.sections import Poincare, Stroboscopic
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
-from nonsmooth.smoothing.attractors import Box, Found, attractors_of, matched
+from nonsmooth.smoothing.attractors import Box, FoundAttractor, attractors_of, matched
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.derived.smoothing import BANDS
 from nonsmooth.system.kinds import at_least
@@ -167,7 +167,7 @@ class _Sharp:
     transient: int
     length: Mapping[str, Any]  # of the runs that give exponents
     search: Box | None = None
-    own: list[Found] = field(default_factory=list)
+    own: list[FoundAttractor] = field(default_factory=list)
 
     def exponents(self) -> FloatArray:
         """Its Lyapunov exponents."""

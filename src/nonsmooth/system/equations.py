@@ -14,8 +14,8 @@ from nonsmooth.system.mode import Band
 from nonsmooth.system.names import unknown
 from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.symbolic.scalar import Scalar, as_written, to_expression
-from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
-from nonsmooth.system.symbolic.tracing import Known, Symbols, call_scalar, call_vector, refuse_corners
+from nonsmooth.system.symbolic.traced import Traced, TracedCondition, TracedTransition
+from nonsmooth.system.symbolic.tracing import KnownFunction, Symbols, call_scalar, call_vector, refuse_corners
 from nonsmooth.system.transition import Surface, Transition
 
 
@@ -71,7 +71,7 @@ def trace_system(
         what = f"indicator {key!r}"
         expression = call_scalar(function, (time, symbols.states(), p), what)
         refuse_corners(expression, moving, what)
-        if not isinstance(function, Known) and not expression.free_symbols & set(symbols.u.values()):
+        if not isinstance(function, KnownFunction) and not expression.free_symbols & set(symbols.u.values()):
             raise SystemDefinitionError(
                 f"{what} never involves the state ({as_written(expression)}): nothing can cross it. "
                 f"For a switch at a given time use Transition(..., at=phase)"
@@ -133,8 +133,12 @@ def _surface_jumps(
         raise SystemDefinitionError(f"{item.label}: both modes must have the same states")
     i = list(indicators).index(item.indicator)
     return [
-        TracedTransition(below, above, (Row(i, 1),), contact=below == 0, label=f"{item.below} -> {item.above}"),
-        TracedTransition(above, below, (Row(i, -1),), contact=above == 0, label=f"{item.above} -> {item.below}"),
+        TracedTransition(
+            below, above, (TracedCondition(i, 1),), contact=below == 0, label=f"{item.below} -> {item.above}"
+        ),
+        TracedTransition(
+            above, below, (TracedCondition(i, -1),), contact=above == 0, label=f"{item.above} -> {item.below}"
+        ),
     ]
 
 
@@ -178,10 +182,10 @@ def _jump(
     label = f"transition {item.label}"
     source, target = (_mode_index(end, item.label, modes) for end in (item.source, item.target))
     before, after, order = modes[item.source], modes[item.target], list(indicators)
-    rows: tuple[Row, ...] = ()
+    rows: tuple[TracedCondition, ...] = ()
     if item.when is not None:
         conditions = read_condition(item.when, order, label)
-        rows = tuple(Row(order.index(key), sign, strict) for key, sign, strict in conditions)
+        rows = tuple(TracedCondition(order.index(key), sign, strict) for key, sign, strict in conditions)
     hidden = {symbols.u[state]: state for state in symbols.u if state not in before}
     for row in rows:
         for symbol in expressions[row.indicator].free_symbols & hidden.keys():

@@ -11,7 +11,7 @@ from nonsmooth.system.parameter import latex_name
 from nonsmooth.system.symbolic.expressions import write_expression
 
 if TYPE_CHECKING:
-    from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
+    from nonsmooth.system.symbolic.traced import Traced, TracedCondition, TracedTransition
     from nonsmooth.system.system import System
 
 
@@ -26,7 +26,7 @@ def _plain(traced: Traced) -> dict[sp.Symbol, str]:
     return names
 
 
-def _row(row: Row, traced: Traced) -> str:
+def _row(row: TracedCondition, traced: Traced) -> str:
     relation = (">" if row.sign > 0 else "<") + ("" if row.strict else "=")
     return f"{traced.indicator_names[row.indicator]} {relation} 0"
 

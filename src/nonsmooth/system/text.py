@@ -21,8 +21,8 @@ from nonsmooth.system.inputs import input_states
 from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.symbolic.expressions import read_expression, write_expression
 from nonsmooth.system.symbolic.scalar import Scalar
-from nonsmooth.system.symbolic.traced import Row, Traced
-from nonsmooth.system.symbolic.tracing import Known, Symbols
+from nonsmooth.system.symbolic.traced import Traced, TracedCondition
+from nonsmooth.system.symbolic.tracing import KnownFunction, Symbols
 from nonsmooth.system.transition import Surface, Transition
 from nonsmooth.system.variant import variant_of
 
@@ -83,8 +83,8 @@ def _content(d: Description) -> dict[str, Any]:
     def text(expression: sp.Expr) -> str:
         return write_expression(expression, names)
 
-    upward = {(s.below, s.above, (Row(s.indicator, 1),)): s for s in surfaces}
-    downward = {(s.above, s.below, (Row(s.indicator, -1),)) for s in surfaces}
+    upward = {(s.below, s.above, (TracedCondition(s.indicator, 1),)): s for s in surfaces}
+    downward = {(s.above, s.below, (TracedCondition(s.indicator, -1),)) for s in surfaces}
     transitions: list[dict[str, Any]] = []
     for jump in t.transitions:
         crossing = (jump.source, jump.target, jump.rows)
@@ -277,13 +277,13 @@ class _Reader:
         _check_kinds(found, text)
         return found
 
-    def function(self, text: str, extra: Mapping[str, sp.Symbol] | None = None) -> Known:
-        return Known(self.expression(text, extra))
+    def function(self, text: str, extra: Mapping[str, sp.Symbol] | None = None) -> KnownFunction:
+        return KnownFunction(self.expression(text, extra))
 
-    def vector(self, texts: Mapping[str, str], extra: Mapping[str, sp.Symbol] | None = None) -> Known:
-        return Known([self.expression(text, extra) for text in texts.values()])
+    def vector(self, texts: Mapping[str, str], extra: Mapping[str, sp.Symbol] | None = None) -> KnownFunction:
+        return KnownFunction([self.expression(text, extra) for text in texts.values()])
 
-    def own(self, texts: Mapping[str, str]) -> Known:
+    def own(self, texts: Mapping[str, str]) -> KnownFunction:
         """A vector without the entries of inputs, whose motion is that of all inputs."""
         return self.vector({state: text for state, text in texts.items() if state not in self.driven})
 

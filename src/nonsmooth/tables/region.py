@@ -102,16 +102,16 @@ def region(result: Any, condition: Annotated[str, _FORM]) -> xr.DataArray:
 
 
 @dataclass(frozen=True)
-class _Held:
+class _Range:
     """A quantity by the least and the largest value that it takes; of one value both are the same."""
 
     ends: tuple[xr.DataArray, ...]
     ranges: bool = field(default=False)
 
 
-def _held(data: xr.Dataset, name: str, known: Mapping[str, xr.DataArray]) -> _Held:
+def _held(data: xr.Dataset, name: str, known: Mapping[str, xr.DataArray]) -> _Range:
     if name in known or name in data.coords:
-        return _Held((quantity(data, name, known),))
+        return _Range((quantity(data, name, known),))
     stems = [name] if f"{name}_maximum" in known else []
     if not stems and name in _OF_ELEMENTS:
         found = (re.fullmatch(rf"(.+_{name})(?:_maximum)?", key) for key in known)
@@ -121,14 +121,14 @@ def _held(data: xr.Dataset, name: str, known: Mapping[str, xr.DataArray]) -> _He
     upper = [known.get(f"{stem}_maximum", known.get(stem)) for stem in stems]
     every = [one for one in [*lower, *upper] if one is not None]
     if not every:
-        return _Held((quantity(data, name, known),))  # which says what there is
+        return _Range((quantity(data, name, known),))  # which says what there is
     if len(every) == 1:
-        return _Held((every[0],))
+        return _Range((every[0],))
     least: Any = every[0]
     most: Any = every[0]
     for one in every[1:]:
         least, most = np.minimum(least, one), np.maximum(most, one)
-    return _Held((least, most), ranges=True)
+    return _Range((least, most), ranges=True)
 
 
 def _parsed(condition: str) -> ast.expr:
@@ -155,7 +155,7 @@ class _Chains(ast.NodeTransformer):
         return ast.BoolOp(ast.And(), [ast.Compare(left, [op], [right]) for left, op, right in pairs])
 
 
-def _holds(read: Any, held: Mapping[sp.Symbol, _Held], condition: str) -> Any:
+def _holds(read: Any, held: Mapping[sp.Symbol, _Range], condition: str) -> Any:
     """The condition over the points."""
     if read in (sp.true, sp.false):
         return bool(read)
@@ -175,7 +175,7 @@ def _holds(read: Any, held: Mapping[sp.Symbol, _Held], condition: str) -> Any:
     return found
 
 
-def _cases(difference: sp.Expr, held: Mapping[sp.Symbol, _Held], condition: str) -> list[dict[sp.Symbol, Any]]:
+def _cases(difference: sp.Expr, held: Mapping[sp.Symbol, _Range], condition: str) -> list[dict[sp.Symbol, Any]]:
     """Values of the symbols at which a comparison is asked: where a quantity takes many, at the ends of its range, or
     of the range of its absolute value. What is linear in it holds between them too."""
     here = difference.free_symbols

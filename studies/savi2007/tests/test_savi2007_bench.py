@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from nonsmooth_savi2007.bench import Bench
+from nonsmooth_savi2007.bench import Measurement
 from nonsmooth_savi2007.study import figures_of_the_study
 
 
@@ -21,7 +21,7 @@ def test_what_the_measurement_has_forked_ends_with_it(tmp_path: Path, monkeypatc
     other.chmod(0o700)
     monkeypatch.setattr(sys, "executable", str(other))
     end = time.monotonic() + 300
-    with Bench(tmp_path, figures_of_the_study()[:1], quick=True):
+    with Measurement(tmp_path, figures_of_the_study()[:1], quick=True):
         while not (note.exists() and note.read_text().endswith("\n")):
             assert time.monotonic() < end
             time.sleep(0.01)

@@ -13,7 +13,7 @@ import xarray as xr
 import nonsmooth as ns
 from nonsmooth.recordings.session import load_session
 from nonsmooth_savi2007 import Reproduction, reproduce, study
-from nonsmooth_savi2007.bench import Bench
+from nonsmooth_savi2007.bench import Measurement
 from nonsmooth_savi2007.claims.claims import CLAIMS
 from nonsmooth_savi2007.claims.verdicts import Verdict
 from nonsmooth_savi2007.findings import estimates_of
@@ -143,7 +143,10 @@ def test_a_failed_measurement_says_where_to_look(tmp_path, monkeypatch: pytest.M
     (tmp_path / "numpy.py").write_text("raise RuntimeError('this is the numpy.py of the folder')")
     monkeypatch.chdir(tmp_path)
     (sketch,) = (figure for figure in figures_of_the_study() if figure.name == "fig02")  # not of the rig
-    with Bench(tmp_path, [sketch], quick=True) as bench, pytest.raises(RuntimeError, match="log.txt.*fig02: not meas"):
+    with (
+        Measurement(tmp_path, [sketch], quick=True) as bench,
+        pytest.raises(RuntimeError, match="log.txt.*fig02: not meas"),
+    ):
         bench.wait(print)
 
 
@@ -184,7 +187,7 @@ def test_what_a_figure_needs_is_all_that_is_measured(quick: Reproduction, tmp_pa
 def test_what_is_finished_is_used_again(quick: Reproduction, monkeypatch: pytest.MonkeyPatch) -> None:
     """A second run computes nothing; its report is that of the folder, whatever was asked for."""
     before = {path: path.read_bytes() for path in quick.out.iterdir() if path.suffix in (".nc", ".md", ".png")}
-    monkeypatch.setattr(study, "Bench", lambda folder, figures, *kind: Bench(folder, [], quick=True))
+    monkeypatch.setattr(study, "Measurement", lambda folder, figures, *kind: Measurement(folder, [], quick=True))
     for figure in quick.figures:
         monkeypatch.setitem(figure.__dict__, "compute", None)
     again = reproduce(quick.out, figures=[9], quick=True, progress=False)

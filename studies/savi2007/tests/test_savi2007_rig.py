@@ -12,7 +12,7 @@ import nonsmooth as ns
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth_savi2007.claims import response as claims_response
 from nonsmooth_savi2007.claims import rig as claims_rig
-from nonsmooth_savi2007.claims.verdicts import Cell, Row, Verdict, printed_cell
+from nonsmooth_savi2007.claims.verdicts import Cell, Statement, Verdict, printed_cell
 from nonsmooth_savi2007.figures.motions import chosen, measured_periods_at, said
 from nonsmooth_savi2007.findings import Number, found_in, kept, the_finding
 from nonsmooth_savi2007.flows import Settings
@@ -100,7 +100,7 @@ def test_a_cell_beside_a_printed_number() -> None:
     assert (cell.text, cell.verdict) == ("8.450 ± 0.029 N/m; -0.2 % (0.0 to 0.8)", "agrees")  # 0.1 / sqrt(12) = 0.029
     assert printed_cell(NUMBERS["jump falling"], None).text == "not found"
     answer = Cell("c", Verdict.DIFFERS, "Rig.")
-    row = Row("F9b", "here", "5.29", "a", "b", "none", Verdict.AGREES, "Model.").measured(answer)
+    row = Statement("F9b", "here", "5.29", "a", "b", "none", Verdict.AGREES, "Model.").measured(answer)
     assert (row.rig, row.rig_verdict, row.verdict, row.why) == ("c", "differs", "agrees", "Model. Rig.")
 
 

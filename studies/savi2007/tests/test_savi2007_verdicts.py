@@ -15,7 +15,7 @@ from nonsmooth_savi2007.claims.verdicts import (
     Beside,
     Cause,
     Cell,
-    Row,
+    Statement,
     Verdict,
     against_printed,
     judge,
@@ -99,9 +99,9 @@ def test_plus_minus_is_the_standard_uncertainty() -> None:
     assert str(Beside(4.6, 0.15, 4.6, 0.0)) == "+0.0 %"
 
 
-def _row(claim: str, verdict: Verdict, rig: Verdict, cause: Cause | None = None) -> Row:
+def _row(claim: str, verdict: Verdict, rig: Verdict, cause: Cause | None = None) -> Statement:
     beside = Beside(1.0, 0.005, 1.01, 0.001) if verdict is Verdict.AGREES else None
-    row = Row(
+    row = Statement(
         claim,
         "here",
         f"{claim} says",

@@ -8,7 +8,7 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.identification.compare.clouds import cloud_distance
-from nonsmooth.identification.compare.jumps import Jump, match_jumps
+from nonsmooth.identification.compare.jumps import AmplitudeJump, match_jumps
 
 MODEL = ns.models.discontinuous_support()
 
@@ -78,8 +78,8 @@ def test_halves_and_ratio_by_brute_force(spread: float, mean: float) -> None:
 def test_an_interval_takes_half_of_the_draws(having: int, known: bool) -> None:
     """Ten draws of which some have the jump, at 5.0, 5.1, ...: its interval is that of those, or there is none."""
     fall = (2.0, 1.0)
-    measured, theory = {"up": [Jump(5.2, 0.1, *fall)]}, {"up": [Jump(5.2, 0.0, *fall)]}
-    drawn = [{"up": [Jump(5.0 + 0.1 * k, 0.0, *fall)] if k < having else []} for k in range(10)]
+    measured, theory = {"up": [AmplitudeJump(5.2, 0.1, *fall)]}, {"up": [AmplitudeJump(5.2, 0.0, *fall)]}
+    drawn = [{"up": [AmplitudeJump(5.0 + 0.1 * k, 0.0, *fall)] if k < having else []} for k in range(10)]
     found = match_jumps(measured, theory, drawn, "rad/s", 0.5)
     ends = [float(found[f"theory_jump_{word}"][1][0]) for word in ("low", "high")]
     expected = [5.0 + 0.1 * (having - 1) * share for share in (0.25, 0.75)] if known else [np.nan, np.nan]

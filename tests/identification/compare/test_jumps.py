@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nonsmooth.identification.compare.jumps import Jump, jumps_in_steps, match_jumps
+from nonsmooth.identification.compare.jumps import AmplitudeJump, jumps_in_steps, match_jumps
 
 ZERO = np.zeros
 
@@ -55,8 +55,14 @@ def test_noise_is_no_jump() -> None:
 def test_pairs_keep_order_and_direction() -> None:
     """A rise is never paired with a fall, near as it may be; of two falls the first belongs to the first."""
     fall, rise = (2.0, 1.0), (1.0, 2.0)
-    measured = {"up": [Jump(4.0, 0.1, *fall), Jump(5.7, 0.1, *fall)], "down": [Jump(5.1, 0.1, *rise)]}
-    theory = {"up": [Jump(5.6, 0.0, *fall), Jump(5.9, 0.0, *fall)], "down": [Jump(5.0, 0.0, *fall)]}
+    measured = {
+        "up": [AmplitudeJump(4.0, 0.1, *fall), AmplitudeJump(5.7, 0.1, *fall)],
+        "down": [AmplitudeJump(5.1, 0.1, *rise)],
+    }
+    theory = {
+        "up": [AmplitudeJump(5.6, 0.0, *fall), AmplitudeJump(5.9, 0.0, *fall)],
+        "down": [AmplitudeJump(5.0, 0.0, *fall)],
+    }
     found = match_jumps(measured, theory, [], "rad/s", 0.95)
     rows = list(zip(found["jump_direction"][1], found["measured_jump"][1], found["theory_jump"][1], strict=True))
     assert rows[:2] == [("up", 4.0, 5.6), ("up", 5.7, 5.9)]
@@ -66,8 +72,8 @@ def test_pairs_keep_order_and_direction() -> None:
 
 def test_what_is_too_many_has_no_partner() -> None:
     fall = (2.0, 1.0)
-    measured = {"up": [Jump(5.7, 0.1, *fall)]}
-    theory = {"up": [Jump(4.1, 0.0, *fall), Jump(5.8, 0.0, *fall)]}
+    measured = {"up": [AmplitudeJump(5.7, 0.1, *fall)]}
+    theory = {"up": [AmplitudeJump(4.1, 0.0, *fall), AmplitudeJump(5.8, 0.0, *fall)]}
     found = match_jumps(measured, theory, [], "rad/s", 0.95)
     np.testing.assert_array_equal(found["theory_jump"][1], [5.8, 4.1])
     np.testing.assert_array_equal(found["measured_jump"][1], [5.7, np.nan])

@@ -19,7 +19,7 @@ from nonsmooth.identification.compare import measured as module
 from nonsmooth.recordings import Recording, load_session
 from nonsmooth_savi2007.comparison import gap_reference, session_measurement
 from nonsmooth_savi2007.rig import VirtualRig
-from nonsmooth_savi2007.rig.driven import Setting, records
+from nonsmooth_savi2007.rig.driven import SteadyRun, records
 from nonsmooth_savi2007.rig.figures import TAPS, without_support
 from nonsmooth_savi2007.rig.motor import frequency, mean_position, voltage_for
 from nonsmooth_savi2007.rig.notebook import write_session
@@ -119,7 +119,7 @@ def session(rig: VirtualRig, tmp_path_factory: pytest.TempPathFactory) -> object
     """Fig. 14's settings with the period-1 and period-2 gaps, and the run without the support."""
     length, knob = 0.03896, voltage_for(rig, 11.15)
     shift = mean_position(rig, length)
-    mounted = [Setting(knob, length, gap + shift, 40.0) for gap in (-0.0012, 0.0006)]
+    mounted = [SteadyRun(knob, length, gap + shift, 40.0) for gap in (-0.0012, 0.0006)]
     made = {
         "section": records(rig, "section", mounted, settle=40.0),
         "response": records(rig, "response", without_support(rig, 14)),

@@ -8,7 +8,7 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.identification.compare.draws import draw_systems, read_settings
-from nonsmooth.identification.compare.jumps import Jump, match_jumps
+from nonsmooth.identification.compare.jumps import AmplitudeJump, match_jumps
 from nonsmooth.identification.compare.periods import flips, measured_period, period_numbers
 
 NOISE = np.array([1e-3, 1e-2])
@@ -91,9 +91,9 @@ def test_short_clouds_and_bad_noise() -> None:
 
 
 def test_jumps_are_paired_within_their_direction() -> None:
-    measured = {"up": [Jump(2.72, 0.02), Jump(5.68, 0.02)], "down": [Jump(5.15, 0.02)]}
-    theory = {"up": [Jump(5.66, 0.001)], "down": [Jump(5.16, 0.001), Jump(2.0, 0.001)]}
-    drawn = [{"up": [Jump(5.60 + 0.01 * i)], "down": []} for i in range(11)]
+    measured = {"up": [AmplitudeJump(2.72, 0.02), AmplitudeJump(5.68, 0.02)], "down": [AmplitudeJump(5.15, 0.02)]}
+    theory = {"up": [AmplitudeJump(5.66, 0.001)], "down": [AmplitudeJump(5.16, 0.001), AmplitudeJump(2.0, 0.001)]}
+    drawn = [{"up": [AmplitudeJump(5.60 + 0.01 * i)], "down": []} for i in range(11)]
     found = match_jumps(measured, theory, drawn, "rad/s", 0.8)
     words = found["jump_direction"][1].tolist()
     seen, expected = found["measured_jump"][1], found["theory_jump"][1]

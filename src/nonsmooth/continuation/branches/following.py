@@ -112,7 +112,7 @@ def dataset(
 
 
 @dataclass(frozen=True)
-class Asked:
+class MarchOptions:
     """Options of ``continue_orbit`` that every march shares; ``range`` is None where not given."""
 
     range: Any
@@ -140,7 +140,7 @@ class Following:
     name: str
     range: tuple[float, float]
     bounds: tuple[float, float]
-    asked: Asked
+    asked: MarchOptions
 
     @property
     def width(self) -> float:

@@ -8,10 +8,10 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.born import first_cycle
-from nonsmooth.continuation.branches.following import Asked, Start, resumed_at
+from nonsmooth.continuation.branches.following import MarchOptions, Start, resumed_at
 from nonsmooth.continuation.branches.reading import hopf_row, marks_of, one_row, special_row
 from nonsmooth.continuation.branches.records import record_of
-from nonsmooth.continuation.march.march import March, Row, SpecialRecord
+from nonsmooth.continuation.march.march import March, MarkedPoint, SpecialRecord
 from nonsmooth.continuation.problems.curve import Point, tangents
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.shooting import Shooting
@@ -25,7 +25,7 @@ SWITCHES = ("flip", "pitchfork", "transcritical", "branch_point")
 AWAY = (1e-3, 3e-3, 3e-4, 1e-2, 1e-4)  # from a crossing of branches
 
 
-def switched(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
+def switched(start: xr.Dataset, name: str | None, asked: MarchOptions) -> xr.Dataset:
     """The other branch through a special point."""
     system, kind, own, point, period_number, before = special_row(start, "continue_orbit")
     _check_parameter(name, own)
@@ -48,16 +48,16 @@ def switched(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
         raise SolveError(f"no other branch was found at this {kind}", status="no_convergence")
     here = fresh.described(Point(fresh, Y, ways[0], 0.0, 0, fresh.evaluate(Y)))
     assert here is not None
-    middle = [record_of(Row(here, mark=SpecialRecord(kind))), record_of(Row(begun[0]))]
+    middle = [record_of(MarkedPoint(here, mark=SpecialRecord(kind))), record_of(MarkedPoint(begun[0]))]
     back: Start = March(ending="branching", said=f"The branch begins at the {kind}.")
     if len(begun) > 1:
         back = begun[1]
-        middle.insert(0, record_of(Row(begun[1].turned())))
+        middle.insert(0, record_of(MarkedPoint(begun[1].turned())))
     number = fresh.shooting.period_number
     return branch.result(number, back, middle, begun[0], closed=fresh.landmark(here), origin=kind)
 
 
-def straight_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
+def straight_on(start: xr.Dataset, name: str | None, asked: MarchOptions) -> xr.Dataset:
     """The branch through a graze or a corner with the signature of the row, both ways."""
     system, kind, own, point, period_number, before = special_row(start, "continue_orbit")
     _check_parameter(name, own)
@@ -65,12 +65,12 @@ def straight_on(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset
     first = branch.resumed(period_number, point)
     if first is None:
         raise SolveError(f"Newton's method did not converge at this {kind}", status="no_convergence")
-    middle = record_of(Row(first))
+    middle = record_of(MarkedPoint(first))
     middle.marks.extend(marks_of(one_row(start, "continue_orbit"), system))
     return branch.result(period_number, first.turned(), [middle], first, origin=kind)
 
 
-def born(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
+def born(start: xr.Dataset, name: str | None, asked: MarchOptions) -> xr.Dataset:
     """The cycles that emanate from a Hopf point, or from a focus-centre."""
     start = one_row(start, "continue_orbit")
     kind = str(start["kind"].values)
@@ -86,7 +86,7 @@ def born(start: xr.Dataset, name: str | None, asked: Asked) -> xr.Dataset:
     back: Start = March(ending="branching", said="The branch begins at the Hopf point.")
     if kind == "focus_centre":
         back = first.turned()
-    return branch.result(0, back, [record_of(Row(first))], first, origin=kind)
+    return branch.result(0, back, [record_of(MarkedPoint(first))], first, origin=kind)
 
 
 def _check_parameter(name: str | None, own: str) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.continuation.march.march import Row, SpecialRecord
+from nonsmooth.continuation.march.march import MarkedPoint, SpecialRecord
 from nonsmooth.continuation.problems.equilibrium import Rest
 from nonsmooth.continuation.problems.multipliers import stable_by
 from nonsmooth.continuation.problems.signature import Signature
@@ -71,7 +71,7 @@ class BranchRecord:
         return [replace(mark, point=i) for i, point in enumerate(self.points) for mark in point.marks]
 
 
-def record_of(row: Row) -> Any:
+def record_of(row: MarkedPoint) -> Any:
     """The record of a solved point of a branch."""
     point = row.point
     if isinstance(point, Rest):
@@ -91,7 +91,7 @@ def record_of(row: Row) -> Any:
     return record
 
 
-def _of_orbit(row: Row) -> PointRecord:
+def _of_orbit(row: MarkedPoint) -> PointRecord:
     point, curve = row.point, row.point.curve
     shooting, path = curve.shooting, point.path
     crossings, contacts = shooting.signature.rates(shooting.system.traced.transitions, shooting.period_number)

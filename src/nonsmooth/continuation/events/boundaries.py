@@ -142,7 +142,7 @@ class Own(Crossed):
         return (*super().crossing(point, visit)[:2], point.signature.visits[visit].row)
 
 
-class Touch(Boundary):
+class Grazing(Boundary):
     """A transition that does not happen is touched within a visit."""
 
     name = "grazing"
@@ -210,4 +210,4 @@ class Unseen(Boundary):
 
 
 #: In the order of ``Path.margins``: what explains the others first.
-BOUNDARIES = (Short(0), Slow(1), Own(2), Touch(3), Others(4), Landed(5))
+BOUNDARIES = (Short(0), Slow(1), Own(2), Grazing(3), Others(4), Landed(5))

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from nonsmooth.continuation.march.event import Crossing, Event, Fold, Met, Name, Step, first_beyond
+from nonsmooth.continuation.march.event import BranchPoint, Event, Fold, Met, Name, Step, first_beyond
 from nonsmooth.continuation.march.march import INTERRUPTED, March, Policy
 from nonsmooth.continuation.problems.equilibrium import FREE, Rest, equilibria_near, goes_on
 
@@ -51,7 +51,7 @@ class Edge(Event):
 class AlongEquilibria(Policy):
     """Folds, crossings, Hopf points and boundaries of equilibria."""
 
-    kinds = (Fold(), Crossing(), Hopf())
+    kinds = (Fold(), BranchPoint(), Hopf())
     boundaries = (Edge(),)
     unseen_on = ("", "range")
     endings: ClassVar = {

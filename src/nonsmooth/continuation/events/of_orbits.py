@@ -36,7 +36,7 @@ from nonsmooth.continuation.events.sliding import TOUCHES, sliding_bifurcation
 from nonsmooth.continuation.march.event import (
     BESIDE,
     LARGEST,
-    Crossing,
+    BranchPoint,
     Event,
     Fold,
     Met,
@@ -108,7 +108,7 @@ class FoldOfOrbits(Fold):
         return ("hopf", "equilibrium") if point.curve.swing(point) < NOTHING else ("fold", None)
 
 
-class CrossingOfOrbits(Crossing):
+class BranchPointOfOrbits(BranchPoint):
     """Another branch of orbits crosses."""
 
     def named(self, step: Step, point: Any) -> Name:
@@ -156,7 +156,7 @@ class NeimarkSacker(Event):
 class AlongOrbits(Policy):
     """Special points of periodic orbits, and the boundaries of their signatures."""
 
-    kinds = (FoldOfOrbits(), CrossingOfOrbits(), Flip(), NeimarkSacker())
+    kinds = (FoldOfOrbits(), BranchPointOfOrbits(), Flip(), NeimarkSacker())
     boundaries = BOUNDARIES
     endings = ENDINGS
 

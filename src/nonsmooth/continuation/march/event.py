@@ -126,7 +126,7 @@ class Fold(Event):
         return point.rise
 
 
-class Crossing(Event):
+class BranchPoint(Event):
     """Another branch crosses: the bordered determinant changes its sign."""
 
     name = "branch_point"
@@ -276,6 +276,6 @@ def special_on(step: Step, kinds: Sequence[Event]) -> list[Met]:
         ):
             found.append(Met(kind, *there, *named))
     # A branch that crosses another one where the parameter turns is one event, not two.
-    crossings = [met.s for met in found if isinstance(met.kind, Crossing)]
+    crossings = [met.s for met in found if isinstance(met.kind, BranchPoint)]
     found = [met for met in found if not isinstance(met.kind, Fold) or all(abs(met.s - s) > TURN for s in crossings)]
     return sorted(found, key=lambda met: met.s)

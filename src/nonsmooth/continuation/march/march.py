@@ -48,7 +48,7 @@ class SpecialRecord:
 
 
 @dataclass
-class Row:
+class MarkedPoint:
     """A point of a branch, and what it is as a special one."""
 
     point: Any
@@ -65,22 +65,22 @@ class Row:
 class March:
     """Rows in the order of the march, and the ending: a key of the policy's ``endings``, with its sentence."""
 
-    rows: list[Row] = field(default_factory=list)
+    rows: list[MarkedPoint] = field(default_factory=list)
     ending: str = "points"
     said: str = ""
 
     @property
-    def special(self) -> list[Row]:
+    def special(self) -> list[MarkedPoint]:
         """The rows that are special points."""
         return [row for row in self.rows if row.mark]
 
     def add(self, point: Point) -> None:
         """Append a point."""
-        self.rows.append(Row(point, point.virtual))
+        self.rows.append(MarkedPoint(point, point.virtual))
 
     def mark(self, kind: str, point: Point, virtual: bool = False, **more: Any) -> None:
         """Append a special point; on a boundary itself no path is virtual."""
-        self.rows.append(Row(point, virtual, SpecialRecord(kind, **more)))
+        self.rows.append(MarkedPoint(point, virtual, SpecialRecord(kind, **more)))
 
 
 class Policy(ABC):

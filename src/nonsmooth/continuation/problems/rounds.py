@@ -19,7 +19,7 @@ from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:
     from nonsmooth.continuation.problems.shooting import Shooting
-    from nonsmooth.flow.engines.engine import Log
+    from nonsmooth.flow.engines.engine import TrajectoryLog
     from nonsmooth.flow.engines.loop import Engine
 
 RTOL = 1e-13  # where the flow is not exact
@@ -102,7 +102,7 @@ class Rounds:
         until: float,
         at: Any,
         engine: Engine | None = None,
-    ) -> Log | None:
+    ) -> TrajectoryLog | None:
         n = len(self.system.states)
         state = State(z[:n].copy(), z[n:].copy())
         state.counters[0], state.settled = mode, True

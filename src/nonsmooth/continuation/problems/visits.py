@@ -11,14 +11,14 @@ from nonsmooth.continuation.problems.signature import AT_ONCE, Round, Signature,
 from nonsmooth.flow.saltation import BEHIND
 
 if TYPE_CHECKING:
-    from nonsmooth.flow.engines.engine import Log
+    from nonsmooth.flow.engines.engine import TrajectoryLog
     from nonsmooth.flow.variational import Jump, VariationalFlow
 
 ROUNDING = 1e-13  # of an indicator's size
 
 
 def visits_of(
-    flow: VariationalFlow, values: FloatArray, log: Log, memory: FloatArray, first: int = 0
+    flow: VariationalFlow, values: FloatArray, log: TrajectoryLog, memory: FloatArray, first: int = 0
 ) -> tuple[list[Visit], FloatArray]:
     """Visits that end with the transitions of a log from ``first`` on, and the states (m, n_z) just after these.
 
@@ -61,7 +61,7 @@ def _size(flow: VariationalFlow, jump: Jump, z: FloatArray) -> float:
 def round_of(
     flow: VariationalFlow,
     values: FloatArray,
-    log: Log,
+    log: TrajectoryLog,
     z: FloatArray,
     mode: int,
     period: float,

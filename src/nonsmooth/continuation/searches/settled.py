@@ -17,7 +17,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.signature import Round, Signature, Visit
 from nonsmooth.continuation.problems.visits import anchored, round_of
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.engines.engine import IntArray, Log, State
+from nonsmooth.flow.engines.engine import IntArray, State, TrajectoryLog
 from nonsmooth.flow.equilibria import AT_REST, ROUNDING, equilibrium_at
 from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.variational import VariationalFlow
@@ -55,7 +55,7 @@ class Guess(Round):
 
 
 @dataclass
-class Settled:
+class SteadySection:
     """Section points after the transient, and the state at the last of them."""
 
     points: FloatArray  # (keep, n_u)
@@ -65,16 +65,16 @@ class Settled:
     status: int
 
 
-def settle_forced(system: System, engine: Engine, state: State, transient: int, keep: int) -> Settled:
+def settle_forced(system: System, engine: Engine, state: State, transient: int, keep: int) -> SteadySection:
     """Run a forced system through a transient and keep the section points after it."""
     out, scale = engine.kept(1, keep), system.scale_vector()
     engine.chain(engine.prepare(system.parameter_vector()[None, :]), 0, 1, state, None, Section(), transient, keep, out)
     size = np.maximum(0.5 * (out.high - out.low)[0, : len(scale)], 1e-3 * scale)
-    return Settled(np.nan_to_num(out.section[0]), out.section_mode[0], size, state, int(out.status[0]))
+    return SteadySection(np.nan_to_num(out.section[0]), out.section_mode[0], size, state, int(out.status[0]))
 
 
 def forced_guesses(
-    system: System, engine: Engine, settled: Settled, period_number: int | None, most: int
+    system: System, engine: Engine, settled: SteadySection, period_number: int | None, most: int
 ) -> list[Guess]:
     """Candidates for the period number, the smallest first, from the last section point.
 
@@ -102,7 +102,9 @@ def forced_guesses(
     return [guess for guess in guesses if guess is not None]
 
 
-def _read_round(system: System, engine: Engine, settled: Settled, p: int, i: int, gaps: FloatArray) -> Guess | None:
+def _read_round(
+    system: System, engine: Engine, settled: SteadySection, p: int, i: int, gaps: FloatArray
+) -> Guess | None:
     """The motion over p forcing periods from section point i, as an orbit; None where it ends in another mode."""
     state = settled.state.copy()
     if i < len(settled.points) - 1:
@@ -149,7 +151,7 @@ def touching(guess: R, system: System, kicks: FloatArray | None = None) -> list[
 class _Interval:
     """An interval of motion, and what its second half tells: passages of the level half way up, and half the ranges."""
 
-    log: Log
+    log: TrajectoryLog
     times: FloatArray  # of the passages upwards, interpolated
     points: FloatArray  # the states there
     modes: IntArray
@@ -206,7 +208,7 @@ def autonomous_guesses(
     return found or _by_level(interval, most, given)
 
 
-def _seen(log: Log, instants: FloatArray, system: System) -> _Interval:
+def _seen(log: TrajectoryLog, instants: FloatArray, system: System) -> _Interval:
     """The passages of the level half way up the state that swings most."""
     u, scale = np.nan_to_num(log.sample_u), system.scale_vector()
     begin = len(u) // 2

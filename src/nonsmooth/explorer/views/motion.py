@@ -17,7 +17,7 @@ from nonsmooth.plot.trajectories import pieces_by_mode, with_gaps
 from nonsmooth.results.statuses import in_words
 
 if TYPE_CHECKING:
-    from nonsmooth.explorer.state import State
+    from nonsmooth.explorer.state import PageState
 
 _MODES = [BLUE, *((COLORS[name],) * 2 for name in ("second", "third", "fourth"))]
 _MANY_MODES = 8
@@ -108,12 +108,12 @@ class Portrait(_Curves):
         super().clear()
         self.zone.visible = False
 
-    def tapped(self, x: float, y: float) -> State:
+    def tapped(self, x: float, y: float) -> PageState:
         """Start there."""
         return self.started(**{self.state.x: x, self.state.y: y})
 
 
-class History(_Curves):
+class TimeHistory(_Curves):
     """A state over time, with its crossings."""
 
     name = "history"
@@ -147,7 +147,7 @@ class History(_Curves):
         return [(str(words[k]).replace("_", " "), _MODES[k][self.dark]) for k in seen if k >= 0]
 
 
-class Section(View):
+class SectionPoints(View):
     """Section points in the phase plane."""
 
     name = "section"

@@ -20,7 +20,7 @@ from nonsmooth.plot.sweeps import one_branch
 from nonsmooth.results.statuses import in_words
 
 if TYPE_CHECKING:
-    from nonsmooth.explorer.state import State
+    from nonsmooth.explorer.state import PageState
 
 _HEIGHT = 400  # pixels of an image before the page has said how large it is
 #: Of a sweep up and down, on a light and a dark ground, in every view.
@@ -177,7 +177,7 @@ class Diagram(View):
         clouds = [(names[word], _CLOUDS[word][0][self.dark]) for word in self._clouds(self.state.direction)]
         return [*clouds, *self.sheet.views["branches"].signs()]
 
-    def tapped(self, x: float, y: float) -> State:
+    def tapped(self, x: float, y: float) -> PageState:
         """Go to the next column, and start at the section point of it next to the click."""
         state, result = self.state, self.results.get("diagram")
         if result is None:
@@ -190,7 +190,7 @@ class Diagram(View):
             return state
         return replace(state, start=tuple(points[np.nanargmin(away)].tolist()))
 
-    def zoomed(self, x: Ends, y: Ends) -> State:
+    def zoomed(self, x: Ends, y: Ends) -> PageState:
         """Compute the range that is seen."""
         self.redraw()
         return replace(self.state, low=x[0], high=x[1])
@@ -386,7 +386,7 @@ class Response(View):
         """Directions of the sweep."""
         return [(words, _DIRECTIONS[words.split(",")[0]][self.dark]) for words in ("up", "down, dashed")]
 
-    def tapped(self, x: float, y: float) -> State:
+    def tapped(self, x: float, y: float) -> PageState:
         """Go to the nearest frequency, on the curve that is nearer to the click."""
         state, result = self.state, self.results.get("response")
         if result is None:
@@ -398,10 +398,10 @@ class Response(View):
         state = state.with_value(over, float(one[over]))
         return replace(state, start=tuple(at[-1].tolist())) if np.isfinite(at[-1]).all() else state
 
-    def zoomed(self, x: Ends, y: Ends) -> State:
+    def zoomed(self, x: Ends, y: Ends) -> PageState:
         """Compute the range that is seen."""
         return self.state.with_settings(response__low=x[0], response__high=x[1])
 
-    def unzoomed(self) -> State:
+    def unzoomed(self) -> PageState:
         """Return to the first range."""
         return self.state.with_settings(response__low=None, response__high=None)

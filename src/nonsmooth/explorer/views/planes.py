@@ -21,14 +21,14 @@ from nonsmooth.plot.style import COLORS
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from nonsmooth.explorer.state import State
+    from nonsmooth.explorer.state import PageState
 
 _NOTHING = -1e300  # Bokeh writes NaN itself, and asks no formatter
 _PLACE = "return Number((value / Math.pow(10, power)).toPrecision(5)).toString().replace('-', '\\u2212') + unit;"
 _MORE = "return value > -1e299 ? before + value.toPrecision(3).replace('-', '\\u2212') + after : '';"
 
 
-class Cells(View):
+class CellImage(View):
     """An image in whose cells a number stands for a class, with marks over it."""
 
     def build(self) -> None:
@@ -93,7 +93,7 @@ class Cells(View):
             self._places[key].args = {"power": power, "unit": text}
 
 
-class Chart(Cells):
+class Chart(CellImage):
     """Period numbers over the diagram's parameter and a second one, from the initial state at rest."""
 
     name = "chart"
@@ -154,7 +154,7 @@ class Chart(Cells):
         """The classes that the chart has."""
         return self._legend if "chart" in self.results else []
 
-    def tapped(self, x: float, y: float) -> State:
+    def tapped(self, x: float, y: float) -> PageState:
         """Go to the nearest point of the chart, and start where its runs started."""
         state, result = self.state, self.results.get("chart")
         if result is None:
@@ -163,11 +163,11 @@ class Chart(Cells):
             state = state.with_value(str(dim), float(result[dim].sel({dim: value}, method="nearest")))
         return replace(state, start=first_state(state.model, self.system).start)
 
-    def zoomed(self, x: Ends, y: Ends) -> State:
+    def zoomed(self, x: Ends, y: Ends) -> PageState:
         """Compute the range that is seen; the diagram's range is the same."""
         return replace(self.state, low=x[0], high=x[1]).with_settings(chart__low=y[0], chart__high=y[1])
 
-    def unzoomed(self) -> State:
+    def unzoomed(self) -> PageState:
         """Return to the first range of the second parameter."""
         return self.state.with_settings(chart__low=None, chart__high=None)
 
@@ -177,7 +177,7 @@ _MARKS = ("circle", "square", "triangle", "diamond", "inverted_triangle", "hex",
 _ENDS = ("left", "right", "bottom", "top")
 
 
-class Basins(Cells):
+class Basins(CellImage):
     """Initial states in the colour of their attractor, with the attractors' section points; a click starts there."""
 
     name = "basins"
@@ -274,10 +274,10 @@ class Basins(Cells):
 
     tapped = Portrait.tapped
 
-    def zoomed(self, x: Ends, y: Ends) -> State:
+    def zoomed(self, x: Ends, y: Ends) -> PageState:
         """Compute the window that is seen."""
         return self.state.with_settings(**{f"basins__{end}": value for end, value in zip(_ENDS, (*x, *y), strict=True)})
 
-    def unzoomed(self) -> State:
+    def unzoomed(self) -> PageState:
         """Return to the first window."""
         return self.state.with_settings(**{f"basins__{end}": None for end in _ENDS})

@@ -11,7 +11,7 @@ from nonsmooth.explorer.figures import GREY, MOST
 from nonsmooth.explorer.views.view import Request, Requests, View
 
 
-class Recording(View):
+class RecordingOverlay(View):
     """A recorded motion in four figures."""
 
     name = "recording"

@@ -12,7 +12,7 @@ from nonsmooth.plot.trajectories import FLOOR
 _LINES = 20  # multiples of the base frequency that are drawn
 
 
-class Spectrum(View):
+class AmplitudeSpectrum(View):
     """The amplitude of every harmonic and subharmonic of the state over time."""
 
     name = "spectrum"

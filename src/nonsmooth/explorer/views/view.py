@@ -10,7 +10,7 @@ from nonsmooth.explorer.labels import symbols_of
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.sheet import Sheet
-    from nonsmooth.explorer.state import State
+    from nonsmooth.explorer.state import PageState
     from nonsmooth.system.system import System
 
 Request = dict[str, Any]
@@ -40,7 +40,7 @@ class View:
         self.paint(dark=False)
 
     @property
-    def state(self) -> State:
+    def state(self) -> PageState:
         """The state of the page."""
         return self.page.state
 
@@ -114,19 +114,19 @@ class View:
         """Words and colours; a sign in place of a dot where a third text says so."""
         return []
 
-    def tapped(self, x: float, y: float) -> State:
+    def tapped(self, x: float, y: float) -> PageState:
         """The state after a click."""
         return self.state
 
-    def started(self, **values: float) -> State:
+    def started(self, **values: float) -> PageState:
         """The state with other initial values of some states."""
         start = dict(zip(self.system.states, self.state.start, strict=True)) | values
         return self.state.but("start", tuple(start.values()))
 
-    def zoomed(self, x: Ends, y: Ends) -> State:
+    def zoomed(self, x: Ends, y: Ends) -> PageState:
         """The state after a zoom."""
         return self.state
 
-    def unzoomed(self) -> State:
+    def unzoomed(self) -> PageState:
         """The state after the zoom was reset."""
         return self.state

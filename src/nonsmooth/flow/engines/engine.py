@@ -66,7 +66,7 @@ NO_CHANGES = Changes(np.zeros(0), np.zeros((0, 0)), 0)
 
 
 @dataclass
-class Log:
+class TrajectoryLog:
     """Everything that ``record`` collected, already trimmed: samples at the times asked for, crossings and touches."""
 
     sample_u: FloatArray  # (n_samples, n)

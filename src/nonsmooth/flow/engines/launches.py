@@ -14,7 +14,7 @@ from nonsmooth.kernels.hybrid.kept import Kept
 
 
 @dataclass
-class States:
+class StatesOnGpu:
     """Places of N trajectories, on the GPU: states, memory, clocks, modes, and the parameter row of each."""
 
     u: Any  # (N, n)
@@ -24,19 +24,21 @@ class States:
     rows: Any  # (N,)
 
     @classmethod
-    def of(cls, cuda: Any, rows: IntArray, u: FloatArray, memory: FloatArray, modes: Any, clock: FloatArray) -> States:
+    def of(
+        cls, cuda: Any, rows: IntArray, u: FloatArray, memory: FloatArray, modes: Any, clock: FloatArray
+    ) -> StatesOnGpu:
         """Those of N trajectories with their clocks (:class:`.engine.State`), which have no transition behind them."""
         counters, room = np.zeros((len(rows), 4), dtype=np.int64), np.zeros((len(rows), max(memory.shape[1], 1)))
         counters[:, 0], counters[:, 1], room[:, : memory.shape[1]] = modes, -1, memory
         parts = (np.array(u, dtype=float), room, np.array(clock, dtype=float), counters, np.asarray(rows))
         return cls(*map(cuda.to_device, parts))
 
-    def room(self, cuda: Any, times: int) -> States:
+    def room(self, cuda: Any, times: int) -> StatesOnGpu:
         """Room for so many states at the parameter rows of each of these."""
         shapes = [(times * len(part), *part.shape[1:]) for part in self.all()]
         rows = np.tile(self.rows.copy_to_host(), times)
         arrays = (cuda.device_array(shape, part.dtype) for shape, part in zip(shapes, self.all(), strict=True))
-        return States(*[*arrays, cuda.to_device(rows)])
+        return StatesOnGpu(*[*arrays, cuda.to_device(rows)])
 
     def all(self) -> tuple[Any, ...]:
         return self.u, self.memory, self.clock, self.counters

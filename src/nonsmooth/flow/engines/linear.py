@@ -39,7 +39,7 @@ def table_bytes(states: int, harmonics: int, modes: int) -> int:
 
 
 @dataclass
-class Tables:
+class LinearPoints:
     """Arrays of the kernel for P parameter points."""
 
     points: FloatArray
@@ -65,7 +65,7 @@ class LinearEngine(Engine):
     def step_in(self, mode: int, system: Any) -> float:
         return float(system[2].info[mode, 0])
 
-    def prepare(self, points: FloatArray) -> Tables:
+    def prepare(self, points: FloatArray) -> LinearPoints:
         t = self.form.evaluate(points)
         n_points, n_modes = t.b.shape[:2]
         n_i, n_h = t.ia.shape[1], len(self.form.multiples)
@@ -103,7 +103,7 @@ class LinearEngine(Engine):
             form = _with_harmonic(form)
         if n_points > 1:  # threads may share them
             compiled(self.module().run)
-        return Tables(points, form, form.period, (n_modes, n_i, outputs[0].shape[1], len(self.net.rows)))
+        return LinearPoints(points, form, form.period, (n_modes, n_i, outputs[0].shape[1], len(self.net.rows)))
 
     @property
     def is_planar(self) -> bool:
@@ -115,7 +115,7 @@ class LinearEngine(Engine):
 
         return linear_module(self.is_planar)
 
-    def given(self, tables: Tables) -> tuple[Any, Any, Any]:
+    def given(self, tables: LinearPoints) -> tuple[Any, Any, Any]:
         """The present thread's tables and work; the kernel keeps the tables of the last point in them."""
         if tables.form.ra.shape[1] < len(self.net.changed):  # some were found since
             from nonsmooth.system.codegen.linear import linear_form

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
-from nonsmooth.flow.engines.launches import OnGpu, States
+from nonsmooth.flow.engines.launches import OnGpu, StatesOnGpu
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.loop import DIVERGENCE
 from nonsmooth.kernels.hybrid import codes
@@ -62,7 +62,7 @@ class PlanarOnGpu(OnGpu):
     def run(
         self,
         jobs: IntArray,
-        states: States,
+        states: StatesOnGpu,
         transient: int,
         keep: Any,
         out: Kept,
@@ -96,7 +96,7 @@ class PlanarOnGpu(OnGpu):
         return done[one_more.status.copy_to_host()[done] == codes.OK]
 
     def run_beside(
-        self, jobs: IntArray, others: States, period: IntArray, whole: Kept, arrived: Kept, extremes: bool
+        self, jobs: IntArray, others: StatesOnGpu, period: IntArray, whole: Kept, arrived: Kept, extremes: bool
     ) -> None:
         """March jobs j by period[j] returns into ``whole``, and their neighbours, which stand behind them in
         ``others``; of these the last return goes into ``arrived``."""
@@ -105,7 +105,7 @@ class PlanarOnGpu(OnGpu):
     def _advance(
         self,
         jobs: IntArray,
-        states: States,
+        states: StatesOnGpu,
         transient: int,
         keep: Any,
         out: Kept,

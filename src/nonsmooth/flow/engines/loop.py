@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import NO_CHANGES, Changes, FloatArray, Log, State
-from nonsmooth.flow.engines.march import March
+from nonsmooth.flow.engines.engine import NO_CHANGES, Changes, FloatArray, State, TrajectoryLog
+from nonsmooth.flow.engines.march import KernelMarch
 from nonsmooth.kernels.hybrid import codes, places
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, FIRED, MODE, RESET, STARTS, TIME, TOUCHES, WAITS
@@ -64,12 +64,12 @@ class Engine(ABC):
     def touches_of_a_leg(self) -> int:
         """Number of touches that one segment may add to a log, at most."""
 
-    def march(self) -> March:
+    def march(self) -> KernelMarch:
         """The present thread's way into the kernels."""
         local = self._threads
         if not hasattr(local, "march"):
-            local.march = March(self.module(), self.limit)
-        found: March = local.march
+            local.march = KernelMarch(self.module(), self.limit)
+        found: KernelMarch = local.march
         return found
 
     @cached_property
@@ -94,7 +94,7 @@ class Engine(ABC):
     def leave(self, here: Any, state: State) -> None:  # noqa: B027  most engines number modes as the system does
         """The reverse of :meth:`enter`, for a state."""
 
-    def go_on(self, tables: Any, march: March, system: Any) -> bool:
+    def go_on(self, tables: Any, march: KernelMarch, system: Any) -> bool:
         """Give a run that has paused what it waits for; True where that exchanged model, tables or work.
 
         What elements decide together is asked here (:mod:`nonsmooth.system.derived.deciding`)."""
@@ -108,7 +108,7 @@ class Engine(ABC):
             self.renew()
         return taken >= len(system[1].transitions)
 
-    def _answer(self, waits: int, tables: Any, march: March, system: Any) -> int:
+    def _answer(self, waits: int, tables: Any, march: KernelMarch, system: Any) -> int:
         """Say where a transition that is asked leads, and which one is taken; -1 at a start."""
         decider, i, local, work = self.traced.decider, int(march.orders[0]), self._threads, system[3]
         assert decider is not None
@@ -217,13 +217,13 @@ class Engine(ABC):
             if state.clock[2] == 0.0 and tables.period[last - 1] < np.inf:
                 state.clock[:] = clock  # failed at the first point: nothing was written
 
-    def _run(self, march: March, tables: Any, indicator: int = -1) -> tuple[int, Any]:
+    def _run(self, march: KernelMarch, tables: Any, indicator: int = -1) -> tuple[int, Any]:
         """March until the goal is reached or a log is full; Ctrl-C comes in between. Returns the code, and the work."""
         system = self.system(tables, int(march.orders[0]), indicator)
         system[3].tally[BEGUN] = system[3].tally[STARTS] = system[3].tally[WAITS] = 0
         return self._go_on(march, tables, indicator, system)
 
-    def _go_on(self, march: March, tables: Any, indicator: int, system: Any) -> tuple[int, Any]:
+    def _go_on(self, march: KernelMarch, tables: Any, indicator: int, system: Any) -> tuple[int, Any]:
         code = codes.PAUSED
         while code == codes.PAUSED:
             code = march.run(system)
@@ -247,7 +247,7 @@ class Engine(ABC):
         samples: FloatArray,
         room: Any = None,
         changes: Changes | None = None,
-    ) -> Log:
+    ) -> TrajectoryLog:
         """Point 0: march ``state`` to the time ``until``, with dense samples at the increasing absolute times
         ``samples`` (a sample exactly at a crossing is the limit after it). A state that a mode lacks is NaN.
 
@@ -280,7 +280,7 @@ class Engine(ABC):
             sample_u[lacking[sample_mode] & (sample_mode >= 0)[:, None]] = np.nan
             before[lacking[[t.source for t in jumps]][transitions]] = np.nan
             after[lacking[[t.target for t in jumps]][transitions]] = np.nan
-        return Log(
+        return TrajectoryLog(
             sample_u,
             sample_memory,
             sample_mode,

@@ -15,7 +15,7 @@ PATIENCE = 50_000  # steps of a run between two looks whether somebody wants to 
 _NO_STARTS = np.zeros((0, 0))
 
 
-class March:
+class KernelMarch:
     """The blocks of one thread, over the kernels of one stepper (``linear_module`` or ``series_module``)."""
 
     def __init__(self, module: ModuleType, limit: FloatArray) -> None:

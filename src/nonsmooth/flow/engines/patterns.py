@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import Changes, FloatArray, IntArray, Log, State
+from nonsmooth.flow.engines.engine import Changes, FloatArray, IntArray, State, TrajectoryLog
 from nonsmooth.flow.engines.linear import table_bytes
 from nonsmooth.flow.engines.loop import Engine
-from nonsmooth.flow.engines.march import March
+from nonsmooth.flow.engines.march import KernelMarch
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.hybrid.places import DEAD_END, FIRED, MODE, RESET, STARTS, TIME, WAITS
@@ -25,7 +25,7 @@ from nonsmooth.results.memory import free_memory, room_for
 from nonsmooth.system.codegen.linear import apart, put_together
 from nonsmooth.system.derived.deciding import Outcome, begun, decide
 from nonsmooth.system.derived.instants import RowNumbers
-from nonsmooth.system.derived.patterns import Change, Lead
+from nonsmooth.system.derived.patterns import Lead, Reset
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, FOUND, TOGETHER
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class PatternEngine(Engine):
         """None: an extremum of each condition of each element, in a hundred states, would fill the memory."""
         return 0
 
-    def go_on(self, tables: Any, march: March, system: Any) -> bool:
+    def go_on(self, tables: Any, march: KernelMarch, system: Any) -> bool:
         tables.complete()
         return True
 
@@ -123,7 +123,7 @@ class PatternEngine(Engine):
         samples: FloatArray,
         room: Any = None,
         changes: Changes | None = None,
-    ) -> Log:
+    ) -> TrajectoryLog:
         here, _ = self.enter(tables, 0, state)
         log = super().record(here, state, until, samples, changes=changes)
         here.leave(state)
@@ -258,7 +258,7 @@ class PatternTables:
             contact = ENDS.index(found.ends) + DEAD_END if found.ends else contact
             way = (key[1], RESET if struck else 0, contact, number, 0)
             self.transitions = np.concatenate([self.transitions, np.array([way], dtype=np.int64)])
-            change = Change(struck, rubs=found.rubbed is not None) if struck else None
+            change = Reset(struck, rubs=found.rubbed is not None) if struck else None
             names, ends = found.names or lead.element, found.ends or FOUND
             self._lead(Lead(lead.source, found.pattern, names, lead.rows, ends, change), lead.kind)
             self.form, self.net = self.form._replace(**self._maps()[0]), self._net()

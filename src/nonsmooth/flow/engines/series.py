@@ -16,7 +16,7 @@ import numpy as np
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.layers import Layers, layers
 from nonsmooth.flow.engines.loop import DIVERGENCE, Engine, pack_net
-from nonsmooth.flow.engines.series_tables import Tables, periods, work_of
+from nonsmooth.flow.engines.series_tables import SeriesPoints, periods, work_of
 from nonsmooth.kernels.series.places import LENGTH, METHODS
 
 if TYPE_CHECKING:
@@ -137,17 +137,17 @@ class SeriesEngine(Engine):
     def step_in(self, mode: int, system: Any) -> float:
         return float(system[3].memo[LENGTH])
 
-    def prepare(self, points: FloatArray) -> Tables:
+    def prepare(self, points: FloatArray) -> SeriesPoints:
         """Periods at the parameter points (P, n_parameters)."""
         points = np.ascontiguousarray(points, dtype=float)
-        return Tables(points, periods(self.traced, points))
+        return SeriesPoints(points, periods(self.traced, points))
 
     def module(self) -> ModuleType:
         from nonsmooth.kernels.series.module import series_module
 
         return series_module()
 
-    def given(self, tables: Tables) -> tuple[Any, Any, Any]:
+    def given(self, tables: SeriesPoints) -> tuple[Any, Any, Any]:
         local = self._threads
         if getattr(local, "tables", None) is not tables or local.maps != len(self.net.changed):
             local.tables, local.generated, local.maps = tables, self.generated(tables), len(self.net.changed)
@@ -158,7 +158,7 @@ class SeriesEngine(Engine):
     def touches_of_a_leg(self) -> int:
         return (len(self.net.rows) + 1) * (self.series_order + 1)
 
-    def generated(self, tables: Tables) -> Any:
+    def generated(self, tables: SeriesPoints) -> Any:
         """Record that stands for system and method in the kernels (``kernels.records.Generated``)."""
         from nonsmooth.kernels.hybrid.records import Generated
 

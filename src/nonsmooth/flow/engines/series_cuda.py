@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
-from nonsmooth.flow.engines.launches import OnGpu, States
+from nonsmooth.flow.engines.launches import OnGpu, StatesOnGpu
 from nonsmooth.flow.engines.series import SeriesEngine
-from nonsmooth.flow.engines.series_tables import Tables
+from nonsmooth.flow.engines.series_tables import SeriesPoints
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.series.places import METHODS
@@ -18,7 +18,7 @@ STEPS = 1024  # of one launch, at most: below a second also on a small GPU
 PART = 0.75  # of ``devices.batch_size`` in one launch: what the registers hold by the compiler's choice (168 of each)
 
 
-def module_of(engine: SeriesEngine, tables: Tables) -> Any:
+def module_of(engine: SeriesEngine, tables: SeriesPoints) -> Any:
     """The kernels for an engine's system, method and order."""
     from nonsmooth.kernels.cuda.series_module import cuda_series_module, cuda_series_source
     from nonsmooth.system.codegen.generate import model_source
@@ -101,7 +101,7 @@ class SeriesOnGpu(OnGpu):
     def run(
         self,
         jobs: IntArray,
-        states: States,
+        states: StatesOnGpu,
         transient: Any,
         keep: Any,
         out: Kept,
@@ -144,7 +144,7 @@ class SeriesOnGpu(OnGpu):
         return jobs[np.isin(out.status.copy_to_host()[jobs], (codes.OK, codes.NOT_GUARANTEED))]
 
     def run_beside(
-        self, jobs: IntArray, others: States, period: IntArray, whole: Kept, arrived: Kept, extremes: bool
+        self, jobs: IntArray, others: StatesOnGpu, period: IntArray, whole: Kept, arrived: Kept, extremes: bool
     ) -> None:
         """March jobs j by period[j] returns into ``whole``, and their neighbours, which stand behind them in
         ``others``; of these the last return goes into ``arrived``. (Extremes are always there.)"""

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Tables:
+class SeriesPoints:
     """Result of ``prepare`` for P points; read only, shared by threads."""
 
     points: FloatArray  # (P, n_parameters)

@@ -12,7 +12,7 @@ from nonsmooth.flow.options import solver_of
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
 from nonsmooth.identification.compare.measured import recorded_motion
-from nonsmooth.identification.options import Prediction
+from nonsmooth.identification.options import Comparing
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.names import unknown
@@ -46,7 +46,7 @@ def compare(
     direction: Literal["up", "down", "both"] = "down",
     start: Any = None,
     section_phase: Any = 0.0,
-    **options: Unpack[Prediction],
+    **options: Unpack[Comparing],
 ) -> xr.Dataset:
     r"""Lay a measurement over the theory: what both show, how far apart they are, and how far they may be.
 

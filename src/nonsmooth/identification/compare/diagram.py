@@ -9,7 +9,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.identification.compare.draws import Model
-from nonsmooth.identification.compare.periods import Flip, delayed_flips, flips, measured_period, period_numbers
+from nonsmooth.identification.compare.periods import MeasuredFlip, delayed_flips, flips, measured_period, period_numbers
 from nonsmooth.identification.compare.predict import Motions
 from nonsmooth.results.labels import labelled
 
@@ -79,7 +79,7 @@ def compare_diagram(
             )
         variables |= drawn
     if name in measured["section"].dims:  # steady runs: a flip lies between two of them
-        seen = {word: Flip(place, np.nan, place) for word, place in flips(at, numbers).items()}
+        seen = {word: MeasuredFlip(place, np.nan, place) for word, place in flips(at, numbers).items()}
     else:
         seen = delayed_flips(at, points, noise, numbers)
         variables["rise_per_return"] = labelled(
@@ -130,10 +130,10 @@ def _measured(
 
 
 def _flips(
-    measured: dict[str, Flip], theory: dict[str, float], drawn: list[dict[str, float]], unit: str, model: Model
+    measured: dict[str, MeasuredFlip], theory: dict[str, float], drawn: list[dict[str, float]], unit: str, model: Model
 ) -> dict[str, Any]:
     words = sorted({*measured, *theory})
-    nothing = Flip(np.nan, np.nan, np.nan)
+    nothing = MeasuredFlip(np.nan, np.nan, np.nan)
     m, error, read = np.array([measured.get(word, nothing) for word in words], dtype=float).reshape(-1, 3).T
     t = np.array([theory.get(word, np.nan) for word in words], dtype=float)
     over = "flip"

@@ -15,7 +15,7 @@ LEAST = 0.02  # and this part of the amplitude
 CERTAIN = 6.0  # and its standard error by this factor
 
 
-class Jump(NamedTuple):
+class AmplitudeJump(NamedTuple):
     """A jump: it lies within ``half`` of ``value``; the amplitude before and after it, in the order of the sweep."""
 
     value: float
@@ -24,10 +24,10 @@ class Jump(NamedTuple):
     after: float = float("nan")
 
 
-Jumps = Mapping[str, Sequence[Jump]]
+Jumps = Mapping[str, Sequence[AmplitudeJump]]
 
 
-def jumps_in_steps(x: FloatArray, heights: FloatArray, error: FloatArray) -> list[Jump]:
+def jumps_in_steps(x: FloatArray, heights: FloatArray, error: FloatArray) -> list[AmplitudeJump]:
     """The jumps in an amplitude measured step by step, in the order in which the steps were taken.
 
     On the way to a fold the steps grow, so a jump need not be many times its neighbours. It is one where the step is
@@ -57,7 +57,7 @@ def jumps_in_steps(x: FloatArray, heights: FloatArray, error: FloatArray) -> lis
         if abs(step[i]) <= CERTAIN * np.hypot(error[i], error[i + 1]):
             continue
         middle, half = 0.5 * float(x[i] + x[i + 1]), 0.5 * float(abs(x[i + 1] - x[i]))
-        found.append(Jump(middle, half, float(heights[i]), float(heights[i + 1])))
+        found.append(AmplitudeJump(middle, half, float(heights[i]), float(heights[i + 1])))
     return found
 
 
@@ -69,7 +69,7 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
 
     Parameters
     ----------
-    measured, theory : mapping of direction to sequence of Jump
+    measured, theory : mapping of direction to sequence of AmplitudeJump
         In the order of the sweep.
     drawn : sequence of such mappings
         The predicted jumps for drawn parameters.
@@ -89,7 +89,7 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
         seen, expected = list(measured.get(word, ())), list(theory.get(word, ()))
         pairs = _pairs(seen, expected)
         for i, jump in enumerate(seen):
-            other, step, *_ = expected[pairs[i]] if i in pairs else Jump(np.nan)
+            other, step, *_ = expected[pairs[i]] if i in pairs else AmplitudeJump(np.nan)
             rows.append((word, jump.value, other, jump.half + step, *_interval(other, word, drawn, level)))
         for j in sorted(set(range(len(expected))) - set(pairs.values())):
             other, step, *_ = expected[j]
@@ -112,7 +112,7 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
     return variables
 
 
-def _pairs(seen: list[Jump], expected: list[Jump]) -> dict[int, int]:
+def _pairs(seen: list[AmplitudeJump], expected: list[AmplitudeJump]) -> dict[int, int]:
     """Pairs of predicted and measured jumps."""
     from scipy.optimize import linear_sum_assignment
 

@@ -12,7 +12,7 @@ from nonsmooth.identification.compare.clouds import cloud_distance, energy_dista
 from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.orbits import common_length, fold, mean_orbit, orbit_distance
 from nonsmooth.identification.compare.periods import measured_period
-from nonsmooth.identification.compare.predict import Attractor, Motions, Prediction, from_result, predict
+from nonsmooth.identification.compare.predict import Motions, Prediction, SteadyState, from_result, predict
 from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
@@ -213,7 +213,7 @@ def _begun_with_the_measurement(
         return predicted
     at = np.empty(len(motions.places))
     at[motions.places] = whole[0, 0]
-    begun = Attractor(0, at, 0)
+    begun = SteadyState(0, at, 0)
     return replace(predicted, orbit=motions.orbit(0, begun, grid, len(whole)))
 
 
@@ -259,7 +259,7 @@ POINTS = 500  # of the clouds whose distance is taken for each draw
 def motion_band(
     systems: list[System],
     model: Model,
-    nearest: Attractor,
+    nearest: SteadyState,
     sections: list[FloatArray],
     phases: list[float],
     noise: FloatArray,
@@ -276,7 +276,7 @@ def motion_band(
     systems : list of System
         As the model has drawn them.
     model : Model
-    nearest : Attractor
+    nearest : SteadyState
         The nominal motion; each drawn system begins on it.
     sections : list of array (n, states)
         The measured clouds.

@@ -154,7 +154,7 @@ STRAY = 12  # points of another period number in a row that end the doubled side
 ALIKE = 8 / 3  # second differences overlap: as many of them say as much as one
 
 
-class Flip(NamedTuple):
+class MeasuredFlip(NamedTuple):
     """A flip found in a slow rise.
 
     Attributes
@@ -170,8 +170,8 @@ class Flip(NamedTuple):
     read: float
 
 
-def delayed_flips(at: FloatArray, points: FloatArray, noise: FloatArray, numbers: IntArray) -> dict[str, Flip]:
-    """The flips along a slow and even rise (or fall) of a parameter, ``{"1-2": Flip, "2-4": ...}``.
+def delayed_flips(at: FloatArray, points: FloatArray, noise: FloatArray, numbers: IntArray) -> dict[str, MeasuredFlip]:
+    """The flips along a slow and even rise (or fall) of a parameter, ``{"1-2": MeasuredFlip, "2-4": ...}``.
 
     Parameters
     ----------
@@ -187,9 +187,9 @@ def delayed_flips(at: FloatArray, points: FloatArray, noise: FloatArray, numbers
     return {word: _followed(at, points / noise, numbers, word, read) for word, read in flips(at, numbers).items()}
 
 
-def _followed(at: FloatArray, points: FloatArray, numbers: IntArray, word: str, read: float) -> Flip:
+def _followed(at: FloatArray, points: FloatArray, numbers: IntArray, word: str, read: float) -> MeasuredFlip:
     p = int(word.split("-")[0])
-    nothing = Flip(np.nan, np.nan, read)
+    nothing = MeasuredFlip(np.nan, np.nan, read)
     cut = int(np.argmin(np.abs(at - read)))
     # Time runs from the doubled side to the other (closing), or the other way round.
     doubled = numbers == 2 * p
@@ -216,7 +216,7 @@ def _followed(at: FloatArray, points: FloatArray, numbers: IntArray, word: str, 
     stop = min(len(size), 2 * seen + FEWEST)
     rho, size = rho[:stop], size[:stop]
     found = _fitted(rho, size, 1.0 if closing else -1.0)
-    return nothing if found is None else Flip(*found, read)
+    return nothing if found is None else MeasuredFlip(*found, read)
 
 
 def _reach(numbers: IntArray, cut: int, number: int) -> int:

@@ -35,7 +35,7 @@ SAME = 1e-6  # orbits whose points are nearer to each other than this part of th
 
 
 @dataclass(frozen=True)
-class Attractor:
+class SteadyState:
     """A steady motion: period number (0: none found), a section point on it at phase 0, the start that led to it."""
 
     period_number: int
@@ -108,7 +108,7 @@ class Motions:
         mapper.settle(self.settler.rules(), carried, False)(len(rows))
         return kept, mapper.settled()
 
-    def attractors(self, i: int, starts: Any) -> list[Attractor]:
+    def attractors(self, i: int, starts: Any) -> list[SteadyState]:
         """The different motions of system i that the starts settle on, in the order of the starts.
 
         All motions without a period number count as one. A start that diverges leads to none.
@@ -118,7 +118,7 @@ class Motions:
         ValueError
             No start leads to a motion.
         """
-        found: list[Attractor] = []
+        found: list[SteadyState] = []
         orbits: list[FloatArray] = []
         statuses = set()
         begin = np.atleast_2d(np.asarray(starts, dtype=float))
@@ -134,14 +134,14 @@ class Motions:
                 for one, other in zip(found, orbits, strict=True)
             ):
                 continue
-            found.append(Attractor(int(number), points[-1].copy(), k))
+            found.append(SteadyState(int(number), points[-1].copy(), k))
             orbits.append(cycle)
         if not found:
             words = "; ".join(by_code(code).sentence for code in sorted(statuses))
             raise ValueError(f"no start of {self.system.name!r} leads to a motion that can be compared: {words}")
         return found
 
-    def cloud(self, i: int, attractor: Attractor, phase: float, n: int) -> FloatArray:
+    def cloud(self, i: int, attractor: SteadyState, phase: float, n: int) -> FloatArray:
         """Successive points of the section at ``phase``: (n, states); those of a periodic motion come round again."""
         count = attractor.period_number or n
         out = self.engine.kept(1, count)
@@ -153,7 +153,7 @@ class Motions:
         points = out.section[0][:, self.places]
         return np.resize(points, (n, points.shape[1])) if count < n else points
 
-    def orbit(self, i: int, attractor: Attractor, grid: int, periods: int) -> FloatArray:
+    def orbit(self, i: int, attractor: SteadyState, grid: int, periods: int) -> FloatArray:
         """The motion from phase 0 over whole forcing periods: (periods * grid, states)."""
         end = periods * self.periods[i]
         instants = np.linspace(0.0, end, periods * grid + 1)
@@ -185,7 +185,7 @@ class Prediction:
         Over ``period_number`` forcing periods, or an interval of a motion without one; from phase 0.
     coexisting : array of int
         Period numbers of all motions found.
-    attractor : Attractor, optional
+    attractor : SteadyState, optional
         Where it came from a System.
     """
 
@@ -193,7 +193,7 @@ class Prediction:
     sections: list[FloatArray]
     orbit: FloatArray | None
     coexisting: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
-    attractor: Attractor | None = None
+    attractor: SteadyState | None = None
 
 
 def predict(
@@ -208,7 +208,7 @@ def predict(
 ) -> Prediction:
     """Of all motions that the starts lead to the one whose section clouds lie nearest to the measured ones."""
     found = motions.attractors(0, starts)
-    best: tuple[float, Attractor, list[FloatArray]] | None = None
+    best: tuple[float, SteadyState, list[FloatArray]] | None = None
     for one in found:
         sections = [motions.cloud(0, one, phase, n) for phase in phases]
         away = sum(energy_distance(a[-400:] / scale, b[-400:] / scale) for a, b in zip(measured, sections, strict=True))

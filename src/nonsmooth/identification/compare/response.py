@@ -11,7 +11,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.diagrams.response import jumps_in
 from nonsmooth.diagrams.sweep import sweep
 from nonsmooth.identification.compare.draws import Model
-from nonsmooth.identification.compare.jumps import Jump, Jumps, jumps_in_steps, match_jumps
+from nonsmooth.identification.compare.jumps import AmplitudeJump, Jumps, jumps_in_steps, match_jumps
 from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
@@ -160,20 +160,20 @@ def _jumps(values: FloatArray, curves: FloatArray, directions: list[str]) -> Jum
     return found
 
 
-def _jump(x: FloatArray, heights: FloatArray, i: int) -> Jump:
+def _jump(x: FloatArray, heights: FloatArray, i: int) -> AmplitudeJump:
     middle, half = 0.5 * float(x[i] + x[i + 1]), 0.5 * float(abs(x[i + 1] - x[i]))
-    return Jump(middle, half, float(heights[i]), float(heights[i + 1]))
+    return AmplitudeJump(middle, half, float(heights[i]), float(heights[i + 1]))
 
 
 def _measured_jumps(measured: xr.Dataset, runs: dict[str, NDArray[Any]], directions: list[str]) -> Jumps:
     """The jumps that the measurement states, else those in its steps; the prediction has no say in it."""
-    found: dict[str, list[Jump]] = {}
+    found: dict[str, list[AmplitudeJump]] = {}
     if "jump_value" in measured and "run" in measured["amplitude"].dims:  # as the experimenter read them off
         words = measured["jump_direction"].values.astype(str)
         half = 0.5 * measured["jump_step"].values if "jump_step" in measured else np.zeros(len(words))
         for word in directions:
             rows = zip(measured["jump_value"].values, half, words, strict=True)
-            stated = [Jump(float(value), float(step), np.nan, np.nan) for value, step, w in rows if w == word]
+            stated = [AmplitudeJump(float(value), float(step), np.nan, np.nan) for value, step, w in rows if w == word]
             found[word] = sorted(stated, key=lambda jump: jump.value, reverse=word == "down")
         return found
     for word in directions:

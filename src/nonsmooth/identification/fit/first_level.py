@@ -21,7 +21,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, shortened
-from nonsmooth.identification.arrow import State, settle
+from nonsmooth.identification.arrow import Residuals, settle
 from nonsmooth.identification.fit.first_windows import first_windows, told_start
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.system.names import unknown
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 def level(
     problem: Windows, theta: FloatArray, starts: FloatArray, used: Any = None
-) -> tuple[FloatArray, FloatArray, State]:
+) -> tuple[FloatArray, FloatArray, Residuals]:
     """A rough fit on the way, in which the parameters are known to about their own size.
 
     What windows so short do not tell then stays where it is: a coefficient of restitution of 1e8, tried where hardly an
@@ -49,7 +49,7 @@ def own_size(problem: Windows) -> FloatArray:
     return np.where(guess != 0.0, np.abs(guess), np.inf)
 
 
-def misfits(problem: Windows, state: State) -> FloatArray:
+def misfits(problem: Windows, state: Residuals) -> FloatArray:
     """Mean squared residual over the noise, of each window."""
     return np.array([float(np.mean((r / problem.noise[w.readings[1]]) ** 2)) for w, r in problem.rows(state)])
 
@@ -154,7 +154,7 @@ _DRAWN = 60  # starts drawn for such a window
 
 def settle_first(
     problem: Windows, theta: FloatArray, length: float, start: FloatArray | None, free: bool
-) -> tuple[Windows, FloatArray, FloatArray, State]:
+) -> tuple[Windows, FloatArray, FloatArray, Residuals]:
     """Windows, unknowns, starts and residuals of the fit over windows of this length.
 
     Raises
@@ -195,7 +195,7 @@ def settle_first(
     return kept, theta, starts, kept.derivatives(theta, starts)
 
 
-def settle_soft(problem: Windows, theta: FloatArray, starts: FloatArray) -> tuple[FloatArray, FloatArray, State]:
+def settle_soft(problem: Windows, theta: FloatArray, starts: FloatArray) -> tuple[FloatArray, FloatArray, Residuals]:
     """Unknowns, starts and residuals of a fit from far off, over the windows as they are."""
     state = problem.residuals(theta, starts)
     for _ in range(_ROUNDS):
@@ -206,7 +206,7 @@ def settle_soft(problem: Windows, theta: FloatArray, starts: FloatArray) -> tupl
     return theta, starts, state
 
 
-def _smaller(problem: Windows, state: State, noise: FloatArray) -> bool:
+def _smaller(problem: Windows, state: Residuals, noise: FloatArray) -> bool:
     """Return whether the residuals have fallen, so that the noise may be taken for less."""
     return bool(((_PART * _sizes(problem, state) < 0.8 * noise) & (noise > problem.noise)).any())
 
@@ -222,7 +222,7 @@ def _soft(problem: Windows, noise: FloatArray) -> Windows:
     return replace(problem, noise=noise, unknowns=replace(u, low=low, high=high))
 
 
-def _sizes(problem: Windows, state: State) -> FloatArray:
+def _sizes(problem: Windows, state: Residuals) -> FloatArray:
     """Size of the residuals of each quantity, of most windows."""
     found = np.zeros(len(problem.sensors))
     for c in range(len(found)):

@@ -15,7 +15,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.arrow import State, Unsettled, settle
+from nonsmooth.identification.arrow import Residuals, Unsettled, settle
 from nonsmooth.identification.fit.first_level import BETTER, level, other_beginnings, rechosen, settle_first
 from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
@@ -41,7 +41,7 @@ class Grown:
     problem : Windows
         The last windows, with the noise as found.
     theta, starts : array
-    state : State
+    state : Residuals
         Residuals there.
     short : float
         Distance to the minimum where no step leads on, in standard uncertainties; 0 at a minimum.
@@ -60,7 +60,7 @@ class Grown:
     problem: Windows
     theta: FloatArray
     starts: FloatArray
-    state: State
+    state: Residuals
     short: float
     left: FloatArray
     rms: float
@@ -177,8 +177,8 @@ def _at_once(problem: Windows, theta: FloatArray, start: FloatArray | None, free
 
 
 def _longer_windows(
-    problem: Windows, theta: FloatArray, starts: FloatArray, state: State, length: float
-) -> tuple[Windows, tuple[FloatArray, FloatArray, State]] | None:
+    problem: Windows, theta: FloatArray, starts: FloatArray, state: Residuals, length: float
+) -> tuple[Windows, tuple[FloatArray, FloatArray, Residuals]] | None:
     """The fit over windows joined up to ``length``; None where it does not come to an end, or fits much worse."""
     joined = _joined(problem, starts, length)
     if len(joined) == len(problem.pieces):
@@ -195,7 +195,7 @@ def _longer_windows(
     return trial, found
 
 
-def _spreads(problem: Windows, starts: FloatArray, state: State) -> float:
+def _spreads(problem: Windows, starts: FloatArray, state: Residuals) -> float:
     """By how much a motion answers to its start, at most, both in units of their own size."""
     found, sizes = 0.0, np.abs(starts).max(axis=0)
     for window, slopes in zip(problem.pieces, state.in_start, strict=True):
@@ -234,7 +234,7 @@ def _joined(problem: Windows, starts: FloatArray, length: float) -> list[Window]
     return found
 
 
-def _reduced(problem: Windows, state: State) -> float:
+def _reduced(problem: Windows, state: Residuals) -> float:
     """Sum of squared residuals over the noise, per degree of freedom."""
     rows = [r / problem.noise[w.readings[1]] for w, r in problem.rows(state)]
     free = sum(w.n_free for w in problem.pieces) + len(problem.unknowns.names)
@@ -288,7 +288,7 @@ def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:
     return replace(final, begins=tuple(begins))
 
 
-def _noise(problem: Windows, state: State) -> FloatArray:
+def _noise(problem: Windows, state: Residuals) -> FloatArray:
     """Standard deviation of a reading of each quantity: from its residuals, or as it is known."""
     free = sum(w.n_free for w in problem.pieces) + len(problem.unknowns.names)
     total = sum(len(w.readings[0]) for w in problem.pieces)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray, IntArray
-from nonsmooth.flow.engines.engine import Log, State
+from nonsmooth.flow.engines.engine import State, TrajectoryLog
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
-from nonsmooth.flow.inputs import Course, Driven
+from nonsmooth.flow.inputs import DelayedInputs, Driven
 from nonsmooth.flow.sensitivity import apart, jump_between, settled
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
@@ -23,7 +23,7 @@ RTOL = 1e-11  # where the flow is not exact: below any noise, and below what a s
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class SampledMotion:
     """States at the samples; with derivatives where they were asked for.
 
     Attributes
@@ -34,7 +34,7 @@ class Motion:
         States and memory.
     mode, segment : array (N,) of int
         The mode, and how many transitions came before.
-    log : Log
+    log : TrajectoryLog
     rate : array (N, n), D : array (N, n, n + n_active), of_time : array (N, n)
         dz/dt; derivatives in the start z and in the active parameters; in the time of the whole window.
     """
@@ -43,7 +43,7 @@ class Motion:
     z: FloatArray
     mode: IntArray
     segment: IntArray
-    log: Log
+    log: TrajectoryLog
     rate: FloatArray | None = None
     D: FloatArray | None = None
     of_time: FloatArray | None = None
@@ -75,7 +75,7 @@ class Marcher:
         mode: int,
         derivatives: bool = False,
         drive: Driven | None = None,
-    ) -> Motion | None:
+    ) -> SampledMotion | None:
         """March from (begin, z, mode) to the samples; None where the run does not come to its end."""
         period = self.system.period_at(values)
         n_u = len(self.traced.u)
@@ -99,7 +99,7 @@ class Marcher:
         if not np.isfinite(u).all():
             return None
         at = slice(1, None) if changes is None else 1 + np.searchsorted(instants, times)
-        plain = Motion(times, u[at], log.sample_mode[at], log.sample_segment[at], log)
+        plain = SampledMotion(times, u[at], log.sample_mode[at], log.sample_segment[at], log)
         if not derivatives:
             return plain
         cuts = np.zeros(0) if changes is None else changes.times
@@ -108,14 +108,14 @@ class Marcher:
 
     def _derived(
         self,
-        plain: Motion,
+        plain: SampledMotion,
         values: FloatArray,
         begin: float,
         z: FloatArray,
         mode: int,
-        course: Course | None,
+        course: DelayedInputs | None,
         changes: list[tuple[float, int]],
-    ) -> Motion:
+    ) -> SampledMotion:
         """The same with derivatives: products over the pieces between samples and transitions."""
         flow, log, n = self.flow, plain.log, self.flow.n
         size = n + flow.n_active
@@ -159,4 +159,4 @@ class Marcher:
         if start is not None:  # transitions that are taken at once, whenever the window begins
             of_time += D[:, :, :n] @ start.R_t
             D = D @ start.R
-        return Motion(plain.time, plain.z, plain.mode, plain.segment, log, rate, D, of_time)
+        return SampledMotion(plain.time, plain.z, plain.mode, plain.segment, log, rate, D, of_time)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.arrow import State
+from nonsmooth.identification.arrow import Residuals
 from nonsmooth.identification.fit.windows import Windows
 
 OUTLYING = 6.0  # noise deviations, beyond which a reading is named
@@ -31,7 +31,7 @@ def _as_irregular(rho: float) -> float:
     return float(np.sqrt(20.0 / (20.0 - 30.0 * rho + 12.0 * rho**2 - 2.0 * rho**3)))
 
 
-def colours(problem: Windows, state: State) -> FloatArray:
+def colours(problem: Windows, state: Residuals) -> FloatArray:
     """Correlation of neighbouring residuals of each quantity, 0 where it is none; ``state``: not whitened."""
     found = np.zeros(len(problem.sensors))
     for c in range(len(found)):
@@ -45,7 +45,7 @@ def colours(problem: Windows, state: State) -> FloatArray:
     return found
 
 
-def strange(problem: Windows, plain: State, white: State, irregular: FloatArray) -> tuple[float, bool]:
+def strange(problem: Windows, plain: Residuals, white: Residuals, irregular: FloatArray) -> tuple[float, bool]:
     """Size of the residuals over that of noise as irregular as the record, and whether the model lacks a part.
 
     The size is that of one quantity, the worst, over that of noise of their correlation. A part is missing where
@@ -64,7 +64,7 @@ def strange(problem: Windows, plain: State, white: State, irregular: FloatArray)
     return worst, missing
 
 
-def parts(problem: Windows, state: State, c: int) -> list[FloatArray]:
+def parts(problem: Windows, state: Residuals, c: int) -> list[FloatArray]:
     """Residuals of a quantity, window by window, without the readings at a limit of the sensor."""
     return [r[(w.readings[1] == c) & (problem.limits(w) == 0)] for w, r in problem.rows(state)]
 

@@ -12,7 +12,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.blas import one_blas_thread
-from nonsmooth.identification.options import Known
+from nonsmooth.identification.options import Prior
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.names import unknown
@@ -33,7 +33,7 @@ def plan_experiment(
     parameters: Sequence[str],
     *,
     measured: Mapping[str, Any] | Sequence[str] | str,
-    **options: Unpack[Known],
+    **options: Unpack[Prior],
 ) -> xr.Dataset:
     r"""Return the information of candidate runs about parameters, and the order in which to make them.
 
@@ -156,7 +156,7 @@ def _information(
     parameters: Sequence[str],
     sensors: Mapping[str, Any],
     noise: FloatArray,
-    known_before: Known,
+    known_before: Prior,
 ) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:
     """Names of the unknowns that runs share, what the run tells of them, what is known before, and their values."""
     from nonsmooth.flow.simulate import simulate

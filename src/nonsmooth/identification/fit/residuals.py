@@ -9,7 +9,7 @@ import numpy as np
 
 from nonsmooth.arrays import IntArray
 from nonsmooth.identification.fit.growth import Grown
-from nonsmooth.identification.fit.motion import Motion
+from nonsmooth.identification.fit.motion import SampledMotion
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def _places(system: System) -> tuple[list[str], dict[tuple[str, int], int]]:
     return names, marks
 
 
-def _of_samples(system: System, motion: Motion, marks: Mapping[tuple[str, int], int]) -> IntArray:
+def _of_samples(system: System, motion: SampledMotion, marks: Mapping[tuple[str, int], int]) -> IntArray:
     """The place of each sample of a motion: the nearest transition, a graze, else its mode."""
     from sympy import lambdify
 

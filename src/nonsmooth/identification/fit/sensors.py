@@ -122,7 +122,7 @@ def read_sensors(system: System, measured: Any, channels: Sequence[str]) -> dict
     return sensors
 
 
-class Readout:
+class Observable:
     """A state or an output of a system along a motion, with its derivatives.
 
     Parameters

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.identification.arrow import State
-from nonsmooth.identification.fit.motion import Marcher, Motion
+from nonsmooth.identification.arrow import Residuals
+from nonsmooth.identification.fit.motion import Marcher, SampledMotion
 from nonsmooth.identification.fit.records import Record
-from nonsmooth.identification.fit.sensors import Readout, Sensor
+from nonsmooth.identification.fit.sensors import Observable, Sensor
 from nonsmooth.identification.fit.unknowns import Unknowns
 from nonsmooth.recordings.signals.spectrum import correlation_times
 
@@ -117,8 +117,8 @@ class Windows:
         return replace(self, colour=np.zeros(len(self.sensors)))
 
     @cached_property
-    def readouts(self) -> list[Readout]:
-        return [Readout(self.system, name, self.marcher.flow.places) for name in self.sensors]
+    def readouts(self) -> list[Observable]:
+        return [Observable(self.system, name, self.marcher.flow.places) for name in self.sensors]
 
     @cached_property
     def starts(self) -> FloatArray:
@@ -148,7 +148,9 @@ class Windows:
         """The system's time over that of the recording."""
         return float(theta[self.unknowns.clock_place(run)]) if self.unknowns.clock else 1.0
 
-    def motion(self, theta: FloatArray, window: Window, start: FloatArray, derivatives: bool = False) -> Motion | None:
+    def motion(
+        self, theta: FloatArray, window: Window, start: FloatArray, derivatives: bool = False
+    ) -> SampledMotion | None:
         """The motion of a window at its samples; where delays differ, at the instants of each quantity in turn."""
         instants = self.instants(theta, window)
         return self.march(theta, window.record, window.begin, instants, start, window.mode, derivatives)
@@ -162,7 +164,7 @@ class Windows:
         start: FloatArray,
         mode: int,
         derivatives: bool = False,
-    ) -> Motion | None:
+    ) -> SampledMotion | None:
         """A motion from an instant of a run to times of its corrected clock; None where it does not come to its end."""
         values, begin = self.values(theta, run), self.clock(theta, run) * begin
         if values is None or not np.isfinite(theta).all() or not np.isfinite(start).all():
@@ -184,7 +186,7 @@ class Windows:
         return np.unique((time[:, None] - delays).ravel())
 
     def readings(
-        self, theta: FloatArray, window: Window, motion: Motion, slopes: bool
+        self, theta: FloatArray, window: Window, motion: SampledMotion, slopes: bool
     ) -> tuple[FloatArray, FloatArray]:
         """Predicted readings (R,), and their derivatives (R, unknowns of the window + n) where asked for."""
         values = self.values(theta, window.record)
@@ -267,7 +269,7 @@ class Windows:
             out[at[1:]] = (rows[at[1:]] - told * rows[at[:-1]]) / np.sqrt(1.0 - told**2)
         return out
 
-    def rows(self, state: State) -> list[tuple[Window, FloatArray]]:
+    def rows(self, state: Residuals) -> list[tuple[Window, FloatArray]]:
         """The windows with the residuals of their readings."""
         return [(w, r[: len(w.readings[0])]) for w, r in zip(self.pieces, state.residuals, strict=True)]
 
@@ -277,16 +279,16 @@ class Windows:
         weights = self.weights(state) if weights is None else weights
         return state.chi2(weights) + float(away @ self.unknowns.precision @ away)
 
-    def residuals(self, theta: FloatArray, starts: FloatArray) -> State:
+    def residuals(self, theta: FloatArray, starts: FloatArray) -> Residuals:
         """Residuals of all windows; not finite where a motion does not come to its end."""
         return self._state(theta, starts, False)
 
-    def derivatives(self, theta: FloatArray, starts: FloatArray) -> State:
+    def derivatives(self, theta: FloatArray, starts: FloatArray) -> Residuals:
         """The same with derivatives."""
         return self._state(theta, starts, True)
 
-    def _state(self, theta: FloatArray, starts: FloatArray, slopes: bool) -> State:
-        state = State([], [], [], [])
+    def _state(self, theta: FloatArray, starts: FloatArray, slopes: bool) -> Residuals:
+        state = Residuals([], [], [], [])
         for window, start in zip(self.pieces, starts, strict=True):
             motion = self.motion(theta, window, start, slopes)
             k, c = window.readings
@@ -312,7 +314,7 @@ class Windows:
                 state.in_parameters.append(np.vstack([table[:, :p], np.zeros((len(free), p))]))
         return state
 
-    def weights(self, state: State | None) -> list[FloatArray]:
+    def weights(self, state: Residuals | None) -> list[FloatArray]:
         """One over the standard deviation of each row; less for those that the loss weighs down."""
         found = []
         for i, w in enumerate(self.pieces):

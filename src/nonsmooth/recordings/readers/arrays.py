@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.recordings.readers.fields import Field, Table, label, traces_of
+from nonsmooth.recordings.readers.fields import Field, FieldTable, label, traces_of
 from nonsmooth.recordings.readers.loaders import load
 from nonsmooth.recordings.reading import (
     MAX_COLUMNS,
@@ -114,7 +114,9 @@ def _note(value: Any) -> str:
     return str(value.ravel()[0]) if _is_array(value) and value.size == 1 else ""
 
 
-def _table(run: str, path: str, node: Mapping[str, Any], key: str | None, options: Options, remarks: Remarks) -> Table:
+def _table(
+    run: str, path: str, node: Mapping[str, Any], key: str | None, options: Options, remarks: Remarks
+) -> FieldTable:
     arrays = {name: value for name, value in node.items() if _is_array(value) and value.size > 1}
     units = _units(node, list(arrays), remarks, run)
     lengths = [v.size for v in arrays.values() if _is_vector(v)] or [max(v.shape) for v in arrays.values()]
@@ -135,7 +137,7 @@ def _table(run: str, path: str, node: Mapping[str, Any], key: str | None, option
                 number = f"({k})" if len(columns) > 1 else ""
                 attrs = getattr(node, "attrs", {}).get(name, {})
                 fields.append(Field(ours + number, units.get(name, "") or unit, column, origin + number, attrs=attrs))
-    return Table(run, fields, n, rate=getattr(node, "rate", None))
+    return FieldTable(run, fields, n, rate=getattr(node, "rate", None))
 
 
 def _columns(value: NDArray[Any], n: int) -> list[NDArray[Any]] | None:
@@ -161,7 +163,7 @@ def _units(node: Mapping[str, Any], names: list[str], remarks: Remarks, run: str
     return dict(zip(names, words, strict=True))
 
 
-def _chosen(variables: Mapping[str, Any], options: Options, source: Source) -> Table:
+def _chosen(variables: Mapping[str, Any], options: Options, source: Source) -> FieldTable:
     """The channels that ``columns`` names by path: ``"data.x"``, ``"runs(2).x"``, ``"M(:,3)"``."""
     found = [
         (f"{path}.{name}".lstrip("."), value, getattr(node, "units", {}).get(name, ""), getattr(node, "rate", None))
@@ -185,7 +187,7 @@ def _chosen(variables: Mapping[str, Any], options: Options, source: Source) -> T
     for field in fields:
         if len(field.values) != n:
             raise source.error(field.origin, f"has {len(field.values)} values, the {options.axis} has {n}")
-    return Table(_TOP, fields, n, rate=rate)
+    return FieldTable(_TOP, fields, n, rate=rate)
 
 
 def _pick(wanted: str | int, arrays: Mapping[str, NDArray[Any]], source: Source) -> NDArray[Any]:

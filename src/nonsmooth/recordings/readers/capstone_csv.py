@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 
 from nonsmooth.errors import DataFileError
-from nonsmooth.recordings.readers.fields import Field, Table, split_unit, traces_of
+from nonsmooth.recordings.readers.fields import Field, FieldTable, split_unit, traces_of
 from nonsmooth.recordings.readers.text_table import Cells, Numerals, checked_header, decoded, read_cells, rows, sniffed
 from nonsmooth.recordings.reading import MAX_COLUMNS, TIME_WORDS, Options, Reading, Remarks, Source, Trace, names_of
 
@@ -64,7 +64,7 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     for column, (run, unit) in times.items():
         if column in tables:
             time = Field("time", unit, cells.values[column], f"column {column + 1}", cells.rows[column])
-            held = Table(run, [time, *tables[column]], len(cells.lines), cells.lines)
+            held = FieldTable(run, [time, *tables[column]], len(cells.lines), cells.lines)
             reading.traces += traces_of(held, options, source, reading)
         else:
             reading.remarks.of(run, header[column], "is the time of no channel")

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Iterator
 
 from nonsmooth.errors import DataFileError
-from nonsmooth.recordings.readers.fields import Field, Table, chosen, traces_of
+from nonsmooth.recordings.readers.fields import Field, FieldTable, chosen, traces_of
 from nonsmooth.recordings.readers.text_table import Numerals, Row, checked_header, decoded, read_cells, rows, sniffed
 from nonsmooth.recordings.reading import Options, Reading, Source, Trace, names_of
 
@@ -108,7 +108,7 @@ def _table(
         for name, (c, unit) in picked.items()
     ]
     reading.header.update(delimiter=delimiter, columns=len(header), rows=len(cells.lines))
-    yield from traces_of(Table(run, found, len(cells.lines), cells.lines), options, source, reading)
+    yield from traces_of(FieldTable(run, found, len(cells.lines), cells.lines), options, source, reading)
 
 
 def _header(

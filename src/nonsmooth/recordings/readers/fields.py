@@ -36,7 +36,7 @@ class Field:
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class FieldTable:
     """Fields over the same rows; ``rate`` where the file itself says how often they were taken."""
 
     run: str
@@ -109,7 +109,7 @@ def _find(wanted: str | int, header: Sequence[str], named: list[tuple[str, str]]
     raise source.error("", f"no column {wanted!r}; the columns are {names_of(header)}")
 
 
-def traces_of(table: Table, options: Options, source: Source, reading: Reading) -> Iterator[Trace]:
+def traces_of(table: FieldTable, options: Options, source: Source, reading: Reading) -> Iterator[Trace]:
     """The channels of a table by run, over its axis or at its rate."""
     fields = [_unwrapped(one, options) for one in table.fields]
     axis, rate = next((one for one in fields if one.name == options.axis), None), options.rate or table.rate
@@ -177,7 +177,9 @@ def _unwrapped(field: Field, options: Options) -> Field:
     return replace(field, values=values)
 
 
-def _along(axis: Field, table: Table, options: Options, source: Source, reading: Reading) -> tuple[FloatArray, str]:
+def _along(
+    axis: Field, table: FieldTable, options: Options, source: Source, reading: Reading
+) -> tuple[FloatArray, str]:
     """The axis and its unit: times in seconds."""
     axis = replace(axis, unit=options.units.get(options.axis, axis.unit))
     if options.axis != "time":
@@ -202,7 +204,7 @@ def _along(axis: Field, table: Table, options: Options, source: Source, reading:
     return scaled, "s"
 
 
-def _runs(table: Table, numbers: Field | None, source: Source) -> list[tuple[str, BoolArray | None]]:
+def _runs(table: FieldTable, numbers: Field | None, source: Source) -> list[tuple[str, BoolArray | None]]:
     """The runs, each with the mask of its rows; one run where no column numbers them."""
     if numbers is None:
         return [(table.run, None)]

@@ -18,10 +18,12 @@ def load_hdf5(data: bytes, source: Source, remarks: Remarks, *, matlab: bool) ->
     import h5py
 
     with h5py.File(io.BytesIO(data), "r") as opened:
-        return _Reader(h5py, opened, source, remarks, inflation_limit(len(data)), matlab).group(opened, 0)
+        return _GroupReader(h5py, opened, source, remarks, inflation_limit(len(data)), matlab).group(opened, 0)
 
 
-class _Reader:
+class _GroupReader:
+    """An open file, of whose groups so much is read as its limits allow."""
+
     def __init__(self, h5py: Any, opened: Any, source: Source, remarks: Remarks, limit: int, matlab: bool) -> None:
         self._h5py, self._file, self._source, self._remarks, self._matlab = h5py, opened, source, remarks, matlab
         self._left = self._limit = limit

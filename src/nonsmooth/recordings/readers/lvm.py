@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.recordings.readers.fields import Field, Table, traces_of
+from nonsmooth.recordings.readers.fields import Field, FieldTable, traces_of
 from nonsmooth.recordings.readers.text_table import Cells, Numerals, decoded, number, read_cells
 from nonsmooth.recordings.reading import MAX_COLUMNS, Options, Reading, Remarks, Source, Trace
 
@@ -223,7 +223,7 @@ def _traces(
         begun, origin = f"{dates[k]} {times[k]}".strip(), f"column {k + 2} from line {segment.line} on"
         clock = Field(options.axis, unit, axis, f"X_Value of {name}", held)
         channel = Field(name, units[k], values, origin, rows, {"started": begun} if begun else {})
-        yield from traces_of(Table(run, [clock, channel], len(cells.lines), cells.lines), options, source, reading)
+        yield from traces_of(FieldTable(run, [clock, channel], len(cells.lines), cells.lines), options, source, reading)
 
 
 def _same(one: float, other: float) -> bool:

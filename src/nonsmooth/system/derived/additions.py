@@ -7,7 +7,7 @@ from typing import Any
 
 import sympy as sp
 
-from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
+from nonsmooth.system.symbolic.traced import Traced, TracedCondition, TracedTransition
 
 
 class Additions:
@@ -27,7 +27,9 @@ class Additions:
             self.indicators.append(expression)
         return self.indicator_names.index(name)
 
-    def jump(self, source: int, target: int, *rows: Row, writes: tuple[tuple[int, sp.Expr], ...] = ()) -> None:
+    def jump(
+        self, source: int, target: int, *rows: TracedCondition, writes: tuple[tuple[int, sp.Expr], ...] = ()
+    ) -> None:
         """Add a transition."""
         label = f"{self.modes[source]} -> {self.modes[target]}"
         self.jumps.append(TracedTransition(source, target, rows, None, None, writes, source == 0, label))

@@ -22,7 +22,7 @@ from nonsmooth.system.derived.expressions import Expressions
 from nonsmooth.system.mode import Mode
 from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, OWN, TOGETHER
-from nonsmooth.system.symbolic.tracing import Known, Symbols, call_vector
+from nonsmooth.system.symbolic.tracing import KnownFunction, Symbols, call_vector
 from nonsmooth.system.transition import Surface, Transition
 
 if TYPE_CHECKING:
@@ -130,9 +130,9 @@ def _written_out(
     for mode, pattern in pairs:
         here = name(mode, pattern)
         f, found = make.flow(mode, pattern)
-        fields[here] = Known(f)
+        fields[here] = KnownFunction(f)
         for k, part in enumerate(make.parts):
-            forces[part.name][here] = Known(found[k])
+            forces[part.name][here] = KnownFunction(found[k])
         for k, part in enumerate(make.parts):
             for way in make.leaving(k, mode, pattern):
                 if way.phase is None:
@@ -142,7 +142,7 @@ def _written_out(
                 there = make.place(k, mode, pattern).put(way.phase).pattern
                 if (mode, there) not in pairs:
                     continue  # more contacts than can be held by forces of their own
-                reset = None if way.states is None else Known(way.states)
+                reset = None if way.states is None else KnownFunction(way.states)
                 when = make.condition(way.conditions, part.name)
                 transitions.append(Transition(here, name(mode, there), when=when, reset=reset))
                 kinds.append(ALONE if make.asks and part.element.held else "")
@@ -171,7 +171,7 @@ def _written_out(
     return {
         "modes": fields,
         "transitions": transitions,
-        "indicators": {**(given["indicators"] or {}), **{key: Known(g) for key, g in make.indicators.items()}},
+        "indicators": {**(given["indicators"] or {}), **{key: KnownFunction(g) for key, g in make.indicators.items()}},
         "outputs": outputs if named else {**outputs, **{f"{key}_force": (row, "") for key, row in forces.items()}},
         "ranges": make.ranges(next(iter(base))),
         "kinds": kinds,
@@ -236,9 +236,9 @@ def _opened(
         )
     patterns = Patterns(make, next(iter(base)), why=why)
     return {
-        "modes": {key: Known(list(field)) for key, field in base.items()},
+        "modes": {key: KnownFunction(list(field)) for key, field in base.items()},
         "transitions": (),
-        "indicators": {key: Known(e) for key, e in zip(patterns.labels, patterns.expressions, strict=True)},
+        "indicators": {key: KnownFunction(e) for key, e in zip(patterns.labels, patterns.expressions, strict=True)},
         "outputs": given["outputs"],
         "ranges": make.ranges(patterns.mode),
         "patterns": patterns,

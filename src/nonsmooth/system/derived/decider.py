@@ -19,7 +19,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.system.condition import read_condition
 from nonsmooth.system.derived.instants import Numbers, RowNumbers, SeriesCode, SeriesNumbers
-from nonsmooth.system.symbolic.traced import FOUND, Row, Traced, TracedTransition
+from nonsmooth.system.symbolic.traced import FOUND, Traced, TracedCondition, TracedTransition
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern
@@ -52,7 +52,7 @@ class Decider:
         for name, kind, text, k in asked:
             here = traced.mode_names.index(name)
             signs = read_condition(text, traced.indicator_names, name) if text else ()
-            rows = tuple(Row(numbers[one], sign, strict) for one, sign, strict in signs)
+            rows = tuple(TracedCondition(numbers[one], sign, strict) for one, sign, strict in signs)
             jumps.append(TracedTransition(here, here, rows, label=name, kind=kind))
             if k >= 0 and self.make.parts[k].element.strikes:
                 reset = tuple(self.make.impact((k,), self.modes[here][0]))

@@ -21,8 +21,7 @@ from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.assembly import Pattern
 from nonsmooth.system.derived.rows import Row, Rows
 from nonsmooth.system.symbolic.period import forcing_period
-from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, TOGETHER, Traced, TracedTransition
-from nonsmooth.system.symbolic.traced import Row as Condition
+from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, TOGETHER, Traced, TracedCondition, TracedTransition
 from nonsmooth.system.symbolic.tracing import call_scalar
 
 if TYPE_CHECKING:
@@ -44,7 +43,7 @@ class Out(NamedTuple):
     rows: Armed
 
 
-class Change(NamedTuple):
+class Reset(NamedTuple):
     """The change of the states by a transition: the ``way``-th way of an element out of its phase, or an impact of
     several of them (~k: without restitution), with friction or one after the other where it ``rubs``."""
 
@@ -62,7 +61,7 @@ class Lead(NamedTuple):
     element: str
     rows: Armed
     kind: str
-    change: Change | None = None
+    change: Reset | None = None
 
 
 @dataclass(eq=False)
@@ -80,7 +79,7 @@ class Patterns:
     at: dict[tuple[int, str, int | None], int] = field(default_factory=dict)
     visited: list[Pattern] = field(default_factory=list)
     jumps: list[TracedTransition] = field(default_factory=list)
-    changes: list[Change | None] = field(default_factory=list)  # of the states, by each of the transitions
+    changes: list[Reset | None] = field(default_factory=list)  # of the states, by each of the transitions
     led: set[Pattern] = field(default_factory=set)  # patterns whose ways out all have numbers
     equations: Traced = field(init=False)  # without elements; the expressions are its indicators
 
@@ -180,7 +179,7 @@ class Patterns:
             part = rows.parts[k]
             target = pattern if way.phase is None else rows.place(k, self.mode, pattern).put(way.phase).pattern
             kind = ASKED if way.phase is None else ALONE if part.element.held else ""
-            found.append(Lead(pattern, target, part.name, given, kind, None if way.states is None else Change((k,), i)))
+            found.append(Lead(pattern, target, part.name, given, kind, None if way.states is None else Reset((k,), i)))
             states.append(way.states)
         together = tuple((slot, 1, 1) for slot in dict.fromkeys(meets))
         return conditions, [*found, Lead(pattern, pattern, "", together, TOGETHER)], [*states, None], meets
@@ -281,7 +280,9 @@ class Patterns:
         with self._lock:
             if lead not in self._jumped:
                 names = self.name(lead.source), self.name(lead.target)
-                conditions = tuple(Condition(indicator, sign, bool(strict)) for indicator, sign, strict in lead.rows)
+                conditions = tuple(
+                    TracedCondition(indicator, sign, bool(strict)) for indicator, sign, strict in lead.rows
+                )
                 self._jumped[lead] = len(self.jumps)
                 label = lead.element if lead.kind in ENDS else " -> ".join(names)
                 contact = lead.change is not None or ends[0] == 0
@@ -307,7 +308,7 @@ class Patterns:
         """The number of a transition that was told."""
         ends = [self.visited[self.retold_mode(phases)] for phases in (source, target)]
         given = tuple((int(i), int(sign), int(strict)) for i, sign, strict in rows)
-        change = change and Change(tuple(map(int, change[0])), int(change[1]), bool(change[2]))
+        change = change and Reset(tuple(map(int, change[0])), int(change[1]), bool(change[2]))
         return self.transition(Lead(ends[0], ends[1], str(element), given, str(kind), change))
 
     def name(self, pattern: Pattern) -> str:

@@ -38,7 +38,7 @@ from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.derived.additions import Additions
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.symbolic.scalar import as_written
-from nonsmooth.system.symbolic.traced import NOT_UNIQUE, Row, Traced, TracedTransition
+from nonsmooth.system.symbolic.traced import NOT_UNIQUE, Traced, TracedCondition, TracedTransition
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -77,7 +77,7 @@ def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str,
     SystemDefinitionError
         A transition that the two modes of a surface have with different resets or targets.
     """
-    build = _Builder(traced, scale)
+    build = _SlidingModes(traced, scale)
     declared = [_Pair(s.indicator, s.below, s.above, s.mode, s.static, s.field) for s in surfaces]
     pairs, level = list(declared), declared
     while level:
@@ -93,7 +93,7 @@ def slide(traced: Traced, surfaces: Sequence[TracedSurface], scale: Mapping[str,
 @lru_cache(maxsize=256)
 def _both_rates(traced: Traced, surface: TracedSurface, scale: tuple[float, ...]) -> Callable[..., Any]:
     """Function of t, u, m, p: the indicator, its size, its rates below and above."""
-    build = _Builder(traced, dict(zip(traced.state_names, scale, strict=True)))
+    build = _SlidingModes(traced, dict(zip(traced.state_names, scale, strict=True)))
     pair = _Pair(surface.indicator, surface.below, surface.above, surface.mode)
     rates = (build.rate(pair, mode) for mode in (pair.below, pair.above))
     found = [traced.indicators[pair.indicator], build.size(pair), *rates]
@@ -121,7 +121,7 @@ def repelled(system: System, states: FloatArray) -> tuple[str, int] | None:
     return None
 
 
-class _Builder(Additions):
+class _SlidingModes(Additions):
     """The sliding modes that are added to the declared system."""
 
     def __init__(self, traced: Traced, scale: Mapping[str, float]) -> None:
@@ -266,8 +266,8 @@ class _Builder(Additions):
         h, name = pair.indicator, self.indicator_names[pair.indicator]
         size, value = self.size(pair), BEYOND * self.indicators[pair.indicator]
         beyond = {
-            1: Row(self.indicator(value - size, f"{name} beyond"), 1),
-            -1: Row(self.indicator(value + size, f"{name} behind"), -1),
+            1: TracedCondition(self.indicator(value - size, f"{name} beyond"), 1),
+            -1: TracedCondition(self.indicator(value + size, f"{name} behind"), -1),
         }
         mode = {-1: pair.below, 1: pair.above}
         rates = {s: self.at_surface(pair, self.rate(pair, mode[s])) for s in mode}
@@ -286,16 +286,18 @@ class _Builder(Additions):
             source, target = mode[-s], mode[s]
             self.jump(source, target, beyond[s])
             if slid is None:
-                self.jump(source, target, Row(h, s))
+                self.jump(source, target, TracedCondition(h, s))
                 continue
-            self.jump(source, target, Row(h, s), Row(leave[s], s))
+            self.jump(source, target, TracedCondition(h, s), TracedCondition(leave[s], s))
             # Behind the end of sliding the rate in its own mode vanishes, and its sign is known.
-            self.jump(source, slid, Row(h, s), Row(leave[s], -s), Row(rate[-s], s))
-            self.jump(slid, target, Row(leave[s], s))
+            self.jump(source, slid, TracedCondition(h, s), TracedCondition(leave[s], -s), TracedCondition(rate[-s], s))
+            self.jump(slid, target, TracedCondition(leave[s], s))
         attraction = sp.expand(rates[-1] - rates[1])
         if slid is not None and attraction.free_symbols & self.moving:
             least = self.size(pair) * self.kappa / BEYOND
-            gone = Row(self.indicator(attraction - least, f"{name} attraction between {self._names(mode)}"), -1)
+            gone = TracedCondition(
+                self.indicator(attraction - least, f"{name} attraction between {self._names(mode)}"), -1
+            )
             self.jump(slid, self.undetermined(slid), gone)
 
     def _names(self, mode: Mapping[int, int]) -> str:
@@ -315,14 +317,14 @@ class _Builder(Additions):
 
     def inherit(self, pairs: Sequence[_Pair]) -> None:
         """Keep the transitions of the declared system and give the sliding modes those of the modes that meet there."""
-        surfaces = {(pair.below, pair.above, Row(pair.indicator, 1)) for pair in pairs}
-        surfaces |= {(pair.above, pair.below, Row(pair.indicator, -1)) for pair in pairs}
+        surfaces = {(pair.below, pair.above, TracedCondition(pair.indicator, 1)) for pair in pairs}
+        surfaces |= {(pair.above, pair.below, TracedCondition(pair.indicator, -1)) for pair in pairs}
         self.jumps = [
             jump for jump in self.traced.transitions if (jump.source, jump.target, *jump.rows) not in surfaces
         ]
         plain = list(self.jumps)
         for slid in range(len(self.traced.mode_names), len(self.modes)):
-            alike: dict[tuple[tuple[Row, ...], float | None], list[TracedTransition]] = {}
+            alike: dict[tuple[tuple[TracedCondition, ...], float | None], list[TracedTransition]] = {}
             for jump in plain:
                 if jump.source in self.cells[slid]:
                     alike.setdefault((jump.rows, jump.at), []).append(jump)

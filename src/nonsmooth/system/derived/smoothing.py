@@ -30,7 +30,7 @@ from nonsmooth.system.derived.additions import Additions
 from nonsmooth.system.derived.sticking import without_sticking
 from nonsmooth.system.description import Description
 from nonsmooth.system.equations import TracedBand
-from nonsmooth.system.symbolic.traced import Row, Traced, TracedTransition
+from nonsmooth.system.symbolic.traced import Traced, TracedCondition, TracedTransition
 
 BANDS = ("linear", "tanh", "arctan")
 REACH = 19  # half widths beyond which tanh is 1 to rounding
@@ -49,17 +49,19 @@ class Smoothed:
 
 
 @dataclass(frozen=True)
-class _Pair:
+class _ModePair:
+    """Two modes between which the field is interpolated, and the conditions by which the inner one is entered."""
+
     outer: int  # P
     inner: int  # Q, where all rows hold
-    rows: tuple[Row, ...]
+    rows: tuple[TracedCondition, ...]
 
 
 def _label(traced: Traced, a: int, b: int) -> str:
     return f"{traced.mode_names[a]!r} and {traced.mode_names[b]!r}"
 
 
-def _pairs(traced: Traced) -> list[_Pair]:
+def _pairs(traced: Traced) -> list[_ModePair]:
     """Group the transitions into pairs of modes, or say which pair cannot be smoothed."""
     remaining = list(traced.transitions)
     if not remaining:
@@ -92,7 +94,7 @@ def _pairs(traced: Traced) -> list[_Pair]:
     return pairs
 
 
-def _oriented(outer: int, inner: int, jumps: Sequence[TracedTransition]) -> _Pair | None:
+def _oriented(outer: int, inner: int, jumps: Sequence[TracedTransition]) -> _ModePair | None:
     """The pair if ``inner`` is entered by one condition and left by reversals of its rows."""
     enter = [jump for jump in jumps if jump.source == outer]
     leave = [jump for jump in jumps if jump.source == inner]
@@ -100,9 +102,9 @@ def _oriented(outer: int, inner: int, jumps: Sequence[TracedTransition]) -> _Pai
         return None
     rows = enter[0].rows
     for jump in leave:
-        if len(jump.rows) != 1 or Row(jump.rows[0].indicator, -jump.rows[0].sign) not in rows:
+        if len(jump.rows) != 1 or TracedCondition(jump.rows[0].indicator, -jump.rows[0].sign) not in rows:
             return None
-    return _Pair(outer, inner, rows)
+    return _ModePair(outer, inner, rows)
 
 
 def smoothed_indicators(description: Description) -> tuple[str, ...]:
@@ -112,7 +114,7 @@ def smoothed_indicators(description: Description) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names[row.indicator] for pair in _pairs(traced) for row in pair.rows))
 
 
-class _Builder(Additions):
+class _Bands(Additions):
     """The bands that are added to the sharp system."""
 
     def __init__(self, description: Description, names: Mapping[str, sp.Symbol], shape: str) -> None:
@@ -122,10 +124,10 @@ class _Builder(Additions):
         self.m = list(self.traced.m)
         self.reach = REACH if shape == "tanh" else 1
 
-    def eta(self, row: Row) -> sp.Symbol:
+    def eta(self, row: TracedCondition) -> sp.Symbol:
         return self.eta_of[self.traced.indicator_names[row.indicator]]
 
-    def share(self, row: Row) -> sp.Expr:
+    def share(self, row: TracedCondition) -> sp.Expr:
         """The share q of the field behind a row, at a distance from it."""
         margin, eta = self.margin(row), self.eta(row)
         if self.shape == "tanh":
@@ -134,18 +136,20 @@ class _Builder(Additions):
             return sp.Rational(1, 2) + sp.atan(margin / eta) / sp.pi
         return (margin + eta) / (2 * eta)
 
-    def margin(self, row: Row) -> sp.Expr:
+    def margin(self, row: TracedCondition) -> sp.Expr:
         return row.sign * self.traced.indicators[row.indicator]
 
-    def beyond(self, row: Row, side: int, upward: int) -> Row:
+    def beyond(self, row: TracedCondition, side: int, upward: int) -> TracedCondition:
         """The row ``upward * (g - side * eta) > 0``."""
         eta, times = self.eta(row), f"{self.reach}*" if self.reach > 1 else ""
         name = self.traced.indicator_names[row.indicator]
         shift = -side * row.sign * self.reach  # g - side eta = sign * (h - side * sign * eta)
         label = f"{name} {'+' if shift > 0 else '-'} {times}{str(eta)[2:]}"
-        return Row(self.indicator(self.traced.indicators[row.indicator] + shift * eta, label), row.sign * upward)
+        return TracedCondition(
+            self.indicator(self.traced.indicators[row.indicator] + shift * eta, label), row.sign * upward
+        )
 
-    def least(self, pair: _Pair, r: int) -> tuple[Row, ...]:
+    def least(self, pair: _ModePair, r: int) -> tuple[TracedCondition, ...]:
         """Rows saying that row r of the pair is the least; ties go to the first."""
         found = []
         for s in range(len(pair.rows)):
@@ -159,10 +163,10 @@ class _Builder(Additions):
             if ratio != 1:
                 label += f"*{str(self.eta(a))[2:]}/{str(self.eta(b))[2:]}"
             index = self.indicator(sp.expand(self.margin(a) - ratio * self.margin(b)), label)
-            found.append(Row(index, -1, strict=False) if r < s else Row(index, 1))
+            found.append(TracedCondition(index, -1, strict=False) if r < s else TracedCondition(index, 1))
         return tuple(found)
 
-    def band(self, pair: _Pair, row: Row) -> tuple[int, tuple[tuple[int, sp.Expr], ...]]:
+    def band(self, pair: _ModePair, row: TracedCondition) -> tuple[int, tuple[tuple[int, sp.Expr], ...]]:
         """Add the band's mode; return its index and what is written at an entry."""
         name = self.traced.indicator_names[row.indicator]
         label = f"{name}_band"
@@ -192,11 +196,13 @@ class _Builder(Additions):
         self.fields.append(field)
         return len(self.modes) - 1, tuple(writes)
 
-    def add(self, pair: _Pair) -> None:
+    def add(self, pair: _ModePair) -> None:
         """Add the bands of a pair and the transitions over their borders."""
         kept = [r for r, row in enumerate(pair.rows) if not self._repeats(pair, r)]
         bands = {r: self.band(pair, pair.rows[r]) for r in kept}
-        least = {r: tuple(self.least(_Pair(0, 0, tuple(pair.rows[s] for s in kept)), k)) for k, r in enumerate(kept)}
+        least = {
+            r: tuple(self.least(_ModePair(0, 0, tuple(pair.rows[s] for s in kept)), k)) for k, r in enumerate(kept)
+        }
         # Between bands first: after a change of a parameter the band must be right before its border is.
         for r in kept:
             for s in kept:
@@ -209,7 +215,7 @@ class _Builder(Additions):
             self.jump(pair.outer, bands[r][0], self.beyond(row, -1, 1), *least[r], writes=bands[r][1])
             self.jump(pair.inner, bands[r][0], self.beyond(row, 1, -1), *least[r], writes=bands[r][1])
 
-    def mix(self, pairs: Sequence[_Pair]) -> None:
+    def mix(self, pairs: Sequence[_ModePair]) -> None:
         """Give every mode the mean of all fields, weighted with the product of what each pair says of its mode.
 
         The weights sum to 1 where the regions are those of one pair or of pairs that cross; else they are divided by
@@ -238,7 +244,7 @@ class _Builder(Additions):
         self.outputs = [[mean(row)] * len(self.modes) for row in self.outputs]
         self.jumps = list(self.traced.transitions)
 
-    def _repeats(self, pair: _Pair, r: int) -> bool:
+    def _repeats(self, pair: _ModePair, r: int) -> bool:
         """Return whether an earlier row is the same function of the state."""
         row = pair.rows[r]
         return any(sp.expand(self.margin(row) - self.margin(earlier)) == 0 for earlier in pair.rows[:r])
@@ -274,7 +280,7 @@ def smooth(description: Description, single: bool, shape: str = "linear") -> Smo
     old, apart = without_sticking(description.traced)
     apart += _check_surfaces(description)
     pairs = _pairs(old)
-    build = _Builder(replace(description, traced=old), of, shape)
+    build = _Bands(replace(description, traced=old), of, shape)
     if shape == "arctan":
         if alone := [name for i, name in enumerate(old.mode_names) if all(i not in (p.outer, p.inner) for p in pairs)]:
             raise SystemDefinitionError(f"{old.name!r} cannot be smoothed: no transition leads to or from {alone[0]!r}")
@@ -312,7 +318,7 @@ def _check_surfaces(description: Description) -> list[tuple[sp.Expr, str]]:
     return found
 
 
-def _check_apart(build: _Builder, pairs: Sequence[_Pair]) -> list[tuple[sp.Expr, str]]:
+def _check_apart(build: _Bands, pairs: Sequence[_ModePair]) -> list[tuple[sp.Expr, str]]:
     """Bands of two pairs that share a mode must be parallel, and then a distance apart."""
     found = []
     for i, one in enumerate(pairs):
@@ -338,7 +344,7 @@ def _check_apart(build: _Builder, pairs: Sequence[_Pair]) -> list[tuple[sp.Expr,
     return found
 
 
-def _distance(build: _Builder, a: Row, b: Row) -> tuple[sp.Expr, sp.Expr | None]:
+def _distance(build: _Bands, a: TracedCondition, b: TracedCondition) -> tuple[sp.Expr, sp.Expr | None]:
     """Return (ratio, distance) with h_a = ratio * h_b + distance for all states, or distance None."""
     traced = build.traced
     first, second = traced.indicators[a.indicator], traced.indicators[b.indicator]

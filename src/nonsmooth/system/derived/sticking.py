@@ -8,7 +8,7 @@ from dataclasses import replace
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.symbolic.traced import ALONE, Row, Traced, TracedTransition
+from nonsmooth.system.symbolic.traced import ALONE, Traced, TracedCondition, TracedTransition
 
 LEVEL = 1e-9  # of 1: by how much a static friction may differ from the kinetic one, given as another number
 
@@ -33,7 +33,7 @@ def without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]]
     apart = [needed for (mode, h), ends in sticks.items() for needed in _equal_friction(traced, mode, h, ends)]
     between = {frozenset(ends.values()): h for (_, h), ends in sticks.items() if not set(ends.values()) & set(dropped)}
     kept = [mode for mode in range(len(traced.mode_names)) if mode not in dropped]
-    jumps: dict[tuple[int, int, tuple[Row, ...]], TracedTransition] = {}
+    jumps: dict[tuple[int, int, tuple[TracedCondition, ...]], TracedTransition] = {}
     for jump in traced.transitions:
         if jump.source in dropped or jump.target in dropped:
             continue

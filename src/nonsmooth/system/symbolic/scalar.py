@@ -52,7 +52,7 @@ def to_expression(value: Any) -> sp.Expr:
         if abs(number) < 2**50 and number * 2 == int(number * 2):
             return sp.Rational(int(number * 2), 2)
         return sp.Float(number)
-    if isinstance(value, Condition):
+    if isinstance(value, Relation):
         raise SystemDefinitionError(
             f"`{value}` is a condition, not a number. For an indicator write the difference of both sides, whose sign "
             "is the condition; elsewhere ns.where(condition, a, b)"
@@ -93,7 +93,7 @@ def _binary(make: Callable[[Any, Any], Any]) -> tuple[Callable[..., Any], Callab
 def _compare(make: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
     def compare(self: Scalar, other: Any) -> Any:
         try:
-            return Condition(make(self.expression, to_expression(other)))
+            return Relation(make(self.expression, to_expression(other)))
         except TypeError:
             return NotImplemented
 
@@ -177,7 +177,7 @@ def _as_object(item: Any) -> Any:
     return box
 
 
-class Condition:
+class Relation:
     """A comparison of symbolic numbers: only `where` may ask for it."""
 
     __slots__ = ("relation",)
@@ -193,20 +193,20 @@ class Condition:
             return bool(self.relation)
         raise SystemDefinitionError(_DECISION.format(self))
 
-    def __and__(self, other: Any) -> Condition:
-        return Condition(sp.And(self.relation, _relation(other)))
+    def __and__(self, other: Any) -> Relation:
+        return Relation(sp.And(self.relation, _relation(other)))
 
-    def __or__(self, other: Any) -> Condition:
-        return Condition(sp.Or(self.relation, _relation(other)))
+    def __or__(self, other: Any) -> Relation:
+        return Relation(sp.Or(self.relation, _relation(other)))
 
-    def __invert__(self) -> Condition:
-        return Condition(sp.Not(self.relation))
+    def __invert__(self) -> Relation:
+        return Relation(sp.Not(self.relation))
 
     __rand__, __ror__ = __and__, __or__
 
 
 def _relation(value: Any) -> Any:
-    if isinstance(value, Condition):
+    if isinstance(value, Relation):
         return value.relation
     if isinstance(value, (bool, np.bool_)):
         return sp.true if value else sp.false
@@ -226,7 +226,7 @@ def where(condition: Any, a: Any, b: Any) -> Any:
     -----
     On the state or the time inside a mode or an indicator it is refused: no method can see such a corner.
     """
-    if not any(isinstance(item, (Scalar, Condition)) for item in (condition, a, b)):
+    if not any(isinstance(item, (Scalar, Relation)) for item in (condition, a, b)):
         return np.where(condition, a, b)
     return Scalar(sp.Piecewise((to_expression(a), _relation(condition)), (to_expression(b), sp.true)))
 
@@ -301,8 +301,8 @@ _COMPARE: dict[str, Callable[[Any, Any], Any]] = {
 }
 
 
-def _ordering(make: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Condition]:
-    return lambda x, y: Condition(make(to_expression(x), to_expression(y)))
+def _ordering(make: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Relation]:
+    return lambda x, y: Relation(make(to_expression(x), to_expression(y)))
 
 
 _UFUNCS: dict[str, Callable[..., Any]] = {

@@ -22,7 +22,7 @@ NOT_UNIQUE = "_not_unique"  # ends the name of a derived mode from which motion 
 
 
 @dataclass(frozen=True)
-class Row:
+class TracedCondition:
     """One sign condition: ``sign * indicator > 0`` (``>= 0`` where not strict).
 
     A non-strict row settles a tie in derived systems (the smoothed switch, the regions of a map): it also holds where
@@ -51,7 +51,7 @@ class TracedTransition:
 
     source: int
     target: int
-    rows: tuple[Row, ...]
+    rows: tuple[TracedCondition, ...]
     at: float | Expr | None = None
     reset: tuple[Expr, ...] | None = None
     writes: tuple[tuple[int, Expr], ...] = ()

@@ -122,7 +122,7 @@ class Parameters(_Named):
         object.__setattr__(self, name, value)
 
 
-class Known:
+class KnownFunction:
     """A function whose expressions are known, one or a list of them, as those of elements and those of a text are.
 
     An indicator among them may be of time alone."""

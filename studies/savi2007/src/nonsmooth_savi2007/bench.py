@@ -31,7 +31,7 @@ _TIMED = " s of a processor"
 _LOOK = 0.2  # s; between two looks at what it says
 
 
-class Bench:
+class Measurement:
     """A running measurement of some figures; ``with`` it, and it ends with the block whatever happens there."""
 
     def __init__(self, folder: Path, figures: Sequence[Figure], quick: bool, full: bool = False) -> None:
@@ -51,7 +51,7 @@ class Bench:
                     start_new_session=True,
                 )
 
-    def __enter__(self) -> Bench:
+    def __enter__(self) -> Measurement:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -112,14 +112,14 @@ def _sized_jumps(response: xr.Dataset, direction: str) -> list[tuple[float, Inte
 
     At rising values.
     """
-    from nonsmooth.identification.compare.jumps import Jump, jumps_in_steps
+    from nonsmooth.identification.compare.jumps import AmplitudeJump, jumps_in_steps
 
     if "jump_value" in response:
         here = response["jump_direction"].values.astype(str) == direction
         if "jump_variable" in response:
             here &= response["jump_variable"].values.astype(str) == "x"
         columns = (response[f"jump_{name}"].values[here].tolist() for name in ("value", "step", "before", "after"))
-        found = [Jump(value, 0.5 * step, *ends) for value, step, *ends in zip(*columns, strict=True)]
+        found = [AmplitudeJump(value, 0.5 * step, *ends) for value, step, *ends in zip(*columns, strict=True)]
     else:
         mine = response.isel(run=response["direction"].values.astype(str) == direction)
         order = np.argsort(mine["omega"].values)[:: 1 if direction == "up" else -1]

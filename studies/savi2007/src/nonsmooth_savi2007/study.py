@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nonsmooth.results.progress import say
-from nonsmooth_savi2007.bench import Bench
+from nonsmooth_savi2007.bench import Measurement
 from nonsmooth_savi2007.figures.figure import Figure
 from nonsmooth_savi2007.finished import finish, finished, just_made, refuse_strange
 from nonsmooth_savi2007.flows import Settings
@@ -19,7 +19,7 @@ from nonsmooth_savi2007.flows import Settings
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth_savi2007.claims.claims import Row
+    from nonsmooth_savi2007.claims.claims import Statement
 
 PICTURE_DPI = 200
 PARAMETERS = "table1"
@@ -34,7 +34,7 @@ class Reproduction:
     out: Path
     figures: tuple[Figure, ...]
     data: dict[str, dict[str, xr.Dataset]]
-    rows: tuple[Row, ...]
+    rows: tuple[Statement, ...]
     seconds: dict[str, float] = field(default_factory=dict)
 
 
@@ -110,7 +110,7 @@ def reproduce(
             (folder / name).unlink(missing_ok=True)
     computed = [figure for figure in missing if not figure.rig]
     measured = [figure for figure in missing if figure.rig]
-    with Bench(folder, measured, quick, full) as bench:
+    with Measurement(folder, measured, quick, full) as bench:
         for i, figure in enumerate(computed):
             say(f"[{i + 1}/{len(computed)}] {figure.name}: {figure.title}", progress)
             begin = time.perf_counter()

@@ -10,7 +10,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.cli.main import main
 from nonsmooth_savi2007.rig import VirtualRig
-from nonsmooth_savi2007.rig.driven import Setting, records
+from nonsmooth_savi2007.rig.driven import SteadyRun, records
 from nonsmooth_savi2007.rig.figures import TAPS, without_support
 from nonsmooth_savi2007.rig.motor import mean_position, voltage_for
 from nonsmooth_savi2007.rig.notebook import write_session
@@ -24,7 +24,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rig = VirtualRig.published()
     length = 0.03896
     gap = -0.0012 + mean_position(rig, length)
-    settings = [Setting(voltage_for(rig, 11.15), length, gap, 25.0, (), place) for place in (None, -0.02)]
+    settings = [SteadyRun(voltage_for(rig, 11.15), length, gap, 25.0, (), place) for place in (None, -0.02)]
     made = {
         "section": records(rig, "section", settings, settle=30.0),
         "response": records(rig, "response", without_support(rig, 14)),

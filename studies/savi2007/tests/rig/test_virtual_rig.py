@@ -9,7 +9,7 @@ import nonsmooth as ns
 from nonsmooth.recordings import RecordingWarning
 from nonsmooth.recordings.session import PROCEDURES
 from nonsmooth_savi2007.rig import FEATURES, UNITS, VirtualRig, sensors
-from nonsmooth_savi2007.rig.driven import Setting, records
+from nonsmooth_savi2007.rig.driven import SteadyRun, records
 from nonsmooth_savi2007.rig.figures import RELEASES
 from nonsmooth_savi2007.rig.motor import frequency, passages, voltage_for
 from nonsmooth_savi2007.rig.physics import crank_angle
@@ -317,7 +317,7 @@ def test_figure_14_is_recorded_from_several_places() -> None:
 def test_a_release_begins_where_it_says_and_the_next_run_goes_on_where_motion_is_carried(carry: bool) -> None:
     """No waiting, a motor hardly driving, no support: the car swings freely from where it was let go."""
     rig = VirtualRig.published(friction=False, quantisation=False, jitter=False, ripple=False)
-    settings = [Setting(4.0, 0.0, None, 1.0, (), -0.03), Setting(4.0, 0.0, None, 1.0)]
+    settings = [SteadyRun(4.0, 0.0, None, 1.0, (), -0.03), SteadyRun(4.0, 0.0, None, 1.0)]
     made = records(rig, "response", settings, settle=1e-9, carry=carry)
     p, period = rig.truth, 2 * np.pi / frequency(rig, 4.0)
     decay, natural = p["c"] / (2 * p["m"]), np.sqrt(2 * p["k"] / p["m"])

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from nonsmooth_savi2007.claims import diagrams, model, parameters, response, rig
-from nonsmooth_savi2007.claims.verdicts import Cell, Data, Row
+from nonsmooth_savi2007.claims.verdicts import Cell, Data, Statement
 
 
 @dataclass(frozen=True)
@@ -18,10 +18,10 @@ class Claim:
 
     id: str
     figures: tuple[str, ...]
-    measure: Callable[[Data], list[Row]]
+    measure: Callable[[Data], list[Statement]]
     rig: Callable[[Data], list[Cell]] | None = None
 
-    def rows(self, data: Data) -> list[Row]:
+    def rows(self, data: Data) -> list[Statement]:
         """The rows with what the rig says."""
         rows = self.measure(data)
         if self.rig is None:
@@ -69,6 +69,6 @@ CLAIMS = (
 )
 
 
-def measure_claims(data: Data) -> tuple[Row, ...]:
+def measure_claims(data: Data) -> tuple[Statement, ...]:
     """The rows of all claims whose figures are there, in the order of the paper."""
     return tuple(row for claim in CLAIMS if all(name in data for name in claim.figures) for row in claim.rows(data))

@@ -10,7 +10,7 @@ import numpy as np
 from nonsmooth_savi2007.claims.verdicts import (
     Cause,
     Data,
-    Row,
+    Statement,
     Verdict,
     against_closed_form,
     against_printed,
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 FLOWS = ("exact", "smoothed")
 
 
-def f11(data: Data) -> list[Row]:
+def f11(data: Data) -> list[Statement]:
     """The ranges of period 1, 2, 4 and of chaos over the forcing amplitude (slowly rising)."""
     swept = [data["fig11"][flow] for flow in FLOWS]
     why = {1: "", 2: _hysteresis(swept[0]), 4: "Longer periods follow below."}
@@ -119,13 +119,13 @@ def _apart(data: Data, figure: str, shown: Mapping[float, int]) -> str:
     return f"section points of both flows within {1e6 * worst:.2g} micrometres"
 
 
-def f12(data: Data) -> list[Row]:
+def f12(data: Data) -> list[Statement]:
     """Portraits at four amplitudes."""
     surveys = [data["fig12"][flow] for flow in FLOWS]
     met = all(periods_reached(surveys[0], rho).keys() == {period} for rho, period in FIGURE_12.items())
     wanted = ", ".join(f"{rho:g}: period {period}" for rho, period in FIGURE_12.items())
     return [
-        Row(
+        Statement(
             "F12",
             "Fig. 12 with the ranges of Fig. 11",
             f"orbits and section points at rho = {wanted}",
@@ -138,7 +138,7 @@ def f12(data: Data) -> list[Row]:
     ]
 
 
-def f13(data: Data) -> list[Row]:
+def f13(data: Data) -> list[Statement]:
     """Periodic and chaotic responses over the gap, and what coexists with them."""
     texts, others = [], []
     for flow in FLOWS:
@@ -149,7 +149,7 @@ def f13(data: Data) -> list[Row]:
         texts.append(", ".join(part for part in parts if part))
         others.append(_coexisting(data["fig13"][f"{flow}_starts"], data["fig13"][flow]))
     return [
-        Row(
+        Statement(
             "F13",
             "Section 4, on Fig. 13",
             "periodic and chaotic responses as the gap varies",
@@ -158,7 +158,7 @@ def f13(data: Data) -> list[Row]:
             "none in kind",
             agreed("no period" in texts[0]),
         ),
-        Row(
+        Statement(
             "F13",
             "not in the paper",
             "coexisting motions (several starts)",
@@ -187,7 +187,7 @@ def _coexisting(many: xr.Dataset, swept: xr.Dataset) -> str:
     return f"more than one motion at {len(at)} of {len(values)} gaps, from {at[0]:.5f} to {at[-1]:.5f} m"
 
 
-def f14(data: Data) -> list[Row]:
+def f14(data: Data) -> list[Statement]:
     """Period numbers at the gaps of the caption, and at those printed in the text."""
     exact, smoothed = (data["fig14"][flow] for flow in FLOWS)
     rows = []
@@ -197,7 +197,7 @@ def f14(data: Data) -> list[Row]:
         verdict = agreed(period in reached)
         why = "" if alone else "Motions coexist here; which is met depends on the start."
         rows.append(
-            Row(
+            Statement(
                 "F14",
                 "Fig. 14, caption",
                 f"g = {g:g} m: {_name(period)}",
@@ -210,7 +210,7 @@ def f14(data: Data) -> list[Row]:
         )
     right = [g for g, period in FIGURE_14_TEXT.items() if period in periods_reached(exact, g)]
     rows.append(
-        Row(
+        Statement(
             "F14",
             "Section 4, on Fig. 14",
             "the text's gaps: " + ", ".join(f"{g:g}: {_name(period)}" for g, period in FIGURE_14_TEXT.items()),
@@ -229,7 +229,7 @@ def _name(period: int) -> str:
     return "chaos" if period == APERIODIC else f"period {period}"
 
 
-def f15(data: Data) -> list[Row]:
+def f15(data: Data) -> list[Statement]:
     """The strange attractor: neighbouring trajectories separate, and both flows draw the same set."""
     from scipy.spatial import cKDTree
 
@@ -248,7 +248,7 @@ def f15(data: Data) -> list[Row]:
     ]
     chaotic = all(rate > 5 * error for rate, error in rates)
     return [
-        Row(
+        Statement(
             "F15",
             "Fig. 15",
             "g = 0.0018 m: a strange attractor, sections at four phases",
@@ -261,12 +261,12 @@ def f15(data: Data) -> list[Row]:
     ]
 
 
-def f17(data: Data) -> list[Row]:
+def f17(data: Data) -> list[Statement]:
     """Three responses over the frequency, contact or not, and the transitions between them."""
     return [*(_response_at(data, omega, says) for omega, says in FIGURE_17_TEXT.items()), _abrupt(data)]
 
 
-def _response_at(data: Data, omega: float, says: str) -> Row:
+def _response_at(data: Data, omega: float, says: str) -> Statement:
     texts, contacts, kinds = [], [], []
     for flow in FLOWS:
         one = data["fig17"][flow].sel(direction="up").sel(omega=omega, method="nearest")
@@ -277,7 +277,7 @@ def _response_at(data: Data, omega: float, says: str) -> Row:
     right_kind = (kinds[0] == APERIODIC) == chaos
     swapped = not chaos and (contacts[0] > 0) != ("with contact" in says)
     difference = "another motion" if not right_kind else "contact and no contact swapped" if swapped else "none"
-    return Row(
+    return Statement(
         "F17",
         "Section 4, on Fig. 17",
         f"omega = {omega:g} rad/s: {says}",
@@ -303,7 +303,7 @@ def _without_support(data: Data, omega: float, swapped: bool) -> str:
     )
 
 
-def _abrupt(data: Data) -> Row:
+def _abrupt(data: Data) -> Statement:
     texts = []
     for flow in FLOWS:
         swept = data["fig17"][flow]
@@ -317,7 +317,7 @@ def _abrupt(data: Data) -> Row:
             f"into chaos by period doublings from {first.value:.3f} to {begin:.3f} rad/s; out of it at once, rising "
             f"after {up:.4f}, falling into it at {down:.4f} rad/s"
         )
-    return Row(
+    return Statement(
         "F17",
         "Section 4, on Fig. 17",
         "abrupt transitions from periodic to chaotic and from chaotic to periodic",
@@ -342,7 +342,7 @@ def _lasting(data: Data) -> str:
     )
 
 
-def f17_grazing(data: Data) -> list[Row]:
+def f17_grazing(data: Data) -> list[Statement]:
     """Falling frequency: motion without contact ends, in chaos, where it grazes."""
     exact, smoothed = (data["fig17"][flow] for flow in FLOWS)
     return [
@@ -357,14 +357,14 @@ def f17_grazing(data: Data) -> list[Row]:
     ]
 
 
-def f18(data: Data) -> list[Row]:
+def f18(data: Data) -> list[Statement]:
     """Portraits at three frequencies."""
     surveys = [data["fig18"][flow] for flow in FLOWS]
     met = all(period in periods_reached(surveys[0], omega) for omega, period in FIGURE_18.items())
     rate, error = separation_rate(data["fig18"]["exact_twins"])
     wanted = ", ".join(f"{omega:g}: {_name(period)}" for omega, period in FIGURE_18.items())
     return [
-        Row(
+        Statement(
             "F18",
             "Fig. 18, caption",
             f"orbits at omega = {wanted}",
@@ -378,17 +378,17 @@ def f18(data: Data) -> list[Row]:
     ]
 
 
-def f13_basins(data: Data) -> list[Row]:
+def f13_basins(data: Data) -> list[Statement]:
     """Attractors at g = 0.0014 m with their shares."""
     return [_row(data, "basins13", "F13", "Fig. 14(c)", "g = 0.0014 m: period 3", 3)]
 
 
-def f17_basins(data: Data) -> list[Row]:
+def f17_basins(data: Data) -> list[Statement]:
     """Attractors at omega = 9.55 rad/s with their shares."""
     return [_row(data, "basins17", "F17", "Fig. 18(b)", "omega = 9.55 rad/s: chaotic", APERIODIC)]
 
 
-def _row(data: Data, figure: str, claim: str, place: str, says: str, period: int) -> Row:
+def _row(data: Data, figure: str, claim: str, place: str, says: str, period: int) -> Statement:
     found = data[figure]["basins"]
     names = names_of(found)
     periods = found["period_number"].values.tolist()
@@ -401,7 +401,7 @@ def _row(data: Data, figure: str, claim: str, place: str, says: str, period: int
         for name in (first, second)
     )
     others = ", ".join(name for name, number in zip(names, periods, strict=True) if number != period)
-    return Row(
+    return Statement(
         claim,
         place,
         says,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth_savi2007.arrays import FloatArray
-from nonsmooth_savi2007.claims.verdicts import Data, Row, Verdict, agreed, judge_step
+from nonsmooth_savi2007.claims.verdicts import Data, Statement, Verdict, agreed, judge_step
 from nonsmooth_savi2007.figures.band import FITTED, order_in_eta
 from nonsmooth_savi2007.figures.resonance import grazing_of
 from nonsmooth_savi2007.flows import ETA
@@ -24,7 +24,7 @@ def _orbits(data: Data, flow: str) -> list[xr.Dataset]:
     return [data["fig12"][f"{flow}_{rho:g}"] for rho in FIGURE_12]
 
 
-def m1(data: Data) -> list[Row]:
+def m1(data: Data) -> list[Statement]:
     """The support pushes, never pulls, and lets go at zero force."""
     texts, pulls = [], []
     for flow in ("exact", "smoothed"):
@@ -35,7 +35,7 @@ def m1(data: Data) -> list[Row]:
     p = _orbits(data, "exact")[0]
     stated, printed_formula = (float(np.sqrt(n * p["k"] / p["m"])) for n in (2, 1))
     return [
-        Row(
+        Statement(
             "M1",
             "Eqs. 1-2",
             "two modes; the support's force f_s < 0 in contact, and zero at release",
@@ -56,7 +56,7 @@ def _indicators(orbit: xr.Dataset) -> tuple[FloatArray, FloatArray]:
     return x - g, -(x - g) - late * v
 
 
-def m2(data: Data) -> list[Row]:
+def m2(data: Data) -> list[Statement]:
     """The mode of the exact flow is the region of the state."""
     right = total = 0
     for orbit in _orbits(data, "exact"):
@@ -66,7 +66,7 @@ def m2(data: Data) -> list[Row]:
         right += int((inside == (orbit["mode"].values == 1))[clear].sum())
         total += int(clear.sum())
     return [
-        Row(
+        Statement(
             "M2",
             "Eqs. 3-5, Fig. 2a",
             "in contact exactly where h_a > 0 and h_b < 0",
@@ -79,7 +79,7 @@ def m2(data: Data) -> list[Row]:
     ]
 
 
-def m3(data: Data) -> list[Row]:
+def m3(data: Data) -> list[Statement]:
     """The mode of the smoothed model is the region of Eqs. 9-10."""
     right = total = 0
     for orbit in _orbits(data, "smoothed"):
@@ -95,7 +95,7 @@ def m3(data: Data) -> list[Row]:
         right += int((region == orbit["mode"].values)[clear].sum())
         total += int(clear.sum())
     return [
-        Row(
+        Statement(
             "M3",
             "Eqs. 6-10, Fig. 2b",
             "smoothed: bands of half width eta, S_a and S_b, between G- and G+",
@@ -109,7 +109,7 @@ def m3(data: Data) -> list[Row]:
     ]
 
 
-def m4(data: Data) -> list[Row]:
+def m4(data: Data) -> list[Statement]:
     """Effect of eta: order 2 away from grazing, and a shift of grazing."""
     errors, grazing = data["eta"]["error"], data["eta"]["grazing"]
     at = errors["error"].sel(eta=ETA, method="nearest")
@@ -119,7 +119,7 @@ def m4(data: Data) -> list[Row]:
     shift, closed = (float(moved[name] - grazing["closed_form"][0]) for name in ("grazing", "closed_form"))
     narrow = float(grazing["grazing"][0] - grazing["closed_form"][0])
     return [
-        Row(
+        Statement(
             "M4",
             "Section 4",
             "Runge-Kutta-Fehlberg with eta = 1e-5 in all simulations",
@@ -129,7 +129,7 @@ def m4(data: Data) -> list[Row]:
             Verdict.INPUT,
             "The paper names no tolerance; rtol 1e-6 here. On orbits that cross transversally.",
         ),
-        Row(
+        Statement(
             "M4",
             "Section 4",
             "the choice of eta is important",
@@ -141,7 +141,7 @@ def m4(data: Data) -> list[Row]:
             agreed(bool((np.abs(order - 2) < 0.1).all())),
             "Away from grazing it matters little: a tenth of the band makes a hundredth of the error.",
         ),
-        Row(
+        Statement(
             "M4",
             "closed form, not printed",
             f"near grazing contact begins at g - eta: Fig. 9's falling jump moves by {closed:+.2e} rad/s at eta = 1e-5",
@@ -154,7 +154,7 @@ def m4(data: Data) -> list[Row]:
     ]
 
 
-def c1(data: Data) -> list[Row]:
+def c1(data: Data) -> list[Statement]:
     """Jumps, bifurcations, chaos; abrupt changes by grazing."""
     texts, seen = [], []
     for flow in ("exact", "smoothed"):
@@ -174,7 +174,7 @@ def c1(data: Data) -> list[Row]:
         at_grazing.append(sum(judge_step(w, met) is Verdict.AGREES for met, w in pairs))
     counted = [f"{n} of 3 within one step of the closed-form grazing" for n in at_grazing]
     return [
-        Row(
+        Statement(
             "C1",
             "Section 5",
             "dynamical jumps, bifurcations and chaos",
@@ -183,7 +183,7 @@ def c1(data: Data) -> list[Row]:
             "none in kind",
             agreed(all(seen)),
         ),
-        Row(
+        Statement(
             "C1",
             "Section 5",
             "grazing causes abrupt changes (falling jumps of Figs. 9 and 10, small rising one)",
@@ -197,11 +197,11 @@ def c1(data: Data) -> list[Row]:
     ]
 
 
-def c1_other_systems(data: Data) -> list[Row]:
+def c1_other_systems(data: Data) -> list[Statement]:
     """The smoothing in the form that fits other systems."""
     order = order_in_eta(data["eta"]["error"], "general")
     return [
-        Row(
+        Statement(
             "C1",
             "Section 5",
             "the procedure may be useful for other non-smooth systems",

@@ -12,8 +12,8 @@ from dataclasses import replace
 from nonsmooth_savi2007.claims.verdicts import (
     Cell,
     Data,
-    Known,
-    Row,
+    Statement,
+    UncertainNumber,
     Verdict,
     against_printed,
     agreed,
@@ -30,12 +30,12 @@ _SAME = "as exact: no contact in this"
 _LEAST_LINE = 1e-2  # of the range: a straight line leaves less
 
 
-def _row(claim: str, place: str, says: str, cell: Cell, why: str = "", model: str = _NO_MODEL) -> Row:
+def _row(claim: str, place: str, says: str, cell: Cell, why: str = "", model: str = _NO_MODEL) -> Statement:
     """A row to which the model has nothing to say."""
-    return Row(claim, place, says, model, model, "see rig", Verdict.NOT_ASKED, why).measured(cell)
+    return Statement(claim, place, says, model, model, "see rig", Verdict.NOT_ASKED, why).measured(cell)
 
 
-def _closed(claim: str, says: str, printed: Printed, model: float, cell: Cell, why: str = "") -> Row:
+def _closed(claim: str, says: str, printed: Printed, model: float, cell: Cell, why: str = "") -> Statement:
     """A printed number beside a closed form of the model with Table 1, and beside the rig."""
     row = against_printed(claim, says, printed, Interval(model, model), None, why)
     text = f"{model:.4g} {printed.unit}".rstrip()
@@ -43,7 +43,7 @@ def _closed(claim: str, says: str, printed: Printed, model: float, cell: Cell, w
     return replace(row, exact=f"{text} (closed form)", smoothed=_SAME, difference=difference).measured(cell)
 
 
-def _back(printed: Printed, found: Known, note: str = "") -> Cell:
+def _back(printed: Printed, found: UncertainNumber, note: str = "") -> Cell:
     """Identified value of a number that the rig was given, or that follows from such."""
     return printed_cell(printed, found, note, put_in=True)
 
@@ -53,7 +53,7 @@ def _built(good: bool) -> Verdict:
     return Verdict.INPUT if good else Verdict.DIFFERS
 
 
-def r1(data: Data) -> list[Row]:
+def r1(data: Data) -> list[Statement]:
     """The apparatus of Fig. 3."""
     seen = data["table1"]["sensors"]
     step, turning, volts = (float(seen[name]) for name in ("angle_step", "turning", "volts_high"))
@@ -74,7 +74,7 @@ def r1(data: Data) -> list[Row]:
     ]
 
 
-def r2(data: Data) -> list[Row]:
+def r2(data: Data) -> list[Statement]:
     """Rate and force sensor."""
     seen = data["table1"]["sensors"]
     rate, step, used = (float(seen[name]) for name in ("rate", "force_step", "force_used"))
@@ -90,7 +90,7 @@ def r2(data: Data) -> list[Row]:
     ]
 
 
-def p1(data: Data) -> list[Row]:
+def p1(data: Data) -> list[Statement]:
     """Two stiffnesses from slopes."""
     car, support = (found_in(data["fig04"][key]) for key in ("oscillator", "support"))
     why = "The slope on the car is 2k: both springs pull. Nearly all of the uncertainty is the force sensor's gain."
@@ -114,7 +114,7 @@ def p1(data: Data) -> list[Row]:
     ]
 
 
-def p2(data: Data) -> list[Row]:
+def p2(data: Data) -> list[Statement]:
     """Mass, and the natural frequency that follows."""
     mass = table_rows(data["table1"])["m"][1]
     slope = found_in(data["fig04"]["oscillator"]).number
@@ -135,7 +135,7 @@ def p2(data: Data) -> list[Row]:
     ]
 
 
-def p3(data: Data) -> list[Row]:
+def p3(data: Data) -> list[Statement]:
     """The DFT's peak, and the frequency read off it."""
     found = found_in(data["fig05"]["tap"])
     grid, peak = found.others["dft_grid"], found.others["dft_peak"]
@@ -166,7 +166,7 @@ def p3(data: Data) -> list[Row]:
     ]
 
 
-def p4(data: Data) -> list[Row]:
+def p4(data: Data) -> list[Statement]:
     """Damping by amplitude over frequency."""
     viscous, both = (found_in(data["fig06"][key]) for key in ("viscous", "amplitudes"))
     printed, ratio = TABLE_1["c"], NUMBERS["damping ratio"]
@@ -209,7 +209,7 @@ def _apart(one: Found, other: Found) -> bool:
     return one.number.low > other.number.high or other.number.low > one.number.high
 
 
-def p5(data: Data) -> list[Row]:
+def p5(data: Data) -> list[Statement]:
     """Damping of the support by logarithmic decrement."""
     found = found_in(data["fig07"]["drop"])
     printed, ratio = TABLE_1["c_s"], NUMBERS["damping ratio of the support"]
@@ -245,7 +245,7 @@ def _line(data: Data, key: str) -> tuple[float, Cell]:
     return left, Cell(text, _built(left < _LEAST_LINE))
 
 
-def p6(data: Data) -> list[Row]:
+def p6(data: Data) -> list[Statement]:
     """Frequency over voltage."""
     offset = found_in(data["fig08"]["voltage"]).others["offset"]
     return [
@@ -259,7 +259,7 @@ def p6(data: Data) -> list[Row]:
     ]
 
 
-def p7(data: Data) -> list[Row]:
+def p7(data: Data) -> list[Statement]:
     """Forcing over crank length."""
     return [
         _row(
@@ -273,7 +273,7 @@ def p7(data: Data) -> list[Row]:
     ]
 
 
-def p8(data: Data) -> list[Row]:
+def p8(data: Data) -> list[Statement]:
     """Table 1, parameter by parameter."""
     rows = []
     for name, (_, number, truth) in table_rows(data["table1"]).items():

@@ -15,7 +15,7 @@ from nonsmooth_savi2007.claims.verdicts import (
     Cause,
     Cell,
     Data,
-    Row,
+    Statement,
     Verdict,
     against_closed_form,
     against_printed,
@@ -43,7 +43,7 @@ _FEWEST_APART = 0.05  # of the amplitude: two motions that differ by more are tw
 _9, _10 = "Section 4, on Fig. 9", "Section 4, on Fig. 10"
 
 
-def f9a(data: Data) -> list[Row]:
+def f9a(data: Data) -> list[Statement]:
     """Rising frequency: period 2, and a jump."""
     exact, smoothed = data["fig09"]["exact"], data["fig09"]["smoothed"]
     printed, rising = NUMBERS["period 2 near"], NUMBERS["jump rising"]
@@ -57,7 +57,7 @@ def f9a(data: Data) -> list[Row]:
             f"{100 * (printed.value - found[0]) / (found[1] - found[0]):.0f} % of it."
         )
     return [
-        Row(
+        Statement(
             "F9a",
             _9,
             f"rising frequency: a small period-2 region near {printed}",
@@ -87,7 +87,7 @@ def _with_printed_frequency() -> list[list[float]]:
     return [grazing_frequencies({**table, **FIGURE_9, **changed}) for changed in changes]
 
 
-def f9b(data: Data) -> list[Row]:
+def f9b(data: Data) -> list[Statement]:
     """Falling frequency: the jump at grazing, and period 2 again."""
     exact, smoothed = data["fig09"]["exact"], data["fig09"]["smoothed"]
     closed = grazing_of(exact)[-1]
@@ -120,7 +120,7 @@ def f9b(data: Data) -> list[Row]:
             main_jump(smoothed, "down"),
             "Within one step of the sweep; read from its amplitudes alone.",
         ),
-        Row(
+        Statement(
             "F9b",
             _9,
             "falling frequency: period 2 appears again",
@@ -132,7 +132,7 @@ def f9b(data: Data) -> list[Row]:
     ]
 
 
-def f9c(data: Data) -> list[Row]:
+def f9c(data: Data) -> list[Statement]:
     """The region between the two jumps: the branch from fold to fold."""
     texts, wide = [], []
     for key in ("exact", "smoothed"):
@@ -170,7 +170,7 @@ def f9c(data: Data) -> list[Row]:
         "below the grazing of the motion without contact, where falling frequency jumps."
     )
     return [
-        Row(
+        Statement(
             "F9c",
             _9,
             "an unstable region between the jumps with rising and falling frequency",
@@ -183,7 +183,7 @@ def f9c(data: Data) -> list[Row]:
     ]
 
 
-def f10(data: Data) -> list[Row]:
+def f10(data: Data) -> list[Statement]:
     """No period 2, a small jump in its place."""
     exact, smoothed = data["fig10"]["exact"], data["fig10"]["smoothed"]
     grazing = list(zip(grazing_of(exact), grazing_of(smoothed), strict=True))
@@ -191,7 +191,7 @@ def f10(data: Data) -> list[Row]:
     count = exact["period_number"].size, smoothed["period_number"].size
     small = small_jump(exact, "up")
     return [
-        Row(
+        Statement(
             "F10",
             _10,
             "jumps as in Fig. 9, elsewhere with rising than with falling frequency",
@@ -208,7 +208,7 @@ def f10(data: Data) -> list[Row]:
             main_jump(exact, "down"),
             main_jump(smoothed, "down"),
         ),
-        Row(
+        Statement(
             "F10",
             _10,
             "no period-2 response",
@@ -217,7 +217,7 @@ def f10(data: Data) -> list[Row]:
             "none",
             agreed(not any(doubled)),
         ),
-        Row(
+        Statement(
             "F10",
             _10,
             "a small jump instead",
@@ -239,7 +239,7 @@ def f10(data: Data) -> list[Row]:
     ]
 
 
-def grazing_behind_both(data: Data) -> list[Row]:
+def grazing_behind_both(data: Data) -> list[Statement]:
     """Period 2 of Fig. 9 and the small jump of Fig. 10 begin where the motion without contact grazes."""
     exact, smoothed = data["fig09"]["exact"], data["fig09"]["smoothed"]
     return [

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth_savi2007.claims.response import against, grazing_of_paper
-from nonsmooth_savi2007.claims.verdicts import CLOSE, Cell, Data, Row, Verdict, agreed, printed_cell
+from nonsmooth_savi2007.claims.verdicts import CLOSE, Cell, Data, Statement, Verdict, agreed, printed_cell
 from nonsmooth_savi2007.figures.amplitude import flip_of, rate_of, slowest
 from nonsmooth_savi2007.figures.motions import measured_periods_at
 from nonsmooth_savi2007.measure import APERIODIC, Interval, jumps, main_jump, period_word, small_jump
@@ -120,7 +120,7 @@ def f15(data: Data) -> list[Cell]:
     return [Cell("not asked: see F16")]
 
 
-def f16(data: Data) -> list[Row]:
+def f16(data: Data) -> list[Statement]:
     """The rig's attractor beside the model's, at four phases."""
     result = data["fig16"]["attractor"]
     far, halves = result["energy_distance_matched"].values, result["measured_halves_p95"].values
@@ -129,7 +129,7 @@ def f16(data: Data) -> list[Row]:
     number = int(result["measured_period_number"])
     alike = number == APERIODIC and worst < 2
     return [
-        Row(
+        Statement(
             "F16",
             "Fig. 16",
             "the same attractor from the apparatus, at four phases",

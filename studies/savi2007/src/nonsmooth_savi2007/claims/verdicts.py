@@ -75,7 +75,7 @@ class Judged(Protocol):
     def expanded(self) -> float: ...
 
 
-class Known(Judged, Protocol):
+class UncertainNumber(Judged, Protocol):
     """A number with its standard uncertainty too: a step that holds a change, a quantity identified."""
 
     @property
@@ -154,7 +154,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Row:
+class Statement:
     """One statement: what the paper says (``place``: where), what both flows and the rig give, and what follows.
 
     ``verdict`` is on the exact flow, ``rig_verdict`` on the virtual rig; ``cause``: why one of them differs, where it
@@ -176,7 +176,7 @@ class Row:
     smoothed_beside: Beside | None = None
     rig_beside: Beside | None = None
 
-    def measured(self, cell: Cell) -> Row:
+    def measured(self, cell: Cell) -> Statement:
         """The row with what the rig says."""
         why = f"{self.why} {cell.why}".strip()
         return replace(self, rig=cell.text, rig_verdict=cell.verdict, why=why, rig_beside=cell.beside)
@@ -196,7 +196,9 @@ class Row:
         return Cause.REAL if self.verdict is Verdict.DIFFERS else Cause.RIG
 
 
-def printed_cell(printed: Printed, found: Known | None, note: str = "", why: str = "", *, put_in: bool = False) -> Cell:
+def printed_cell(
+    printed: Printed, found: UncertainNumber | None, note: str = "", why: str = "", *, put_in: bool = False
+) -> Cell:
     """The rig's number beside a printed one; ``put_in``: that the rig was given, or that follows from what it was."""
     verdict = judge(printed.value, found, printed.resolution)
     if put_in and verdict is Verdict.AGREES:
@@ -211,15 +213,15 @@ def against_printed(
     claim: str,
     says: str,
     printed: Printed,
-    exact: Known | None,
-    smoothed: Known | None,
+    exact: UncertainNumber | None,
+    smoothed: UncertainNumber | None,
     why: str = "",
     cause: Cause | None = None,
-) -> Row:
+) -> Statement:
     """A printed number beside what both flows give; the verdict is on the exact one."""
     found = [Beside.of(printed.value, printed.resolution, one) for one in (exact, smoothed)]
     words = [str(one) if one is not None else "not found" for one in found]
-    return Row(
+    return Statement(
         claim,
         printed.place,
         says,
@@ -242,7 +244,7 @@ def against_closed_form(
     exact: Interval | None,
     smoothed: Interval | None,
     why: str = "",
-) -> Row:
+) -> Statement:
     """A frequency known in closed form, in rad/s, beside the sweeps: they agree within one of their steps.
 
     ``closed`` holds it for the gap g and, to compare the smoothed switch with, for g - eta.
@@ -251,7 +253,7 @@ def against_closed_form(
     off = ["not found" if found is None else f"{found.value - truth:+.4f} rad/s" for found, truth in pairs]
     verdicts = [judge_step(truth, found) for found, truth in pairs]
     verdict = verdicts[0] if len(set(verdicts)) == 1 else Verdict.IN_PART
-    return Row(
+    return Statement(
         claim,
         place,
         f"{says}: {closed[0]:.5f} rad/s (gap g - eta: {closed[1]:.5f})",
@@ -263,5 +265,5 @@ def against_closed_form(
     )
 
 
-def _with_unit(found: Known | None, unit: str) -> str:
+def _with_unit(found: UncertainNumber | None, unit: str) -> str:
     return "not found" if found is None else f"{with_uncertainty(found.value, found.uncertainty)} {unit}".rstrip()

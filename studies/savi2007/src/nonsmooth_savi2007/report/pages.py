@@ -83,7 +83,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Picture:
+class Image:
     """A PNG file beside the report, with the vector file it stands for and its caption."""
 
     path: Path
@@ -91,7 +91,7 @@ class Picture:
     caption: str
 
 
-Block: TypeAlias = Heading | Paragraph | Notice | Lines | Bullets | Contents | Tally | Comparison | Table | Picture
+Block: TypeAlias = Heading | Paragraph | Notice | Lines | Bullets | Contents | Tally | Comparison | Table | Image
 
 
 def to_markdown(blocks: Sequence[Block]) -> str:
@@ -121,7 +121,7 @@ def _markdown(block: Block) -> str:
                 header, rows = (*header, note), tuple((*row, text) for row, text in zip(rows, notes, strict=True))
             lines = [header, tuple("---" for _ in header), *rows]
             return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
-        case Picture(path, vector, caption):
+        case Image(path, vector, caption):
             return f"![{vector}]({path.name})\n\n{caption} ([PDF]({vector}))"
     return ""
 
@@ -157,7 +157,7 @@ def _html(block: Block, document: Sequence[Block]) -> str:
             return _comparison(block)
         case Table():
             return _table(block)
-        case Picture(path, vector, caption):
+        case Image(path, vector, caption):
             image = base64.b64encode(path.read_bytes()).decode("ascii")
             return (
                 f'<figure id="{escape(path.stem)}"><img alt="{escape(caption)}" src="data:image/png;base64,{image}">'

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from nonsmooth import __version__
-from nonsmooth_savi2007.claims.verdicts import CLOSE, MEANING, RULE, Cause, Data, Row, Verdict, judge
+from nonsmooth_savi2007.claims.verdicts import CLOSE, MEANING, RULE, Cause, Data, Statement, Verdict, judge
 from nonsmooth_savi2007.figures.figure import Figure
 from nonsmooth_savi2007.figures.parameters import NAMES, table_rows
 from nonsmooth_savi2007.flows import ETA, SMOOTHED, Settings
@@ -19,10 +19,10 @@ from nonsmooth_savi2007.report.pages import (
     Comparison,
     Contents,
     Heading,
+    Image,
     Lines,
     Notice,
     Paragraph,
-    Picture,
     Table,
     Tally,
     to_html,
@@ -48,7 +48,13 @@ _MODEL, _RIG = "model", "virtual rig (synthetic)"
 
 
 def write_report(
-    folder: Path, figures: Sequence[Figure], data: Data, rows: Sequence[Row], settings: Settings, *, complete: bool
+    folder: Path,
+    figures: Sequence[Figure],
+    data: Data,
+    rows: Sequence[Statement],
+    settings: Settings,
+    *,
+    complete: bool,
 ) -> None:
     """Write ``REPORTS`` into the folder that holds the figures."""
     blocks = _blocks(folder, figures, data, rows, settings, complete)
@@ -58,7 +64,7 @@ def write_report(
 
 
 def _blocks(
-    folder: Path, figures: Sequence[Figure], data: Data, rows: Sequence[Row], settings: Settings, complete: bool
+    folder: Path, figures: Sequence[Figure], data: Data, rows: Sequence[Statement], settings: Settings, complete: bool
 ) -> list[Block]:
     blocks: list[Block] = [Heading(TITLE, 1), Paragraph(_PAPER)]
     if settings.quick:
@@ -88,14 +94,14 @@ def _blocks(
         title += f" (not in the paper; beside Fig. {figure.beside})" if figure.beside is not None else ""
         title += " (virtual rig, synthetic)" if figure.rig else ""
         caption = figure.caption(data[figure.name])
-        blocks += [Heading(title, 3), Picture(folder / f"{figure.name}.png", f"{figure.name}.pdf", caption)]
+        blocks += [Heading(title, 3), Image(folder / f"{figure.name}.png", f"{figure.name}.pdf", caption)]
     blocks += [Heading("The computation"), Paragraph(_about_the_model())]
     if any(figure.rig for figure in figures):
         blocks.append(Paragraph(_ABOUT_THE_RIG))
     return [*blocks, Heading("What the paper leaves open"), Bullets(_OPEN)]
 
 
-def _counts(rows: Sequence[Row]) -> dict[str, dict[Verdict, int]]:
+def _counts(rows: Sequence[Statement]) -> dict[str, dict[Verdict, int]]:
     """Number of statements with each verdict, from the model and from the rig; both sum to all of them."""
     return {
         _MODEL: Counter(row.verdict for row in rows),
@@ -107,7 +113,7 @@ def _counts(rows: Sequence[Row]) -> dict[str, dict[Verdict, int]]:
 _DECIDING = (Verdict.AGREES, Verdict.IN_PART, Verdict.UNDECIDED, Verdict.DIFFERS)
 
 
-def _in_short(rows: Sequence[Row]) -> tuple[tuple[str, str], ...]:
+def _in_short(rows: Sequence[Statement]) -> tuple[tuple[str, str], ...]:
     """Three lines: the model, why it differs, the rig."""
     model, rig = _counts(rows).values()
     lines = []
@@ -153,7 +159,7 @@ def _spread(counts: Mapping[Verdict, int]) -> str:
     return text + f", {n[Verdict.DIFFERS] or 'none'} {'differs' if n[Verdict.DIFFERS] == 1 else 'differ'}"
 
 
-def _numbers(rows: Sequence[Row]) -> list[Block]:
+def _numbers(rows: Sequence[Statement]) -> list[Block]:
     """The picture of all printed numbers that something was found for."""
     shown = []
     for row in rows:
@@ -171,7 +177,7 @@ def _numbers(rows: Sequence[Row]) -> list[Block]:
     return [Heading("Printed numbers"), Comparison(sides, tuple(shown), CLOSE, caption)]
 
 
-def _differences(rows: Sequence[Row]) -> list[Block]:
+def _differences(rows: Sequence[Statement]) -> list[Block]:
     """The statements that differ, each with its cause."""
     cells, notes = [], []
     for row in sorted((row for row in rows if row.differs), key=lambda row: list(Cause).index(row.reason or Cause.RIG)):
@@ -187,7 +193,7 @@ def _differences(rows: Sequence[Row]) -> list[Block]:
     return [Heading("Differences and their cause"), Table(header, tuple(cells), tuple(notes))]
 
 
-def _table(rows: Sequence[Row]) -> Table:
+def _table(rows: Sequence[Statement]) -> Table:
     """The long table: a row per statement, its reasons below."""
     header = (
         "claim",

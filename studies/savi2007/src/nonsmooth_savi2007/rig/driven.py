@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Setting:
+class SteadyRun:
     """One steady run: voltage (V), crank length and gap at the screw (m; None: no support), and what to note.
 
     ``release`` is where the car is held and let go (m), the motor running; None: it begins at rest.
@@ -41,7 +41,7 @@ class Setting:
 
 
 def records(
-    rig: VirtualRig, procedure: str, settings: Sequence[Setting], *, settle: float = 20.0, carry: bool = False
+    rig: VirtualRig, procedure: str, settings: Sequence[SteadyRun], *, settle: float = 20.0, carry: bool = False
 ) -> Recording:
     """One run per setting, steady after ``settle`` seconds; with ``carry`` each begins where the one before ended."""
     runs = []
@@ -59,7 +59,7 @@ def _steady(
     rig: VirtualRig,
     rng: np.random.Generator,
     name: str,
-    setting: Setting,
+    setting: SteadyRun,
     settle: float,
     last: xr.Dataset | None,
     wander: Wander,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth_savi2007.rig import driven
-from nonsmooth_savi2007.rig.driven import Setting, records
+from nonsmooth_savi2007.rig.driven import SteadyRun, records
 from nonsmooth_savi2007.rig.motor import mean_position, voltage_for
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def section(
             remark += "" if place is None else f"; the car let go at {1e3 * place:g} mm"
             notes = (("figure", figure), ("note", remark))
             duration = n * 2 * np.pi / omega
-            settings.append(Setting(voltage_for(rig, omega), length, reading, duration, notes, place))
+            settings.append(SteadyRun(voltage_for(rig, omega), length, reading, duration, notes, place))
     return records(rig, "section", settings, settle=settle, carry=figure == 17)
 
 
@@ -111,7 +111,7 @@ def rise(
     return driven.rise(rig, voltage=knob, crank_length=lengths, gap=screw, duration=duration)
 
 
-def without_support(rig: VirtualRig, number: int) -> list[Setting]:
+def without_support(rig: VirtualRig, number: int) -> list[SteadyRun]:
     """Runs at the crank lengths of a figure with the support taken away: they show where the car swings about."""
     if number in _RESPONSES:
         pairs = {(6.5, crank_for(rig, _RESPONSES[number][0]))}
@@ -121,7 +121,7 @@ def without_support(rig: VirtualRig, number: int) -> list[Setting]:
     else:
         pairs = {(SECTIONS[number][0][0], crank_for(rig, rho)) for _, rho, _ in SECTIONS[number]}
     notes = (("figure", number), ("note", "no support: the place about which the car swings"))
-    return [Setting(voltage_for(rig, omega), length, None, 30.0, notes) for omega, length in sorted(pairs)]
+    return [SteadyRun(voltage_for(rig, omega), length, None, 30.0, notes) for omega, length in sorted(pairs)]
 
 
 def figure(rig: VirtualRig, number: int, **options: Any) -> dict[str, Recording]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth import SolveError
-from nonsmooth_savi2007.rig.driven import Setting, records
+from nonsmooth_savi2007.rig.driven import SteadyRun, records
 from nonsmooth_savi2007.rig.motor import frequency, mean_position, voltage_for
 from nonsmooth_savi2007.rig.truth import NOMINAL_GAP
 
@@ -63,7 +63,7 @@ def response(
     voltages: Sequence[float] | None = None,
     gap: float | None = None,
     duration: float = 12.0,
-    after: Sequence[Setting] = (),
+    after: Sequence[SteadyRun] = (),
 ) -> Recording:
     """Frequency steps up and then down at each crank length (m), one run per step, the motion carried along: Fig. 6.
 
@@ -73,7 +73,7 @@ def response(
     natural = float(np.sqrt(2 * rig.truth["k"] / rig.truth["m"]))
     steps = [voltage_for(rig, natural * r) for r in RELATIVE] if voltages is None else list(voltages)
     settings = [
-        Setting(voltage, float(length), gap, duration, (("direction", direction),))
+        SteadyRun(voltage, float(length), gap, duration, (("direction", direction),))
         for length in crank_lengths
         for direction, row in (("up", steps), ("down", steps[::-1]))
         for voltage in row
@@ -95,7 +95,7 @@ def grazing(
     centre = graze_frequency(rig, crank_length, gap) + float(rng.uniform(-2, 2)) * step
     omegas = np.arange(centre + half_width, centre - half_width, -step)
     voltages = list(dict.fromkeys(voltage_for(rig, float(omega)) for omega in omegas))
-    settings = [Setting(voltage, crank_length, gap, duration, (("direction", "down"),)) for voltage in voltages]
+    settings = [SteadyRun(voltage, crank_length, gap, duration, (("direction", "down"),)) for voltage in voltages]
     return records(rig, "grazing", settings, carry=True)
 
 
@@ -124,7 +124,7 @@ def contact(
     duration: float = 20.0,
 ) -> Recording:
     """Records with contact at (frequency in rad/s, crank length in m), each begun at rest."""
-    settings = [Setting(voltage_for(rig, omega), length, gap, duration) for omega, length in regimes]
+    settings = [SteadyRun(voltage_for(rig, omega), length, gap, duration) for omega, length in regimes]
     for setting in settings:
         frequency(rig, setting.voltage)
     return records(rig, "contact", settings)
