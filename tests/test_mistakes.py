@@ -55,6 +55,36 @@ MISTAKES = {
         "write them so",
     ),
     "a power as in MATLAB": (FIELD.format("(u.v, -u.x^3)"), "mode 'free'", "`^` is not a power", "write x**3"),
+    "a force without its coordinate": (
+        "ns.mechanical(1.0, 0.1, 1.0, forcing=lambda t, p: np.cos(t))",
+        "not <function",
+        "`forcing` must be a mapping",
+        'such as {"q": lambda t, p:',
+    ),
+    "an output without a name": (
+        "system(outputs=lambda t, u, p: u.v**2)",
+        "not <function",
+        "`outputs` must be a mapping",
+        'such as {"energy": lambda t, u, p:',
+    ),
+    "a table in a force": (
+        "ns.mechanical(1.0, 0.1, 1.0, forcing={'q': lambda t, p: np.interp(t, [0, 1], [0, 2])})",
+        "the number was `t`",
+        "a table over time (np.interp)",
+        "is an input, inputs=",
+    ),
+    "two walls in one indicator": (
+        "system(indicators={'gap': lambda t, u, p: abs(u.x) - p.g})",
+        "indicator 'gap' contains `abs`",
+        "one indicator for each side",
+        "with a transition each",
+    ),
+    "a system saved as a result": (
+        "ns.save(system(), 'rig.nc')",
+        "got System",
+        "of an orbit or a fit give .to_dataset()",
+        "system.to_text()",
+    ),
     "math.cos": (
         FIELD.format("(u.v, math.cos(p.omega * t))"),
         "the number was `p.omega*t`",

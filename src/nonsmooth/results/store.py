@@ -60,7 +60,10 @@ def save(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         read-only. The result is the attribute ``result`` of the error.
     """
     if not isinstance(result, xr.Dataset):
-        raise TypeError(f"save takes an xarray.Dataset, got {type(result).__name__}")
+        raise TypeError(
+            f"save takes an xarray.Dataset, got {type(result).__name__}: of an orbit or a fit give .to_dataset(); a "
+            "system stands in every result made with it (ns.system_of), or is text, system.to_text()"
+        )
     target = Path(path)
     try:
         check_place(target)
@@ -122,7 +125,8 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     with _readable(source), _opened(source) as raw:
         if ATTRIBUTE not in raw.attrs:
             raise DataFileError(
-                f"{source}: has no attribute {ATTRIBUTE!r}, so it is not a result of this package; {_EXPECTED}"
+                f"{source}: has no attribute {ATTRIBUTE!r}, so it is not a result of this package; {_EXPECTED}; "
+                "the store of a chart (store=) is read by the call that made it"
             )
         expected, record = unstamp(str(raw.attrs[ATTRIBUTE]))
         attributes = _own(raw.attrs) | {ATTRIBUTE: record}

@@ -131,6 +131,8 @@ def describe(
     _is_mapping(parameters, "parameters", name, '{"m": (0.838, "kg"), "k": 8.47}')
     known = {key: Parameter.read(key, given) for key, given in parameters.items()}
     _is_mapping(modes, "modes", name, '{"free": free, "contact": contact}')
+    _is_mapping(indicators or {}, "indicators", name, '{"gap": lambda t, u, p: u.x - p.g}')
+    _is_mapping(outputs or {}, "outputs", name, '{"energy": lambda t, u, p: u.v**2 / 2}')
     if not modes:
         raise SystemDefinitionError(f"{name!r}: a system needs at least one mode")
     remembered = {key: _memory(key, given) for key, given in _units(memory or {}, "memory", name, raw=True).items()}

@@ -51,8 +51,8 @@ class Sensor:
     Examples
     --------
     >>> import nonsmooth as ns
-    >>> ns.Sensor("Position", gain=1e-3, resolution=5e-5).gain
-    0.001
+    >>> ns.Sensor("Position", gain=1e3, resolution=0.05).gain  # of a position in m: readings in mm
+    1000.0
     """
 
     channel: Annotated[str, "a sensor's channel is given by its name"] = ""

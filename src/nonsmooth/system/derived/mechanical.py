@@ -92,7 +92,11 @@ def mechanical(
     size = _size(M)
     names = _coordinates(coordinates, size)
     speeds = [f"v_{key}" for key in names]
-    given = dict(parameters or {})
+    if not isinstance(forcing, Mapping | None):
+        raise SystemDefinitionError(
+            f'{name!r}: `forcing` must be a mapping such as {{"{names[0]}": lambda t, p: p.F * np.cos(p.w * t)}}, '
+            f"not {shortened(forcing)}"
+        )
     for key in forcing or {}:
         if key not in names:
             raise SystemDefinitionError(f"forcing: {unknown(key, 'a coordinate', repr(name), names)}")
@@ -130,7 +134,7 @@ def mechanical(
     system = System(
         name=name,
         states=states,
-        parameters=given,
+        parameters=parameters or {},
         modes={"all": field},
         outputs=outputs,
         scale=scale,

@@ -24,7 +24,8 @@ _DECISION = (
 )
 _NUMBER = (
     "a symbolic number cannot become a float: use NumPy's functions (np.cos, np.sqrt, np.exp, ...) in place of "
-    "those of `math`, and build arrays without dtype=float; the number was `{}`"
+    "those of `math`, and build arrays without dtype=float; a table over time (np.interp) is an input, inputs=; "
+    "the number was `{}`"
 )
 
 

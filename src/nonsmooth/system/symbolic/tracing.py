@@ -244,6 +244,7 @@ def refuse_corners(expression: sp.Expr, state: set[sp.Symbol], what: str) -> Non
             )
             raise SystemDefinitionError(
                 f"{what} contains `{kind}` of the state or the time: a corner no method can see. Make it two modes "
-                f"with an indicator that changes sign at the corner and a transition each way "
-                f"(of the time alone: transitions with `at=`)"
+                f"with an indicator that changes sign at the corner and a transition each way (in an "
+                f"indicator: one indicator for each side, with a transition each; of the time alone: transitions with "
+                f"`at=`, or an input)"
             )
