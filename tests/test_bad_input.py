@@ -189,7 +189,7 @@ SIMULATE = {
     "unknown option": (
         {"periods": 1, "tol": 1e-9},
         TypeError,
-        r"`tol` is not an option of simulate; nearest: atol; all: ",
+        r"`tol` is not an option of simulate; nearest: rtol; all: ",
     ),
     "parameter as option": (
         {"periods": 1, "omega": 3.0},

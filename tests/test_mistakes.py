@@ -85,6 +85,62 @@ MISTAKES = {
         "of an orbit or a fit give .to_dataset()",
         "system.to_text()",
     ),
+    "a force that pulls a stop shut": (
+        "ball = ns.System(states=['x', 'v'], parameters={}, modes={'fly': lambda t, u, p: (u.v, -9.81)},\n"
+        "    elements={'floor': ns.elements.Stop(gap=lambda t, u, p: u.x, on={'v': -1.0})})",
+        "element 'floor'",
+        "a positive force opens its gap, and on= does the opposite",
+        "turn the sign of on=",
+    ),
+    "a friction that drives": (
+        "ns.mechanical(1.0, 0.0, 1.0, parameters={'mu': 0.3}, elements={'pad': ns.elements.Coulomb(at='q',"
+        " friction='mu')}).with_parameters(mu=-0.3)",
+        "mu = -0.3",
+        "the friction of element 'pad' must not be negative",
+        "friction",
+    ),
+    "a static friction below the kinetic one": (
+        "ns.mechanical(1.0, 0.0, 1.0, elements={'pad': ns.elements.Coulomb(at='q', friction=0.3, static=0.1)})",
+        "element 'pad'",
+        "must not be less than its kinetic friction",
+        "the static friction",
+    ),
+    "an elastic stop without stiffness": (
+        "ns.elements.ElasticStop(at='q', position=1.0)",
+        "without which nothing stops",
+        "give stiffness=",
+        "a rigid stop is Stop",
+    ),
+    "a play of negative width": (
+        "ns.mechanical(1.0, 0.0, 1.0, elements={'gear': ns.elements.Backlash(at='q', half_width=-0.1, stiffness=1.0)})",
+        "element 'gear'",
+        "must not be negative",
+        "the half width",
+    ),
+    "a negative mass": (
+        "ns.mechanical('m', 0.1, 1.0, parameters={'m': 1.0}).with_parameters(m=-1.0)",
+        "m = -1.0",
+        "must be positive",
+        "the mass of coordinate 'q'",
+    ),
+    "a force of time alone": (
+        "ns.mechanical(1.0, 0.1, 1.0, forcing={'q': lambda t: np.cos(t)})",
+        "too many positional arguments",
+        "forcing of 'q' is a function of t and p",
+        "`lambda t, p: ...`",
+    ),
+    "an expression for the name of a parameter": (
+        "ns.mechanical(1.0, 0.1, 1.0, parameters={'d': 0.1}, elements=[ns.elements.Stop(at='q', position='-d')])",
+        "'-d'",
+        "is not the name of a parameter",
+        "what is computed is a function",
+    ),
+    "an option of another program": (
+        "ns.simulate(system(), x0=[0, 1], periods=1)",
+        "`x0` is not an option of simulate",
+        "nearest: start",
+        "samples",
+    ),
     "math.cos": (
         FIELD.format("(u.v, math.cos(p.omega * t))"),
         "the number was `p.omega*t`",

@@ -407,3 +407,17 @@ def test_a_near_guess_needs_no_short_windows_and_gives_the_same(monkeypatch):
     for name in ("k", "c"):
         assert abs(at_once[name] - grown[name]) < 1e-3 * grown.uncertainty[name]
         assert at_once.uncertainty[name] == pytest.approx(grown.uncertainty[name], rel=1e-3)
+
+
+def test_a_channel_in_another_unit_is_told_of_unless_its_gain_is_given(recwarn):
+    """x = exp(-t / 10) cos(w t) in mm beside a state in m: with a gain of 1000 readings per metre k and c are exact."""
+    t = np.linspace(0.0, 20.0, 400)
+    w = np.sqrt(4.0 - 0.01)
+    x = xr.Dataset({"disp": ("time", 5.0 * np.exp(-t / 10) * np.cos(w * t), {"units": "mm"})}, coords={"time": t})
+    mass = ns.mechanical(1.0, "c", "k", coordinates={"x": "m"}, parameters={"c": 0.15, "k": 4.2})
+    with pytest.warns(UserWarning, match="channel 'disp' is in mm, the model in m"):
+        problem_of(mass, x, ["c", "k"], {"x": "disp"})
+    recwarn.clear()
+    found = ns.fit(mass, x, ["c", "k"], measured={"x": ns.Sensor("disp", gain=1e3)}, tries=1, progress=False)
+    assert not [one for one in recwarn if "the model in" in str(one.message)]
+    assert [found["c"], found["k"]] == pytest.approx([0.2, 4.0], rel=1e-6)

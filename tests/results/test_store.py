@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import nonsmooth as ns
 from nonsmooth.errors import DataFileError
 from nonsmooth.results.store import load, save
 
@@ -29,6 +30,16 @@ def test_nothing_is_lost(name: str, ending: str, tmp_path: Path, request: pytest
             assert back[key].attrs["flag_values"].dtype == variable.dtype
     again = load(save(back, tmp_path / f"again.{ending}"))
     xr.testing.assert_identical(again, result)
+
+
+def test_one_state_of_a_result_is_saved_and_drawing_it_says_what_is_missing(
+    trajectory: xr.Dataset, tmp_path: Path
+) -> None:
+    name = str(trajectory["state"].values[0])
+    one = trajectory.sel(state=name)
+    xr.testing.assert_identical(load(save(one, tmp_path / "one.nc")), one)
+    with pytest.raises(ValueError, match=rf"one state was taken out of this result.*sel\(state=\['{name}'\]\)"):
+        ns.plot.time_history(one)
 
 
 @pytest.mark.parametrize("ending", FORMATS)

@@ -77,6 +77,11 @@ def variable_along(result: xr.Dataset, variable: str, verb: str) -> None:
     """Check that ``result`` is of the kind a plot needs; an error names the verb that makes such results."""
     if not hasattr(result, "data_vars"):
         raise TypeError(f"this plot draws the result of {verb}, not {type(result).__name__}")
+    if "state" in result.coords and not result["state"].dims:
+        one = str(result["state"].values)
+        raise ValueError(
+            f"one state was taken out of this result: keep the others, or the dimension by sel(state=[{one!r}])"
+        )
     if variable not in result:
         held = sorted(map(str, result.data_vars))
         raise ValueError(f"this result has no {variable!r}: it is not the result of {verb}; it holds {held}")

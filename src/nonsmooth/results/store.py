@@ -268,7 +268,7 @@ def _plain(result: xr.Dataset) -> dict[str, str]:
         pairs = [f"{name} = {value:.15g} {unit.removesuffix('1')}" for name, (value, unit) in units.items()]
         told["parameters"] = ", ".join(map(str.strip, pairs))
     if "state_unit" in result.coords:
-        states = zip(result["state"].values, result["state_unit"].values, strict=True)
+        states = zip(result["state"].values.ravel(), result["state_unit"].values.ravel(), strict=True)
         told["states"] = ", ".join(f"{name} ({unit})" if unit != "1" else str(name) for name, unit in states)
     return {_PLAIN + key: text for key, text in told.items()}
 

@@ -158,6 +158,18 @@ def unknown(name: object, what: str, of: str, known: Mapping[str, str] | Iterabl
     return text + (f"; all: {', '.join(ordered)}" if ordered else f"; {of} has none")
 
 
+#: Words of other programs for our options.
+ELSEWHERE = {
+    **dict.fromkeys(("x0", "y0", "u0", "z0", "initial", "initial_state"), "start"),
+    **dict.fromkeys(("t_end", "tend", "t_final", "t_max", "tmax", "t_span", "tspan"), "duration"),
+    **dict.fromkeys(("dt", "t_eval", "tout", "sampling"), "samples"),
+    **dict.fromkeys(("tol", "reltol", "rel_tol"), "rtol"),
+    **dict.fromkeys(("abstol", "abs_tol"), "atol"),
+    **dict.fromkeys(("solver", "integrator", "algorithm"), "method"),
+    **dict.fromkeys(("n_jobs", "workers", "processes", "cores"), "threads"),
+}
+
+
 def nearest(name: str, known: Iterable[str]) -> list[str]:
     """Return the known names that are like ``name``, the nearest first, at most three."""
     likeness = {candidate: _likeness(name[:100], candidate) for candidate in known}
@@ -166,5 +178,7 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
 
 def _likeness(given: str, candidate: str) -> float:
     """Similarity, 0 to about 1; the same beginning counts (``gap`` means g rather than omega)."""
+    if ELSEWHERE.get(given.lower()) == candidate:
+        return 2.0
     begins = given[:1].lower() == candidate[:1].lower()
     return difflib.SequenceMatcher(None, given.lower(), candidate.lower()).ratio() + 0.2 * begins

@@ -31,6 +31,7 @@ PERTURBED = 12  # rounds from about the orbit, on each side
 POWERS = (2.0, 1.0, 0.5)  # of the distance in the parameter: how far from it, beside a square root as beside a kink
 ROUNDS = 6  # signatures tried in a row
 STEEP = 1e-3  # of a tangent: its parameter
+ALONG = (1e-7, 1e-6, 1e-5)  # along the curve of a contact from the orbit where it has no speed
 BACK = 1e-3  # of its distance: an orbit nearer than this to the branch that has come here is on it
 EXACT = 1e-9  # of the orbit's size: orbits that meet are as near as this
 JUMP = 1e-6  # of the orbit's size: as far it jumps where an impact becomes slow enough to be completed as rest
@@ -46,6 +47,9 @@ def beside(point: OrbitPoint, contacts: Sequence[Change] = (), passed: Sequence[
     away from there. None where there is none, or no simulated round shows it.
     """
     common = [end for change in contacts if (end := common_orbit(change)) is not None]
+    for found in _along(common):
+        if not (_leads_back(point, found) or _came_by(found, passed)):
+            return found
     forward = float(np.sign(point.tangent[-1])) or 1.0
     nearest: dict[float, list[float]] = {forward: [], -forward: []}  # of those found, at each distance
     ahead: tuple[float, OrbitPoint] | None = None  # one to which the branch jumps, and how far
@@ -66,6 +70,19 @@ def beside(point: OrbitPoint, contacts: Sequence[Change] = (), passed: Sequence[
                 least = min(least, apart)
             before.append(least)
     return None if ahead is None else ahead[1]
+
+
+def _along(common: list[Common]) -> Iterator[OrbitPoint]:
+    """Orbits on the curves of contacts that leave their common orbits as square roots: by the speed of the contact."""
+    for curve, solved, tangent in common:
+        Y = solved.X / curve.scale
+        for ds in ALONG if abs(float(tangent[-1])) < STEEP else ():
+            for way in (tangent, -tangent):
+                found = curve.near(Y + ds * way, way)
+                if found is None or found.virtual or np.abs(found.Y - Y).max() > 2.0 * ds:
+                    continue
+                if curve.shows(found):
+                    yield found
 
 
 def _found(point: OrbitPoint, common: list[Common], side: float, aside: float) -> Iterator[OrbitPoint]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from nonsmooth.flow.inputs import Driven, Input, driven
 from nonsmooth.identification.fit.sensors import Sensor, read_sensors
 from nonsmooth.recordings.recording import Recording
 from nonsmooth.system.names import unknown
+from nonsmooth.system.units import read_unit
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -86,6 +88,16 @@ def read_records(
             tables[label] = table
     channels = list(dict.fromkeys(name for table in tables.values() for name in table))
     sensors = read_sensors(system, measured, channels)
+    units = {name: unit for one in given for name, unit in _units(one).items()}
+    ours = {**system.states, **system.outputs}
+    for quantity, sensor in sensors.items():
+        if sensor.gain == 1.0:
+            _compare_units(f"measured[{quantity!r}]", sensor.channel, units, ours[quantity], "Sensor(gain=...)")
+    for name, unit in system.inputs.items():
+        one = (inputs or {}).get(name) if isinstance(inputs, Mapping | None) else None
+        channel = one.time if isinstance(one, Input) else name if inputs is None else one
+        if isinstance(channel, str):
+            _compare_units(f"inputs[{name!r}]", channel, units, unit, "Input(time, values) in that unit")
     per_run = _settings(system, settings, list(tables))
     records = []
     for label, table in tables.items():
@@ -98,6 +110,25 @@ def read_records(
             columns.append(table[sensor.channel])
         records.append(replace(_joined(label, columns, per_run[label]), drive=_driven(system, inputs, label, table)))
     return sensors, records
+
+
+def _units(recording: Any) -> dict[str, str]:
+    """Units of the channels, as far as a recording says them."""
+    if isinstance(recording, Recording):
+        return recording.units
+    return {str(name): str(one.attrs.get("units", "")) for name, one in getattr(recording, "data_vars", {}).items()}
+
+
+def _compare_units(what: str, channel: str, units: Mapping[str, str], ours: str, remedy: str) -> None:
+    """Warn where channel and model are in units that are known and differ."""
+    theirs = units.get(channel, "")
+    one, other = read_unit(theirs), read_unit(ours)
+    if one is not None and other is not None and one != other:
+        warnings.warn(
+            f"{what}: channel {channel!r} is in {theirs}, the model in {ours}, and numbers are compared as they are; "
+            f"give {remedy}",
+            stacklevel=4,
+        )
 
 
 def _driven(

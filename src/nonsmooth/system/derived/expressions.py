@@ -224,11 +224,19 @@ class Expressions(Assembler):
     # What a user would have written
 
     def ranges(self, mode: str) -> list[tuple[sp.Expr, str]]:
-        """Expressions of the parameters that must not be negative, each with the sentence for where it is."""
-        known = set(self.symbols.p.values())
-        places = (self.place(k, mode, (0,) * len(self.parts)) for k in range(len(self.parts)))
-        every = [row for here in places for row in here.element.ranges(here)]
-        return [(e, text) for e, text in every if e.free_symbols and e.free_symbols <= known]
+        """Expressions of the parameters that must not be negative, each with the sentence for where it is.
+
+        Where a number is, or what a force does with the parameters as they are given, the sentence is raised."""
+        known, found = set(self.symbols.p.values()), []
+        for k in range(len(self.parts)):
+            here = self.place(k, mode, (0,) * len(self.parts))
+            rows = [(sp.sympify(e), text) for e, text in here.element.ranges(here)]
+            found += [(e, text) for e, text in rows if e.free_symbols and e.free_symbols <= known]
+            effect, text = here.effect()
+            for e, sentence in (*rows, (sp.sympify(sp.sympify(effect).xreplace(self.values)), text)):
+                if e.is_number and e < 0:
+                    raise SystemDefinitionError(sentence)
+        return found
 
     def condition(self, rows: Sequence[Condition], owner: str) -> str:
         """The text of a condition; its expressions become indicators, equal ones of an element the same."""

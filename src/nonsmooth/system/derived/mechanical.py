@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -19,6 +20,7 @@ from nonsmooth.system.symbolic.scalar import Scalar, to_expression
 from nonsmooth.system.symbolic.tracing import Symbols
 from nonsmooth.system.system import System
 from nonsmooth.system.units import product, read_unit, unit_of, write_unit
+from nonsmooth.system.variant import variant_of
 
 
 @checked(read=False)
@@ -59,7 +61,7 @@ def mechanical(
         As for :class:`nonsmooth.System`.
     coordinates : sequence of str, or mapping of str to unit, optional
         Names of the coordinates (``q1``, ``q2``, ...; ``q`` for one). Speeds are called ``v_<coordinate>``.
-    base : callable, optional
+    base : callable, number or name of a parameter, optional
         Acceleration of the base, ``lambda t, p: -p.Y * p.w**2 * np.cos(p.w * t)``; coordinates are relative to it.
     scale, outputs, symmetry, period, impacts, inputs, name
         As for :class:`nonsmooth.System`.
@@ -101,7 +103,8 @@ def mechanical(
         if key not in names:
             raise SystemDefinitionError(f"forcing: {unknown(key, 'a coordinate', repr(name), names)}")
 
-    forces = {key: _function(one) for key, one in (forcing or {}).items()}
+    forces = {key: _function(one, f"forcing of {key!r}") for key, one in (forcing or {}).items()}
+    rides = _function(0.0 if base is None else base, "base, an acceleration,")
     found: list[tuple[sp.Matrix, sp.Matrix, sp.Matrix, sp.Matrix]] = []
 
     def matrices(p: Any) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix, sp.Matrix]:
@@ -114,7 +117,7 @@ def mechanical(
     def outside(t: Any, p: Any) -> tuple[sp.Matrix, sp.Expr]:
         """Forcing of each coordinate, acceleration of the base."""
         loads = [to_expression(forces[key](t, p)) if key in forces else sp.Integer(0) for key in names]
-        return sp.Matrix(loads), sp.Integer(0) if base is None else to_expression(base(t, p))
+        return sp.Matrix(loads), to_expression(rides(t, p))
 
     def field(t: Any, u: Any, p: Any) -> list[Any]:
         inverse, damping, stiffness, _ = matrices(p)
@@ -153,7 +156,12 @@ def mechanical(
     )
     energy = next((one for one in energies if one is not None), None)
     loads = d.loads or Loads((), {"all": d.traced.fields[0]})
+    masses = {key: matrices(p)[3][i, i] for i, key in enumerate(names)}
+    positive = [(m, f"the mass of coordinate {key!r} must be positive") for key, m in masses.items() if m.free_symbols]
     new = d.with_loads(replace(loads, powers=powers, energy=write_unit(energy)))
+    if positive:
+        new = replace(new, ranges=(*positive, *d.ranges), variants={})
+        return System._make(new, dict(system.values), variant_of(new))
     return System._make(new, dict(system.values), system._variant)
 
 
@@ -178,9 +186,17 @@ def _powers(
     return {key: power[0, 0] for key, power in powers.items() if key in ("forcing", "damping") or power[0, 0] != 0}
 
 
-def _function(given: Any) -> Callable[..., Any]:
-    """A force as a function of time and parameters; it may be a number or the name of a parameter."""
-    return given if callable(given) else (lambda t, p: p[given] if isinstance(given, str) else given)
+def _function(given: Any, what: str) -> Callable[..., Any]:
+    """A load as a function of time and parameters; it may be a number or the name of a parameter."""
+    if not callable(given):
+        return lambda t, p: p[given] if isinstance(given, str) else given
+    try:
+        inspect.signature(given).bind(None, None)
+    except TypeError as error:
+        raise SystemDefinitionError(f"{what} is a function of t and p, `lambda t, p: ...` ({error})") from error
+    except ValueError:  # a function of C
+        pass
+    return given
 
 
 def _placed(label: str, element: Any, names: list[str], inverse: Callable[[Any], sp.Matrix], system: str) -> Any:

@@ -99,6 +99,15 @@ class Place:
         strikes = (part for part in self.make.parts if part.element.strikes)
         return any(not self.vanishes(self.make.across(self.where, part)) for part in strikes)
 
+    def effect(self) -> tuple[Any, str]:
+        """The effect of a unit force of the element on its own rate, with the sentence for where it is negative."""
+        own = self.make.across(self.where, self.part)  # a force may act on the place itself
+        return (
+            self.make.across(self.rate(), self.part) if self.vanishes(own) else own,
+            f"element {self.name!r}: a positive force {self.element.drives}, and on= does the opposite; turn the sign "
+            f"of on= or of {self.element.kinematics}=",
+        )
+
     def begins_alone(self) -> bool:
         """Return whether nothing is asked where a run begins, so that its conditions must lead out of its phase."""
         return not self.make.asks

@@ -114,6 +114,10 @@ class Parameters(_Named):
     _of = "a parameter"
 
     def __getitem__(self, name: str) -> Scalar:
+        if not str(name).isidentifier():
+            raise SystemDefinitionError(
+                f"{shortened(name)} is not the name of a parameter; what is computed is a function"
+            )
         return getattr(self, name)
 
     def __setattr__(self, name: str, value: Any) -> None:

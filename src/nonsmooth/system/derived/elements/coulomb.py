@@ -69,6 +69,16 @@ class Coulomb(Element):
         pressed = [("normal", None)] if self.normal is not None and self.normal not in others else []
         return [*(("friction", side) for side in sides), *own, *pressed]
 
+    def ranges(self, here: Place) -> list[tuple[Any, str]]:
+        kinetic, name = here.law("friction", 0), f"element {here.name!r}"
+        rows = [(kinetic, f"the friction of {name} must not be negative")]
+        if self.normal is not None and here.named(self.normal) is None:
+            rows.append((here.law("normal"), f"the normal force of {name} must not be negative"))
+        if self.static is not None:
+            static = here.law("static")
+            rows.append((static - kinetic, f"the static friction of {name} must not be less than its kinetic friction"))
+        return rows
+
     def rate(self, here: Place) -> Any:
         return here.where
 

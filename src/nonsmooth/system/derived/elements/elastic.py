@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.elements.element import SMALL, Condition, Contact, Element, Law, Leaving
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ class ElasticStop(Contact):
     gap, position, side
         As for :class:`Stop`.
     stiffness, damping : number, name of a parameter, or function
+        ``stiffness`` must be given; with 0 the stop is a plane that acts by its damper alone, or by nothing.
     pulls : bool
         True: in contact as long as the gap is negative, also where the damper pulls. False (a massless support that
         relaxes at once): in contact while the gap is negative and the force pushes (Savi et al. 2007, Eq. (2)).
@@ -30,7 +32,7 @@ class ElasticStop(Contact):
         See :class:`Element`.
     """
 
-    stiffness: Law = 0.0
+    stiffness: Law | None = None
     damping: Law = 0.0
     pulls: bool = False
 
@@ -38,6 +40,17 @@ class ElasticStop(Contact):
     laws = ("stiffness", "damping")
     conditions = ("gap", "push")
     presses = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.stiffness is None:
+            raise SystemDefinitionError(
+                "ElasticStop: give stiffness=, without which nothing stops (0: a plane that only marks a place); a "
+                "rigid stop is Stop"
+            )
+
+    def ranges(self, here: Place) -> list[tuple[Any, str]]:
+        return [(here.law("stiffness"), f"the stiffness of element {here.name!r} must not be negative")]
 
     def force(self, here: Place) -> Any:
         return 0 if here.phase == "open" else -here.law("stiffness") * here.where + damped(here)
@@ -59,6 +72,7 @@ class Displaced(Element):
     displacement: Callable[..., Any] | None = None
 
     kinematics = "displacement"
+    drives = "drives its displacement up"
 
     def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
         return q
@@ -84,6 +98,9 @@ class Backlash(Displaced):
     phases = ("free", "above", "below")
     laws = ("half_width", "stiffness", "damping")
     conditions = ("upper", "lower")
+
+    def ranges(self, here: Place) -> list[tuple[Any, str]]:
+        return [(here.law("half_width"), f"the half width of element {here.name!r} must not be negative")]
 
     def force(self, here: Place) -> Any:
         if here.phase == "free":
@@ -126,6 +143,9 @@ class PreloadedSpring(Displaced):
     conditions = ("over", "under", "side", "fast", "beyond")
     held = ("held",)
     sides = ("above", "below")
+
+    def ranges(self, here: Place) -> list[tuple[Any, str]]:
+        return [(here.law("preload"), f"the preload of element {here.name!r} must not be negative")]
 
     def force(self, here: Place) -> Any:
         side = 1 if here.phase == "above" else -1

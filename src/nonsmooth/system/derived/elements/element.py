@@ -68,6 +68,7 @@ class Element(ABC):
     sides: ClassVar[tuple[str, str]] = ("", "")  # the phases in which it lets go, its rate rising or falling
     strikes: ClassVar[bool] = False  # its impacts turn speeds at once
     bears: ClassVar[bool] = False  # while it is held it bears its part of an impulse
+    drives: ClassVar[str] = "drives its speed up"  # a positive force
     slow: ClassVar[float] = SLOW  # of the scale of its rate: below it it may hold, where a place decides
     presses: ClassVar[bool] = False  # its law is a normal force for friction
     given: ClassVar[Any] = None  # on an element that stands for one with ``at``: that one
@@ -148,6 +149,7 @@ class Contact(Element):
     side: int = 1
 
     kinematics = "gap"
+    drives = "opens its gap"
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -67,4 +67,4 @@ class Rubbing(Element):
         return here.make.asked(here.k, here.mode, here.pattern)
 
     def ranges(self, here: Place) -> list[tuple[Any, str]]:
-        return [(here.law("friction"), f"friction of element {here.name!r} is not negative")]
+        return [(here.law("friction"), f"the friction of element {here.name!r} must not be negative")]
