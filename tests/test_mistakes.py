@@ -141,6 +141,12 @@ MISTAKES = {
         "nearest: start",
         "samples",
     ),
+    "a file for a recording": (
+        "ns.fit(system(), 'disp.csv', ['g'])",
+        "not 'disp.csv'",
+        "a recording is a Recording",
+        "read a file with ns.load_recording",
+    ),
     "math.cos": (
         FIELD.format("(u.v, math.cos(p.omega * t))"),
         "the number was `p.omega*t`",

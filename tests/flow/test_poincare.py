@@ -235,3 +235,21 @@ def test_steps_of_returns_that_are_only_counted_do_not_add_up() -> None:
     )
     found = ns.poincare(system, n=3, transient=300_000)
     assert np.allclose(found.section.values, [0.3, 0.0], atol=1e-15)
+
+
+@pytest.mark.parametrize("stopped", [False, True])
+def test_a_plane_of_a_mechanical_system(stopped: bool) -> None:
+    """x = cos t is at x = 1/2 with the speeds -+sqrt(3)/2; an elastic stop beyond its reach changes nothing."""
+    stop = {"far": ns.elements.ElasticStop(at="x", position=2.0, stiffness=9.0)}
+    mass = ns.mechanical(
+        1.0,
+        0.0,
+        1.0,
+        coordinates=["x"],
+        elements=stop if stopped else None,
+        indicators={"plane": lambda t, u, p: u.x - 0.5},
+    )
+    for rising, sign in ((True, 1), (False, -1)):
+        found = ns.poincare(mass, section=ns.Poincare("plane", rising=rising), n=4, start={"x": 1.0})
+        expected = np.tile([0.5, sign * np.sqrt(0.75)], (4, 1))
+        assert found["section"].values == pytest.approx(expected, abs=1e-12)

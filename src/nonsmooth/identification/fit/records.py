@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -201,7 +202,8 @@ def _tables(one: Any, runs: Sequence[str] | None, time: str) -> dict[str, dict[s
                 )
             made[str(name)] = _pair(pair[0], pair[1], str(name))
         return {"run": made}
-    raise TypeError(f"a recording is {FORMS}, not {shortened(one)}")
+    of_a_file = "; read a file with ns.load_recording" if isinstance(one, str | PathLike) else ""
+    raise TypeError(f"a recording is {FORMS}, not {shortened(one)}{of_a_file}")
 
 
 def _of_dataset(one: Any, time: str) -> dict[str, tuple[FloatArray, FloatArray]]:

@@ -36,6 +36,7 @@ def mechanical(
     base: Callable[..., Any] | None = None,
     scale: Mapping[str, float] | None = None,
     outputs: Mapping[str, Any] | None = None,
+    indicators: Mapping[str, Callable[..., Any]] | None = None,
     symmetry: Any = None,
     period: Any = None,
     impacts: str = "simultaneous",
@@ -63,7 +64,7 @@ def mechanical(
         Names of the coordinates (``q1``, ``q2``, ...; ``q`` for one). Speeds are called ``v_<coordinate>``.
     base : callable, number or name of a parameter, optional
         Acceleration of the base, ``lambda t, p: -p.Y * p.w**2 * np.cos(p.w * t)``; coordinates are relative to it.
-    scale, outputs, symmetry, period, impacts, inputs, name
+    scale, outputs, indicators, symmetry, period, impacts, inputs, name
         As for :class:`nonsmooth.System`.
 
     Returns
@@ -140,6 +141,7 @@ def mechanical(
         parameters=parameters or {},
         modes={"all": field},
         outputs=outputs,
+        indicators=indicators,
         scale=scale,
         symmetry=symmetry,
         period=period,
