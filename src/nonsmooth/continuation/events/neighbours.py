@@ -47,9 +47,6 @@ def beside(point: OrbitPoint, contacts: Sequence[Change] = (), passed: Sequence[
     away from there. None where there is none, or no simulated round shows it.
     """
     common = [end for change in contacts if (end := common_orbit(change)) is not None]
-    for found in _along(common):
-        if not (_leads_back(point, found) or _came_by(found, passed)):
-            return found
     forward = float(np.sign(point.tangent[-1])) or 1.0
     nearest: dict[float, list[float]] = {forward: [], -forward: []}  # of those found, at each distance
     ahead: tuple[float, OrbitPoint] | None = None  # one to which the branch jumps, and how far
@@ -69,7 +66,10 @@ def beside(point: OrbitPoint, contacts: Sequence[Change] = (), passed: Sequence[
                     ahead = ahead or (left, found)
                 least = min(least, apart)
             before.append(least)
-    return None if ahead is None else ahead[1]
+    if ahead is not None:
+        return ahead[1]
+    beginnings = (found for found in _along(common) if not (_leads_back(point, found) or _came_by(found, passed)))
+    return next(beginnings, None)
 
 
 def _along(common: list[Common]) -> Iterator[OrbitPoint]:
