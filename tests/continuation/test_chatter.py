@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import brute_force
 import numpy as np
 import pytest
@@ -11,6 +14,7 @@ from test_random_branches import endings
 
 import nonsmooth as ns
 from nonsmooth.continuation.branches.following import curve_of
+from nonsmooth.continuation.events import neighbours
 
 
 def followed(template: str, seed: int, low: float, high: float, **begin: float) -> xr.Dataset:
@@ -89,3 +93,29 @@ def test_the_number_of_impacts_before_rest_is_no_event() -> None:
     assert np.ptp(branch["minimum"].sel(state="q").values) < 1e-12
     few, many = (ns.simulate(system.with_parameters(r=r), periods=1, transient=20) for r in (0.45, 0.58))
     assert many.sizes["crossing"] > few.sizes["crossing"] + 5
+
+
+@pytest.mark.parametrize("jump", [5e-8, 5e-9])
+def test_a_branch_jumps_only_where_no_orbit_comes_nearer(jump: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two orbits, one a jump away at every distance, one that arrives and is found from 1e-8 of the range on."""
+
+    def orbit(name: str, apart: float, left: float) -> Any:
+        return SimpleNamespace(name=name, apart=apart, left=left, rise=1.0)
+
+    def found(point: Any, common: Any, side: float, aside: float) -> list[Any]:
+        if side < 0.0:
+            return []
+        own = [orbit("own", aside, 0.1 * aside)] if aside >= 1e-8 else []
+        return [orbit("other", jump + aside, jump + 0.1 * aside), *own]
+
+    for name, stand_in in {
+        "_found": found,
+        "_apart": lambda point, other: other.apart,
+        "_left": lambda point, other: other.left,
+        "_may_jump": lambda *sides: True,
+        "_leads_back": lambda point, other: False,
+        "_came_by": lambda other, passed: False,
+    }.items():
+        monkeypatch.setattr(neighbours, name, stand_in)
+    taken: Any = neighbours.beside(SimpleNamespace(tangent=np.array([1.0])))  # type: ignore[arg-type]
+    assert taken.name == ("own" if jump > 1e-8 else "other")
