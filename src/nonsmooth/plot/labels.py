@@ -76,7 +76,9 @@ def column(result: xr.Dataset, variable: str, name: str) -> xr.DataArray:
 def variable_along(result: xr.Dataset, variable: str, verb: str) -> None:
     """Check that ``result`` is of the kind a plot needs; an error names the verb that makes such results."""
     if not hasattr(result, "data_vars"):
-        raise TypeError(f"this plot draws the result of {verb}, not {type(result).__name__}")
+        kind = type(result).__name__
+        instead = {"Orbit": "; an orbit is drawn by ns.plot.orbit", "System": f"; call ns.{verb} with it first"}
+        raise TypeError(f"this plot draws the result of {verb}, not {kind}{instead.get(kind, '')}")
     if "state" in result.coords and not result["state"].dims:
         one = str(result["state"].values)
         raise ValueError(
