@@ -498,6 +498,18 @@ MISTAKES = {
         "ns.system_of(result)",
     ),
     "a run's figure of a system": ("ns.plot.phase_portrait(osc)", "not System", "the result of simulate", "first"),
+    "two states in one figure": (
+        "ns.plot.time_history(RUN, y=['x', 'v'])",
+        "['x', 'v'] is not one name",
+        "a call of its own",
+        "the same axes with ax=",
+    ),
+    "all axes of a figure": (
+        "ns.plot.time_history(RUN, ax=np.array([None, None]))",
+        "ax = array([None, None]",
+        "is no matplotlib Axes",
+        "ax[0]",
+    ),
     "a figure of a fit": (
         "ns.plot.fit_residuals",
         "`fit_residuals` is not a figure",
@@ -592,6 +604,7 @@ NAMES = {
     "valve": ns.models.relief_valve(),
     "xr": xr,
     "Path": Path,
+    "RUN": xr.Dataset({"u": (("time", "state"), np.zeros((2, 2)))}, {"time": [0.0, 1.0], "state": ["x", "v"]}),
     "CHART": xr.Dataset({f"{name}_{of}": ("rho", [0.5]) for name in "xv" for of in ("minimum", "maximum")}),
 }
 

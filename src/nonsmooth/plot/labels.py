@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nonsmooth.errors import shortened
 from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
@@ -63,6 +64,10 @@ def column(result: xr.Dataset, variable: str, name: str) -> xr.DataArray:
     ValueError
         If ``name`` is neither; the message lists what there is.
     """
+    if not isinstance(name, str):
+        raise TypeError(
+            f"{shortened(name)} is not one name: draw each by a call of its own, into the same axes with ax="
+        )
     states = result["state"].values.tolist() if "state" in result.coords else []
     if name in states:
         return result[variable].isel(state=states.index(name))

@@ -131,7 +131,10 @@ def axes(ax: Axes | None, *, width: float = COLUMN, ratio: float = 0.72) -> Iter
     from matplotlib.axes import Axes as Drawable
 
     if ax is not None and not isinstance(ax, Drawable):
-        raise TypeError(f"ax = {ax!r} is no matplotlib Axes: what to draw is given by name, as in show=...")
+        hint = (
+            "one of several is ax[0]" if isinstance(ax, np.ndarray) else "what to draw is given by name, as in show=..."
+        )
+        raise TypeError(f"ax = {shortened(ax)} is no matplotlib Axes: {hint}")
     if ax is not None:
         with _own_legend(ax):
             yield ax
