@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.cli import main as cli
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.series import SeriesEngine
+from nonsmooth.identification import Estimate
 from nonsmooth.kernels.compile import cache
 
 IMPACT = "system(transitions=[ns.Transition('free', 'free', when='{}', reset=lambda t, u, p: (u.x, -p.e * u.v))])"
@@ -445,6 +447,139 @@ MISTAKES = {
     "a result as a table": ("ns.load('data.csv')", "data.csv", ".nc (NetCDF) or .zarr (Zarr)", "must end in"),
     "no such file": ("ns.load('none.nc')", "none.nc: no such file", ".nc or .zarr", "written by nonsmooth.save"),
     "save in another order": ("ns.save('run.nc', osc)", "got str", "an xarray.Dataset", "save takes"),
+    # elements and matrices
+    "an element between two coordinates, as a list": (
+        "ns.mechanical(np.eye(2), 0.1 * np.eye(2), np.eye(2), elements={'b': ns.elements.Stop(at=['q1', 'q2'])})",
+        "not ['q1', 'q2']",
+        "the name of a coordinate, 'q1', or a combination",
+        '{"q2": 1, "q1": -1}',
+    ),
+    "an element between two coordinates, as a text": (
+        "ns.mechanical(np.eye(2), 0.1 * np.eye(2), np.eye(2), elements={'b': ns.elements.Stop(at='q2-q1')})",
+        "`q2-q1` is not a coordinate",
+        "all: q1, q2",
+        'between two: at={"q2": 1, "q1": -1}',
+    ),
+    "a coordinate by its number": (
+        "ns.mechanical(np.eye(2), 0.1 * np.eye(2), np.eye(2), elements={'b': ns.elements.Stop(at=1)})",
+        "element 'b': at= is",
+        "the name of a coordinate",
+        "not 1",
+    ),
+    "a list of masses": (
+        "ns.mechanical([1.0, 2.0], np.eye(2), np.eye(2))",
+        "not of shape (2,)",
+        "a square array",
+        "np.diag(masses)",
+    ),
+    "a gap with a coordinate": (
+        "ns.elements.Stop(at='q', gap=0.1)",
+        "at= (of ns.mechanical) and gap=",
+        "exclude each other",
+        "is position=",
+    ),
+    "a coefficient of friction by its letter": (
+        "ns.elements.Coulomb(at='q', mu=0.3)",
+        "`mu` is not an option",
+        "all: at, belt",
+        "nearest: friction",
+    ),
+    "static friction as a ratio": (
+        "ns.mechanical(1.0, 0.1, 1.0, elements={'r': ns.elements.Coulomb(at='q', friction=5.0, static=1.6)})",
+        "the static friction of element 'r'",
+        "must not be less than its kinetic friction",
+        "no ratio",
+    ),
+    # figures and files
+    "a sketch of a run": (
+        "ns.plot.mechanism(xr.Dataset({'u': ('time', [0.0])}))",
+        "not Dataset",
+        "draws a system",
+        "ns.system_of(result)",
+    ),
+    "a run's figure of a system": ("ns.plot.phase_portrait(osc)", "not System", "the result of simulate", "first"),
+    "two states in one figure": (
+        "ns.plot.time_history(RUN, y=['x', 'v'])",
+        "['x', 'v'] is not one name",
+        "a call of its own",
+        "the same axes with ax=",
+    ),
+    "all axes of a figure": (
+        "ns.plot.time_history(RUN, ax=np.array([None, None]))",
+        "ax = array([None, None]",
+        "is no matplotlib Axes",
+        "ax[0]",
+    ),
+    "a figure of a fit": (
+        "ns.plot.fit_residuals",
+        "`fit_residuals` is not a figure",
+        "all: ",
+        "ns.plot.identification.fit_residuals",
+    ),
+    "a figure behind its file": (
+        "ns.plot.save_figure('fig.pdf', ns.plot.mechanism(osc))",
+        "not 'fig.pdf'",
+        "takes the figure",
+        "first, then the file",
+    ),
+    "a figure as a document": (
+        "ns.plot.save_figure(ns.plot.mechanism(osc), 'fig.docx')",
+        "fig.docx",
+        "allowed: ",
+        "pdf",
+    ),
+    "a figure in a folder that is not there": (
+        "ns.plot.save_figure(ns.plot.mechanism(osc), 'none/fig.pdf')",
+        "fig.pdf",
+        "does not exist",
+        "create it first",
+    ),
+    "a result for MATLAB": ("ns.save(xr.Dataset(), 'run.mat')", "got '.mat'", "must end in .nc", "read .nc by ncread"),
+    "an option of pandas": (
+        "Path('a.csv').write_text('t,x' + 40 * '\\n0,1')\nns.load_recording('a.csv', sep=';')",
+        "`sep` is not an option",
+        "nearest: delimiter",
+        "all: ",
+    ),
+    "the time column alone": (
+        "Path('a.csv').write_text('t,x' + 40 * '\\n0,1')\nns.load_recording('a.csv', columns={'time': 't'})",
+        "columns= names no channel",
+        "leaves out what it does not name",
+        "the columns are 't', 'x'",
+    ),
+    "a channel as an input": (
+        "y = xr.DataArray([0.0, 1.0], coords={'time': [0.0, 1.0]}, dims='time')\n"
+        "rig = ns.mechanical(1.0, 0.1, 1.0, inputs={'y': 'm'}, forcing={'q': lambda t, p: p.y})\n"
+        "ns.simulate(rig, duration=1.0, inputs={'y': y})",
+        "inputs['y'] is an array over its time",
+        "give (y.time, y)",
+        "such a y",
+    ),
+    # conditions
+    "an extreme in a condition": (
+        "ns.region(CHART, 'max(x) < 1')",
+        "`max(x)`",
+        "x_maximum and x_minimum",
+        "every value along the motion",
+    ),
+    "the and of arrays": (
+        "ns.region(CHART, 'x < 1 & v < 2')",
+        "`&` and `|`",
+        "write `and`, `or`",
+        "a condition such as",
+    ),
+    "one sign of equality": (
+        "ns.region(CHART, 'period_number = 1')",
+        "cannot read the condition",
+        "is equal to: ==",
+        "a condition such as",
+    ),
+    "a unit in a condition": (
+        "ns.region(CHART, 'abs(x) < 25 mm')",
+        "cannot read the condition",
+        "numbers stand without units",
+        "a condition such as",
+    ),
 }
 
 
@@ -467,6 +602,10 @@ NAMES = {
     "system": system,
     "osc": ns.models.discontinuous_support(),
     "valve": ns.models.relief_valve(),
+    "xr": xr,
+    "Path": Path,
+    "RUN": xr.Dataset({"u": (("time", "state"), np.zeros((2, 2)))}, {"time": [0.0, 1.0], "state": ["x", "v"]}),
+    "CHART": xr.Dataset({f"{name}_{of}": ("rho", [0.5]) for name in "xv" for of in ("minimum", "maximum")}),
 }
 
 
@@ -595,6 +734,22 @@ def test_a_reset_with_the_wrong_sign(method: str, sign: int) -> None:
     before, after = (float(word) for word in str(raised.value).split("d(stop)/dt is ")[1].split()[0:6:4])
     assert after == pytest.approx(0.8 * before, rel=1e-3) and np.sign(before) == sign
     assert "the other sign" in str(raised.value) and raised.value.status == "chatter"
+
+
+def test_a_state_that_a_figure_does_not_hold() -> None:
+    """The states stand in the list, although a table has their extremes only."""
+    diagram = ns.sweep(ns.models.discontinuous_support(), "rho", [0.2, 0.3], transient=5, keep=5, max_period=2)
+    with pytest.raises(
+        ValueError, match="`speed` is not a quantity of this result.*, status, v, v_amplitude.*, x, x_amp"
+    ):
+        ns.plot.bifurcation(diagram, y="speed")
+
+
+def test_a_parameter_that_was_not_fitted() -> None:
+    found = ns.ParameterSet({"k": Estimate(8.0, 0.1)}, np.eye(1))
+    with pytest.raises(KeyError, match="'m' was not identified; there are: k"):
+        found["m"]
+    assert found.get("m") is None
 
 
 def test_real_chatter_is_not_taken_for_a_wrong_sign() -> None:

@@ -58,13 +58,14 @@ def progress_of(path: Path) -> str:
 
     record = describe_store(path)
     done, chunks = record["done"], record["chunks"]
-    each = record["seconds"] / done if done else 0.0
     part, places = 100 * done / chunks, record["places"]
     whose = "a GPU" if record.get("device") == "cuda" else "one core"
+    each = record["seconds"] / max(done, 1)
+    left = f"about {each * (chunks - done):.3g} s of {whose}" if done else "unknown until a chunk is there"
     lines = [
         f"{one_line(record['verb'])}: {done} of {chunks} chunks are there ({part:.3g} %), {places} points",
         f"worked      {record['seconds']:.3g} s of {whose}, on a processor of type {one_line(record['cpu'], 80)}",
-        f"remains     about {each * (chunks - done):.3g} s of {whose}" if done < chunks else "remains     nothing",
+        f"remains     {left}" if done < chunks else "remains     nothing",
     ]
     if record["content"]:
         lines.append(f"content     sha256 {record['content'][:16]}; stores of equal results have the same")

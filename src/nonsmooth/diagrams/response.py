@@ -51,7 +51,9 @@ def frequency_response(
     Notes
     -----
     A jump is a step between neighbouring values in which the amplitude changes by more than 0.5 % and more than five
-    times as much as in the steps before and after it.
+    times as much as in the steps before and after it. Each state and output is asked by itself, so
+    that a jump may stand for some of them only; between points whose ``period_number`` is 0 it may be the scatter of
+    chaos.
     """
     from nonsmooth.results.provenance import attribute, read_provenance, with_short_record
     from nonsmooth.results.schema import response

@@ -231,6 +231,8 @@ def driven(system: System, given: Any) -> Driven | None:
         one = table[name]
         if not isinstance(one, Input):
             if not isinstance(one, list | tuple) or len(one) != 2:
+                if hasattr(one, "dims") and "time" in getattr(one, "coords", ()):  # a channel of a recording
+                    raise TypeError(f"inputs[{name!r}] is an array over its time: give (y.time, y) of such a y")
                 raise TypeError(f"inputs[{name!r}] = {shortened(one)}: give (time, values) or ns.Input(...)")
             one = Input(*one)
         if isinstance(one.time, str):

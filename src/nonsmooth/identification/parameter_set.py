@@ -82,6 +82,8 @@ class ParameterSet(Mapping[str, float]):
         raise AttributeError(f"a ParameterSet does not change (tried to set {name!r})")
 
     def __getitem__(self, name: str) -> float:
+        if name not in self.estimates:
+            raise KeyError(f"{name!r} was not identified; there are: {', '.join(self.estimates)}")
         return self.estimates[name].value
 
     def __iter__(self) -> Iterator[str]:

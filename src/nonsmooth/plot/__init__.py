@@ -61,6 +61,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    from nonsmooth.plot import identification
     from nonsmooth.system.names import unknown
 
-    raise AttributeError(unknown(name, "a figure", "nonsmooth.plot", __all__), name=name)
+    there = not name.startswith("_") and hasattr(identification, name)
+    hint = f"; there is ns.plot.identification.{name}" if there else ""
+    raise AttributeError(unknown(name, "a figure", "nonsmooth.plot", __all__) + hint, name=name)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nonsmooth.errors import shortened
 from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
@@ -63,6 +64,10 @@ def column(result: xr.Dataset, variable: str, name: str) -> xr.DataArray:
     ValueError
         If ``name`` is neither; the message lists what there is.
     """
+    if not isinstance(name, str):
+        raise TypeError(
+            f"{shortened(name)} is not one name: draw each by a call of its own, into the same axes with ax="
+        )
     states = result["state"].values.tolist() if "state" in result.coords else []
     if name in states:
         return result[variable].isel(state=states.index(name))
@@ -76,7 +81,9 @@ def column(result: xr.Dataset, variable: str, name: str) -> xr.DataArray:
 def variable_along(result: xr.Dataset, variable: str, verb: str) -> None:
     """Check that ``result`` is of the kind a plot needs; an error names the verb that makes such results."""
     if not hasattr(result, "data_vars"):
-        raise TypeError(f"this plot draws the result of {verb}, not {type(result).__name__}")
+        kind = type(result).__name__
+        instead = {"Orbit": "; an orbit is drawn by ns.plot.orbit", "System": f"; call ns.{verb} with it first"}
+        raise TypeError(f"this plot draws the result of {verb}, not {kind}{instead.get(kind, '')}")
     if "state" in result.coords and not result["state"].dims:
         one = str(result["state"].values)
         raise ValueError(

@@ -62,6 +62,9 @@ def mechanism(system: System, ax: Axes | None = None, *, labels: bool = True) ->
     """
     from nonsmooth.plot.scheme import scheme_of
 
+    if not hasattr(system, "modes"):
+        made = ", which ns.system_of(result) gives" if hasattr(system, "data_vars") else ""
+        raise TypeError(f"mechanism draws a system{made}; not {type(system).__name__}")
     sketch = Sketch(scheme_of(system))
     with style.axes(ax, width=min(0.56 * sketch.width, style.PAGE), ratio=sketch.height / sketch.width) as drawn:
         sketch.frame(drawn)

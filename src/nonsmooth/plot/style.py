@@ -19,6 +19,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from nonsmooth.errors import DataFileError, shortened
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -129,7 +131,10 @@ def axes(ax: Axes | None, *, width: float = COLUMN, ratio: float = 0.72) -> Iter
     from matplotlib.axes import Axes as Drawable
 
     if ax is not None and not isinstance(ax, Drawable):
-        raise TypeError(f"ax = {ax!r} is no matplotlib Axes: what to draw is given by name, as in show=...")
+        hint = (
+            "one of several is ax[0]" if isinstance(ax, np.ndarray) else "what to draw is given by name, as in show=..."
+        )
+        raise TypeError(f"ax = {shortened(ax)} is no matplotlib Axes: {hint}")
     if ax is not None:
         with _own_legend(ax):
             yield ax
@@ -284,10 +289,18 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
     """Save a figure (or the figure of some axes) in the format of the path's ending.
 
     Lines and text stay vectors in PDF and SVG; point clouds are pixels at 600 dpi. The file holds no date,
-    so equal input gives equal files.
+    so equal input gives equal files. The path is returned, with the ending ``.png`` where it has none.
     """
-    target = Path(path)
     owner: Any = getattr(figure, "figure", figure)
+    if not hasattr(owner, "savefig"):
+        raise TypeError(f"save_figure takes the figure (or its axes) first, then the file; not {shortened(figure)}")
+    target = Path(path)
+    if not target.suffix:
+        target = target.with_name(f"{target.name}.{owner.canvas.get_default_filetype()}")
+    if target.suffix[1:].lower() not in (known := owner.canvas.get_supported_filetypes()):
+        raise ValueError(f"{target}: the ending is that of no format of figures; allowed: {', '.join(sorted(known))}")
+    if not target.parent.is_dir():
+        raise DataFileError(f"{target}: the folder {target.parent} does not exist; create it first")
     metadata: dict[str, Any] | None = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}.get(target.suffix)
     with _in(_made.get(owner, "journal")):
         owner.savefig(target, metadata=metadata)

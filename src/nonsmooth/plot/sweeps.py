@@ -72,7 +72,10 @@ def bifurcation(
     parameter = str(result["maximum"].dims[0])
     _share_an_axis(over, parameter)
     of_state = name in result["state"].values
-    points = column(result, "section", name) if of_state else quantity_of(result, name).expand_dims("iterate")
+    if of_state:
+        points = column(result, "section", name)
+    else:
+        points = quantity_of(result, name, also=result["state"].values.tolist()).expand_dims("iterate")
     size = size if of_state else 3.0 * size
     directions = [str(word) for word in np.atleast_1d(result["direction"].values)]
     for i, direction in enumerate(directions):
@@ -198,7 +201,8 @@ def frequency_response(
     values = result[parameter].values
     known = quantities_of(result)
     alone = f"{name}_{quantity}" not in known
-    heights = quantity_of(result, name if alone else f"{name}_{quantity}", known)
+    ranges = [one.removesuffix("_amplitude") for one in known if one.endswith("_amplitude")]
+    heights = quantity_of(result, name if alone else f"{name}_{quantity}", known, also=ranges)
     inside = held(result, region)
     _share_an_axis(over, parameter)
     marks: list[Any] = []

@@ -174,7 +174,8 @@ def needs_zarr(path: Path) -> None:
 def _suffix(path: Path) -> str:
     if path.suffix not in (".nc", ".zarr"):
         given = path.suffix or "no ending"
-        raise ValueError(f"{path}: the name must end in .nc (NetCDF) or .zarr (Zarr), got {given!r}")
+        matlab = "; MATLAB and Octave read .nc by ncread" if path.suffix == ".mat" else ""
+        raise ValueError(f"{path}: the name must end in .nc (NetCDF) or .zarr (Zarr), got {given!r}{matlab}")
     if path.suffix == ".zarr":
         needs_zarr(path)
     return path.suffix

@@ -167,6 +167,14 @@ ELSEWHERE = {
     **dict.fromkeys(("abstol", "abs_tol"), "atol"),
     **dict.fromkeys(("solver", "integrator", "algorithm"), "method"),
     **dict.fromkeys(("n_jobs", "workers", "processes", "cores"), "threads"),
+    **dict.fromkeys(("sep", "separator"), "delimiter"),
+    **dict.fromkeys(("skiprows", "skip_rows", "skiplines"), "skip"),
+    **dict.fromkeys(("usecols", "names"), "columns"),
+    **dict.fromkeys(("fps", "framerate", "frame_rate"), "rate"),
+    **dict.fromkeys(("mu", "mu_k", "mu_d", "muk", "mud"), "friction"),
+    **dict.fromkeys(("mu_s", "mus", "stiction"), "static"),
+    "bounds": "parameters",  # of fit: {"k": (5.0, 12.0)}
+    "cor": "restitution",
 }
 
 

@@ -7,7 +7,7 @@ and a minimum is an amplitude: ``x_amplitude``, ``contact_force_amplitude``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -116,8 +116,10 @@ def coordinates_of(result: xr.Dataset, rows: tuple[str, ...]) -> dict[str, xr.Da
     return {str(name): array for name, array in result.coords.items() if array.dims and set(array.dims) <= set(rows)}
 
 
-def quantity(result: xr.Dataset, name: str, known: Mapping[str, xr.DataArray] | None = None) -> xr.DataArray:
-    """The quantity of that name, over the result's rows; ValueError that lists what there is."""
+def quantity(
+    result: xr.Dataset, name: str, known: Mapping[str, xr.DataArray] | None = None, also: Iterable[str] = ()
+) -> xr.DataArray:
+    """The quantity of that name, over the result's rows; ValueError that lists these and what else is taken."""
     known = quantities_of(result) if known is None else known
     if name in known:
         return known[name]
@@ -128,5 +130,5 @@ def quantity(result: xr.Dataset, name: str, known: Mapping[str, xr.DataArray] | 
         if any(one.endswith("_impulse") for one in known) or "status" not in result
         else ("; loads of elements (forces, impact speeds, energies) are there with loads=True")
     )
-    every = [*known, *coordinates_of(result, rows_of(result))]
+    every = [*also, *known, *coordinates_of(result, rows_of(result))]
     raise ValueError(unknown(name, "a quantity", "this result", every) + hint)

@@ -138,9 +138,19 @@ def _parsed(condition: str) -> ast.expr:
     try:
         tree = ast.parse(condition.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise ValueError(f"cannot read the condition {shortened(condition)}: {error}; write {_FORM}") from None
+        hint = "is equal to: ==; numbers stand without units"
+        raise ValueError(f"cannot read the condition {shortened(condition)}: {error}; {hint}; write {_FORM}") from None
     if any(isinstance(node, ast.Not) for node in ast.walk(tree)):
         raise ValueError(f"`not` in {shortened(condition)}: write the opposite comparison, or take ~region(...)")
+    for node in ast.walk(tree):
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitAnd | ast.BitOr):
+            raise ValueError(f"`&` and `|` in {shortened(condition)}: write `and`, `or`, as in {_FORM}")
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("max", "min") and len(node.args) == 1:
+            whose = ast.unparse(node.args[0])  # SymPy's is this one number, of a range either of its ends
+            raise ValueError(
+                f"`{ast.unparse(node)}` in {shortened(condition)}: the extremes have names, {whose}_maximum and "
+                f"{whose}_minimum; {whose} alone stands for every value along the motion"
+            )
     return ast.fix_missing_locations(_Chains().visit(tree))
 
 

@@ -144,7 +144,10 @@ def _about(data: xr.Dataset) -> dict[str, Any]:
 def _target(file: str | os.PathLike[str]) -> Path:
     path = Path(file)
     if path.suffix not in _WRITERS:
-        raise ValueError(f"{path}: a table is written to .csv, .xlsx or .parquet; nonsmooth.save writes .nc and .zarr")
+        matlab = "; MATLAB and Octave read .csv, and .nc by ncread" if path.suffix == ".mat" else ""
+        raise ValueError(
+            f"{path}: a table is written to .csv, .xlsx or .parquet; nonsmooth.save writes .nc and .zarr{matlab}"
+        )
     package = _WRITERS[path.suffix]
     if package and find_spec(package) is None:
         raise ImportError(

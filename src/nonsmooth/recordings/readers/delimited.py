@@ -94,6 +94,11 @@ def _table(
         units += [""] * (len(header) - len(units))
         header = [f"{name} ({unit})" if unit else name for name, unit in zip(header, units, strict=False)]
     picked = chosen(header, options, source, options.rate)
+    if options.columns is not None and set(picked) <= {"time", "run"}:
+        there = names_of([name for name in header if name.strip()])
+        raise source.error(
+            "", f"columns= names no channel, and leaves out what it does not name; the columns are {there}"
+        )
     wanted = list(dict.fromkeys(column for column, _ in picked.values()))
     stamped = picked.get("time", (-1, ""))[0] if options.axis == "time" else -1
     cells = read_cells(

@@ -205,10 +205,17 @@ def _placed(label: str, element: Any, names: list[str], inverse: Callable[[Any],
     """The element with its place and its direction as functions of the states."""
     if not isinstance(element, Element) or element.at is None:
         return element
+    if not isinstance(element.at, str | Mapping):
+        raise SystemDefinitionError(
+            f"element {label!r}: at= is the name of a coordinate, {names[0]!r}, or a combination, {_between(names)}; "
+            f"not {shortened(element.at)}"
+        )
     weights = {element.at: 1.0} if isinstance(element.at, str) else dict(element.at)
     for key in weights:
         if key not in names:
-            raise SystemDefinitionError(f"element {label!r}: {unknown(key, 'a coordinate', repr(system), names)}")
+            several = f"; between two: at={_between(names)}" if any(sign in str(key) for sign in "+-,") else ""
+            given = unknown(key, "a coordinate", repr(system), names)
+            raise SystemDefinitionError(f"element {label!r}: {given}{several}")
     places = {names.index(key): to_expression(weight) for key, weight in weights.items()}
 
     def along(entries: Any) -> Any:
@@ -252,6 +259,12 @@ def _inverse(mass: sp.Matrix, system: str) -> sp.Matrix:
         raise SystemDefinitionError(f"{system!r}: the mass matrix cannot be inverted: {error}") from error
 
 
+def _between(names: list[str]) -> str:
+    """The text of ``at=`` for an element between two coordinates."""
+    first, last = (names[0], names[-1]) if len(names) > 1 else ("q1", "q2")
+    return f'{{"{last}": 1, "{first}": -1}}'
+
+
 def _size(M: Any) -> int:
     if callable(M):
         return _size(M(_Any()))
@@ -259,7 +272,10 @@ def _size(M: Any) -> int:
     if found.ndim == 0:
         return 1
     if found.ndim != 2 or found.shape[0] != found.shape[1] or not found.size:
-        raise SystemDefinitionError(f"M is a square array, a number or a function of p; not of shape {found.shape}")
+        hint = "; a list of masses is its diagonal, np.diag(masses)" if found.ndim == 1 and found.size else ""
+        raise SystemDefinitionError(
+            f"M is a square array, a number or a function of p; not of shape {found.shape}{hint}"
+        )
     return len(found)
 
 

@@ -76,7 +76,8 @@ class Coulomb(Element):
             rows.append((here.law("normal"), f"the normal force of {name} must not be negative"))
         if self.static is not None:
             static = here.law("static")
-            rows.append((static - kinetic, f"the static friction of {name} must not be less than its kinetic friction"))
+            less = f"the static friction of {name} must not be less than its kinetic friction (it is no ratio of both)"
+            rows.append((static - kinetic, less))
         return rows
 
     def rate(self, here: Place) -> Any:

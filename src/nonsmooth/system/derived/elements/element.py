@@ -83,7 +83,8 @@ class Element(ABC):
             )
         for name, given in (("on", self.on), (self.kinematics, own)):
             if self.at is not None and given is not None:
-                raise SystemDefinitionError(f"{label}: at= (of ns.mechanical) and {name}= exclude each other")
+                instead = "; with at= the place of a stop is position=" if name == "gap" else ""
+                raise SystemDefinitionError(f"{label}: at= (of ns.mechanical) and {name}= exclude each other{instead}")
         if self.on is not None and not isinstance(self.on, Mapping):
             raise SystemDefinitionError(
                 f'{label}: on= maps states to numbers or functions, {{"v": 1.0}}; not {shortened(self.on)}'

@@ -32,7 +32,7 @@ class Stop(Contact):
     position, side : number, name of a parameter or function; {1, -1}
         With ``at=``: the stop stands at this value of the coordinate, above (1) or below (-1) it.
     restitution : number, name of a parameter, or function
-        Newton's coefficient, 0 <= e <= 1.
+        Newton's coefficient, 0 <= e <= 1; 0 (an impact without rebound) where not given.
     rest : bool
         Without rest every impact rebounds, and an accumulation ends in the status ``chatter``.
     creep : float, optional
