@@ -13,6 +13,7 @@ import nonsmooth as ns
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.fit import problem_of
+from nonsmooth.identification.fit.motion import Marcher
 
 M, K, C, RHO, W = 0.838, 8.47, 0.87, 0.3, 5.0
 
@@ -421,3 +422,17 @@ def test_a_channel_in_another_unit_is_told_of_unless_its_gain_is_given(recwarn):
     found = ns.fit(mass, x, ["c", "k"], measured={"x": ns.Sensor("disp", gain=1e3)}, tries=1, progress=False)
     assert not [one for one in recwarn if "the model in" in str(one.message)]
     assert [found["c"], found["k"]] == pytest.approx([0.2, 4.0], rel=1e-6)
+
+
+def test_a_trial_that_begins_with_an_impact_has_no_derivatives_and_ends_no_fit():
+    """v = 1 at the stop: it leaves with -e v + mu t; elements decide together there, and the start has none."""
+    elements = {
+        "stop": ns.elements.Stop(at="x", position=0.5, restitution=0.5),
+        "rub": ns.elements.Coulomb(at="x", friction=0.1),
+    }
+    mass = ns.mechanical(1.0, 0.0, "k", coordinates=["x"], parameters={"k": 0.0}, elements=elements)
+    marcher, times, start = Marcher(mass, ("k",)), np.array([0.0, 1.0]), np.array([0.5, 1.0])
+    mode = mass.modes.index("rub_forward_stop_open") if "rub_forward_stop_open" in mass.modes else 0
+    found = marcher.run(mass.parameter_vector(), 0.0, times, start, mode)
+    assert found.z[-1] == pytest.approx([0.5 - 0.5 + 0.05, -0.4], abs=1e-12)
+    assert marcher.run(mass.parameter_vector(), 0.0, times, start, mode, derivatives=True) is None

@@ -115,12 +115,16 @@ class Marcher:
         mode: int,
         course: DelayedInputs | None,
         changes: list[tuple[float, int]],
-    ) -> SampledMotion:
-        """The same with derivatives: products over the pieces between samples and transitions."""
+    ) -> SampledMotion | None:
+        """The same with derivatives: products over the pieces between samples and transitions; None where they are not
+        known, as of a start at which several contacts are hit."""
         flow, log, n = self.flow, plain.log, self.flow.n
         size = n + flow.n_active
         first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
-        start = settled(flow, values, (mode, z), first, begin)
+        try:
+            start = settled(flow, values, (mode, z), first, begin)
+        except ValueError:
+            return None
         modes, starts, times, transitions, before = apart(flow, log, first, begin, changes)
         ends = np.searchsorted(plain.time, times[1:], "left")  # a sample at a crossing is the limit after it
         cuts = [0, *ends.tolist(), len(plain.time)]

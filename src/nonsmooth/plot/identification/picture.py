@@ -110,7 +110,11 @@ class Picture:
         name_axes(self.ax, x, y)
         if self.left:
             self.draw_residuals(y[1] if strip is None else strip)
-        style.even_dots(self.ax.legend(**place, ncols=columns, columnspacing=1.0))
+        for number in range(columns, 0, -1):  # names of modes may be long
+            legend = self.ax.legend(**place, ncols=number, columnspacing=1.0)
+            if legend.get_window_extent().width <= 0.9 * self.ax.figure.bbox.width:
+                break
+        style.even_dots(legend)
 
     def values(self, *names: str) -> list[Any]:
         """The values of variables."""
