@@ -137,7 +137,7 @@ def _chosen(data: Any, name: str, given: str | None) -> int:
     return words.index(asked)
 
 
-@picture("", ("time", ""), columns=3, margin=0.05, strip="standard deviations", ratio=0.9)
+@picture("", ("time", ""), columns=3, margin=0.05, strip=r"$\sigma$", ratio=0.9)
 def _over_time(one: Picture, data: Any, *, quantity: str | None, run: str | None) -> None:
     q, r = _chosen(data, "quantity", quantity), _chosen(data, "run", run)
     one.data = part = data.isel(sample=np.flatnonzero((data["quantity"].values == q) & (data["run"].values == r)))
