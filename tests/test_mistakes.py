@@ -95,11 +95,11 @@ MISTAKES = {
         "turn the sign of on=",
     ),
     "a friction that drives": (
-        "ns.mechanical(1.0, 0.0, 1.0, parameters={'mu': 0.3}, elements={'pad': ns.elements.Coulomb(at='q',"
-        " friction='mu')}).with_parameters(mu=-0.3)",
-        "mu = -0.3",
-        "the friction of element 'pad' must not be negative",
-        "friction",
+        "ns.mechanical(1.0, 0.0, 1.0, parameters={'mu': -0.3}, elements={'pad': ns.elements.Coulomb(at='q',"
+        " friction='mu')})",
+        "element 'pad'",
+        "must not be negative",
+        "the friction of",
     ),
     "a static friction below the kinetic one": (
         "ns.mechanical(1.0, 0.0, 1.0, elements={'pad': ns.elements.Coulomb(at='q', friction=0.3, static=0.1)})",

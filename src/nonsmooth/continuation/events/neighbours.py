@@ -68,6 +68,8 @@ def beside(point: OrbitPoint, contacts: Sequence[Change] = (), passed: Sequence[
             before.append(least)
     if ahead is not None:
         return ahead[1]
+    if not point.shooting.forced:  # behind a centre orbits of any size are closed
+        return None
     beginnings = (found for found in _along(common) if not (_leads_back(point, found) or _came_by(found, passed)))
     return next(beginnings, None)
 

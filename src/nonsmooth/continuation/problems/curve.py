@@ -133,6 +133,8 @@ class Curve(ABC, Generic[P]):
     def at_landmark(self, point: P, place: Place) -> P | None:
         """The point nearby that is the one of a landmark: across the branch from it, or at its parameter; else None."""
         word, X, seen = place
+        if np.abs(self.seen(point) - seen).max() < AGAIN:  # also where it cannot be solved: at a crossing of branches
+            return point
         level = float(point.tangent @ (X / self.scale)) if word == self.word() else None
         for border, at in ((point.tangent, level), (np.eye(self.n)[-1], X[-1] / self.scale[-1])):
             found = None if at is None else self.correct(point.Y, border, at, tolerance=CLOSE, most=2 * self.most)

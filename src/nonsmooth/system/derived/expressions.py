@@ -226,14 +226,14 @@ class Expressions(Assembler):
     def ranges(self, mode: str) -> list[tuple[sp.Expr, str]]:
         """Expressions of the parameters that must not be negative, each with the sentence for where it is.
 
-        Where a number is, or what a force does with the parameters as they are given, the sentence is raised."""
+        Where a number is, or what must not be with the parameters as they are given, the sentence is raised."""
         known, found = set(self.symbols.p.values()), []
         for k in range(len(self.parts)):
             here = self.place(k, mode, (0,) * len(self.parts))
             rows = [(sp.sympify(e), text) for e, text in here.element.ranges(here)]
             found += [(e, text) for e, text in rows if e.free_symbols and e.free_symbols <= known]
-            effect, text = here.effect()
-            for e, sentence in (*rows, (sp.sympify(sp.sympify(effect).xreplace(self.values)), text)):
+            given = (*here.element.limits(here), here.effect())
+            for e, sentence in (*rows, *((sp.sympify(sp.sympify(e).xreplace(self.values)), text) for e, text in given)):
                 if e.is_number and e < 0:
                     raise SystemDefinitionError(sentence)
         return found

@@ -69,7 +69,7 @@ class Coulomb(Element):
         pressed = [("normal", None)] if self.normal is not None and self.normal not in others else []
         return [*(("friction", side) for side in sides), *own, *pressed]
 
-    def ranges(self, here: Place) -> list[tuple[Any, str]]:
+    def limits(self, here: Place) -> list[tuple[Any, str]]:
         kinetic, name = here.law("friction", 0), f"element {here.name!r}"
         rows = [(kinetic, f"the friction of {name} must not be negative")]
         if self.normal is not None and here.named(self.normal) is None:

@@ -49,7 +49,7 @@ class ElasticStop(Contact):
                 "rigid stop is Stop"
             )
 
-    def ranges(self, here: Place) -> list[tuple[Any, str]]:
+    def limits(self, here: Place) -> list[tuple[Any, str]]:
         return [(here.law("stiffness"), f"the stiffness of element {here.name!r} must not be negative")]
 
     def force(self, here: Place) -> Any:
@@ -99,7 +99,7 @@ class Backlash(Displaced):
     laws = ("half_width", "stiffness", "damping")
     conditions = ("upper", "lower")
 
-    def ranges(self, here: Place) -> list[tuple[Any, str]]:
+    def limits(self, here: Place) -> list[tuple[Any, str]]:
         return [(here.law("half_width"), f"the half width of element {here.name!r} must not be negative")]
 
     def force(self, here: Place) -> Any:
@@ -144,7 +144,7 @@ class PreloadedSpring(Displaced):
     held = ("held",)
     sides = ("above", "below")
 
-    def ranges(self, here: Place) -> list[tuple[Any, str]]:
+    def limits(self, here: Place) -> list[tuple[Any, str]]:
         return [(here.law("preload"), f"the preload of element {here.name!r} must not be negative")]
 
     def force(self, here: Place) -> Any:

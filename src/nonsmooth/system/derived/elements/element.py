@@ -136,6 +136,10 @@ class Element(ABC):
         """Expressions of the parameters that must not be negative, each with the sentence for where it is."""
         return []
 
+    def limits(self, here: Place) -> list[tuple[Any, str]]:
+        """The same of the parameters as they are given: a fit may come from beyond zero to a value beside it."""
+        return []
+
     @abstractmethod
     def placed(self, q: Any, v: Any, law: Callable[[Law], Any]) -> Any:
         """The place of the element, by a coordinate ``q`` and its speed ``v`` (:func:`nonsmooth.mechanical`)."""
