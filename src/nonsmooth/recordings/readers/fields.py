@@ -249,7 +249,9 @@ def seconds_of(axis: Field, lines: IntArray | None, source: Source) -> tuple[Flo
     read = pandas.to_datetime(plain, format=given or "ISO8601", utc=True, errors="coerce")
     if read.hasnans:
         raise _unread(texts, int(np.flatnonzero(read.isna())[0]), axis, lines, source)
-    return _since(read.as_unit("ns").asi8), str(read[0].isoformat()) if len(read) else ""
+    if not len(read):
+        return np.empty(0), ""
+    return np.asarray((read - read[0]).total_seconds(), np.float64), str(read[0].isoformat())
 
 
 def _since(nanoseconds: IntArray) -> FloatArray:
