@@ -131,7 +131,7 @@ class Curve(ABC, Generic[P]):
         return self.word(), point.X, self.seen(point)
 
     def at_landmark(self, point: P, place: Place) -> P | None:
-        """The point that is the one of a landmark: this one, across the branch from it, or at its parameter; or None."""
+        """The point that is a landmark: this one, the one across the branch from it, or at its parameter; or None."""
         word, X, seen = place
         if np.abs(self.seen(point) - seen).max() < AGAIN:  # also where it cannot be solved: at a crossing of branches
             return point
