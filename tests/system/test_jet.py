@@ -197,4 +197,4 @@ def test_field_with_a_corner_is_refused(fields):
 
 def test_function_without_series_is_refused():
     with pytest.raises(SystemDefinitionError, match=r"no Taylor series is known for .*erf.*allowed are"):
-        jet_code(T, (X,), {}, [sp.erf(X)], [])
+        jet_code(T, (X,), {}, [[sp.erf(X)]], [[]])

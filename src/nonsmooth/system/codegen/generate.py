@@ -15,7 +15,7 @@ from typing import Any
 
 from sympy import Basic, Expr, Integer
 
-from nonsmooth.system.codegen.jet import jet_code
+from nonsmooth.system.codegen.jet import JetCode, chain, jet_code
 from nonsmooth.system.symbolic.printing import Printer, assignments
 from nonsmooth.system.symbolic.traced import Traced
 
@@ -95,37 +95,47 @@ def compile_model(traced: Traced) -> CompiledModel:
 @lru_cache(maxsize=16)
 def model_source(traced: Traced) -> str:
     """The text of the generated module; the same for the same expressions, in every process."""
+    modes = range(len(traced.fields))
+    rows = [
+        [
+            *(Integer(0) if traced.keeps_at_zero(mode, i) else h for i, h in enumerate(_asked(traced, mode))),
+            *(output[mode] for output in traced.outputs),
+        ]
+        for mode in modes
+    ]
+    jet = jet_code(traced.t, traced.u, constants_of(traced), traced.fields, rows)
     writers = {
-        "field": [_field(traced, mode) for mode in range(len(traced.fields))],
-        "values": [_values(traced, mode) for mode in range(len(traced.fields))],
+        "field": [_field(traced, mode) for mode in modes],
+        "values": [_values(traced, mode) for mode in modes],
         "jump": [_jump(traced, i) for i in range(len(traced.transitions))],
     }
-    jets = []
-    for mode, fields in enumerate(traced.fields):
-        rows = [Integer(0) if traced.keeps_at_zero(mode, i) else h for i, h in enumerate(_asked(traced, mode))]
-        rows += [output[mode] for output in traced.outputs]
-        jets.append(jet_code(traced.t, traced.u, constants_of(traced), fields, rows))
-    bodies = {name: [lines for lines, _ in parts] for name, parts in writers.items()}
-    bodies["jet"] = [jet.lines for jet in jets]
-    functions = {f for parts in writers.values() for _, used in parts for f in used}
-    functions |= {f for jet in jets for f in jet.functions}
+    functions = jet.functions.union(*(used for parts in writers.values() for _, used in parts))
     inlined = sorted({_INLINED[f] for _, used in writers["field"] for f in used & _INLINED.keys()})
+    always = {
+        "values": [f"for i in range({len(rows[0])}):", "    out[i] = 0.0"],
+        "jump": [
+            *(f"for i in range({len(traced.u)}):", "    u_new[i] = u[i]"),
+            *(f"for i in range({len(traced.p) + len(traced.m)}):", "    q_new[i] = q[i]"),
+        ],
+    }
+    bodies = {name: [lines for lines, _ in parts] for name, parts in writers.items()}
     bodies["field"] = [_inlined(lines) for lines in bodies["field"]]
-    n_indicators = len(traced.indicators)
-    smooth = tuple(all(jet.smooth[n_indicators + i] for jet in jets) for i in range(len(traced.outputs)))
+    smooth = tuple(all(mode[len(traced.indicators) + i] for mode in jet.smooth) for i in range(len(traced.outputs)))
     parts = [
-        "from nonsmooth.kernels.compile.cache import callback",
+        "from numpy import array",
+        "from nonsmooth.kernels.compile.cache import callback, device",
         f"from math import {', '.join(sorted(functions))}" if functions else "",
         f"from nonsmooth.kernels.circular import {', '.join(inlined)}" if inlined else "",
-        f"N_SCRATCH = {max([1, *(jet.n_scratch for jet in jets)])}",
+        f"N_SCRATCH = {max(1, jet.n_scratch)}",
         f"SMOOTH_OUTPUTS = {smooth!r}",
     ]
-    copies = [f"for i in range({len(traced.u)}):", "    u_new[i] = u[i]"]
-    copies += [f"for i in range({len(traced.p) + len(traced.m)}):", "    q_new[i] = q[i]"]
-    parts += [
-        function_of(name, f'"{SIGNATURES[name]}"', _ARGUMENTS[name], bodies[name], copies if name == "jump" else [])
-        for name in SIGNATURES
-    ]
+    for name, signature in SIGNATURES.items():
+        if name == "jet":
+            parts += jet_functions(jet, f'callback("{signature}")', _ARGUMENTS[name])
+        else:
+            tables, lines = by_case(bodies[name])
+            lines = [*always.get(name, []), *lines]
+            parts.append(function_of(name, f'callback("{signature}")', _ARGUMENTS[name], tables, lines))
     return "\n".join(part for part in parts if part) + "\n"
 
 
@@ -140,17 +150,35 @@ def _inlined(lines: list[str]) -> list[str]:
     return [re.sub(r"\b(cos|sin)\(", lambda found: f"{_INLINED[found[1]]}(", line) for line in lines]
 
 
-def function_of(name: str, options: str, arguments: str, branches: list[list[str]], always: Sequence[str] = ()) -> str:
-    """The text of a function that does one of some branches, by its first argument, after what is ``always`` done.
+def function_of(name: str, kind: str, arguments: str, tables: dict[str, list[int]], lines: Sequence[str]) -> str:
+    """The text of a function of some lines, in which the name of a table is its entry of the first argument.
 
-    ``options`` are those of ``callback``."""
-    selector, lines = arguments.split(",")[0], list(always)
-    for i, branch in enumerate(branches):
-        lines.append(f"{'el' if i else ''}if {selector} == {i}:")
-        lines += [f"    {line}" for line in branch or ["pass"]]
-    lines = [*unpacked(line for branch in branches for line in branch), *lines]
-    body = "".join(f"    {line}\n" for line in lines or ["pass"])
-    return f"\n\n@callback({options})\ndef {name}({arguments}):\n{body}".rstrip("\n")
+    ``kind`` is its decorator."""
+    selector, text, before, found = arguments.split(",")[0], "\n".join(lines), "", unpacked(lines)
+    for entry, table in tables.items():
+        if re.search(rf"\b{entry}\b", text):
+            before += f"{entry}_of_{name} = array({table})\n"
+            found += [f"{entry} = {entry}_of_{name}[{selector}]"]
+    body = "".join(f"    {line}\n" for line in [*found, *lines] or ["pass"])
+    return f"\n\n{before}@{kind}\ndef {name}({arguments}):\n{body}".rstrip("\n")
+
+
+def jet_functions(jet: JetCode, kind: str, arguments: str, after: Sequence[str] = (), **tables: list[int]) -> list[str]:
+    """The texts of the function ``jet`` and of those that it calls, one for a group of modes: compilers take far more
+    time for one long function than for several short ones."""
+    given = _ARGUMENTS["jet"]
+    lines = chain([(f"group == {i}", [f"jet{i}({given})"]) for i in range(len(jet.groups))])
+    return [
+        *(function_of(f"jet{i}", "device", given, jet.tables, group) for i, group in enumerate(jet.groups)),
+        function_of("jet", kind, arguments, {**jet.tables, **tables}, [*lines, *after]),
+    ]
+
+
+def by_case(branches: Sequence[list[str]], entry: str = "case") -> tuple[dict[str, list[int]], list[str]]:
+    """A table for ``function_of``, and lines that do one of some branches; those with the same text stand once."""
+    different = list(dict.fromkeys(map(tuple, branches)))
+    cases = [different.index(tuple(branch)) for branch in branches]
+    return {entry: cases}, chain([(f"{entry} == {i}", list(branch)) for i, branch in enumerate(different)])
 
 
 def unpacked(lines: Iterable[str]) -> list[str]:
@@ -180,7 +208,7 @@ def _field(traced: Traced, mode: int) -> tuple[list[str], set[str]]:
 
 def _values(traced: Traced, mode: int) -> tuple[list[str], set[str]]:
     rows = [*_asked(traced, mode), *(output[mode] for output in traced.outputs)]
-    return scalar_code(traced, [(f"out[{i}]", e) for i, e in enumerate(rows)])
+    return scalar_code(traced, [(f"out[{i}]", e) for i, e in enumerate(rows) if e != 0])
 
 
 def _jump(traced: Traced, index: int) -> tuple[list[str], set[str]]:

@@ -1,14 +1,15 @@
-"""The generated jet of one mode: lines of code that fill the Taylor coefficients of states, indicators, outputs.
+"""The generated jet: lines of code that fill the Taylor coefficients of states, indicators and outputs in every mode.
 
-Coefficient 0 comes first, in straight lines; then one loop over the order computes coefficient k of every node
-and k + 1 of every state; last, coefficient ``order`` of what the indicators and outputs need.
+One loop over the order computes coefficient k of every node, indicator and output, and k + 1 of every state. Modes that
+need the same nodes share them; each has its own linear forms over them. What stays zero is left out.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 from sympy import Basic, Expr, Symbol
 
@@ -19,18 +20,24 @@ from nonsmooth.system.symbolic.printing import Printer
 
 @dataclass(frozen=True)
 class JetCode:
-    """Lines of one mode's jet, the rows of scratch it needs, and which of the rows are smooth."""
+    """Lines for each group of modes, and tables of what holds in each mode: its group, and what it has there."""
 
-    lines: list[str]
+    groups: list[list[str]]
+    tables: dict[str, list[int]]
     n_scratch: int
-    smooth: tuple[bool, ...]
+    smooth: list[tuple[bool, ...]]  # whether each row is, in each mode
     functions: frozenset[str]  # of the module ``math``
 
 
 def jet_code(
-    t: Symbol, u: Sequence[Symbol], constants: dict[Basic, str], fields: Sequence[Expr], rows: Sequence[Expr]
+    t: Symbol,
+    u: Sequence[Symbol],
+    constants: dict[Basic, str],
+    fields: Sequence[Sequence[Expr]],
+    rows: Sequence[Sequence[Expr]],
 ) -> JetCode:
-    """Write the body of ``jet`` for one mode.
+    """Write the bodies of the functions ``jet`` of the groups. In them the name of a table stands for its entry of the
+    mode; rows that are zero are not written.
 
     Parameters
     ----------
@@ -39,35 +46,108 @@ def jet_code(
     constants
         Parameter or memory symbol -> identifier.
     fields
-        du/dt, one expression per state.
+        du/dt in each mode, one expression per state.
     rows
-        Further expressions whose series along the flow are wanted: indicators, then outputs. One with a corner
-        (abs, maximum, ...) gets its value as coefficient 0 and NaN as the others.
+        Further expressions in each mode whose series along the flow are wanted: indicators, then outputs. One with a
+        corner (abs, maximum, ...) gets its value as coefficient 0 and NaN as the others.
 
     Raises
     ------
     SystemDefinitionError
         A field has a corner, or holds a function without known series.
     """
-    return _writer(t, u, constants, fields, rows).code()
+    series = Series(t, tuple(u), constants)
+    modes = [_mode(series, *given) for given in zip(fields, rows, strict=True)]
+    n, n_rows = len(u), len(rows[0])
+    groups = [_Writer(series, nodes) for nodes in dict.fromkeys(mode.nodes for mode in modes)]
+    tables = {"group": [[group.nodes for group in groups].index(mode.nodes) for mode in modes]}
+    tables |= {f"w{target}": [0] * len(modes) for target in range(n + n_rows)}
+    bodies = []
+    for number, group in enumerate(groups):
+        own = [i for i, where in enumerate(tables["group"]) if where == number]
+        lines, chosen = group.whole([modes[i] for i in own])
+        bodies.append(lines)
+        for i, choices in zip(own, chosen, strict=True):
+            for target, choice in enumerate(choices):
+                tables[f"w{target}"][i] = choice
+    return JetCode(
+        bodies,
+        tables,
+        max(len(group.scratch) for group in groups),
+        [tuple(not form.corner for form in mode.forms[n:]) for mode in modes],
+        frozenset(series.functions),
+    )
 
 
 def jet_steps(
     t: Symbol, u: Sequence[Symbol], constants: dict[Basic, str], fields: Sequence[Expr], rows: Sequence[Expr]
 ) -> tuple[list[str], list[str]]:
-    """The same in two parts, to be called order by order: for coefficient 0, and for coefficient ``k`` of the rest."""
-    writer = _writer(t, u, constants, fields, rows)
-    first, following = writer.first(), writer.following()
-    return [*writer.series.constant_lines(), *first], following
-
-
-def _writer(
-    t: Symbol, u: Sequence[Symbol], constants: dict[Basic, str], fields: Sequence[Expr], rows: Sequence[Expr]
-) -> _Writer:
+    """The same for one mode in two parts, to be called order by order: for coefficient 0, and for coefficient ``k`` of
+    the rest. Coefficients that are always zero are not written."""
     series = Series(t, tuple(u), constants)
-    field_forms = [series.linear(e) for e in fields]
-    row_forms = [_form_or_none(series, e) for e in rows]
-    return _Writer(series, field_forms, rows, row_forms)
+    mode = _mode(series, fields, rows)
+    writer = _Writer(series, mode.nodes)
+    each = [*writer.states(), *(line for form in mode.forms for line in form.body), *writer.ahead([mode])]
+    once = [line for form in mode.forms for line in writer.once(form)]
+    return [*writer.first(), *once, *each], [*writer.steps(), *each]
+
+
+def chain(branches: Sequence[tuple[str, list[str]]]) -> list[str]:
+    """Lines that do the first branch whose condition holds; the last needs none."""
+    if len(branches) == 1:
+        return branches[0][1]
+    lines = []
+    for i, (condition, body) in enumerate(branches):
+        lines.append("else:" if i == len(branches) - 1 else f"{'el' if i else ''}if {condition}:")
+        lines += [f"    {line}" for line in body or ["pass"]]
+    return lines
+
+
+@dataclass(frozen=True)
+class _Form:
+    """Lines for coefficient k of a row or of the derivative of a state, and for its term of coefficient 0 alone."""
+
+    body: tuple[str, ...] = ()
+    once: tuple[str, ...] = ()
+    corner: bool = False
+
+
+_BODY: Callable[[_Form], tuple[str, ...]] = attrgetter("body")
+
+
+@dataclass(frozen=True)
+class _Mode:
+    """The forms of a mode, those of the states first, and the nodes that they need."""
+
+    nodes: tuple[int, ...]  # in an order of computation; states apart
+    forms: tuple[_Form, ...]
+
+
+def _mode(series: Series, fields: Sequence[Expr], rows: Sequence[Expr]) -> _Mode:
+    derivatives = [series.linear(e) for e in fields]
+    smooth = [_form_or_none(series, e) for e in rows]
+    n = len(fields)
+    forms = [_form(series, f"d{i}", i, form) for i, form in enumerate(derivatives)]
+    for row, (expression, form) in enumerate(zip(rows, smooth, strict=True), start=n):
+        if form is None:
+            names = {**series.names, series.t: "t", **{symbol: f"z{i}" for i, symbol in enumerate(series.u)}}
+            printer = Printer(names)
+            forms.append(_Form((f"C[{row}, k] = n{row}",), (f"n{row} = {printer(expression)}",), True))
+            series.functions.update(printer.used)
+        elif form.constant == 0 and not form.terms:
+            forms.append(_Form())
+        else:
+            forms.append(_form(series, f"C[{row}, k]", row, form))
+    return _Mode(_closure(series, [*derivatives, *filter(None, smooth)]), tuple(forms))
+
+
+def _form(series: Series, target: str, number: int, form: Linear) -> _Form:
+    """The constant comes first: near a surface, x - g is then exact."""
+    terms = series.combination(form, False)
+    if form.constant == 0:
+        return _Form((f"{target} = {terms}",))
+    text = f"e{number}" if terms == "0.0" else f"e{number} + {terms}".replace("+ -", "- ")
+    return _Form((f"{target} = {text}",), (f"e{number} = {series.constant(form.constant)}",))
 
 
 def _form_or_none(series: Series, expression: Expr) -> Linear | None:
@@ -77,81 +157,84 @@ def _form_or_none(series: Series, expression: Expr) -> Linear | None:
         return None
 
 
+def _closure(series: Series, forms: Iterable[Linear]) -> tuple[int, ...]:
+    """The nodes these forms need, in an order of computation; states apart."""
+    nodes, reached = series.nodes, set()
+    pending = [node for form in forms for node, _ in form.terms]
+    while pending:
+        i = pending.pop()
+        if i not in reached:
+            reached.add(i)
+            pending.extend(nodes[i].needs)
+            pending.extend([nodes[i].partner] if nodes[i].partner >= 0 else [])
+    return tuple(sorted(i for i in reached if i >= len(series.u)))
+
+
 class _Writer:
-    def __init__(
-        self, series: Series, fields: list[Linear], rows: Sequence[Expr], row_forms: list[Linear | None]
-    ) -> None:
-        self.series, self.fields, self.rows, self.row_forms = series, fields, rows, row_forms
-        self.n = len(fields)
-        smooth_rows = [form for form in row_forms if form is not None]
-        self.tail = self._closure(smooth_rows)
-        self.all = self._closure([*fields, *smooth_rows])
-        nodes = series.nodes
-        stored = sorted({x for i in self.all for _, *pair in nodes[i].sums for x in pair if x >= self.n})
+    """Lines for the modes that need the same nodes. In them c is coefficient k, z coefficient 0."""
+
+    def __init__(self, series: Series, nodes: tuple[int, ...]) -> None:
+        self.series, self.nodes, self.n = series, nodes, len(series.u)
+        stored = sorted({x for i in nodes for _, *pair in series.nodes[i].sums for x in pair if x >= self.n})
         self.scratch = {node: row for row, node in enumerate(stored)}
 
-    def _closure(self, forms: Iterable[Linear]) -> list[int]:
-        """The nodes these forms need, in an order of computation; states apart."""
-        nodes, reached = self.series.nodes, set()
-        pending = [node for form in forms for node, _ in form.terms]
-        while pending:
-            i = pending.pop()
-            if i not in reached:
-                reached.add(i)
-                pending.extend(nodes[i].needs)
-                pending.extend([nodes[i].partner] if nodes[i].partner >= 0 else [])
-        return sorted(i for i in reached if i >= self.n)
+    def whole(self, modes: Sequence[_Mode]) -> tuple[list[str], list[list[int]]]:
+        """Lines for all coefficients, and which of its forms each target has in each mode."""
+        different = [list(dict.fromkeys(forms)) for forms in zip(*(mode.forms for mode in modes), strict=True)]
 
-    def code(self) -> JetCode:
-        first, following, tail = self.first(), self.following(), self._tail()
-        loop = ["for k in range(1, order):", *("    " + line for line in following)]
-        lines = [*self.series.constant_lines(), *first, *loop, *tail]
-        smooth = tuple(form is not None for form in self.row_forms)
-        return JetCode(lines, len(self.scratch), smooth, frozenset(self.series.functions | self.functions))
+        def chosen(lines_of: Callable[[_Form], Iterable[str]], targets: range) -> list[str]:
+            chains = ([(f"w{i} == {j}", [*lines_of(form)]) for j, form in enumerate(different[i])] for i in targets)
+            return [line for branches in chains for line in chain(branches)]
+
+        n, count, steps, end = self.n, len(different), self.steps(), ["if k == order:", "    break"]
+        rows, derivatives = chosen(_BODY, range(n, count)), chosen(_BODY, range(n))
+        of_nodes = ["if k > 0:", *(f"    {line}" for line in steps)] if steps else []
+        if self._in(rows):
+            body = [*of_nodes, *self.states(), *rows, *end, *derivatives]
+        else:  # the last coefficients of the nodes are for nothing
+            body = [*self.states(), *rows, *end, *of_nodes, *derivatives]
+        lines = [f"for i in range({n}, {count}):", "    for k in range(order + 1):", "        C[i, k] = 0.0"]
+        lines += [*self.first(), *(f"{name} = 0.0" for name in self._terms(modes)), *chosen(self.once, range(count))]
+        lines += ["for k in range(order + 1):", *(f"    {line}" for line in [*body, *self.ahead(modes)])]
+        return lines, [[own.index(form) for own, form in zip(different, mode.forms, strict=True)] for mode in modes]
+
+    def _in(self, lines: list[str]) -> bool:
+        """Do lines hold a coefficient of a node other than the time?"""
+        found = {int(number) for number in re.findall(r"\bc(\d+)\b", "\n".join(lines))}
+        return bool(found & set(self.nodes) - {self.series.time})
+
+    def _terms(self, modes: Sequence[_Mode]) -> list[str]:
+        """Names of the terms of coefficient 0 alone."""
+        return sorted({line.split(" ")[0] for mode in modes for form in mode.forms for line in form.once})
 
     def first(self) -> list[str]:
-        """Coefficient 0 of everything and 1 of the states."""
-        series, n = self.series, self.n
-        lines = [f"z{i} = u[{i}]" for i in range(n)]
-        lines += [f"C[{i}, 0] = z{i}" for i in range(n)]
-        lines += [f"z{series.time} = t"] if series.time >= 0 else []
-        lines += [f"z{i} = {series.nodes[i].value}" for i in self.all if i != series.time]
-        names = {**series.names, series.t: "t", **{symbol: f"z{i}" for i, symbol in enumerate(series.u)}}
-        printer = Printer(names)
-        for row, (expression, form) in enumerate(zip(self.rows, self.row_forms, strict=True), start=n):
-            lines.append(f"C[{row}, 0] = {printer(expression) if form is None else series.combination(form, True)}")
-        self.functions = printer.used
-        lines += [f"c{i} = z{i}" for i in self.all if series.nodes[i].carried]
-        lines += [f"c{series.time} = 1.0"] if series.time in self.all else []
-        lines += [f"c{i} = {series.combination(form, True)}" for i, form in enumerate(self.fields)]
-        return [*lines, *(f"C[{i}, 1] = c{i}" for i in range(n))]
+        """Constants and coefficient 0 of the nodes."""
+        values = self.values()
+        return [*self.series.constant_lines([*values, *self.steps()]), *values]
 
-    def following(self) -> list[str]:
-        """Coefficient k of everything and k + 1 of the states."""
-        series, n = self.series, self.n
-        body = [*self._steps(self.all, store=True), *self._row_lines("k")]
-        body.append("r1 = 1.0/(k + 1)")
-        for i, form in enumerate(self.fields):
-            text = series.combination(form, False)
-            body.append(f"d{i} = " + (text if text == "0.0" else f"({text})*r1" if " " in text else f"{text}*r1"))
-        body += [f"c{i} = d{i}" for i in range(n)]
-        body += [f"C[{i}, k + 1] = d{i}" for i in range(n)]
-        body += [f"c{series.time} = 0.0"] if series.time in self.all else []
-        return body
+    def once(self, form: _Form) -> list[str]:
+        """A form's term of coefficient 0, and its constants that the nodes do not need."""
+        return [*self.series.constant_lines([*form.once, *form.body], [*self.values(), *self.steps()]), *form.once]
 
-    def _tail(self) -> list[str]:
-        lines = self._steps(self.tail, store=False)
-        return (["k = order", *lines] if self.tail else []) + self._row_lines("order")
+    def values(self) -> list[str]:
+        """Coefficient 0 of the states and nodes."""
+        nodes, time = self.series.nodes, self.series.time
+        lines = [f"z{i} = u[{i}]" for i in range(self.n)] + ([f"z{time} = t"] if time >= 0 else [])
+        lines += [f"z{i} = {nodes[i].value}" for i in self.nodes if i != time]
+        return lines + [f"c{i} = z{i}" for i in (*range(self.n), *self.nodes)]
 
-    def _row_lines(self, k: str) -> list[str]:
-        lines = []
-        for row, form in enumerate(self.row_forms, start=self.n):
-            lines.append(f"C[{row}, {k}] = " + ("1e400*0.0" if form is None else self.series.combination(form, False)))
-        return lines
+    def states(self) -> list[str]:
+        return [f"C[{i}, k] = c{i}" for i in range(self.n)]
 
-    def _steps(self, chosen: list[int], store: bool) -> list[str]:
-        """Coefficient k of the chosen nodes, from their coefficients below k."""
-        nodes = self.series.nodes
+    def ahead(self, modes: Sequence[_Mode]) -> list[str]:
+        """Coefficient k + 1 of the states; what belongs to coefficient 0 alone is gone."""
+        lines = ["r1 = 1.0/(k + 1)", *(f"c{i} = d{i}*r1" for i in range(self.n))]
+        lines += [f"c{self.series.time} = 0.0 if k else 1.0"] if self.series.time in self.nodes else []
+        return [*lines, *(f"{name} = {'1e400*0.0' if name[0] == 'n' else '0.0'}" for name in self._terms(modes))]
+
+    def steps(self) -> list[str]:
+        """Coefficient k > 0 of the nodes, from their coefficients below k."""
+        nodes, chosen = self.series.nodes, self.nodes
         sums: dict[Sum, str] = {}
         for i in chosen:
             for term in nodes[i].sums:
@@ -172,7 +255,7 @@ class _Writer:
                 lines.append(f"c{i} = {step}")
             elif nodes[i].partner > i:  # both of a pair use the previous coefficients of both
                 lines += [f"d{i} = {step}", f"d{i + 1} = {steps[i + 1]}", f"c{i} = d{i}", f"c{i + 1} = d{i + 1}"]
-        return lines + ([f"W[{row}, k] = c{i}" for i, row in self.scratch.items()] if store else [])
+        return lines + [f"W[{row}, k] = c{i}" for i, row in self.scratch.items()]
 
     @staticmethod
     def _canonical(term: Sum) -> Sum:

@@ -7,6 +7,7 @@ same node wherever it occurs.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -19,6 +20,7 @@ from nonsmooth.system.codegen.recurrences import Node
 from nonsmooth.system.symbolic.printing import Printer, assignments, is_corner
 
 ZERO, ONE = sympy.S.Zero, sympy.S.One
+_NAMED = re.compile(r"\bh\d+\b")
 
 
 class CornerError(SystemDefinitionError):
@@ -93,9 +95,13 @@ class Series:
             self._hoisted[expression] = f"h{len(self._hoisted)}"
         return self._hoisted[expression]
 
-    def constant_lines(self) -> list[str]:
-        """The lines that compute all constants named so far."""
-        return assignments([(name, e) for e, name in self._hoisted.items()], self._printer, "g")
+    def constant_lines(self, lines: Iterable[str], before: Iterable[str] = ()) -> list[str]:
+        """The lines that compute the constants that some lines need, but for those that lines before them needed."""
+        used = set(_NAMED.findall("\n".join(lines))) - set(_NAMED.findall("\n".join(before)))
+        printer = Printer(dict(self.names))
+        found = assignments([(name, e) for e, name in self._hoisted.items() if name in used], printer, "g")
+        self._printer.used |= printer.used
+        return found
 
     @property
     def functions(self) -> set[str]:

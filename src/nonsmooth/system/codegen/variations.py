@@ -18,8 +18,16 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from nonsmooth.system.codegen import generate
-from nonsmooth.system.codegen.generate import MOST_MODELS, SIGNATURES, constants_of, scalar_code
+from nonsmooth.system.codegen.generate import (
+    MOST_MODELS,
+    SIGNATURES,
+    by_case,
+    constants_of,
+    function_of,
+    jet_functions,
+    scalar_code,
+    unpacked,
+)
 from nonsmooth.system.codegen.jet import jet_code
 from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
@@ -71,28 +79,21 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
         [ZERO if jac[i][j] == 0 else VARYING if jac[i][j].free_symbols & varying else CONSTANT for i, j in entries]
         for jac in jacobians
     ]
-    jets = [
-        jet_code(traced.t, traced.u, constants_of(traced), field, [jac[i][j] for i, j in entries])
-        for field, jac in zip(traced.fields, jacobians, strict=True)
-    ]
+    jet = jet_code(
+        traced.t, traced.u, constants_of(traced), traced.fields, [[jac[i][j] for i, j in entries] for jac in jacobians]
+    )
+    changes, small = by_case([_small_changes(entries, kind, n, len(wanted)) for kind in kinds], "change")
     fields = [scalar_code(traced, [(f"du[{i}]", e) for i, e in enumerate(field)]) for field in traced.fields]
     switches = [scalar_code(traced, _switch(traced, jump, wanted)) for jump in traced.transitions]
-    functions = set().union(*(jet.functions for jet in jets), *(used for _, used in [*fields, *switches]))
+    functions = jet.functions.union(*(used for _, used in [*fields, *switches]))
     parts = [
-        "from nonsmooth.kernels.compile.cache import callback",
+        "from numpy import array",
+        "from nonsmooth.kernels.compile.cache import callback, device",
         "from nonsmooth.kernels.compile.lanes import load, plus, store, times",
         f"from math import {', '.join(sorted(functions))}" if functions else "",
-        _function(
-            "jet",
-            _JET,
-            "mode, order, t, u, q, C, W, D",
-            [
-                [*jet.lines, *_small_changes(entries, kind, n, len(wanted))]
-                for jet, kind in zip(jets, kinds, strict=True)
-            ],
-        ),
-        _function("field", SIGNATURES["field"], "mode, t, u, q, du", [lines for lines, _ in fields]),
-        _function("switch", _SWITCH, "transition, t, u, q, out", [lines for lines, _ in switches]),
+        *jet_functions(jet, _kind(_JET), "mode, order, t, u, q, C, W, D", small, **changes),
+        function_of("field", _kind(SIGNATURES["field"]), "mode, t, u, q, du", *by_case([lines for lines, _ in fields])),
+        function_of("switch", _kind(_SWITCH), "transition, t, u, q, out", *by_case([lines for lines, _ in switches])),
     ]
     module = load_module("\n".join(part for part in parts if part) + "\n", "variations", lasting=False)
     return VariationalModel(
@@ -101,13 +102,13 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
         module.switch,
         np.array(entries, dtype=np.int64).reshape(-1, 2),
         np.array(kinds, dtype=np.int64).reshape(len(kinds), len(entries)),
-        max([1, *(jet.n_scratch for jet in jets)]),
+        max(1, jet.n_scratch),
     )
 
 
-def _function(name: str, signature: str, arguments: str, branches: list[list[str]]) -> str:
-    only_kernels = "no_cpython_wrapper=True, no_cfunc_wrapper=True"  # call it
-    return generate.function_of(name, f'"{signature}", {only_kernels}', arguments, branches)
+def _kind(signature: str) -> str:
+    """A decorator for what only kernels call."""
+    return f'callback("{signature}", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 
 
 def _small_changes(entries: list[tuple[int, int]], kinds: list[int], n: int, columns: int) -> list[str]:
@@ -177,7 +178,7 @@ def touch_function(traced: Traced, active: tuple[int, ...], indicator: int, mode
     slope = along(h)
     values = [e for one in (h, slope, along(slope)) for e in (one, *(one.diff(s) for s in variables))]
     lines, used = scalar_code(traced, [(f"r{i}", e) for i, e in enumerate(values)])
-    constants = generate.unpacked(lines)
+    constants = unpacked(lines)
     result = ", ".join(f"r{i}" for i in range(len(values)))
     body = "".join(f"    {line}\n" for line in [*constants, *lines, f"return ({result})"])
     header = f"from math import {', '.join(sorted(used))}\n" if used else ""

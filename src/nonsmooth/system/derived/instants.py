@@ -302,7 +302,7 @@ class _SeriesAhead(Ahead):
     def rates(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         lanes, first = self._step(np.zeros(self.count)), self.n + self.count
         rows = range(first, first + self.count + self.laws)
-        found = np.array([[names["C"][row, self.order] for row in rows] for names in lanes])
+        found = np.array([[names["C"].get((row, self.order), 0.0) for row in rows] for names in lanes])
         return found[0, : self.count], sizes(found)[: self.count], found[0, self.count :]
 
     def put(self, forces: FloatArray) -> None:
