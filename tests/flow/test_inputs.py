@@ -82,6 +82,29 @@ def test_a_delay_moves_a_ramp_from_the_start_on() -> None:
     np.testing.assert_allclose(found.P.sel(parameter="late"), [-3.0, -3.0, -3.0, 0.0], atol=1e-13)
 
 
+@pytest.mark.parametrize(
+    ("delays", "sizes"), [(("late", "late"), (3, 0)), (("late", "other"), (1, 2)), (("late", 0.1), (1, 0))]
+)
+def test_steps_of_two_inputs_at_one_time(delays: tuple[Any, Any], sizes: tuple[float, float]) -> None:
+    """v(2) = 1 (1 - late of a) + 2 (1 - late of b), with one delay or two that are equal; sizes: -dv/d(delays)."""
+    cart = ns.mechanical(
+        1.0,
+        0.0,
+        0.0,
+        parameters={"late": 0.1, "other": 0.1},
+        forcing={"q": lambda t, p: p.a + p.b},
+        inputs={"a": "N", "b": "N"},
+    )
+    inputs = {
+        name: ns.Input([0, 1], [0.0, size], between="steps", delay=delay)
+        for name, size, delay in zip("ab", (1.0, 2.0), delays, strict=True)
+    }
+    found = ns.sensitivity(cart, duration=2.0, parameters=["late", "other"], inputs=inputs)
+    np.testing.assert_allclose(found.end[:2], [3 * 0.81 / 2, 2.7], atol=1e-13)
+    np.testing.assert_allclose(found.P[:2], [-0.9 * np.array(sizes), -np.array(sizes)], atol=1e-12)
+    assert not np.any(found.P[2:])
+
+
 def test_a_step_that_brings_a_reset_about() -> None:
     """v is halved where the force rises above 1, at t = 1 + late: v(2) = (1 + (1 + late)/2)/2 + 2 (1 - late)."""
     rig = ns.System(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.errors import shortened
 from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.engines.engine import Changes
@@ -151,43 +152,84 @@ class DelayedInputs:
         return Changes(self.times[here], self.table[here], self.first)
 
     def by_delays(self, flow: VariationalFlow, rates: FloatArray) -> FloatArray:
-        """Derivatives (n, n_active) of the states that are inputs in the active parameters: in their delays."""
-        found = np.zeros((flow.n, flow.n_active))
+        """Derivatives (..., n, n_active) of the states that are inputs in the active parameters: in their delays."""
+        found = np.zeros((*rates.shape[:-1], flow.n, flow.n_active))
         for i, delay in enumerate(self.delays):
             if delay in flow.active:
-                found[self.first + 2 * i, flow.active.index(str(delay))] = -rates[self.first + 2 * i]
+                k = self.first + 2 * i
+                found[..., k, flow.active.index(str(delay))] = -rates[..., k]
         return found
 
-    def jump(
+    def moved(self, flow: VariationalFlow, times: FloatArray) -> BoolArray:
+        """Does a parameter move what changes at some times? (K, n_active)"""
+        changed = self.own[np.searchsorted(self.times, times)]
+        found = [changed[:, [delay == name for delay in self.delays]].any(axis=1) for name in flow.active]
+        return np.array(found, dtype=bool).reshape(len(found), len(times)).T
+
+    def lasting(
         self,
         flow: VariationalFlow,
-        time: float,
-        z: FloatArray,
+        values: FloatArray,
+        modes: IntArray,
+        times: FloatArray,
+        states: tuple[FloatArray, FloatArray],
         before: FloatArray,
-        after: FloatArray,
-        then: Jump | None = None,
-    ) -> Jump:
-        """A change of inputs as a jump to z, from the rates before it to those behind it and the transitions that it
-        brings about (``then``), which happen at its time whatever their conditions.
+    ) -> FloatArray:
+        """Rates (K, n_active, n) that last longer where an active parameter is greater, at changes of inputs.
 
-        Inputs take values of their own. One with a delay changes later where that is greater: what moves has the rates
-        before it for so much longer."""
-        n, size = flow.n, flow.n + flow.n_active
-        R, fields, instant = np.eye(size), np.zeros((3, size)), np.zeros(size)
-        own = slice(self.first, flow.n_u)
+        Those before the change, where it moves all that changes there; else what it does not move has changed. Modes
+        are those before, ``states`` those before and behind (K, n)."""
+        found = np.repeat(before[:, None], flow.n_active, axis=1)
+        changed = self.own[np.searchsorted(self.times, times)]
+        for j, name in enumerate(flow.active):
+            moved = np.array([delay == name for delay in self.delays])
+            some = changed[:, moved].any(axis=1) & changed[:, ~moved].any(axis=1)
+            if some.any():
+                z = states[0][some]
+                others = self.first + np.flatnonzero(np.repeat(~moved, 2))
+                z[:, others] = states[1][some][:, others]
+                found[some, j] = flow.segments(values, modes[some], times[some], np.zeros(len(z)), z).f_begin
+        return found
+
+    def steps(
+        self, flow: VariationalFlow, times: FloatArray, lasting: FloatArray, after: FloatArray, then: Jump | None = None
+    ) -> FloatArray:
+        """Derivatives (K, N, N) across changes of inputs, from the rates that last longer where a delay is greater
+        (:meth:`lasting`) to those behind (K, n), and the transitions that they bring about (``then``), which happen at
+        their times whatever their conditions.
+
+        Inputs take values of their own."""
+        n, own = flow.n, slice(self.first, flow.n_u)
+        R, late = np.eye(n + flow.n_active), lasting - after[:, None]
         R[own] = 0.0
         if then is not None:
-            R, fields[2] = then.R @ R, then.fields[2]
-        fields[0, :n], fields[1, :n] = before, after
-        S = R.copy()
-        changed = self.own[np.searchsorted(self.times, time)]
-        moved = {delay for delay, one in zip(self.delays, changed, strict=True) if one}
-        for j in (n + k for k, name in enumerate(flow.active) if name in moved):
-            instant[j] = 1.0
-            S[:n, j] += R[:n, :n] @ before + fields[2, :n] - after
-        S[own] = 0.0
-        S[own, n:] = self.by_delays(flow, after)[own]
-        return Jump(z, R, fields, 0.0, np.zeros(n), 1.0, np.zeros(flow.n_active), S, instant, -1, -1)
+            R = then.R @ R
+            late = lasting @ R[:n, :n].T + then.fields[2, :n] - after[:, None]
+        S = np.repeat(R[None], len(times), axis=0)
+        S[:, :n, n:] += self.moved(flow, times)[:, None, :] * late.transpose(0, 2, 1)
+        S[:, own] = 0.0
+        S[:, own, n:] = self.by_delays(flow, after)[:, own]
+        return S
+
+    def jump(
+        self, flow: VariationalFlow, time: float, z: FloatArray, lasting: FloatArray, rates: FloatArray, then: Jump
+    ) -> Jump:
+        """A change of inputs and the transitions that it brings about, as a jump to z; ``rates`` are those before and
+        behind (2, n)."""
+        n, at = flow.n, np.array([time])
+        R, fields = np.eye(n + flow.n_active), np.zeros((3, n + flow.n_active))
+        R[self.first : flow.n_u] = 0.0
+        fields[:2, :n], fields[2] = rates, then.fields[2]
+        S, moved = self.steps(flow, at, lasting[None], rates[1:], then)[0], self.moved(flow, at)[0]
+        if (lasting[moved] != rates[0]).any():
+            warnings.warn(
+                "two inputs with delays of their own change at one instant, and a transition follows: its derivatives "
+                "are those of a transition that waits for both. Let one change a little later for another.",
+                RuntimeWarning,
+                stacklevel=2,
+            )
+        instant = np.concatenate([np.zeros(n), moved])
+        return Jump(z, then.R @ R, fields, 0.0, np.zeros(n), 1.0, np.zeros(flow.n_active), S, instant, -1, -1)
 
 
 def driven(system: System, given: Any) -> Driven | None:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import FloatArray, State, TrajectoryLog
+from nonsmooth.arrays import FloatArray, IntArray
+from nonsmooth.flow.engines.engine import State, TrajectoryLog
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.inputs import DelayedInputs, driven
 from nonsmooth.flow.options import Length, as_called
@@ -35,8 +36,8 @@ class Variation:
     modes : list of int, times : list of float
         Mode and beginning of each segment.
     segments : Segments
-    jumps : list of Jump
-        Between the segments; transitions at one instant are one.
+    jumps : list of Jump or None
+        Between the segments; transitions at one instant are one. None: nothing but inputs change.
     transitions : list of tuple of int
         Of each jump; ``CHANGE`` before them, or alone, where inputs change.
     start : Jump or None
@@ -53,29 +54,30 @@ class Variation:
         start: tuple[int, FloatArray],
         t_begin: float,
         t_end: float,
-        course: DelayedInputs | None = None,
-        changes: Sequence[float] = (),
+        course: DelayedInputs | None,
+        changes: FloatArray,
     ) -> None:
         first = int(log.sample_mode[0]), np.concatenate([np.nan_to_num(log.sample_u[0]), log.sample_memory[0]])
         flow.catch_up()
         self.start = settled(flow, values, start, first, t_begin)
         self.modes, starts, self.times, self.transitions, before = apart(
-            flow, log, first, t_begin, [(t, k) for k, t in enumerate(changes, start=1)]
+            flow, log, first, t_begin, (changes, np.arange(1, 1 + len(changes)))
         )
         taus = np.diff([*self.times, t_end])
         self.segments: Segments = flow.segments(values, self.modes, self.times, taus, starts)
-        self.jumps: list[Jump] = []
-        for i, (chain, t, z) in enumerate(zip(self.transitions, self.times[1:], before, strict=True)):
-            rates = self.segments.f_end[i], self.segments.f_begin[i + 1]
-            self.jumps.append(jump_between(flow, values, chain, t, z, starts[i + 1], rates, course))
+        states = self.segments.z[:-1], np.array(starts[1:]).reshape(-1, flow.n)
+        rates = self.segments.f_end[:-1], self.segments.f_begin[1:]
+        ending = self.transitions, np.array(self.times[1:]), np.array(self.modes[:-1])
+        steps, self.jumps = steps_between(flow, values, *ending, states, before, rates, course)
         self.Phi, self.P = self.segments.Phi[0], self.segments.P[0]
         if course is not None:
             self.P = self.P + self.Phi @ course.by_delays(flow, self.segments.f_begin[0])
         if self.start is not None:
             self.Phi, self.P = self.Phi @ self.start.R_z, self.P + self.Phi @ self.start.R_p
-        for i, jump in enumerate(self.jumps, start=1):
-            self.Phi = self.segments.Phi[i] @ (jump.saltation @ self.Phi)
-            self.P = self.segments.Phi[i] @ (jump.saltation @ self.P + jump.parameter_column) + self.segments.P[i]
+        n = flow.n
+        for i, S in enumerate(steps, start=1):
+            self.Phi = self.segments.Phi[i] @ (S[:n, :n] @ self.Phi)
+            self.P = self.segments.Phi[i] @ (S[:n, :n] @ self.P + S[:n, n:]) + self.segments.P[i]
 
     @property
     def log_determinant(self) -> float:
@@ -89,7 +91,7 @@ class Variation:
 
     def _of_jumps(self) -> float:
         at_start = 0.0 if self.start is None else float(np.linalg.slogdet(self.start.R_z)[1])
-        return at_start + sum(jump.log_determinant for jump in self.jumps)
+        return at_start + sum(-np.inf if jump is None else jump.log_determinant for jump in self.jumps)
 
 
 def apart(
@@ -97,32 +99,38 @@ def apart(
     log: TrajectoryLog,
     first: tuple[int, FloatArray],
     t_begin: float,
-    changes: Sequence[tuple[float, int]] = (),
+    changes: tuple[FloatArray, IntArray],
 ) -> tuple[list[int], list[FloatArray], list[float], list[tuple[int, ...]], list[FloatArray]]:
     """Segments of a run that begins in ``first`` = (mode, z): their modes, starts and times; the transitions between
     them, those at one instant as one, and the state before each.
 
-    ``changes`` of inputs (their times, and the samples there) stand between segments too, as ``CHANGE``."""
+    ``changes`` of inputs (their times, and which samples are there) stand between segments too, as ``CHANGE``."""
     flow.catch_up()
     n_u, targets = flow.n_u, [jump.target for jump in flow.traced.transitions]
     modes, starts, times = [first[0]], [first[1]], [t_begin]
     transitions: list[tuple[int, ...]] = []
     before: list[FloatArray] = []
     memory = first[1][n_u:]
-    rest, crossings = list(changes), len(log.crossing_time)
+    instants, places = changes
+    taken, crossings = 0, len(log.crossing_time)
 
     def change(upto: float, crossing: int) -> None:
         """Take the changes up to a time; one at the very time of a crossing comes before it."""
-        while rest and rest[0][0] <= upto:
-            t, k = rest.pop(0)
-            state = np.concatenate([np.nan_to_num(log.sample_u[k]), memory])
-            if crossing < crossings and log.crossing_time[crossing] == t:
-                state = np.concatenate([np.nan_to_num(log.u_before[crossing]), memory])
-            transitions.append((CHANGE,))
-            before.append(state)
-            modes.append(modes[-1])
-            starts.append(state)
-            times.append(float(t))
+        nonlocal taken
+        here = slice(taken, int(np.searchsorted(instants, upto, "right")))
+        taken = here.stop
+        count = here.stop - here.start
+        if count == 0:
+            return
+        u = np.nan_to_num(log.sample_u[places[here]])
+        if crossing < crossings and log.crossing_time[crossing] == instants[taken - 1]:
+            u[-1] = np.nan_to_num(log.u_before[crossing])
+        states = [*np.hstack([u, np.tile(memory, (count, 1))])]
+        transitions.extend([(CHANGE,)] * count)
+        before.extend(states)
+        modes.extend([modes[-1]] * count)
+        starts.extend(states)
+        times.extend(instants[here].tolist())
 
     for i, t in enumerate(log.crossing_time):
         change(t, i)
@@ -142,22 +150,39 @@ def apart(
     return modes, starts, times, transitions, before
 
 
-def jump_between(
+def steps_between(
     flow: VariationalFlow,
     values: FloatArray,
-    chain: tuple[int, ...],
-    t: float,
-    before: FloatArray,
-    after: FloatArray,
+    transitions: Sequence[tuple[int, ...]],
+    times: FloatArray,
+    modes: IntArray,
+    states: tuple[FloatArray, FloatArray],
+    before: Sequence[FloatArray],
     rates: tuple[FloatArray, FloatArray],
     course: DelayedInputs | None,
-) -> Jump:
-    """The jump between two segments that :func:`apart` names; ``rates`` are those at the end and beginning of these."""
-    if chain[0] != CHANGE:
-        return flow.jump(values, chain, t, before)
-    assert course is not None
-    then = flow.jump(values, chain[1:], t, before) if chain[1:] else None
-    return course.jump(flow, t, after, *rates, then)
+) -> tuple[FloatArray, list[Jump | None]]:
+    """Derivatives (J, N, N) from the end of each segment that :func:`apart` names to the beginning of the next, and the
+    jumps there, None where nothing but inputs change; of the times, the modes that end, states and rates at the ends,
+    and at the beginnings."""
+    S = np.empty((len(transitions), flow.n + flow.n_active, flow.n + flow.n_active))
+    jumps: list[Jump | None] = [None] * len(transitions)
+    change = np.array([chain[0] == CHANGE for chain in transitions], dtype=bool)
+    if course is not None and change.any():
+        ends = states[0][change], states[1][change]
+        lasting = course.lasting(flow, values, modes[change], times[change], ends, rates[0][change])
+        S[change] = course.steps(flow, times[change], lasting, rates[1][change])
+    for i, chain in enumerate(transitions):
+        if chain[0] != CHANGE:
+            found = flow.jump(values, chain, times[i], before[i])
+        elif chain[1:]:
+            assert course is not None
+            then = flow.jump(values, chain[1:], times[i], before[i])
+            both = np.array([rates[0][i], rates[1][i]])
+            found = course.jump(flow, times[i], states[1][i], lasting[np.sum(change[:i])], both, then)
+        else:
+            continue
+        S[i], jumps[i] = found.S, found
+    return S, jumps
 
 
 def settled(
@@ -209,7 +234,7 @@ def variation(
     instants = np.zeros(1) if changes is None else np.append(0.0, changes.times)
     log = engine.record(engine.prepare(values[None, :]), state, t_end, instants, changes=changes)
     check_complete(log, system, state, system.period())
-    return Variation(flow, values, log, start, 0.0, t_end, course, instants[1:].tolist()), log
+    return Variation(flow, values, log, start, 0.0, t_end, course, instants[1:]), log
 
 
 @checked
@@ -286,7 +311,7 @@ def sensitivity(
     crossings = [
         (t, chain[-1], jump)
         for t, chain, jump in zip(found.times[1:], found.transitions, found.jumps, strict=True)
-        if chain[-1] != CHANGE
+        if jump is not None
     ]
     return derivatives_of_run(
         labels,

@@ -12,7 +12,7 @@ from nonsmooth.flow.engines.engine import State, TrajectoryLog
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.inputs import DelayedInputs, Driven
-from nonsmooth.flow.sensitivity import apart, jump_between, settled
+from nonsmooth.flow.sensitivity import apart, settled, steps_between
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
 
@@ -104,7 +104,7 @@ class Marcher:
             return plain
         cuts = np.zeros(0) if changes is None else changes.times
         places = 1 + np.searchsorted(instants, cuts)
-        return self._derived(plain, values, begin, z, mode, course, [*zip(cuts, places, strict=True)])
+        return self._derived(plain, values, begin, z, mode, course, (cuts, places))
 
     def _derived(
         self,
@@ -114,7 +114,7 @@ class Marcher:
         z: FloatArray,
         mode: int,
         course: DelayedInputs | None,
-        changes: list[tuple[float, int]],
+        changes: tuple[FloatArray, IntArray],
     ) -> SampledMotion | None:
         """The same with derivatives: products over the pieces between samples and transitions; None where they are not
         known, as of a start at which several contacts are hit."""
@@ -126,39 +126,31 @@ class Marcher:
         except ValueError:
             return None
         modes, starts, times, transitions, before = apart(flow, log, first, begin, changes)
-        ends = np.searchsorted(plain.time, times[1:], "left")  # a sample at a crossing is the limit after it
-        cuts = [0, *ends.tolist(), len(plain.time)]
-        t0, t1, z0, of_mode, is_sample = [], [], [], [], []
-        for j, mode_j in enumerate(modes):
-            here = slice(cuts[j], cuts[j + 1])
-            inner = plain.time[here]
-            last = [times[j + 1]] if j + 1 < len(times) else []
-            t0.append(np.concatenate([[times[j]], inner])[: len(inner) + len(last)])
-            t1.append(np.concatenate([inner, last]))
-            z0.append(np.vstack([starts[j][None, :], plain.z[here]])[: len(inner) + len(last)])
-            of_mode.append(np.full(len(inner) + len(last), mode_j))
-            is_sample.append(np.concatenate([np.ones(len(inner), dtype=bool), np.zeros(len(last), dtype=bool)]))
-        t, sample = np.concatenate(t0), np.concatenate(is_sample)
-        legs = flow.segments(values, np.concatenate(of_mode), t, np.concatenate(t1) - t, np.vstack(z0))
-        steps = np.zeros((len(t), size, size))
+        # Legs between points: beginnings of segments and samples. A sample at a crossing is the limit after it.
+        segment = np.concatenate([np.arange(len(times)), np.searchsorted(times[1:], plain.time, "right")])
+        order = np.argsort(segment, kind="stable")
+        is_sample = (order >= len(times))[1:]
+        t = np.concatenate([times, plain.time])[order]
+        z0, of_mode = np.vstack([*starts, plain.z])[order], np.array(modes)[segment[order]]
+        legs = flow.segments(values, of_mode[:-1], t[:-1], np.diff(t), z0[:-1])
+        steps = np.zeros((len(is_sample), size, size))
         steps[:, :n, :n], steps[:, :n, n:] = legs.Phi, legs.P
         steps[:, range(n, size), range(n, size)] = 1.0
+        ending = np.flatnonzero(~is_sample)
+        states, rates = (legs.z[ending], z0[ending + 1]), (legs.f_end[ending], legs.f_begin[ending + 1])
+        at = transitions, t[ending + 1], of_mode[ending]
+        steps[ending + 1] @= steps_between(flow, values, *at, states, before, rates, course)[0]
         total = np.eye(size)
         if course is not None:
             total[:n, n:] = course.by_delays(flow, legs.f_begin[0])
-        jumps = iter(zip(transitions, times[1:], before, starts[1:], strict=True))
         D = np.empty((len(plain.time), n, size))
         k = 0
-        for leg, to_sample in enumerate(sample.tolist()):
-            total = steps[leg] @ total
+        for step, to_sample in zip(steps, is_sample.tolist(), strict=True):
+            total = step @ total
             if to_sample:
                 D[k] = total[:n]
                 k += 1
-            else:
-                chain, at, state, after = next(jumps)
-                rates = legs.f_end[leg], legs.f_begin[leg + 1]
-                total = jump_between(flow, values, chain, at, state, after, rates, course).S @ total
-        rate = legs.f_end[sample]
+        rate = legs.f_end[is_sample]
         of_time = rate - D[:, :, :n] @ legs.f_begin[0]
         if start is not None:  # transitions that are taken at once, whenever the window begins
             of_time += D[:, :, :n] @ start.R_t
