@@ -11,6 +11,7 @@ from tests.identification.fit_coverage import cover, coverage, rms
 
 import nonsmooth as ns
 from nonsmooth.errors import SolveError
+from nonsmooth.flow.inputs import driven
 from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.fit import problem_of
 from nonsmooth.identification.fit.motion import Marcher
@@ -436,3 +437,15 @@ def test_a_trial_that_begins_with_an_impact_has_no_derivatives_and_ends_no_fit()
     found = marcher.run(mass.parameter_vector(), 0.0, times, start, mode)
     assert found.z[-1] == pytest.approx([0.5 - 0.5 + 0.05, -0.4], abs=1e-12)
     assert marcher.run(mass.parameter_vector(), 0.0, times, start, mode, derivatives=True) is None
+
+
+def test_a_sample_where_an_input_changes_is_the_limit_behind_it():
+    """A cart under a step at t = 1: v is -late per second of the delay behind it, also where the sample lies on it."""
+    cart = ns.mechanical(
+        1.0, 0.0, 0.0, parameters={"late": 0.0}, forcing={"q": lambda t, p: p.force}, inputs={"force": "N"}
+    )
+    drive = driven(cart, {"force": ns.Input([0, 1], [0.0, 3.0], between="steps", delay="late")})
+    marcher, times = Marcher(cart, ("late",)), np.array([0.5, 1.0, 1.5])
+    motion = marcher.run(cart.parameter_vector(), 0.0, times, np.zeros(4), 0, derivatives=True, drive=drive)
+    np.testing.assert_allclose(motion.z[:, :2], [[0, 0], [0, 0], [0.375, 1.5]], atol=1e-14)
+    np.testing.assert_allclose(motion.D[:, :2, -1], [[0, 0], [0, -3], [-1.5, -3]], atol=1e-14)
