@@ -121,6 +121,23 @@ def test_a_step_that_brings_a_reset_about() -> None:
     np.testing.assert_allclose(found.P.sel(parameter="late")[1], 0.25 - 2.0, atol=1e-12)
 
 
+def test_steps_of_two_inputs_that_bring_a_reset_about_are_warned_of() -> None:
+    rig = ns.System(
+        states=["x", "v"],
+        parameters={"late": 0.1, "other": 0.1},
+        inputs={"f": "", "g": ""},
+        modes={"low": lambda t, u, p: [u.v, p.f], "high": lambda t, u, p: [u.v, p.f]},
+        indicators={"level": lambda t, u, p: p.f + p.g - 1},
+        transitions=[ns.Transition("low", "high", when="level > 0", reset=lambda t, u, p: [u.x, u.v / 2])],
+    )
+    inputs = {
+        name: ns.Input([0, 1], [0.3, 2.0], between="steps", delay=delay)
+        for name, delay in (("f", "late"), ("g", "other"))
+    }
+    with pytest.warns(RuntimeWarning, match="two inputs with delays of their own change at one instant"):
+        ns.sensitivity(rig, duration=2.0, start={"v": 1.0}, parameters=["late"], inputs=inputs)
+
+
 def test_a_mass_pressed_on_a_stop_lifts_where_the_load_turns() -> None:
     """Modes made when visited, too; the force on the stop is the load."""
     for rubs in (False, True):

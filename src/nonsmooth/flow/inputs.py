@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -160,11 +159,13 @@ class DelayedInputs:
                 found[..., k, flow.active.index(str(delay))] = -rates[..., k]
         return found
 
-    def moved(self, flow: VariationalFlow, times: FloatArray) -> BoolArray:
-        """Does a parameter move what changes at some times? (K, n_active)"""
-        changed = self.own[np.searchsorted(self.times, times)]
-        found = [changed[:, [delay == name for delay in self.delays]].any(axis=1) for name in flow.active]
-        return np.array(found, dtype=bool).reshape(len(found), len(times)).T
+    def moved(self, flow: VariationalFlow, times: FloatArray) -> tuple[BoolArray, BoolArray]:
+        """Does an active parameter move what changes at some times (K, n_active), and some of it only?"""
+        changed = self.own[np.searchsorted(self.times, times)][:, None]
+        mine = np.array([[delay == name for delay in self.delays] for name in flow.active], dtype=bool)
+        mine = mine.reshape(flow.n_active, len(self.delays))
+        moved = (changed & mine).any(axis=2)
+        return moved, moved & (changed & ~mine).any(axis=2)
 
     def lasting(
         self,
@@ -177,16 +178,14 @@ class DelayedInputs:
     ) -> FloatArray:
         """Rates (K, n_active, n) that last longer where an active parameter is greater, at changes of inputs.
 
-        Those before the change, where it moves all that changes there; else what it does not move has changed. Modes
-        are those before, ``states`` those before and behind (K, n)."""
+        Those before the change, where it moves all that changes there; else what it does not move has changed: where
+        forces multiply two such inputs, derivatives are those towards a greater delay. Modes are those before,
+        ``states`` those before and behind (K, n)."""
         found = np.repeat(before[:, None], flow.n_active, axis=1)
-        changed = self.own[np.searchsorted(self.times, times)]
-        for j, name in enumerate(flow.active):
-            moved = np.array([delay == name for delay in self.delays])
-            some = changed[:, moved].any(axis=1) & changed[:, ~moved].any(axis=1)
+        for j, some in enumerate(self.moved(flow, times)[1].T):
             if some.any():
                 z = states[0][some]
-                others = self.first + np.flatnonzero(np.repeat(~moved, 2))
+                others = self.first + np.flatnonzero(np.repeat([delay != flow.active[j] for delay in self.delays], 2))
                 z[:, others] = states[1][some][:, others]
                 found[some, j] = flow.segments(values, modes[some], times[some], np.zeros(len(z)), z).f_begin
         return found
@@ -206,30 +205,10 @@ class DelayedInputs:
             R = then.R @ R
             late = lasting @ R[:n, :n].T + then.fields[2, :n] - after[:, None]
         S = np.repeat(R[None], len(times), axis=0)
-        S[:, :n, n:] += self.moved(flow, times)[:, None, :] * late.transpose(0, 2, 1)
+        S[:, :n, n:] += self.moved(flow, times)[0][:, None, :] * late.transpose(0, 2, 1)
         S[:, own] = 0.0
         S[:, own, n:] = self.by_delays(flow, after)[:, own]
         return S
-
-    def jump(
-        self, flow: VariationalFlow, time: float, z: FloatArray, lasting: FloatArray, rates: FloatArray, then: Jump
-    ) -> Jump:
-        """A change of inputs and the transitions that it brings about, as a jump to z; ``rates`` are those before and
-        behind (2, n)."""
-        n, at = flow.n, np.array([time])
-        R, fields = np.eye(n + flow.n_active), np.zeros((3, n + flow.n_active))
-        R[self.first : flow.n_u] = 0.0
-        fields[:2, :n], fields[2] = rates, then.fields[2]
-        S, moved = self.steps(flow, at, lasting[None], rates[1:], then)[0], self.moved(flow, at)[0]
-        if (lasting[moved] != rates[0]).any():
-            warnings.warn(
-                "two inputs with delays of their own change at one instant, and a transition follows: its derivatives "
-                "are those of a transition that waits for both. Let one change a little later for another.",
-                RuntimeWarning,
-                stacklevel=2,
-            )
-        instant = np.concatenate([np.zeros(n), moved])
-        return Jump(z, then.R @ R, fields, 0.0, np.zeros(n), 1.0, np.zeros(flow.n_active), S, instant, -1, -1)
 
 
 def driven(system: System, given: Any) -> Driven | None:

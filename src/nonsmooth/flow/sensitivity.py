@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -176,9 +178,18 @@ def steps_between(
             found = flow.jump(values, chain, times[i], before[i])
         elif chain[1:]:
             assert course is not None
-            then = flow.jump(values, chain[1:], times[i], before[i])
-            both = np.array([rates[0][i], rates[1][i]])
-            found = course.jump(flow, times[i], states[1][i], lasting[np.sum(change[:i])], both, then)
+            then, here = flow.jump(values, chain[1:], times[i], before[i]), slice(i, i + 1)
+            longer = lasting[np.count_nonzero(change[:i])]
+            if course.moved(flow, times[here])[1].any():
+                warnings.warn(
+                    "two inputs with delays of their own change at one instant, and a transition follows: its "
+                    "derivatives are those of a transition that waits for both. Let one change a little later for "
+                    "another.",
+                    RuntimeWarning,
+                    stacklevel=2,
+                )
+            both = course.steps(flow, times[here], longer[None], rates[1][here], then)[0]
+            found = replace(then, S=both, row=-1)  # at the time of the change
         else:
             continue
         S[i], jumps[i] = found.S, found
@@ -286,7 +297,8 @@ def sensitivity(
     Notes
     -----
     Transitions taken at the same instant stand as one crossing, with the last one's number; where several happen by
-    themselves and their order matters, derivatives are those of one order, and a warning says so. A parameter that has
+    themselves and their order matters, derivatives are those of one order, and a warning says so. Where two inputs
+    change at once, the derivative in the delay of one is that towards a greater delay. A parameter that has
     the name of a variable above (``P``, ``end``) is no coordinate of the result; `system_of` gives its value.
     """
     asked = as_called(locals())

@@ -26,7 +26,7 @@ def watch_forks() -> None:
     """Let every fork of this process wait until no other thread makes a first call."""
     if hasattr(os, "register_at_fork"):
         # It and logging have hooks of this kind, which may not come while a fork waits.
-        import concurrent.futures.thread  # noqa: F401
+        import concurrent.futures.thread  # noqa: F401  its hook comes with it
 
         os.register_at_fork(before=_wait, after_in_parent=_go_on, after_in_child=_go_on)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from operator import attrgetter
 
 from sympy import Basic, Expr, Symbol
@@ -209,12 +210,15 @@ class _Writer:
 
     def first(self) -> list[str]:
         """Constants and coefficient 0 of the nodes."""
-        values = self.values()
-        return [*self.series.constant_lines([*values, *self.steps()]), *values]
+        return [*self.series.constant_lines(self._of_nodes), *self.values()]
+
+    @cached_property
+    def _of_nodes(self) -> list[str]:
+        return [*self.values(), *self.steps()]
 
     def once(self, form: _Form) -> list[str]:
         """A form's term of coefficient 0, and its constants that the nodes do not need."""
-        return [*self.series.constant_lines([*form.once, *form.body], [*self.values(), *self.steps()]), *form.once]
+        return [*self.series.constant_lines([*form.once, *form.body], self._of_nodes), *form.once]
 
     def values(self) -> list[str]:
         """Coefficient 0 of the states and nodes."""
