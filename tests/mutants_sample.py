@@ -76,7 +76,7 @@ def places(node: ast.AST, around: ast.stmt | None = None, function: str = "", in
             elif isinstance(child, ast.Constant) and type(child.value) in (int, float, bool):
                 other = not child.value if isinstance(child.value, bool) else child.value + 1
                 yield node, where, ast.Constant(other), around, function
-            elif name == "test":
+            elif name == "test" and ast.unparse(child) != "TYPE_CHECKING":  # imports too early are no other program
                 yield node, where, ast.UnaryOp(ast.Not(), child), around, function
             elif function and isinstance(child, DROPPED):
                 yield node, where, ast.Pass(), around, function

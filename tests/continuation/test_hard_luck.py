@@ -150,6 +150,25 @@ def test_a_range_that_leaves_the_physical_region() -> None:
         assert all(str(text) for text in branch["ended_because"].values)
 
 
+@pytest.mark.parametrize(("asked", "begun", "edge"), [((0.2, 0.4), 0.38, 0.3), ((0.2, 0.5), 0.32, 0.4)])
+def test_the_end_says_where_the_equations_end_it(asked: tuple[float, float], begun: float, edge: float) -> None:
+    """A forcing of sqrt(a - 0.3) or sqrt(0.4 - a): one end of the range lies beyond."""
+    side = 1.0 if edge == 0.3 else -1.0
+    system = ns.mechanical(
+        1.0,
+        0.2,
+        4.0,
+        parameters={"a": begun, "omega": 1.0},
+        forcing={"x": lambda t, p: np.sqrt(side * (p.a - edge)) * np.cos(p.omega * t)},
+        coordinates=["x"],
+    )
+    branch = ns.continue_orbit(ns.find_orbit(system), "a", asked)
+    end = 0 if edge == 0.3 else -1
+    assert ends(branch)[end] == "physical"
+    assert ends(branch)[-1 - end] == "range"
+    assert 0.0 < side * (float(branch["a"][end]) - edge) < 2e-4
+
+
 def test_a_fold_at_the_edge_of_the_range() -> None:
     """The range ends exactly at the fold: the branch ends there or just turns, and says which."""
     fold = known.FOLDS["figure 9 rising"]
