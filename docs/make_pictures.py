@@ -22,6 +22,11 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.axis import Axis
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.spines import Spine
+from matplotlib.text import Text
 
 from nonsmooth import plot
 
@@ -29,6 +34,7 @@ DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "pictures"
 PIXELS = 1400  # wide: twice what a page shows, for screens of two pixels per point
 RAISES = re.compile(r"```text\n\w+Error: ")  # below a block of Python: it ends in this error
+SMALL = 300, 190  # pixels of a picture on the page that shows them all, there of half the size
 INCHES = 5.2  # a figure of one column is drawn this wide, its letters as they are
 
 
@@ -47,6 +53,20 @@ def keep(drawn: Any, name: str) -> None:
     # A palette of 256 colours shows the same in a third of the bytes.
     Image.open(drawing).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(target, optimize=True)
     print(f"{name}.png: {target.stat().st_size // 1024} kB")
+
+
+def small(drawn: Any, name: str) -> None:
+    """Save what is left of a figure without words, its lines twice as wide: docs/pictures/small/NAME.png."""
+    figure = getattr(drawn, "figure", drawn)
+    for words in figure.findobj(lambda one: isinstance(one, Text | Legend | Axis)):
+        words.set_visible(False)
+    for line in figure.findobj(Line2D):
+        line.set(linewidth=2 * line.get_linewidth(), markersize=1.6 * line.get_markersize())
+    for frame in figure.findobj(Spine):
+        frame.set_linewidth(1.2)
+    figure.set_size_inches(SMALL[0] / 100, SMALL[1] / 100)
+    target = PICTURES / "small" / f"{name}.png"
+    figure.savefig(target, dpi=200, bbox_inches="tight", pad_inches=0.04)
 
 
 def comparison_section() -> Any:
@@ -83,7 +103,7 @@ def drawn_by(page: Path, elsewhere: set[str]) -> list[tuple[str, str]]:
 def main(wanted: list[str]) -> None:
     """The pictures named, or all."""
     mpl.use("Agg")
-    PICTURES.mkdir(exist_ok=True)
+    (PICTURES / "small").mkdir(parents=True, exist_ok=True)
     examples = sorted((DOCS.parent / "examples").glob("*.py"))
     elsewhere = {path.stem for path in examples} | {"comparison_section", "effect_of_eta", "chart_cost"}
     for page in sorted(DOCS.rglob("*.md")):
@@ -115,7 +135,9 @@ def main(wanted: list[str]) -> None:
         if needs and not (Path(os.environ.get("NONSMOOTH_DATA", "")) / needs).is_file():
             print(f"{path.stem}.png: left as it is; NONSMOOTH_DATA names no folder with {needs}")
             continue
-        keep(example["main"](), path.stem)
+        drawn = example["main"]()
+        keep(drawn, path.stem)
+        small(drawn, path.stem)
     total = sum(os.path.getsize(file) for file in PICTURES.glob("*.png"))
     print(f"together {total // 1024} kB")
 

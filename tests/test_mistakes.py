@@ -764,3 +764,10 @@ def test_real_chatter_is_not_taken_for_a_wrong_sign() -> None:
     with pytest.raises(ns.SolveError, match="ever shorter times") as raised:
         ns.simulate(ball, duration=20.0, start=[1.0, 0.0])
     assert raised.value.status == "chatter" and "other sign" not in str(raised.value)
+
+
+def test_two_ends_and_a_number_are_three_values() -> None:
+    system = ns.models.discontinuous_support()
+    with pytest.warns(UserWarning, match=r"three values, 3\.0, 4, 500; .* write np\.linspace\(3\.0, 4, 500\)"):
+        found = ns.sweep(system, "omega", (3.0, 4, 500), progress=False)
+    assert found["omega"].values.tolist() == [3.0, 4.0, 500.0]

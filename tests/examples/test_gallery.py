@@ -24,7 +24,8 @@ def test_picture_then_lesson_then_code(name: str) -> None:
         for part in (f"](../pictures/{name}.png)", "## You learn", "## Checked", f"../../examples/{name}.py")
     ]
     assert order == sorted(order)
-    assert (ROOT / "docs" / "pictures" / f"{name}.png").is_file()
+    for folder in ("pictures", "pictures/small"):
+        assert (ROOT / "docs" / folder / f"{name}.png").is_file()
     index = (GALLERY / "index.md").read_text(encoding="utf-8")
-    assert re.search(rf":img-top: \.\./pictures/{name}\.png\n:img-alt: .+\n:link: {name}\n", index)
+    assert re.search(rf":img-top: \.\./pictures/small/{name}\.png\n:img-alt: .+\n:link: {name}\n", index)
     assert re.search(rf"^{name}$", index, flags=re.M)  # in its table of contents

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,6 +59,11 @@ def swept_values(system: System, parameter: str, values: Any) -> FloatArray:
     if not np.isfinite(numbers).all():
         where = int(np.argmin(np.isfinite(numbers)))
         raise ValueError(f"values of {parameter!r} must be finite; number {where} is {numbers[where]}")
+    many = values[2] if isinstance(values, list | tuple) and len(values) == 3 else 0
+    if isinstance(many, int) and many > 49.0 + 20.0 * np.abs(numbers[:2]).max():
+        given = str([*values])[1:-1]
+        words = f"{parameter} takes three values, {given}; for many from end to end write np.linspace({given})"
+        warnings.warn(words, stacklevel=2)
     distinct, count = np.unique(numbers, return_counts=True)
     if (count > 1).any():
         twice = distinct[count > 1][0]
