@@ -41,6 +41,7 @@ SWAPS: dict[type, type] = {
 }
 DROPPED = (ast.Assign, ast.AugAssign, ast.Expr, ast.Continue, ast.Break)
 SILENT = (ast.Raise, ast.JoinedStr, ast.Assert, ast.AnnAssign, ast.arguments, ast.Import, ast.ImportFrom)
+FOR_CUDA = ["tests/diagrams/test_gpu.py", "tests/diagrams/test_gpu_series.py"]
 FOR_KERNELS = ["tests/kernels", "tests/flow", "tests/diagrams/test_sweep.py", "tests/diagrams/test_lyapunov.py"]
 
 
@@ -152,7 +153,9 @@ def tests_of(one: Mutant, called: dict, longest: float) -> list[str]:
         seen = {test for place, tests in known.items() if place.startswith(f"{file}:") for test in tests}
     if not seen:
         room = room_of(one.path)
-        return FOR_KERNELS if room == "kernels" else [f"tests/{room}"] if (ROOT / "tests" / room).is_dir() else []
+        if room == "kernels":
+            return FOR_CUDA if file.startswith("kernels/cuda") else FOR_KERNELS
+        return [f"tests/{room}"] if (ROOT / "tests" / room).is_dir() else []
     chosen, left = [], longest
     for test in sorted(seen, key=lambda name: called["took"][name]):
         left -= called["took"][test]

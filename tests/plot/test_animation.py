@@ -47,6 +47,7 @@ def test_gif_and_page(moving, tmp_path) -> None:
     (held,) = re.findall(r"frames = \[(.*?)\]", page)
     pictures = re.findall(r'"([^"]+)"', held)
     assert len(pictures) == 10
+    assert "setTimeout(step, 100 * Number(speed.value))" in page  # ms from picture to picture, at ten a second
     assert Image.open(io.BytesIO(base64.b64decode(pictures[3]))).size[0] == 360
     assert not re.search(r"(src|href)=[\"']?http", page)  # nothing from elsewhere
     assert moving._repr_html_().startswith("<div id=")

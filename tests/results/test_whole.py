@@ -74,8 +74,8 @@ def test_what_is_not_ours_stays(tmp_path: Path) -> None:
     for folder in (mine, cut, own):
         folder.mkdir()
     (mine / "letter.txt").write_text("keep")
-    (cut / "writer.json").write_text('{"target": "r.nc", "pla')
-    (own / "writer.json").write_text(json.dumps({"target": "r.nc", "place": whole._place(), "process": os.getpid()}))
+    (cut / "writer.json").write_text('{"process": 1, "pla')
+    (own / "writer.json").write_text(json.dumps({"place": whole._place(), "process": os.getpid()}))
     save(large(10), target)
     assert (mine / "letter.txt").read_text() == "keep" and cut.is_dir() and own.is_dir()
 
@@ -83,7 +83,7 @@ def test_what_is_not_ours_stays(tmp_path: Path) -> None:
 def test_a_folder_of_another_machine_is_left_for_a_day(tmp_path: Path) -> None:
     folder = tmp_path / ".r.nc-abcd1234"
     folder.mkdir()
-    (folder / "writer.json").write_text(json.dumps({"target": "r.nc", "place": ["other", "", 0], "process": 1}))
+    (folder / "writer.json").write_text(json.dumps({"place": ["other", "", 0], "process": 1}))
     clear(tmp_path / "r.nc")
     assert folder.is_dir()
     for path in (folder / "writer.json", folder):

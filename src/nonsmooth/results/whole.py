@@ -31,7 +31,7 @@ def beside(target: Path) -> Iterator[Path]:
     """A new folder beside ``target``, gone at the end; folders that killed processes left there are gone before."""
     clear(target)
     with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
-        whose = {"target": target.name, "place": _place(), "process": os.getpid()}
+        whose = {"place": _place(), "process": os.getpid()}
         (Path(folder) / _WRITER).write_text(json.dumps(whose), encoding="utf-8")
         yield Path(folder)
 
@@ -40,7 +40,7 @@ def clear(target: Path) -> None:
     """Take away what killed processes left of ``target``; what they had moved out of its place goes back there."""
     with suppress(OSError):  # a folder that may not be read or changed: its owner's next run clears it
         for folder in target.parent.glob(f".{escape(target.name)}-????????"):
-            if not folder.is_symlink() and folder.is_dir() and _stale(folder, target):
+            if not folder.is_symlink() and folder.is_dir() and _stale(folder):
                 moved = folder / _OLD
                 if moved.exists() and not target.exists():
                     os.replace(moved, target)
@@ -91,12 +91,10 @@ def told(path: Path, remedy: str) -> Iterator[None]:
         raise DataFileError(f"{path}: {why} ({error}); {remedy}") from error
 
 
-def _stale(folder: Path, target: Path) -> bool:
+def _stale(folder: Path) -> bool:
     """Return whether the process that made a folder has ended."""
     try:
         whose = json.loads((folder / _WRITER).read_text(encoding="utf-8"))
-        if whose["target"] != target.name:
-            return False
         if whose["place"] == _place() and os.name == "posix":
             return not _alive(int(whose["process"]))
         newest = max(item.lstat().st_mtime for item in (folder, *folder.rglob("*")))

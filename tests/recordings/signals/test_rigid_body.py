@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from nonsmooth.recordings.signals.restitution import flights, restitution
-from nonsmooth.recordings.signals.rigid_body import corner_heights, corner_restitution, cube
+from nonsmooth.recordings.signals.rigid_body import _Flight, corner_heights, corner_restitution, cube
 
 G, E, RATE = 187.0, 0.3, 148.0
 
@@ -119,3 +119,14 @@ def test_doors() -> None:
     place[3, 0] = np.nan
     with pytest.raises(ValueError, match="values are missing"):
         corner_restitution(t, place, q, cube(), free)
+
+
+def test_the_error_of_a_spin_is_as_stated() -> None:
+    """Orientations of a body that turns at 5 rad/s, each off by turns of 1e-3 rad about the room's axes."""
+    rng, t, spin = np.random.default_rng(3), np.arange(60) / 148.0, np.array([5.0, 0.0, 0.0])
+    z = []
+    for _ in range(200):
+        off = Rotation.from_rotvec(1e-3 * rng.standard_normal((60, 3)))
+        flight = _Flight(t, np.zeros((60, 3)), off * Rotation.from_rotvec(np.outer(t, spin)), slice(None), -9.81)
+        z.append((flight.spin - spin) / flight.spin_error)
+    assert np.sqrt(np.mean(np.square(z))) == pytest.approx(1.0, abs=0.1)

@@ -170,12 +170,13 @@ class _Flight:
         self.z, self.v = float(z.mean()), float(s @ z) / self.spread
         left = z - self.z - self.v * s
         self.v_error = math.sqrt(float(left @ left) / max(n - 2, 1) / self.spread)
-        middle = turns[here][n // 2]
-        vectors = (turns[here] * middle.inv()).as_rotvec()  # turns about the axes of the room
+        self.middle = turns[here][n // 2]
+        for _ in range(2):  # one sample's noise, carried along by the spin, would be no residual
+            vectors = (turns[here] * self.middle.inv()).as_rotvec()  # turns about the axes of the room
+            self.middle = Rotation.from_rotvec(vectors.mean(axis=0)) * self.middle
         self.spin = s @ vectors / self.spread
         left_turn = vectors - vectors.mean(axis=0) - np.outer(s, self.spin)
         self.spin_error = math.sqrt(float(np.sum(left_turn**2)) / 3 / max(n - 2, 1) / self.spread)
-        self.middle = Rotation.from_rotvec(vectors.mean(axis=0)) * middle
 
     def _arms(self, when: float, points: FloatArray) -> FloatArray:
         """Corners about the centre, in the axes of the room."""
