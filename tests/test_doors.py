@@ -138,3 +138,8 @@ def test_no_verb_has_more_than_twelve_arguments_of_its_own_or_120_lines() -> Non
         if len(own) > 12 or lines > 120:
             many[verb] = len(own), lines
     assert not many
+
+
+def test_the_ends_of_limits_are_allowed_but_for_one_that_says_above() -> None:
+    assert [Limit(0, 2).holds(x) for x in (-0.1, 0, 2, 2.1)] == [False, True, True, False]
+    assert [Limit(0, 2, without_low=True).holds(x) for x in (0, 0.1, 2, 2.1)] == [False, True, True, False]

@@ -39,7 +39,7 @@ PLAN = """
 import json, sys, h5netcdf, xarray
 from pathlib import Path
 from nonsmooth.diagrams.chart import plan_chart
-from nonsmooth.diagrams.chart_work import STORED
+from nonsmooth.campaign.work import STORED
 from nonsmooth.campaign.plan import plan
 from nonsmooth.cli.study import read_study
 study = read_study(Path(sys.argv[1]))

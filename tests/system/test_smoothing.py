@@ -147,6 +147,8 @@ def test_eta_is_a_parameter_of_one_set_of_equations():
     with pytest.raises(ValueError, match="must be positive"):
         system.smoothed(0.0)
     with pytest.raises(ValueError, match="must be positive"):
+        one.with_parameters(eta=-1e-6)
+    with pytest.raises(ValueError, match="must be positive"):
         one.parameter_points({"eta": [1e-5, -1e-5]})
     assert dict(one.memory) == {"v_a": "m/s"}
 
