@@ -34,7 +34,7 @@ DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "pictures"
 PIXELS = 1400  # wide: twice what a page shows, for screens of two pixels per point
 RAISES = re.compile(r"```text\n\w+Error: ")  # below a block of Python: it ends in this error
-SMALL = 300, 190  # pixels of a picture on the page that shows them all, there of half the size
+SMALL = 300, 190  # of a picture in the gallery, in pixels of the page; its file has twice as many
 INCHES = 5.2  # a figure of one column is drawn this wide, its letters as they are
 
 
