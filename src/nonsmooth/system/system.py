@@ -35,7 +35,8 @@ class System:
         ``{"m": (0.838, "kg"), "k": 8.47}``; a third entry is a LaTeX symbol.
     modes : mapping of str to callable or Mode
         Vector fields ``f(t, u, p)``; a run starts in the first. They are called once, with symbols: ``x, v = u``,
-        ``u.x``, ``p.k``, NumPy functions. No ``if`` on a state: that is two modes.
+        ``u.x``, ``p.k``, NumPy functions. They return one value for each state, in order or by name
+        (``{"x": u.v, "v": -u.x}``). No ``if`` on a state: that is two modes.
     indicators : mapping of str to callable, optional
         Functions ``h(t, u, p)`` whose zeros bound the modes.
     transitions : sequence of Transition or Surface, optional

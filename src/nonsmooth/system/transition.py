@@ -25,7 +25,7 @@ class Transition:
         Instead of ``when``: a phase of the forcing, in periods (0 <= at < 1), or a function of the parameters that
         returns it: ``at=lambda p: p.duty``.
     reset : callable, optional
-        ``reset(t, u, p)`` returns the new state (in the order of the target mode's states).
+        ``reset(t, u, p)`` returns the new state: the target mode's states, in their order or by name.
     write : mapping of str to callable, optional
         ``{"v_a": f}``: memory written, ``f(t, u, p)`` evaluated just before the jump.
     """

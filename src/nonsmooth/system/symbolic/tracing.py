@@ -140,7 +140,7 @@ class KnownFunction:
 
 
 def call_vector(function: Callable[..., Any], arguments: Sequence[Any], names: Sequence[str], what: str) -> tuple:
-    """Call a user's function and return one expression per name.
+    """Call a user's function and return one expression per name; what it returns is in their order or a mapping.
 
     Parameters
     ----------
@@ -155,6 +155,10 @@ def call_vector(function: Callable[..., Any], arguments: Sequence[Any], names: S
     result = _call(function, arguments, what)
     if isinstance(result, Scalar) or np.isscalar(result):
         result = (result,)
+    if isinstance(result, Mapping):  # by name
+        if set(result) != set(names):
+            _shape(what, names, f"it returned values of {', '.join(map(str, result)) or 'none'}")
+        result = [result[name] for name in names]
     try:
         entries = list(result)
     except TypeError:
