@@ -58,7 +58,10 @@ MODELS = {
     "unknown state": (field(lambda t, u, p: (u.v, -u.y)), r"`y` is not a state of mode 'free'; all: v, x"),
     "unknown parameter": (field(lambda t, u, p: (u.v, -p.kk)), r"`kk` is not a parameter.*nearest: k; all: g, k"),
     "too few components": (field(lambda t, u, p: (u.v,)), r"must return 2 values, one for each of x, v; it returned 1"),
-    "another component": (field(lambda t, u, p: {"x": u.v, "y": 1}), r"one for each of x, v; it returned values of x, y"),
+    "another component": (
+        field(lambda t, u, p: {"x": u.v, "y": 1}),
+        r"one for each of x, v; it returned values of x, y",
+    ),
     "nothing returned": (field(lambda t, u, p: None), r"returned NoneType"),
     "unknown target": (
         {"transitions": [ns.Transition("free", "contakt", when="gap > 0")]},

@@ -38,12 +38,12 @@ UNKNOWN = -1
 
 
 def labels_of_points(arrays: Mapping[str, NDArray[Any]]) -> IntArray:
-    """One integer per point: equal where period number, contacts per cycle and status are equal."""
+    """One integer per point: equal where period number, transitions per cycle and status are equal."""
     period = np.asarray(arrays["period_number"], dtype=np.int64)
     status = np.asarray(arrays["status"], dtype=np.int64)
-    contacts = np.rint(np.nan_to_num(arrays["contacts_per_period"]) * np.maximum(period, 1)).astype(np.int64)
+    crossings = np.rint(np.nan_to_num(arrays["crossings_per_period"]) * np.maximum(period, 1)).astype(np.int64)
     good = period > 0
-    return np.where(good, (period * 4096 + np.clip(contacts, 0, 4095)) * 16 + status, status)
+    return np.where(good, (period * 4096 + np.clip(crossings, 0, 4095)) * 16 + status, status)
 
 
 def refined(

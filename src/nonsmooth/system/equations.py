@@ -211,7 +211,7 @@ def _jump(
             raise SystemDefinitionError(f"{label}: {unknown(key, 'memory', 'this system', list(symbols.m))}")
         value = call_scalar(function, (time, u, p), f"what {label} writes to {key!r}")
         writes.append((list(symbols.m).index(key), value))
-    contact = source == 0 or reset is not None
+    contact = item.begins_contact(next(iter(modes)))
     at = _phase(item.at, label, symbols) if callable(item.at) else item.at
     return TracedTransition(source, target, rows, at, reset, tuple(writes), contact, item.label)
 

@@ -104,6 +104,8 @@ def _content(d: Description) -> dict[str, Any]:
             entry["reset"] = {s: text(e) for s, e, gone in zip(t.state_names, jump.reset, own, strict=True) if not gone}
         if jump.writes:
             entry["write"] = {t.memory_names[i]: text(value) for i, value in jump.writes}
+        if jump.contact != (jump.source == 0 or jump.reset is not None):
+            entry["contact"] = jump.contact
         transitions.append(entry)
     modes = {}
     for mode, field, lacking in zip(t.mode_names, t.fields, t.lacking, strict=True):
@@ -393,6 +395,7 @@ class _Reader:
             at=self.function(entry["at"]) if isinstance(entry.get("at"), str) else entry.get("at"),
             reset=self.own(entry["reset"]) if "reset" in entry else None,
             write={k: self.function(e) for k, e in entry["write"].items()} if "write" in entry else None,
+            contact=entry.get("contact"),
         )
 
     def band(self, entry: Mapping[str, Any]) -> Band:

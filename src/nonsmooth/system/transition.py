@@ -28,6 +28,9 @@ class Transition:
         ``reset(t, u, p)`` returns the new state: the target mode's states, in their order or by name.
     write : mapping of str to callable, optional
         ``{"v_a": f}``: memory written, ``f(t, u, p)`` evaluated just before the jump.
+    contact : bool, optional
+        Whether a contact begins by it, which ``contacts_per_period`` counts. Where not given: if it has a reset, or
+        leaves the first mode.
     """
 
     source: str
@@ -36,6 +39,7 @@ class Transition:
     at: float | Callable[..., Any] | None = None
     reset: Callable[..., Any] | None = None
     write: Mapping[str, Callable[..., Any]] | None = field(default=None)
+    contact: bool | None = None
 
     def __post_init__(self) -> None:
         if (self.when is None) == (self.at is None):
@@ -61,6 +65,10 @@ class Transition:
     def label(self) -> str:
         """Name in errors and logs: ``free -> contact``."""
         return f"{self.source} -> {self.target}"
+
+    def begins_contact(self, first: str) -> bool:
+        """Return whether a contact begins by it, in a system with this ``first`` mode."""
+        return bool(self.reset or self.source == first) if self.contact is None else bool(self.contact)
 
 
 @dataclass(frozen=True)

@@ -254,13 +254,13 @@ class PatternTables:
                 number = self._keep(self.maps[0])
             elif struck:
                 number = self._map(self.rows.impact(struck, self.patterns.mode))
-            contact = int(bool(struck) or self.patterns.number(lead.source) == 0)
-            contact = ENDS.index(found.ends) + DEAD_END if found.ends else contact
-            way = (key[1], RESET if struck else 0, contact, number, 0)
-            self.transitions = np.concatenate([self.transitions, np.array([way], dtype=np.int64)])
             change = Reset(struck, rubs=found.rubbed is not None) if struck else None
             names, ends = found.names or lead.element, found.ends or FOUND
-            self._lead(Lead(lead.source, found.pattern, names, lead.rows, ends, change), lead.kind)
+            to = Lead(lead.source, found.pattern, names, lead.rows, ends, change)
+            contact = ENDS.index(ends) + DEAD_END if found.ends else int(self.patterns.begins_contact(to))
+            way = (key[1], RESET if struck else 0, contact, number, 0)
+            self.transitions = np.concatenate([self.transitions, np.array([way], dtype=np.int64)])
+            self._lead(to, lead.kind)
             self.form, self.net = self.form._replace(**self._maps()[0]), self._net()
         taken = self.answers[key]
         if found.rubbed is not None:  # of the rates that an impact had, of which its impulses depend as no row does
@@ -289,9 +289,9 @@ class PatternTables:
             to = -1 if asked else self.index.get(lead.target, -1)
             if to < 0 and not asked:
                 self.waiting.setdefault(lead.target, []).append(len(self.leads))
-            contact = lead.kind != TOGETHER and (change is not None or self.numbers[here] == 0)
             number = 0 if change is None else self._map(change)
-            ways.append((to, 0 if change is None else RESET, int(contact), number, int(lead.kind == ALONE)))
+            contact = int(self.patterns.begins_contact(lead))
+            ways.append((to, 0 if change is None else RESET, contact, number, int(lead.kind == ALONE)))
             self._lead(lead, lead.kind)
         self.lists.append([*range(len(self.leads) - len(leads), len(self.leads) - 1)])
         self.together.append(len(self.leads) - 1)

@@ -183,6 +183,15 @@ class Assembler(ABC):
         each = ((k, self.parts[k].element) for k in (range(len(self.parts)) if some is None else some))
         return tuple(k for k, element in each if element.phases[pattern[k]] in element.held)
 
+    def begins_contact(self, source: Pattern, target: Pattern, struck: Sequence[int] = ()) -> bool:
+        """Return whether an element that is in no contact is struck or comes into one (``struck`` as in ``impact``)."""
+        hit = {max(k, ~k) for k in struck}
+        for k, element in enumerate(part.element for part in self.parts):
+            open_before = element.phases[source[k]] not in element.touching
+            if open_before and ((element.strikes and k in hit) or element.phases[target[k]] in element.touching):
+                return True
+        return False
+
     @kept
     def rate(self, k: int, mode: str) -> Any:
         """The rate that a constraint of element k holds at zero."""

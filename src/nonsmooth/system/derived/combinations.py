@@ -144,7 +144,8 @@ def _written_out(
                     continue  # more contacts than can be held by forces of their own
                 reset = None if way.states is None else KnownFunction(way.states)
                 when = make.condition(way.conditions, part.name)
-                transitions.append(Transition(here, name(mode, there), when=when, reset=reset))
+                contact = make.begins_contact(pattern, there, (k,) if reset else ()) if named is None else None
+                transitions.append(Transition(here, name(mode, there), when=when, reset=reset, contact=contact))
                 kinds.append(ALONE if make.asks and part.element.held else "")
         if make.asks:
             asked.append((here, TOGETHER, _meetings(make, mode, pattern), -1))
@@ -160,7 +161,8 @@ def _written_out(
                     )
             elif isinstance(item, Transition) and item.source == mode:
                 ends = name(item.source, pattern), name(item.target, pattern)
-                transitions.append(Transition(*ends, item.when, item.at, item.reset, item.write))
+                contact = item.begins_contact(next(iter(base)))
+                transitions.append(Transition(*ends, item.when, item.at, item.reset, item.write, contact))
                 kinds.append(OWN if item.reset is None else ASKS_BEHIND)
     outputs = {}
     for key, output in (given["outputs"] or {}).items():

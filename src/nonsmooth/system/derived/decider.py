@@ -55,8 +55,11 @@ class Decider:
             rows = tuple(TracedCondition(numbers[one], sign, strict) for one, sign, strict in signs)
             jumps.append(TracedTransition(here, here, rows, label=name, kind=kind))
             if k >= 0 and self.make.parts[k].element.strikes:
-                reset = tuple(self.make.impact((k,), self.modes[here][0]))
-                jumps.append(TracedTransition(here, here, rows, reset=reset, label=name, kind=FOUND))
+                reset, contact = (
+                    tuple(self.make.impact((k,), self.modes[here][0])),
+                    self._begins_contact(here, here, (k,)),
+                )
+                jumps.append(TracedTransition(here, here, rows, None, reset, (), contact, name, FOUND))
         places = {number for name, number in numbers.items() if self.met(name, traced.indicators[number])}
         own = {number for name, number in numbers.items() if name not in self.make.indicators}
         self.idle = [{*range(len(numbers))} - places - own for _ in self.modes]
@@ -64,6 +67,9 @@ class Decider:
             self.idle[jump.source] -= {row.indicator for row in jump.rows}
         self._written = replace(traced, transitions=tuple(jumps), decider=self)
         return self._written
+
+    def _begins_contact(self, source: int, target: int, struck: tuple[int, ...]) -> bool:
+        return self.make.begins_contact(self.modes[source][1], self.modes[target][1], struck)
 
     def with_changes(self, traced: Traced, changes: Mapping[sp.Basic, sp.Expr]) -> Traced:
         """The equations with functions of time put in place of parameters; its answers are numbered as here."""
@@ -99,7 +105,7 @@ class Decider:
                     question.rows,
                     reset=reset,
                     kind=FOUND,
-                    contact=bool(struck) or question.source == 0,
+                    contact=self._begins_contact(question.source, target, struck),
                     label=f"{names[question.source]} -> {names[target]}",
                 )
                 self._written = replace(written, transitions=(*written.transitions, jump))

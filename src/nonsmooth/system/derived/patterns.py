@@ -285,10 +285,14 @@ class Patterns:
                 )
                 self._jumped[lead] = len(self.jumps)
                 label = lead.element if lead.kind in ENDS else " -> ".join(names)
-                contact = lead.change is not None or ends[0] == 0
+                contact = self.begins_contact(lead)
                 self.jumps.append(TracedTransition(*ends, conditions, contact=contact, label=label, kind=lead.kind))
                 self.changes.append(lead.change)
             return self._jumped[lead]
+
+    def begins_contact(self, lead: Lead) -> bool:
+        """Return whether a contact begins by a transition."""
+        return self.make.begins_contact(lead.source, lead.target, lead.change.elements if lead.change else ())
 
     def told_mode(self, mode: int) -> Pattern:
         """A mode as data, as :meth:`told`."""

@@ -45,13 +45,7 @@ def without_sticking(traced: Traced) -> tuple[Traced, list[tuple[sp.Expr, str]]]
         source, target = kept.index(jump.source), kept.index(jump.target)
         jumps.setdefault(
             (source, target, rows),
-            replace(
-                jump,
-                source=source,
-                target=target,
-                rows=rows,
-                contact=source == 0 or jump.reset is not None,
-            ),
+            replace(jump, source=source, target=target, rows=rows),
         )
     return replace(
         traced,

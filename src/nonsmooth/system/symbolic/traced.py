@@ -41,7 +41,7 @@ class TracedTransition:
     It fires at the instant all ``rows`` hold (``rows``), or at the forcing phase ``at`` (in periods, 0..1: a number,
     or an expression of the parameters); one of the two is empty. ``reset`` has one expression per state, or is None
     (identity). ``writes`` are (memory index, expression) pairs, evaluated with the state just before the jump.
-    ``contact`` marks the transitions counted as contacts: those with a reset, and those that leave the first mode.
+    ``contact`` marks the transitions by which a contact begins.
     ``kind`` is that of a transition of elements: ``ALONE`` where one decides by itself what it does next, ``ASKED``
     where several do so together (where it leads is found when it happens), ``TOGETHER`` what is asked where those of
     the rows vanish together with another; ``FOUND`` where such a question has led, one of ``ENDS`` where it has no

@@ -37,6 +37,7 @@ class ElasticStop(Contact):
     pulls: bool = False
 
     phases = ("open", "contact")
+    touching = ("contact",)
     laws = ("stiffness", "damping")
     conditions = ("gap", "push")
     presses = True
@@ -96,6 +97,7 @@ class Backlash(Displaced):
     damping: Law = 0.0
 
     phases = ("free", "above", "below")
+    touching = ("above", "below")
     laws = ("half_width", "stiffness", "damping")
     conditions = ("upper", "lower")
 

@@ -65,6 +65,7 @@ class Element(ABC):
     laws: ClassVar[tuple[str, ...]] = ()  # its arguments that are numbers, parameters or functions
     conditions: ClassVar[tuple[str, ...]] = ()  # names of the conditions on its ways out
     held: ClassVar[tuple[str, ...]] = ()  # the phases in which its force is that of a constraint
+    touching: ClassVar[tuple[str, ...]] = ()  # the phases in which it is in contact
     sides: ClassVar[tuple[str, str]] = ("", "")  # the phases in which it lets go, its rate rising or falling
     strikes: ClassVar[bool] = False  # its impacts turn speeds at once
     bears: ClassVar[bool] = False  # while it is held it bears its part of an impulse

@@ -72,7 +72,7 @@ class Stop(Contact):
     phases = ("open", "rest")
     laws = ("restitution",)
     conditions = ("gap", "closing", "opens", "slow", "off", "beyond")
-    held = ("rest",)
+    held = touching = ("rest",)
     strikes = True
     bears = True
 
