@@ -102,10 +102,11 @@ class Walk:
         self.armed = (sources == self.modes[:, None]) & fires
         self.elsewhere = self.armed.copy()  # transitions that could fire at the end of a visit but do not
         for i, (k, r) in enumerate(zip(self.fired, self.fired_row, strict=True)):
-            if k >= 0:  # what holds wherever this one does, and was declared behind it, is not taken
-                own = set(jumps[k].rows)
+            if k >= 0:  # of those behind it none is taken that holds wherever it does, or by the condition that fires
+                own, fires_by = set(jumps[k].rows), jumps[k].rows[r - self.net.row_start[k]] if r >= 0 else None
+                taken = [jump.rows and (set(jump.rows) <= own or fires_by in jump.rows) for jump in jumps[k:]]
                 self.elsewhere[i, k] = False
-                self.elsewhere[i, k:] &= np.array([not (jump.rows and set(jump.rows) <= own) for jump in jumps[k:]])
+                self.elsewhere[i, k:] &= ~np.array(taken, dtype=bool)
             if traced.asks and r >= 0:  # what several decide fires with what one does, of its own or of their condition
                 fired = traced.indicators[self.net.rows[r, 0]]
                 self.elsewhere[i] &= [all(traced.indicators[one.indicator] != fired for one in j.rows) for j in jumps]

@@ -132,36 +132,38 @@ class Patterns:
         """The element of each condition."""
         return [k for k, element in enumerate(self.elements.values()) for _ in element.conditions]
 
-    def ways_of(self, rows: Rows, pattern: Pattern, k: int) -> tuple[list[Out], dict[int, FloatArray], list[int]]:
-        """The ways of an element out of its phase in a pattern, the rows of its conditions by their numbers, and those
-        at which it meets what it may be held by."""
+    def ways_of(self, rows: Rows, pattern: Pattern, k: int) -> tuple[list[Out], dict[int, FloatArray], Armed]:
+        """The ways of an element out of its phase in a pattern, the rows of its conditions by their numbers, and the
+        conditions at which it meets what it may be held by."""
         key = k, rows.phases(k, pattern)
         if key in rows.ways:
-            found: tuple[list[Out], dict[int, FloatArray], list[int]] = rows.ways[key]
+            found: tuple[list[Out], dict[int, FloatArray], Armed] = rows.ways[key]
             return found
         name, conditions = rows.parts[k].name, {}
 
-        def armed(one: Any) -> int:
-            own = f"{name}_{one.name}"
-            slot = self.slots[own if own in self.slots else one.name]
-            conditions[slot] = one.value.values
-            return slot
+        def armed(some: Sequence[Any]) -> Armed:
+            found = []
+            for one in some:
+                own = f"{name}_{one.name}"
+                slot = self.slots[own if own in self.slots else one.name]
+                conditions[slot] = one.value.values
+                found.append((slot, one.sign, int(one.strict)))
+            return tuple(found)
 
-        outs = [
-            Out(k, i, way, tuple((armed(one), one.sign, int(one.strict)) for one in way.conditions))
-            for i, way in enumerate(rows.leaving(k, self.mode, pattern))
-        ]
+        leaving = enumerate(rows.leaving(k, self.mode, pattern))
+        outs = [Out(k, i, way, armed(way.conditions)) for i, way in leaving]
         here = rows.place(k, self.mode, pattern)
         ways = here.element.meeting(here) if here.phase not in here.element.held else []
-        rows.ways[key] = outs, conditions, [armed(way[0]) for way in ways]
+        rows.ways[key] = outs, conditions, armed([way[0] for way in ways])
         return outs, conditions, rows.ways[key][2]
 
-    def ways_out(self, rows: Rows, pattern: Pattern) -> tuple[FloatArray, list[Out], list[int]]:
+    def ways_out(self, rows: Rows, pattern: Pattern) -> tuple[FloatArray, list[Out], Armed]:
         """The rows (conditions, M) of a pattern, NaN where one is not asked for; the ways out; the conditions at which
         elements meet what they may be held by."""
         every = np.zeros((len(self.slots), rows.field.shape[1]), dtype=rows.field.dtype)
         every[:, rows.n] = np.nan
-        found, meets = [], []
+        found: list[Out] = []
+        meets: Armed = ()
         for k in range(len(rows.parts)):
             outs, conditions, met = self.ways_of(rows, pattern, k)
             found += outs
@@ -181,8 +183,8 @@ class Patterns:
             kind = ASKED if way.phase is None else ALONE if part.element.held else ""
             found.append(Lead(pattern, target, part.name, given, kind, None if way.states is None else Reset((k,), i)))
             states.append(way.states)
-        together = tuple((slot, 1, 1) for slot in dict.fromkeys(meets))
-        return conditions, [*found, Lead(pattern, pattern, "", together, TOGETHER)], [*states, None], meets
+        together = Lead(pattern, pattern, "", tuple(dict.fromkeys(meets)), TOGETHER)
+        return conditions, [*found, together], [*states, None], [slot for slot, _, _ in meets]
 
     def look_at(self, rows: Rows, pattern: Pattern) -> None:
         """Give all ways out of a pattern their numbers."""
