@@ -24,6 +24,7 @@ from nonsmooth.flow.engines.methods import warn_if_coarse
 from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.loads import Quantities, checked_loads
 from nonsmooth.flow.options import Settling, Varied, as_called, workers_of
+from nonsmooth.flow.outputs import out_of_bounds
 from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.results.memory import room_for
@@ -281,7 +282,10 @@ class _Sweep:
             arrays["maximum"], arrays["minimum"] = high[0], low[0]
             arrays["clearance"] = np.where(armed_signs(system) > 0, -high[1], low[1])
             if system.outputs and high[2].shape[-1] == len(system.outputs):
-                arrays["output_maximum"], arrays["output_minimum"] = high[2], low[2]
+                beyond = out_of_bounds(system.traced, self.points, high[2], low[2])
+                arrays["output_maximum"], arrays["output_minimum"] = (
+                    np.where(beyond, np.nan, one[2]) for one in (high, low)
+                )
         if asked["judge"] and self.edges is None:
             arrays |= standing_in_sweep(settler, self.points, arrays, gather("kept.section")[..., 0, :])
         loaded = gather("loads")  # by name

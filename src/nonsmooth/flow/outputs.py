@@ -13,6 +13,8 @@ from nonsmooth.flow.engines.engine import FloatArray
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
 
+ROUNDING = 1e-9  # of a force, by which it may seem beyond its bound
+
 
 def output_values(
     traced: Traced, parameters: FloatArray, time: FloatArray, u: FloatArray, memory: FloatArray, mode: Any
@@ -61,6 +63,34 @@ def _shared(
 
         forces[here] = (rows or decider.make).shared(*decider.modes[int(m)], forces[here], value)
     return forces
+
+
+def out_of_bounds(traced: Traced, points: FloatArray, high: FloatArray, low: FloatArray) -> Any:
+    """Marks of the extremes (..., P, O) of forces that a kernel does not know.
+
+    Elements that bear one load together share it by least norm within their bounds; kernels know nothing of these."""
+    from sympy import lambdify
+
+    found = np.zeros(high.shape, dtype=bool)
+    known = traced.patterns or traced.decider
+    if known is None or known.make.rubbing:
+        return found
+    make, mode = known.make, next(iter(known.make.fields))
+    of = {k: traced.output_names.index(f"{make.parts[k].name}_force") for k in make.sharing(mode)}
+    beyond = np.zeros(high.shape[:-1], dtype=bool)
+    for k, i in of.items():
+        element = make.parts[k].element
+        pattern = tuple(element.phases.index(element.held[0]) if j == k else 0 for j in range(len(make.parts)))
+        most = element.most(make.place(k, mode, pattern))
+        if most is None:
+            beyond |= low[..., i] < -ROUNDING * np.abs(high[..., i])
+        elif element.exceeds or not most.free_symbols <= set(traced.p):
+            beyond |= True
+        else:
+            bound = lambdify([traced.p], most, modules="numpy")(points.T) * np.ones(len(points))
+            beyond |= np.maximum(high[..., i], -low[..., i]) > (1.0 + ROUNDING) * bound
+    found[..., list(of.values())] = beyond[..., None]
+    return found
 
 
 @lru_cache(maxsize=128)

@@ -253,8 +253,9 @@ def sweep(
             if name in arrays:
                 told = f"{stem} of {output}", quantity.unit
                 variables[f"{output}_{stem}"] = labelled(leading, floats(arrays[name][..., i]), *told)
-    for name, (load, words, unit) in (loads or {}).items():  # a maximum of an output is there already
-        variables.setdefault(name, labelled(leading, floats(load), words, unit))
+    for name, (load, words, unit) in (loads or {}).items():
+        dims, known_by_now, told = variables.get(name, labelled(leading, floats(load), words, unit))
+        variables[name] = dims, np.where(np.isnan(known_by_now), load, known_by_now), told
     along: dict[str, Any] = {**varied(labels, parameter, values), "direction": [*directions]}
     if edges is not None:
         variables["bin_edge"] = (("state", "edge"), floats(edges), {"long_name": "edges of the bins, per state"})

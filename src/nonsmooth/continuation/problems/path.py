@@ -104,7 +104,7 @@ class Walk:
         for i, (k, r) in enumerate(zip(self.fired, self.fired_row, strict=True)):
             if k >= 0:  # of those behind it none is taken that holds wherever it does, or by the condition that fires
                 own, fires_by = set(jumps[k].rows), jumps[k].rows[r - self.net.row_start[k]] if r >= 0 else None
-                taken = [jump.rows and (set(jump.rows) <= own or fires_by in jump.rows) for jump in jumps[k:]]
+                taken = [bool(jump.rows) and (set(jump.rows) <= own or fires_by in jump.rows) for jump in jumps[k:]]
                 self.elsewhere[i, k] = False
                 self.elsewhere[i, k:] &= ~np.array(taken, dtype=bool)
             if traced.asks and r >= 0:  # what several decide fires with what one does, of its own or of their condition
@@ -217,7 +217,9 @@ class Walk:
         held[0] = -np.inf
         for i in self.instants:  # what happens at once must hold; the others: ``elsewhere``
             k = self.fired[i]
-            held[i], held[i, k] = -np.inf, 0.0 if zero[i, k] else -begin[i, k]
+            held[i] = -np.inf
+            if self.net.row_start[k] < self.net.row_start[k + 1]:
+                held[i, k] = 0.0 if zero[i, k] else -begin[i, k]
         return held
 
     def clearance(self, path: Path, indicators: int) -> FloatArray:
@@ -232,11 +234,12 @@ class Walk:
 
 
 def _in_net(traced: Traced, net: Any, k: int, row: int) -> tuple[int, int]:
-    """A transition and the row of it that is zero, as the transition table has them: a question for its answer."""
+    """A transition and the row of it that is zero, as the transition table has them: a question for its answer. (Where
+    no row is zero and several elements were asked, no condition of the table had to hold.)"""
     jump = traced.transitions[k] if k >= 0 else None
     if jump is not None and jump.kind == FOUND:
-        fired = jump.rows[max(row, 0)]
         for j, other in enumerate(traced.transitions):
-            if other.source == jump.source and other.fires and fired in other.rows:
-                return j, int(net.row_start[j]) + other.rows.index(fired) if row >= 0 else -1
+            same = jump.rows[row] in other.rows if row >= 0 else jump.rows == other.rows
+            if other.source == jump.source and other.fires and same:
+                return j, int(net.row_start[j]) + other.rows.index(jump.rows[row]) if row >= 0 else -1
     return k, -1 if row < 0 else int(net.row_start[k]) + row

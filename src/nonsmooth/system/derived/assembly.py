@@ -202,6 +202,15 @@ class Assembler(ABC):
         parts = parts or [self.parts[k] for k in some]
         return [[self.across(self.rate(i, mode), part) for part in parts] for i in some]
 
+    def sharing(self, mode: str) -> list[int]:
+        """Elements that may hold a rate together with others, so that their forces are not unique."""
+        held = [k for k, part in enumerate(self.parts) if part.element.held]
+        rows = np.array([self.slopes(self.rate(k, mode)) for k in held])
+        rows /= np.linalg.norm(rows, axis=-1, keepdims=True)
+        rank = len(independent(rows, range(len(held)))[0])
+        rest = (np.delete(rows, i, axis=0) for i in range(len(held)))
+        return [k for k, one in zip(held, rest, strict=True) if len(independent(one, range(len(one)))[0]) == rank]
+
     @property
     def striking(self) -> list[int]:
         """The rigid stops."""

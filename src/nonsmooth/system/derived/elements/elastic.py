@@ -144,6 +144,7 @@ class PreloadedSpring(Displaced):
     laws = ("preload", "stiffness")
     conditions = ("over", "under", "side", "fast", "beyond")
     held = ("held",)
+    exceeds = True
     sides = ("above", "below")
 
     def limits(self, here: Place) -> list[tuple[Any, str]]:

@@ -69,6 +69,7 @@ class Element(ABC):
     sides: ClassVar[tuple[str, str]] = ("", "")  # the phases in which it lets go, its rate rising or falling
     strikes: ClassVar[bool] = False  # its impacts turn speeds at once
     bears: ClassVar[bool] = False  # while it is held it bears its part of an impulse
+    exceeds: ClassVar[bool] = False  # its force goes beyond ``most`` where it is not held
     drives: ClassVar[str] = "drives its speed up"  # a positive force
     slow: ClassVar[float] = SLOW  # of the scale of its rate: below it it may hold, where a place decides
     presses: ClassVar[bool] = False  # its law is a normal force for friction
