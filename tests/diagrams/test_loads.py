@@ -369,3 +369,32 @@ def test_loads_are_refused_where_there_are_none() -> None:
             verb()
     with pytest.raises(TypeError, match="loads = 'yes'; allowed: True, False"):
         ns.sweep(between_stops(0.5), "e", [0.5], loads="yes")
+
+
+@pytest.mark.parametrize(("friction", "stop", "rub"), [(0.3, 1.2, -0.25), (2.0, 0.75, -0.25)])
+def test_a_load_that_two_elements_share_stays_within_their_bounds(friction: float, stop: float, rub: float) -> None:
+    """1 + cos(t) / 2 presses a block onto a stop, where it sticks: each bears half, but friction no more than it can.
+
+    Without ``loads`` the extremes are those of halves, and unknown where friction cannot bear its own."""
+    system = ns.mechanical(
+        1.0,
+        0.1,
+        1.0,
+        parameters={"omega": 1.0},
+        forcing={"q": lambda t, p: 1.0 + 0.5 * np.cos(p.omega * t)},
+        elements={
+            "stop": Stop(at="q", position=0.0, restitution=0.5),
+            "rub": Coulomb(at="q", friction=friction),
+        },
+    )
+    options: dict[str, Any] = {"direction": None, "transient": 5, "keep": 4, "progress": False}
+    swept = ns.sweep(system, "omega", [1.0], loads=True, **options).squeeze()
+    assert [float(swept[f"{name}_force_maximum"]) for name in ("stop", "rub")] == pytest.approx([stop, rub], abs=1e-6)
+    run = ns.simulate(system, periods=3, samples=301)
+    assert [run[f"{name}_force"].values.max() for name in ("stop", "rub")] == pytest.approx([stop, rub], abs=1e-9)
+    bare = ns.sweep(system, "omega", [1.0], **options).squeeze()
+    ends = [float(bare[f"{name}_force_{end}"]) for name in ("stop", "rub") for end in ("maximum", "minimum")]
+    if friction > 0.75:
+        assert ends == pytest.approx([0.75, 0.25, -0.25, -0.75], abs=1e-9)
+    else:
+        assert np.isnan(ends).all()

@@ -236,16 +236,18 @@ class Meter:
                 outputs = output_values(traced, values, time, log.sample_u, log.sample_memory, log.sample_mode)
                 names = list(traced.output_names)
                 force = outputs[:, [names.index(f"{load.name}_force") for load in self.elements]]
-                work = np.hstack([-force * moved, power]).reshape(len(half), NODES, -1)
-                tails = np.abs(np.einsum("kx,pxi->pki", back[-2:], work)).max(axis=(0, 1), initial=0.0)
-                fine = tails <= tail * np.abs(work).max(axis=(0, 1), initial=0.0)
+                seen = np.hstack([force, -force * moved, power]).reshape(len(half), NODES, -1)
+                tails = np.abs(np.einsum("kx,pxi->pki", back[-2:], seen)).max(axis=(0, 1), initial=0.0)
+                fine = tails <= tail * np.abs(seen).max(axis=(0, 1), initial=0.0)
                 if fine.all() or piece * FINEST * returns * PIECES < duration:
                     break
                 piece /= 2.0
         except _Failed:
             return None
-        total = np.einsum("p,x,pxi->i", half, weight, work) / returns
-        highest = _highest(force.reshape(len(half), NODES, -1), back)
+        count = len(self.elements)
+        total = np.einsum("p,x,pxi->i", half, weight, seen[..., count:]) / returns
+        # Where no polynomial describes it, the largest sample: one overshoots at a kink.
+        highest = np.where(fine[:count], _highest(seen[..., :count], back), force.max(axis=0))
         size = np.nanmax(np.abs(np.vstack([log.sample_u, log.u_before, log.u_after])), axis=0)
         impulses, speed, _, taken = self.impacts(
             values, log.crossing_time, log.u_before, log.u_after, log.memory_after, size

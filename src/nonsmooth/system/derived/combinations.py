@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.patterns import Patterns
 
 MOST = 256  # modes that are written out
-OWN_KINDS = ("transitions", "indicators", "memory", "symmetry", "bands")  # what stands beside written modes alone
 
 
 def _natural(item: tuple[Any, Any]) -> list[Any]:
@@ -98,8 +97,6 @@ def assembled(
         why = f"have more than {MOST} combinations of phases"
         return _opened(make, base, given, "rub" if make.rubbing else "strike in sequence" if make.sequential else why)
     make.asks = _decide_together(make, base, resets)
-    if make.asks and named is None and not any(given[key] for key in OWN_KINDS) and _affine(make, base, given):
-        return _opened(make, base, given, "decide together")
     try:
         return _written_out(make, base, given, counts, named)
     except VaryingError as error:
@@ -234,7 +231,7 @@ def _opened(
     from nonsmooth.system.derived.patterns import Patterns
 
     make.asks = True
-    if len(base) > 1 or any(given[key] for key in OWN_KINDS):
+    if len(base) > 1 or any(given[key] for key in ("transitions", "indicators", "memory", "symmetry", "bands")):
         raise SystemDefinitionError(
             f"its elements {why}, so that their modes are made when they are visited: such a system has one mode and "
             "no indicators, transitions, memory, symmetry or bands of its own"
