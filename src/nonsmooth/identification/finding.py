@@ -37,6 +37,8 @@ class Estimate:
     logarithmic: bool = False
 
     def __post_init__(self) -> None:
+        if self.uncertainty != self.uncertainty:
+            raise ValueError("the data leave a value undetermined: its standard uncertainty would not be a number")
         if not self.uncertainty >= 0:
             raise ValueError(f"a standard uncertainty is zero or more, not {self.uncertainty!r}")
 

@@ -37,6 +37,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nonsmooth import SolveError
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth_savi2007.arrays import FloatArray
@@ -201,6 +202,11 @@ def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: Quantity, *, resol
     """
     peaks = [_peaks(runs[i], span, decay, resolution) for i, span in zip(decay.runs, decay.spans, strict=True)]
     viscous = np.array([decay_rate(*row) for row in peaks if len(row[0]) > 2]).reshape(-1, 3)
+    if not len(viscous):
+        raise SolveError(
+            f"no tap has three turning points that stand {resolution:g} m apart, so its decrement is not known: a "
+            "motion that does not decay, or a length on the pulley that is wrong"
+        )
     weight = 1.0 / viscous[:, 2]
     rate = -2 * float(np.average(viscous[:, 0], weights=weight))
     rate_error = 2 * float(np.sqrt(1 / np.sum(weight)))
