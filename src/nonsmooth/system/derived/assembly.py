@@ -204,7 +204,7 @@ class Assembler(ABC):
 
     def sharing(self, mode: str) -> list[int]:
         """Elements that may hold a rate together with others, so that their forces are not unique."""
-        held = [k for k, part in enumerate(self.parts) if part.element.held]
+        held = [k for k, part in enumerate(self.parts) if {*part.element.held} & {*part.element.phases}]
         rows = np.array([self.slopes(self.rate(k, mode)) for k in held])
         rows /= np.linalg.norm(rows, axis=-1, keepdims=True)
         rank = len(independent(rows, range(len(held)))[0])
