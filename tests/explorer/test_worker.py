@@ -129,3 +129,11 @@ def test_one_that_ends_says_so_and_can_be_started_again(worker: Worker, answers:
     worker.start()
     worker.ask(4, job("orbit"))
     assert last_of(answers, 4)[0] == "done"
+
+
+def test_work_that_is_cancelled_while_it_waits_is_answered(worker: Worker, answers: queue.Queue[Answer]) -> None:
+    """Else the page waits for it."""
+    worker.ask(901, job("diagram", columns=60))
+    worker.ask(902, job("diagram"))
+    worker.cancel(902)
+    assert last_of(answers, 902)[0] == "cancelled"

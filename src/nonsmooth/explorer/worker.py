@@ -158,9 +158,12 @@ def main() -> None:
     send(("ready", 0, None))
     while (request := waiting.get()) is not None:
         number, job = request
-        if number not in cancelled.numbers:
-            with suppress(BrokenPipeError):
-                send(_answer(number, job, compute, cancelled, send))
+        with suppress(BrokenPipeError):  # one that was cancelled while it waited is answered too
+            send(
+                ("cancelled", number, None)
+                if number in cancelled.numbers
+                else _answer(number, job, compute, cancelled, send)
+            )
         cancelled.numbers.discard(number)
 
 
