@@ -170,3 +170,8 @@ def test_an_error_inside_a_function_keeps_its_traceback():
     with pytest.raises(SystemDefinitionError, match=r"mode 'only' .function `field`.*IndexError") as caught:
         make(field)
     assert isinstance(caught.value.__cause__, IndexError)
+
+
+def test_whether_a_contact_begins_is_no_word():
+    with pytest.raises(SystemDefinitionError, match="`contact` is True, False or None, not 'no'"):
+        Transition("free", "contact", when="gap > 0", contact="no")

@@ -58,6 +58,8 @@ class Transition:
             raise SystemDefinitionError(
                 f"{self.label}: `write` must map names of memory to functions f(t, u, p), not {self.write!r}"
             )
+        if self.contact not in (None, True, False):
+            raise SystemDefinitionError(f"{self.label}: `contact` is True, False or None, not {self.contact!r}")
         if self.source == self.target and self.reset is None and not self.write:
             raise SystemDefinitionError(f"{self.label}: a transition into its own mode needs a `reset` or a `write`")
 
@@ -68,7 +70,7 @@ class Transition:
 
     def begins_contact(self, first: str) -> bool:
         """Return whether a contact begins by it, in a system with this ``first`` mode."""
-        return bool(self.reset or self.source == first) if self.contact is None else bool(self.contact)
+        return bool(self.reset or self.source == first) if self.contact is None else self.contact
 
 
 @dataclass(frozen=True)
