@@ -108,7 +108,7 @@ def compared(plane: str, side: int) -> list[str]:
     cpu, gpu, points, starts = settlers(side, plane, stop_early=False)
     rows = np.arange(len(points))
     a, b = cpu.run(points, rows, starts), gpu.run(points, rows, starts)
-    names = {"contacts_per_period": "contacts", "period_number": "period_number", "status": "status"}
+    names = {"crossings_per_period": "crossings", "period_number": "period_number", "status": "status"}
     one, other = (
         labels_of_points({name: getattr(found, key) for name, key in names.items()}).reshape(side, side)
         for found in (a, b)

@@ -144,6 +144,15 @@ def test_every_kernel_compiles_for_the_types_it_is_launched_with(
         cache.set(f"gpu/{optimised}", key)
 
 
+def test_the_benchmark_compares_both_devices() -> None:
+    code = "import gpu, gpu_valve as v; v.TRANSIENT, v.KEEP = 6, 4; print(*gpu.compared('Fig. 9', 3), *v.compared(2))"
+    paths = os.pathsep.join([*sys.path, str(SCRIPT.parents[2] / "benchmarks")])
+    chart, valve, _ = run(["-c", code], NUMBA_ENABLE_CUDASIM="1", PYTHONPATH=paths).split("- ")[1:]
+    assert "0.000% of the labels differ" in chart
+    assert "9 periodic points" in chart
+    assert "0.000% of the labels differ" in valve
+
+
 def test_tables_are_built_once_for_each_point(simulated: dict[str, Any]) -> None:
     """Four points of a chart and of its exponents, three of a sweep, two of spectra; whatever launches and starts."""
     built = {verb: simulated["results"][verb]["built"] for verb in ("chart", "every_period", "sweep", "lyapunov")}
