@@ -21,6 +21,7 @@ from bokeh.models import ColumnDataSource
 from nonsmooth.explorer import session as sessions
 from nonsmooth.explorer.catalogue import Catalogue
 from nonsmooth.explorer.session import Page
+from nonsmooth.explorer.worker import _Process
 
 FEW = "columns=10&transient=20&keep=8&low=0.2&high=0.3"
 PATIENCE = 120.0
@@ -79,6 +80,12 @@ def tabs() -> Iterator[list[Page]]:
         one._close()
 
 
+@pytest.fixture
+def new_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No page takes over the process of another one, which has its environment."""
+    monkeypatch.setattr(_Process, "idle", _Process)
+
+
 def test_nothing_of_a_model_stands_under_the_name_of_the_next(tabs: list[Page]) -> None:
     """The figures, the line above them and the names of the axes are blank until the new motion is there."""
     tab = Tab(tabs)
@@ -95,6 +102,7 @@ def test_nothing_of_a_model_stands_under_the_name_of_the_next(tabs: list[Page]) 
         assert (plot.xaxis[0].axis_label, plot.title.text) == (None, "")
 
 
+@pytest.mark.usefixtures("new_processes")
 def test_a_compile_is_said(tabs: list[Page], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path))
     tab = Tab(tabs, f"model=stick_slip_belt&{FEW}")
@@ -103,6 +111,7 @@ def test_a_compile_is_said(tabs: list[Page], tmp_path: Path, monkeypatch: pytest
     assert tab.busy[-1] | {"view": ""} == {"view": "", "fraction": 0, "long": True, "compiling": True}
 
 
+@pytest.mark.usefixtures("new_processes")
 def test_a_process_that_cannot_start_is_given_up(tabs: list[Page], tmp_path: Path, monkeypatch: Any) -> None:
     broken, log = tmp_path / "python", tmp_path / "starts"
     broken.write_text(f"#!/bin/sh\necho start >> {log}\nexit 3\n")

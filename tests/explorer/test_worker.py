@@ -15,7 +15,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.explorer.catalogue import first_state
-from nonsmooth.explorer.worker import Answer, Worker, _Cancelled
+from nonsmooth.explorer.worker import Answer, Worker, _Cancelled, _Process, end_spare, prepare
 
 SYSTEM = ns.models.discontinuous_support()
 
@@ -137,3 +137,31 @@ def test_work_that_is_cancelled_while_it_waits_is_answered(worker: Worker, answe
     worker.ask(902, job("diagram"))
     worker.cancel(902)
     assert last_of(answers, 902)[0] == "cancelled"
+
+
+def test_a_page_takes_over_the_process_of_one_that_was_closed() -> None:
+    """Cancelled is what the other one had asked, and its answers reach nobody."""
+    first, second = queue.Queue[Answer](), queue.Queue[Answer]()
+    one = Worker(first.put)
+    process = one._process
+    assert process is not None
+    one.ask(1, job("diagram", columns=200_000))  # an hour
+    while first.get(timeout=120)[:2] != ("progress", 1):
+        pass
+    one.close()
+    one.ask(2, job("orbit"))  # of a page that is not there any more
+    end = time.monotonic() + 60
+    while _Process.spare is not process:
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    other = Worker(second.put)
+    assert other._process is process
+    other.ask(1, job("orbit"))
+    assert last_of(second, 1)[0] == "done"
+    assert {kind for kind, *_ in first.queue} <= {"progress"}
+    prepare()  # one more waits
+    waiting = _Process.spare
+    other.close()
+    process._popen.wait(30)  # of two that nobody hears one ends
+    assert _Process.spare is waiting
+    end_spare()

@@ -63,6 +63,7 @@ def explore(
     mpl.use("Agg")  # figures are made for files, in threads
     from nonsmooth.explorer.access import Access
     from nonsmooth.explorer.catalogue import Catalogue
+    from nonsmooth.explorer.worker import end_spare, prepare
 
     catalogue = Catalogue.of(system)
     catalogue.state_of(parse_qsl(query))  # a query that does not fit is refused before anything is served
@@ -84,6 +85,7 @@ def explore(
         session_token_expiration=3600,
     )
     access.listen_at(number)
+    prepare()
     server.start()
     origin = f"http://127.0.0.1:{number}"
     address = f"{origin}/?token={access.token}"
@@ -97,6 +99,7 @@ def explore(
             server.io_loop.start()
         finally:
             server.stop()
+            end_spare()
 
 
 def _open(catalogue: Catalogue, query: str, tabs: list[Page], document: Any) -> None:

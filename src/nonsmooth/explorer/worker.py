@@ -1,5 +1,6 @@
 """A process that computes, and the page's side of it: asked, cancelled, started again where it ended.
 
+Where a page is closed its process waits for the next one, which need not load everything again.
 Requests and answers are pickles on the two pipes of the process, both ends of which are ours. A request may be
 cancelled: the verbs hear of it through their ``progress``, and those that say nothing for a while as Ctrl-C.
 """
@@ -25,6 +26,7 @@ from nonsmooth.kernels.compile.forking import is_importing
 
 _OFTEN = 0.15  # seconds between two words on progress
 _SILENT = 1.0  # seconds in which cancelled work must end before it is interrupted
+_DEAF = 10.0  # seconds after which the process of a page that was closed is ended, where it is still at work
 
 #: ``(kind, number, content)``: "ready" to take work, "progress" with the fraction done, "compiling" with the name of a
 #: kernel, "done" with results and warnings, "cancelled", "error" with a sentence, "ended" with the process's exit code.
@@ -32,7 +34,7 @@ Answer = tuple[str, int, Any]
 
 
 class Worker:
-    """The process that computes for one page.
+    """The process that computes for one page: one that another page has left, or a new one.
 
     Parameters
     ----------
@@ -42,28 +44,21 @@ class Worker:
 
     def __init__(self, hear: Callable[[Answer], None]) -> None:
         self._hear = hear
-        self._closed = False
-        self._process: subprocess.Popen[bytes] | None = None
-        self._lock = threading.Lock()
         self.start()
 
     def start(self) -> None:
         """Start the process, in place of one that has ended."""
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "nonsmooth.explorer.worker"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env={**os.environ, "MPLBACKEND": "Agg"},
-        )
-        threading.Thread(target=self._listen, args=(self._process,), daemon=True).start()
+        self._process: _Process | None = _Process.idle(self._hear)
 
     def ask(self, number: int, job: Mapping[str, Any]) -> None:
         """Hand over a request; its answers bear this number."""
-        self._send(("ask", number, dict(job)))
+        if self._process is not None:
+            self._process.ask(number, dict(job))
 
     def cancel(self, number: int) -> None:
         """Say that a request is not wanted any more."""
-        self._send(("cancel", number, None))
+        if self._process is not None:
+            self._process.cancel(number)
 
     def end(self) -> None:
         """End the process, whatever it does now; ``start`` begins another one."""
@@ -71,30 +66,127 @@ class Worker:
             self._process.kill()
 
     def close(self) -> None:
-        """End for good."""
-        self._closed = True
-        self.end()
+        """Leave the process to the next page; what it was asked is cancelled."""
+        if self._process is not None:
+            self._process.leave()
+        self._process = None
+
+
+class _Process:
+    """A process that computes, for the one that hears it; one that nobody hears any more waits for the next."""
+
+    spare: _Process | None = None
+    lock = threading.RLock()  # of the spare one, and of who hears whom
+
+    def __init__(self, hear: Callable[[Answer], None] | None = None) -> None:
+        self.hear = hear
+        self._ready, self._count = False, 0
+        self._asked: dict[int, int] = {}  # number here, and that of the one who asked
+        self._writing = threading.Lock()
+        self._popen = subprocess.Popen(
+            [sys.executable, "-P", "-m", "nonsmooth.explorer.worker"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env={**os.environ, "MPLBACKEND": "Agg"},
+        )
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    @classmethod
+    def idle(cls, hear: Callable[[Answer], None]) -> _Process:
+        """The one that waits, or a new one, heard from now on."""
+        with cls.lock:
+            one, cls.spare = cls.spare, None
+            if one is None or one._popen.poll() is not None:
+                return cls(hear)
+            one.hear = hear
+            if one._ready:
+                hear(("ready", 0, None))
+            return one
+
+    def ask(self, number: int, job: dict[str, Any]) -> None:
+        with self.lock:
+            self._count += 1
+            self._asked[self._count] = number
+        self._send(("ask", self._count, job))
+
+    def cancel(self, number: int) -> None:
+        for own in [own for own, other in self._asked.copy().items() if other == number]:
+            self._send(("cancel", own, None))
+
+    def kill(self) -> None:
+        self._popen.kill()
+
+    def leave(self) -> None:
+        """Wait for the next page, once what was asked has been cancelled."""
+        with self.lock:
+            self.hear, unwanted = None, [*self._asked]
+            self._rest()
+        for own in unwanted:
+            self._send(("cancel", own, None))
+        if unwanted:
+            late = threading.Timer(_DEAF, self._end_if_at_work)
+            late.daemon = True
+            late.start()
+
+    def _rest(self) -> None:
+        if self.hear is None and not self._asked and _Process.spare is not self:
+            if _Process.spare is not None:
+                self.kill()
+            else:
+                _Process.spare = self
+
+    def _end_if_at_work(self) -> None:
+        with self.lock:
+            if self.hear is None and self._asked:
+                self.kill()
 
     def _send(self, message: Any) -> None:
-        process = self._process
-        assert process is not None
-        assert process.stdin is not None
-        with self._lock, suppress(OSError, ValueError):  # one that has ended is reported by the thread that listens
-            pickle.dump(message, process.stdin)
-            process.stdin.flush()
+        assert self._popen.stdin is not None
+        with self._writing, suppress(OSError, ValueError):  # one that has ended is reported by the thread that listens
+            pickle.dump(message, self._popen.stdin)
+            self._popen.stdin.flush()
 
-    def _listen(self, process: subprocess.Popen[bytes]) -> None:
-        assert process.stdout is not None
+    def _listen(self) -> None:
+        assert self._popen.stdout is not None
         with suppress(EOFError, OSError, pickle.UnpicklingError):
             while True:
-                self._hear(pickle.load(process.stdout))
-        code = process.wait()
-        for pipe in (process.stdin, process.stdout):
+                self._take(pickle.load(self._popen.stdout))
+        code = self._popen.wait()
+        for pipe in (self._popen.stdin, self._popen.stdout):
             with suppress(OSError):
                 assert pipe is not None
                 pipe.close()
-        if not self._closed:
-            self._hear(("ended", 0, code))
+        with self.lock:
+            if _Process.spare is self:
+                _Process.spare = None
+            if self.hear is not None:
+                self.hear(("ended", 0, code))
+
+    def _take(self, answer: Answer) -> None:
+        kind, own, content = answer
+        with self.lock:
+            self._ready = True
+            number = self._asked.get(own, 0)
+            if kind in ("done", "cancelled", "error"):
+                self._asked.pop(own, None)
+            if self.hear is not None:
+                self.hear((kind, number, content))
+            self._rest()
+
+
+def prepare() -> None:
+    """Start the process of the first page, which takes a while."""
+    with _Process.lock:
+        if _Process.spare is None:
+            _Process.spare = _Process()
+
+
+def end_spare() -> None:
+    """End the process that waits for a page."""
+    with _Process.lock:
+        if _Process.spare is not None:
+            _Process.spare.kill()
+        _Process.spare = None
 
 
 class _Cancelled:
