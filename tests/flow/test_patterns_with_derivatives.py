@@ -158,7 +158,7 @@ def test_an_orbit_and_its_branch_go_on_from_a_file(tmp_path):
 
 
 def test_orbits_and_branches_are_those_of_the_system_written_out(monkeypatch):
-    written = pair()
+    written = pair().written_out()
     assert len(written.modes) > 1
     monkeypatch.setattr(combinations, "MOST", 1)
     visited = pair()

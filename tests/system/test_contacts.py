@@ -5,7 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import time
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +16,16 @@ from scipy.optimize import brentq
 
 import nonsmooth as ns
 from nonsmooth.elements import Coulomb, ElasticStop, PreloadedSpring, Stop
+from nonsmooth.system.description import describe
 
 Force = Callable[[Any, Any], Any]
 
 
-@pytest.fixture(params=["rows", "series"], autouse=True)
+@pytest.fixture(params=["visited", "rows", "series"], autouse=True)
 def calculus(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ask elements by rows of numbers, and by Taylor series as where something is not affine."""
+    """Ask by rows, in modes that are visited or written out, and by series as where something is not affine."""
+    if request.param == "rows":
+        monkeypatch.setattr("nonsmooth.system.system.describe", partial(describe, written=True))
     two_stops.cache_clear()
     if request.param == "series":
         monkeypatch.setattr("nonsmooth.system.derived.combinations._affine", lambda *given: None)

@@ -37,7 +37,7 @@ def pair() -> ns.System:
 @pytest.fixture
 def both(monkeypatch: pytest.MonkeyPatch) -> tuple[ns.System, ns.System]:
     """All twelve combinations written out; the same as patterns that are made when they are visited."""
-    written = pair()
+    written = pair().written_out()
     monkeypatch.setattr(combinations, "MOST", 0)
     return written, pair()
 

@@ -133,7 +133,7 @@ class Mapper:
         from nonsmooth.kernels.hybrid import blocks, records
         from nonsmooth.kernels.judging.driver import Runs
 
-        march, plan, (one, other) = self.march, self.settler.plan, self.states
+        march, plan, (one, other) = self.march, self.engine.placed(tables, self.settler.plan), self.states
         march.returns(0, 0, one, None, plan, 0, 0, self.kept)
         first, work = march.call.record, self._system(tables, row)[3]
         second = first._replace(motion=other.motion())

@@ -80,7 +80,7 @@ def continue_equilibrium(
     low, high = limits(system, parameter, range, system.values.get(parameter), what="the system")
     here = system.values[parameter]
     state = first_state(system, start, mode)
-    modes = None if mode is None else [list(system.modes).index(mode)]
+    modes = None if mode is None else [int(state.counters[0])]
     first: Rest | None = None
     for rest in equilibria_near(system, parameter, high - low, np.nan_to_num(state.u), here, modes):
         inside = (rest.margins < 0.0).all()

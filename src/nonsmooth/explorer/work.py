@@ -81,7 +81,7 @@ def compute(asked: Mapping[str, Any], heard: Heard) -> dict[str, Any]:
     system = _system(asked["text"]).with_parameters(asked["values"])
     if asked["method"] == "smoothed":
         system = system.smoothed(asked["eta"])
-    return _WORK[asked["view"]](Job(system, asked, heard))
+    return _WORK[asked["view"]](Job(system.as_solved_by(asked), asked, heard))
 
 
 @lru_cache(maxsize=8)

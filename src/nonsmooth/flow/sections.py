@@ -96,13 +96,15 @@ def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare,
         return section, Section(phase=section.phase)
     if not isinstance(section, Poincare):
         raise TypeError(f"section must be ns.Stroboscopic(...) or ns.Poincare(...), not {shortened(section)}")
+    from nonsmooth.flow.starts import mode_number
     from nonsmooth.system.names import unknown
 
-    indicators, modes = list(system.indicators), list(system.modes)
+    indicators = list(system.indicators)
+    mode = -1 if section.mode is None else mode_number(system, section.mode)
     if section.indicator not in indicators:
         raise ValueError(unknown(section.indicator, "an indicator", repr(system.name), indicators))
-    if section.mode is not None and section.mode not in modes:
-        raise ValueError(unknown(section.mode, "a mode", repr(system.name), modes))
+    if mode is None:
+        raise ValueError(unknown(str(section.mode), "a mode", repr(system.name), system.written_out().modes))
     t_max = section.t_max
     if t_max is None:
         t_max = 1e6 if period is None else 1e3 * period
@@ -110,7 +112,7 @@ def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare,
         phase=-1.0,
         indicator=indicators.index(section.indicator),
         rising=0 if section.rising is None else 2 * int(section.rising) - 1,
-        mode=-1 if section.mode is None else modes.index(section.mode),
+        mode=mode,
         after=int(section.side == "after"),
         every=int(section.every),
         t_max=float(t_max),

@@ -93,6 +93,8 @@ def simulate(
         The run could not be completed; it says where and why.
     """
     asked = as_called(locals())
+    if ramps:
+        system = system.written_out()
     period = system.period()
     unit, length = run_length(system, periods, duration, period)
     if not is_one_start(start):
@@ -149,8 +151,6 @@ def simulate(
 
 def _resting(system: System, begun: FloatArray, log: TrajectoryLog, state: State) -> str:
     """The equilibrium at which a run begins and stays, in a sentence; a warning too where it is unstable."""
-    if system.traced.patterns is not None:
-        return ""
     still = ROUNDING * (system.scale_vector() + begun)
     few = log.sample_u[:: max(1, len(log.sample_u) // 64)]  # most runs are seen to move by these
     for u in (begun * np.sign(state.u), few, log.sample_u, log.u_before, log.u_after):
@@ -164,7 +164,7 @@ def _resting(system: System, begun: FloatArray, log: TrajectoryLog, state: State
         warnings.warn(
             f"simulate of {system.name!r}: {text}, though any other motion nearby leaves it; give start=, a state "
             "beside it",
-            stacklevel=3,
+            stacklevel=4,
         )
     return text
 

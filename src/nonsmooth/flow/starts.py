@@ -134,19 +134,27 @@ def first_state(system: System, start: Any, mode: str | None = None) -> State:
     ValueError
         A mode that does not exist, and what :func:`start_states` raises.
     """
-    modes = list(system.modes)
     state = State(start_states(system, start)[0].copy(), system.memory_vector())
     if hasattr(start, "data_vars"):
         ended = start["mode"].attrs["flag_meanings"].split()[int(start["mode"].values[-1])]
-        state.counters[0] = modes.index(ended) if ended in modes else 0
+        state.counters[0] = mode_number(system, ended) or 0
         for i, name in enumerate(system.memory):
             if name in start:
                 state.memory[i] = float(start[name].values[-1])
     if mode is not None:
-        if mode not in modes:
-            raise ValueError(unknown(mode, "a mode", repr(system.name), modes))
-        state.counters[0] = modes.index(mode)
+        if (number := mode_number(system, mode)) is None:
+            raise ValueError(unknown(mode, "a mode", repr(system.name), system.written_out().modes))
+        state.counters[0] = number
     return state
+
+
+def mode_number(system: System, name: Any) -> int | None:
+    """The number of a mode by its name, one that no run has visited yet too; None where there is none."""
+    patterns, modes = system.traced.patterns, system.modes
+    if patterns is not None and isinstance(name, str):
+        found: int | None = patterns.named(name)
+        return found
+    return modes.index(name) if name in modes else None
 
 
 def _state(system: System, start: Any) -> FloatArray:

@@ -133,7 +133,10 @@ class _Door:
             self.fit(given, named)
         readers = self.readers
         read = {name: readers[name](value, name) if name in readers else value for name, value in values.items()}
-        return self.shared | read
+        read = self.shared | read
+        if "system" in read and "method" in read:
+            read["system"] = read["system"].as_solved_by(read)
+        return read
 
     @cached_property
     def kinds(self) -> dict[str, Any]:

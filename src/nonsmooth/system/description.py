@@ -62,7 +62,18 @@ class Description:
     relays: bool = False  # the elements are the surfaces that were given
     loads: Loads | None = None  # of a system with elements
     inputs: Mapping[str, str] = field(default_factory=dict)  # those of the states that stand for inputs, by unit
+    written: Callable[[], Description] | None = field(default=None, compare=False, repr=False)
     variants: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # a cache, see variant.py
+
+    def written_out(self) -> Description:
+        """The description with a mode for each combination of its elements' phases, made once."""
+        if self.written is None:
+            return self
+        if "written out" not in self.variants:
+            found = self.written()
+            self.variants["written out"] = found if self.loads is None else found.with_loads(self.loads)
+        written: Description = self.variants["written out"]
+        return written
 
     def with_loads(self, loads: Loads) -> Description:
         """Return the description with these loads, and the units of forces that follow from all others."""
@@ -113,8 +124,13 @@ def describe(
     elements: Any = None,
     impacts: str = "simultaneous",
     inputs: Mapping[str, str] | Sequence[str] | None = None,
+    written: bool = False,
 ) -> Description:
-    """Check everything, call each function once with symbols, and return the description."""
+    """Check everything, call each function once with symbols, and return the description.
+
+    Elements that decide together are ``written`` out as modes where that is asked for, or has to be.
+    """
+    asked = dict(locals())
     if not isinstance(name, str) or not name:
         raise SystemDefinitionError(f"`name` must be a string, not {name!r}")
     if impacts not in IMPACTS:
@@ -163,6 +179,7 @@ def describe(
             "bands": bands,
             "period": period,
             "impacts": impacts,
+            "written": written,
         }
         if relays is None:
             made = assembled(symbols, modes, elements, given, _scale(scale, units, name), now)
@@ -231,6 +248,7 @@ def describe(
         relays=relays is not None,
         loads=loads,
         inputs=driven,
+        written=partial(describe, **{**asked, "written": True}) if made.get("also written") else None,
     )
     return description if loads is None else description.with_loads(loads)
 

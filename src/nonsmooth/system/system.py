@@ -54,8 +54,8 @@ class System:
     bands : mapping of str to Band, optional
         Fields prescribed inside the bands of the smoothed system, by indicator.
     elements : mapping of str to element, or sequence, optional
-        Stops, friction, backlash (:mod:`nonsmooth.elements`): modes and transitions are written for all combinations of
-        their phases; the force of each, without impulses, is an output ``<name>_force``.
+        Stops, friction, backlash (:mod:`nonsmooth.elements`): there is a mode for each combination of their phases (see
+        `written_out`); the force of each, without impulses, is an output ``<name>_force``.
     impacts : {"simultaneous", "sequential"}, optional
         Impacts of several contacts at one instant: all at once by Newton's law, or one after the other, the fastest
         approach first, as of bodies that are not quite in touch.
@@ -163,7 +163,7 @@ class System:
 
     @property
     def modes(self) -> tuple[str, ...]:
-        """Names of the modes, the bands of a smoothed system included."""
+        """Names of the modes, the bands of a smoothed system included; those visited so far (see `written_out`)."""
         return self.traced.mode_names
 
     @property
@@ -210,7 +210,7 @@ class System:
     def traced(self) -> Traced:
         """The equations as expressions; those of the smoothed system where it is smoothed.
 
-        Where modes are made when they are first visited, the names of those visited so far."""
+        Where modes are made when they are first visited, the names of those visited so far (see `written_out`)."""
         return self._variant.visited
 
     @property
@@ -220,9 +220,10 @@ class System:
 
     @property
     def derivatives(self) -> Derivatives:
-        """Exact derivatives of the equations, shared by all copies."""
-        self.refuse_patterns("what needs derivatives of the equations")
-        return self._variant.derivatives
+        """Exact derivatives of the equations (`written_out`), shared by all copies."""
+        whole = self.written_out()
+        whole.refuse_patterns("what needs derivatives of the equations")
+        return whole._variant.derivatives
 
     @property
     def is_smoothed(self) -> bool:
@@ -313,6 +314,23 @@ class System:
         new = changed_values(self._variant, self._values, self.name, given, values)
         return self._make(self._description, new, self._variant)
 
+    def written_out(self) -> Self:
+        """Return the same system with all its modes, indicators and transitions as expressions.
+
+        Elements whose forces depend on each other (two stops on coupled masses, a stop and a friction) have modes that
+        are made when a run visits them. What needs expressions (a series, a band, derivatives, LaTeX, a fit) writes all
+        of them out by itself; here they are to be looked at. Many elements take seconds.
+        """
+        description = self._description.written_out()
+        if description is self._description:
+            return self
+        return self._make(description, dict(self._values), variant_of(description, SHARP))
+
+    def as_solved_by(self, options: Mapping[str, Any]) -> Self:
+        """Return the system as the options of a verb need it: written out for a series or a step."""
+        stepped = any(options.get(name) is not None for name in ("order", "step")) or not options.get("locate", True)
+        return self.written_out() if stepped or options.get("method") in ("taylor", "rkf45") else self
+
     def smoothed(self, eta: float | Mapping[str, float] | None, band: str = "linear") -> Self:
         r"""Return the system with its switches smoothed over bands (Savi et al. 2007, Eqs. 6-10).
 
@@ -340,9 +358,10 @@ class System:
         --------
         nonsmooth.smoothing_report : what a band does to an orbit.
         """
-        self.refuse_patterns("smoothed")
-        new, variant = smoothed_values(self._description, self._values, eta, band)
-        return self._make(self._description, new, variant)
+        whole = self.written_out()
+        whole.refuse_patterns("smoothed")
+        new, variant = smoothed_values(whole._description, self._values, eta, band)
+        return self._make(whole._description, new, variant)
 
     # Text
 
@@ -401,11 +420,11 @@ class System:
         verbose : bool
             True: the modes, indicators and transitions that were made of elements stand there as well.
         """
-        return table(self, verbose=verbose)
+        return table(self.written_out() if verbose else self, verbose=verbose)
 
     def to_latex(self) -> str:
         """Return the equations as LaTeX (an ``align*`` environment)."""
-        return latex(self)
+        return latex(self.written_out())
 
     def _repr_latex_(self) -> str | None:
         return None if self.traced.patterns is not None else self.to_latex()

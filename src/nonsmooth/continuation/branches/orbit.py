@@ -17,6 +17,7 @@ from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.loads import checked_loads, meter_of
+from nonsmooth.flow.starts import mode_number
 from nonsmooth.results.representation import cut, html_table
 from nonsmooth.system.system import System
 
@@ -135,7 +136,7 @@ class Orbit:
 
     def _begin(self) -> State:
         """State, memory and mode behind the transitions that lie on the section: a start cannot lead into a stop."""
-        z, mode = np.append(self.u, self.memory), self.system.modes.index(self.mode)
+        z, mode = np.append(self.u, self.memory), mode_number(self.system, self.mode) or 0
         for i in np.flatnonzero(self.crossing_times <= AT_SECTION * self.period):
             z, mode = self.crossing_states[i], self.signature.visits[i + 1].mode
         state = State(z[: len(self.u)].copy(), z[len(self.u) :].copy())

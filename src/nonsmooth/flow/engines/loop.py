@@ -94,6 +94,10 @@ class Engine(ABC):
     def leave(self, here: Any, state: State) -> None:  # noqa: B027  most engines number modes as the system does
         """The reverse of :meth:`enter`, for a state."""
 
+    def placed(self, here: Any, plan: Section) -> Section:
+        """The section with its mode as these tables number it."""
+        return plan
+
     def go_on(self, tables: Any, march: KernelMarch, system: Any) -> bool:
         """Give a run that has paused what it waits for; True where that exchanged model, tables or work.
 
@@ -210,7 +214,7 @@ class Engine(ABC):
             starts = np.ascontiguousarray(np.hstack([starts, np.tile(state.memory, (len(starts), 1))]), dtype=float)
         state.counters[1] = int(carry and state.settled)
         march = self.march()
-        march.returns(first, last, state, starts, plan, transient, keep, out)
+        march.returns(first, last, state, starts, self.placed(tables, plan), transient, keep, out)
         self._run(march, tables, plan.indicator)
         if carry:
             state.settled = True

@@ -82,6 +82,9 @@ class PatternEngine(Engine):
     def leave(self, here: PatternTables, state: State) -> None:
         here.leave(state)
 
+    def placed(self, here: PatternTables, plan: Section) -> Section:
+        return plan if plan.mode < 0 else plan._replace(mode=here.place(self.patterns.visited[plan.mode]))
+
     def touches_of_a_leg(self) -> int:
         """None: an extremum of each condition of each element, in a hundred states, would fill the memory."""
         return 0

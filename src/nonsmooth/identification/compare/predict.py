@@ -65,7 +65,7 @@ class Motions:
     def __init__(
         self, systems: Sequence[System], model: Model, *, keep: int, max_period: int, phase: float = 0.0
     ) -> None:
-        self.system = systems[0]
+        self.system = systems[0].as_solved_by(model.options)
         if self.system.period() is None:
             raise ValueError(f"{self.system.name!r} has no forcing period; compare takes forced systems")
         self.places = model.places

@@ -204,6 +204,7 @@ def problem_of(
 ) -> Windows:
     """The problem, without windows; the noise is the records' own irregularity."""
     check_system(system, "fit", inputs=True)
+    system = system.written_out()  # any mode may be the first, and a force that is fitted needs its formula
     from nonsmooth.identification.fit.first_level import read_modes
     from nonsmooth.identification.fit.motion import Marcher
     from nonsmooth.identification.fit.records import irregularity, read_records

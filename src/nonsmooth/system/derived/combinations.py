@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.patterns import Patterns
 
 MOST = 256  # modes that are written out
+ALONE_WITH = ("transitions", "indicators", "memory", "symmetry", "bands")  # of one's own: modes are written out then
 
 
 def _natural(item: tuple[Any, Any]) -> list[Any]:
@@ -97,6 +98,9 @@ def assembled(
         why = f"have more than {MOST} combinations of phases"
         return _opened(make, base, given, "rub" if make.rubbing else "strike in sequence" if make.sequential else why)
     make.asks = _decide_together(make, base, resets)
+    visited = make.asks and not given["written"] and named is None and not any(given[key] for key in ALONE_WITH)
+    if visited and _affine(make, base, given) is not None:
+        return {**_opened(make, base, given, "decide together"), "also written": True}
     try:
         return _written_out(make, base, given, counts, named)
     except VaryingError as error:
@@ -231,7 +235,7 @@ def _opened(
     from nonsmooth.system.derived.patterns import Patterns
 
     make.asks = True
-    if len(base) > 1 or any(given[key] for key in ("transitions", "indicators", "memory", "symmetry", "bands")):
+    if len(base) > 1 or any(given[key] for key in ALONE_WITH):
         raise SystemDefinitionError(
             f"its elements {why}, so that their modes are made when they are visited: such a system has one mode and "
             "no indicators, transitions, memory, symmetry or bands of its own"

@@ -317,6 +317,21 @@ class Patterns:
         change = change and Reset(tuple(map(int, change[0])), int(change[1]), bool(change[2]))
         return self.transition(Lead(ends[0], ends[1], str(element), given, str(kind), change))
 
+    def named(self, name: str) -> int | None:
+        """The number of the pattern of a name; None where there is none."""
+        ends: dict[str, Pattern] = {name: ()}  # what is left of the name, and the phases read
+        for key, element in self.elements.items():
+            words = [f"{key}_{phase}" for phase in element.phases]
+            ends = {
+                rest[len(word) :].removeprefix("_"): (*phases, k)
+                for rest, phases in ends.items()
+                for k, word in enumerate(words)
+                if rest == word or rest.startswith(f"{word}_")
+            }
+        pattern = ends.get("")
+        held = pattern is not None and self.make.may_hold(self.make.held(pattern), self.mode)
+        return self.number(pattern) if pattern is not None and held else None
+
     def name(self, pattern: Pattern) -> str:
         """The phases of all elements as one name."""
         phases = zip(self.elements.items(), pattern, strict=True)
