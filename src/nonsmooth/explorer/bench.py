@@ -227,8 +227,8 @@ class Bench:
         return response_points(self.recorded, self.setup, page.system, page.state.values, over, state)
 
     def put(self, found: Mapping[str, Any]) -> None:
-        """Take in what the worker found of the recording beside the motion."""
-        self.laid = found
+        """Take in what the worker found of the recording beside the motion; nothing where it was removed meanwhile."""
+        self.laid = None if self.recorded is None else found
         self.tell()
 
     def readout(self) -> list[tuple[str, str]]:
