@@ -164,3 +164,11 @@ def test_so_many_tabs_compute_and_no_more(tabs: list[Page], monkeypatch: pytest.
     third.say("set", "p.rho", 0.25)
     assert third.session.work.worker is not None
     assert "page" not in third.told("notes")
+
+
+def test_what_was_found_of_a_recording_goes_with_it(tabs: list[Page]) -> None:
+    """Its distance may come behind its removal."""
+    bench = Tab(tabs).session.bench
+    bench.put({"distance": {"of": "x"}, "curve": {}, "section": {}, "history": {}, "why": ""})
+    assert bench.laid is None
+    assert bench.readout() == []
