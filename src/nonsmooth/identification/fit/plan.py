@@ -167,7 +167,6 @@ def _information(
     asked: dict[str, Any] = {key: run.get(key) for key in ("samples", "start", "mode")}
     asked |= {key: run[key] for key in ("duration", "periods") if key in run}
     motion = simulate(system.with_parameters(settings), **asked)
-    motion = motion.isel(time=~np.isin(motion["time"], motion["crossing_time"]))  # no readings are taken there
     mode = list(system.modes)[int(motion["mode"].values[0])] if motion["mode"].dtype.kind in "iu" else None
     priors, mode = known_before["priors"], run.get("mode") or mode
     problem = problem_of(system, motion, parameters, sensors, priors, settings, None, "time", mode)

@@ -207,18 +207,21 @@ def _tables(one: Any, runs: Sequence[str] | None, time: str) -> dict[str, dict[s
 
 
 def _of_dataset(one: Any, time: str) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Channels of a Dataset; of a result of ``simulate`` its states and outputs, each instant once."""
+    """Channels of a Dataset; of a result of ``simulate`` its states and outputs, but for the instants of its crossings.
+
+    No reading is taken there: a speed that jumps has two values, and is on either side of the model's own crossing.
+    """
     if time not in one.coords:
         raise ValueError(f"the Dataset has no coordinate {time!r}; it has {', '.join(map(str, one.coords)) or 'none'}")
     t = np.asarray(one[time].values)
-    last = np.append(np.diff(t) > 0, True) if len(t) and t.dtype.kind == "f" else np.ones(len(t), dtype=bool)
+    kept = ~np.isin(t, one["crossing_time"].values) if "crossing_time" in one else np.ones(len(t), dtype=bool)
     found = {}
-    if "u" in one and one["u"].dims == (time, "state"):  # both limits of a crossing stand there: the second is kept
+    if "u" in one and one["u"].dims == (time, "state"):
         for k, name in enumerate(one["state"].values):
-            found[str(name)] = _pair(t[last], one["u"].values[last, k], str(name))
+            found[str(name)] = _pair(t[kept], one["u"].values[kept, k], str(name))
     for name, array in one.data_vars.items():
         if array.dims == (time,) and array.dtype.kind in "fiu":
-            found[str(name)] = _pair(t[last], array.values[last], str(name))
+            found[str(name)] = _pair(t[kept], array.values[kept], str(name))
     return found
 
 
