@@ -62,13 +62,13 @@ def test_a_force_that_was_measured_is_fitted() -> None:
         forcing={"q": lambda t, p: p.A * np.cos(p.w * t)},
         elements={
             "s": Stop(at="q", position=0.3, restitution=0.6),
-            "r": Stop(at="q", position=-0.4, side=-1, restitution=0.7),
+            "f": Coulomb(at="q", friction=0.05),
             "e": ElasticStop(at="q", position=-0.2, side=-1, stiffness="k"),
         },
     )
     run = ns.simulate(system, periods=1.5, samples=120)
     found = ns.fit(system.with_parameters(k=8.2), run, ["k"], measured=["q", "e_force"], progress=False)
-    assert found["k"] == pytest.approx(8.0, abs=1e-7)
+    assert found["k"] == pytest.approx(8.0, abs=1e-9)  # though the force is zero, without noise, in most samples
 
 
 def test_a_mode_that_no_run_has_visited_is_known_by_its_name() -> None:

@@ -223,9 +223,13 @@ def problem_of(
         [record.values[sensor.limit(y) == 0, c] for record in records for y in [record.values[:, c]]]
         for c, sensor in enumerate(sensors.values())
     ]
-    irregular = np.array(
+
+    def noise(readings: list[FloatArray], moving: bool = False) -> float:
+        return float(np.sqrt(np.mean([irregularity(y, moving) ** 2 for y in readings])))
+
+    irregular = np.array(  # of a channel without noise that is mostly zero, as a contact's force, what moves
         [
-            max(np.sqrt(np.mean([irregularity(y) ** 2 for y in readings])), sensor.floor, 1e-300)
+            max(noise(readings), sensor.floor) or max(noise(readings, moving=True), 1e-300)
             for readings, sensor in zip(within, sensors.values(), strict=True)
         ]
     )

@@ -55,9 +55,11 @@ class Record:
         return float(self.time[-1] - self.time[0])
 
 
-def irregularity(y: FloatArray) -> float:
-    """Standard deviation of white noise that explains the third differences; a motion adds to it."""
+def irregularity(y: FloatArray, moving: bool = False) -> float:
+    """Standard deviation of white noise that explains the third differences (where it is ``moving``, those that are not
+    zero); a motion adds to it."""
     third = np.diff(y[np.isfinite(y)], 3)
+    third = third[third != 0.0] if moving else third
     return float(np.sqrt(np.median(third**2) / (20.0 * 0.4549))) if len(third) else 0.0
 
 
