@@ -54,11 +54,8 @@ def look(i, form, tables, work, mode):
     if not (h < inf):
         h = 1.0
     for j in range(n_indicators):
-        if scale[j] == 0.0:  # the largest term of a step: the slope of a speed is mere rounding where a stick ends
-            power = 1.0
-            for k in range(m + 1):
-                scale[j] = max(scale[j], fabs(X[n + j, k]) * power)
-                power *= h
+        if scale[j] == 0.0:  # the slope of a speed is mere rounding where a stick ends
+            scale[j] = max(fabs(X[n + j, 0]), fabs(X[n + j, 1]) * h, fabs(X[n + j, 2]) * h * h)
     snap(X, m, n, n_indicators, h, scale, work.measured, work.side)
     for j in range(n_indicators):
         scale[j] = max(scale[j], fabs(X[n + j, 0]))
