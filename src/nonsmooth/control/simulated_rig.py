@@ -96,7 +96,7 @@ class SimulatedRig:
         self.mass = float(system.values[mass]) if isinstance(mass, str) and mass in system.values else mass
         self.rate, self.resolution, self.noise, self.jitter = float(rate), resolution, noise, jitter
         self.system = system
-        self._system = actuated(system, velocity=velocity, mass=mass).as_solved_by({"method": method})
+        self._system = actuated(system, velocity=velocity, mass=mass)
         self._engine = engine_for(self._system, method)
         self._state = first_state(self._system, start)
         self._place = list(system.states).index(position)

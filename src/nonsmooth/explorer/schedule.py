@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from nonsmooth.explorer.kinds import ORDER, QUICK
-from nonsmooth.explorer.worker import Answer, Worker
+from nonsmooth.explorer.worker import DEAF, Answer, Worker
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.session import Page
 
 _PATIENCE = 1.0  # seconds after which short work is cancelled like any other
-_DEAF = 10.0  # seconds in which cancelled work must end by itself
 _VAIN = 3  # times in a row that the worker ended before it could take work; then it is not started again
 _NOT_STARTED = (
     f"The process that computes cannot be started: {_VAIN} times in a row it ended at once. The terminal of nonsmooth "
@@ -122,7 +121,7 @@ class Schedule:
             return
         if running.cancelled is None:
             self.go_on()
-        elif time.monotonic() - running.cancelled > _DEAF:
+        elif time.monotonic() - running.cancelled > DEAF:
             self.worker.end()
 
     def take(self, answer: Answer) -> None:

@@ -26,7 +26,7 @@ from nonsmooth.kernels.compile.forking import is_importing
 
 _OFTEN = 0.15  # seconds between two words on progress
 _SILENT = 1.0  # seconds in which cancelled work must end before it is interrupted
-_DEAF = 10.0  # seconds after which the process of a page that was closed is ended, where it is still at work
+DEAF = 10.0  # seconds in which cancelled work must end by itself; then its process is ended
 
 #: ``(kind, number, content)``: "ready" to take work, "progress" with the fraction done, "compiling" with the name of a
 #: kernel, "done" with results and warnings, "cancelled", "error" with a sentence, "ended" with the process's exit code.
@@ -124,7 +124,7 @@ class _Process:
         for own in unwanted:
             self._send(("cancel", own, None))
         if unwanted:
-            late = threading.Timer(_DEAF, self._end_if_at_work)
+            late = threading.Timer(DEAF, self._end_if_at_work)
             late.daemon = True
             late.start()
 

@@ -93,8 +93,6 @@ def simulate(
         The run could not be completed; it says where and why.
     """
     asked = as_called(locals())
-    if ramps:
-        system = system.written_out()
     period = system.period()
     unit, length = run_length(system, periods, duration, period)
     if not is_one_start(start):

@@ -327,8 +327,8 @@ class System:
         return self._make(description, dict(self._values), variant_of(description, SHARP))
 
     def as_solved_by(self, options: Mapping[str, Any]) -> Self:
-        """Return the system as the options of a verb need it: written out for a series or a step."""
-        stepped = any(options.get(name) is not None for name in ("order", "step")) or not options.get("locate", True)
+        """Return the system as the options of a verb need it: written out for a series, a step or a ramp."""
+        stepped = any(options.get(name) for name in ("order", "step", "ramps")) or not options.get("locate", True)
         return self.written_out() if stepped or options.get("method") in ("taylor", "rkf45") else self
 
     def smoothed(self, eta: float | Mapping[str, float] | None, band: str = "linear") -> Self:

@@ -136,7 +136,8 @@ class Orbit:
 
     def _begin(self) -> State:
         """State, memory and mode behind the transitions that lie on the section: a start cannot lead into a stop."""
-        z, mode = np.append(self.u, self.memory), mode_number(self.system, self.mode) or 0
+        z, mode = np.append(self.u, self.memory), mode_number(self.system, self.mode)
+        assert mode is not None
         for i in np.flatnonzero(self.crossing_times <= AT_SECTION * self.period):
             z, mode = self.crossing_states[i], self.signature.visits[i + 1].mode
         state = State(z[: len(self.u)].copy(), z[len(self.u) :].copy())

@@ -99,14 +99,15 @@ def assembled(
         return _opened(make, base, given, "rub" if make.rubbing else "strike in sequence" if make.sequential else why)
     make.asks = _decide_together(make, base, resets)
     visited = make.asks and not given["written"] and named is None and not any(given[key] for key in ALONE_WITH)
-    if visited and _affine(make, base, given) is not None:
-        return {**_opened(make, base, given, "decide together"), "also written": True}
+    if visited and (patterns := _affine(make, base, given)) is not None:
+        return {**_opened(make, base, given, "decide together", patterns), "also written": True}
     try:
         return _written_out(make, base, given, counts, named)
     except VaryingError as error:
-        if named is not None or _affine(make, base, given) is None:
+        if named is not None or (patterns := _affine(make, base, given)) is None:
             raise
-        return _opened(make, base, given, f"hold together by sums of forces that depend on parameters ({error.names})")
+        why = f"hold together by sums of forces that depend on parameters ({error.names})"
+        return _opened(make, base, given, why, patterns)
 
 
 def _written_out(
@@ -229,7 +230,11 @@ def _affine(make: Expressions, base: Mapping[str, Any], given: Mapping[str, Any]
 
 
 def _opened(
-    make: Expressions, base: Mapping[str, tuple[sp.Expr, ...]], given: Mapping[str, Any], why: str
+    make: Expressions,
+    base: Mapping[str, tuple[sp.Expr, ...]],
+    given: Mapping[str, Any],
+    why: str,
+    patterns: Patterns | None = None,
 ) -> dict[str, Any]:
     """The system without its elements, with all that these need as indicators: modes are made when they are visited."""
     from nonsmooth.system.derived.patterns import Patterns
@@ -240,7 +245,8 @@ def _opened(
             f"its elements {why}, so that their modes are made when they are visited: such a system has one mode and "
             "no indicators, transitions, memory, symmetry or bands of its own"
         )
-    patterns = Patterns(make, next(iter(base)), why=why)
+    patterns = patterns or Patterns(make, next(iter(base)))
+    patterns.why = why
     return {
         "modes": {key: KnownFunction(list(field)) for key, field in base.items()},
         "transitions": (),
