@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.control.controller import Controller
+from nonsmooth.arrays import ComplexArray
+from nonsmooth.control.controller import Controller, Samples
 from nonsmooth.control.course import course_of
 from nonsmooth.control.guard import Guard
-from nonsmooth.control.held import Holder
+from nonsmooth.control.harmonics import FourierSeries
+from nonsmooth.control.held import Held, Holder
+from nonsmooth.control.holding import Holding
 from nonsmooth.control.outcome import Names
 from nonsmooth.control.release import STABLE, UNKNOWN, UNSTABLE, release
 
@@ -140,3 +143,30 @@ def test_a_course_varies_one_setting_and_keeps_the_other() -> None:
     course = course_of(names, "frequency", (1.0, 3.0), 2.0, 0.3, "up")
     assert (course.parameter, course.rising, course.setting(2.5)) == ("frequency", True, (2.5, 0.3))
     assert [course.inside(value) for value in (0.9, 1.0, 3.0, 3.1)] == [False, True, True, False]
+
+
+def test_a_motion_is_let_go_a_hundredth_away() -> None:
+    """The first harmonic of what it is held to grows by 1 %, or by six times the noise of a turn where that is more."""
+
+    class Rig:
+        """A motion that comes back to half of its distance within a turn."""
+
+        harmonics, holding = 3, Holding(settle=4, record=4)
+        asked: ComplexArray | None = None
+        away = 0.0
+
+        def run(self, frequency: float, reference: ComplexArray | None, turns: int) -> Samples:
+            if reference is not None:
+                self.asked, self.away = reference, float(reference[1].real) - 1.0
+            phase = np.linspace(0.0, turns, 64 * turns, endpoint=False)
+            self.away *= 0.5 if reference is None else 1.0
+            x = (1.0 + self.away) * np.cos(2.0 * np.pi * phase)
+            return Samples(phase, x, 0.0 * x)
+
+    for noise, push in ((0.0, 0.01), (0.001, 6.0 * 0.001 * np.sqrt(8.0))):
+        rig = Rig()
+        c, u = np.array([0.0, 1.0, 0.0, 0.0], dtype=complex), np.array([0.0, noise, 0.0, 0.0])
+        held = Held(1.0, 1.0, c, FourierSeries(c, u), FourierSeries(0.0 * c, u), 0.0)
+        found, factor = release(rig, held, 6)  # type: ignore[arg-type]
+        assert rig.asked is not None and rig.asked == pytest.approx([0.0, 1.0 + push, 0.0, 0.0], abs=1e-12)
+        assert found == STABLE and factor == pytest.approx(0.5, abs=1e-9)

@@ -51,6 +51,13 @@ def test_eigenvalues_of_the_lorenz_system() -> None:
     assert at(lorenz(1.0), 0.0, 0.0, 0.0).kind == "undecided"  # a pitchfork: an eigenvalue 0
 
 
+@pytest.mark.parametrize("frequency", [1e-4, 1.0, 1e4])
+def test_stability_is_the_same_in_every_unit_of_time(frequency: float) -> None:
+    """x'' = -w^2 x - 2 D w x': the eigenvalues' real parts are -D w."""
+    for damping, kind in ((1e-3, "stable"), (-1e-3, "unstable"), (1e-12, "undecided")):
+        assert at(line(-(frequency**2), 2 * damping * frequency), 0.0, 0.0).kind == kind
+
+
 def test_a_boundary_and_what_lies_beyond_it() -> None:
     """x' = -x below the boundary x = b: at b = 0 no eigenvalue decides, at b < 0 a transition leads away."""
     system = ns.System(

@@ -389,6 +389,24 @@ def test_a_compile_copies_no_names_of_what_it_inlines(tmp_path, monkeypatch):
     assert not hasattr(ir.Scope, "__deepcopy__")  # Numba is left as it was
 
 
+def test_a_function_of_many_branches_is_compiled(tmp_path, monkeypatch):
+    from nonsmooth.kernels.compile import cache
+
+    branches = "".join(f"    if k == {i}:\n        y = x + {i}.5\n" for i in range(200))
+    head = "from nonsmooth.kernels.compile.cache import kernel\n\n\n@kernel('f8(i8, f8)')\ndef deep(k, x):\n"
+    head += "    y = z = 0.0\n"
+    tail = "    if k > 199:\n        z = z + 0.5\n    return y + z\n"  # its z is sought through all the branches
+    monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path))
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(300)  # as 700 branches are to 1000
+    try:
+        module = cache.load_module(f"{head}{branches}{tail}", "deep", lasting=False)
+        assert [module.deep(i, 1.0) for i in (0, 3, 199, 200)] == [1.5, 4.5, 200.5, 0.5]
+        assert sys.getrecursionlimit() == 300
+    finally:
+        sys.setrecursionlimit(limit)
+
+
 def test_failed_module_is_not_kept(tmp_path, monkeypatch):
     from nonsmooth.kernels.compile import cache
 

@@ -138,6 +138,23 @@ def test_a_response_with_its_jumps(tmp_path: Path) -> None:
     assert (np.abs(found["jump_difference"]) <= found["jump_tolerance"]).all()
     ns.save(found, tmp_path / "response.nc")
     xr.testing.assert_identical(ns.load(tmp_path / "response.nc"), found)
+    double = measured.assign(amplitude=2.0 * measured["amplitude"])
+    assert compare(double, swept)["relative_difference"].values == pytest.approx(-0.5, abs=1e-12)  # it is given
+
+
+@pytest.mark.parametrize("frequency", [6.5, 5.4])
+def test_a_periodic_motion_that_is_exact_is_compared_in_units_of_the_noise(frequency: float) -> None:
+    """Its section points part by rounding only. Of a motion beside it the distance is that of the points."""
+    system = MODEL.with_parameters(rho=0.14, g=0.02, omega=frequency)
+    run = ns.simulate(system, periods=60, transient=300, samples=60 * 64 + 1)
+    run = run.assign(phase=("time", run["time"].values * frequency / (2.0 * np.pi)))
+    noise = {"x": 1e-6, "v": 2e-6}
+    same, other = (compare(run, one, noise=noise) for one in (system, system.with_parameters(rho=0.15)))
+    assert same["section_scale"].values == pytest.approx([1e-6, 2e-6], rel=1e-12)
+    assert float(same["wasserstein_distance_joint"].max()) < 3.0  # of points without noise and points with it
+    apart = other["theory_section"].values[0] - run["u"].values[0]
+    far = float(other["wasserstein_distance_joint"].max())
+    assert far == pytest.approx(np.linalg.norm(apart / [1e-6, 2e-6]), rel=1e-3) and far > 100.0
 
 
 def test_a_diagram_with_its_flips(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ def work_of(
     jets = [np.zeros((size, width)) for size in (rows, n_scratch, rows, rows)]
     return SeriesWork(
         *one_block(
-            *(vector(n) for _ in range(5)),
+            *(vector(size) for size in (n, n, n + n_q, n, n)),
             vector(n_q),
             vector(n_q),
             *jets,

@@ -39,7 +39,7 @@ def compare_motion(
 ) -> dict[str, Any]:
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
     folded, sections = _measured(measured, phases, grid)
-    scale = _scale(sections)
+    scale = np.maximum(np.concatenate(sections).std(axis=0), noise)
     number = measured_period(sections[0], noise, max_period=max_period).number
     rng = np.random.default_rng(model.seed)
     motions = None
@@ -86,12 +86,6 @@ def _measured(measured: xr.Dataset, phases: list[float], grid: int) -> tuple[Flo
 
 def _finite(points: FloatArray) -> FloatArray:
     return points[np.isfinite(points).all(axis=1)]
-
-
-def _scale(sections: list[FloatArray]) -> FloatArray:
-    """One unit for each state: the spread of the measured section points, at all phases together."""
-    spread = np.concatenate(sections).std(axis=0)
-    return np.where(spread > 0, spread, 1.0)
 
 
 def _starts(points: FloatArray | None, folded: FloatArray | None, model: Model, start: Any) -> Any:

@@ -54,6 +54,7 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {
 # What only kernels call needs no way in from Python. Numba takes over what is not set here (``forceinline``, fastmath)
 # from the function whose compilation asks for this one.
 _INNER: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": False}
+DEEP = 20_000  # Numba looks for a name's value by recursion, twice for each block of a function
 _DIGEST = hashlib.sha256().digest_size
 _GENERATED = "nonsmooth_generated_"
 _MACHINERY = {f"compile.{name}" for name in ("ahead", "assembly", "cache", "folder", "target")}
@@ -286,13 +287,15 @@ def _compile_once(dispatcher: Any, signature: Any) -> None:
 
 @contextlib.contextmanager
 def _cheaply() -> Iterator[None]:
-    """Leave out what costs a compile half of its time and changes nothing.
+    """Leave out what costs a compile half of its time and changes nothing, and let it recurse (see ``DEEP``).
 
     A compile makes millions of objects and hardly a cycle, so the collector rests. And with each block of a function
     that becomes part of its caller (:func:`once`), Numba's ``InlineWorker`` copies all names of the function and the
     places they stand at: they are shared instead, since the function's own text is thrown away."""
     running, outermost = gc.isenabled(), not hasattr(ir.Scope, "__deepcopy__")
+    limit = sys.getrecursionlimit()
     gc.disable()
+    sys.setrecursionlimit(max(limit, DEEP))
     for kind in (ir.Scope, ir.Loc) if outermost else ():
         kind.__deepcopy__ = lambda self, memo: self
     try:
@@ -300,6 +303,7 @@ def _cheaply() -> Iterator[None]:
     finally:
         for kind in (ir.Scope, ir.Loc) if outermost else ():
             del kind.__deepcopy__
+        sys.setrecursionlimit(limit)
         if running:
             gc.enable()
 

@@ -16,7 +16,7 @@ from nonsmooth.kernels.cuda.target import cuda, entry, local, once
 from nonsmooth.kernels.hybrid.codes import PAUSED
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.hybrid.loop import leave, march
-from nonsmooth.kernels.hybrid.places import BEGUN, RETURNS_OF_SECTION
+from nonsmooth.kernels.hybrid.places import BEGUN, NOTED_AT, RETURNS_OF_SECTION
 from nonsmooth.kernels.hybrid.records import Generated, Goal, Motion, Net, Seen, SeriesWork
 from nonsmooth.kernels.hybrid.sections import window_of
 from nonsmooth.kernels.series.places import N_SERIES_MEMO, N_SERIES_TALLY, OPEN_STEP, READY, ZERO_ROW
@@ -81,7 +81,7 @@ def arrays_of_thread():
     rest = cuda.local.array(N_U, float64)
     w = cuda.local.array(N_U, float64)
     end = cuda.local.array(N_U, float64)
-    before = cuda.local.array(N_U, float64)
+    before = cuda.local.array(N_U + N_MEMORY, float64)
     wp = cuda.local.array(N_U, float64)
     dense_ = cuda.local.array(N_U, float64)
     q = cuda.local.array(N_Q, float64)
@@ -161,6 +161,7 @@ def advance(jobs, rows, point, norms, plan, settings, place, counts, way, betwee
             tally[n] = whole[n, j]
         for n in range(N_SERIES_MEMO):
             memo[n] = real[n, j]
+        tally[NOTED_AT] = 0  # that place is not kept between launches
         first = N_SERIES_MEMO
         for n in range(N_SIDES):
             work.side[n] = whole[N_SERIES_TALLY + n, j]

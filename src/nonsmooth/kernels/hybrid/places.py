@@ -10,14 +10,19 @@ FIRED = 10  # the functional (indicator) that has crossed, or -1
 WAITS, TAKEN, SOURCE, FIRST, CLOSELY, NOTED = 11, 12, 13, 14, 15, 16
 STARTS = 17  # 1 where what the elements of a system do at a start is asked; -1: motion is not unique, -2: there is none
 CHANGES = 18  # of inputs, so far
-N_TALLY = 19
+# one more than the returns, where a run was last compared with the place noted, and where that was noted (0: none); its
+# mode, and the transitions and contacts in the kept window by then
+LOOKED, NOTED_AT, NOTED_MODE, NOTED_CROSSINGS, NOTED_CONTACTS = 19, 20, 21, 22, 23
+N_TALLY = 24
 
 # times
 TIME, PERIODS, SINCE, WAITED, DONE = 0, 1, 2, 3, 4  # in the period, since a crossing, since a pass, since the start
 LONGEST_STEP = 5  # of the modes visited so far
-N_MEMO = 6
+NOTED_TIME = 6  # in the period, where a run was noted
+N_MEMO = 7
 
 MOST_CROSSINGS = 50_000  # within one return, period or unit of time: with e = 0.999 a mass rests after some 16 000
+REPEATS_WITHIN = 16  # returns after which a motion that repeats itself has been seen to
 MOST_AT_ONCE = 60  # at one instant: a log has room for 64 more when a step begins
 MOST_STEPS = 2_000_000  # on the way to the next return
 BURST_LENGTH = 50  # crossings in a row at intervals below SHORT of the stepper's time scale end a run as chatter
