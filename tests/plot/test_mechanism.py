@@ -51,6 +51,21 @@ def chain():
     )
 
 
+def test_what_stands_between_two_masses_or_at_a_wall_is_drawn_there(chain) -> None:
+    """Zone i lies on the left of mass i, the last one on the right of the last mass."""
+    zones = Sketch(scheme_of(chain)).zones
+    drawn = [sorted(link.kind for link in zone) for zone in zones]
+    assert drawn[0] == ["damper", "spring"] and drawn[3] == ["stop"]  # q3 strikes on its right
+    assert drawn[1] == [
+        "damper",
+        "elastic",
+        "spring",
+        "stop",
+        "stop",
+    ]  # q2 has a buffer on its left, bump and tie to q1
+    assert drawn[2] == ["backlash", "damper", "spring"]
+
+
 def test_a_chain_is_read_as_it_was_built(chain) -> None:
     scheme = scheme_of(chain)
     assert scheme.coordinates == ["q1", "q2", "q3"]
