@@ -82,6 +82,22 @@ def test_a_delay_moves_a_ramp_from_the_start_on() -> None:
     np.testing.assert_allclose(found.P.sel(parameter="late"), [-3.0, -3.0, -3.0, 0.0], atol=1e-13)
 
 
+def test_delays_of_two_ramps() -> None:
+    """v(2) is the integral of 3 (t - late) + 3 and of 5 (t - other): each delay moves its own."""
+    cart = ns.mechanical(
+        1.0,
+        0.0,
+        0.0,
+        parameters={"late": 0.1, "other": 0.2},
+        forcing={"q": lambda t, p: p.a + p.b},
+        inputs={"a": "N", "b": "N"},
+    )
+    inputs = {"a": ns.Input([-1, 5], [0, 18], delay="late"), "b": ns.Input([-1, 5], [-5, 25], delay="other")}
+    found = ns.sensitivity(cart, duration=2.0, parameters=["late", "other"], inputs=inputs)
+    assert found.end[1] == pytest.approx((6.0 - 0.6 + 6.0) + (10.0 - 2.0), abs=1e-12)
+    np.testing.assert_allclose(found.P[:2], [[-6.0, -10.0], [-6.0, -10.0]], atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("delays", "sizes"), [(("late", "late"), (3, 0)), (("late", "other"), (1, 2)), (("late", 0.1), (1, 0))]
 )
