@@ -79,6 +79,27 @@ def test_a_buckled_mass_between_stops_has_three() -> None:
     assert not any(one.free for one in found)
 
 
+def test_a_mass_pressed_on_a_stop_beside_frictions() -> None:
+    """q1 = d where the load presses, and |K21 d + K22 q2| <= m + n: what is held has its place, not any."""
+    stiffness, d, m, n = np.array([[3.0, -1.0], [-1.0, 2.0]]), 0.2, 0.5, 0.3
+    system = ns.mechanical(
+        np.eye(2),
+        0.1 * stiffness,
+        stiffness,
+        forcing={"q1": lambda t, p: 5.0},
+        elements={
+            "stop": E.Stop(at="q1", position=d, restitution=0.0),
+            "rub": E.Coulomb(at="q2", friction=m),
+            "tie": E.Coulomb(at={"q1": 1.0, "q2": -1.0}, friction=n),
+        },
+    )
+    assert system.traced.patterns is not None  # modes are made when visited
+    (found,) = sets(system, d, 0.0, 0.0, 0.0)
+    assert found.free == 1
+    assert found.lower[:2] == pytest.approx([d, (d - m - n) / 2.0], abs=1e-12)
+    assert found.upper[:2] == pytest.approx([d, (d + m + n) / 2.0], abs=1e-12)
+
+
 def test_two_stops_never_close_together() -> None:
     """A mode in which both stops of one coordinate rest has a field, but no state."""
     system = one_mass(a=E.Stop(at="q", position=0.5), b=E.Stop(at="q", position=-0.5, side=-1))
