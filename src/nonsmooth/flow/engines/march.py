@@ -53,6 +53,7 @@ class KernelMarch:
             plan.after,
             plan.every,
             plan.extremes,
+            plan.repeats and plan.indicator < 0,
             -1,
         )
         phase = plan.phase if plan.indicator < 0 else -1.0
@@ -80,7 +81,7 @@ class KernelMarch:
 
     def _anywhere(self, i: int, kind: int, keep: int) -> None:
         """A run that knows no section."""
-        self.orders[:] = i, i + 1, kind, 0, keep, PATIENCE, -1, 0, -1, 0, 1, 0, -1
+        self.orders[:] = i, i + 1, kind, 0, keep, PATIENCE, -1, 0, -1, 0, 1, 0, 0, -1
 
     def _ask(self, state: State, starts: FloatArray) -> None:
         from nonsmooth.kernels.hybrid.records import Call

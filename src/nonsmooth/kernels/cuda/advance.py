@@ -21,7 +21,7 @@ from nonsmooth.kernels.linear.extremes import finish
 def go(motion, form, net, phase, limit, plan, transient, keep, out, scratch):
     """Run the one parameter row on from a motion, which is left where it ends. Returns the status."""
     tables, work = scratch
-    section = Section(phase, plan[0], plan[1], plan[2], plan[3], plan[4], 1e300, plan[5])
+    section = Section(phase, plan[0], plan[1], plan[2], plan[3], plan[4], 1e300, plan[5], 1)
     goal = Goal(RETURNS_OF_SECTION, transient, keep, 0.0, 0.0, limit, 1 << 62)
     code = march(0, form, net, section, goal, motion, Seen(out, (), ()), tables, work)
     work.tally[BEGUN] = 0

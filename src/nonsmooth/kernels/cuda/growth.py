@@ -62,7 +62,7 @@ def frames(jobs, rows, point, net, place, count, units, limit, scale, found):
         nothing,
     )
     goal = Goal(GROW, 0, count, 0.0, units[rows[j]], limit, 1 << 62)
-    section = Section(0.0, -1, 0, -1, 0, 1, 0.0, 0)
+    section = Section(0.0, -1, 0, -1, 0, 1, 0.0, 0, 0)
     status[j] = march(0, form, Net(*net), section, goal, motion, Seen((), (), seen), scratch[0], scratch[1])
     leave(0, form, motion, scratch[1])
     for n in range(count):

@@ -198,7 +198,9 @@ def advance(jobs, rows, point, norms, plan, settings, place, counts, way, betwee
         N_INDICATORS,
         N_OUTPUTS,
     )
-    at = Section(settings[2] if plan[0] < 0 else -1.0, plan[0], plan[1], plan[2], plan[3], plan[4], settings[3], 1)
+    at = Section(
+        settings[2] if plan[0] < 0 else -1.0, plan[0], plan[1], plan[2], plan[3], plan[4], settings[3], 1, plan[0] < 0
+    )
     returns = transient[min(j, transient.shape[0] - 1)], keep[min(j, keep.shape[0] - 1)]
     goal = Goal(RETURNS_OF_SECTION, returns[0], returns[1], 0.0, 0.0, norms[2], pause)
     motion = Motion(u[j], memory[j, :N_MEMORY], clock[j], counters[j])

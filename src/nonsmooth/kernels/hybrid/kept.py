@@ -19,6 +19,7 @@ class Section(NamedTuple):
     every: int = 1  # so many passes are one return
     t_max: float = inf
     extremes: int = 1  # wanted in the kept window; 0: an engine may leave them out
+    repeats: int = 1  # may be left out where the motion repeats itself bit for bit; 0: every return is run
 
 
 class Kept(NamedTuple):

@@ -160,6 +160,6 @@ def arrive(i, code, source, t, sense, state, form, section, goal, motion, seen, 
     if GROWS != 2:
         if goal.kind == RETURNS_OF_SECTION:
             code = arrive_at_section(i, code, source, t, sense, state, form, section, goal, seen.kept, tables, work)
-            if t >= 0 and section.indicator < 0 and code == OK:
+            if t >= 0 and section.repeats != 0 and code == OK:
                 leave_out(i, form, section, goal, motion, seen.kept, work)
     return code

@@ -254,9 +254,11 @@ class Call(NamedTuple):
 
 
 # Places in ``Call.orders`` and ``Call.reals``.
-BEGIN, END, KIND, TRANSIENT, KEEP, PATIENCE_LEFT, INDICATOR, RISING, OF_MODE, AFTER, EVERY, EXTREMES, ROW = range(13)
+BEGIN, END, KIND, TRANSIENT, KEEP, PATIENCE_LEFT, INDICATOR, RISING, OF_MODE, AFTER, EVERY, EXTREMES, REPEATS, ROW = (
+    range(14)
+)
 UNTIL, UNIT, PHASE, T_MAX = range(4)
-N_ORDERS, N_REALS = 13, 4
+N_ORDERS, N_REALS = 14, 4
 
 
 FORM = type_of(Form, _f4, _f3, _f4, _f4, _i1, _f1, _f1, _f3, _f2, _f3, _f3, _f4, _f3, _f4, _f4, _f4, _f3, _f4, _f4, _i2)

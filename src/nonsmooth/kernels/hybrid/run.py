@@ -29,6 +29,7 @@ from nonsmooth.kernels.hybrid.records import (
     OF_MODE,
     PATIENCE_LEFT,
     PHASE,
+    REPEATS,
     RISING,
     ROW,
     T_MAX,
@@ -91,6 +92,7 @@ def run(system, call, kept, log, growth):
         orders[EVERY],
         reals[T_MAX],
         orders[EXTREMES],
+        orders[REPEATS],
     )
     goal = Goal(kind, orders[TRANSIENT], orders[KEEP], reals[UNTIL], reals[UNIT], limit, orders[PATIENCE_LEFT])
     for i in range(orders[BEGIN], orders[END]):
