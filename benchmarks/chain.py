@@ -9,6 +9,7 @@ import numpy as np
 
 import nonsmooth as ns
 from timing import geometric_mean, interleaved, per_unit, ratio
+from work import march
 
 SIZES = (1, 2, 3, 5, 10)
 K, C, FORCE, OMEGA, STOP = 1.0, 0.05, 1.0, 1.0, 20.0
@@ -100,18 +101,15 @@ def run(effort: float) -> tuple[list[str], list[tuple[str, str, str, bool]]]:
         values = [GAPS[masses]]
         near = ns.simulate(ours, periods=COMPARED, method="exact")["u"].values[-1]
         difference = float(np.abs(peer.run(COMPARED) - near).max())
-        ns.sweep(ours, "g", values, transient=10, keep=20, method="exact", progress=False)
         chunk = periods // 5
         times = per_unit(
             interleaved(
                 {
-                    "exact": lambda ours=ours, values=values: ns.sweep(
-                        ours, "g", values, transient=periods, keep=20, method="exact", progress=False
-                    ),
+                    "exact": lambda ours=ours: march(ours, None, periods, method="exact"),
                     "heyoka": lambda peer=peer, chunk=chunk: peer.run(chunk),
                 }
             ),
-            {"exact": periods + 20, "heyoka": chunk},
+            {"exact": periods, "heyoka": chunk},
         )
         exact, theirs = median(times["exact"]), median(times["heyoka"])
         ratios.append(ratio(times, "heyoka", "exact"))

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
 from timing import interleaved, per_unit, ratio
+from work import march, section
 
 Array = NDArray[np.float64]
 
@@ -199,12 +200,10 @@ def run(effort: float) -> tuple[list[str], list[tuple[str, str, str, bool]]]:
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     verdicts = []
-    for ours, name, rules in (
-        (rubbing(), "mu", Rules(OMEGA, MU, 0.0)),
-        (resting(), "d", Rules(RATE, 0.0, GAP)),
+    for ours, impacts, rules in (
+        (rubbing(), False, Rules(OMEGA, MU, 0.0)),
+        (resting(), True, Rules(RATE, 0.0, GAP)),
     ):
-        impacts = name == "d"
-        value = ours.values[name]
         peer, scipy = Heyoka(rules, impacts), SciPy(rules, impacts)
         near = ns.simulate(ours, periods=COMPARED, samples=2)
         state = near["u"].values[-1]
@@ -212,12 +211,12 @@ def run(effort: float) -> tuple[list[str], list[tuple[str, str, str, bool]]]:
         apart = float(np.abs(scipy.run(COMPARED) - state).max())
         chunks = {"heyoka": periods // 50, "SciPy": max(periods // 20_000, 2)}
         calls = {
-            "exact": lambda s=ours, n=name, v=value: ns.sweep(s, n, [v], transient=periods, keep=2, progress=False),
-            "exact, points": lambda s=ours: ns.poincare(s, n=periods // 5),
+            "exact": lambda s=ours: march(s, None, periods),
+            "exact, points": lambda s=ours: section(s, None, periods // 5),
             "heyoka": lambda p=peer, n=chunks["heyoka"]: p.run(n),
             "SciPy": lambda p=scipy, n=chunks["SciPy"]: p.run(n),
         }
-        times = per_unit(interleaved(calls), {"exact": periods + 2, "exact, points": periods // 5, **chunks})
+        times = per_unit(interleaved(calls), {"exact": periods, "exact, points": periods // 5, **chunks})
         shown = {key: median(values) for key, values in times.items()}
         over_heyoka, over_scipy = ratio(times, "heyoka", "exact"), ratio(times, "SciPy", "exact")
         count = len(near["crossing_time"]) / COMPARED

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
 from timing import interleaved, per_unit, ratio
+from work import march, section
 
 Array = NDArray[np.float64]
 
@@ -166,15 +167,13 @@ def run(effort: float) -> tuple[list[str], list[tuple[str, str, str, bool]]]:
     times = per_unit(
         interleaved(
             {
-                "exact": lambda: ns.sweep(
-                    ours, "gaps", [PART], transient=periods, keep=2, method="exact", progress=False
-                ),
-                "exact, points": lambda: ns.poincare(ours, n=periods // 5, method="exact"),
+                "exact": lambda: march(ours, None, periods, method="exact"),
+                "exact, points": lambda: section(ours, None, periods // 5, method="exact"),
                 "heyoka": lambda: peer.run(chunks["heyoka"]),
                 "SciPy": lambda: scipy.run(chunks["SciPy"]),
             }
         ),
-        {"exact": periods + 2, "exact, points": periods // 5, **chunks},
+        {"exact": periods, "exact, points": periods // 5, **chunks},
     )
     shown = {name: median(values) for name, values in times.items()}
     over_heyoka, over_scipy = ratio(times, "heyoka", "exact"), ratio(times, "SciPy", "exact")

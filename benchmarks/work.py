@@ -1,4 +1,4 @@
-"""The work that is timed, and our side of it through the public verbs.
+"""The work that is timed, and our side of it.
 
 Every peer does the same: marches the same model from the same settled state over the same number of forcing
 periods (or for the same time), finding every crossing. Ours returns more (touches, section points, status).
@@ -13,6 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import nonsmooth as ns
+from nonsmooth.flow.engines.engine import State
+from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.kept import Section
 
 TABLE_1 = {"m": 0.838, "k": 8.47, "k_s": 1210.0, "c": 0.87, "c_s": 0.60}
 
@@ -43,19 +47,26 @@ def start_of(u: NDArray[np.float64]) -> dict[str, float]:
     return {"x": float(u[0]), "v": float(u[1])}
 
 
-def march(system: ns.System, u: NDArray[np.float64], n_periods: int, **method: Any) -> NDArray[np.float64]:
-    """State after `n_periods`: the transient of a sweep with one point, as a bifurcation diagram runs it."""
-    rho = system.values["rho"]
-    result = ns.sweep(
-        system, "rho", [rho], start=start_of(u), transient=n_periods - 2, keep=2, max_period=1, progress=False, **method
-    )
-    return result["section"].transpose("rho", "iterate", "state").values[0, -1]
+def section(
+    system: ns.System, u: NDArray[np.float64] | None, n_periods: int, keep: int | None = None, **method: Any
+) -> NDArray[np.float64]:
+    """States after each of `n_periods` periods, or of the last ones, from u or rest, as `poincare` runs them.
+
+    But every period is run: the verbs leave out those in which a motion repeats itself bit for bit."""
+    engine, kept = engine_for(system, **method), keep or n_periods
+    begun = np.zeros(len(system.states)) if u is None else np.asarray(u, dtype=float)
+    state, out = State(begun, system.memory_vector()), engine.kept(1, kept)
+    tables = engine.prepare(system.parameter_vector()[None, :])
+    every = Section(extremes=0, repeats=0)
+    engine.chain(tables, 0, 1, state, begun[None, :], every, n_periods - kept, kept, out)
+    if out.status[0] not in (codes.OK, codes.NOT_GUARANTEED):
+        raise RuntimeError(f"{system.name}: status {out.status[0]}")
+    return np.asarray(out.section[0])
 
 
-def section(system: ns.System, u: NDArray[np.float64], n_periods: int, **method: Any) -> NDArray[np.float64]:
-    """States after each of `n_periods` periods."""
-    result = ns.poincare(system, n=n_periods, start=start_of(u), section=ns.Stroboscopic(0.0), **method)
-    return result["section"].transpose("iterate", "state").values
+def march(system: ns.System, u: NDArray[np.float64] | None, n_periods: int, **method: Any) -> NDArray[np.float64]:
+    """State after `n_periods`, from u or rest."""
+    return section(system, u, n_periods, 1, **method)[-1]
 
 
 def valve_section(q: float, u: NDArray[np.float64], n_returns: int, tolerance: float) -> NDArray[np.float64]:
