@@ -72,6 +72,25 @@ def test_counts_and_extremes_are_those_of_a_run_of_every_period(elements) -> Non
         assert float(row["minimum"].sel(state=state)) == pytest.approx(u.min(), abs=2e-4 * np.ptp(u))
 
 
+@pytest.mark.parametrize("keep", [1, 2, 3, 8])
+def test_returns_at_the_instant_of_a_transition(keep: int) -> None:
+    """At the section's phase x becomes x / 2 + 1, and decays in between: behind it x -> exp(-1) x / 2 + 1."""
+    system = ns.System(
+        states=["x"],
+        parameters={"T": 1.0},
+        modes={"all": lambda t, u, p: (-u.x,)},
+        period=lambda p: p.T,
+        transitions=[ns.Transition("all", "all", at=0.25, reset=lambda t, u, p: (0.5 * u.x + 1.0,))],
+    )
+    for transient in (0, 5, 400):
+        points = ns.poincare(system, n=keep, transient=transient, start=[0.0], section=ns.Stroboscopic(0.25))
+        assert points["time"].values == pytest.approx(transient + np.arange(keep) + 0.25, rel=1e-14)
+        x = [0.0]
+        for _ in range(transient + keep):
+            x.append(0.5 * x[-1] * (np.exp(-1.0) if len(x) > 1 else 1.0) + 1.0)
+        assert points["section"].values[:, 0] == pytest.approx(x[-keep:], abs=1e-13)
+
+
 @pytest.mark.parametrize("method", ["exact", "taylor"])
 def test_a_thousand_million_periods(method: str) -> None:
     """Impacts once a period, whose orbit is a fixed point of the return."""

@@ -238,7 +238,7 @@ def leave_out(i, form, section, goal, motion, seen, work):
     Behind the first transition after a return the whole place of the run is compared with one that was noted at most
     ``REPEATS_WITHIN`` returns before. What is kept of the returns left out is what was kept a repetition before."""
     tally, memo = work.tally, work.memo
-    if tally[LOOKED] == tally[RETURNS] + 1:
+    if tally[LOOKED] == tally[RETURNS] + 1 or tally[RETURNS] >= goal.transient + goal.keep:
         return
     tally[LOOKED] = tally[RETURNS] + 1
     lag, own, n = tally[RETURNS] + 1 - tally[NOTED_AT], motion.u.shape[0], work.w.shape[0]
