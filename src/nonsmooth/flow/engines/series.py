@@ -200,4 +200,4 @@ class SeriesEngine(Engine):
         traced = self.traced
         rows = len(traced.u) + len(traced.indicators) + len(traced.outputs) + self.layers.count
         sizes = (len(traced.u), len(traced.indicators), rows, len(traced.mode_names), len(self.net.rows))
-        return work_of(*sizes, len(traced.p) + len(traced.m), self.series_order, self.model.n_scratch)
+        return work_of(*sizes, len(traced.p), len(traced.m), self.series_order, self.model.n_scratch)

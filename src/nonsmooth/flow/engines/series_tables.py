@@ -23,7 +23,7 @@ class SeriesPoints:
 
 
 def work_of(
-    n: int, n_indicators: int, rows: int, n_modes: int, n_rows: int, n_q: int, order: int, n_scratch: int
+    n: int, n_indicators: int, rows: int, n_modes: int, n_rows: int, n_p: int, n_m: int, order: int, n_scratch: int
 ) -> Any:
     """Working memory of one running kernel (``kernels.records.SeriesWork``)."""
     from nonsmooth.kernels.compile.block import one_block
@@ -36,9 +36,9 @@ def work_of(
     jets = [np.zeros((size, width)) for size in (rows, n_scratch, rows, rows)]
     return SeriesWork(
         *one_block(
-            *(vector(size) for size in (n, n, n + n_q, n, n)),
-            vector(n_q),
-            vector(n_q),
+            *(vector(size) for size in (n, n, n + n_m, n, n)),
+            vector(n_p + n_m),
+            vector(n_p + n_m),
             *jets,
             tuple(vector(n) for _ in range(8)),
             vector(width),

@@ -282,7 +282,7 @@ def march(i, form, net, section, goal, motion, seen, tables, work):
             touch_section(section, work)
         if not bounded(work, goal.limit):
             code = DIVERGED
-        code = arrive(i, code, tally[SOURCE], t, sense, state, form, section, goal, motion, seen, tables, work)
+        code = arrive(i, code, tally[SOURCE], t, sense, state, form, section, goal, seen, tables, work)
     return NOT_GUARANTEED if code == OK and doubtful(work) else code
 
 

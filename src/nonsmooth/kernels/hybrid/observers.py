@@ -155,11 +155,11 @@ def depart(jumps, goal, seen, work):
 
 
 @once
-def arrive(i, code, source, t, sense, state, form, section, goal, motion, seen, tables, work):
+def arrive(i, code, source, t, sense, state, form, section, goal, seen, tables, work):
     """Count returns at the end of a segment. Gives a status."""
     if GROWS != 2:
         if goal.kind == RETURNS_OF_SECTION:
             code = arrive_at_section(i, code, source, t, sense, state, form, section, goal, seen.kept, tables, work)
             if t >= 0 and section.repeats != 0 and code == OK:
-                leave_out(i, form, section, goal, motion, seen.kept, work)
+                leave_out(i, form, section, goal, seen.kept, work)
     return code

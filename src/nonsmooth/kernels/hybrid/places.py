@@ -22,7 +22,7 @@ NOTED_TIME = 6  # in the period, where a run was noted
 N_MEMO = 7
 
 MOST_CROSSINGS = 50_000  # within one return, period or unit of time: with e = 0.999 a mass rests after some 16 000
-REPEATS_WITHIN = 16  # returns after which a motion that repeats itself has been seen to
+REPEATS_WITHIN = 16  # returns from a place noted to the last one that is compared with it
 MOST_AT_ONCE = 60  # at one instant: a log has room for 64 more when a step begins
 MOST_STEPS = 2_000_000  # on the way to the next return
 BURST_LENGTH = 50  # crossings in a row at intervals below SHORT of the stepper's time scale end a run as chatter

@@ -98,7 +98,7 @@ class Work(NamedTuple):
     wq: Any
     end: Any  # at the end of the leg
     there: Any  # at the crossing just found
-    before: Any  # just before a transition
+    before: Any  # just before a transition; where sections are phases the place noted
     row: Any  # rows of the generator's powers
     scr: Any  # (rows + n + 1, 8) Taylor polynomials
     points: Any  # (4,) critical points
@@ -139,7 +139,9 @@ class SeriesWork(NamedTuple):
 
     w: Any  # (n,) where the present leg begins
     end: Any  # at its end
-    before: Any  # just before a transition
+    before: (
+        Any  # just before a transition; where sections are phases the place noted, in the series with memory behind it
+    )
     wp: Any
     dense: Any
     q: Any  # parameters, then memory

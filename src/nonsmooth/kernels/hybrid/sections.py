@@ -4,7 +4,7 @@ Of ``transient`` + ``keep`` returns the last ones are kept. The window reaches f
 start) to the last kept one; its end is where a carried state goes on.
 """
 
-from math import inf
+from math import floor, inf
 
 from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.codes import NO_CONVERGENCE, OK
@@ -221,48 +221,51 @@ def arrive_at_section(i, code, source, t, sense, state, form, section, goal, see
 
 
 @once
-def note_place(form, motion, seen, work):
+def note_place(form, seen, work):
     """Note where a run stands, and what it has counted."""
-    tally, memo, own, n = work.tally, work.memo, motion.u.shape[0], work.w.shape[0]
-    tally[NOTED_AT], tally[NOTED_MODE], memo[NOTED_TIME] = tally[RETURNS] + 1, tally[MODE], memo[TIME]
+    tally, n = work.tally, work.w.shape[0]
+    tally[NOTED_AT], tally[NOTED_MODE], work.memo[NOTED_TIME] = tally[RETURNS] + 1, tally[MODE], work.memo[TIME]
     tally[NOTED_CROSSINGS], tally[NOTED_CONTACTS] = seen.crossings[0], seen.contacts[0]
-    for j in range(max(n, own + motion.memory.shape[0])):
-        work.before[j] = work.w[j] if j < n else memory_at(j - own, own, form, work)
+    for j in range(work.before.shape[0]):
+        work.before[j] = work.w[j] if j < n else memory_at(j - n, n, form, work)
 
 
 @once
-def leave_out(i, form, section, goal, motion, seen, work):
+def is_noted(form, work):
+    """Return whether a run stands at the place noted, bit for bit."""
+    tally, n = work.tally, work.w.shape[0]
+    same = tally[MODE] == tally[NOTED_MODE] and work.memo[TIME] == work.memo[NOTED_TIME]
+    for j in range(work.before.shape[0]):
+        same = same and work.before[j] == (work.w[j] if j < n else memory_at(j - n, n, form, work))
+    return same
+
+
+@once
+def leave_out(i, form, section, goal, seen, work):
     """Leave out what repeats itself bit for bit, but for its last repetition: of the returns that are not kept, then of
     those that are.
 
     Behind the first transition after a return the whole place of the run is compared with one that was noted at most
     ``REPEATS_WITHIN`` returns before. What is kept of the returns left out is what was kept a repetition before."""
-    tally, memo = work.tally, work.memo
-    if tally[LOOKED] == tally[RETURNS] + 1 or tally[RETURNS] >= goal.transient + goal.keep:
+    tally, returns = work.tally, work.tally[RETURNS]
+    if tally[LOOKED] == returns + 1 or returns >= goal.transient + goal.keep:
         return
-    tally[LOOKED] = tally[RETURNS] + 1
-    lag, own, n = tally[RETURNS] + 1 - tally[NOTED_AT], motion.u.shape[0], work.w.shape[0]
-    is_open = tally[RETURNS] >= goal.transient
+    tally[LOOKED] = returns + 1
+    lag, is_open = returns + 1 - tally[NOTED_AT], returns >= goal.transient
     if tally[NOTED_AT] == 0 or (is_open and tally[NOTED_AT] <= goal.transient):
-        note_place(form, motion, seen, work)
-        return
-    same = tally[MODE] == tally[NOTED_MODE] and memo[TIME] == memo[NOTED_TIME]
-    for j in range(max(n, own + motion.memory.shape[0])):
-        same = same and work.before[j] == (work.w[j] if j < n else memory_at(j - own, own, form, work))
-    if not same:
-        if lag >= REPEATS_WITHIN:
-            note_place(form, motion, seen, work)
-        return
-    turns = (goal.transient + (goal.keep if is_open else 0) - tally[RETURNS] - 1) // lag
-    if is_open:
-        T, first = form.period[i], tally[RETURNS] - goal.transient
-        turn = memo[PERIODS] + (1.0 if memo[TIME] >= section.phase * T else 0.0)  # of the next return
-        for k in range(first, first + turns * lag):
-            time = (turn + (k - first)) * T + section.phase * T
-            keep_point(k, seen.section[k - lag], seen.section_mode[k - lag], time, seen)
-        seen.crossings[0] += turns * (seen.crossings[0] - tally[NOTED_CROSSINGS])
-        seen.contacts[0] += turns * (seen.contacts[0] - tally[NOTED_CONTACTS])
-        seen.elapsed[0] += turns * lag * T
-    tally[RETURNS] += turns * lag
-    tally[LOOKED] = tally[RETURNS] + 1
-    memo[PERIODS] += turns * lag
+        note_place(form, seen, work)
+    elif is_noted(form, work):
+        turns = (goal.transient + (goal.keep if is_open else 0) - returns - 1) // lag
+        if is_open:
+            T, first = form.period[i], returns - goal.transient
+            for k in range(first, first + turns * lag):
+                turn = floor(seen.section_time[k - lag] / T - section.phase + 0.5) + lag
+                keep_point(k, seen.section[k - lag], seen.section_mode[k - lag], turn * T + section.phase * T, seen)
+            seen.crossings[0] += turns * (seen.crossings[0] - tally[NOTED_CROSSINGS])
+            seen.contacts[0] += turns * (seen.contacts[0] - tally[NOTED_CONTACTS])
+            seen.elapsed[0] += turns * lag * T
+        tally[RETURNS] += turns * lag
+        tally[LOOKED] += turns * lag
+        work.memo[PERIODS] += turns * lag
+    elif lag >= REPEATS_WITHIN:
+        note_place(form, seen, work)
