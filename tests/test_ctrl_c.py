@@ -69,9 +69,9 @@ import nonsmooth as ns
 faulthandler.dump_traceback_later(280, exit=True)  # says where it is
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs are begun deaf to Ctrl-C
 warnings.simplefilter("ignore")
-o = ns.models.discontinuous_support()
+o = ns.models.discontinuous_support().with_parameters(rho=0.2)  # chaotic: what repeats itself is not run
 valve, top = ns.models.relief_valve(), ns.Poincare("lift_velocity", rising=False)
-two = {"rho": [0.3, 0.4], "omega": [3.0, 3.6]}
+two = {"rho": [0.2, 0.201], "omega": [3.69, 3.691]}
 cases = {  # each short, to compile what it needs, then long
     "a step of 1e-9": lambda long: ns.simulate(o, duration=0.9, method="taylor", step=1e-9 if long else 0.01),
     "a period of 1e12": lambda long: ns.simulate(
@@ -82,7 +82,7 @@ cases = {  # each short, to compile what it needs, then long
     "on a surface": lambda long: ns.poincare(
         valve, n=2, transient=10**8 if long else 1, start=[0.2, 0.0, 10.0], section=top
     ),
-    "one value of a sweep": lambda long: ns.sweep(o, "rho", [0.4], transient=2 * 10**7 if long else 1),
+    "one value of a sweep": lambda long: ns.sweep(o, "rho", [0.2], transient=2 * 10**7 if long else 1),
     "a chart": lambda long: ns.chart(o, two, transient=2 * 10**7 if long else 1, stop_early=False),
     "exponents": lambda long: ns.lyapunov(o, periods=10**7 if long else 100),
 }

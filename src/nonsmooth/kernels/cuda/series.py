@@ -40,6 +40,7 @@ N_MODES = LACKING.shape[0]
 N_ROWS = ROWS.shape[0]
 ALL_ROWS = N_U + N_INDICATORS + N_OUTPUTS + N_GUARDS
 N_Q = max(N_PARAMETERS + N_MEMORY, 1)
+N_PLACE = N_U + N_MEMORY
 N_SIDES = max(N_INDICATORS, 1)
 N_VALUES = max(ALL_ROWS - N_U, 1)
 WIDTH = max(ORDER, 6) + 1
@@ -81,7 +82,7 @@ def arrays_of_thread():
     rest = cuda.local.array(N_U, float64)
     w = cuda.local.array(N_U, float64)
     end = cuda.local.array(N_U, float64)
-    before = cuda.local.array(N_U + N_MEMORY, float64)
+    before = cuda.local.array(N_PLACE, float64)
     wp = cuda.local.array(N_U, float64)
     dense_ = cuda.local.array(N_U, float64)
     q = cuda.local.array(N_Q, float64)
