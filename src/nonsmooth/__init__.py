@@ -166,7 +166,7 @@ def _not_there(name: str) -> str:
     text = f"module 'nonsmooth' has no attribute {name!r}"
     if name.startswith("_"):
         return text
-    from nonsmooth.system.names import nearest
+    from nonsmooth.errors import nearest
 
     elsewhere = [f"ns.{room}.{name}" for room in _ROOMS if name in import_module(f"nonsmooth.{room}").__all__]
     near = elsewhere or [f"ns.{one}" for one in nearest(name, __all__)]

@@ -10,7 +10,7 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from nonsmooth.system.names import unknown
+from nonsmooth.errors import unknown
 
 __all__ = ["installed", "study"]
 

@@ -11,7 +11,8 @@ import pytest
 
 from nonsmooth import plot
 from nonsmooth.plot.labels import name_axes
-from nonsmooth.plot.units import name_axis, power_for, prefixed
+from nonsmooth.plot.prefixes import power_for, prefixed
+from nonsmooth.plot.units import name_axis
 
 PREFIXES = {"": 1.0, "m": 1e-3, "µ": 1e-6, "n": 1e-9}
 

@@ -192,7 +192,7 @@ def by_share(found: list[Attractor], labels: IntArray) -> tuple[list[Attractor],
 
 
 def _plane(system: System, grid: Any) -> dict[str, FloatArray]:
-    from nonsmooth.system.names import unknown
+    from nonsmooth.errors import unknown
 
     names = dict(system.states)
     if not isinstance(grid, Mapping) or len(grid) != 2:
@@ -210,7 +210,7 @@ def _plane(system: System, grid: Any) -> dict[str, FloatArray]:
 
 
 def _fixed(system: System, values: Mapping[str, Any], fixed: Any) -> FloatArray:
-    from nonsmooth.system.names import unknown
+    from nonsmooth.errors import unknown
 
     names = list(system.states)
     rest = np.zeros(len(names))

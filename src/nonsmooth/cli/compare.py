@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from nonsmooth.cli.files import ANY, TEXT, read_tables, write
 from nonsmooth.cli.study import SYSTEM, system_of
-from nonsmooth.system.names import unknown
+from nonsmooth.errors import unknown
 
 if TYPE_CHECKING:
     import xarray as xr

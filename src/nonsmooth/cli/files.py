@@ -10,8 +10,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.errors import shortened
-from nonsmooth.system.names import check_keys
+from nonsmooth.errors import check_keys, shortened
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from nonsmooth.cli.files import LENGTH, NAMES, QUANTITIES, TEXT, keep, read_tables, with_folder, without_screen
-from nonsmooth.system.names import check_keys, unknown
+from nonsmooth.errors import check_keys, unknown
 
 _TABLES = {
     "identify": {

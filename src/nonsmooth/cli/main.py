@@ -16,8 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from nonsmooth.cli import compare, completion, explore, identify, init, models, plan, reproduce, rig, run, schema, show
 from nonsmooth.cli.terminal import printable
-from nonsmooth.errors import SolveError, shortened
-from nonsmooth.system.names import unknown
+from nonsmooth.errors import SolveError, shortened, unknown
 
 _COMMANDS = (init, run, plan, show, explore, models, identify, compare, reproduce, rig, schema, completion)
 #: What a user can have caused and mend; anything else is a fault of the package.

@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from nonsmooth.cli.files import ANY, TEXT, read_tables, write
 from nonsmooth.cli.verb_options import VERBS, options_of
-from nonsmooth.errors import shortened
-from nonsmooth.system.names import check_keys, unknown
+from nonsmooth.errors import check_keys, shortened, unknown
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.names import unknown
+from nonsmooth.errors import SystemDefinitionError, unknown
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from nonsmooth.control.held import Held
 from nonsmooth.control.outcome import Names
-from nonsmooth.system.names import unknown
+from nonsmooth.errors import unknown
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 
 from nonsmooth.control.actuated import FORCE, actuated
+from nonsmooth.errors import unknown
 from nonsmooth.flow.arguments import real_number
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import above, at_least
-from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

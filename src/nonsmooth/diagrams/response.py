@@ -59,7 +59,7 @@ def frequency_response(
     from nonsmooth.results.schema import response
 
     if parameter not in system.parameters:
-        from nonsmooth.system.names import unknown
+        from nonsmooth.errors import unknown
 
         known = {name: item.unit for name, item in system.parameters.items()}
         raise ValueError(unknown(parameter, "a parameter", repr(system.name), known) + "; choose one with parameter=")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from sympy.printing.pretty.pretty_symbology import greek_unicode, sub
 
-from nonsmooth.plot.units import PREFIXES, power_for
+from nonsmooth.plot.prefixes import PREFIXES, power_for
 from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def _parts(latex: str) -> tuple[str, str]:
 
 
 def power_of(unit: str, *values: float) -> int:
-    """The power of ten of the prefix in which values are read easily: see ``nonsmooth.plot.units``."""
+    """The power of ten of the prefix in which values are read easily: see ``nonsmooth.plot.prefixes``."""
     return power_for(unit, max((abs(value) for value in values), default=0.0))
 
 

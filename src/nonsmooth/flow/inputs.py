@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
-from nonsmooth.errors import shortened
+from nonsmooth.errors import shortened, unknown
 from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.engines.engine import Changes
 from nonsmooth.flow.saltation import Jump
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     from nonsmooth.flow.variational import VariationalFlow

@@ -42,8 +42,8 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
     """
     from sympy import Float
 
+    from nonsmooth.errors import unknown
     from nonsmooth.system.derived.sliding import slide
-    from nonsmooth.system.names import unknown
     from nonsmooth.system.symbolic.scalar import Scalar
     from nonsmooth.system.symbolic.tracing import call_scalar, refuse_corners
 

@@ -96,8 +96,8 @@ def section_plan(system: System, section: Any) -> tuple[Stroboscopic | Poincare,
         return section, Section(phase=section.phase)
     if not isinstance(section, Poincare):
         raise TypeError(f"section must be ns.Stroboscopic(...) or ns.Poincare(...), not {shortened(section)}")
+    from nonsmooth.errors import unknown
     from nonsmooth.flow.starts import mode_number
-    from nonsmooth.system.names import unknown
 
     indicators = list(system.indicators)
     mode = -1 if section.mode is None else mode_number(system, section.mode)

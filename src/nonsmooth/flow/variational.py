@@ -128,7 +128,7 @@ class VariationalFlow:
         names = (active,) if isinstance(active, str) else tuple(active)
         for name in names:
             if name not in system.values:
-                from nonsmooth.system.names import unknown
+                from nonsmooth.errors import unknown
 
                 units = {key: parameter.unit for key, parameter in system.parameters.items()}
                 raise ValueError(unknown(name, "a parameter", repr(system.name), units))

@@ -3,5 +3,6 @@
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.identification.report import report
+from nonsmooth.identification.uncertainty import correlated, coverage_factor, uniform
 
-__all__ = ["Estimate", "Finding", "ParameterSet", "report"]
+__all__ = ["Estimate", "Finding", "ParameterSet", "correlated", "coverage_factor", "report", "uniform"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit
-from nonsmooth.errors import Interrupted, SolveError, shortened
+from nonsmooth.errors import Interrupted, SolveError, shortened, unknown
 from nonsmooth.identification.compare.draws import Setting, draw_systems, nominal, read_settings
 from nonsmooth.identification.gathered import Gathered, matched
 from nonsmooth.results.labels import labelled
@@ -19,7 +19,6 @@ from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as watched
 from nonsmooth.system.arguments import checked, declared
 from nonsmooth.system.kinds import at_least, real_number
-from nonsmooth.system.names import unknown
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:

@@ -54,7 +54,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    from nonsmooth.system.names import unknown
+    from nonsmooth.errors import unknown
 
     raise AttributeError(unknown(name, "a model", "nonsmooth.models", names()))
 

@@ -16,18 +16,28 @@ from nonsmooth.plot.comparison import (
     comparison_section,
     comparison_time,
 )
+from nonsmooth.plot.labels import name_plane
 from nonsmooth.plot.mechanism import mechanism
 from nonsmooth.plot.planes import basin_fractions, basins, chart
+from nonsmooth.plot.prefixes import prefixed
 from nonsmooth.plot.regions import regions
-from nonsmooth.plot.style import COLORS, COLUMN, PAGE, journal, save_figure, slides
+from nonsmooth.plot.style import COLORS, COLUMN, PAGE, annotate, journal, save_figure, shared_legend, slides
 from nonsmooth.plot.sweeps import bifurcation, bifurcation_diagram, density, frequency_response, smoothing_report
-from nonsmooth.plot.trajectories import amplitude_spectrum, orbit, phase_portrait, section, time_history
+from nonsmooth.plot.trajectories import (
+    amplitude_spectrum,
+    orbit,
+    phase_portrait,
+    section,
+    shade_zone,
+    time_history,
+)
 
 __all__ = [
     "COLORS",
     "COLUMN",
     "PAGE",
     "amplitude_spectrum",
+    "annotate",
     "basin_fractions",
     "basins",
     "bifurcation",
@@ -49,11 +59,15 @@ __all__ = [
     "manifolds",
     "mechanism",
     "multipliers",
+    "name_plane",
     "orbit",
     "phase_portrait",
+    "prefixed",
     "regions",
     "save_figure",
     "section",
+    "shade_zone",
+    "shared_legend",
     "slides",
     "smoothing_report",
     "time_history",
@@ -61,8 +75,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    from nonsmooth.errors import unknown
     from nonsmooth.plot import identification
-    from nonsmooth.system.names import unknown
 
     there = not name.startswith("_") and hasattr(identification, name)
     hint = f"; there is ns.plot.identification.{name}" if there else ""

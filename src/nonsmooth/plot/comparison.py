@@ -315,7 +315,7 @@ def _jumps(ax: Axes, result: xr.Dataset, digits: int) -> None:
         if np.isfinite(seen) and np.isfinite(expected):
             number = f"{expected - seen:+.{digits}f}".replace("-", "\N{MINUS SIGN}")
             between, lift = ((seen + expected) / 2, 0.03), (0, _LIFT[direction])
-            style.label(ax, number, between, lift, xycoords=foot, ha="center", color=color)
+            style.annotate(ax, number, between, lift, xycoords=foot, ha="center", color=color)
             differences = True
     if differences:
         unit = name_and_unit(result, str(result["theory_amplitude"].dims[0]))[1]

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
+from nonsmooth.errors import unknown
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import variable_along
-from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

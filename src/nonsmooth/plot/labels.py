@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.errors import shortened
+from nonsmooth.plot.prefixes import together
 from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
@@ -33,8 +34,8 @@ def with_unit(text: str, unit: str) -> str:
 
 
 def name_axes(ax: Axes, x: tuple[str, str] | None = None, y: tuple[str, str] | None = None) -> None:
-    """Label the axes with quantities and units, in the prefixes that suit what is drawn: see ``plot.units``."""
-    from nonsmooth.plot.units import name_axis, together
+    """Label the axes with quantities and units, in the prefixes that suit what is drawn."""
+    from nonsmooth.plot.units import name_axis
 
     named = [(axis, *one) for axis, one in ((ax.xaxis, x), (ax.yaxis, y)) if one is not None]
     largest = together([(unit, float(np.abs(axis.get_view_interval()).max())) for axis, _, unit in named])
@@ -43,7 +44,17 @@ def name_axes(ax: Axes, x: tuple[str, str] | None = None, y: tuple[str, str] | N
 
 
 def name_plane(ax: Axes, result: xr.Dataset, x: str, y: str, before: str = "") -> None:
-    """Label the axes with two states, parameters or outputs of a result, words ``before`` the second."""
+    """Label the axes with two quantities of a result, in the prefixes that suit what is drawn; call it at the end.
+
+    Parameters
+    ----------
+    ax
+    result
+    x, y : str
+        States, parameters or outputs of the result, or ``"time"``.
+    before : str
+        Words before the name of ``y``.
+    """
     text, unit = name_and_unit(result, y)
     name_axes(ax, name_and_unit(result, x), (before + text, unit))
 

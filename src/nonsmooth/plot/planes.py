@@ -9,6 +9,7 @@ import numpy as np
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import name_and_unit, name_axes, name_plane, only_states
+from nonsmooth.plot.prefixes import PREFIXES, power_for
 from nonsmooth.results.labels import kind_of
 from nonsmooth.results.statuses import in_words
 from nonsmooth.tables.quantities import quantities_of, quantity
@@ -137,8 +138,6 @@ def held(result: xr.Dataset, region: Any) -> Any:
 
 def _contours(ax: Axes, heights: xr.DataArray, levels: Any, name: str) -> None:
     """Lines of equal value, each with its value in the unit that suits it."""
-    from nonsmooth.plot.units import PREFIXES, power_for
-
     unit = str(heights.attrs.get("units", "1"))
     y, x = (heights[dim].values for dim in heights.dims)
     looks: dict[str, Any] = {"colors": style.COLORS["section"], "linestyles": "--", "linewidths": 0.8}

@@ -223,8 +223,20 @@ def points(
     )
 
 
-def label(ax: Axes, words: str, place: tuple[float, float], offset: tuple[float, float], **looks: Any) -> Any:
-    """Write small words beside a place, so many points away, that show over whatever lies below."""
+def annotate(ax: Axes, words: str, place: tuple[float, float], offset: tuple[float, float], **looks: Any) -> Any:
+    """Write small words beside a place of the axes, so that they show over whatever lies below.
+
+    Parameters
+    ----------
+    ax
+    words
+    place : (float, float)
+        In the units of what is drawn, or of ``xycoords``.
+    offset : (float, float)
+        Of the words from it, in typographic points.
+    **looks
+        Of ``Axes.annotate``: ``rotation``, ``ha``, ``va``, ``color``, ``xycoords``, ...
+    """
     looks = {"fontsize": small(ax), "zorder": 6, "path_effects": halo(), **looks}
     return ax.annotate(words, place, offset, textcoords="offset points", **looks)
 
@@ -239,6 +251,29 @@ def make_room(ax: Axes, share: float) -> None:
     """Raise the upper end of the ordinate by a share of its length: room for a legend."""
     low, high = ax.get_ylim()
     ax.set_ylim(low, high + share * (high - low))
+
+
+def shared_legend(figure: Figure, columns: int = 5) -> Legend:
+    """Put one legend under all axes of a figure in place of their own, so that it hides nothing.
+
+    What several axes have in their legends stands in it once. The figure's layout must be ``constrained`` for it to
+    have a place of its own, as :func:`journal` has it.
+
+    Parameters
+    ----------
+    figure
+    columns : int
+        The most entries in a row.
+    """
+    entries: dict[str, Any] = {}
+    for ax in figure.axes:
+        for handle, words in zip(*ax.get_legend_handles_labels(), strict=True):
+            entries.setdefault(words, handle)
+        if (own := ax.get_legend()) is not None:
+            own.remove()
+    legend = figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns)
+    even_dots(legend)
+    return legend
 
 
 def even_dots(legend: Legend) -> None:

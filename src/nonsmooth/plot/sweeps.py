@@ -279,7 +279,7 @@ def _mark(
     small = abs(after - before) < 0.2 * np.ptp(curve[np.isfinite(curve)])  # no room beside the arrow: below it
     where, offset = (min(before, after), (side, -3)) if small else ((before + after) / 2, (side, 0))
     sides = {"va": "top" if small else "center", "ha": "left" if side > 0 else "right"}
-    return style.label(ax, f"{place:.{digits}g}", (place, where), offset, color=color, rotation=90, **sides)
+    return style.annotate(ax, f"{place:.{digits}g}", (place, where), offset, color=color, rotation=90, **sides)
 
 
 @figure("sweep(..., density=True)", "density")

@@ -123,7 +123,7 @@ def phase_portrait(
 
 
 def shade_zone(ax: Axes, edge: float) -> None:
-    """Shade x > edge as far as the axes reach now, without moving them."""
+    """Shade the contact zone x > edge as far as the axes reach now, without moving them; call it at the end."""
     low, high = ax.get_xlim()
     ax.axvline(edge, color=style.COLORS["muted"], linewidth=0.6, linestyle="--", zorder=1)
     if edge < high:

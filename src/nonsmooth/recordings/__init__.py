@@ -3,9 +3,11 @@
 from nonsmooth.recordings.load import load_recording
 from nonsmooth.recordings.readers.capstone_writers import write_cap, write_capstone_csv
 from nonsmooth.recordings.recording import Recording, RecordingWarning
-from nonsmooth.recordings.session import Quantity, Session, load_session
+from nonsmooth.recordings.session import PROCEDURES, SETTINGS, Quantity, Session, load_session
 
 __all__ = [
+    "PROCEDURES",
+    "SETTINGS",
     "Quantity",
     "Recording",
     "RecordingWarning",

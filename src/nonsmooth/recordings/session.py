@@ -16,12 +16,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from nonsmooth.errors import DataFileError
+from nonsmooth.errors import DataFileError, check_keys, unknown
 from nonsmooth.flow.arguments import real_number
 from nonsmooth.recordings.load import content_of, load_recording
 from nonsmooth.recordings.reading import Options
 from nonsmooth.recordings.recording import Recording, RecordingWarning
-from nonsmooth.system.names import check_keys, unknown
 
 NOTEBOOK = "session.toml"
 

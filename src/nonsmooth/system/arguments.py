@@ -15,9 +15,8 @@ from inspect import Parameter
 from typing import Any, TypeVar, cast, get_args, get_type_hints, overload
 from typing import is_typeddict as is_group
 
-from nonsmooth.errors import shortened
+from nonsmooth.errors import shortened, unknown
 from nonsmooth.system.kinds import Default, Reader, reader_of
-from nonsmooth.system.names import unknown
 
 Verb = Callable[..., Any]
 F = TypeVar("F", bound=Verb)

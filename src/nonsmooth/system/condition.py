@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from nonsmooth.errors import SystemDefinitionError, shortened
-from nonsmooth.system.names import unknown
+from nonsmooth.errors import SystemDefinitionError, shortened, unknown
 
 GRAMMAR = "<indicator> > 0  or  <indicator> < 0,  joined by 'and'"
 _SIGN = re.compile(r"\s*([A-Za-z_]\w*)\s*([<>])(=?)\s*0(?:\.0*)?\s*\Z")

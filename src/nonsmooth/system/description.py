@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
-from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.errors import SystemDefinitionError, shortened, unknown
 from nonsmooth.system.equations import (
     TracedBand,
     TracedSurface,
@@ -24,7 +24,7 @@ from nonsmooth.system.equations import (
 )
 from nonsmooth.system.inputs import input_states, with_inputs
 from nonsmooth.system.mode import Band, Mode
-from nonsmooth.system.names import check_names, unknown
+from nonsmooth.system.names import check_names
 from nonsmooth.system.parameter import Parameter, finite_number
 from nonsmooth.system.symbolic.domain import Domain
 from nonsmooth.system.symbolic.period import check_period, forcing_period, timed_expressions

@@ -8,10 +8,9 @@ from typing import Any
 
 import sympy as sp
 
-from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.errors import SystemDefinitionError, shortened, unknown
 from nonsmooth.system.condition import read_condition
 from nonsmooth.system.mode import Band
-from nonsmooth.system.names import unknown
 from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.symbolic.scalar import Scalar, as_written, to_expression
 from nonsmooth.system.symbolic.traced import Traced, TracedCondition, TracedTransition

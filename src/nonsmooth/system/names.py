@@ -1,4 +1,4 @@
-"""Names that may be used, and helpful answers to those that may not.
+"""Names that the parts of a system may have.
 
 A parameter's name becomes a dim of a result and a state's name a coordinate, so that the names the
 results use themselves are reserved.
@@ -6,12 +6,11 @@ results use themselves are reserved.
 
 from __future__ import annotations
 
-import difflib
 import keyword
 import unicodedata
 from collections.abc import Iterable, Mapping
 
-from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.errors import SystemDefinitionError
 
 RESERVED = frozenset(
     [
@@ -126,67 +125,3 @@ def check_names(groups: Mapping[str, Iterable[str]], system: str) -> None:
 
 def _a(word: str) -> str:
     return f"an {word}" if word[0] in "aeio" else f"a {word}"
-
-
-def check_keys(table: Iterable[str], allowed: Iterable[str], where: str, what: str) -> None:
-    """Check the keys of a table that a user wrote; ``where`` names its place, ``what`` a key with its article."""
-    known = list(allowed)
-    for key in table:
-        if key not in known:
-            raise ValueError(f"{where}: {unknown(key, what, 'this place', known)}")
-
-
-def unknown(name: object, what: str, of: str, known: Mapping[str, str] | Iterable[str]) -> str:
-    """Return the sentence for a name that is not known: nearest first, then all.
-
-    Parameters
-    ----------
-    name : object
-        The name that was given.
-    what : str
-        What it should have been, with its article: "a parameter".
-    of : str
-        The owner as it shall be printed: "'discontinuous support'".
-    known : mapping of name to unit, or iterable of names
-        What is allowed.
-    """
-    units = known if isinstance(known, Mapping) else dict.fromkeys(known, "")
-    ordered = sorted(units)
-    text = f"`{shortened(name, quoted=False)}` is not {what} of {of}"
-    for near in nearest(str(name), ordered)[:1]:
-        text += f"; nearest: {near}" + (f" [{units[near]}]" if units[near] else "")
-    return text + (f"; all: {', '.join(ordered)}" if ordered else f"; {of} has none")
-
-
-#: Words of other programs for our options.
-ELSEWHERE = {
-    **dict.fromkeys(("x0", "y0", "u0", "z0", "initial", "initial_state"), "start"),
-    **dict.fromkeys(("t_end", "tend", "t_final", "t_max", "tmax", "t_span", "tspan"), "duration"),
-    **dict.fromkeys(("dt", "t_eval", "tout", "sampling"), "samples"),
-    **dict.fromkeys(("tol", "reltol", "rel_tol"), "rtol"),
-    **dict.fromkeys(("abstol", "abs_tol"), "atol"),
-    **dict.fromkeys(("solver", "integrator", "algorithm"), "method"),
-    **dict.fromkeys(("n_jobs", "workers", "processes", "cores"), "threads"),
-    **dict.fromkeys(("sep", "separator"), "delimiter"),
-    **dict.fromkeys(("skiprows", "skip_rows", "skiplines"), "skip"),
-    **dict.fromkeys(("usecols", "names"), "columns"),
-    **dict.fromkeys(("fps", "framerate", "frame_rate"), "rate"),
-    **dict.fromkeys(("mu", "mu_k", "mu_d", "muk", "mud"), "friction"),
-    **dict.fromkeys(("mu_s", "mus", "stiction"), "static"),
-    "bounds": "parameters",  # of fit: {"k": (5.0, 12.0)}
-    "cor": "restitution",
-}
-
-
-def nearest(name: str, known: Iterable[str]) -> list[str]:
-    """Return the known names that are like ``name``, the nearest first, at most three."""
-    likeness = {candidate: _likeness(name[:100], candidate) for candidate in known}
-    return sorted((one for one in likeness if likeness[one] >= 0.5), key=lambda one: -likeness[one])[:3]
-
-
-def _likeness(given: str, candidate: str) -> float:
-    """Similarity, 0 to about 1; the same beginning counts (``gap`` means g rather than omega)."""
-    if ELSEWHERE.get(given.lower()) == candidate:
-        return 2.0
-    begins = given[:1].lower() == candidate[:1].lower()
-    return difflib.SequenceMatcher(None, given.lower(), candidate.lower()).ratio() + 0.2 * begins

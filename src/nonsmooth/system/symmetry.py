@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
-from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.names import unknown
+from nonsmooth.errors import SystemDefinitionError, unknown
 from nonsmooth.system.parameter import finite_number
 from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.traced import Traced

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.errors import shortened
+from nonsmooth.errors import nearest, shortened, unknown
 from nonsmooth.system.description import Description
-from nonsmooth.system.names import nearest, unknown
 from nonsmooth.system.parameter import finite_number
 from nonsmooth.system.variant import ETA_PER_INDICATOR, ONE_ETA, SHARP, Variant, variant_of
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.system.names import unknown
+from nonsmooth.errors import unknown
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,13 +27,20 @@ def _response(jumps: dict[str, float], doubled: tuple[float, float] = (3.6, 4.0)
     """Amplitudes that fall evenly, and by half of them at a jump; period 2 within ``doubled``."""
     omega = np.round(np.arange(3.0, 6.5, STEP), 6)
     columns: dict[str, list[np.ndarray]] = {"omega": [], "amplitude": [], "direction": [], "period_number": []}
+    met: dict[str, list[Any]] = {"direction": [], "value": [], "step": [], "before": [], "after": []}
     for direction, jump in jumps.items():
         columns["omega"].append(omega)
         columns["amplitude"].append(0.02 - 1e-3 * (omega - 3.0) - np.where(omega > jump, 0.01, 0.0))
         columns["direction"].append(np.full(len(omega), direction))
         columns["period_number"].append(np.where((omega >= doubled[0]) & (omega <= doubled[1]), 2, 1))
+        if jump < omega[-1]:
+            step = np.searchsorted(omega, jump) + np.arange(-1, 1)
+            ends = columns["amplitude"][-1][step]
+            row = (direction, omega[step].mean(), STEP, *(ends if direction == "up" else ends[::-1]))
+            for cells, value in zip(met.values(), row, strict=True):
+                cells.append(value)
     runs = xr.Dataset({name: ("run", np.concatenate(parts)) for name, parts in columns.items()})
-    runs["amplitude_error"] = ("run", np.full(runs.sizes["run"], 1e-5))
+    runs = runs.assign({f"jump_{name}": ("jump", np.array(cells)) for name, cells in met.items()})
     return {"runs": runs}
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 import numpy as np
 
+from nonsmooth.errors import unknown
 from nonsmooth.flow.arguments import real_number
 from nonsmooth.flow.options import solver_of
 from nonsmooth.identification.blas import one_blas_thread
@@ -15,7 +16,6 @@ from nonsmooth.identification.compare.measured import recorded_motion
 from nonsmooth.identification.options import Comparing
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.results.labels import labelled
@@ -58,6 +59,17 @@ def jumps_in_steps(x: FloatArray, heights: FloatArray, error: FloatArray) -> lis
             continue
         middle, half = 0.5 * float(x[i] + x[i + 1]), 0.5 * float(abs(x[i + 1] - x[i]))
         found.append(AmplitudeJump(middle, half, float(heights[i]), float(heights[i + 1])))
+    return found
+
+
+def jumps_of_runs(value: FloatArray, amplitude: FloatArray, error: FloatArray, direction: NDArray[Any]) -> Jumps:
+    """The jumps in each direction in which runs were reached, in the order of the steps."""
+    found = {}
+    for word in ("up", "down"):
+        mine = np.flatnonzero(direction == word)
+        order = mine[np.argsort(value[mine])][:: -1 if word == "down" else 1]
+        if len(order):
+            found[word] = jumps_in_steps(*(np.nan_to_num(column[order]) for column in (value, amplitude, error)))
     return found
 
 

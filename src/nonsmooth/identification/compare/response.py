@@ -11,7 +11,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.diagrams.response import jumps_in
 from nonsmooth.diagrams.sweep import sweep
 from nonsmooth.identification.compare.draws import Model
-from nonsmooth.identification.compare.jumps import AmplitudeJump, Jumps, jumps_in_steps, match_jumps
+from nonsmooth.identification.compare.jumps import AmplitudeJump, Jumps, jumps_of_runs, match_jumps
 from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
@@ -167,18 +167,14 @@ def _jump(x: FloatArray, heights: FloatArray, i: int) -> AmplitudeJump:
 
 def _measured_jumps(measured: xr.Dataset, runs: dict[str, NDArray[Any]], directions: list[str]) -> Jumps:
     """The jumps that the measurement states, else those in its steps; the prediction has no say in it."""
-    found: dict[str, list[AmplitudeJump]] = {}
-    if "jump_value" in measured and "run" in measured["amplitude"].dims:  # as the experimenter read them off
+    stated = "jump_value" in measured and "jump_before" not in measured  # as the experimenter read them off
+    if stated and "run" in measured["amplitude"].dims:
+        found: dict[str, list[AmplitudeJump]] = {}
         words = measured["jump_direction"].values.astype(str)
         half = 0.5 * measured["jump_step"].values if "jump_step" in measured else np.zeros(len(words))
         for word in directions:
             rows = zip(measured["jump_value"].values, half, words, strict=True)
-            stated = [AmplitudeJump(float(value), float(step), np.nan, np.nan) for value, step, w in rows if w == word]
-            found[word] = sorted(stated, key=lambda jump: jump.value, reverse=word == "down")
+            named = [AmplitudeJump(float(value), float(step), np.nan, np.nan) for value, step, w in rows if w == word]
+            found[word] = sorted(named, key=lambda jump: jump.value, reverse=word == "down")
         return found
-    for word in directions:
-        mine = runs["direction"] == word
-        order = np.argsort(runs["value"][mine])[:: 1 if word == "up" else -1]
-        columns = (runs[key][mine][order] for key in ("value", "amplitude", "error"))
-        found[word] = jumps_in_steps(*(np.nan_to_num(column) for column in columns))
-    return found
+    return jumps_of_runs(*(runs[key] for key in ("value", "amplitude", "error", "direction")))

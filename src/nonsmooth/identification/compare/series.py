@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.identification.compare.jumps import AmplitudeJump, jumps_of_runs
 from nonsmooth.identification.compare.orbits import fold
+from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
 
+_JUMPS: tuple[tuple[str, Callable[[AmplitudeJump], float], str, str], ...] = (
+    ("value", lambda one: one.value, "middle of the step in which the amplitude jumps", "rad/s"),
+    ("step", lambda one: 2 * one.half, "width of the step", "rad/s"),
+    ("before", lambda one: one.before, "amplitude before it", "m"),
+    ("after", lambda one: one.after, "amplitude behind it", "m"),
+)
 FEW = 6  # turns of the drive below which no period number is sought
 
 
@@ -39,11 +47,11 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
     xarray.Dataset
         Over ``run``: ``amplitude`` (half the range of x, the mean over forcing periods), ``amplitude_error`` (that of
         the mean: the scatter of the periods, and the error of a sample), ``omega``, ``direction``, and
-        ``period_number`` (0: none found, -1: fewer than six turns).
+        ``period_number`` (0: none found, -1: fewer than six turns). Over ``jump``, as
+        :func:`nonsmooth.frequency_response` has them: ``jump_direction``, ``jump_value``, ``jump_step``,
+        ``jump_before`` and ``jump_after``.
     """
     import xarray as xr
-
-    from nonsmooth.identification.compare.periods import measured_period
 
     if len(motions) != len(directions) or not len(motions):
         raise ValueError(f"{len(motions)} runs and {len(directions)} directions: each run needs its own")
@@ -64,18 +72,26 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
         sample = float(np.median(motion["u_error"].values[:, 0])) / np.sqrt(2)
         scatter = float(half.std(ddof=1) / np.sqrt(len(half))) if len(half) > 1 else 0.0
         errors.append(float(np.hypot(scatter, sample / np.sqrt(len(half)))))
+    omega = np.array([float(motion["omega"]) for motion in motions])
+    words = np.array(directions, dtype=str)
+    jumps = jumps_of_runs(omega, np.array(heights), np.array(errors), words)
+    rows = [(word, jump) for word, found in jumps.items() for jump in found]
     attrs = {key: motions[0].attrs[key] for key in ("synthetic", "file", "sha256") if key in motions[0].attrs}
     attrs["title"] = f"{attrs.get('file') or 'in memory'}, {len(motions)} runs"
-    omega = np.array([float(motion["omega"]) for motion in motions])
     return xr.Dataset(
         {
             "amplitude": labelled("run", np.array(heights), "half the range of x", "m"),
             "amplitude_error": labelled("run", np.array(errors), "standard error of it", "m"),
             "omega": labelled("run", omega, "frequency of the drive", "rad/s"),
-            "direction": labelled("run", np.array(directions, dtype=str), "how the run was reached"),
+            "direction": labelled("run", words, "how the run was reached"),
             "period_number": labelled(
                 "run", np.array(periods, dtype=np.int64), "period number (0: none found, -1: too few turns)"
             ),
+            "jump_direction": labelled("jump", np.array([word for word, _ in rows], dtype=str), "how it was met"),
+            **{
+                f"jump_{name}": labelled("jump", np.array([value(one) for _, one in rows], dtype=float), said, unit)
+                for name, value, said, unit in _JUMPS
+            },
         },
         attrs=attrs,
     )
@@ -133,16 +149,20 @@ def measured_sections(
     -------
     xarray.Dataset
         ``section(<parameter>, iterate, state)`` at phase 0, in rising order of the parameter (NaN behind the end of a
-        shorter run), and ``section_error(state)``.
+        shorter run), ``section_error(state)`` and ``period_number(<parameter>)`` (0: none found).
     """
     import xarray as xr
 
-    order = np.argsort(values)
+    order = np.argsort(values, kind="stable")
     clouds = [section_points(motions[i]) for i in order]
     points = np.full((len(clouds), max(map(len, clouds)), clouds[0].shape[1]), np.nan)
     for row, cloud in zip(points, clouds, strict=True):
         row[: len(cloud)] = cloud
     error = np.median(np.concatenate([motion["u_error"].values for motion in motions]), axis=0)
+    numbers = [
+        measured_period(cloud, np.median(motions[i]["u_error"].values, axis=0)).number
+        for i, cloud in zip(order, clouds, strict=True)
+    ]
     first = motions[0]
     attrs = {**first.attrs, "title": f"{first.attrs.get('file') or 'in memory'}, {len(motions)} runs"}
     attrs.pop("run", None)
@@ -150,6 +170,7 @@ def measured_sections(
         {
             "section": labelled((parameter, "iterate", "state"), points, "section points"),
             "section_error": ("state", error),
+            "period_number": labelled(parameter, np.array(numbers, dtype=np.int64), "period number (0: none found)"),
         },
         {
             parameter: labelled(parameter, np.asarray(values, dtype=float)[order], parameter, unit),

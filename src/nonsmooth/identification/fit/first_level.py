@@ -20,11 +20,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import SolveError, shortened
+from nonsmooth.errors import SolveError, shortened, unknown
 from nonsmooth.identification.arrow import Residuals, settle
 from nonsmooth.identification.fit.first_windows import first_windows, told_start
 from nonsmooth.identification.fit.windows import Window, Windows
-from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

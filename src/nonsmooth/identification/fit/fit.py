@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import SolveError
+from nonsmooth.errors import SolveError, unknown
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.options import Fitting
 from nonsmooth.results.progress import Progress, progress
 from nonsmooth.system.arguments import check_system, checked
 from nonsmooth.system.kinds import above, at_least
-from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     from nonsmooth.identification.fit.growth import Grown

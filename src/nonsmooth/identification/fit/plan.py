@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import SolveError
+from nonsmooth.errors import SolveError, unknown
 from nonsmooth.identification.arrow import inverted, reduced
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.options import Prior
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import shortened
+from nonsmooth.errors import shortened, unknown
 from nonsmooth.flow.arguments import float_array, real_number
 from nonsmooth.flow.inputs import Driven, Input, driven
 from nonsmooth.identification.fit.sensors import Sensor, read_sensors
 from nonsmooth.recordings.recording import Recording
-from nonsmooth.system.names import unknown
 from nonsmooth.system.units import read_unit
 
 if TYPE_CHECKING:

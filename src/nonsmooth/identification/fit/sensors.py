@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import shortened
+from nonsmooth.errors import shortened, unknown
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.inputs import input_states
 from nonsmooth.system.kinds import above, at_least
-from nonsmooth.system.names import unknown
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced

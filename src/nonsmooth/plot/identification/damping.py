@@ -208,7 +208,7 @@ def forced_responses(one: Picture, finding: Any, *, responses: Sequence[Any] = (
             top = int(np.argmax(a))
             paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.4}
             looks = {"color": style.COLORS["second"], "ha": "left", "va": "bottom", "bbox": paper}
-            style.label(one.ax, f"{curve.attrs['force']:.2g} N", (f[top], a[top]), (3, 2), **looks)
+            style.annotate(one.ax, f"{curve.attrs['force']:.2g} N", (f[top], a[top]), (3, 2), **looks)
     natural, a = one.values("f_n", "amplitude")
     one.line(natural, a, "backbone", linewidth=1.1, zorder=5)
     one.ax.set_ylim(bottom=0, top=1.32 * float(height.max()))

@@ -128,7 +128,7 @@ def fit_residuals(
 
 
 def _chosen(data: Any, name: str, given: str | None) -> int:
-    from nonsmooth.system.names import unknown
+    from nonsmooth.errors import unknown
 
     words = words_of_flags(data[name])
     asked = words[0] if given is None else given.replace(" ", "_")

@@ -11,12 +11,11 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.errors import SystemDefinitionError, shortened, unknown
 from nonsmooth.system.derived.assembly import Assembler, Part, Pattern, kept
 from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.derived.elements.element import Condition, Law
 from nonsmooth.system.derived.faces import INDEPENDENT
-from nonsmooth.system.names import unknown
 from nonsmooth.system.symbolic.scalar import Scalar, to_expression
 from nonsmooth.system.symbolic.tracing import Symbols, call_scalar
 

@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.errors import SystemDefinitionError, shortened, unknown
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.derived.combinations import element_names
 from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.derived.loads import Loads
-from nonsmooth.system.names import unknown
 from nonsmooth.system.symbolic.scalar import Scalar, to_expression
 from nonsmooth.system.symbolic.tracing import Symbols
 from nonsmooth.system.system import System

@@ -10,8 +10,7 @@ from typing import Any, NoReturn
 import numpy as np
 import sympy as sp
 
-from nonsmooth.errors import SystemDefinitionError, shortened
-from nonsmooth.system.names import unknown
+from nonsmooth.errors import SystemDefinitionError, shortened, unknown
 from nonsmooth.system.symbolic.scalar import Scalar, as_written, exact, to_expression
 
 # What no method can see inside a mode: the derivative jumps and nothing says where.

@@ -108,23 +108,18 @@ def range_of(swept: xr.Dataset, regime_wanted: int, direction: str | None = None
 
 
 def _sized_jumps(response: xr.Dataset, direction: str) -> list[tuple[float, Interval]]:
-    """The jumps of an amplitude in one direction, computed or read off measured runs: size, and the step that holds it.
+    """The jumps of an amplitude in one direction, computed or measured: size, and the step that holds it.
 
     At rising values.
     """
-    from nonsmooth.identification.compare.jumps import AmplitudeJump, jumps_in_steps
-
-    if "jump_value" in response:
-        here = response["jump_direction"].values.astype(str) == direction
-        if "jump_variable" in response:
-            here &= response["jump_variable"].values.astype(str) == "x"
-        columns = (response[f"jump_{name}"].values[here].tolist() for name in ("value", "step", "before", "after"))
-        found = [AmplitudeJump(value, 0.5 * step, *ends) for value, step, *ends in zip(*columns, strict=True)]
-    else:
-        mine = response.isel(run=response["direction"].values.astype(str) == direction)
-        order = np.argsort(mine["omega"].values)[:: 1 if direction == "up" else -1]
-        found = jumps_in_steps(*(mine[name].values[order] for name in ("omega", "amplitude", "amplitude_error")))
-    rows = [(abs(one.after - one.before), Interval(one.value - one.half, one.value + one.half)) for one in found]
+    here = response["jump_direction"].values.astype(str) == direction
+    if "jump_variable" in response:
+        here &= response["jump_variable"].values.astype(str) == "x"
+    columns = (response[f"jump_{name}"].values[here].tolist() for name in ("value", "step", "before", "after"))
+    rows = [
+        (abs(after - before), Interval(value - 0.5 * step, value + 0.5 * step))
+        for value, step, before, after in zip(*columns, strict=True)
+    ]
     return sorted(rows, key=lambda row: row[1].low)
 
 

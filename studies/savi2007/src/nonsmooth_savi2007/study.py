@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -10,7 +11,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nonsmooth.results.progress import say
 from nonsmooth_savi2007.bench import Measurement
 from nonsmooth_savi2007.figures.figure import Figure
 from nonsmooth_savi2007.finished import finish, finished, just_made, refuse_strange
@@ -104,7 +104,7 @@ def reproduce(
     made = {figure.name: found for figure in known if (found := finished(figure.name, settings)) is not None}
     missing = [figure for figure in chosen if figure.name not in made]
     if made:
-        say(f"finished before in {folder}: {', '.join(made)}", progress)
+        _say(f"finished before in {folder}: {', '.join(made)}", progress)
     if missing:
         for name in REPORTS:  # a report that stands is of the figures beside it
             (folder / name).unlink(missing_ok=True)
@@ -112,7 +112,7 @@ def reproduce(
     measured = [figure for figure in missing if figure.rig]
     with Measurement(folder, measured, quick, full) as bench:
         for i, figure in enumerate(computed):
-            say(f"[{i + 1}/{len(computed)}] {figure.name}: {figure.title}", progress)
+            _say(f"[{i + 1}/{len(computed)}] {figure.name}: {figure.title}", progress)
             begin = time.perf_counter()
             datasets = figure.compute(settings)
             seconds = time.perf_counter() - begin
@@ -120,8 +120,8 @@ def reproduce(
             made[figure.name] = datasets, seconds
             _draw(figure, datasets, folder)
         names = ", ".join(one.name for one in measured)
-        say(f"waiting for the virtual rig: {names}", progress and bool(measured))
-        bench.wait(lambda line: say(line, progress))
+        _say(f"waiting for the virtual rig: {names}", progress and bool(measured))
+        bench.wait(lambda line: _say(line, progress))
     made |= {figure.name: just_made(figure.name, settings) for figure in measured}
     shown = tuple(figure for figure in known if figure.name in made)
     data = {figure.name: made[figure.name][0] for figure in shown}
@@ -131,6 +131,12 @@ def reproduce(
     rows = measure_claims(data)
     write_report(folder, shown, data, rows, settings, complete=set(figures_of_the_study(full)) <= set(shown))
     return Reproduction(folder, shown, data, rows, {name: seconds for name, (_, seconds) in made.items()})
+
+
+def _say(line: str, progress: bool) -> None:
+    """A line on stderr, on a terminal."""
+    if progress and getattr(sys.stderr, "isatty", bool)():
+        print(line, file=sys.stderr, flush=True)
 
 
 def _make(folder: Path) -> None:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.recordings import RecordingWarning
-from nonsmooth.recordings.session import PROCEDURES
+from nonsmooth.recordings import PROCEDURES, RecordingWarning
 from nonsmooth_savi2007.rig import FEATURES, UNITS, VirtualRig, sensors
 from nonsmooth_savi2007.rig.driven import SteadyRun, records
 from nonsmooth_savi2007.rig.figures import RELEASES

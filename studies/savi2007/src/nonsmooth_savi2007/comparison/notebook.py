@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.errors import unknown
 from nonsmooth.identification.compare import measured_motion, measured_response, measured_rise, measured_sections
 from nonsmooth_savi2007.comparison.reference import GapOffset, GapReference, gap_reference
 
@@ -132,8 +133,6 @@ def session_measurement(
 
 
 def _chosen(session: Session, procedure: str, runs: str | Sequence[str] | None) -> list[Any]:
-    from nonsmooth.system.names import unknown
-
     if procedure not in SHOWS:
         raise ValueError(unknown(procedure, "a procedure", "compare", SHOWS.keys()))
     found = session.recordings(procedure)

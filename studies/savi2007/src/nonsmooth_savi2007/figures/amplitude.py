@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.plot import comparison_diagram
+from nonsmooth.plot import comparison_diagram, shared_legend
 from nonsmooth_savi2007.figures.branches import BEGINNINGS
 from nonsmooth_savi2007.figures.diagrams import (
     ABOUT_BRANCHES,
@@ -18,7 +18,6 @@ from nonsmooth_savi2007.figures.diagrams import (
     draw_both,
     how,
     mark_values,
-    shared_legend,
 )
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth_savi2007.figures.motions import GRID, compared, draw_pairs, motions, said

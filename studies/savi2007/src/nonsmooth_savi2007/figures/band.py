@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth import System, plot, poincare, simulate
-from nonsmooth_savi2007.figures.diagrams import shared_legend
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth_savi2007.flows import ETA, EXACT, SMOOTHED, Settings
 from nonsmooth_savi2007.grazing import grazing_frequencies, steady_state
@@ -150,7 +149,7 @@ def _draw(canvas: Canvas, data: Datasets) -> None:
     )
     for ax in (left, right):
         ax.xaxis.set_major_formatter("{x:g}")
-    shared_legend(canvas, columns=4)
+    plot.shared_legend(canvas, columns=4)
 
 
 def _caption(data: Datasets) -> str:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth import SolveError, chart, continue_curve, continue_orbit, find_orbit, plot
-from nonsmooth.plot.branches import KINDS
 from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, rows_of
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth_savi2007.flows import EXACT, Settings
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _FULL, _QUICK = 1000, 24  # points along each parameter
+_FOLLOWED = ("fold", "flip", "neimark_sacker", "grazing")
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def curves(plane: Plane) -> list[xr.Dataset]:
         table = rows_of(branch)
         for i in range(table.sizes["special"]):
             row = table.isel(special=i)
-            if str(row["kind"].values) not in KINDS or any(_on(one, row, begin.parameter) for one in found):
+            if str(row["kind"].values) not in _FOLLOWED or any(_on(one, row, begin.parameter) for one in found):
                 continue
             try:
                 found.append(continue_curve(row, plane.ranges))
@@ -138,7 +138,7 @@ def _caption(data: Datasets) -> str:
     names, counts = np.unique(status_names(found), return_counts=True)
     ended = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
     kinds = [str(one["kind"].values) for key, one in data.items() if key.startswith("curve")]
-    counted = ", ".join(f"{kinds.count(kind)} of {words}" for kind, (_, _, words) in KINDS.items() if kind in kinds)
+    counted = ", ".join(f"{kinds.count(kind)} of {kind.replace('_', '-')}" for kind in _FOLLOWED if kind in kinds)
     fixed = "g" if "g" not in (first, second) else "omega"
     rays = (
         " The system is piecewise linear, so all depends on g / rho alone: every boundary is a straight line."

@@ -11,13 +11,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from nonsmooth import basins, plot, simulate
-from nonsmooth.plot.palette import attractor_color
-from nonsmooth.plot.planes import names_of as kinds_of
-from nonsmooth.plot.planes import section_mark
-from nonsmooth.plot.trajectories import ZONE, shade_zone
-from nonsmooth.plot.units import prefixed
+from nonsmooth.plot import prefixed, shade_zone
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth_savi2007.flows import EXACT, Settings
+from nonsmooth_savi2007.measure import period_word
 from nonsmooth_savi2007.printed import FIGURE_13, FIGURE_17
 
 if TYPE_CHECKING:
@@ -28,6 +25,7 @@ BASINS = {"basins13": {**FIGURE_13, "g": 0.0014}, "basins17": {**FIGURE_17, "ome
 _PLANE = {"x": (-0.02, 0.02), "v": (-0.2, 0.2)}
 _POINTS, _FULL, _QUICK = 160, 500, 40  # along each side
 _WANDERING = 60  # periods drawn of an attractor that is no cycle
+_LOOKS = ("marker", "markersize", "markerfacecolor", "markeredgecolor", "markeredgewidth", "rasterized", "zorder")
 
 
 def _compute(settings: Settings, name: str) -> Datasets:
@@ -47,6 +45,12 @@ def _compute(settings: Settings, name: str) -> Datasets:
     return data
 
 
+def kinds_of(found: xr.Dataset) -> list[str]:
+    """Each attractor by what it is."""
+    rows = zip(found["period_number"].values.tolist(), found["chaotic"].values.tolist(), strict=True)
+    return ["chaos" if chaotic else period_word(number) for number, chaotic in rows]
+
+
 def names_of(found: xr.Dataset) -> list[str]:
     """``period 3, 67.30 ± 0.29 %`` of each attractor: what it is, its share with the binomial error."""
     words = []
@@ -61,6 +65,7 @@ def _draw(canvas: Canvas, data: Datasets) -> None:
     left, right = canvas.subplots(1, 2)
     plot.basins(found, left)
     left.get_legend().remove()
+    marks, cells = left.get_lines(), left.collections[0]
     left.set_title("(a) basins, section at phase 0", y=1.0, pad=9)
     handles: list[Any] = []
     for k in range(found.sizes["attractor"]):
@@ -68,12 +73,11 @@ def _draw(canvas: Canvas, data: Datasets) -> None:
         begun = len(right.get_lines())
         plot.phase_portrait(data[f"orbit_{k}"], right)
         for line in right.get_lines()[begun:]:
-            line.set(color=attractor_color(k), linewidth=1.1 if cycle else 0.3, zorder=3 if cycle else 2)
-        points = found["section_points"].values[found["point_attractor"].values == k]
-        mark = section_mark(found, k, 3.6 if cycle else 2.4)
-        right.plot(points[:, 0], points[:, 1], linestyle="", **mark)
-        patch = Patch(facecolor=attractor_color(k), edgecolor="black", linewidth=0.4)
-        handles.append((patch, Line2D([], [], linestyle="", **{**mark, "markersize": 3.6 if cycle else 2.4})))
+            line.set(color=cells.to_rgba(k), linewidth=1.1 if cycle else 0.3, zorder=3 if cycle else 2)
+        looks = {name: getattr(marks[k], f"get_{name}")() for name in _LOOKS}
+        right.plot(*marks[k].get_data(), linestyle="", **looks)
+        sign = Line2D([], [], linestyle="", **{**looks, "markersize": 3.6 if cycle else 2.4})
+        handles.append((Patch(facecolor=cells.to_rgba(k), edgecolor="black", linewidth=0.4), sign))
     limits = right.get_xlim()
     shade_zone(right, float(found["g"]))
     right.set_xlim(limits)
@@ -81,7 +85,7 @@ def _draw(canvas: Canvas, data: Datasets) -> None:
     zone = Patch(facecolor=plot.COLORS["zone"], alpha=0.18, linewidth=0)
     canvas.legend(
         [*handles, zone],
-        [*names_of(found), ZONE],
+        [*names_of(found), "contact zone"],
         loc="outside lower center",
         ncols=4,
         handler_map={tuple: HandlerTuple(ndivide=1)},

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nonsmooth import plot, sweep
-from nonsmooth.plot.branches import draw_branch
-from nonsmooth.plot.style import even_dots, halo, small
+from nonsmooth.plot import annotate, shared_legend
 from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, branches_of
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, only_outer
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Settings, starts
@@ -86,9 +85,8 @@ def draw_diagram(ax: Axes, data: Datasets, key: str, y: str, *, values: Mapping[
         if bool(chosen.any()):
             plot.bifurcation(many.assign(section=many["section"].where(chosen)), ax, y=y, color=color, size=size)
             ax.get_lines()[-1].set(label=name, zorder=0.3)
-    plot.bifurcation(swept, ax, y=y, size=0.9 if swept.sizes["iterate"] > 100 else 1.1)
-    if key == EXACT.key:
-        draw_branches(ax, data, y=y)
+    lines = branches_to_draw(data) if key == EXACT.key else []
+    plot.bifurcation(swept, *lines, ax, y=y, size=0.9 if swept.sizes["iterate"] > 100 else 1.1, linewidth=1.0)
     mark_values(ax, values, words)
 
 
@@ -121,18 +119,15 @@ def mark_values(ax: Axes, values: Mapping[float, str], words: str, foot: bool = 
     """A dotted line with its number at each of these values, at the top or at the foot."""
     for i, (value, text) in enumerate(values.items()):
         ax.axvline(value, color="black", linewidth=0.7, linestyle=":", zorder=2.5, label=words if i == 0 else None)
-        ax.annotate(
+        annotate(
+            ax,
             text,
             (value, 0.0 if foot else 1.0),
             (-1.5, 3 if foot else -3),
             xycoords=ax.get_xaxis_transform(),
-            textcoords="offset points",
             rotation=90,
             ha="right",
             va="bottom" if foot else "top",
-            fontsize=small(ax),
-            path_effects=halo(),
-            zorder=6,
         )
 
 
@@ -151,22 +146,9 @@ def mark_grazing(ax: Axes, places: Sequence[float]) -> None:
         )
 
 
-def draw_branches(ax: Axes, data: Datasets, *, y: str) -> None:
-    """The branches of a figure in black, where there are any; marks on those of period 1 and 2."""
-    for one in branches_of(data):
-        few = int(one["period_number"]) <= 2
-        draw_branch(ax, one, y=y, special=few, color="black", width=0.6 if few else 0.35, behind=True)
-
-
-def shared_legend(canvas: Canvas, columns: int = 5) -> None:
-    """One legend under all axes in place of their own, so that it hides no branch."""
-    entries: dict[str, Any] = {}
-    for ax in canvas.axes:
-        for handle, words in zip(*ax.get_legend_handles_labels(), strict=True):
-            entries.setdefault(words, handle)
-        if (own := ax.get_legend()) is not None:
-            own.remove()
-    even_dots(canvas.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns))
+def branches_to_draw(data: Datasets) -> list[xr.Dataset]:
+    """The branches of a figure, special points on those of period 1 and 2 only."""
+    return [one if int(one["period_number"]) <= 2 else one.isel(special=slice(0, 0)) for one in branches_of(data)]
 
 
 def how(data: Datasets) -> str:

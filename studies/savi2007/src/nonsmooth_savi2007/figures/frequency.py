@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth import poincare, sweep
-from nonsmooth.plot import comparison_diagram, comparison_phase_portrait
-from nonsmooth.plot.style import halo, small
+from nonsmooth.plot import annotate, comparison_diagram, comparison_phase_portrait, shared_legend
 from nonsmooth_savi2007.figures.branches import BEGINNINGS
 from nonsmooth_savi2007.figures.diagrams import (
     ABOUT_BRANCHES,
@@ -18,7 +17,6 @@ from nonsmooth_savi2007.figures.diagrams import (
     how,
     mark_grazing,
     mark_values,
-    shared_legend,
 )
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure, only_outer
 from nonsmooth_savi2007.figures.motions import (
@@ -102,16 +100,7 @@ def _name_windows(ax: Axes, data: Datasets, state: str) -> None:
     many = data["exact_starts"]
     for period, (low, high) in _windows(data).items():
         top = many["section"].sel(state=state, omega=slice(low, high)).where(many["period_number"] == period).max()
-        ax.annotate(
-            f"period {period}",
-            (0.5 * (low + high), float(top)),
-            (0, 3),
-            textcoords="offset points",
-            ha="center",
-            fontsize=small(ax),
-            path_effects=halo(),
-            zorder=6,
-        )
+        annotate(ax, f"period {period}", (0.5 * (low + high), float(top)), (0, 3), ha="center")
 
 
 def _caption_17(data: Datasets) -> str:

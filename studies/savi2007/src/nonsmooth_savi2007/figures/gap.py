@@ -12,10 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth import Stroboscopic, plot, poincare, sweep
-from nonsmooth.plot import comparison_diagram
-from nonsmooth.plot.comparison import MEASURED, THEORY
-from nonsmooth.plot.labels import name_and_unit, name_axes
-from nonsmooth.plot.units import prefixed
+from nonsmooth.plot import COLORS, comparison_diagram, name_plane, prefixed, shared_legend
 from nonsmooth_savi2007.figures.branches import BEGINNINGS
 from nonsmooth_savi2007.figures.diagrams import (
     ABOUT_BRANCHES,
@@ -23,7 +20,6 @@ from nonsmooth_savi2007.figures.diagrams import (
     draw_both,
     how,
     mark_values,
-    shared_legend,
 )
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure, two_rows
 from nonsmooth_savi2007.figures.motions import (
@@ -150,7 +146,7 @@ def _draw_rig_13(canvas: Canvas, data: Datasets) -> None:
             points["measured_section"].sel(state="v").values,
             "_",
             markersize=4,
-            color=plot.COLORS["muted"],
+            color=COLORS["muted"],
             markeredgewidth=0.3,
             rasterized=True,
             zorder=1,
@@ -184,8 +180,8 @@ def _measure_14(settings: Settings) -> Datasets:
     found = _records(settings.bench)
     runs = runs_of(found, "g")
     first: dict[tuple[float, int], str] = {}
-    for key, setting, number in zip(found, runs["setting"].values, runs["period_number"].values, strict=True):
-        first.setdefault((float(setting), int(number)), key)
+    for key, setting, number in zip(*(runs[name].values for name in ("run", "setting", "period_number")), strict=True):
+        first.setdefault((float(setting), int(number)), str(key))
     return compared(settings.bench, {key: found[key] for key in first.values()}, grid=GRID)
 
 
@@ -214,12 +210,12 @@ def _draw_16(canvas: Canvas, data: Datasets) -> None:
             points[:, 0],
             points[:, 1],
             ".",
-            color=(THEORY, MEASURED)[i],
+            color=COLORS[("first", "section")[i]],
             markersize=1.4,
             markeredgewidth=0,
             rasterized=True,
         )
-        name_axes(ax, name_and_unit(result, "x"), name_and_unit(result, "v"))
+        name_plane(ax, result, "x", "v")
 
     _draw_attractor(canvas, list(SIDES.values()), cell)
 

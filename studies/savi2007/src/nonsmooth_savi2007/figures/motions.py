@@ -8,12 +8,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from nonsmooth import plot
-from nonsmooth.identification.compare.series import measured_sections, section_points
-from nonsmooth.plot.comparison import MEASURED, THEORY
-from nonsmooth.plot.labels import name_and_unit, name_axes
-from nonsmooth.plot.trajectories import shade_zone
-from nonsmooth.plot.units import prefixed
-from nonsmooth_savi2007.figures.diagrams import shared_legend
+from nonsmooth.identification.compare import measured_sections
+from nonsmooth.plot import name_plane, prefixed, shade_zone, shared_legend
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, two_rows
 from nonsmooth_savi2007.figures.portraits import QUANTITIES, titles
 from nonsmooth_savi2007.laboratory import as_result
@@ -57,9 +53,14 @@ def compared(bench: Laboratory, found: Motions, **options: Any) -> Datasets:
 def diagram_of(found: Motions, parameter: str) -> tuple[xr.Dataset, dict[str, Any]]:
     """Section points of motions at several values of a parameter, as ``compare`` takes a diagram; settings."""
     measured, settings = zip(*found.values(), strict=True)
-    values = [float(np.atleast_1d(one[parameter])[0]) for one in settings]
+    values = [_value(one, parameter) for one in settings]
     others = {key: value for key, value in settings[0].items() if key != parameter}
     return measured_sections(measured, parameter, values, unit=QUANTITIES[parameter][0]), others
+
+
+def _value(settings: Mapping[str, Any], name: str) -> float:
+    """The value of a setting, which may stand with its uncertainty."""
+    return float(np.atleast_1d(settings[name])[0])
 
 
 def model_at(bench: Laboratory, settings: Mapping[str, Any]) -> System:
@@ -73,28 +74,28 @@ def model_at(bench: Laboratory, settings: Mapping[str, Any]) -> System:
 
 
 def runs_of(found: Motions, parameter: str) -> xr.Dataset:
-    """Of each motion: the parameter's ``setting`` and measured ``value``, ``period_number``, ``contact`` (0 or 1)."""
+    """Of each motion, at rising values of the parameter: its ``setting`` and measured ``value``, ``period_number``,
+    ``contact`` (0 or 1); ``run`` is its key."""
     import xarray as xr
 
-    from nonsmooth.identification.compare.periods import measured_period
-
-    values, numbers, touches = [], [], []
-    for motion, settings in found.values():
-        points = section_points(motion)
-        error = np.median(motion["u_error"].values, axis=0)
-        values.append(float(np.atleast_1d(settings[parameter])[0]))
-        numbers.append(measured_period(points, error, max_period=16).number)
+    sections, _ = diagram_of(found, parameter)
+    values = sections[parameter].values
+    keys = sorted(found, key=lambda key: _value(found[key][1], parameter))  # as the sections are, and as stable
+    touches = []
+    for motion, settings in (found[key] for key in keys):
         # where turning points lie: one outlier is no contact
         reach = np.quantile(motion["u"].sel(state="x").values, 0.999)
-        touches.append(bool(reach > float(np.atleast_1d(settings["g"])[0]) + 3 * error[0]))
-    nominal = [float(key.partition("_")[0]) for key in found]
+        error = np.median(motion["u_error"].sel(state="x").values)
+        touches.append(bool(reach > _value(settings, "g") + 3 * error))
+    nominal = [float(key.partition("_")[0]) for key in keys]
     runs = xr.Dataset(
         {
             "setting": ("run", nominal, {"long_name": f"{parameter} that was meant"}),
             "value": ("run", values, {"long_name": f"{parameter} as measured"}),
-            "period_number": ("run", np.array(numbers, dtype=np.int64)),
+            "period_number": ("run", sections["period_number"].values),
             "contact": ("run", np.array(touches, dtype=np.int8)),
-        }
+        },
+        {"run": keys},
     )
     return as_result(runs, f"steady runs over {parameter}")
 
@@ -146,7 +147,7 @@ def draw_pairs(canvas: Canvas, data: Datasets, *, parameter: str, shown: Mapping
 
 def _portrait(ax: Axes, result: xr.Dataset, side: str) -> None:
     """One side's orbit and section points; on the rig's, of motions with a period, the model's points as crosses."""
-    color = THEORY if side == "theory" else MEASURED
+    color = plot.COLORS["first" if side == "theory" else "section"]
     word = "model" if side == "theory" else "virtual rig"
     closed = "phase" in result.coords
     orbit = result[f"{side}_orbit"].values
@@ -171,7 +172,7 @@ def _portrait(ax: Axes, result: xr.Dataset, side: str) -> None:
             expected[:, 0],
             expected[:, 1],
             "x",
-            color=THEORY,
+            color=plot.COLORS["first"],
             markersize=7,
             markeredgewidth=1.0,
             linestyle="none",
@@ -179,4 +180,4 @@ def _portrait(ax: Axes, result: xr.Dataset, side: str) -> None:
             label="section points of the model",
         )
     shade_zone(ax, float(result["g"]))
-    name_axes(ax, name_and_unit(result, "x"), name_and_unit(result, "v"))
+    name_plane(ax, result, "x", "v")

@@ -10,7 +10,6 @@ import numpy as np
 
 from nonsmooth import plot
 from nonsmooth.plot import identification as pictures
-from nonsmooth.plot.comparison import ABOVE
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth_savi2007.findings import Number, estimates_of, found_in, kept, the_finding
 from nonsmooth_savi2007.flows import Settings
@@ -59,7 +58,7 @@ def _spectrum(data: xr.Dataset, ax: Axes) -> None:
     pictures.impulse_response(data, ax)
     printed = NUMBERS["peak of the DFT"]
     ax.axvline(printed.value, color="black", linestyle=":", linewidth=1.0, label=f"printed in the paper {printed}")
-    ax.legend(**ABOVE, ncols=2, handlelength=1.6, columnspacing=1.0)
+    ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, handlelength=1.6, columnspacing=1, borderaxespad=0.2)
 
 
 def _caption_4(data: Datasets) -> str:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth import plot, poincare, simulate, sweep
-from nonsmooth.plot.units import prefixed
-from nonsmooth_savi2007.figures.diagrams import shared_legend
+from nonsmooth.plot import prefixed, shared_legend
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, two_rows
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Flow, Settings, starts
 from nonsmooth_savi2007.measure import APERIODIC, period_word, periods_reached

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from nonsmooth import plot
-from nonsmooth.plot.labels import name_axes
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth_savi2007.flows import ETA, EXACT, SMOOTHED
 
@@ -15,7 +14,7 @@ def _draw(canvas: Canvas, data: Datasets) -> None:
     left.set_title("(a) non-smooth system, Eqs. 4-5")
     right.set_title(r"(b) smoothed system, $\eta = 10$ µm, Eqs. 9-10")
     for ax in (left, right):
-        name_axes(ax, ("$x - g$", "m"), ("$v$", "m/s"))
+        ax.set_xlabel(ax.get_xlabel().replace("$x$", "$x - g$"))
 
 
 def _caption(data: Datasets) -> str:

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth import frequency_response, plot
-from nonsmooth.plot import comparison_response
-from nonsmooth.plot.style import small
+from nonsmooth.plot import annotate, comparison_response, shared_legend
 from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, branches_of
-from nonsmooth_savi2007.figures.diagrams import mark_grazing, shared_legend
+from nonsmooth_savi2007.figures.diagrams import mark_grazing
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure, only_outer
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Settings
 from nonsmooth_savi2007.grazing import grazing_frequencies
@@ -99,15 +98,7 @@ def mark_printed(ax: Axes, printed: Mapping[str, float]) -> None:
             label="printed in the paper (rad/s)" if i == 0 else None,
             linestyle="none",
         )
-        ax.annotate(
-            f"{value:.2f}",
-            (value, 1.0),
-            (0, 3.5),
-            xycoords=ax.get_xaxis_transform(),
-            textcoords="offset points",
-            ha="center",
-            fontsize=small(ax),
-        )
+        annotate(ax, f"{value:.2f}", (value, 1.0), (0, 3.5), xycoords=ax.get_xaxis_transform(), ha="center")
 
 
 def _caption(data: Datasets, printed: str) -> str:

@@ -24,8 +24,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth import SolveError
-from nonsmooth.identification import Estimate
-from nonsmooth.identification.uncertainty import uniform
+from nonsmooth.identification import Estimate, uniform
 from nonsmooth_savi2007.arrays import FloatArray
 
 _ROUNDS = 50

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth.identification import Estimate, Finding
-from nonsmooth.identification.uncertainty import coverage_factor, uniform
+from nonsmooth.identification import Estimate, Finding, coverage_factor, uniform
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth import SolveError
-from nonsmooth.identification import Estimate, Finding
-from nonsmooth.identification.uncertainty import coverage_factor
+from nonsmooth.identification import Estimate, Finding, coverage_factor
 from nonsmooth.recordings import Quantity
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth_savi2007.identification.free_decay import DecayFit

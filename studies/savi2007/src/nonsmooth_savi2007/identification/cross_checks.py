@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nonsmooth.identification import Estimate, Finding
-from nonsmooth.identification.uncertainty import uniform
+from nonsmooth.identification import Estimate, Finding, uniform
 from nonsmooth.recordings import Quantity
 from nonsmooth_savi2007.identification.consistency import birge_ratio
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from nonsmooth import Recording
-from nonsmooth.recordings.session import PROCEDURES, SETTINGS, Quantity, Session, load_session
+from nonsmooth.errors import unknown
+from nonsmooth.recordings import PROCEDURES, SETTINGS, Quantity, Session, load_session
 from nonsmooth.recordings.signals.checks import take
-from nonsmooth.recordings.signals.displacement import position, resolution
-from nonsmooth.system.names import unknown
+from nonsmooth.recordings.signals.displacement import position
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.directions import oriented
 
@@ -96,10 +96,7 @@ class Evidence:
     @property
     def resolution(self) -> float:
         """Length of a count of the rotary sensor (m)."""
-        return resolution(
-            distance_per_turn=self.apparatus["distance_per_turn"].value,
-            counts_per_turn=round(self.apparatus["counts_per_turn"].value),
-        )
+        return abs(self.apparatus["distance_per_turn"].value) / round(self.apparatus["counts_per_turn"].value)
 
     def quantity(self, name: str) -> Quantity:
         """A number from the notebook.

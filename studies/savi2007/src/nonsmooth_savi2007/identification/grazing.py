@@ -35,8 +35,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.identification import Estimate, Finding
-from nonsmooth.identification.uncertainty import uniform
+from nonsmooth.identification import Estimate, Finding, uniform
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nonsmooth.identification.uncertainty import correlated
+from nonsmooth.identification import correlated
 from nonsmooth_savi2007.arrays import FloatArray
 
 

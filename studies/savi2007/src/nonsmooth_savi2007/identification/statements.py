@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from nonsmooth import ParameterSet
+from nonsmooth.errors import unknown
 from nonsmooth.identification import Estimate, Finding
-from nonsmooth.system.names import unknown
 from nonsmooth_savi2007.identification.adjustment import Adjusted
 from nonsmooth_savi2007.identification.consistency import birge_ratio
 from nonsmooth_savi2007.identification.evidence import Evidence

@@ -22,8 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.identification import Estimate, Finding
-from nonsmooth.identification.uncertainty import uniform
+from nonsmooth.identification import Estimate, Finding, uniform
 from nonsmooth.recordings.signals.savitzky_golay import savitzky_golay
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.recordings import write_cap, write_capstone_csv
-from nonsmooth.recordings.session import NOTEBOOK, SETTINGS
+from nonsmooth.recordings import SETTINGS, write_cap, write_capstone_csv
 from nonsmooth_savi2007.rig import sensors
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ def write_session(
         lines += ["", "[[recording]]", f"file = {_text(name)}", f"procedure = {_text(procedure)}", "runs = ["]
         lines += [f"    {_run(run, recording.tree[run].attrs)}," for run in recording.runs]
         lines.append("]")
-    (place / NOTEBOOK).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (place / "session.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
     beside.parent.mkdir(parents=True, exist_ok=True)
     beside.write_text("\n".join(_truth(rig)) + "\n", encoding="utf-8")
     return place

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth import DataFileError
-from nonsmooth.system.names import unknown
+from nonsmooth.errors import unknown
 
 #: Reading of the support's screw at which the true gap is ``truth["g"]`` (Fig. 15).
 NOMINAL_GAP = 0.0018

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.recordings.session import PROCEDURES
-from nonsmooth.system.names import unknown
+from nonsmooth.errors import unknown
+from nonsmooth.recordings import PROCEDURES
 from nonsmooth_savi2007.rig import decays, figures, hand, motor, sensors, steps
 from nonsmooth_savi2007.rig.physics import WANDERING, Wander
 from nonsmooth_savi2007.rig.truth import FEATURES, HOLDING, NOMINAL_GAP, awkward, drawn, published, switched
