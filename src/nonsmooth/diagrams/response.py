@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from nonsmooth.diagrams.sweep import sweep
+from nonsmooth.errors import Interrupted, unknown
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.system.arguments import checked
 
@@ -55,15 +56,20 @@ def frequency_response(
     that a jump may stand for some of them only; between points whose ``period_number`` is 0 it may be the scatter of
     chaos.
     """
+    if parameter not in system.parameters:
+        known = {name: item.unit for name, item in system.parameters.items()}
+        raise ValueError(unknown(parameter, "a parameter", repr(system.name), known) + "; choose one with parameter=")
+    try:
+        return _response(system, sweep(system, parameter, values, direction=direction, **options), parameter)
+    except Interrupted as error:
+        raise Interrupted(str(error), _response(system, error.result, parameter)) from error
+
+
+def _response(system: System, swept: xr.Dataset, parameter: str) -> xr.Dataset:
+    """The sweep with its amplitudes and jumps."""
     from nonsmooth.results.provenance import attribute, read_provenance, with_short_record
     from nonsmooth.results.schema import response
 
-    if parameter not in system.parameters:
-        from nonsmooth.errors import unknown
-
-        known = {name: item.unit for name, item in system.parameters.items()}
-        raise ValueError(unknown(parameter, "a parameter", repr(system.name), known) + "; choose one with parameter=")
-    swept = sweep(system, parameter, values, direction=direction, **options)
     full = [("direction", 1), ("start", 1), (parameter, swept.sizes[parameter]), ("state", swept.sizes["state"])]
     half = 0.5 * (swept["maximum"] - swept["minimum"])
     expanded = half.expand_dims([dim for dim, _ in full if dim not in half.dims]).transpose(*[dim for dim, _ in full])

@@ -18,6 +18,7 @@ from nonsmooth.attractors.standing import standing_in_sweep
 from nonsmooth.campaign.threads import cores, over_items
 from nonsmooth.diagrams.density import bin_edges, coarse_values, given_ranges
 from nonsmooth.diagrams.sweep_pieces import Slot, pieces_of, run_on_gpu
+from nonsmooth.errors import Interrupted
 from nonsmooth.flow.arguments import swept_values
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.methods import warn_if_coarse
@@ -27,6 +28,7 @@ from nonsmooth.flow.options import Settling, Varied, as_called, workers_of
 from nonsmooth.flow.outputs import out_of_bounds
 from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import is_one_start, start_states
+from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
@@ -111,6 +113,8 @@ def sweep(
     ValueError, TypeError
         Arguments that do not fit, and starts at an equilibrium of a system without forcing. A point that fails keeps
         its status; the others are whole.
+    Interrupted
+        Ctrl-C; the sweep with the points run until then is its ``result``.
     ImportError, RuntimeError
         ``device="cuda"`` without the package numba-cuda, or without a GPU.
 
@@ -169,14 +173,17 @@ def sweep(
                 .values
             )
         work.edges = bin_edges(system, ranges, bins, coarse)
+    squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
     if gpu:
         run_on_gpu(points, starts, work.slots, options["progress"], parameter)
     else:
-        work.run(threads, options["progress"])
+        try:
+            work.run(threads, options["progress"])
+        except KeyboardInterrupt as error:
+            raise work.ended(error, asked, squeeze) from None
     largest = work.largest(extremes)
     warn_if_coarse(system, settler.engine, largest)
     warn_if_small(system, largest)
-    squeeze = (() if direction == "both" else ("direction",)) + (("start",) if is_one_start(start) else ())
     return work.dataset(asked, squeeze)
 
 
@@ -233,6 +240,17 @@ class _Sweep:
         total = len(self.slots) * len(self.points)
         with progress_bar(total, f"sweep over {self.parameter}", progress) as advance:
             over_items(pieces, march, lambda *_: None, min(threads or cores(), len(pieces)), stop)
+
+    def ended(self, error: KeyboardInterrupt, asked: Mapping[str, Any], squeeze: tuple[str, ...]) -> KeyboardInterrupt:
+        """The exception of a sweep that Ctrl-C ended, with the points that were run, where there are any."""
+        done = self.gather("status") != codes.INTERRUPTED
+        if not done.any():
+            return error
+        return Interrupted(
+            f"interrupted: {done.sum()} of {done.size} points of the sweep over {self.parameter} were run; they are in "
+            '`result` of this exception (at a prompt: sys.last_value.result), the others have the status "interrupted"',
+            self.dataset(asked, squeeze),
+        )
 
     def largest(self, extremes: bool) -> FloatArray:
         """The largest size of each state, of the starts and of all runs that came to their end; without their extremes

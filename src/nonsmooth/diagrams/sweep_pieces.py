@@ -46,24 +46,27 @@ class Slot:
         rows, n = np.array(order, dtype=np.int64), len(order)
         room: dict[str, Any] = {"kept": self.kept, "into": rows} if self.counter is None else {}
         mapper = Mapper(self.settler, tables, rows, np.tile(start, (n, 1)), **room)
-        run = mapper.settle(self.settler.rules(), 2 * carried, False)
-        for j, i in enumerate(order):
-            if stop.is_set():
-                return
-            run(j + 1)
-            if self.counter is not None:
-                for part, own in zip(self.kept[1:6], mapper.kept[1:6], strict=True):
-                    part[i] = own[0]
-                if usable(mapper.jobs.status[j]):
-                    self.counter.count(mapper.kept.section, i)
-            advance(1)
-        self.put(rows, mapper.settled())
+        run, done = mapper.settle(self.settler.rules(), 2 * carried, False), 0
+        try:
+            for j, i in enumerate(order):
+                if stop.is_set():
+                    return
+                run(j + 1)
+                if self.counter is not None:
+                    for part, own in zip(self.kept[1:6], mapper.kept[1:6], strict=True):
+                        part[i] = own[0]
+                    if usable(mapper.jobs.status[j]):
+                        self.counter.count(mapper.kept.section, i)
+                done = j + 1
+                advance(1)
+        finally:
+            self.put(rows[:done], mapper.settled()[:done], loaded=done == n)
 
-    def put(self, rows: Any, found: Settled) -> None:
-        """Take the verdicts on some parameter values."""
+    def put(self, rows: Any, found: Settled, loaded: bool = True) -> None:
+        """Take the verdicts on some parameter values; the loads too."""
         for name in ("period_number", "residual", "status"):
             getattr(self, name)[rows] = getattr(found, name)
-        if self.loads:
+        if self.loads and loaded:
             for name, values in self.settler.loads(self.at, np.arange(len(self.at))[rows], found).items():
                 self.loads[name][rows] = values
 

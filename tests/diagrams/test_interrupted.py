@@ -1,0 +1,73 @@
+"""Ctrl-C in a sweep: the points that were run are those of a whole sweep, the others say that they were not run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.results.statuses import by_name
+
+pytestmark = pytest.mark.physics
+
+SYSTEM = ns.models.discontinuous_support()
+VALUES = np.linspace(0.25, 0.5, 41)
+SHORT: dict[str, Any] = {"transient": 60, "keep": 20}
+NOT_RUN = by_name("interrupted").code
+
+
+def part_of(verb: Callable[..., Any], system: ns.System, **options: Any) -> ns.Interrupted:
+    with pytest.raises(ns.Interrupted) as caught:
+        verb(system, progress=lambda done: done < 0.5, **SHORT, **options)
+    return caught.value
+
+
+@pytest.mark.parametrize("direction", ["up", "down", "both", None])
+def test_a_sweep(direction: str | None) -> None:
+    named: dict[str, Any] = {"parameter": "rho", "values": VALUES, "direction": direction}
+    whole = ns.sweep(SYSTEM, progress=False, **named, **SHORT)
+    error = part_of(ns.sweep, SYSTEM, **named)
+    part = error.result
+    run = part["status"].values != NOT_RUN
+    assert run.sum() >= run.size / 2 and not run.all()
+    assert f"{run.sum()} of {run.size} points of the sweep over rho were run" in str(error)
+    assert (whole["status"].values != NOT_RUN).all()
+    for name in ("section", "maximum", "period_number", "contacts_per_period"):
+        np.testing.assert_array_equal(part[name].values[run], whole[name].values[run], err_msg=name)
+    for name in ("section", "maximum", "contacts_per_period", "residual"):
+        assert np.isnan(part[name].values[~run]).all(), name
+
+
+def test_a_frequency_response() -> None:
+    values = np.linspace(3.0, 6.5, 41)
+    part = part_of(ns.frequency_response, SYSTEM, values=values).result
+    whole = ns.frequency_response(SYSTEM, values, progress=False, **SHORT)
+    run = part["status"].values != NOT_RUN
+    np.testing.assert_array_equal(part["amplitude"].values[run], whole["amplitude"].values[run])
+    assert np.isnan(part["amplitude"].values[~run]).all() and not run.all()
+
+
+def test_where_nothing_was_run_there_is_no_part() -> None:
+    with pytest.raises(KeyboardInterrupt) as caught:
+        ns.sweep(SYSTEM, "rho", VALUES, progress=lambda done: False)
+    assert not isinstance(caught.value, ns.Interrupted)
+
+
+def test_loads_are_measured_behind_a_chain_of_points() -> None:
+    """They are lacking where it was cut, and the result says so by NaN."""
+    rig = ns.mechanical(
+        1.0,
+        0.1,
+        1.0,
+        coordinates=["x"],
+        parameters={"P": 1.0, "omega": 0.8, "gap": 0.5, "e": 0.6},
+        forcing={"x": lambda t, p: p.P * np.cos(p.omega * t)},
+        elements={"wall": ns.elements.Stop(at="x", position="gap", restitution="e")},
+    )
+    part = part_of(ns.sweep, rig, parameter="omega", values=np.linspace(0.7, 0.9, 21), loads=True).result
+    run = part["status"].values != NOT_RUN
+    assert run.any() and np.isfinite(part["section"].values[run]).all()
+    assert np.isnan(part["wall_impulse"].values).all()
