@@ -86,7 +86,7 @@ def test_a_system_of_the_form_is_written_and_explored(page: Any) -> None:
     page.tab.fill('#building-elements [data-set="build.elements.0.restitution"]', "2")
     page.tab.press('#building-elements [data-set="build.elements.0.restitution"]', "Tab")
     page.until('document.getElementById("wrong-building").textContent.includes("at most 1")')
-    assert page.tab.is_disabled("#building-explore")
+    page.until('document.getElementById("building-explore").disabled')
     page.tab.fill('#building-elements [data-set="build.elements.0.restitution"]', "0.6")
     page.tab.press('#building-elements [data-set="build.elements.0.restitution"]', "Tab")
     page.until('document.getElementById("building-python").textContent.includes("(0.6,")')

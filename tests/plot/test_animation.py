@@ -53,6 +53,19 @@ def test_gif_and_page(moving, tmp_path) -> None:
     assert moving._repr_html_().startswith("<div id=")
 
 
+def test_pictures_are_those_of_the_whole_figure(moving, tmp_path) -> None:
+    """Still parts are drawn once for all of them."""
+    for k, picture in enumerate(moving.images()):
+        if k in (0, 4, 9):
+            moving.draw(k)
+            with ns.plot.journal():
+                moving.figure.savefig(tmp_path / "whole.png", dpi="figure")
+            with Image.open(tmp_path / "whole.png") as whole:
+                other = np.asarray(whole.convert("RGB"), dtype=int)
+            far = np.abs(np.asarray(picture.convert("RGB"), dtype=int) - other).max(axis=2) > 60
+            assert far.mean() < 1e-3, k
+
+
 def test_a_film_needs_ffmpeg_and_says_how_to_get_it(moving, tmp_path, monkeypatch) -> None:
     import matplotlib.animation
 

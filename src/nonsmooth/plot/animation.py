@@ -107,6 +107,7 @@ class Animation:
         from matplotlib.figure import Figure
 
         self.rate, self._run, self._sketch = rate, run, sketch
+        self._made: list[Any] = []
         self._time, self._at = at["time"].values, [column(at, "u", name).values for name in names]
         self._drawn, self._curves = run["time"].values, [column(run, "u", name).values for name in names]
         width, plots, high = 6.0, 2.1, 0.0
@@ -124,7 +125,6 @@ class Animation:
             plane, over = (self.figure.add_subplot(grid[-1, k]) for k in (0, 1))
             if sketch is not None:
                 self._paper = self.figure.add_subplot(grid[0, :])
-                self._made: list[Any] = []
                 paper.frame(self._paper, room=max(0.0, 0.5 * (4.2 - paper.width)))
             pale: dict[str, Any] = {"color": style.COLORS["pale"], "linewidth": 0.8}
             end: dict[str, Any] = {"color": style.COLORS["first"], "linewidth": 1.3}
@@ -145,9 +145,8 @@ class Animation:
     def draw(self, k: int) -> None:
         """Bring the figure to picture k."""
         with style.journal():
+            self._wipe()
             if self._sketch is not None:
-                for one in self._made:
-                    one.remove()
                 self._made = put(self._paper, self._sketch[1](k))
             now, whole = self._time[k], self._drawn[-1] - self._drawn[0]
             rows = slice(*np.searchsorted(self._drawn, [now - _TRAIL * whole, now], side="right"))
@@ -160,14 +159,29 @@ class Animation:
                 line.set_data(*trail)
                 dot.set_data(*np.atleast_2d(place).T)
 
+    def _wipe(self) -> None:
+        """Take what moves out of the sketch."""
+        while self._made:
+            self._made.pop().remove()
+
     def images(self) -> Iterator[Image.Image]:
-        """The pictures, with few colours, all of one palette."""
+        """The pictures, with few colours, all of one palette. What does not move is drawn once."""
         from PIL import Image
+
+        canvas: Any = self.figure.canvas
+        moving = [*self._ends, *self._dots]
+        for one in moving:
+            one.set_animated(True)
+        self._wipe()
+        with style.journal():
+            canvas.draw()
+        still = canvas.copy_from_bbox(self.figure.bbox)
 
         def picture(k: int) -> Image.Image:
             self.draw(k)
-            canvas: Any = self.figure.canvas
-            canvas.draw()
+            canvas.restore_region(still)
+            for one in (*self._made, *moving):
+                one.axes.draw_artist(one)
             return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
 
         palette = picture(len(self) // 2).quantize(_COLORS, dither=Image.Dither.NONE)

@@ -157,7 +157,10 @@ class Pen:
 
 
 def put(ax: Axes, parts: Iterable[Part]) -> list[Any]:
-    """Draw parts of a sketch on axes; the artists are returned."""
+    """Draw parts of a sketch on axes, whose limits stay; the artists are returned."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Polygon
+
     made: list[Any] = []
     for kind, x, y, *looks in parts:
         if kind == "text":
@@ -167,7 +170,8 @@ def put(ax: Axes, parts: Iterable[Part]) -> list[Any]:
         color, width, fill = looks
         common: dict[str, Any] = {"linewidth": width, "clip_on": False, "zorder": 2}
         if fill:
-            made += ax.fill(x, y, facecolor=fill, edgecolor=color, **common)
+            one: Any = Polygon(np.column_stack([x, y]), facecolor=fill, edgecolor=color, **common)
         else:
-            made += ax.plot(x, y, "-", color=color, solid_capstyle="butt", **common)
+            one = Line2D(x, y, color=color, solid_capstyle="butt", **common)
+        made.append(ax.add_artist(one))
     return made
