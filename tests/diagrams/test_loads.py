@@ -398,3 +398,29 @@ def test_a_load_that_two_elements_share_stays_within_their_bounds(friction: floa
         assert ends == pytest.approx([0.75, 0.25, -0.25, -0.75], abs=1e-9)
     else:
         assert np.isnan(ends).all()
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.7, 1.9, 4.1])
+def test_a_contact_at_rest_takes_impulses_without_impacts(phase: float) -> None:
+    """A mass that lies on a floor is struck from above: the floor takes the same impulse, at no speed."""
+    rig = ns.mechanical(
+        np.diag([2.0, 1.0]),
+        np.diag([0.0, 0.1]),
+        np.diag([0.0, 1.0]),
+        coordinates=["a", "b"],
+        parameters={"P": 1.0, "omega": 0.8, "phase": phase},
+        forcing={"a": lambda t, p: -5.0, "b": lambda t, p: p.P * np.cos(p.omega * t + p.phase)},
+        elements={
+            "floor": ns.elements.Stop(at="a", position=0.0, side=-1, restitution=0.3),
+            "strike": ns.elements.Stop(at={"b": 1.0, "a": -1.0}, position=-0.3, side=-1, restitution=0.6),
+        },
+    )
+    found = ns.sweep(rig, "P", [1.0], direction=None, transient=200, loads=True, progress=False).isel(P=0)
+    assert int(found["period_number"]) > 0
+    assert float(found["strike_impacts"]) > 0.0 and float(found["strike_impact_speed_maximum"]) > 0.1
+    assert float(found["floor_impacts"]) == float(found["floor_impact_speed_maximum"]) == 0.0
+    assert float(found["floor_impulse"]) == pytest.approx(float(found["strike_impulse"]), rel=1e-12)
+    run = ns.simulate(rig, periods=4, transient=200)
+    struck = np.isfinite(run["strike_impact_speed"].values)
+    assert struck.any() and (run["floor_impact_speed"].values[struck] == 0.0).all()
+    np.testing.assert_allclose(run["floor_impulse"], run["strike_impulse"], rtol=1e-12)

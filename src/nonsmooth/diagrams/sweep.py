@@ -125,7 +125,9 @@ def sweep(
     see :mod:`nonsmooth.kernels.judging.judge`.
 
     Loads are per return of the section (per forcing period), averaged over the returns of a cycle, from the last
-    section point on; over ``keep`` returns, at most 200, where the motion has no period. Forces are without impulses.
+    section point on; over ``keep`` returns, at most 200, where the motion has no period. Forces are without impulses. A
+    contact at rest that takes an impulse from another one's impact has no impact of its own: its speed is 0, and it is
+    not counted.
     The energy of an element is what it takes from the masses,
 
     .. math:: E = -\int \lambda\, w \cdot v\, dt - \sum \Lambda\, w \cdot (v^+ + v^-) / 2
