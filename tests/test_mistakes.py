@@ -5,7 +5,10 @@ But for the last group each is refused before anything is compiled.
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -771,3 +774,34 @@ def test_two_ends_and_a_number_are_three_values() -> None:
     with pytest.warns(UserWarning, match=r"three values, 3\.0, 4, 500; .* write np\.linspace\(3\.0, 4, 500\)"):
         found = ns.sweep(system, "omega", (3.0, 4, 500), progress=False)
     assert found["omega"].values.tolist() == [3.0, 4.0, 500.0]
+
+
+@pytest.mark.parametrize(
+    ("ask", "said"),
+    [
+        (lambda orbit, found: orbit.multipliers, "an Orbit has no 'multipliers'; nearest: floquet_multipliers"),
+        (lambda orbit, found: orbit.x, r"an Orbit has no 'x': orbit.u is the section point.*sel\(state='x'\)"),
+        (lambda orbit, found: orbit.k, r"orbit.system.values\['k'\]"),
+        (lambda orbit, found: orbit.eigenvalues, "it has clearance, .*virtual"),
+        (lambda orbit, found: orbit.system.params, "a System has no 'params'; nearest: parameters"),
+        (lambda orbit, found: found.k, r"found\['k'\] is the value, found.estimates\['k'\]"),
+        (lambda orbit, found: found.covar, "a ParameterSet has no 'covar'; nearest: covariance"),
+    ],
+)
+def test_an_attribute_that_there_is_not(ask: Callable[..., object], said: str) -> None:
+    orbit = ns.find_orbit(ns.models.discontinuous_support())
+    found = ns.ParameterSet({"k": Estimate(1.0, 0.1)}, [[0.01]])
+    with pytest.raises(AttributeError, match=said):
+        ask(orbit, found)
+    assert not hasattr(orbit, "data_vars")
+
+
+def test_answers_can_be_copied_and_sent_to_another_process() -> None:
+    orbit = ns.find_orbit(ns.models.discontinuous_support())
+    found = ns.ParameterSet({"k": Estimate(1.0, 0.1)}, [[0.01]], notes=["one"], synthetic=True)
+    for one in (orbit, orbit.system, found):
+        for other in (copy.copy(one), copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
+            assert type(other) is type(one) and repr(other) == repr(one)
+    again = pickle.loads(pickle.dumps(found))
+    assert again["k"] == 1.0 and again.notes == ("one",) and again.synthetic
+    assert float(again.full_covariance[0, 0]) == 0.01

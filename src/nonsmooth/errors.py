@@ -69,6 +69,25 @@ def unknown(name: object, what: str, of: str, known: Mapping[str, str] | Iterabl
     return text + (f"; all: {', '.join(ordered)}" if ordered else f"; {of} has none")
 
 
+class Answering:
+    """An object that answers for an attribute which it has not: where that stands instead, or what is like it."""
+
+    __slots__ = ()
+
+    def __getattr__(self, name: str) -> Any:
+        kind = type(self).__name__
+        text = f"{'an' if kind[0] in 'AEIO' else 'a'} {kind} has no {name!r}"
+        if not name.startswith("_"):  # machines ask for those, of objects that are not whole yet
+            known = [word for word in dir(self) if not word.startswith("_")]
+            alike = f"; nearest: {', '.join(nearest(name, known))}".removesuffix("; nearest: ")
+            text += self._elsewhere(name) or alike or f"; it has {', '.join(known)}"
+        raise AttributeError(text)
+
+    def _elsewhere(self, name: str) -> str:
+        """The end of the sentence on a name that many look for; "" where nothing is known."""
+        return ""
+
+
 #: Words of other programs for our options.
 ELSEWHERE = {
     **dict.fromkeys(("x0", "y0", "u0", "z0", "initial", "initial_state"), "start"),

@@ -80,10 +80,10 @@ def simulate(
         after), ``crossing_time``, ``crossing_transition``, ``u_before``, ``u_after``, the touches (``touch_time``,
         ``touch_indicator``, ``touch_u``, ``touch_clearance``: maxima of an armed indicator that do not reach zero),
         the outputs, and ``status``. For each rigid stop among the elements, over ``crossing``: ``<element>_impulse``,
-        ``<element>_impact_speed`` (of approach; 0 where it rests and takes an impulse of another; else NaN) and ``<element>_energy_lost``, the energy
-        that the impact dissipates. The output ``<element>_force`` is the force between impacts, without impulses. A run
-        that stays at an equilibrium from its start says so in the attribute ``note``, and in a warning where the
-        equilibrium is unstable.
+        ``<element>_impact_speed`` (of approach; 0 where it rests and takes an impulse of another one's impact; else
+        NaN) and ``<element>_energy_lost``, the energy that the impact dissipates. The output ``<element>_force`` is the
+        force between impacts, without impulses. A run that stays at an equilibrium from its start says so in the
+        attribute ``note``, and in a warning where the equilibrium is unstable.
 
     Raises
     ------

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.errors import Answering
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.uncertainty import normal_draws
 from nonsmooth.results.representation import cut, html_table, text_table
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-class ParameterSet(Mapping[str, float]):
+class ParameterSet(Answering, Mapping[str, float]):
     """Parameters by name, with what is known of how well: ``system.with_parameters(parameter_set)``.
 
     Parameters
@@ -78,8 +80,18 @@ class ParameterSet(Mapping[str, float]):
         for name, value in held.items():
             object.__setattr__(self, name, value)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        named: dict[str, Any] = {"extra": dict(self.extra), "identifiability": dict(self.identifiability)}
+        named |= {name: getattr(self, name) for name in ("findings", "notes", "anomalies", "synthetic")}
+        return partial(ParameterSet, dict(self.estimates), self._covariance, **named), ()
+
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"a ParameterSet does not change (tried to set {name!r})")
+
+    def _elsewhere(self, name: str) -> str:
+        if name not in self.estimates:
+            return ""
+        return f": found[{name!r}] is the value, found.estimates[{name!r}] that with its uncertainty"
 
     def __getitem__(self, name: str) -> float:
         if name not in self.estimates:

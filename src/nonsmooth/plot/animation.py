@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from nonsmooth.errors import DataFileError
+from nonsmooth.errors import Answering, DataFileError
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import column, first_states, name_plane, variable_along
 from nonsmooth.plot.mechanism import sketch_of_run
@@ -99,7 +99,7 @@ def _speed(run: xr.Dataset, name: str | None) -> str | None:
     return next((one for one in (f"v_{name}", "v") if one in states), states[min(len(states) // 2, len(states) - 1)])
 
 
-class Animation:
+class Animation(Answering):
     """Pictures of a run in motion, drawn when they are asked for; :func:`animate` makes it."""
 
     def __init__(self, run: xr.Dataset, at: xr.Dataset, sketch: Any, names: list[str], rate: int, pixels: int) -> None:

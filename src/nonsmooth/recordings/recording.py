@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.errors import Answering
 from nonsmooth.results.provenance import ATTRIBUTE, COORDINATE
 from nonsmooth.results.representation import cut, html_table
 
@@ -25,7 +26,7 @@ class RecordingWarning(UserWarning):
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(Answering):
     """Recorded signals by run and sensor, with units, rates and where each channel came from.
 
     Read one with :func:`nonsmooth.load_recording`, or build one with :meth:`from_runs`.
@@ -109,6 +110,9 @@ class Recording:
     def rates(self) -> dict[str, float]:
         """The mean sample rate of each sensor in Hz, by ``run/sensor``; NaN where there is none."""
         return {f"{run}/{sensor}": float(ds.attrs.get("rate", np.nan)) for run, sensor, ds in self._sensors()}
+
+    def _elsewhere(self, name: str) -> str:
+        return f": recording.channel({name!r}) is that channel" if name in self.channels else ""
 
     def channel(self, name: str, run: str | None = None) -> xr.DataArray:
         """One channel of one run, over its own axis.

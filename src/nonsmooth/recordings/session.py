@@ -16,7 +16,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from nonsmooth.errors import DataFileError, check_keys, unknown
+from nonsmooth.errors import Answering, DataFileError, check_keys, unknown
 from nonsmooth.flow.arguments import real_number
 from nonsmooth.recordings.load import content_of, load_recording
 from nonsmooth.recordings.reading import Options
@@ -178,7 +178,7 @@ class RecordedRun(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Session:
+class Session(Answering):
     """The recordings of one experiment by procedure, and its notebook. Read one with :func:`load_session`.
 
     Attributes

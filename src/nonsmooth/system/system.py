@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from nonsmooth.errors import Answering
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.description import Description, describe
 from nonsmooth.system.equations import TracedSurface
@@ -20,11 +21,11 @@ from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 from nonsmooth.system.symmetry import Symmetry
 from nonsmooth.system.text import read_system, write_system
 from nonsmooth.system.transition import Surface, Transition
-from nonsmooth.system.values import changed_values, no_attribute, parameter_rows, smoothed_values
+from nonsmooth.system.values import changed_values, parameter_rows, smoothed_values
 from nonsmooth.system.variant import SHARP, Variant, variant_of
 
 
-class System:
+class System(Answering):
     r"""A piecewise-smooth dynamical system: smooth in each of its modes, switching between them.
 
     Parameters
@@ -132,8 +133,10 @@ class System:
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"a System does not change: use with_parameters(...) (tried to set {name!r})")
 
-    def __getattr__(self, name: str) -> Any:
-        raise AttributeError(no_attribute(name, () if name.startswith("_") else self._values, dir(type(self))))
+    def _elsewhere(self, name: str) -> str:
+        if name not in self._values:
+            return ""
+        return f": the value of a parameter is system.values[{name!r}], set by with_parameters({name}=...)"
 
     def __delattr__(self, name: str) -> None:
         raise AttributeError("a System does not change")

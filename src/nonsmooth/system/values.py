@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from nonsmooth.errors import nearest, shortened, unknown
+from nonsmooth.errors import shortened, unknown
 from nonsmooth.system.description import Description
 from nonsmooth.system.parameter import finite_number
 from nonsmooth.system.variant import ETA_PER_INDICATOR, ONE_ETA, SHARP, Variant, variant_of
@@ -87,16 +87,6 @@ def smoothed_values(
     new = plain | {key: _positive(finite_number(width, key), key) for key, width in widths.items()}
     variant.domain.check(new)
     return new, variant
-
-
-def no_attribute(name: str, values: Collection[str], known: Iterable[str]) -> str:
-    """Sentence on an attribute that a system has not, where that may be one of its parameters."""
-    text = f"a System has no {name!r}"
-    if name in values:
-        text += f": the value of a parameter is system.values[{name!r}], set by with_parameters({name}=...)"
-    elif not name.startswith("_") and (near := nearest(name, [word for word in known if not word.startswith("_")])):
-        text += f"; nearest: {', '.join(near)}"
-    return text
 
 
 def _unknown_parameter(key: object, variant: Variant, name: str) -> str:

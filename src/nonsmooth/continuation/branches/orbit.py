@@ -13,7 +13,7 @@ from nonsmooth.continuation.branches.reading import fields_of, layout_attributes
 from nonsmooth.continuation.problems.multipliers import stability, stable_by
 from nonsmooth.continuation.problems.orbits import OrbitPoint
 from nonsmooth.continuation.problems.signature import Signature
-from nonsmooth.errors import SolveError
+from nonsmooth.errors import Answering, SolveError
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.loads import checked_loads, meter_of
@@ -29,7 +29,7 @@ AT_SECTION = 1e-14  # of the period: a transition nearer to the section than rou
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Orbit:
+class Orbit(Answering):
     """A periodic orbit, found by :func:`nonsmooth.find_orbit`.
 
     Attributes
@@ -89,6 +89,11 @@ class Orbit:
     virtual: bool = False
     options: Mapping[str, Any] = field(default_factory=dict)
     loads: Mapping[str, float] = field(default_factory=dict)
+
+    def _elsewhere(self, name: str) -> str:
+        if name in self.system.states:
+            return f": orbit.u is the section point, orbit.trajectory()['u'].sel(state={name!r}) the orbit's {name}"
+        return f": orbit.system.values[{name!r}] is that parameter" if name in self.system.values else ""
 
     @property
     def crossings_per_period(self) -> float:
