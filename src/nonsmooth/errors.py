@@ -178,6 +178,15 @@ class Interrupted(KeyboardInterrupt):
         super().__init__(message)
         self.result = result
 
+    @classmethod
+    def with_points(cls, done: int, size: int, what: str, result: Any) -> Interrupted:
+        """That of a result over many points, some of which were computed."""
+        return cls(
+            f"interrupted: {done} of {size} points of the {what} were computed; they are in `result` of this exception "
+            '(at a prompt: sys.last_value.result), the others have the status "interrupted"',
+            result,
+        )
+
 
 class DataFileError(ValueError):
     """A file that cannot be read or written: the message names the file, the place in it, and what was expected.

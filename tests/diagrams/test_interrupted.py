@@ -1,4 +1,4 @@
-"""Ctrl-C in a sweep: the points that were run are those of a whole sweep, the others say that they were not run."""
+"""Ctrl-C in a sweep or a chart: points that were run are those of a whole one, the others say that they were not."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_a_sweep(direction: str | None) -> None:
     part = error.result
     run = part["status"].values != NOT_RUN
     assert run.sum() >= run.size / 2 and not run.all()
-    assert f"{run.sum()} of {run.size} points of the sweep over rho were run" in str(error)
+    assert f"{run.sum()} of {run.size} points of the sweep over rho were computed" in str(error)
     assert (whole["status"].values != NOT_RUN).all()
     for name in ("section", "maximum", "period_number", "contacts_per_period"):
         np.testing.assert_array_equal(part[name].values[run], whole[name].values[run], err_msg=name)
@@ -50,9 +50,31 @@ def test_a_frequency_response() -> None:
     assert np.isnan(part["amplitude"].values[~run]).all() and not run.all()
 
 
+@pytest.mark.parametrize(
+    "options", [{}, {"carry": {"rho": "up"}}, {"start": [[0.0, 0.0], [0.01, 0.0]]}], ids=["plain", "carried", "starts"]
+)
+def test_a_chart(options: dict[str, Any]) -> None:
+    grid = {"rho": np.linspace(0.3, 0.5, 24), "g": np.linspace(-0.005, -0.004, 44)}
+    named = {"transient": 20, "max_period": 4, "threads": 1, **options}
+    whole = ns.chart(SYSTEM, grid, progress=False, **named)
+    with pytest.raises(ns.Interrupted) as caught:
+        ns.chart(SYSTEM, grid, progress=lambda done: done < 0.5, **named)
+    part = caught.value.result
+    run = part["status"].values != NOT_RUN
+    assert run.any() and not run.all()
+    assert f"{run.sum()} of {run.size} points of the chart over rho and g" in str(caught.value)
+    for name in ("period_number", "contacts_per_period", "maximum"):
+        np.testing.assert_array_equal(part[name].values[run], whole[name].values[run], err_msg=name)
+    for name in ("contacts_per_period", "maximum", "minimum"):
+        assert np.isnan(part[name].values[~run]).all(), name
+
+
 def test_where_nothing_was_run_there_is_no_part() -> None:
     with pytest.raises(KeyboardInterrupt) as caught:
         ns.sweep(SYSTEM, "rho", VALUES, progress=lambda done: False)
+    assert not isinstance(caught.value, ns.Interrupted)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        ns.chart(SYSTEM, {"rho": VALUES, "g": [-0.005, -0.004]}, progress=lambda done: False)
     assert not isinstance(caught.value, ns.Interrupted)
 
 

@@ -23,6 +23,7 @@ def run(
     store: Any = None,
     client: Any = None,
     any_cpu: bool = False,
+    columns: dict[str, NDArray[Any]] | None = None,
 ) -> dict[str, NDArray[Any]]:
     """Compute every chunk of ``work`` that is not in the store yet, and return its columns over all places.
 
@@ -39,6 +40,8 @@ def run(
         Chunks are computed by its workers, which must see the same store under the same path.
     any_cpu : bool
         See :func:`nonsmooth.campaign.store.open_store`.
+    columns : dict, optional
+        Filled in place where there is no store: holds what was computed by then, should the work be interrupted.
     """
     check_room(work, label)
     keeper = None
@@ -51,7 +54,9 @@ def run(
     if keeper is not None and client is not None:
         begun = keeper.begun()  # by workers that may be at them still, for a client that is gone: they come last
         missing.sort(key=begun.__contains__)
-    columns = empty_columns(work) if keeper is None else {}
+    columns = {} if columns is None else columns
+    if keeper is None:
+        columns |= empty_columns(work)
     size = work.bounds(work.n_chunks() - 1)[1]
     before = size - sum(_places(work, chunk) for chunk in missing)
     with progress_bar(size, label, progress, before) as advance:

@@ -21,10 +21,12 @@ LISTED = 40  # bytes of a chunk's number in a list
 
 @dataclass(frozen=True)
 class ColumnType:
-    """One result per place: its type and the shape of one entry."""
+    """One result per place: its type, the shape of one entry, and what stands where nothing was computed (NaN of real
+    numbers)."""
 
     dtype: str
     shape: tuple[int, ...] = ()
+    unknown: int = 0
 
 
 class ChunkedWork(Protocol):
@@ -63,7 +65,10 @@ def empty_columns(work: ChunkedWork) -> dict[str, NDArray[Any]]:
     """Arrays for all places of a work."""
     chunks = work.n_chunks()
     size = work.bounds(chunks - 1)[1] if chunks else 0
-    return {name: np.zeros((size, *column.shape), column.dtype) for name, column in work.columns().items()}
+    return {
+        name: np.full((size, *one.shape), np.nan if one.dtype.startswith("f") else one.unknown, one.dtype)
+        for name, one in work.columns().items()
+    }
 
 
 def inputs(system: System, verb: str, options: Mapping[str, Any]) -> dict[str, Any]:

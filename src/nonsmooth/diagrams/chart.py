@@ -12,7 +12,7 @@ from nonsmooth.attractors.settler import settler_for
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import CHUNK, STORED, inputs
 from nonsmooth.diagrams.chart_work import ChartWork
-from nonsmooth.errors import shortened
+from nonsmooth.errors import Interrupted, shortened
 from nonsmooth.flow.arguments import swept_values
 from nonsmooth.flow.engines.devices import BATCH
 from nonsmooth.flow.equilibria import refuse_resting
@@ -20,6 +20,7 @@ from nonsmooth.flow.loads import Quantities, checked_loads
 from nonsmooth.flow.options import Campaign, as_called, kept_of, workers_of
 from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import is_one_start, start_states
+from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import at_least
 
@@ -88,6 +89,8 @@ def chart(
     ValueError, TypeError
         Arguments that do not fit, and starts at an equilibrium of a system without forcing. A point that fails keeps
         its status; the others are whole.
+    Interrupted
+        Ctrl-C; a chart with the points computed until then is its ``result`` (with ``store`` they are there).
     ImportError, RuntimeError
         ``device="cuda"`` without the package numba-cuda, or without a GPU.
 
@@ -110,25 +113,18 @@ def chart(
     else:
         if chunked and work.device == "cpu":
             work = replace(work, chunk=STORED)
-        flat = run(work, label=label, **kept_of(options))
-        arrays = {name: planned.order(column) for name, column in flat.items()}
+        flat: dict[str, Any] = {}
+        try:
+            arrays = planned.over_grid(run(work, label=label, columns=flat, **kept_of(options)))
+        except KeyboardInterrupt as error:
+            known = int((flat["status"] != codes.INTERRUPTED).sum()) if flat else 0
+            if not known:
+                raise
+            part = planned.dataset(asked, planned.over_grid(flat))
+            raise Interrupted.with_points(known, flat["status"].size, label, part) from error
     if "maximum" in arrays:
         warn_if_small(system, work.starts, arrays["maximum"], arrays["minimum"])
-    from nonsmooth.results.global_schema import chart as build
-    from nonsmooth.results.labels import labels_of
-    from nonsmooth.results.provenance import provenance
-
-    labels = labels_of(system)
-    record = provenance(labels, "chart", asked | {"grid": planned.values}, method=work.settler.engine.name)
-    return build(
-        labels,
-        record,
-        planned.values,
-        arrays,
-        starts=work.starts,
-        one_start=is_one_start(start) or len(work.starts) == 1,
-        loads=planned.loads,
-    )
+    return planned.dataset(asked, arrays)
 
 
 @dataclass(frozen=True)
@@ -139,6 +135,22 @@ class PlannedChart:
     values: Mapping[str, FloatArray]
     order: Callable[[Any], Any]
     loads: Quantities
+
+    def over_grid(self, flat: Mapping[str, Any]) -> dict[str, Any]:
+        """The arrays of flat columns."""
+        return {name: self.order(column) for name, column in flat.items()}
+
+    def dataset(self, asked: Mapping[str, Any], arrays: dict[str, Any]) -> xr.Dataset:
+        """The chart as a result."""
+        from nonsmooth.results.global_schema import chart as build
+        from nonsmooth.results.labels import labels_of
+        from nonsmooth.results.provenance import provenance
+
+        work = self.work
+        labels = labels_of(work.settler.system)
+        record = provenance(labels, "chart", {**asked, "grid": self.values}, method=work.settler.engine.name)
+        one_start = is_one_start(asked["start"]) or len(work.starts) == 1
+        return build(labels, record, self.values, arrays, starts=work.starts, one_start=one_start, loads=self.loads)
 
 
 @checked(of=chart)

@@ -73,7 +73,7 @@ class ChartWork:
         n = self.starts.shape[1]
         found = {
             "period_number": ColumnType("i2", many),
-            "status": ColumnType("i1", many),
+            "status": ColumnType("i1", many, codes.INTERRUPTED),
             "crossings_per_period": ColumnType("f8", many),
             "contacts_per_period": ColumnType("f8", many),
         }

@@ -248,11 +248,8 @@ class _Sweep:
         done = self.gather("status") != codes.INTERRUPTED
         if not done.any():
             return error
-        return Interrupted(
-            f"interrupted: {done.sum()} of {done.size} points of the sweep over {self.parameter} were run; they are in "
-            '`result` of this exception (at a prompt: sys.last_value.result), the others have the status "interrupted"',
-            self.dataset(asked, squeeze),
-        )
+        part = self.dataset(asked, squeeze)
+        return Interrupted.with_points(int(done.sum()), done.size, f"sweep over {self.parameter}", part)
 
     def largest(self, extremes: bool) -> FloatArray:
         """The largest size of each state, of the starts and of all runs that came to their end; without their extremes
