@@ -179,11 +179,11 @@ class Interrupted(KeyboardInterrupt):
         self.result = result
 
     @classmethod
-    def with_points(cls, done: int, size: int, what: str, result: Any) -> Interrupted:
+    def with_points(cls, why: KeyboardInterrupt, done: int, size: int, what: str, result: Any) -> Interrupted:
         """That of a result over many points, some of which were computed."""
         return cls(
-            f"interrupted: {done} of {size} points of the {what} were computed; they are in `result` of this exception "
-            '(at a prompt: sys.last_value.result), the others have the status "interrupted"',
+            f"{str(why) or 'interrupted'}: {done} of {size} points of the {what} were computed; they are in `result` "
+            'of this exception (at a prompt: sys.last_value.result), the others have the status "interrupted"',
             result,
         )
 

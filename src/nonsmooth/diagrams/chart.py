@@ -121,7 +121,7 @@ def chart(
             if not known:
                 raise
             part = planned.dataset(asked, planned.over_grid(flat))
-            raise Interrupted.with_points(known, flat["status"].size, label, part) from error
+            raise Interrupted.with_points(error, known, flat["status"].size, label, part) from error
     if "maximum" in arrays:
         warn_if_small(system, work.starts, arrays["maximum"], arrays["minimum"])
     return planned.dataset(asked, arrays)

@@ -249,7 +249,7 @@ class _Sweep:
         if not done.any():
             return error
         part = self.dataset(asked, squeeze)
-        return Interrupted.with_points(int(done.sum()), done.size, f"sweep over {self.parameter}", part)
+        return Interrupted.with_points(error, int(done.sum()), done.size, f"sweep over {self.parameter}", part)
 
     def largest(self, extremes: bool) -> FloatArray:
         """The largest size of each state, of the starts and of all runs that came to their end; without their extremes

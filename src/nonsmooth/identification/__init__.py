@@ -3,6 +3,6 @@
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.identification.report import report
-from nonsmooth.identification.uncertainty import correlated, coverage_factor, uniform
+from nonsmooth.identification.uncertainty import correlated, uniform
 
-__all__ = ["Estimate", "Finding", "ParameterSet", "correlated", "coverage_factor", "report", "uniform"]
+__all__ = ["Estimate", "Finding", "ParameterSet", "correlated", "report", "uniform"]

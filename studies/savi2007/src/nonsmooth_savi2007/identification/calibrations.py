@@ -15,8 +15,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import ndtri
 
-from nonsmooth.identification import Estimate, Finding, coverage_factor, uniform
+from nonsmooth.identification import Estimate, Finding, uniform
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
@@ -163,7 +164,7 @@ def _data(
     low = min(float(setting.min()), 0.0)
     fine = np.linspace(low, float(setting.max()), 200)
     rows = np.column_stack([fine, np.ones_like(fine)])
-    reach = coverage_factor() * np.sqrt(np.einsum("ij,jk,ik->i", rows, line.covariance, rows))
+    reach = ndtri(0.975) * np.sqrt(np.einsum("ij,jk,ik->i", rows, line.covariance, rows))
     fitted, errors = line.intercept + line.slope * fine, np.sqrt(np.diag(line.covariance))
     unit = {"units": read[1], "long_name": read[0]}
     return xr.Dataset(

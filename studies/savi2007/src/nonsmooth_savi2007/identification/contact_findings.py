@@ -10,9 +10,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import ndtri
 
 from nonsmooth import SolveError
-from nonsmooth.identification import Estimate, Finding, coverage_factor
+from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth_savi2007.identification.free_decay import DecayFit
@@ -122,7 +123,7 @@ def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: 
     assert data is not None
     best, low, high = (mass * float(data[name]) for name in ("best", "low", "high"))
     bounded = bool(0 < low and np.isfinite(high))
-    error = best * float(np.log(high / low)) / (2 * coverage_factor()) if bounded else mass * width
+    error = best * float(np.log(high / low)) / (2 * ndtri(0.975)) if bounded else mass * width
     shown = data.assign({name: data[name] * mass for name in ("best", "low", "high")})
     shown = shown.assign_coords(value=("value", mass * data["value"].values, {"units": "N s/m"}))
     return Finding(
