@@ -124,7 +124,7 @@ def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = Non
 
     .. math::
 
-        C = H^{-1} \Big[\sum_{|k| \le K} w_k \sum_i J_i r_i \, r_{i+k} J_{i+k}^T\Big] H^{-1}, \qquad H = J^T J
+        C = H^{-1} \left[\sum_{|k| \le K} w_k \sum_i J_i r_i \, r_{i+k} J_{i+k}^T\right] H^{-1}, \qquad H = J^T J
 
     with Bartlett's weights (Newey and West, Econometrica 55 (1987) 703) and K from the residuals' own correlation.
 
