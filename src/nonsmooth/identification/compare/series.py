@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.compare.jumps import AmplitudeJump, jumps_of_runs
+from nonsmooth.identification.compare.jumps import jumps_of_runs
 from nonsmooth.identification.compare.orbits import fold
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.results.labels import labelled
@@ -16,18 +16,25 @@ from nonsmooth.results.labels import labelled
 if TYPE_CHECKING:
     import xarray as xr
 
-_JUMPS: tuple[tuple[str, Callable[[AmplitudeJump], float], str, str], ...] = (
-    ("value", lambda one: one.value, "middle of the step in which the amplitude jumps", "rad/s"),
-    ("step", lambda one: 2 * one.half, "width of the step", "rad/s"),
-    ("before", lambda one: one.before, "amplitude before it", "m"),
-    ("after", lambda one: one.after, "amplitude behind it", "m"),
-)
+_JUMPS = {
+    "value": ("middle of the step in which the amplitude jumps", "rad/s"),
+    "step": ("width of the step", "rad/s"),
+    "before": ("amplitude before it", "m"),
+    "after": ("amplitude behind it", "m"),
+}
+_WHOLE = np.array([[1.0], [2.0], [1.0], [1.0]])  # of a half step
 FEW = 6  # turns of the drive below which no period number is sought
 
 
 def section_points(motion: xr.Dataset) -> FloatArray:
     """Points of a measured motion at phase 0, one for each whole period of the drive: (periods, states)."""
     return fold(motion["phase"].values, motion["u"].values, 8)[:, 0]
+
+
+def _period_of(points: FloatArray, noise: FloatArray, longest: int) -> int:
+    """The period number of section points with known noise; 0: none found, -1: too few turns."""
+    points = points[np.isfinite(points).all(axis=1)]
+    return measured_period(points, noise, max_period=longest).number if len(points) >= FEW else -1
 
 
 def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], *, settle: int = 4) -> xr.Dataset:
@@ -59,9 +66,7 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
     for motion in motions:
         folded = fold(motion["phase"].values, motion["u"].values, 64)
         points, noise = folded[:, 0], np.median(motion["u_error"].values, axis=0)
-        points = points[np.isfinite(points).all(axis=1)]
-        many = len(points) >= FEW
-        periods.append(measured_period(points, noise, max_period=8).number if many else -1)
+        periods.append(_period_of(points, noise, 8))
         whole = folded[:, :, 0]
         whole = whole[min(settle, len(whole) - 1) :]
         whole = whole[np.isfinite(whole).all(axis=1)]
@@ -75,7 +80,8 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
     omega = np.array([float(motion["omega"]) for motion in motions])
     words = np.array(directions, dtype=str)
     jumps = jumps_of_runs(omega, np.array(heights), np.array(errors), words)
-    rows = [(word, jump) for word, found in jumps.items() for jump in found]
+    met = [word for word, found in jumps.items() for _ in found]
+    steps = np.array([one for found in jumps.values() for one in found], dtype=float).reshape(-1, 4).T * _WHOLE
     attrs = {key: motions[0].attrs[key] for key in ("synthetic", "file", "sha256") if key in motions[0].attrs}
     attrs["title"] = f"{attrs.get('file') or 'in memory'}, {len(motions)} runs"
     return xr.Dataset(
@@ -87,10 +93,10 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
             "period_number": labelled(
                 "run", np.array(periods, dtype=np.int64), "period number (0: none found, -1: too few turns)"
             ),
-            "jump_direction": labelled("jump", np.array([word for word, _ in rows], dtype=str), "how it was met"),
+            "jump_direction": labelled("jump", np.array(met, dtype=str), "how it was met"),
             **{
-                f"jump_{name}": labelled("jump", np.array([value(one) for _, one in rows], dtype=float), said, unit)
-                for name, value, said, unit in _JUMPS
+                f"jump_{name}": labelled("jump", column, *words_of)
+                for (name, words_of), column in zip(_JUMPS.items(), steps, strict=True)
             },
         },
         attrs=attrs,
@@ -149,7 +155,8 @@ def measured_sections(
     -------
     xarray.Dataset
         ``section(<parameter>, iterate, state)`` at phase 0, in rising order of the parameter (NaN behind the end of a
-        shorter run), ``section_error(state)`` and ``period_number(<parameter>)`` (0: none found).
+        shorter run), ``section_error(state)`` and ``period_number(<parameter>)`` (0: none found, -1: too
+        few turns).
     """
     import xarray as xr
 
@@ -160,7 +167,7 @@ def measured_sections(
         row[: len(cloud)] = cloud
     error = np.median(np.concatenate([motion["u_error"].values for motion in motions]), axis=0)
     numbers = [
-        measured_period(cloud, np.median(motions[i]["u_error"].values, axis=0)).number
+        _period_of(cloud, np.median(motions[i]["u_error"].values, axis=0), 16)
         for i, cloud in zip(order, clouds, strict=True)
     ]
     first = motions[0]
@@ -170,7 +177,9 @@ def measured_sections(
         {
             "section": labelled((parameter, "iterate", "state"), points, "section points"),
             "section_error": ("state", error),
-            "period_number": labelled(parameter, np.array(numbers, dtype=np.int64), "period number (0: none found)"),
+            "period_number": labelled(
+                parameter, np.array(numbers, dtype=np.int64), "period number (0: none found, -1: too few turns)"
+            ),
         },
         {
             parameter: labelled(parameter, np.asarray(values, dtype=float)[order], parameter, unit),
