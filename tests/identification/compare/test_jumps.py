@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 
+from nonsmooth.identification.compare import measured_response, measured_sections
 from nonsmooth.identification.compare.jumps import AmplitudeJump, jumps_in_steps, match_jumps
 
 ZERO = np.zeros
@@ -77,3 +79,35 @@ def test_what_is_too_many_has_no_partner() -> None:
     found = match_jumps(measured, theory, [], "rad/s", 0.95)
     np.testing.assert_array_equal(found["theory_jump"][1], [5.8, 4.1])
     np.testing.assert_array_equal(found["measured_jump"][1], [5.7, np.nan])
+
+
+def _motion(amplitude: float, omega: float, turns: int = 12) -> xr.Dataset:
+    """A harmonic motion, sampled 50 times in each turn of the drive."""
+    phase = np.arange(0.0, turns, 0.02)
+    u = amplitude * np.column_stack([np.cos(2 * np.pi * phase), -omega * np.sin(2 * np.pi * phase)])
+    columns = {"u": (("time", "state"), u), "u_error": (("time", "state"), np.full(u.shape, 1e-5))}
+    named = {"state": ["x", "v"], "state_unit": ("state", ["m", "m/s"]), "time": phase * 2 * np.pi / omega}
+    return xr.Dataset({**columns, "phase": ("time", phase), "omega": omega}, named)
+
+
+def test_a_measured_response_states_its_jumps() -> None:
+    """Even steps of 1 mm, and one of 20 mm: up between 4.2 and 4.3, down between 4.0 and 4.1."""
+    omegas = np.round(np.arange(3.5, 5.0, 0.1), 6)
+    motions, words = [], []
+    for word, place in (("up", 4.25), ("down", 4.05)):
+        for k, omega in enumerate(omegas):
+            motions.append(_motion(0.05 - 1e-3 * k - 0.02 * (omega > place), omega))
+            words.append(word)
+    found = measured_response(motions, words)
+    assert found["jump_direction"].values.tolist() == ["up", "down"]
+    np.testing.assert_allclose(found["jump_value"], [4.25, 4.05], rtol=1e-12)
+    np.testing.assert_allclose(found["jump_step"], 0.1, rtol=1e-9)
+    np.testing.assert_allclose(found["jump_before"], [0.043, 0.024], atol=1e-4)
+    np.testing.assert_allclose(found["jump_after"], [0.022, 0.045], atol=1e-4)
+
+
+def test_measured_sections_say_where_turns_are_too_few() -> None:
+    """In rising order of the parameter."""
+    found = measured_sections([_motion(0.01, 2.0, 12), _motion(0.01, 2.0, 4)], "g", [0.2, 0.1])
+    assert found["g"].values.tolist() == [0.1, 0.2]
+    assert found["period_number"].values.tolist() == [-1, 1]
