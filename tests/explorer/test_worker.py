@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib
 import queue
 import signal
@@ -23,6 +24,20 @@ SYSTEM = ns.models.discontinuous_support()
 @pytest.fixture(scope="module")
 def answers() -> queue.Queue[Answer]:
     return queue.Queue()
+
+
+@pytest.fixture
+def cancelled(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Cancelled]:
+    """Cancelled work in this process, about to be interrupted."""
+    monkeypatch.setattr("nonsmooth.explorer.worker._SILENT", 0.1)
+    before, hook = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    one = _Cancelled()
+    one.at_work = 7
+    one.add(7)
+    yield one
+    one.at_work = 0
+    signal.signal(signal.SIGINT, before)
+    sys.unraisablehook = hook
 
 
 @pytest.fixture(scope="module")
@@ -100,21 +115,30 @@ def test_work_that_does_not_ask_is_interrupted_and_the_process_stays(
 
 
 def test_a_package_is_loaded_whole_before_its_work_is_interrupted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
     (tmp_path / "slow_to_load.py").write_text("import time\nfor _ in range(60):\n    time.sleep(0.01)\nwhole = True\n")
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr("nonsmooth.explorer.worker._SILENT", 0.1)
-    before = signal.getsignal(signal.SIGINT)
-    try:
-        cancelled = _Cancelled()
-        cancelled.at_work = 7
-        cancelled.add(7)
-        with pytest.raises(KeyboardInterrupt):  # while it is loaded, or behind it
-            time.sleep(20 if importlib.import_module("slow_to_load").whole else 0)
-    finally:
-        signal.signal(signal.SIGINT, before)
+    request.getfixturevalue("cancelled")
+    with pytest.raises(KeyboardInterrupt):  # while it is loaded, or behind it
+        time.sleep(20 if importlib.import_module("slow_to_load").whole else 0)
     assert sys.modules["slow_to_load"].whole
+
+
+@pytest.mark.usefixtures("cancelled")
+def test_an_interruption_that_c_ignores_comes_again() -> None:
+    @ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
+    def slowly(_one: int, _other: int) -> int:
+        time.sleep(20)
+        return 0
+
+    def work() -> None:
+        numbers = (ctypes.c_int * 2)()
+        ctypes.CDLL(None).qsort(numbers, ctypes.c_size_t(2), ctypes.c_size_t(4), slowly)  # the sleep alone ends
+        time.sleep(20)
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
 
 
 def test_an_error_is_a_sentence(worker: Worker, answers: queue.Queue[Answer]) -> None:

@@ -22,6 +22,7 @@ from contextlib import suppress
 from types import FrameType
 from typing import Any
 
+from nonsmooth.errors import SolveError
 from nonsmooth.kernels.compile.forking import is_importing
 
 _OFTEN = 0.15  # seconds between two words on progress
@@ -197,6 +198,7 @@ class _Cancelled:
         self.at_work = 0
         # Ctrl-C on the terminal comes here too: it ends the server, and that closes the pipe
         signal.signal(signal.SIGINT, self._interrupted)
+        sys.unraisablehook = self._swallowed
 
     def add(self, number: int) -> None:
         """Cancel a request; in a while as Ctrl-C does, should its verb not hear of it."""
@@ -223,6 +225,13 @@ class _Cancelled:
             self._later(_OFTEN, self.at_work)
             return
         raise KeyboardInterrupt
+
+    def _swallowed(self, what: sys.UnraisableHookArgs) -> None:
+        # raised where C had called Python (LLVM asks for an object that it compiled): ignored there, so it comes again
+        if issubclass(what.exc_type, KeyboardInterrupt):
+            self._later(_OFTEN, self.at_work)
+        else:
+            sys.__unraisablehook__(what)
 
 
 def main() -> None:
@@ -291,13 +300,8 @@ def _answer(
     except KeyboardInterrupt:
         return "cancelled", number, None
     except Exception as error:
-        return "error", number, f"{error}" if isinstance(error, (ValueError, TypeError)) else _told(error)
-
-
-def _told(error: Exception) -> str:
-    from nonsmooth.errors import SolveError
-
-    return str(error) if isinstance(error, SolveError) else f"{type(error).__name__}: {error}"
+        ours = isinstance(error, (ValueError, TypeError, SolveError))
+        return "error", number, str(error) if ours else f"{type(error).__name__}: {error}"
 
 
 def _read(waiting: queue.SimpleQueue[Any], cancelled: _Cancelled) -> None:
