@@ -209,12 +209,14 @@ def test_a_crossing_that_has_just_passed_the_section() -> None:
     assert tables[0]["w"].values == pytest.approx(tables[1]["w"].values, abs=1e-9)
 
 
-@pytest.mark.parametrize("begun", [-0.05, 0.05])
-def test_a_flip_right_behind_a_corner(begun: float) -> None:
+@pytest.mark.parametrize(
+    ("begun", "d"), [(-0.05, 3e-4), (0.05, 3e-4), (-0.03, 3e-3), (-0.05, 1e-3), (-0.3, 1e-3), (-1.0, 1e-4)]
+)
+def test_a_flip_right_behind_a_corner(begun: float, d: float) -> None:
     """x -> l x + mu - d sqrt(x) for x > 0: the multiplier l - d / (2 sqrt(x)) is -1 at sqrt(x) = d / (2 (1 + l)).
 
     The first orbit found behind the border lies beyond that flip, and the map has no values on the other side."""
-    lam, d = 0.15, 3e-4
+    lam = 0.15
     slight = ns.Map(
         states=["x"],
         parameters={"mu": begun, "d": d},
