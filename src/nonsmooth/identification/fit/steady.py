@@ -1,0 +1,329 @@
+r"""Readings of steady states beside records over time: amplitudes of a response, points of a section.
+
+The steady states are those that sweeps up and down the runs reach, each run from where the one before it ended; a
+reading is of the one nearest to it, so that a run that jumped a little early is no error of the model. The derivatives
+are those of its periodic orbit, :math:`\partial z^* / \partial p = (I - M)^{-1} \partial P / \partial p` with the
+return map P and M its derivative. An extreme moves with the motion at its instant t; where the rate jumps there (an
+impact), from s to s', with :math:`x_p + s (x'_p - x_p) / (s - s')`, which is x_p at a smooth extreme.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nonsmooth.arrays import BoolArray, FloatArray, IntArray
+from nonsmooth.attractors.settled import usable
+from nonsmooth.attractors.settler import Settler
+from nonsmooth.errors import unknown
+from nonsmooth.flow.sections import Stroboscopic, section_plan
+from nonsmooth.flow.starts import start_states
+from nonsmooth.identification.fit.motion import Marcher, SampledMotion
+from nonsmooth.identification.fit.sensors import Sensor
+
+if TYPE_CHECKING:
+    from nonsmooth.system.system import System
+
+KEPT, LONGEST = 33, 16  # section points looked at, and the longest period number looked for
+TRANSIENT = 300
+_FINE = 256  # instants of a period among which an extreme is looked for
+_BESIDE = 1e-6  # of a period: on either side of an extreme
+_FIRST = 0.05  # of the largest reading: the noise at first, where none is known
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyReadings:
+    """Amplitudes, or section points at phase 0, of R runs.
+
+    Attributes
+    ----------
+    name : str
+    quantities : tuple of str
+        States that were measured.
+    amplitude : bool
+    places : array (k,) of int
+        The system's parameters that were set in each run.
+    values, setting : array (S, k), (R,)
+        The different settings of these, and which of them each run has.
+    settings : mapping of str to float
+        Parameters that were set in all runs.
+    run, iterate, quantity : array (N,) of int
+        Of each reading; ``measured`` (N,), and ``error`` (N,), NaN where it is not known.
+    noise : array (N,)
+        Standard deviation of each reading, known or found.
+    used : array (N,) of bool
+        Readings where the model's motion has a period number: the amplitude of another one is drawn by chance.
+    left : int
+        Runs without a period number, of which nothing is used.
+    """
+
+    name: str
+    quantities: tuple[str, ...]
+    amplitude: bool
+    places: IntArray
+    values: FloatArray
+    setting: IntArray
+    settings: Mapping[str, float]
+    run: IntArray
+    iterate: IntArray
+    quantity: IntArray
+    measured: FloatArray
+    error: FloatArray
+    noise: FloatArray
+    used: BoolArray
+    left: int
+
+    def with_noise(self, fitted: FloatArray, periodic: BoolArray, unknowns: int) -> SteadyReadings:
+        """The same, used where the motion is periodic, with the noise that residuals show where it is not known."""
+        noise, residual = self.error.copy(), self.measured - fitted
+        for q in range(len(self.quantities)):
+            mine = (self.quantity == q) & np.isnan(self.error) & periodic
+            if (n := int(mine.sum())) and np.isfinite(residual[mine]).all():
+                noise[mine] = np.sqrt(np.sum(residual[mine] ** 2) / max(n - unknowns, 0.1 * n))
+        return replace(self, used=periodic, noise=np.maximum(np.where(np.isnan(noise), self.noise, noise), 1e-300))
+
+
+def is_steady(one: Any) -> bool:
+    """Return whether this is a response or sections, not a record over time."""
+    held = [str(name) for name in getattr(one, "variables", getattr(one, "columns", one))] if _named(one) else []
+    return "time" not in held and ("amplitude" in held or "section" in held)
+
+
+def _named(one: Any) -> bool:
+    return hasattr(one, "variables") or hasattr(one, "columns") or isinstance(one, Mapping)
+
+
+def read_steady(system: System, one: Any, name: str, measured: Any, settings: Mapping[str, float]) -> SteadyReadings:
+    """Readings of a response or of sections.
+
+    Raises
+    ------
+    ValueError
+        A system without forcing, a parameter that is missing, quantities that are no states, sections without period
+        numbers.
+    """
+    import xarray as xr
+
+    if system.period() is None:
+        raise ValueError(
+            f"{system.name!r} has no forcing period; a response and sections are of the steady states of forced systems"
+        )
+    if not isinstance(one, xr.Dataset):
+        one = xr.Dataset({str(key): ("run", np.asarray(one[key])) for key in one})
+    kind = "amplitude" if "amplitude" in one else "section"
+    y = one[kind]
+    over = [str(dim) for dim in y.dims if dim not in ("state", "iterate")]
+    set_ = [key for key in system.values if key in one.variables and {*one[key].dims} <= {*over} and one[key].dims]
+    if not set_:
+        raise ValueError(
+            f"run {name!r} does not say at which values of a parameter its {kind} was read: give them under the "
+            f"parameter's name, {next(iter(over), 'run')!r} being the dimension; parameters: {', '.join(system.values)}"
+        )
+    states = [str(state) for state in one["state"].values] if "state" in y.dims else [_first(system, measured)]
+    wanted = [q for q in ([measured] if isinstance(measured, str) else measured or states) if q in states]
+    for q in wanted or states:
+        if q not in system.states:
+            raise ValueError(f"run {name!r}: {unknown(q, 'a state', repr(system.name), system.states)}")
+    if not wanted:
+        raise ValueError(f"run {name!r} holds {', '.join(states)}; none of them is measured: {', '.join(measured)}")
+    y = y if "state" in y.dims else y.expand_dims(state=states)
+    y = y.assign_coords(state=states).sel(state=wanted)
+    y = y if "iterate" in y.dims else y.expand_dims("iterate")
+    y = y.transpose(*over, "iterate", "state")
+
+    def along(key: str, otherwise: float) -> FloatArray:
+        """A variable of each run and quantity (R, c)."""
+        if key not in one:
+            return np.full((y[..., 0, 0].size, len(wanted)), otherwise)
+        column = one[key].sel(state=wanted) if "state" in one[key].dims else one[key]
+        table = column.broadcast_like(y.isel(iterate=0, drop=True).drop_vars("state")).transpose(*over, "state")
+        return np.asarray(table.values, dtype=float).reshape(-1, len(wanted))
+
+    readings = np.asarray(y.values, dtype=float).reshape(-1, *y.shape[-2:])
+    at = np.stack([along(key, np.nan)[:, 0] for key in set_], axis=1)
+    if kind == "section" and "period_number" not in one:
+        raise ValueError(
+            f"run {name!r}: sections need `period_number` for each run, as nonsmooth.measured_sections gives it"
+        )
+    numbers = along("period_number", 1.0)[:, 0]
+    if kind == "amplitude":
+        numbers = np.where(numbers == 0, 0.0, 1.0)
+    error = along(f"{kind}_error", np.nan)
+    order, left = np.lexsort(at.T[::-1]), 0
+    parts: list[Any] = []
+    for i in order:
+        points = readings[i][np.isfinite(readings[i]).all(axis=1)]
+        q = int(numbers[i])
+        if not (0 < q <= min(LONGEST, len(points))) or not np.isfinite(at[i]).all():
+            left += 1
+            continue
+        cycle = np.array([points[k::q].mean(axis=0) for k in range(q)])
+        each = error[i] / np.sqrt([[len(points[k::q])] for k in range(q)])
+        parts.append((at[i], cycle, np.broadcast_to(each, cycle.shape)))
+    if not parts:
+        raise ValueError(f"run {name!r} has no {kind} that can be used: numbers, with a period number from 1 on")
+    where = [
+        (r, k, c) for r, (_, cycle, _) in enumerate(parts) for k in range(len(cycle)) for c in range(len(wanted))
+    ]
+    run, iterate, quantity = np.array(where, dtype=np.int64).T
+    measured_, error_ = (np.concatenate([part[which].ravel() for part in parts]) for which in (1, 2))
+    error_ = np.where(error_ > 0, error_, np.nan)
+    first = np.full(len(error_), _FIRST * float(np.max(np.abs(measured_))))
+    values, setting = np.unique(np.array([part[0] for part in parts]), axis=0, return_inverse=True)
+    return SteadyReadings(
+        name,
+        tuple(wanted),
+        kind == "amplitude",
+        np.array([list(system.values).index(key) for key in set_]),
+        values,
+        setting.reshape(-1),
+        settings,
+        run,
+        iterate,
+        quantity,
+        measured_,
+        error_,
+        np.where(np.isnan(error_), np.maximum(first, 1e-300), error_),
+        np.ones(len(error_), dtype=bool),
+        left,
+    )
+
+
+def _first(system: System, measured: Any) -> str:
+    names = [measured] if isinstance(measured, str) else list(measured or system.states)
+    return str(names[0])
+
+
+def predicted(
+    one: SteadyReadings, marcher: Marcher, values: FloatArray, sensors: Sequence[Sensor], slopes: bool
+) -> tuple[FloatArray, BoolArray, FloatArray]:
+    """What a sensor of each quantity should read (N,), whether the motion is periodic, and the derivatives
+    (N, n_active + 2): in the active parameters, in the sensor's gain and in its offset. NaN where no motion comes to
+    its end."""
+    system, count, a = marcher.system, len(one.values), marcher.flow.n_active
+    points = np.tile(values, (count, 1))
+    points[:, one.places] = one.values
+    settler = Settler(
+        system, marcher.engine, section_plan(system, Stroboscopic(0.0))[1], TRANSIENT, KEPT, LONGEST, False
+    )
+    rows = np.concatenate([np.arange(count), np.arange(count)[::-1]])
+    found = settler.run(points, rows, np.repeat(start_states(system, None)[:1], len(rows), axis=0), carried=True)
+    columns = [list(system.states).index(name) for name in one.quantities]
+    gain, offset = (np.array([getattr(sensor, word) for sensor in sensors]) for word in ("gain", "offset"))
+    if one.amplitude:
+        gain, offset = np.abs(gain), 0.0 * offset
+    fitted, of = np.full(len(one.measured), np.nan), np.zeros((len(one.measured), (a + 2) * slopes))
+    periodic, good = np.zeros(len(fitted), dtype=bool), usable(found.status)
+    tables: dict[tuple[int, int, int], FloatArray] = {}
+    for run, i in enumerate(one.setting):
+        mine = np.flatnonzero(one.run == run)
+        shape = len(mine) // len(columns), len(columns)
+        least, chosen = np.inf, None
+        for job in (i, 2 * count - 1 - i):
+            if not good[job]:
+                continue
+            if one.amplitude:
+                raw, ahead = 0.5 * (found.maximum[job] - found.minimum[job])[None, columns], 1
+            else:
+                raw, ahead = _points(settler, points[i], found, job, shape[0])[:, columns], int(found.period_number[job])
+            for shift in range(max(ahead, 1)):
+                y = raw[shift : shift + shape[0]]
+                far = float(np.sum(((one.measured[mine] - (gain * y + offset).ravel()) / one.noise[mine]) ** 2))
+                if far < least:
+                    least, chosen = far, (job, shift, y)
+        if chosen is None:
+            continue
+        job, shift, y = chosen
+        fitted[mine], periodic[mine] = (gain * y + offset).ravel(), found.period_number[job] > 0
+        if slopes:
+            key = job, shift, shape[0]
+            if key not in tables:
+                tables[key] = _slopes(one, marcher, points[i], found, *key)[:, columns]
+            table = tables[key]
+            of[mine, :a] = (gain[:, None] * table).reshape(len(mine), a) * ~np.isin(marcher.flow.places, one.places)
+            of[mine, a] = y.ravel() * (np.tile(np.sign([s.gain for s in sensors]), shape[0]) if one.amplitude else 1.0)
+            of[mine, a + 1] = 0.0 if one.amplitude else 1.0
+    return fitted, periodic, of
+
+
+def _points(settler: Settler, point: FloatArray, found: Any, job: int, wanted: int) -> FloatArray:
+    """Section points of a job, from its last on: so many, from each of a cycle on."""
+    further = wanted - 1 + max(int(found.period_number[job]) - 1, 0)
+    n = len(settler.system.states)
+    first = found.last[job][None, :n]
+    if not further:
+        return np.asarray(first)
+    trace = settler.trace(point[None], found.last[job], int(found.mode[job]), 0, further)
+    return np.vstack([first, trace.section, np.full((further - len(trace.section), n), np.nan)])
+
+
+def _slopes(
+    one: SteadyReadings, marcher: Marcher, values: FloatArray, found: Any, job: int, shift: int, wanted: int
+) -> FloatArray:
+    """Derivatives (wanted, n, n_active) of a job's amplitudes or section points; zero where it is no periodic orbit."""
+    flow, number = marcher.flow, int(found.period_number[job])
+    n, none = flow.n, np.zeros((wanted, flow.n, flow.n_active))
+    if not number:
+        return none
+    period, of_period = flow.period(values)
+    z, mode, length = found.last[job][:n], int(found.mode[job]), number * period
+
+    def motion(times: FloatArray, derivatives: bool = True) -> SampledMotion | None:
+        return marcher.run(values, 0.0, times, z, mode, derivatives)
+
+    round_ = motion(np.array([length]))
+    if round_ is None:
+        return none
+    assert round_.D is not None and round_.rate is not None
+    moved = round_.D[0, :, n:] + np.outer(round_.rate[0], number * of_period)
+    try:
+        of_start = np.linalg.solve(np.eye(n) - round_.D[0, :, :n], moved)
+    except np.linalg.LinAlgError:  # on a fold
+        return none
+
+    def along(times: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+        """Derivatives (N, n, n_active) at fixed times, and rates (N, n)."""
+        there = motion(times)
+        if there is None:
+            return None
+        assert there.D is not None and there.rate is not None
+        return there.D[:, :, :n] @ of_start + there.D[:, :, n:], there.rate
+
+    if not one.amplitude:
+        k = shift + np.arange(wanted)
+        at = along(period * np.maximum(k, 1))
+        if at is None:
+            return none
+        table = at[0] + at[1][:, :, None] * k[:, None, None] * of_period
+        return np.asarray(np.where((k > 0)[:, None, None], table, of_start))
+    coarse = motion(period / _FINE * np.arange(1, _FINE * number + 3), False)  # a whole cycle within its ends
+    assert coarse is not None
+    full = motion(np.union1d(coarse.time, coarse.log.crossing_time), False)
+    assert full is not None
+    instants = np.array([[_extreme(full, k, sign) for sign in (1.0, -1.0)] for k in range(n)])
+    beside = np.array([-_BESIDE, _BESIDE]) * period
+    wanted_at, back = np.unique(np.clip(instants[..., None] + beside, 0.1 * _BESIDE * period, None), return_inverse=True)
+    at = along(wanted_at)
+    if at is None:
+        return none
+    back, k = back.reshape(n, 2, 2), np.arange(n)[:, None]
+    before, behind = (at[0][back[..., side], k] for side in (0, 1))
+    rate, rate_behind = (at[1][back[..., side], k] for side in (0, 1))
+    turn = rate - rate_behind
+    part = np.where(np.abs(turn) > 0, rate / np.where(turn == 0, 1.0, turn), 0.0)
+    ends = before + np.clip(part, 0.0, 1.0)[..., None] * (behind - before)
+    return np.asarray(0.5 * (ends[:, 0] - ends[:, 1])[None])
+
+
+def _extreme(motion: SampledMotion, k: int, sign: float) -> float:
+    """The instant of the largest (sign 1) or least (-1) value of a state: between samples where it is smooth there."""
+    y, t = sign * motion.z[:, k], motion.time
+    i = 1 + int(np.argmax(y[1:-1]))
+    if motion.segment[i - 1] != motion.segment[i + 1]:
+        return float(t[i])
+    one, other = t[i] - t[i - 1], t[i + 1] - t[i]
+    down, up = (y[i] - y[i - 1]) / one, (y[i + 1] - y[i]) / other
+    return float(t[i] + 0.5 * (down * other + up * one) / (down - up)) if down > up else float(t[i])
