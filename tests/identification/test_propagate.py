@@ -266,3 +266,18 @@ def test_what_does_not_fit_is_refused(change: dict[str, Any], error: type[Except
     given: dict[str, Any] = {"verb": lambda one: one.values["c"], "start": s, "draws": 3, **QUIET, **change}
     with pytest.raises(error, match=message):
         ns.propagate(known(s, {"c": 0.01}), given.pop("verb"), given.pop("start"), **given)
+
+
+def test_a_response_without_a_jump_has_bands() -> None:
+    """The amplitude of a linear oscillator is in proportion to its force."""
+    s = ns.models.discontinuous_support(omega=3.69, g=1.0, rho=0.1)
+    at = np.linspace(2.0, 3.0, 5)
+    band = ns.propagate(known(s, {"rho": 0.01}), ns.frequency_response, s, at, draws=12, **QUIET)
+    assert band.sizes["jump"] == 0
+    factor = np.quantile(band["drawn_rho"].values / 0.1, band["quantile"].values)
+    height = 2.0 * band["maximum"].sel(state="x").values.reshape(-1)
+    np.testing.assert_allclose(
+        2.0 * band["maximum_quantiles"].sel(state="x").values.reshape(len(factor), -1),
+        factor[:, None] * height,
+        rtol=1e-6,
+    )

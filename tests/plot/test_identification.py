@@ -258,8 +258,41 @@ def test_a_fit_is_drawn_over_time_and_by_place() -> None:
         identification.fit_residuals(fitted_motion(), show="phase")
 
 
+def read_amplitudes() -> xr.Dataset:
+    at, none = np.linspace(2.0, 3.0, 20), np.zeros(20, dtype=int)
+    data = xr.Dataset(
+        {
+            "measured": ("sample", np.cos(at), {"units": "m", "long_name": "amplitude"}),
+            "measured_error": ("sample", np.full(20, 0.1)),
+            "fitted": ("sample", np.cos(at)),
+            "residual": ("sample", np.cos(9 * at)),
+            "used": ("sample", at > 2.2),
+            "iterate": ("sample", none),
+            "run": ("sample", none),
+            "quantity": ("sample", none),
+            "omega": ("sample", at, {"units": "rad/s"}),
+            "rho": ("sample", np.full(20, 0.3)),
+        },
+        attrs=SYNTHETIC,
+    )
+    for name, flags in {"run": "run", "quantity": "x"}.items():
+        data[name].attrs["flag_meanings"] = flags
+    return data
+
+
+def test_readings_of_steady_states_are_drawn_over_what_was_changed() -> None:
+    axes = identification.steady_readings(read_amplitudes())
+    assert axes.get_xlabel() == r"$\omega$ (rad/s)" and axes.get_ylabel().startswith("amplitude of $x$")
+    fit = next(line for line in axes.lines if line.get_label() == "fit")
+    assert len(fit.get_xdata()) == 16  # those that are not used have none
+    assert identification.steady_readings(read_amplitudes(), over="rho").get_xlabel() == r"$\rho$"
+    with pytest.raises(ValueError, match="`k` is not a parameter that was set"):
+        identification.steady_readings(read_amplitudes(), over="k")
+
+
 PICTURES = {
     "fit_residuals": fitted_motion,
+    "steady_readings": read_amplitudes,
     "force_displacement": spring,
     "impulse_response": decay,
     "impulse_history": decay,

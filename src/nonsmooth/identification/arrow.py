@@ -11,7 +11,7 @@ within a piece.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -29,17 +29,21 @@ _ACCURACY = 0.05  # of a standard uncertainty: how near the minimum is told wher
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Residuals and derivatives of all pieces at one point, not weighted."""
+    """Residuals and derivatives of all pieces at one point, not weighted; ``alone``, those of what depends on the
+    unknowns alone, weighted, with the derivatives of what they are the residuals of."""
 
     fitted: list[FloatArray]
     residuals: list[FloatArray]
     in_parameters: list[FloatArray]
     in_start: list[FloatArray]
+    alone: FloatArray = field(default_factory=lambda: np.zeros(0))
+    of_alone: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def chi2(self, weights: list[FloatArray], used: Any = None) -> float:
         """Sum of the weighted residuals' squares, of all pieces or of those that are used."""
         rows = zip(self.residuals, weights, strict=True)
-        return sum(float(np.sum((r * w) ** 2)) for i, (r, w) in enumerate(rows) if used is None or used[i])
+        each = (float(np.sum((r * w) ** 2)) for i, (r, w) in enumerate(rows) if used is None or used[i])
+        return sum(each, float(self.alone @ self.alone))
 
 
 class Fittable(Protocol):
@@ -86,7 +90,8 @@ def reduced(
     piece ``(inverse, cross, part)``: a start's step is ``inverse @ (part - cross @ step)``, its covariance at given
     parameters ``inverse @ inverse.T``.
     """
-    normal, right = np.zeros((p, p)), np.zeros(p)
+    J = state.of_alone.reshape(-1, p)
+    normal, right = J.T @ J, J.T @ state.alone[: len(J)]
     back = []
     for i, piece in enumerate(problem.pieces):
         w = weights[i]
@@ -252,7 +257,9 @@ def sandwich(problem: Fittable, theta: FloatArray, starts: FloatArray) -> Sandwi
     state = problem.derivatives(theta, starts)
     weights = problem.weights(state)
     normal, _, back = reduced(problem, state, weights, p)
-    meat, tau, rows = np.zeros((p, p)), [], 0
+    J, tau, rows = state.of_alone.reshape(-1, p), [1.0] * (not problem.pieces), len(state.alone)
+    alone = J.T @ J * max(1.0, float(state.alone @ state.alone) / max(rows - p, 1))  # independent, of the noise given
+    meat = np.zeros((p, p))
     for i, (piece, (inner, cross, _)) in enumerate(zip(problem.pieces, back, strict=True)):
         g, s = state.in_parameters[i] * weights[i][:, None], state.in_start[i] * weights[i][:, None]
         r = state.residuals[i] * weights[i]
@@ -264,5 +271,7 @@ def sandwich(problem: Fittable, theta: FloatArray, starts: FloatArray) -> Sandwi
     size = state.chi2(weights) / freedom
     inverse, _ = inverted(normal + prior)
     part = rows / freedom
-    covariance = not_below(inverse @ (meat * part + prior) @ inverse, inverse @ (normal * size + prior) @ inverse)
+    covariance = not_below(
+        inverse @ (meat * part + alone + prior) @ inverse, inverse @ (normal * size + prior) @ inverse
+    )
     return Sandwich(state, covariance, size, float(np.median(tau)), normal, back)

@@ -37,7 +37,7 @@ class Gathered:
         self.plain = [name for name in numbers if name not in listed | along and centre[name].size]
         left = {self.branch, "unknowns", "tangent", "layout", "mode"}
         self.along = [] if "branch" in centre else [name for name in along if name not in left]  # one branch alone
-        self.lists = [dim for dim in LISTS if dim in centre.dims and (dim != "special" or self.branch)]
+        self.lists = [dim for dim in LISTS if centre.sizes.get(dim) and (dim != "special" or self.branch)]
         self.rows: list[dict[str, Any]] = []
         self.failures: list[str] = []
         self.sheets = _Sheets(centre, self.branch, self.along) if self.along else None

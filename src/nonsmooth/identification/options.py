@@ -34,7 +34,8 @@ class Recorded(TypedDict, total=False):
         ``{"x": "position channel"}``: which channel shows which state or output of the system, or with which
         :class:`nonsmooth.Sensor`. Channels named as states or outputs where not given.
     settings : mapping or sequence, optional
-        Parameters that were set in each run, ``{run: {"omega": 3.0}}``, or in all.
+        Parameters that were set in each run, ``{run: {"omega": 3.0}}``, or in all. One that is to be found is known
+        in the runs in which it was set.
     runs : sequence of str, optional
         Runs of a ``Recording``; all where not given.
     time : str

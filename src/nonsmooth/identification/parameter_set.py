@@ -131,7 +131,21 @@ class ParameterSet(Answering, Mapping[str, float]):
         """
         if (data := self._data_of("fit")) is not None:
             return data
-        raise ValueError("this set holds no residuals: they are those of a fit, ns.fit(...), made in this session")
+        other = ", and those of steady states are in .steady" if self._data_of("steady states") is not None else ""
+        raise ValueError(f"this set holds no residuals: they are those of a fit to records in this session{other}")
+
+    @property
+    def steady(self) -> xr.Dataset:
+        """Readings of steady states, fit and residuals over ``sample``, of a set that :func:`nonsmooth.fit` found.
+
+        Raises
+        ------
+        ValueError
+            If no such readings were fitted in this session.
+        """
+        if (data := self._data_of("steady states")) is not None:
+            return data
+        raise ValueError("this set holds no readings of steady states: they are those of a fit made in this session")
 
     @property
     def posterior(self) -> xr.DataArray:

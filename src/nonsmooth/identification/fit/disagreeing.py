@@ -50,7 +50,8 @@ def without_disagreeing(problem: Windows, theta: FloatArray) -> tuple[Windows, l
             origin.append(i)
             modes.append(problem.modes[i] if a == 0 else tuple(range(len(problem.system.modes))))
     u = problem.unknowns
-    unknowns = replace(u, guess=np.clip(theta, u.low, u.high), places=u.places[origin])
+    whose = [*origin, *range(len(problem.records), len(u.places))]
+    unknowns = replace(u, guess=np.clip(theta, u.low, u.high), places=u.places[whose])
     return replace(problem, records=records, modes=modes, unknowns=unknowns), said
 
 

@@ -37,8 +37,9 @@ def level(
     What windows so short do not tell then stays where it is: a coefficient of restitution of 1e8, tried where hardly an
     impact was seen, makes a motion of hours.
     """
-    if not np.isfinite(np.concatenate(problem.residuals(theta, starts).residuals)).all():
-        raise SolveError("a motion over longer windows does not come to its end")
+    state = problem.residuals(theta, starts)
+    if not np.isfinite(np.concatenate([*state.residuals, state.alone])).all():
+        raise SolveError("a motion over longer windows, or to a steady state, does not come to its end")
     known = problem.unknowns.precision + np.diag(own_size(problem) ** -2.0)
     return settle(problem, theta, starts, used, known, rough=True)
 

@@ -1,8 +1,9 @@
-"""``fit``: the parameters of any system from recordings."""
+"""``fit``: the parameters of any system from recordings and from readings of its steady states."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 
@@ -27,6 +28,11 @@ _PHASES = 8  # first guesses of an unknown phase
 _LONGER = 3.3  # the other length of first windows, in every second try
 _LOSSES = {"linear": np.inf, "huber": 2.5}  # noise deviations from which on a residual counts linearly
 _MORE = 3  # guesses that are looked at, for each that is fitted
+_KNOWN, _ROUGH = 4.0, 0.25  # mean squared residual of a fit near the steady states: over known noise, and over a guess
+_NONE = (
+    "no fit from any of {tries} first guesses ({why}); start nearer, with system.with_parameters(...) and start=, or "
+    "give bounds"
+)
 
 
 @checked
@@ -65,7 +71,13 @@ def fit(
     recording : Recording, Dataset, DataFrame, mapping or list of these
         A ``DataFrame`` with a column ``time`` (or time as its index), a ``Dataset`` over ``time``, ``{"x": (t, y)}``,
         ``{"time": t, "x": y}``, or several runs. Samples that are NaN are missing; channels may have clocks of their
-        own. Times are those of the model: the forcing begins at t = 0, unless the phase is unknown.
+        own. Times are those of the model: the forcing begins at t = 0, unless the phase is unknown. Among them, or
+        alone, readings of steady states: the ``amplitude`` of a state (half its range) or the points of its
+        ``section`` at phase 0 with their ``period_number``, and under its name each parameter that was set
+        (``{"omega": w, "amplitude": a, "amplitude_error": s}``), as measured responses and sections, sweeps and
+        :func:`nonsmooth.frequency_response` hold them. Each reading is compared with the nearest of the steady states
+        that sweeps up and down reach at the parameters, and those of chaos are not used. Errors that are not given are
+        found from the residuals.
     parameters : sequence of str, or mapping of str to (low, high)
         What is to be found: parameters of the system, ``"<quantity>.gain"``, ``".offset"`` and ``".delay"`` of sensors,
         ``"clock"`` (time of the model over that of the recording: 1.0001 where its clock is slow by that much, between
@@ -106,7 +118,8 @@ def fit(
         covariance takes what is left of the residuals' own correlation into account; a parameter that the recording
         does not determine has an infinite uncertainty and says so in ``identifiability``. ``anomalies`` says where the
         model fails. ``.residuals`` is a Dataset of the readings, the fit and the residuals over ``sample``, drawn by
-        ``ns.plot.identification.fit_residuals``.
+        ``ns.plot.identification.fit_residuals``; ``.steady`` the same for readings of steady states, drawn by
+        ``ns.plot.identification.steady_readings``.
 
     Raises
     ------
@@ -182,6 +195,8 @@ def _begun(problem: Windows, start: Any, free: bool, leave_out: bool) -> FloatAr
         raise ValueError("fit takes one first guess of the start, for all runs; settings= differ from run to run")
     if not free and start is None:
         raise ValueError("free_start=False says that the start is known: give start=, the states at the first sample")
+    if leave_out and not problem.records:
+        raise ValueError("leave_out=True leaves out parts of records over time; readings of steady states have none")
     if leave_out and not free:
         raise ValueError("leave_out=True begins anew behind what it leaves out: it needs free starts, free_start=True")
     return None if start is None else np.tile(start_states(problem.system, start)[0], (len(problem.records), 1))
@@ -212,10 +227,12 @@ def problem_of(
 
     if system.is_map:
         raise ValueError(f"{system.name!r} is a map, whose time is a count: fit takes systems with vector fields")
-    sensors, records = read_records(system, recording, measured, runs=runs, time=time, settings=settings, inputs=inputs)
-    labels = [record.name for record in records]
-    known = [record.settings for record in records]
-    unknowns = read_unknowns(system, sensors, parameters, priors, labels, known, per_run)
+    sensors, records, steady = read_records(
+        system, recording, measured, runs=runs, time=time, settings=settings, inputs=inputs
+    )
+    labels = [one.name for one in records] + [one.name for one in steady]
+    known = [one.settings for one in records] + [one.settings for one in steady]
+    unknowns = read_unknowns(system, sensors, parameters, priors, labels, known, per_run, len(steady))
     if system.inputs and (unknowns.phases or unknowns.clock):
         raise ValueError("inputs have the time of the recording: with them neither 'phase' nor 'clock' can be found")
     within = [
@@ -228,7 +245,7 @@ def problem_of(
 
     irregular = np.array(  # of a channel without noise that is mostly zero, as a contact's force, what moves
         [
-            max(noise(readings), sensor.floor) or max(noise(readings, moving=True), 1e-300)
+            (max(noise(readings), sensor.floor) or max(noise(readings, moving=True), 1e-300)) if readings else np.inf
             for readings, sensor in zip(within, sensors.values(), strict=True)
         ]
     )
@@ -239,9 +256,10 @@ def problem_of(
         sensors,
         unknowns,
         irregular,
-        read_modes(system, mode, labels),
+        read_modes(system, mode, labels[: len(records)]),
         np.zeros(len(sensors)),
         _LOSSES[loss],
+        steady=steady,
     )
 
 
@@ -250,8 +268,11 @@ def best_of(
 ) -> Grown:
     """The fit from the first guess that leads to one, else the best of all."""
     from nonsmooth.identification.fit.first_windows import first_length
-    from nonsmooth.identification.fit.growth import grow
+    from nonsmooth.identification.fit.growth import grow, with_steady
 
+    if not problem.records:
+        return _of_steady(problem, tries, seed, watched)
+    both, problem = problem, replace(problem, steady=())
     length = min(first_length(problem), longest)
     best: Grown | None = None
     why: SolveError | None = None
@@ -272,17 +293,49 @@ def best_of(
             else:
                 if best is None or found.good or found.rank < best.rank:
                     best = found
-                if found.good:
-                    advance(left[0])
-                    return best
             advance(left[0])
+            if best is not None and best.good:
+                break
     if best is None:
         assert why is not None
-        raise SolveError(
-            f"no fit from any of {tries} first guesses ({why}); start nearer, with system.with_parameters(...) "
-            "and start=, or give bounds"
-        )
-    return best
+        raise SolveError(_NONE.format(tries=tries, why=why))
+    return with_steady(both, best.theta, best) if both.steady else best
+
+
+def _of_steady(problem: Windows, tries: int, seed: int, watched: Progress) -> Grown:
+    """The fit to readings of steady states alone: from the first guess that leads near, else from the best."""
+    from nonsmooth.identification.fit.beginnings import drawn
+    from nonsmooth.identification.fit.first_level import level
+    from nonsmooth.identification.fit.growth import with_steady
+
+    now, rng, rough, why = problem.of([]), np.random.default_rng(seed), list[tuple[float, FloatArray]](), ""
+
+    def far(theta: FloatArray) -> float:
+        """Mean squared residual over the noise as it is known, or at first."""
+        return float(np.mean(now.residuals(theta, now.starts).alone ** 2))
+
+    def guesses() -> Iterator[FloatArray]:
+        yield problem.unknowns.guess
+        yield from sorted((drawn(problem, rng) for _ in range(_MORE * (tries - 1))), key=far)
+
+    good = _KNOWN if all(np.isfinite(run.error).all() for run in problem.steady) else _ROUGH
+    with progress(tries, "fit", watched) as advance:
+        for guess in islice(guesses(), tries):
+            try:
+                theta = level(now, guess, now.starts)[0]
+            except SolveError as reason:
+                why = f"{reason}"
+            else:
+                rough.append((far(theta), theta))
+                if rough[-1][0] < good:
+                    break
+            advance(1)
+    for _, theta in sorted(rough, key=lambda row: row[0]):
+        try:
+            return with_steady(problem, theta)
+        except SolveError as reason:
+            why = f"{reason}"
+    raise SolveError(_NONE.format(tries=tries, why=why))
 
 
 def _guesses(

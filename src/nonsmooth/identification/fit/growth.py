@@ -248,9 +248,14 @@ def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: F
     for _ in range(rounds):
         colour = colours(problem, problem.plain.residuals(theta, starts))
         problem, before = replace(problem, colour=colour), problem
-        noise = _noise(problem, problem.residuals(theta, starts))
-        changed = float(max(np.max(np.abs(noise / before.noise - 1.0)), np.max(np.abs(colour - before.colour))))
-        problem = replace(problem, noise=noise)
+        noise = _noise(problem, replace(problem, steady=()).residuals(theta, starts))
+        steady = tuple(
+            one.with_noise(*problem.of_steady(theta, i)[:2], len(theta)) for i, one in enumerate(problem.steady)
+        )
+        ratios = [one.noise / old.noise for one, old in zip((*steady,), before.steady, strict=True)]
+        moves = [np.concatenate([noise / before.noise, *ratios]) - 1.0, colour - before.colour]
+        changed = float(np.max(np.abs(np.concatenate(moves)), initial=0.0))
+        problem = replace(problem, noise=noise, steady=steady)
         try:
             theta, starts, _ = settle(problem, theta, starts)
             short, left = 0.0, np.zeros(len(theta))
@@ -262,6 +267,16 @@ def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: F
     state = problem.residuals(theta, starts)
     far, missing = strange(problem, problem.plain.residuals(theta, starts), state, irregular)
     return Grown(problem, theta, starts, state, short, left, far, missing)
+
+
+def with_steady(problem: Windows, theta: FloatArray, grown: Grown | None = None) -> Grown:
+    """The fit to the readings of steady states too, from a fit to the records; or to them alone."""
+    now, starts = problem.of([]), np.zeros((0, problem.marcher.flow.n))
+    if grown is not None:
+        now, starts = replace(grown.problem, steady=problem.steady), grown.starts
+    theta, starts, _ = level(now, theta, starts)
+    final = _final(now, theta, starts, problem.noise, _ROUNDS)
+    return final if grown is None else replace(final, stuck=grown.stuck, begins=grown.begins)
 
 
 def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:
@@ -292,7 +307,7 @@ def _noise(problem: Windows, state: Residuals) -> FloatArray:
     """Standard deviation of a reading of each quantity: from its residuals, or as it is known."""
     free = sum(w.n_free for w in problem.pieces) + len(problem.unknowns.names)
     total = sum(len(w.readings[0]) for w in problem.pieces)
-    grow = total / max(total - free, 0.1 * total)
+    grow = total / max(total - free, 0.1 * total, 1e-9)
     found = np.empty(len(problem.sensors))
     for c, sensor in enumerate(problem.sensors.values()):
         r = np.concatenate([np.zeros(0), *parts(problem, state, c)])
@@ -300,6 +315,7 @@ def _noise(problem: Windows, state: Residuals) -> FloatArray:
             found[c] = np.hypot(sensor.noise, sensor.floor)
         else:
             size = robust_size(r) if np.isfinite(problem.loss) else float(np.sqrt(np.mean(r**2))) if len(r) else 0.0
-            largest = max(float(np.nanmax(np.abs(record.values[:, c]), initial=0.0)) for record in problem.records)
+            values = [record.values[:, c] for record in problem.records]
+            largest = max((float(np.nanmax(np.abs(y), initial=0.0)) for y in values), default=0.0)
             found[c] = max(size * float(np.sqrt(grow)), 0.5 * sensor.floor, _ROUNDING * largest, 1e-300)
     return found

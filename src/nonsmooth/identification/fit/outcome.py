@@ -15,7 +15,7 @@ from nonsmooth.identification.fit.first_level import BETTER
 from nonsmooth.identification.fit.growth import SHORT, Grown
 from nonsmooth.identification.fit.noise import OUTLYING, robust_size
 from nonsmooth.identification.fit.profile import profiled
-from nonsmooth.identification.fit.residuals import by_place, residual_data
+from nonsmooth.identification.fit.residuals import by_place, residual_data, steady_data
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.results.progress import Progress
 
@@ -26,6 +26,7 @@ _TOGETHER = 0.98  # correlation from which two parameters are said to be known o
 _POOR = 2.0  # residuals over noise, from which the model is said not to be the motion
 _SHARED = 8  # readings that share the record's extreme value
 _FEW, _NAMED = 0.05, 6  # part of the readings that outliers are at most; outliers of which the times are named
+METHOD_STEADY = "least squares over the steady states that sweeps up and down reach, derivatives of the periodic orbits"
 METHOD = (
     "least squares over windows with free starts, derivatives through every transition (Bock 1981); covariance from "
     "the scatter of the scores (Newey and West 1987)"
@@ -68,28 +69,34 @@ def outcome(
     a = sum(name in u.active for name in u.names)
     estimates = dict(zip(u.names[:a], rows[:a], strict=True))
     extra = {**dict(zip([*u.names[a:], *starts.names], rows[a:], strict=True)), **noise}
-    data = residual_data(grown, options).assign_attrs(synthetic="yes" if synthetic else "no")
+    mark, samples = {"synthetic": "yes" if synthetic else "no"}, grown.readings
+    data = residual_data(grown, options).assign_attrs(mark) if problem.pieces else None
+    if problem.steady:
+        steady = steady_data(grown, options).assign_attrs(mark)
+        beside = [_of_steady(grown, steady, rows[0]), *beside]
+        samples += steady.sizes["sample"]
     known = [name for name in profiles if np.isfinite(rows[u.names.index(name)].uncertainty)]
     beside = [*profiled(grown, known, normal, found.covariance, synthetic, watched), *beside]
-    notes = [*left, *_notes(grown, found, data)] + [note for finding in beside for note in finding.notes]
+    notes = [*left, *(_notes(grown, found, data) if data is not None else [])]
+    notes += [note for finding in beside for note in finding.notes]
     finding = Finding(
         "fit",
         next(iter({**estimates, **extra}.values())),
         METHOD,
-        data.sizes["sample"],
+        samples,
         grown.runs,
         tuple(notes),
         data=data,
-        plot="fit_residuals",
+        plot="fit_residuals" if data is not None else "",
     )
     return ParameterSet(
         estimates,
         covariance,
         extra=extra,
         findings=[finding, *beside],
-        identifiability=_sentences(grown, covariance[:m, :m], loose, data),
+        identifiability=_sentences(grown, covariance[:m, :m], loose, samples),
         notes=notes,
-        anomalies=_anomalies(grown, data),
+        anomalies=[*(_anomalies(grown, data) if data is not None else []), *_far_off(grown)],
         synthetic=synthetic,
     )
 
@@ -150,9 +157,7 @@ def _undetermined(directions: FloatArray) -> dict[int, list[int]]:
     return found
 
 
-def _sentences(
-    grown: Grown, covariance: FloatArray, loose: Mapping[int, list[int]], data: xr.Dataset
-) -> dict[str, str]:
+def _sentences(grown: Grown, covariance: FloatArray, loose: Mapping[int, list[int]], samples: int) -> dict[str, str]:
     """A sentence for each unknown: what it rests on, or that the record does not determine it."""
     u, theta = grown.problem.unknowns, grown.theta
     error = np.sqrt(np.diag(covariance))
@@ -174,9 +179,47 @@ def _sentences(
         elif abs(correlation[i, closest]) > _TOGETHER:
             text = f"known mainly together with {u.names[closest]} (correlation {correlation[i, closest]:.4f})"
         else:
-            text = f"{data.sizes['sample']} readings of {', '.join(grown.problem.sensors)}"
+            measured = dict.fromkeys([*grown.problem.sensors, *(q for s in grown.problem.steady for q in s.quantities)])
+            text = f"{samples} readings of {', '.join(measured)}"
         rows[name] = text
     return rows
+
+
+def _of_steady(grown: Grown, data: xr.Dataset, estimate: Estimate) -> Finding:
+    notes = []
+    for one in grown.problem.steady:
+        kind, known = "amplitudes" if one.amplitude else "section points", np.isfinite(one.error)
+        found = "" if known.all() else f"; their noise, which is not known, is {np.median(one.noise[~known]):.3g}"
+        notes.append(
+            f"run {one.name}: {len(one.measured)} {kind} of steady states at {len(one.values)} settings{found}"
+        )
+        if one.left:
+            notes.append(f"run {one.name}: {one.left} settings are not used, which have no period number or no reading")
+        if n := int((~one.used).sum()):
+            notes.append(f"run {one.name}: {n} readings are not used: the model's motion there has no period")
+    return Finding(
+        "steady states",
+        estimate,
+        METHOD_STEADY,
+        data.sizes["sample"],
+        tuple(one.name for one in grown.problem.steady),
+        tuple(notes),
+        data=data,
+        plot="steady_readings",
+    )
+
+
+def _far_off(grown: Grown) -> list[str]:
+    found = []
+    for i, one in enumerate(grown.problem.steady):
+        known = np.isfinite(one.error) & one.used
+        r = ((one.measured - grown.problem.of_steady(grown.theta, i)[0]) / one.error)[known]
+        if len(r) and (rms := float(np.sqrt(np.mean(r**2)))) > _POOR:
+            found.append(
+                f"the readings of run {one.name} are {rms:.3g} times their errors away from the steady states of the "
+                "model: it does not describe them, or their errors are larger; the uncertainties do not hold"
+            )
+    return found
 
 
 def _notes(grown: Grown, found: Sandwich, data: xr.Dataset) -> list[str]:

@@ -15,6 +15,7 @@ from nonsmooth.errors import shortened, unknown
 from nonsmooth.flow.arguments import float_array, real_number
 from nonsmooth.flow.inputs import Driven, Input, driven
 from nonsmooth.identification.fit.sensors import Sensor, read_sensors
+from nonsmooth.identification.fit.steady import SteadyReadings, is_steady, read_steady
 from nonsmooth.recordings.recording import Recording
 from nonsmooth.system.units import read_unit
 
@@ -71,8 +72,8 @@ def read_records(
     time: str = "time",
     settings: Any = None,
     inputs: Any = None,
-) -> tuple[dict[str, Sensor], list[Record]]:
-    """The sensors and the records of a recording.
+) -> tuple[dict[str, Sensor], list[Record], tuple[SteadyReadings, ...]]:
+    """The sensors and the records of a recording, and its readings of steady states.
 
     Raises
     ------
@@ -83,13 +84,19 @@ def read_records(
     if not given:
         raise ValueError(f"the list of recordings is empty; give {FORMS}")
     tables: dict[str, dict[str, tuple[FloatArray, FloatArray]]] = {}
+    still = {f"{i}" if len(given) > 1 else "steady": one for i, one in enumerate(given) if is_steady(one)}
     for i, one in enumerate(given):
-        found = _tables(one, runs, time)
+        found = {} if is_steady(one) else _tables(one, runs, time)
         for name, table in found.items():
             label = name if len(given) == 1 else f"{i}" if len(found) == 1 else f"{i} {name}"
             tables[label] = table
+    if runs is not None and not tables:
+        raise ValueError("runs= chooses runs of a Recording; what is given here is none, so leave it out")
+    per_run = _settings(system, settings, [*tables, *still])
+    steady = tuple(read_steady(system, one, name, measured, per_run[name]) for name, one in still.items())
     channels = list(dict.fromkeys(name for table in tables.values() for name in table))
-    sensors = read_sensors(system, measured, channels)
+    quantities = [] if tables else [q for one in steady for q in one.quantities]
+    sensors = read_sensors(system, measured, channels or quantities)
     units = {name: unit for one in given for name, unit in _units(one).items()}
     ours = {**system.states, **system.outputs}
     for quantity, sensor in sensors.items():
@@ -100,7 +107,6 @@ def read_records(
         channel = one.time if isinstance(one, Input) else name if inputs is None else one
         if isinstance(channel, str):
             _compare_units(f"inputs[{name!r}]", channel, units, unit, "Input(time, values) in that unit")
-    per_run = _settings(system, settings, list(tables))
     records = []
     for label, table in tables.items():
         columns = []
@@ -111,7 +117,7 @@ def read_records(
                 )
             columns.append(table[sensor.channel])
         records.append(replace(_joined(label, columns, per_run[label]), drive=_driven(system, inputs, label, table)))
-    return sensors, records
+    return sensors, records, steady
 
 
 def _units(recording: Any) -> dict[str, str]:

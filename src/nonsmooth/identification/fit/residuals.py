@@ -79,6 +79,49 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
     return data.assign_attrs(provenance(labels_of(system), "fit", dict(options), method=problem.marcher.engine.name))
 
 
+def steady_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
+    """Readings of steady states, fit and residuals over ``sample``, each with its run, quantity, settings and place in
+    the cycle."""
+    import xarray as xr
+
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance
+
+    problem, system = grown.problem, _nominal(grown)
+    names = [*system.values]
+    set_ = sorted({int(place) for one in problem.steady for place in one.places})
+    columns: dict[str, list[Any]] = {}
+    quantities = [*dict.fromkeys(q for one in problem.steady for q in one.quantities)]
+    for i, one in enumerate(problem.steady):
+        fitted, count = problem.of_steady(grown.theta, i)[0], len(one.measured)
+        at = np.full((count, len(names)), np.nan)
+        at[:, one.places] = one.values[one.setting[one.run]]
+        for name, values in {
+            "run": np.full(count, i),
+            "quantity": np.array([quantities.index(q) for q in one.quantities])[one.quantity],
+            "iterate": one.iterate,
+            "measured": one.measured,
+            "fitted": fitted,
+            "measured_error": one.noise,
+            "used": one.used,
+            "residual": (one.measured - fitted) / one.noise,
+            **{names[place]: at[:, place] for place in set_},
+        }.items():
+            columns.setdefault(name, []).append(values)
+    data = xr.Dataset({name: ("sample", np.concatenate(parts)) for name, parts in columns.items()})
+    units = {**system.states, **{name: parameter.unit for name, parameter in system.parameters.items()}}
+    for name, words in {"run": [one.name for one in problem.steady], "quantity": quantities}.items():
+        data[name].attrs = {"flag_values": np.arange(len(words)), "flag_meanings": " ".join(words)}
+    for name in (names[place] for place in set_):
+        data[name].attrs["units"] = units[name]
+    for name in ("measured", "fitted", "measured_error"):
+        data[name].attrs["units"] = units[quantities[0]] if len(quantities) == 1 else "that of the quantity"
+    kinds = {one.amplitude for one in problem.steady}
+    data["measured"].attrs["long_name"] = "reading" if len(kinds) > 1 else "amplitude" if True in kinds else "section"
+    data["residual"].attrs = {"long_name": "residual over its standard deviation", "units": "1"}
+    return data.assign_attrs(provenance(labels_of(system), "fit", dict(options), method=problem.marcher.engine.name))
+
+
 def by_place(data: xr.Dataset) -> list[tuple[str, float, int]]:
     """Places of the motion with the rms of the normalized residuals there and their number, the worst first."""
     names = data["place"].attrs["flag_meanings"].split()

@@ -121,6 +121,8 @@ def _held_out(problem: Windows, folds: int) -> list[IntArray]:
     """The fold in which each instant of each record is held out; -1: never, at the record's beginning."""
     from nonsmooth.identification.fit.first_windows import first_length
 
+    if not problem.records:
+        raise ValueError("select_model holds out parts of records over time: give some beside the steady states")
     length, block, found = _BLOCK * first_length(problem), 0, []
     for record in problem.records:
         number = np.floor((record.time - record.time[0]) / length).astype(np.int64)

@@ -88,12 +88,12 @@ class SteadyReadings:
 
 def is_steady(one: Any) -> bool:
     """Return whether this is a response or sections, not a record over time."""
-    held = [str(name) for name in getattr(one, "variables", getattr(one, "columns", one))] if _named(one) else []
+    held = [str(name) for name in getattr(one, "variables", one)] if isinstance(one, Mapping) or _is_frame(one) else []
     return "time" not in held and ("amplitude" in held or "section" in held)
 
 
-def _named(one: Any) -> bool:
-    return hasattr(one, "variables") or hasattr(one, "columns") or isinstance(one, Mapping)
+def _is_frame(one: Any) -> bool:
+    return hasattr(one, "columns") and hasattr(one, "index")
 
 
 def read_steady(system: System, one: Any, name: str, measured: Any, settings: Mapping[str, float]) -> SteadyReadings:
@@ -114,65 +114,46 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
     if not isinstance(one, xr.Dataset):
         one = xr.Dataset({str(key): ("run", np.asarray(one[key])) for key in one})
     kind = "amplitude" if "amplitude" in one else "section"
-    y = one[kind]
-    over = [str(dim) for dim in y.dims if dim not in ("state", "iterate")]
-    set_ = [key for key in system.values if key in one.variables and {*one[key].dims} <= {*over} and one[key].dims]
+    over = [str(dim) for dim in one[kind].dims if dim not in ("state", "iterate")]
+    set_ = [key for key in system.values if key in one.variables and {*one[key].dims} & {*over}]
+    extra = [each for each in (f"{kind}_error", "period_number") if each in one]
+    frame = one[[kind, *extra, *set_]].to_dataframe().reset_index()
     if not set_:
         raise ValueError(
             f"run {name!r} does not say at which values of a parameter its {kind} was read: give them under the "
-            f"parameter's name, {next(iter(over), 'run')!r} being the dimension; parameters: {', '.join(system.values)}"
+            f"parameter's name; parameters: {', '.join(system.values)}"
         )
-    states = [str(state) for state in one["state"].values] if "state" in y.dims else [_first(system, measured)]
-    wanted = [q for q in ([measured] if isinstance(measured, str) else measured or states) if q in states]
-    for q in wanted or states:
-        if q not in system.states:
-            raise ValueError(f"run {name!r}: {unknown(q, 'a state', repr(system.name), system.states)}")
-    if not wanted:
-        raise ValueError(f"run {name!r} holds {', '.join(states)}; none of them is measured: {', '.join(measured)}")
-    y = y if "state" in y.dims else y.expand_dims(state=states)
-    y = y.assign_coords(state=states).sel(state=wanted)
-    y = y if "iterate" in y.dims else y.expand_dims("iterate")
-    y = y.transpose(*over, "iterate", "state")
-
-    def along(key: str, otherwise: float) -> FloatArray:
-        """A variable of each run and quantity (R, c)."""
-        if key not in one:
-            return np.full((y[..., 0, 0].size, len(wanted)), otherwise)
-        column = one[key].sel(state=wanted) if "state" in one[key].dims else one[key]
-        table = column.broadcast_like(y.isel(iterate=0, drop=True).drop_vars("state")).transpose(*over, "state")
-        return np.asarray(table.values, dtype=float).reshape(-1, len(wanted))
-
-    readings = np.asarray(y.values, dtype=float).reshape(-1, *y.shape[-2:])
-    at = np.stack([along(key, np.nan)[:, 0] for key in set_], axis=1)
-    if kind == "section" and "period_number" not in one:
+    if kind == "section" and "period_number" not in frame:
         raise ValueError(
             f"run {name!r}: sections need `period_number` for each run, as nonsmooth.measured_sections gives it"
         )
-    numbers = along("period_number", 1.0)[:, 0]
-    if kind == "amplitude":
-        numbers = np.where(numbers == 0, 0.0, 1.0)
-    error = along(f"{kind}_error", np.nan)
-    order, left = np.lexsort(at.T[::-1]), 0
-    parts: list[Any] = []
-    for i in order:
-        points = readings[i][np.isfinite(readings[i]).all(axis=1)]
-        q = int(numbers[i])
-        if not (0 < q <= min(LONGEST, len(points))) or not np.isfinite(at[i]).all():
+    named = [measured] if isinstance(measured, str) else list(measured or system.states)
+    frame = frame.assign(**{key: of for key, of in (("state", named[0]), ("iterate", 0)) if key not in frame})
+    states = list(dict.fromkeys(frame["state"]))
+    wanted = [state for state in named if state in states] or states
+    for state in wanted:
+        if state not in system.states or state not in named:
+            raise ValueError(f"run {name!r}: {unknown(state, 'a measured state', repr(system.name), system.states)}")
+    runs, rows, left = list[Any](), list[Any](), 0
+    for _, part in sorted(frame.groupby(over, sort=False), key=lambda pair: tuple(pair[1][set_].iloc[0])):
+        points = part.pivot(index="iterate", columns="state", values=kind)[wanted].dropna().to_numpy(float)
+        at, q = part[set_].to_numpy(float)[0], part["period_number"].iloc[0] if "period_number" in part else 1
+        q = 1 if kind == "amplitude" and q else q
+        if not 0 < q <= min(LONGEST, len(points)) or not np.isfinite(at).all():
             left += 1
             continue
-        cycle = np.array([points[k::q].mean(axis=0) for k in range(q)])
-        each = error[i] / np.sqrt([[len(points[k::q])] for k in range(q)])
-        parts.append((at[i], cycle, np.broadcast_to(each, cycle.shape)))
-    if not parts:
+        size = part.reindex(columns=["state", f"{kind}_error"]).groupby("state").first().loc[wanted].to_numpy(float)
+        for k in range(int(q)):
+            cycle = points[k :: int(q)]
+            each = zip(cycle.mean(axis=0), size[:, 0] / np.sqrt(len(cycle)), strict=True)
+            rows += [(len(runs), k, c, y, error) for c, (y, error) in enumerate(each)]
+        runs.append(at)
+    if not runs:
         raise ValueError(f"run {name!r} has no {kind} that can be used: numbers, with a period number from 1 on")
-    where = [
-        (r, k, c) for r, (_, cycle, _) in enumerate(parts) for k in range(len(cycle)) for c in range(len(wanted))
-    ]
-    run, iterate, quantity = np.array(where, dtype=np.int64).T
-    measured_, error_ = (np.concatenate([part[which].ravel() for part in parts]) for which in (1, 2))
-    error_ = np.where(error_ > 0, error_, np.nan)
-    first = np.full(len(error_), _FIRST * float(np.max(np.abs(measured_))))
-    values, setting = np.unique(np.array([part[0] for part in parts]), axis=0, return_inverse=True)
+    (run, iterate, quantity), (y, error) = np.array(rows)[:, :3].T.astype(np.int64), np.array(rows)[:, 3:].T
+    error = np.where(error > 0.0, error, np.nan)
+    values, setting = np.unique(np.array(runs), axis=0, return_inverse=True)
+    first = max(_FIRST * float(np.max(np.abs(y))), 1e-300)
     return SteadyReadings(
         name,
         tuple(wanted),
@@ -184,23 +165,18 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
         run,
         iterate,
         quantity,
-        measured_,
-        error_,
-        np.where(np.isnan(error_), np.maximum(first, 1e-300), error_),
-        np.ones(len(error_), dtype=bool),
+        y,
+        error,
+        np.where(np.isnan(error), first, error),
+        np.ones(len(y), dtype=bool),
         left,
     )
-
-
-def _first(system: System, measured: Any) -> str:
-    names = [measured] if isinstance(measured, str) else list(measured or system.states)
-    return str(names[0])
 
 
 def predicted(
     one: SteadyReadings, marcher: Marcher, values: FloatArray, sensors: Sequence[Sensor], slopes: bool
 ) -> tuple[FloatArray, BoolArray, FloatArray]:
-    """What a sensor of each quantity should read (N,), whether the motion is periodic, and the derivatives
+    """Predicted readings of the sensors (N,), whether the motion is periodic, and the derivatives
     (N, n_active + 2): in the active parameters, in the sensor's gain and in its offset. NaN where no motion comes to
     its end."""
     system, count, a = marcher.system, len(one.values), marcher.flow.n_active
@@ -228,7 +204,10 @@ def predicted(
             if one.amplitude:
                 raw, ahead = 0.5 * (found.maximum[job] - found.minimum[job])[None, columns], 1
             else:
-                raw, ahead = _points(settler, points[i], found, job, shape[0])[:, columns], int(found.period_number[job])
+                raw, ahead = (
+                    _points(settler, points[i], found, job, shape[0])[:, columns],
+                    int(found.period_number[job]),
+                )
             for shift in range(max(ahead, 1)):
                 y = raw[shift : shift + shape[0]]
                 far = float(np.sum(((one.measured[mine] - (gain * y + offset).ravel()) / one.noise[mine]) ** 2))
@@ -257,7 +236,7 @@ def _points(settler: Settler, point: FloatArray, found: Any, job: int, wanted: i
     if not further:
         return np.asarray(first)
     trace = settler.trace(point[None], found.last[job], int(found.mode[job]), 0, further)
-    return np.vstack([first, trace.section, np.full((further - len(trace.section), n), np.nan)])
+    return np.vstack([first, trace.points, np.full((further - len(trace.points), n), np.nan)])
 
 
 def _slopes(
@@ -299,13 +278,16 @@ def _slopes(
             return none
         table = at[0] + at[1][:, :, None] * k[:, None, None] * of_period
         return np.asarray(np.where((k > 0)[:, None, None], table, of_start))
-    coarse = motion(period / _FINE * np.arange(1, _FINE * number + 3), False)  # a whole cycle within its ends
+    fine = np.arange(1, _FINE * number + 3, dtype=np.float64)
+    coarse = motion(fine * (period / _FINE), False)  # a whole cycle within its ends
     assert coarse is not None
     full = motion(np.union1d(coarse.time, coarse.log.crossing_time), False)
     assert full is not None
     instants = np.array([[_extreme(full, k, sign) for sign in (1.0, -1.0)] for k in range(n)])
     beside = np.array([-_BESIDE, _BESIDE]) * period
-    wanted_at, back = np.unique(np.clip(instants[..., None] + beside, 0.1 * _BESIDE * period, None), return_inverse=True)
+    wanted_at, back = np.unique(
+        np.clip(instants[..., None] + beside, 0.1 * _BESIDE * period, None), return_inverse=True
+    )
     at = along(wanted_at)
     if at is None:
         return none

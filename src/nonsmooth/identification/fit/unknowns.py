@@ -73,8 +73,10 @@ def read_unknowns(
     runs: Sequence[str],
     settings: Sequence[Mapping[str, float]],
     per_run: Sequence[str] = (),
+    steady: int = 0,
 ) -> Unknowns:
-    """Read the unknowns of a fit from names, bounds and priors, and those of which each run has its own.
+    """Read the unknowns of a fit from names, bounds and priors, and those of which each run has its own; the last
+    ``steady`` runs have no phase. A parameter that is set in a run is known there.
 
     Raises
     ------
@@ -92,17 +94,18 @@ def read_unknowns(
     for name in given:
         if name not in allowed:
             raise ValueError(unknown(name, "an unknown of this fit", repr(system.name), allowed))
-        if any(name in own for own in settings):
+        if all(name in own for own in settings):
             raise ValueError(f"{name!r} stands in parameters, to be found, and in settings, as known: leave one out")
-    if "phase" in given and system.period() is None:
-        raise ValueError(f"the phase of {system.name!r} cannot be found: it has no forcing period; leave 'phase' out")
+    if "phase" in given and (system.period() is None or steady == len(runs)):
+        why = "it has no forcing period" if system.period() is None else "readings of steady states have none"
+        raise ValueError(f"the phase of {system.name!r} cannot be found: {why}; leave 'phase' out")
     active = tuple(name for name in given if name in system.values)
     of_sensors = tuple((q, what) for name in given if "." in name for q, what in [name.split(".", 1)])
     own = list(per_run)
     for name in own:
         if name not in given:
             raise ValueError(f"per_run: {unknown(name, 'an unknown', 'this fit', dict.fromkeys(given, ''))}")
-    clock, phases = "clock" in given, len(runs) if "phase" in given else 0
+    clock, phases = "clock" in given, len(runs) - steady if "phase" in given else 0
     each = {*own, *(["phase"] if phases else [])} if len(runs) > 1 else set()
     local = [*active, *(f"{q}.{what}" for q, what in of_sensors), *["clock"] * clock, *["phase"] * bool(phases)]
     order = [*(n for n in active if n not in each), *(n for n in active if n in each), *local[len(active) :]]
@@ -111,9 +114,13 @@ def read_unknowns(
     first: dict[str, int] = {}
     for name in order:
         first[name] = len(names)
-        base += [name] * (len(runs) if name in each else 1)
-        names += [f"{name}, {run}" for run in runs] if name in each else [name]
-    places = np.array([[first[n] + run * (n in each) for n in local] for run in range(len(runs))], dtype=np.intp)
+        mine = (runs[:phases] if name == "phase" else runs) if name in each else [""]
+        base += [name] * len(mine)
+        names += [f"{name}, {run}" for run in mine] if name in each else [name]
+    steps = [[min(run, phases - 1) if n == "phase" else run for n in local] for run in range(len(runs))]
+    places = np.array(
+        [[first[n] + k * (n in each) for n, k in zip(local, row, strict=True)] for row in steps], dtype=np.intp
+    )
     guess = np.array([known[name][0] for name in base])
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
     for i, name in enumerate(names):

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.identification.arrow import Residuals
 from nonsmooth.identification.fit.motion import Marcher, SampledMotion
 from nonsmooth.identification.fit.records import Record
 from nonsmooth.identification.fit.sensors import Observable, Sensor
+from nonsmooth.identification.fit.steady import SteadyReadings, predicted
 from nonsmooth.identification.fit.unknowns import Unknowns
 from nonsmooth.recordings.signals.spectrum import correlation_times
 
@@ -93,7 +94,8 @@ class Windows:
 
     ``noise``: standard deviation of a reading of each quantity, rounding included. ``modes``: in which each record
     may begin, the first guess first. ``colour``: correlation of neighbouring readings of each quantity. ``loss``: noise
-    deviations from which on a residual counts linearly (Huber).
+    deviations from which on a residual counts linearly (Huber). ``steady``: readings of steady states, which are runs
+    behind the records.
     """
 
     system: System
@@ -106,6 +108,7 @@ class Windows:
     colour: FloatArray
     loss: float = np.inf
     pieces: list[Window] = field(default_factory=list)
+    steady: tuple[SteadyReadings, ...] = ()
 
     def of(self, pieces: list[Window]) -> Windows:
         """The same problem with other windows."""
@@ -113,8 +116,8 @@ class Windows:
 
     @property
     def plain(self) -> Windows:
-        """The same problem with readings taken for independent."""
-        return replace(self, colour=np.zeros(len(self.sensors)))
+        """The problem of the records alone, with readings taken for independent."""
+        return replace(self, colour=np.zeros(len(self.sensors)), steady=())
 
     @cached_property
     def readouts(self) -> list[Observable]:
@@ -123,7 +126,7 @@ class Windows:
     @cached_property
     def starts(self) -> FloatArray:
         """Starts of the windows as they are set (windows, n)."""
-        return np.array([window.start for window in self.pieces])
+        return np.array([window.start for window in self.pieces]).reshape(-1, self.marcher.flow.n)
 
     def sensor_values(self, theta: FloatArray, run: int) -> dict[str, Sensor]:
         """The sensors in a run at these values of the unknowns."""
@@ -133,13 +136,21 @@ class Windows:
             found[quantity] = replace(found[quantity], **{what: value})
         return found
 
-    def values(self, theta: FloatArray, record: int) -> FloatArray | None:
-        """The system's parameters in a record; None where its equations do not allow them."""
-        own = dict(zip(self.unknowns.active, map(float, theta[self.unknowns.places[record]]), strict=False))
+    def values(self, theta: FloatArray, run: int) -> FloatArray | None:
+        """The system's parameters in a run; None where its equations do not allow them."""
+        own = dict(zip(self.unknowns.active, map(float, theta[self.unknowns.places[run]]), strict=False))
         try:
-            return self.system.with_parameters({**self.records[record].settings, **own}).parameter_vector()
+            return self.system.with_parameters({**own, **self.runs[run].settings}).parameter_vector()
         except (SystemDefinitionError, ValueError):
             return None
+
+    @property
+    def runs(self) -> list[Record | SteadyReadings]:
+        return [*self.records, *self.steady]
+
+    def acts(self, run: int) -> BoolArray:
+        """Marks of the active parameters that are not set in a run."""
+        return np.array([name not in self.runs[run].settings for name in self.unknowns.active], dtype=bool)
 
     def phase(self, theta: FloatArray, run: int) -> float:
         return float(theta[self.unknowns.places[run][-1]]) if self.unknowns.phases else 0.0
@@ -229,6 +240,7 @@ class Windows:
             if u.phases:
                 table[rows, :a] += sensor.gain * phase * of_shift[:, None] * of_period
                 table[rows, p - 1] = sensor.gain * period * of_shift
+        table[:, :a] *= self.acts(window.record)
         return predicted, table
 
     def limits(self, window: Window) -> FloatArray:
@@ -312,7 +324,38 @@ class Windows:
                 inner[range(len(k), len(k) + len(free)), free] = 1.0
                 state.in_start.append(inner)
                 state.in_parameters.append(np.vstack([table[:, :p], np.zeros((len(free), p))]))
-        return state
+        alone = [self.of_steady(theta, i, slopes) for i in range(len(self.steady))] if self.steady else []
+        if not alone:
+            return state
+        parts = []
+        for one, (fitted, _, table) in zip(self.steady, alone, strict=True):
+            r, table = np.where(one.used, one.measured - fitted, 0.0) / one.noise, table * one.used[:, None]
+            far = np.abs(r) > self.loss  # of the root of Huber's loss, which is linear there
+            root = np.sqrt(np.where(far, self.loss * (2.0 * np.abs(r) - self.loss), r**2)) if far.any() else np.abs(r)
+            slope = np.where(far, self.loss / np.where(far, root, 1.0), 1.0) / one.noise
+            parts.append((np.where(np.isnan(r), np.inf, np.sign(r) * root), slope[:, None] * table))
+        return replace(
+            state, alone=np.concatenate([r for r, _ in parts]), of_alone=np.vstack([table for _, table in parts])
+        )
+
+    def of_steady(self, theta: FloatArray, i: int, slopes: bool = False) -> tuple[FloatArray, BoolArray, FloatArray]:
+        """Predictions of steady readings (NaN: none), where they are periodic, and their derivatives in all
+        unknowns."""
+        one, run, u = self.steady[i], len(self.records) + i, self.unknowns
+        values, table = self.values(theta, run), np.zeros((len(one.measured), len(theta) * slopes))
+        if values is None or not np.isfinite(theta).all():
+            return np.full(len(one.measured), np.nan), np.zeros(len(one.measured), dtype=bool), table
+        sensors = self.sensor_values(theta, run)
+        own = [sensors.get(q, Sensor()) for q in one.quantities]
+        fitted, periodic, of = predicted(one, self.marcher, values, own, slopes)
+        if slopes:
+            places, a = u.places[run], len(u.active)
+            table[:, places[:a]] = of[:, :a] * self.acts(run)
+            for k, (quantity, what) in zip(places[a:], u.sensors, strict=False):
+                if quantity in one.quantities and what != "delay":
+                    mine = one.quantity == one.quantities.index(quantity)
+                    table[mine, k] = of[mine, a if what == "gain" else a + 1]
+        return fitted, periodic, table
 
     def weights(self, state: Residuals | None) -> list[FloatArray]:
         """One over the standard deviation of each row; less for those that the loss weighs down."""

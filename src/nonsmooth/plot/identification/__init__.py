@@ -10,7 +10,14 @@ from nonsmooth.plot.identification.damping import (
     modal_damping,
     nyquist,
 )
-from nonsmooth.plot.identification.estimates import calibration, coverage, fit_residuals, force_displacement, profile
+from nonsmooth.plot.identification.estimates import (
+    calibration,
+    coverage,
+    fit_residuals,
+    force_displacement,
+    profile,
+    steady_readings,
+)
 from nonsmooth.plot.identification.motions import (
     grazing,
     impulse_history,
@@ -43,5 +50,6 @@ __all__ = [
     "restitution",
     "steady_amplitude",
     "steady_phase",
+    "steady_readings",
     "toss",
 ]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.errors import unknown
 from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.identification.picture import Picture, data_of, number, picture
@@ -128,13 +129,45 @@ def fit_residuals(
 
 
 def _chosen(data: Any, name: str, given: str | None) -> int:
-    from nonsmooth.errors import unknown
-
     words = words_of_flags(data[name])
     asked = words[0] if given is None else given.replace(" ", "_")
     if asked not in words:
         raise ValueError(unknown(given, f"a {name}", "this fit", words))
     return words.index(asked)
+
+
+@picture("", columns=3, margin=0.03, strip=r"$\sigma$", ratio=0.9)
+def steady_readings(
+    one: Picture, fitted: Any, *, over: str | None = None, quantity: str | None = None, run: str | None = None
+) -> None:
+    """Draw readings of steady states with the fit over a parameter, and residuals over their standard deviation below.
+
+    Parameters
+    ----------
+    fitted
+        A result of :func:`nonsmooth.fit`, or its ``steady``.
+    ax
+        Where to draw; a new one-column figure if None.
+    over
+        The parameter; the first that differs from run to run where not given.
+    quantity, run
+        Of which measured state, and of which run; the first ones where not given.
+    """
+    data = data_of(getattr(fitted, "steady", fitted), "measured", "fitted", "used", "iterate")
+    q, r = _chosen(data, "quantity", quantity), _chosen(data, "run", run)
+    one.data = part = data.isel(sample=np.flatnonzero((data["quantity"].values == q) & (data["run"].values == r)))
+    known = ("run", "quantity", "iterate", "measured", "fitted", "measured_error", "used", "residual")
+    set_ = [str(name) for name in part.data_vars if name not in known and np.isfinite(part[name].values).any()]
+    if over is not None and over not in set_:
+        raise ValueError(unknown(over, "a parameter that was set", "these runs", set_))
+    name = over or max(set_, key=lambda each: len(np.unique(part[each].values)))
+    attrs, of = part["measured"].attrs, symbol_of(words_of_flags(data["quantity"])[q])
+    one.x = symbol_of(name), str(part[name].attrs.get("units", ""))
+    one.y = f"{attrs.get('long_name', 'reading')} of {of}", str(attrs.get("units", ""))
+    used, residual = one.values("used", "residual")
+    one.points(name, "measured")
+    one.line(part[name].values[used], part["fitted"].values[used], "fit", "second", "_", markersize=6, zorder=4)
+    one.residual(part[name].values[used], residual[used])
 
 
 @picture("", ("time", ""), columns=3, margin=0.05, strip=r"$\sigma$", ratio=0.9)

@@ -1,0 +1,208 @@
+"""Fits to readings of steady states: responses and sections, alone and beside records over time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import nonsmooth as ns
+
+pytestmark = pytest.mark.physics
+OMEGA = np.linspace(1.0, 3.0, 21)
+ERROR = 3e-3
+
+
+def linear(**values: float) -> ns.System:
+    """q'' + c q' + k q = F cos(omega t)."""
+    given = {"c": 0.2, "k": 4.0, "F": 0.3, "omega": 2.0, **values}
+    return ns.mechanical(
+        1.0,
+        "c",
+        "k",
+        parameters=given,
+        coordinates=["q"],
+        forcing={"q": lambda t, p: p.F * np.cos(p.omega * t)},
+        period=lambda p: 2 * np.pi / p.omega,
+    )
+
+
+def amplitude(c: float = 0.2, k: float = 4.0, F: float = 0.3) -> Any:
+    return F / np.sqrt((k - OMEGA**2) ** 2 + (c * OMEGA) ** 2)
+
+
+def response(values: Any, error: float | None = ERROR, name: str = "omega", at: Any = OMEGA) -> xr.Dataset:
+    held = {"amplitude": ("run", values), name: ("run", at)}
+    return xr.Dataset(held if error is None else {**held, "amplitude_error": ("run", np.full(len(values), error))})
+
+
+def fisher(rows: Any, values: dict[str, float], error: float) -> Any:
+    """Information of readings ``rows(**values)`` with this error, by central differences."""
+    columns = []
+    for name, value in values.items():
+        h = 1e-5 * abs(value)
+        one, other = (rows(**{**values, name: value + sign * h}) for sign in (1.0, -1.0))
+        columns.append((one - other) / (2.0 * h * error))
+    J = np.stack(columns, axis=1)
+    return J.T @ J
+
+
+def test_a_resonance_has_the_information_of_its_formula() -> None:
+    """Without noise in the readings the covariance is the inverse of Fisher's information by F / |k - w^2 + i c w|."""
+    found = ns.fit(linear(c=0.3, k=3.5), response(amplitude()), ["c", "k"], progress=False)
+    assert [found["c"], found["k"]] == pytest.approx([0.2, 4.0], rel=1e-7)
+    expected = np.linalg.inv(fisher(amplitude, {"c": 0.2, "k": 4.0}, ERROR))
+    assert found.full_covariance.values == pytest.approx(expected, rel=2e-3)
+    assert found.steady["fitted"].values == pytest.approx(amplitude(), rel=1e-7)
+    assert found.steady["omega"].attrs["units"] == linear().parameters["omega"].unit
+
+
+def test_intervals_hold_the_truth() -> None:
+    """Standard scores of 16 noisy responses are of mean 0 and deviation 1, the noise known or found."""
+    rng, scores = np.random.default_rng(1), {None: [], ERROR: []}
+    for _ in range(16):
+        y = amplitude() + ERROR * rng.standard_normal(len(OMEGA))
+        for error, held in scores.items():
+            found = ns.fit(linear(), response(y, error), ["c", "k"], progress=False)
+            held.append(
+                [(found[name] - true) / found.estimate(name).uncertainty for name, true in (("c", 0.2), ("k", 4.0))]
+            )
+    for held in scores.values():
+        assert np.abs(np.mean(held, axis=0)).max() < 0.7
+        assert np.std(held, axis=0) == pytest.approx([1.0, 1.0], abs=0.45)
+
+
+def test_records_and_a_response_add_their_information() -> None:
+    """A decay knows nothing of the force, which is set to zero there; a response of F / |...| does not know it well."""
+    decay = ns.simulate(linear(F=0.0), start={"q": 0.5}, duration=20.0, samples=400)
+    noise = 0.01 * np.random.default_rng(3).standard_normal(decay.sizes["time"])
+    record = {"q": (decay["time"].values, decay["u"].sel(state="q").values + noise)}
+    options: Any = {"measured": {"q": ns.Sensor(noise=0.01)}, "progress": False}
+    alone = ns.fit(linear(F=0.0), record, ["c", "k"], **options)
+    curve = ns.fit(linear(), response(amplitude()), ["c", "k", "F"], progress=False)
+    both = [record, response(amplitude())]
+    found = ns.fit(linear(c=0.25, F=0.2), both, ["c", "k", "F"], settings={"0": {"F": 0.0}}, **options)
+    scores = [
+        (found[name] - true) / found.estimate(name).uncertainty for name, true in (("c", 0.2), ("k", 4.0), ("F", 0.3))
+    ]
+    assert np.abs(scores).max() < 2.5
+    added = np.linalg.inv(curve.covariance.values)
+    added[:2, :2] += np.linalg.inv(alone.covariance.values)
+    assert np.diag(found.covariance.values) == pytest.approx(np.diag(np.linalg.inv(added)), rel=0.3)
+    assert found.estimate("F").uncertainty < 0.85 * curve.estimate("F").uncertainty
+    assert len(found.residuals["sample"]) == 400 and len(found.steady["sample"]) == len(OMEGA)
+
+
+def swept(system: ns.System, at: Any, state: str = "x") -> xr.Dataset:
+    both = ns.frequency_response(system, at, direction="both", progress=False)
+    return both[["amplitude", "period_number"]].sel(state=[state])
+
+
+def test_extremes_at_an_impact_move_with_it() -> None:
+    """Amplitudes of an impact oscillator, largest at a corner: information by differences of ``frequency_response``."""
+    at, values = np.linspace(1.2, 2.1, 8), {"k": 1.0, "d": 0.2, "e": 0.6}
+    system = ns.models.impact_oscillator(**values)
+
+    def rows(**given: float) -> Any:
+        return swept(system.with_parameters(**given), at)["amplitude"].values.ravel()
+
+    data = swept(system, at)
+    data["amplitude_error"] = data["amplitude"] * 0.0 + ERROR
+    near = system.with_parameters(k=1.02, d=0.21, e=0.58)
+    found = ns.fit(near, data, list(values), progress=False)
+    assert [found[name] for name in values] == pytest.approx(list(values.values()), rel=1e-6)
+    assert found.full_covariance.values == pytest.approx(np.linalg.inv(fisher(rows, values, ERROR)), rel=0.02)
+
+
+def test_sections_of_doubled_motions() -> None:
+    """Section points of periods 1 and 2, from whichever of them a recording begins, with their signs."""
+    system, at = ns.models.discontinuous_support(g=-0.0045, rho=0.45, omega=3.69), np.linspace(0.3, 0.44, 8)
+    sweep = ns.sweep(system, "rho", at, transient=600, keep=32, progress=False)
+    assert {1, 2} <= set(sweep["period_number"].values.tolist())
+    data = sweep[["section", "period_number"]].isel(iterate=slice(3, None))  # an odd number of turns later
+    data["section_error"] = ("state", [2e-5, 2e-4])
+    found = ns.fit(system.with_parameters(k=8.5, k_s=1150.0), data, ["k", "k_s"], progress=False)
+    assert [found["k"], found["k_s"]] == pytest.approx([8.47, 1210.0], rel=1e-6)
+    assert set(found.steady["iterate"].values.tolist()) == {0, 1}
+
+
+def test_a_run_that_jumped_early_is_of_the_other_branch() -> None:
+    """Each reading is of one of the steady states that exist, whichever way it was come to."""
+    system = ns.models.discontinuous_support(g=0.02, rho=0.14)
+    at = np.linspace(4.6, 6.2, 17)
+    both = swept(system, at)["amplitude"]
+    jumped = both.sel(direction="up").values[:, 0].copy()
+    apart = np.flatnonzero(np.abs(both.sel(direction="down").values[:, 0] / jumped - 1.0) > 0.2)
+    assert len(apart) >= 2
+    jumped[apart[-1]] = both.sel(direction="down").values[apart[-1], 0]
+    found = ns.fit(system.with_parameters(k=8.3, g=0.0205), response(jumped, 2e-4, at=at), ["k", "g"], progress=False)
+    assert [found["k"], found["g"]] == pytest.approx([system.values["k"], 0.02], rel=1e-6)
+    assert not found.anomalies
+
+
+def test_a_reading_of_chaos_is_not_used_and_that_is_said() -> None:
+    system, at = ns.models.discontinuous_support(rho=0.2, omega=3.69), [0.2, 0.3, 0.35, 0.4, 0.45, 0.5]
+    sweep = ns.sweep(system, "rho", at, progress=False)
+    numbers = sweep["period_number"].values
+    assert numbers[0] == 0 and (numbers[1:] > 0).any()
+    heights = 0.5 * (sweep["maximum"] - sweep["minimum"]).sel(state="x").values
+    found = ns.fit(system.with_parameters(k=8.6), response(heights, 1e-4, "rho", at), ["k"], progress=False)
+    assert found["k"] == pytest.approx(8.47, rel=1e-5)
+    assert any("the model's motion there has no period" in note for note in found.notes)
+    known = response(heights, 1e-4, "rho", at).assign(period_number=("run", numbers))
+    again = ns.fit(system.with_parameters(k=8.6), known, ["k"], progress=False)
+    assert any("have no period number" in note for note in again.notes)
+    assert len(again.steady["sample"]) == int((numbers > 0).sum())
+
+
+def test_sensors_and_settings_of_responses() -> None:
+    """Two responses to known forces by a sensor of unknown gain; a third set by two parameters at once, as a table."""
+    gain = 250.0
+    runs = [response(gain * amplitude(F=F), gain * ERROR) for F in (0.3, 0.6)]
+    options: Any = {"settings": [{"F": 0.3}, {"F": 0.6}], "measured": {"q": ns.Sensor(gain=200.0)}, "progress": False}
+    found = ns.fit(linear(c=0.25), runs, ["c", "k", "q.gain"], **options)
+    assert [found["c"], found["k"], found.extra["q.gain"].value] == pytest.approx([0.2, 4.0, gain], rel=1e-6)
+    own = ns.fit(linear(c=0.25), runs, ["c", "k", "q.gain"], per_run=["q.gain"], **options)
+    assert [own.extra[f"q.gain, {i}"].value for i in (0, 1)] == pytest.approx([gain] * 2, rel=1e-6)
+    table = pd.DataFrame({"omega": OMEGA, "F": np.where(OMEGA < 2, 0.3, 0.6)})
+    table["amplitude"] = amplitude(F=table["F"].values)
+    assert ns.fit(linear(c=0.25), table, "c", progress=False)["c"] == pytest.approx(0.2, rel=1e-6)
+
+
+def test_a_model_that_is_wrong_says_so() -> None:
+    found = ns.fit(linear(), response(amplitude() + 0.02 * np.sin(5 * OMEGA)), ["c", "k"], progress=False)
+    assert any("times their errors away from the steady states" in one for one in found.anomalies)
+
+
+def free() -> ns.System:
+    return ns.mechanical(1.0, 0.1, "k", parameters={"k": 4.0}, coordinates=["q"])
+
+
+@pytest.mark.parametrize(
+    ("system", "data", "parameters", "options", "words"),
+    [
+        (free(), response(amplitude()), "k", {}, "no forcing period"),
+        (linear(), response(amplitude(), name="frequency"), "k", {}, "at which values of a parameter its amplitude"),
+        (linear(), response(amplitude()), "k", {"measured": "omega"}, "not a measured state"),
+        (linear(), response(np.full(21, np.nan)), "k", {}, "no amplitude that can be used"),
+        (linear(), response(amplitude()), ["k", "phase"], {}, "readings of steady states have none"),
+        (linear(), response(amplitude()), "k", {"settings": {"steady": {"z": 1.0}}}, "not a parameter"),
+        (linear(), response(amplitude()), "k", {"settings": {"k": 1.0}}, "in settings, as known"),
+        (linear(), response(amplitude()), "k", {"runs": ["one"]}, "runs= chooses runs of a Recording"),
+        (linear(), response(amplitude()), "k", {"leave_out": True}, "leaves out parts of records over time"),
+        (linear(), response(amplitude()).rename(amplitude="section"), "k", {}, "period_number"),
+    ],
+)
+def test_what_cannot_be_read_is_refused(system: Any, data: Any, parameters: Any, options: Any, words: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=words):
+        ns.fit(system, data, parameters, progress=False, **options)
+
+
+def test_models_are_chosen_by_records() -> None:
+    with pytest.raises(ValueError, match="holds out parts of records over time"):
+        ns.select_model({"a": (linear(), "c"), "b": (linear(), "k")}, response(amplitude()), progress=False)
+    with pytest.raises(ValueError, match=r"steady states are in \.steady"):
+        _ = ns.fit(linear(), response(amplitude()), "k", progress=False).residuals
