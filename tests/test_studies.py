@@ -58,7 +58,7 @@ def _documented() -> set[int]:
     """Identities of all that the reference shows."""
     found: list[Any] = [ns.__version__]
     for page in (ROOT / "docs" / "api").glob("*.md"):
-        for path in re.findall(r"auto\w+:: (nonsmooth\.[\w.]+)", page.read_text(encoding="utf-8")):
+        for path in re.findall(r"(?:auto\w+|py:data):: (nonsmooth\.[\w.]+)", page.read_text(encoding="utf-8")):
             one = _named(path)
             found += [getattr(one, name) for name in one.__all__] if hasattr(one, "__all__") else [one]
     return {id(one) for one in found}
