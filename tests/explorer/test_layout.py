@@ -51,7 +51,7 @@ def frame(page: Any, figure: str) -> list[float]:
 
 
 @pytest.mark.parametrize(("width", "height", "large"), SIZES)
-def test_every_picture_and_every_word_has_room(
+def test_every_picture_and_every_word_has_room_and_numbers_stand_apart(
     server: Any, new_page: Callable[..., Any], width: int, height: int, large: bool
 ) -> None:
     page = opened(server, new_page, width, height, large, "&upper=response")
@@ -85,13 +85,6 @@ def test_every_picture_and_every_word_has_room(
         )
         assert wide[0] == words
         assert wide[1] <= frame(page, figure)[0] + 1
-
-
-@pytest.mark.parametrize(("width", "height", "large"), SIZES)
-def test_the_numbers_of_an_axis_stand_apart(
-    server: Any, new_page: Callable[..., Any], width: int, height: int, large: bool
-) -> None:
-    page = opened(server, new_page, width, height, large)
     page.tab.wait_for_timeout(300)
     written = page.tab.evaluate("""[...window.written].filter(([canvas]) => canvas.id !== "sketch").map(([, some]) =>
         some.filter(([words]) => /^[\\d\\u2212.]+$/.test(words)))""")
@@ -104,19 +97,22 @@ def test_the_numbers_of_an_axis_stand_apart(
 
 
 def test_the_tour_covers_nothing(server: Any, new_page: Callable[..., Any]) -> None:
-    for width, height, large in SIZES:
-        page = new_page(width, height, first_visit=True)
+    free = """() => {
+        const tour = document.getElementById("tour").getBoundingClientRect();
+        return [...document.querySelectorAll("#bar *, aside, main, .panel")].every(one => {
+            const box = one.getBoundingClientRect();
+            return box.bottom <= tour.top + 1 || box.top >= tour.bottom - 1 || !box.width;
+        });
+    }"""
+    for large in (False, True):
+        page = new_page(first_visit=True)
         if large:
             page.tab.add_init_script(LARGE)
         page.open(f"{server.address}&{FEW}")
         for _ in range(3):
-            assert page.tab.evaluate("""() => {
-                const tour = document.getElementById("tour").getBoundingClientRect();
-                return [...document.querySelectorAll("#bar *, aside, main, .panel")].every(one => {
-                    const box = one.getBoundingClientRect();
-                    return box.bottom <= tour.top + 1 || box.top >= tour.bottom - 1 || !box.width;
-                });
-            }""")
+            for width in (1280, 400):
+                page.tab.set_viewport_size({"width": width, "height": 800})
+                page.until(f"innerWidth === {width} && ({free})()", 5)
             page.tab.click("#tour-next")
         assert not page.tab.is_visible("#tour")
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import re
 import signal
-import statistics
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,8 +13,6 @@ import numpy as np
 from tests.explorer.conftest import FEW
 
 import nonsmooth as ns
-
-MOVES = int(os.environ.get("NONSMOOTH_MOVES", "3"))  # of the slider whose latency is measured
 
 
 def test_figure_11_a_dragged_slider_and_a_click_on_a_column_of_period_4(page: Any) -> None:
@@ -62,49 +58,27 @@ def test_a_moved_slider_redraws_the_diagram_live(server: Any, new_page: Callable
         const source = Bokeh.documents[0].get_model_by_name("diagram image");
         window.drawn = [];
         const note = () => window.drawn.push(
-            [performance.now(), source.data.of[0], source.data.stage[0], source.data.image[0].shape]);
+            [source.data.of[0], source.data.stage[0], source.data.image[0].shape]);
         source.properties.data.change.connect(() => requestAnimationFrame(() => setTimeout(note)));
     }""")
-    first, judged = [], []
-    for k in range(2 * MOVES):
-        if k == MOVES:
-            page.tab.select_option("#direction", "rest")
-            page.until_done()
-        begun = page.tab.evaluate(
+    for k, direction in enumerate(("both", "rest")):
+        page.tab.select_option("#direction", direction)
+        page.until_done()
+        page.tab.evaluate(
             """value => {
                 const slider = document.getElementById("s-p.g");
                 slider.value = value;
-                const now = performance.now();
                 slider.dispatchEvent(new Event("input"));
                 window.sent = Number(slider.value);
-                return now;
             }""",
-            -0.0045 - 0.0002 * (k + 1),
+            -0.0047 - 0.0002 * k,
         )
-        shown = page.until(
-            "(() => { const own = window.drawn.filter(one => JSON.parse(one[1]).values.g === window.sent);"
-            " const done = own.find(one => one[2] === 'judged'); return done && [own[0], done]; })()"
+        own = page.until(
+            "(() => { const own = window.drawn.filter(one => JSON.parse(one[0]).values.g === window.sent);"
+            " return own.some(one => one[1] === 'judged') && own; })()"
         ).json_value()
-        assert shown[0][2] == "first look"
-        assert shown[0][3][1] == shown[1][3][1] == 600
-        first.append(shown[0][0] - begun)
-        judged.append(shown[1][0] - begun)
-    system, values = ns.models.discontinuous_support(), np.linspace(0.2, 0.5, 600)
-    alone = []
-    for _ in range(MOVES):
-        begun, spent = time.perf_counter(), time.process_time()
-        ns.sweep(
-            system, "rho", values, direction=None, transient=300, keep=100, judge=False, extremes=False, progress=False
-        )
-        alone.append((1000 * (time.perf_counter() - begun), 1000 * (time.process_time() - spent)))
-    wall, cpu = (statistics.median(one[k] for one in alone) for k in (0, 1))
-    print(f"the sweep alone: median {wall:.0f} ms, {cpu:.0f} ms of processor time; load {os.getloadavg()[0]:.1f}")
-    print(
-        f"slider to first look: median {statistics.median(first):.0f} ms, longest {max(first):.0f} ms; "
-        f"to the judged diagram: up and down {statistics.median(judged[:MOVES]):.0f} ms, "
-        f"every column from rest {statistics.median(judged[MOVES:]):.0f} ms"
-    )
-    assert statistics.median(first) < 3 * wall + 1000  # 250 ms with two free cores; a crowded machine is no fault
+        assert [stage for _, stage, _ in own][:: len(own) - 1] == ["first look", "judged"]
+        assert all(shape[1] == 600 for _, _, shape in own)
 
 
 def test_text_that_is_no_number_is_refused_beside_its_field_and_changes_nothing(page: Any) -> None:

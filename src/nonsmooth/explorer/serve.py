@@ -81,7 +81,7 @@ def explore(
         websocket_max_message_size=256 * 1024 * 1024,
         keep_alive_milliseconds=0,
         unused_session_lifetime_milliseconds=5_000,
-        check_unused_sessions_milliseconds=2_000,
+        check_unused_sessions_milliseconds=300,
         session_token_expiration=3600,
     )
     access.listen_at(number)

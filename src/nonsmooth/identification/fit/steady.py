@@ -16,15 +16,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
-from nonsmooth.attractors.settled import usable
-from nonsmooth.attractors.settler import Settler
 from nonsmooth.errors import unknown
-from nonsmooth.flow.sections import Stroboscopic, section_plan
 from nonsmooth.flow.starts import start_states
-from nonsmooth.identification.fit.motion import Marcher, SampledMotion
 from nonsmooth.identification.fit.sensors import Sensor
 
 if TYPE_CHECKING:
+    from nonsmooth.attractors.settler import Settler
+    from nonsmooth.identification.fit.motion import Marcher, SampledMotion
     from nonsmooth.system.system import System
 
 KEPT, LONGEST = 33, 16  # section points looked at, and the longest period number looked for
@@ -179,6 +177,10 @@ def predicted(
     """Predicted readings of the sensors (N,), whether the motion is periodic, and the derivatives
     (N, n_active + 2): in the active parameters, in the sensor's gain and in its offset. NaN where no motion comes to
     its end."""
+    from nonsmooth.attractors.settled import usable
+    from nonsmooth.attractors.settler import Settler
+    from nonsmooth.flow.sections import Stroboscopic, section_plan
+
     system, count, a = marcher.system, len(one.values), marcher.flow.n_active
     points = np.tile(values, (count, 1))
     points[:, one.places] = one.values
