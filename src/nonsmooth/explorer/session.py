@@ -135,16 +135,13 @@ class Page:
             files=FILES,
             channels=("act", *CHANNELS),
         )
+        # a second click soon after the first is a double one, wherever it lies
+        acts = {Tap: self._tap, DoubleTap: self._tap, RangesUpdate: self._zoom, Reset: self._reset_view}
         with document.models.freeze():  # else Bokeh looks through all models again for each root
             for view in self.sheet.views.values():
                 if view.figure is not None:
-                    for kind in (
-                        Tap,
-                        DoubleTap,
-                    ):  # a second click soon after the first is a double one, wherever it lies
-                        view.figure.plot.on_event(kind, partial(self._tap, view))
-                    view.figure.plot.on_event(RangesUpdate, partial(self._zoom, view))
-                    view.figure.plot.on_event(Reset, partial(self._reset_view, view))
+                    for kind, act in acts.items():
+                        view.figure.plot.on_event(kind, partial(act, view))
                     document.add_root(view.figure.plot)  # events are heard of what had a callback by now
             for channel in (self._act, *self._say.values()):
                 document.add_root(channel)
@@ -153,8 +150,8 @@ class Page:
 
     def _begin(self) -> None:
         """The page is there: work begins, where not too many others are at it; once it has gone its session ends."""
-        if (context := self.document.session_context) is not None:
-            context.session.request_expiration()
+        with suppress(AttributeError):  # of a document that nobody serves
+            self.document.session_context.session.request_expiration()
         if self.work.worker is None and len(self.tabs) >= MOST_TABS:
             self.notes["page"] = (
                 f"{MOST_TABS} tabs of this explorer compute already, each in a process of some 300 MB. Close one of "
