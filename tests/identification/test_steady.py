@@ -118,15 +118,23 @@ def test_extremes_at_an_impact_move_with_it() -> None:
 
 
 def test_sections_of_doubled_motions() -> None:
-    """Section points of periods 1 and 2, from whichever of them a recording begins, with their signs."""
-    system, at = ns.models.discontinuous_support(g=-0.0045, rho=0.45, omega=3.69), np.linspace(0.3, 0.44, 8)
+    """Section points of periods 1, 2 and 4, from whichever of them a recording begins, with their signs."""
+    system, at = (
+        ns.models.discontinuous_support(g=-0.0045, rho=0.45, omega=3.69),
+        np.array([0.248, 0.25, 0.28, 0.32, 0.36, 0.41, 0.44]),
+    )
     sweep = ns.sweep(system, "rho", at, transient=600, keep=32, progress=False)
-    assert {1, 2} <= set(sweep["period_number"].values.tolist())
-    data = sweep[["section", "period_number"]].isel(iterate=slice(3, None))  # an odd number of turns later
-    data["section_error"] = ("state", [2e-5, 2e-4])
-    found = ns.fit(system.with_parameters(k=8.5, k_s=1150.0), data, ["k", "k_s"], progress=False)
-    assert [found["k"], found["k_s"]] == pytest.approx([8.47, 1210.0], rel=1e-6)
-    assert set(found.steady["iterate"].values.tolist()) == {0, 1}
+    assert {1, 2, 4} <= set(sweep["period_number"].values.tolist())
+    for first in (1, 2, 3, 4):
+        data = sweep[["section", "period_number"]].isel(iterate=slice(first, None))
+        data["section_error"] = ("state", [2e-5, 2e-4])
+        found = ns.fit(system.with_parameters(k=8.5, k_s=1150.0), data, ["k", "k_s"], progress=False)
+        assert [found["k"], found["k_s"]] == pytest.approx([8.47, 1210.0], rel=1e-6)
+    steady = found.steady
+    assert set(steady["iterate"].values.tolist()) == {0, 1, 2, 3}
+    means = data.sizes["iterate"] / sweep["period_number"].sel(rho=steady["rho"].values).values
+    error = np.where(steady["quantity"].values == 0, 2e-5, 2e-4) / np.sqrt(means)
+    assert steady["measured_error"].values == pytest.approx(error)
 
 
 def test_a_run_that_jumped_early_is_of_the_other_branch() -> None:
@@ -137,7 +145,7 @@ def test_a_run_that_jumped_early_is_of_the_other_branch() -> None:
     jumped = both.sel(direction="up").values[:, 0].copy()
     apart = np.flatnonzero(np.abs(both.sel(direction="down").values[:, 0] / jumped - 1.0) > 0.2)
     assert len(apart) >= 2
-    jumped[apart[-1]] = both.sel(direction="down").values[apart[-1], 0]
+    jumped[apart[-2:]] = both.sel(direction="down").values[apart[-2:], 0]
     found = ns.fit(system.with_parameters(k=8.3, g=0.0205), response(jumped, 2e-4, at=at), ["k", "g"], progress=False)
     assert [found["k"], found["g"]] == pytest.approx([system.values["k"], 0.02], rel=1e-6)
     assert not found.anomalies
@@ -148,14 +156,16 @@ def test_a_reading_of_chaos_is_not_used_and_that_is_said() -> None:
     sweep = ns.sweep(system, "rho", at, progress=False)
     numbers = sweep["period_number"].values
     assert numbers[0] == 0 and (numbers[1:] > 0).any()
-    heights = 0.5 * (sweep["maximum"] - sweep["minimum"]).sel(state="x").values
+    heights = 0.5 * (sweep["maximum"] - sweep["minimum"]).sel(state="x").values * np.where(numbers == 0, 1.5, 1.0)
     found = ns.fit(system.with_parameters(k=8.6), response(heights, 1e-4, "rho", at), ["k"], progress=False)
     assert found["k"] == pytest.approx(8.47, rel=1e-5)
     assert any("the model's motion there has no period" in note for note in found.notes)
+    assert found.steady["used"].values.tolist() == (numbers > 0).tolist()
     known = response(heights, 1e-4, "rho", at).assign(period_number=("run", numbers))
     again = ns.fit(system.with_parameters(k=8.6), known, ["k"], progress=False)
     assert any("have no period number" in note for note in again.notes)
     assert len(again.steady["sample"]) == int((numbers > 0).sum())
+    assert again.estimate("k").uncertainty == pytest.approx(found.estimate("k").uncertainty, rel=1e-3)
 
 
 def test_sensors_and_settings_of_responses() -> None:
@@ -170,6 +180,29 @@ def test_sensors_and_settings_of_responses() -> None:
     table = pd.DataFrame({"omega": OMEGA, "F": np.where(OMEGA < 2, 0.3, 0.6)})
     table["amplitude"] = amplitude(F=table["F"].values)
     assert ns.fit(linear(c=0.25), table, "c", progress=False)["c"] == pytest.approx(0.2, rel=1e-6)
+
+
+def test_a_parameter_that_was_set_in_every_run_is_not_told() -> None:
+    found = ns.fit(linear(), response(amplitude()), ["c", "omega"], progress=False)
+    assert found["c"] == pytest.approx(0.2, rel=1e-6)
+    assert found.identifiability["omega"].startswith("not identifiable")
+
+
+def test_an_outlier_hardly_counts_where_that_is_asked() -> None:
+    far = amplitude() + np.where(np.arange(len(OMEGA)) == 7, 80 * ERROR, 0.0)
+    plain, huber = (
+        ns.fit(linear(), response(far), ["c", "k"], loss=loss, progress=False) for loss in ("linear", "huber")
+    )
+    away = [abs(found["k"] - 4.0) / 0.0025 for found in (plain, huber)]
+    assert away[1] < 0.2 * away[0]
+
+
+def test_noise_that_is_found_is_that_of_the_residuals() -> None:
+    y = amplitude() + ERROR * np.random.default_rng(5).standard_normal(len(OMEGA))
+    found = ns.fit(linear(), response(y, None), ["c", "k", "F"], progress=False).steady
+    left = found["measured"] - found["fitted"]
+    expected = np.sqrt(float((left**2).sum()) / (len(OMEGA) - 3))
+    assert found["measured_error"].values == pytest.approx(np.full(len(OMEGA), expected), rel=0.02)
 
 
 def test_a_model_that_is_wrong_says_so() -> None:

@@ -61,7 +61,6 @@ FARTHEST = 0.1  # along the branch: the end of a signature is not looked for fro
 WITHIN = 1e-9  # of the range: as near as an event is located that only simulations show
 AHEAD = 1e-6  # of the range
 NEARER = 60  # steps back to a boundary from the first orbit behind it, at most
-PART = 0.7  # of the way to a boundary beyond which there are no values: one step
 WAITS = 1e-3  # along the branch: an orbit whose section changes less is only longer, the parameter by the square of it
 #: How a branch can end, with the sentence for each.
 ENDINGS = {
@@ -235,11 +234,11 @@ class AlongOrbits(Policy):
         found: list[Met] = []
         away, steep = abs(first.value - point.value) / first.curve.width, abs(first.rise)
         b, ds = first.turned(), 2.0 * away / steep if steep * FARTHEST > away else 0.0
-        numbers, part = [kind.number(b) for kind in self.kinds], 0.0
+        numbers = [kind.number(b) for kind in self.kinds]
         for _ in range(NEARER if ds else 0):
             new = b.curve.step(b, ds)
             if new is None:  # no values beyond the boundary
-                ds, part = 0.25 * ds, PART
+                ds *= 0.25
                 continue
             now = [kind.number(new) for kind in self.kinds]
             step = Step(b, new, (numbers, now), (b.curve.margins(b), b.curve.margins(new)), True)
@@ -250,7 +249,6 @@ class AlongOrbits(Policy):
             if ends != []:
                 return found, replace(ends[0], point=ends[0].point.turned()) if ends else None
             b, numbers = new, now
-            ds = part * abs((new.value - point.value) / new.rise) / new.curve.width or ds
         return found, None
 
     def over(self, point: OrbitPoint) -> str | None:
