@@ -8,6 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize_scalar
 
 import nonsmooth as ns
 
@@ -135,6 +137,37 @@ def test_sections_of_doubled_motions() -> None:
     means = data.sizes["iterate"] / sweep["period_number"].sel(rho=steady["rho"].values).values
     error = np.where(steady["quantity"].values == 0, 2e-5, 2e-4) / np.sqrt(means)
     assert steady["measured_error"].values == pytest.approx(error)
+
+
+def test_amplitudes_by_scipy() -> None:
+    """q'' + 0.2 q' + q + 5 max(q - 0.4, 0) = 0.3 cos w t, integrated by SciPy until its steady state."""
+
+    def height(w: float) -> float:
+        def rate(t: float, u: Any) -> Any:
+            return u[1], 0.3 * np.cos(w * t) - 0.2 * u[1] - u[0] - 5.0 * max(u[0] - 0.4, 0.0)
+
+        begin, end = 2 * np.pi / w * np.array([29.0, 30.0])
+        run = solve_ivp(rate, (0.0, end), [0.0, 0.0], "DOP853", rtol=1e-10, atol=1e-12, dense_output=True)
+        grid, ends = np.linspace(begin, end, 400), 0.0
+        for sign in (1.0, -1.0):
+            at = grid[np.argmin(sign * run.sol(grid)[0])]
+            q = lambda t, sign: sign * run.sol(t)[0]
+            ends -= minimize_scalar(q, (at - 0.1, at, at + 0.1), args=(sign,), tol=1e-9).fun
+        return 0.5 * ends
+
+    at = np.linspace(0.7, 1.6, 8)
+    stop = ns.elements.ElasticStop(at="q", position="g", stiffness="k_s", damping=0.0)
+    system = ns.mechanical(
+        1.0,
+        "c",
+        1.0,
+        parameters={"c": 0.25, "g": 0.45, "k_s": 4.0, "omega": 1.0},
+        coordinates=["q"],
+        forcing={"q": lambda t, p: 0.3 * np.cos(p.omega * t)},
+        elements={"stop": stop},
+    )
+    found = ns.fit(system, response([height(w) for w in at], 1e-5, at=at), ["c", "g", "k_s"], progress=False)
+    assert [found[name] for name in ("c", "g", "k_s")] == pytest.approx([0.2, 0.4, 5.0], rel=1e-6)
 
 
 def test_a_run_that_jumped_early_is_of_the_other_branch() -> None:
