@@ -114,3 +114,32 @@ def test_a_stick_that_began_at_rest_ends_at_any_phase(method: str) -> None:
         exact, series = (ns.simulate(one, periods=0.3, method=name) for name in ("exact", method))
         assert len(exact["crossing_time"]) == len(series["crossing_time"])
         np.testing.assert_allclose(series["u"].values[-1], exact["u"].values[-1], atol=1e-7)
+
+
+def test_systems_that_were_defined_alike_have_their_own_answers() -> None:
+    """What elements that decide together do is found run by run; derivatives once took the numbers of another system."""
+
+    def rubbing_between_walls() -> ns.System:
+        return ns.System(
+            states=["q", "v"],
+            parameters={"k": 1.0, "w": 0.8},
+            modes={"all": lambda t, u, p: (u.v, 1.2 * np.cos(p.w * t) - p.k * u.q - u.q**3 - 0.1 * u.v)},
+            elements={
+                "right": ns.elements.Stop(gap=lambda t, u, p: 0.5 - u.q, on={"v": -1.0}, restitution=0.0),
+                "left": ns.elements.Stop(gap=lambda t, u, p: 0.45 + u.q, on={"v": 1.0}, restitution=0.3),
+                "rub": ns.elements.Coulomb(speed=lambda t, u, p: u.v, on={"v": 1.0}, friction=0.15, static=0.25),
+            },
+        )
+
+    def end(system: ns.System, start: list[float], length: float, **values: float) -> np.ndarray:
+        run = ns.simulate(system.with_parameters(**values), duration=length, start=start, samples=2)
+        return run["u"].values[-1]
+
+    for start, length in (([0.11, -0.46], 3.4), ([-0.39, 0.63], 11.2), ([0.29, -0.93], 9.6)):
+        system = rubbing_between_walls()
+        found = ns.sensitivity(system, duration=length, start=start, parameters=["k", "w"])
+        assert found.sizes["crossing"] >= 3
+        for name, column in zip(("k", "w"), found["P"].values.T, strict=True):
+            value, h = system.values[name], 1e-5
+            one, other = (end(system, start, length, **{name: value + sign * h}) for sign in (1, -1))
+            np.testing.assert_allclose(column, (one - other) / (2 * h), rtol=1e-5, atol=1e-5)

@@ -134,7 +134,7 @@ class VariationalFlow:
                 raise ValueError(unknown(name, "a parameter", repr(system.name), units))
         traced, scale = system.traced, tuple(system.scale_vector().tolist())
         if traced.patterns is None:
-            return _flow(traced, names, scale, rows and not system.is_smoothed)
+            return _flow(traced, traced.decider, names, scale, rows and not system.is_smoothed)
         from nonsmooth.flow.variational_patterns import pattern_flow
 
         found: VariationalFlow = pattern_flow(traced.patterns, names, scale)
@@ -289,7 +289,10 @@ def _floats(x: Any) -> FloatArray:
 
 
 @lru_cache(maxsize=32)  # as many as of what it is made of
-def _flow(traced: Traced, names: tuple[str, ...], scale: tuple[float, ...], rows: bool) -> VariationalFlow:
+def _flow(
+    traced: Traced, decider: Any, names: tuple[str, ...], scale: tuple[float, ...], rows: bool
+) -> VariationalFlow:
+    """A flow for each ``decider``: systems that were defined alike number what they find each in its own order."""
     from nonsmooth.flow.engines.linear import is_linear
     from nonsmooth.flow.variational_rows import LinearFlow
     from nonsmooth.system.codegen.linear import linear_form
