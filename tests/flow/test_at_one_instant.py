@@ -117,7 +117,7 @@ def test_a_stick_that_began_at_rest_ends_at_any_phase(method: str) -> None:
 
 
 def test_systems_that_were_defined_alike_have_their_own_answers() -> None:
-    """What elements that decide together do is found run by run; derivatives once took the numbers of another system."""
+    """Elements that decide together number what they find; derivatives once took the numbers of another system."""
 
     def rubbing_between_walls() -> ns.System:
         return ns.System(
