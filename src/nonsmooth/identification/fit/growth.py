@@ -19,13 +19,13 @@ from nonsmooth.identification.arrow import Residuals, Unsettled, settle
 from nonsmooth.identification.fit.first_level import BETTER, level, other_beginnings, rechosen, settle_first
 from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
+from nonsmooth.identification.fit.steady import ROUNDING
 from nonsmooth.identification.fit.windows import Window, Windows
 
 POOR = 50.0  # chi^2 per degree of freedom of the first windows, from which there is no use in longer ones
 _CHAOS = 1e3  # growth of a start's change within a window, from which neighbouring motions are not followed
 _REGULAR = 10.0  # that growth, below which a motion is regular enough to be followed over twice the time
 _WORSE = 1.5  # chi^2 per degree of freedom against that of the level before: a longer window does not fit
-_ROUNDING = 1e-13  # of the largest reading: no record has less noise
 _GOOD, _WHITE = 1.3, 5.0  # residuals over irregularity, and readings that share an error, of a fit that needs no other
 _NEAR = 0.6  # residuals of a guess over the readings' own size, up to which the longest windows are fitted from it
 SHORT = 0.05  # standard uncertainties from the minimum, beyond which a fit is said not to have come to its end
@@ -317,5 +317,5 @@ def _noise(problem: Windows, state: Residuals) -> FloatArray:
             size = robust_size(r) if np.isfinite(problem.loss) else float(np.sqrt(np.mean(r**2))) if len(r) else 0.0
             values = [record.values[:, c] for record in problem.records]
             largest = max((float(np.nanmax(np.abs(y), initial=0.0)) for y in values), default=0.0)
-            found[c] = max(size * float(np.sqrt(grow)), 0.5 * sensor.floor, _ROUNDING * largest, 1e-300)
+            found[c] = max(size * float(np.sqrt(grow)), 0.5 * sensor.floor, ROUNDING * largest, 1e-300)
     return found

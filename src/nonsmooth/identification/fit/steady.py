@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 KEPT, LONGEST = 33, 16  # section points looked at, and the longest period number looked for
 TRANSIENT = 300
+ROUNDING = 1e-13  # of the largest reading: none has less noise
 _FINE = 256  # instants of a period among which an extreme is looked for
 _BESIDE = 1e-6  # of a period: on either side of an extreme
 _FIRST = 0.05  # of the largest reading: the noise at first, where none is known
@@ -81,7 +82,9 @@ class SteadyReadings:
             mine = (self.quantity == q) & np.isnan(self.error) & periodic
             if (n := int(mine.sum())) and np.isfinite(residual[mine]).all():
                 noise[mine] = np.sqrt(np.sum(residual[mine] ** 2) / max(n - unknowns, 0.1 * n))
-        return replace(self, used=periodic, noise=np.maximum(np.where(np.isnan(noise), self.noise, noise), 1e-300))
+        least = ROUNDING * float(np.max(np.abs(self.measured)))
+        noise = np.maximum(np.where(np.isnan(noise), self.noise, noise), max(least, 1e-300))
+        return replace(self, used=periodic, noise=noise)
 
 
 def is_steady(one: Any) -> bool:
