@@ -247,10 +247,32 @@ def free() -> ns.System:
     return ns.mechanical(1.0, 0.1, "k", parameters={"k": 4.0}, coordinates=["q"])
 
 
+def driven() -> ns.System:
+    return ns.mechanical(
+        1.0,
+        0.1,
+        "k",
+        parameters={"k": 4.0, "omega": 2.0},
+        coordinates=["q"],
+        inputs={"f": ""},
+        forcing={"q": lambda t, p: p.f},
+        period=lambda p: 2 * np.pi / p.omega,
+    )
+
+
+def test_quantities_that_are_no_states_are_of_the_records() -> None:
+    system = ns.models.discontinuous_support(g=0.02, rho=0.14)
+    output = next(iter(system.outputs))
+    data = response(swept(system, OMEGA + 3.5)["amplitude"].sel(direction="up").values[:, 0], 1e-4, at=OMEGA + 3.5)
+    found = ns.fit(system.with_parameters(k=8.4), data, "k", measured=[output, "x"], progress=False)
+    assert found["k"] == pytest.approx(8.47, rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("system", "data", "parameters", "options", "words"),
     [
         (free(), response(amplitude()), "k", {}, "no forcing period"),
+        (driven(), response(amplitude()), "k", {}, "has inputs"),
         (linear(), response(amplitude(), name="frequency"), "k", {}, "at which values of a parameter its amplitude"),
         (linear(), response(amplitude()), "k", {"measured": "omega"}, "not a measured state"),
         (linear(), response(np.full(21, np.nan)), "k", {}, "no amplitude that can be used"),

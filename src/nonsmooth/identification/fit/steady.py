@@ -108,10 +108,9 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
     """
     import xarray as xr
 
-    if system.period() is None:
-        raise ValueError(
-            f"{system.name!r} has no forcing period; a response and sections are of the steady states of forced systems"
-        )
+    if system.period() is None or system.inputs:
+        why = "inputs" if system.inputs else "no forcing period"
+        raise ValueError(f"{system.name!r} has {why}; a response and sections are of steady states under a forcing")
     if not isinstance(one, xr.Dataset):
         one = xr.Dataset({str(key): ("run", np.asarray(one[key])) for key in one})
     kind = "amplitude" if "amplitude" in one else "section"
@@ -129,6 +128,7 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
             f"run {name!r}: sections need `period_number` for each run, as nonsmooth.measured_sections gives it"
         )
     named = [measured] if isinstance(measured, str) else list(measured or system.states)
+    named = [q for q in named if q in system.states] or named
     frame = frame.assign(**{key: of for key, of in (("state", named[0]), ("iterate", 0)) if key not in frame})
     states = list(dict.fromkeys(frame["state"]))
     wanted = [state for state in named if state in states] or states
@@ -253,7 +253,7 @@ def _slopes(
     if not number:
         return none
     period, of_period = flow.period(values)
-    z, mode, length = found.last[job][:n], int(found.mode[job]), number * period
+    z, mode, length = np.nan_to_num(found.last[job][:n]), int(found.mode[job]), number * period
 
     def motion(times: FloatArray, derivatives: bool = True) -> SampledMotion | None:
         return marcher.run(values, 0.0, times, z, mode, derivatives)
