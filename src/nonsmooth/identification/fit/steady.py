@@ -124,9 +124,7 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
             f"parameter's name; parameters: {', '.join(system.values)}"
         )
     if kind == "section" and "period_number" not in frame:
-        raise ValueError(
-            f"run {name!r}: sections need `period_number` for each run, as nonsmooth.measured_sections gives it"
-        )
+        raise ValueError(f"run {name!r}: sections need `period_number` for each run, as nonsmooth.sweep gives it")
     named = [measured] if isinstance(measured, str) else list(measured or system.states)
     named = [q for q in named if q in system.states] or named
     frame = frame.assign(**{key: of for key, of in (("state", named[0]), ("iterate", 0)) if key not in frame})
