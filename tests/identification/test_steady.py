@@ -212,7 +212,8 @@ def test_sensors_and_settings_of_responses() -> None:
     assert [own.extra[f"q.gain, {i}"].value for i in (0, 1)] == pytest.approx([gain] * 2, rel=1e-6)
     table = pd.DataFrame({"omega": OMEGA, "F": np.where(OMEGA < 2, 0.3, 0.6)})
     table["amplitude"] = amplitude(F=table["F"].values)
-    assert ns.fit(linear(c=0.25), table, "c", progress=False)["c"] == pytest.approx(0.2, rel=1e-6)
+    for data in (table, table.set_index("omega"), {name: table[name].tolist() for name in table}):
+        assert ns.fit(linear(c=0.25), data, "c", progress=False)["c"] == pytest.approx(0.2, rel=1e-6)
 
 
 def test_a_parameter_that_was_set_in_every_run_is_not_told() -> None:
@@ -241,6 +242,8 @@ def test_noise_that_is_found_is_that_of_the_residuals() -> None:
 def test_a_model_that_is_wrong_says_so() -> None:
     found = ns.fit(linear(), response(amplitude() + 0.02 * np.sin(5 * OMEGA)), ["c", "k"], progress=False)
     assert any("times their errors away from the steady states" in one for one in found.anomalies)
+    millimetres = ns.fit(linear(), response(1e3 * amplitude(), None), ["c", "k"], tries=1, progress=False)
+    assert any("times their own variation away" in one for one in millimetres.anomalies)
 
 
 def free() -> ns.System:
@@ -273,6 +276,9 @@ def test_quantities_that_are_no_states_are_of_the_records() -> None:
     [
         (free(), response(amplitude()), "k", {}, "no forcing period"),
         (driven(), response(amplitude()), "k", {}, "has inputs"),
+        (linear(), {"omega": OMEGA[:5], "amplitude": amplitude()}, "k", {}, "amplitude of 21, omega of 5"),
+        (linear(), {"omega": 2.0, "amplitude": 0.3}, "k", {}, "one number of each kind for every reading"),
+        (linear(), {"omega": OMEGA, "amplitude": ["high"] * 21}, "k", {}, "amplitude"),
         (linear(), response(amplitude(), name="frequency"), "k", {}, "at which values of a parameter its amplitude"),
         (linear(), response(amplitude()), "k", {"measured": "omega"}, "not a measured state"),
         (linear(), response(np.full(21, np.nan)), "k", {}, "no amplitude that can be used"),

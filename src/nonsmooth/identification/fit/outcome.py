@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 _TOGETHER = 0.98  # correlation from which two parameters are said to be known only together
 _POOR = 2.0  # residuals over noise, from which the model is said not to be the motion
+_NOTHING = 0.5  # residuals over the readings' own variation, from which the model is said to explain nothing
 _SHARED = 8  # readings that share the record's extreme value
 _FEW, _NAMED = 0.05, 6  # part of the readings that outliers are at most; outliers of which the times are named
 METHOD_STEADY = "least squares over the steady states that sweeps up and down reach, derivatives of the periodic orbits"
@@ -210,15 +211,20 @@ def _of_steady(grown: Grown, data: xr.Dataset, estimate: Estimate) -> Finding:
 
 
 def _far_off(grown: Grown) -> list[str]:
+    """Sentences on readings of steady states that lie far from those of the model."""
     found = []
     for i, one in enumerate(grown.problem.steady):
+        left = one.measured - grown.problem.of_steady(grown.theta, i)[0]
         known = np.isfinite(one.error) & one.used
-        r = ((one.measured - grown.problem.of_steady(grown.theta, i)[0]) / one.error)[known]
-        if len(r) and (rms := float(np.sqrt(np.mean(r**2)))) > _POOR:
-            found.append(
-                f"the readings of run {one.name} are {rms:.3g} times their errors away from the steady states of the "
-                "model: it does not describe them, or their errors are larger; the uncertainties do not hold"
-            )
+        for size, mine, most, words in (
+            (one.error, known, _POOR, "their errors"),
+            (np.full(len(left), np.std(one.measured)), ~known, _NOTHING, "their own variation"),
+        ):
+            if mine.any() and (rms := float(np.sqrt(np.mean((left / size)[mine] ** 2)))) > most:
+                found.append(
+                    f"the readings of run {one.name} are {rms:.3g} times {words} away from the steady states of the "
+                    "model: it does not describe them (are they in its units?), and the uncertainties do not hold"
+                )
     return found
 
 

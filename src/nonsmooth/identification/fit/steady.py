@@ -17,6 +17,7 @@ import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.errors import unknown
+from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.starts import start_states
 from nonsmooth.identification.fit.sensors import Sensor
 
@@ -89,12 +90,8 @@ class SteadyReadings:
 
 def is_steady(one: Any) -> bool:
     """Return whether this is a response or sections, not a record over time."""
-    held = [str(name) for name in getattr(one, "variables", one)] if isinstance(one, Mapping) or _is_frame(one) else []
+    held = [str(name) for name in getattr(one, "variables", one)] if hasattr(one, "keys") else []
     return "time" not in held and ("amplitude" in held or "section" in held)
-
-
-def _is_frame(one: Any) -> bool:
-    return hasattr(one, "columns") and hasattr(one, "index")
 
 
 def read_steady(system: System, one: Any, name: str, measured: Any, settings: Mapping[str, float]) -> SteadyReadings:
@@ -111,9 +108,15 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
     if system.period() is None or system.inputs:
         why = "inputs" if system.inputs else "no forcing period"
         raise ValueError(f"{system.name!r} has {why}; a response and sections are of steady states under a forcing")
-    if not isinstance(one, xr.Dataset):
-        one = xr.Dataset({str(key): ("run", np.asarray(one[key])) for key in one})
     kind = "amplitude" if "amplitude" in one else "section"
+    if not isinstance(one, xr.Dataset):
+        one = one.reset_index() if hasattr(one, "reset_index") else one
+        told = [key for key in (kind, f"{kind}_error", "period_number", *system.values) if key in one]
+        columns = {key: float_array(one[key], f"run {name!r}: {key}") for key in told}
+        if any(column.shape != columns[kind].shape or column.ndim != 1 for column in columns.values()):
+            sizes = ", ".join(f"{key} of {column.size}" for key, column in columns.items())
+            raise ValueError(f"run {name!r} must hold one number of each kind for every reading; it has {sizes}")
+        one = xr.Dataset({key: ("run", column) for key, column in columns.items()})
     over = [str(dim) for dim in one[kind].dims if dim not in ("state", "iterate")]
     set_ = [key for key in system.values if key in one.variables and {*one[key].dims} & {*over}]
     extra = [each for each in (f"{kind}_error", "period_number") if each in one]
