@@ -97,7 +97,7 @@ def outcome(
         findings=[finding, *beside],
         identifiability=_sentences(grown, covariance[:m, :m], loose, samples),
         notes=notes,
-        anomalies=[*(_anomalies(grown, data) if data is not None else []), *_far_off(grown)],
+        anomalies=[*_anomalies(grown, data), *_far_off(grown)],
         synthetic=synthetic,
     )
 
@@ -296,9 +296,9 @@ def _ends(grown: Grown, data: xr.Dataset) -> list[str]:
     return found
 
 
-def _anomalies(grown: Grown, data: xr.Dataset) -> list[str]:
-    found = _ends(grown, data)
-    if grown.rms > _POOR or grown.missing:
+def _anomalies(grown: Grown, data: xr.Dataset | None) -> list[str]:
+    found = [] if data is None else _ends(grown, data)
+    if data is not None and (grown.rms > _POOR or grown.missing):
         name, rms, _ = next(row for row in by_place(data) if row[2] >= min(5, data.sizes["sample"]))
         found.append(
             f"the residuals are {grown.rms:.3g} times the noise that the record's own irregularity shows"
@@ -312,7 +312,7 @@ def _anomalies(grown: Grown, data: xr.Dataset) -> list[str]:
         )
     if grown.unused:
         found.append(
-            f"{grown.unused} of {grown.unused + data.sizes['sample']} readings are not used: the model has no motion "
+            f"{grown.unused} of {grown.unused + grown.readings} readings are not used: the model has no motion "
             "there (it begins beyond a stop, or does not come to an end)"
         )
     if grown.stuck:

@@ -153,6 +153,8 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
     if not runs:
         raise ValueError(f"run {name!r} has no {kind} that can be used: numbers, with a period number from 1 on")
     (run, iterate, quantity), (y, error) = np.array(rows)[:, :3].T.astype(np.int64), np.array(rows)[:, 3:].T
+    if (error < 0.0).any():
+        raise ValueError(f"run {name!r}: {kind}_error has the negative number {np.nanmin(error):g}; NaN: not known")
     error = np.where(error > 0.0, error, np.nan)
     values, setting = np.unique(np.array(runs), axis=0, return_inverse=True)
     first = max(_FIRST * float(np.max(np.abs(y))), 1e-300)
@@ -284,11 +286,11 @@ def _slopes(
             return none
         table = at[0] + at[1][:, :, None] * k[:, None, None] * of_period
         return np.asarray(np.where((k > 0)[:, None, None], table, of_start))
-    fine = np.arange(1, _FINE * number + 3, dtype=np.float64)
-    coarse = motion(fine * (period / _FINE), False)  # a whole cycle within its ends
-    assert coarse is not None
-    full = motion(np.union1d(coarse.time, coarse.log.crossing_time), False)
-    assert full is not None
+    grid, hits = np.arange(1, _FINE * number + 3) * (period / _FINE), round_.log.crossing_time
+    hits = np.concatenate([hits, hits + length])  # a whole cycle lies within the ends of the grid
+    full = motion(np.union1d(grid, hits[(hits > 0.0) & (hits < grid[-1])]), False)
+    if full is None:
+        return none
     instants = np.array([[_extreme(full, k, sign) for sign in (1.0, -1.0)] for k in range(n)])
     beside = np.array([-_BESIDE, _BESIDE]) * period
     wanted_at, back = np.unique(

@@ -324,15 +324,15 @@ class Windows:
                 inner[range(len(k), len(k) + len(free)), free] = 1.0
                 state.in_start.append(inner)
                 state.in_parameters.append(np.vstack([table[:, :p], np.zeros((len(free), p))]))
-        alone = [self.of_steady(theta, i, slopes) for i in range(len(self.steady))] if self.steady else []
-        if not alone:
+        if not self.steady:
             return state
         parts = []
-        for one, (fitted, _, table) in zip(self.steady, alone, strict=True):
-            r, table = np.where(one.used, one.measured - fitted, 0.0) / one.noise, table * one.used[:, None]
+        for i, one in enumerate(self.steady):
+            fitted, _, table = self.of_steady(theta, i, slopes)
+            r, table = ((one.measured - fitted) / one.noise)[one.used], table[one.used]
             far = np.abs(r) > self.loss  # of the root of Huber's loss, which is linear there
             root = np.sqrt(np.where(far, self.loss * (2.0 * np.abs(r) - self.loss), r**2)) if far.any() else np.abs(r)
-            slope = np.where(far, self.loss / np.where(far, root, 1.0), 1.0) / one.noise
+            slope = np.where(far, self.loss / np.where(far, root, 1.0), 1.0) / one.noise[one.used]
             parts.append((np.where(np.isnan(r), np.inf, np.sign(r) * root), slope[:, None] * table))
         return replace(
             state, alone=np.concatenate([r for r, _ in parts]), of_alone=np.vstack([table for _, table in parts])
