@@ -76,40 +76,22 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: st
 
 def _runs(measured: xr.Dataset, name: str, state: str) -> dict[str, NDArray[Any]]:
     """One row for each run: value, direction, amplitude, error, period number, sorted by direction and value."""
-    amplitude = measured["amplitude"]
-    if "state" in amplitude.dims:
-        amplitude = amplitude.sel(state=state)
-    if name in amplitude.dims:  # the grid of frequency_response: value, direction
-        amplitude = amplitude.expand_dims([d for d in ("direction",) if d not in amplitude.dims])
-        stacked = amplitude.transpose("direction", name)
-        words = np.atleast_1d(stacked["direction"].values).astype(str)
-        value = np.tile(stacked[name].values, len(words))
-        direction = np.repeat(words, stacked.sizes[name])
-        heights, error = stacked.values.ravel(), np.full(stacked.size, np.nan)
-        period = np.full(stacked.size, -1)
-    else:
-        if amplitude.ndim != 1 or name not in measured:
-            raise ValueError(
-                f"a measured response holds `amplitude` over its runs, with `{name}` (and `direction`) for each; this "
-                f"one has {amplitude.dims} and {', '.join(map(str, measured.variables))}"
-            )
-        value, heights = np.asarray(measured[name].values, dtype=float), np.asarray(amplitude.values, dtype=float)
-        direction = (
-            np.asarray(measured["direction"].values, dtype=str)
-            if "direction" in measured
-            else np.full(len(value), "up")
+    one = measured.sel(state=state) if "state" in measured["amplitude"].dims else measured
+    over = {*one["amplitude"].dims} - {"direction"}
+    if name not in one.variables or len(over) != 1 or {*one[name].dims} != over:
+        raise ValueError(
+            f"a measured response holds `amplitude` over its runs, with `{name}` (and `direction`) for each; this "
+            f"one has {one['amplitude'].dims} and {', '.join(map(str, measured.variables))}"
         )
-        has_error = "amplitude_error" in measured
-        error = np.asarray(measured["amplitude_error"].values, float) if has_error else np.full(len(value), np.nan)
-        known = "period_number" in measured
-        period = np.asarray(measured["period_number"].values) if known else np.full(len(value), -1)
-    good = np.isfinite(value) & np.isfinite(heights)
-    order = np.lexsort((value, direction))
-    order = order[good[order]]
-    if not len(order):
+    absent = {"direction": "up", "amplitude_error": np.nan, "period_number": -1}
+    held = [key for key in ("amplitude", name, *absent) if key in one.variables]
+    frame = one[held].to_dataframe().reset_index().assign(**{key: absent[key] for key in {*absent} - {*held}})
+    frame = frame[np.isfinite(frame[name]) & np.isfinite(frame["amplitude"])].sort_values(["direction", name])
+    if frame.empty:
         raise ValueError("the measured response has no run with a finite amplitude")
-    columns = {"value": value, "direction": direction, "amplitude": heights, "error": error, "period": period}
-    return {key: column[order] for key, column in columns.items()}
+    columns = {"value": name, "amplitude": "amplitude", "error": "amplitude_error", "period": "period_number"}
+    direction = {"direction": frame["direction"].to_numpy(str)}
+    return direction | {key: frame[column].to_numpy() for key, column in columns.items()}
 
 
 def _curves(
