@@ -38,6 +38,12 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.loads import Loads
 
 IMPACTS = ("simultaneous", "sequential")
+EXAMPLES = {
+    "parameters": '{"m": (0.838, "kg"), "k": 8.47}',
+    "modes": '{"free": free, "contact": contact}',
+    "indicators": '{"gap": lambda t, u, p: u.x - p.g}',
+    "outputs": '{"energy": lambda t, u, p: u.v**2 / 2}',
+}
 
 
 @dataclass(frozen=True)
@@ -131,97 +137,54 @@ def describe(
     Elements that decide together are ``written`` out as modes where that is asked for, or has to be.
     """
     asked = dict(locals())
-    if not isinstance(name, str) or not name:
-        raise SystemDefinitionError(f"`name` must be a string, not {name!r}")
-    if impacts not in IMPACTS:
-        raise SystemDefinitionError(f"{name!r}: `impacts` is one of {', '.join(map(repr, IMPACTS))}, not {impacts!r}")
-    units = _units(states, "states", name)
-    if not units:
-        raise SystemDefinitionError(f"{name!r}: a system needs at least one state")
-    driven = _units(inputs or {}, "inputs", name)
+    given = asked | {"states": _units(states, "states", name), "inputs": _units(inputs or {}, "inputs", name)}
+    given |= {"indicators": indicators or {}, "outputs": outputs or {}}
+    _check_kinds(given)
+    own = given["states"]
+    driven = input_states(given["inputs"])
     if driven:
-        made_of = {"name": name, "modes": modes, "transitions": transitions, "symmetry": symmetry, "bands": bands}
-        check_names({"state": units, "input": input_states(driven)}, name)
-        made_of = with_inputs(driven, made_of)
-        modes, transitions, units = made_of["modes"], made_of["transitions"], units | input_states(driven)
-    _is_mapping(parameters, "parameters", name, '{"m": (0.838, "kg"), "k": 8.47}')
-    known = {key: Parameter.read(key, given) for key, given in parameters.items()}
-    _is_mapping(modes, "modes", name, '{"free": free, "contact": contact}')
-    _is_mapping(indicators or {}, "indicators", name, '{"gap": lambda t, u, p: u.x - p.g}')
-    _is_mapping(outputs or {}, "outputs", name, '{"energy": lambda t, u, p: u.v**2 / 2}')
-    if not modes:
-        raise SystemDefinitionError(f"{name!r}: a system needs at least one mode")
-    remembered = {key: _memory(key, given) for key, given in _units(memory or {}, "memory", name, raw=True).items()}
+        check_names({"state": own, "input": driven}, name)
+        given |= with_inputs(given)
+    known = {key: Parameter.read(key, one) for key, one in parameters.items()}
+    remembered = {key: _memory(key, one) for key, one in _units(memory or {}, "memory", name, raw=True).items()}
     symbols = Symbols(
         name,
-        units,
-        {k: v.unit for k, v in known.items()},
-        {k: unit for k, (_, unit) in remembered.items()},
-        tuple(input_states(driven)),
+        given["states"],
+        {key: parameter.unit for key, parameter in known.items()},
+        {key: unit for key, (_, unit) in remembered.items()},
+        tuple(driven),
     )
-    ranges: Sequence[tuple[sp.Expr, str]] = ()
-    patterns: Any = None
-    made: Mapping[str, Any] = {}
-    plain: Any = None
-    from nonsmooth.system.derived.relays import relays_of
-
-    now = {symbols.p[key]: parameter.value for key, parameter in known.items()}
-    relays = None if elements else relays_of(symbols, modes, indicators, transitions, outputs, now)
-    if elements or relays:
-        from nonsmooth.system.derived.combinations import assembled
-
-        given = {
-            "indicators": indicators,
-            "transitions": transitions,
-            "outputs": outputs,
-            "memory": memory,
-            "symmetry": symmetry,
-            "bands": bands,
-            "period": period,
-            "impacts": impacts,
-            "written": written,
-        }
-        if relays is None:
-            made = assembled(symbols, modes, elements, given, _scale(scale, units, name), now)
-        else:
-            given["transitions"] = ()
-            between = {"all": relays.field}
-            made = assembled(symbols, between, relays.elements, given, _scale(scale, units, name), now, relays.name)
-        ranges, patterns = [*(relays.ranges if relays else ()), *made["ranges"]], made.get("patterns")
-        plain = partial(_without_elements, name, symbols, units, modes, indicators, transitions, outputs)
-        modes, indicators, transitions, outputs = (made[k] for k in ("modes", "indicators", "transitions", "outputs"))
-    indicators = dict(indicators or {})
-    shown = {key: _output(key, given) for key, given in (outputs or {}).items()}
+    values = {symbol: known[key].value for key, symbol in symbols.p.items()}
+    given |= {"scale": _scale(scale, given["states"], name)}
+    made = _with_elements(symbols, given, values)
+    given = given | made  # `plain` goes on with what was given
+    shown = {key: _output(key, one) for key, one in given["outputs"].items()}
     bands = dict(bands or {})
     for key, band in bands.items():
         if not isinstance(band, Band):
             raise SystemDefinitionError(f"{name!r}: the band of {key!r} must be an ns.Band, not {band!r}")
-    inside = {key for band in bands.values() for key in (band.write or {})}
-    slid = [(item, sliding_mode(item, transitions)) for item in _surfaces(transitions)]
+    slid = [(item, sliding_mode(item, given["transitions"])) for item in _surfaces(given["transitions"])]
     check_names(
         {
-            "state": [key for key in units if key not in input_states(driven)],
-            "input": input_states(driven),
+            "state": own,
+            "input": driven,
             "parameter": known,
             "memory": remembered,
-            "mode": modes,
-            "indicator": indicators,
+            "mode": given["modes"],
+            "indicator": given["indicators"],
             "output": shown,
-            "memory of a band": sorted(inside),
+            "memory of a band": sorted({key for band in bands.values() for key in (band.write or {})}),
             "sliding mode": [mode for _, mode in slid],
         },
         name,
     )
-    kinds = {key: _mode(mode, key, units) for key, mode in modes.items()}
-    traced = trace_system(name, symbols, kinds, indicators, transitions, shown)
+    traced, surfaces = _traced(symbols, given, shown)
     _check_phases(traced)
-    surfaces = tuple(trace_surface(item, mode, traced, symbols) for item, mode in slid)
-    values = {symbol: known[key].value for key, symbol in symbols.p.items()}
     traced, explicit = _with_period(traced, symbols, values, period)
     if symmetry is not None:
         Domain(traced).check({key: parameter.value for key, parameter in known.items()})
-    if patterns is not None:
-        traced = patterns.bind(traced)
+    if "patterns" in made:
+        traced = made["patterns"].bind(traced)
     elif made.get("decider") is not None:
         traced = made["decider"].decides(traced, made["kinds"], made["asked"])
     units_out = {key: unit for key, (_, unit) in shown.items()}
@@ -233,33 +196,66 @@ def describe(
         units_out |= {f"{load.name}_force": "" for load in loads.elements}
     description = Description(
         name=name,
-        states=units,
+        states=given["states"],
         parameters=known,
         memory=remembered,
-        scale=_scale(scale, units, name),
+        scale=given["scale"],
         outputs=units_out,
         traced=traced,
         surfaces=surfaces,
         bands=tuple(trace_band(key, band, traced, symbols, shown, known) for key, band in bands.items()),
         symmetry=None if symmetry is None else trace_symmetry(symmetry, traced, symbols, values),
         explicit_time=explicit,
-        ranges=tuple(ranges),
-        plain=plain,
-        relays=relays is not None,
+        ranges=tuple(made.get("ranges", ())),
+        plain=made.get("plain"),
+        relays=made.get("relays", False),
         loads=loads,
-        inputs=driven,
+        inputs=given["inputs"],
         written=partial(describe, **{**asked, "written": True}) if made.get("also written") else None,
     )
     return description if loads is None else description.with_loads(loads)
 
 
-def _without_elements(
-    name: str, symbols: Symbols, states: Mapping[str, str], modes: Any, indicators: Any, transitions: Any, outputs: Any
+def _check_kinds(given: Mapping[str, Any]) -> None:
+    """Refuse what has no name, no state or no mode, and what should be a mapping and is none."""
+    name, impacts = given["name"], given["impacts"]
+    if not isinstance(name, str) or not name:
+        raise SystemDefinitionError(f"`name` must be a string, not {name!r}")
+    if impacts not in IMPACTS:
+        raise SystemDefinitionError(f"{name!r}: `impacts` is one of {', '.join(map(repr, IMPACTS))}, not {impacts!r}")
+    if not given["states"]:
+        raise SystemDefinitionError(f"{name!r}: a system needs at least one state")
+    for what, example in EXAMPLES.items():
+        if not isinstance(one := given[what], Mapping):
+            raise SystemDefinitionError(f"{name!r}: `{what}` must be a mapping such as {example}, not {shortened(one)}")
+    if not given["modes"]:
+        raise SystemDefinitionError(f"{name!r}: a system needs at least one mode")
+
+
+def _with_elements(symbols: Symbols, given: Mapping[str, Any], values: Mapping[sp.Symbol, float]) -> dict[str, Any]:
+    """The parts of a system with its elements, or with surfaces that are relays; nothing where it has none."""
+    from nonsmooth.system.derived.combinations import assembled
+    from nonsmooth.system.derived.relays import relays_of
+
+    if given["elements"]:
+        relays, made = None, assembled(symbols, given, values)
+    elif (relays := relays_of(symbols, given, values)) is not None:
+        between = {"modes": {"all": relays.field}, "elements": relays.elements, "transitions": ()}
+        made = assembled(symbols, {**given, **between}, values, relays.name)
+    else:
+        return {}
+    ranges = [*(relays.ranges if relays else ()), *made["ranges"]]
+    return made | {"ranges": ranges, "relays": relays is not None, "plain": partial(_traced, symbols, given)}
+
+
+def _traced(
+    symbols: Symbols, given: Mapping[str, Any], shown: Mapping[str, Any] | None = None
 ) -> tuple[Traced, tuple[TracedSurface, ...]]:
-    """The equations that elements were put into, and their surfaces."""
-    kinds = {key: _mode(mode, key, states) for key, mode in modes.items()}
-    shown = {key: _output(key, given) for key, given in (outputs or {}).items()}
-    traced = trace_system(name, symbols, kinds, dict(indicators or {}), transitions, shown)
+    """The equations as they are given, elements put aside, and their surfaces."""
+    shown = {key: _output(key, one) for key, one in given["outputs"].items()} if shown is None else shown
+    kinds = {key: _mode(mode, key, given["states"]) for key, mode in given["modes"].items()}
+    transitions = given["transitions"]
+    traced = trace_system(given["name"], symbols, kinds, dict(given["indicators"]), transitions, shown)
     slid = [(item, sliding_mode(item, transitions)) for item in _surfaces(transitions)]
     return traced, tuple(trace_surface(item, mode, traced, symbols) for item, mode in slid)
 
@@ -267,11 +263,6 @@ def _without_elements(
 def _surfaces(transitions: Any) -> list[Surface]:
     """The surfaces among what may yet turn out to be no list."""
     return [item for item in transitions if isinstance(item, Surface)] if isinstance(transitions, Iterable) else []
-
-
-def _is_mapping(given: Any, what: str, system: str, example: str) -> None:
-    if not isinstance(given, Mapping):
-        raise SystemDefinitionError(f"{system!r}: `{what}` must be a mapping such as {example}, not {shortened(given)}")
 
 
 def _units(given: Any, what: str, system: str, raw: bool = False) -> dict[str, Any]:

@@ -27,13 +27,13 @@ def input_states(inputs: Mapping[str, str]) -> dict[str, str]:
     }
 
 
-def with_inputs(inputs: Mapping[str, str], given: dict[str, Any]) -> dict[str, Any]:
-    """The parts of a system (``describe``) with the states of its inputs and their motion."""
-    name = given["name"]
+def with_inputs(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The parts of a system (``describe``) that have the states of its inputs and their motion."""
+    name, inputs = given["name"], given["inputs"]
     for what in ("symmetry", "bands"):
         if given[what]:
             raise SystemDefinitionError(f"{name!r}: a system with inputs has no `{what}`: leave it out")
-    more = tuple(input_states(inputs))
+    more = input_states(inputs)
     rates = [rate for key in inputs for rate in (key + RATE, None)]
 
     def moved(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -55,7 +55,8 @@ def with_inputs(inputs: Mapping[str, str], given: dict[str, Any]) -> dict[str, A
         return item
 
     modes, transitions = given["modes"], given["transitions"]
-    return given | {
+    return {
+        "states": given["states"] | more,
         "modes": {key: of_mode(mode) for key, mode in modes.items()} if isinstance(modes, Mapping) else modes,
         "transitions": [*map(of_transition, transitions)] if isinstance(transitions, Sequence) else transitions,
     }

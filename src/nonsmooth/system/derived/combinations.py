@@ -63,19 +63,16 @@ def element_names(elements: Any) -> dict[str, Element]:
 
 def assembled(
     symbols: Symbols,
-    modes: Mapping[str, Any],
-    elements: Any,
     given: Mapping[str, Any],
-    scale: Mapping[str, float],
     values: Mapping[sp.Symbol, float],
     named: Callable[[list[str]], str] | None = None,
 ) -> dict[str, Any]:
     """Modes, indicators, transitions and outputs of a system with elements, as a user would give them.
 
-    ``given`` are those without elements: its transitions go from each combination of phases to the same of the target.
+    ``given`` is a system's own: its transitions go from each combination of phases to the same of the target.
     ``named`` gives the name of a combination, where elements are not the user's; these then have no outputs.
     """
-    parts = element_names(elements)
+    parts, modes = element_names(given["elements"]), given["modes"]
     for key, mode in modes.items():
         if isinstance(mode, Mode) and set(mode.states or symbols.u) != set(symbols.u):
             raise SystemDefinitionError(f"mode {key!r}: a system with elements has all its states in every mode")
@@ -90,7 +87,7 @@ def assembled(
         for key, mode in modes.items()
     }
     resets = any(isinstance(item, Transition) and item.reset is not None for item in given["transitions"])
-    make = Expressions(symbols, base, parts, scale, values)
+    make = Expressions(symbols, base, parts, given["scale"], values)
     counts = [len(part.element.phases) for part in make.parts]
     number = len(base) * int(sp.prod(counts))
     make.sequential = given["impacts"] == "sequential" and len(make.striking) > 1
@@ -170,7 +167,7 @@ def _written_out(
                 transitions.append(Transition(*ends, item.when, item.at, item.reset, item.write, contact))
                 kinds.append(OWN if item.reset is None else ASKS_BEHIND)
     outputs = {}
-    for key, output in (given["outputs"] or {}).items():
+    for key, output in given["outputs"].items():
         function, unit = output if isinstance(output, (tuple, list)) else (output, "")
         if isinstance(function, Mapping):
             function = {name(mode, pattern): function[mode] for mode, pattern in pairs}
@@ -178,7 +175,7 @@ def _written_out(
     return {
         "modes": fields,
         "transitions": transitions,
-        "indicators": {**(given["indicators"] or {}), **{key: KnownFunction(g) for key, g in make.indicators.items()}},
+        "indicators": {**given["indicators"], **{key: KnownFunction(g) for key, g in make.indicators.items()}},
         "outputs": outputs if named else {**outputs, **{f"{key}_force": (row, "") for key, row in forces.items()}},
         "ranges": make.ranges(next(iter(base))),
         "kinds": kinds,

@@ -58,27 +58,20 @@ class Relays:
         return "_".join([*(key for key, holds, _ in every if holds), "sliding", *beside])
 
 
-def relays_of(
-    symbols: Symbols,
-    modes: Mapping[str, Any],
-    indicators: Mapping[str, Any] | None,
-    transitions: Sequence[Any],
-    outputs: Mapping[str, Any] | None,
-    values: Mapping[sp.Symbol, float],
-) -> Relays | None:
+def relays_of(symbols: Symbols, given: Mapping[str, Any], values: Mapping[sp.Symbol, float]) -> Relays | None:
     """The relays that a system's surfaces are; None where they are not, or all have relative degree one.
 
     They push towards their surfaces at the present ``values`` of the parameters."""
+    modes, where, transitions = given["modes"], given["indicators"], given["transitions"]
     if len(modes) < 4 or not transitions or not all(isinstance(item, Surface) for item in transitions):
         return None
     if any(item.static is not None or item.field is not None or item.mode for item in transitions):
         return None
-    tables = (one[0] if isinstance(one, (tuple, list)) else one for one in (outputs or {}).values())
+    tables = (one[0] if isinstance(one, (tuple, list)) else one for one in given["outputs"].values())
     if any(isinstance(mode, Mode) for mode in modes.values()) or any(isinstance(one, Mapping) for one in tables):
         return None
     keys = list(dict.fromkeys(item.indicator for item in transitions))
     signs = _signs(keys, modes, transitions)
-    where = dict(indicators or {})
     if signs is None or any(key not in where for key in keys):
         return None
     arguments = Scalar(symbols.t), symbols.states(), symbols.parameters()
