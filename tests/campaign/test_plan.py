@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import json
 import os
+import statistics
 import subprocess
 import sys
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
+from simple_work import Squares
+
+from nonsmooth.campaign.plan import plan
 
 STUDY = """
 [system]
@@ -77,3 +83,23 @@ def test_the_plan_of_a_chart(plane: str, n: int, tmp_path: Path) -> None:
         print(f"{plane:<11} {n:>4}^2  {what:<10} plan {a / unit:9.4g}  truth {b / unit:9.4g}  ratio {a / b:.3f}")
     for a, b in zip(planned[:3], true, strict=True):
         assert abs(a / b - 1) <= 0.3
+
+
+def test_the_error_of_a_plan_is_that_of_a_sample_without_replacement(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Standard error of a total from k of n chunks of equal size: N s sqrt((1 - k/n) / k)."""
+    clock, took = [0.0], []
+
+    class Counted(Squares):
+        def compute(self, chunk: int) -> dict[str, Any]:
+            took.append(1.0 + chunk % 5)
+            clock[0] += took[-1] * self.step
+            return super().compute(chunk)
+
+    monkeypatch.setattr(time, "thread_time", lambda: clock[0])
+    work = Counted(size=280)
+    found = plan(work, seconds=150.0)
+    times = took[1:]  # the first runs before the clock
+    assert 3 <= found.sampled == len(times) < work.n_chunks() == 40
+    assert found.core_seconds == pytest.approx(280 * statistics.mean(times))
+    expected = 280 * statistics.stdev(times) * ((1 - len(times) / 40) / len(times)) ** 0.5
+    assert found.error == pytest.approx(expected)

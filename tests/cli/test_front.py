@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -254,6 +255,10 @@ def test_a_first_study_file_runs(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert run("init", model, "--verb", verb) == 0
+    (path,) = tmp_path.iterdir()
+    given = tomllib.loads(path.read_text(encoding="utf-8"))[verb]
+    if "parameter" in given:  # what is varied is varied about its own value
+        assert given["values"]["from"] < named_model(model).values[given["parameter"]] < given["values"]["to"]
     said = capsys.readouterr().out.strip().rpartition(": ")[2]
     assert run(*said.split()[1:]) == 0
     assert f"{verb} of" in capsys.readouterr().out

@@ -29,6 +29,8 @@ def test_branch_goes_on_after_a_file(tmp_path: Path) -> None:
     n = int(np.flatnonzero(np.isclose(joined["omega"].values, part["omega"].values[0], rtol=0, atol=1e-12))[0])
     kept = joined.isel(point=slice(n, n + part.sizes["point"]))
     assert np.array_equal(kept["section"], part["section"])
+    omega, size = joined["omega"].values, part.sizes["point"]
+    assert omega[n - 1] < omega[n] and omega[n + size] > omega[n + size - 1]  # each side begins where the part ends
 
 
 def test_too_few_points_and_on(tmp_path: Path) -> None:
