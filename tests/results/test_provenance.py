@@ -210,3 +210,11 @@ def test_files_that_were_copied_without_being_installed_work(tmp_path: Path) -> 
     done = subprocess.run([sys.executable, "-c", NOT_INSTALLED, str(tmp_path)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["unknown", "unknown"]
+
+
+def test_the_inputs_of_a_run_are_recorded_by_their_ends_and_not_as_arrays() -> None:
+    cart = ns.mechanical(2.0, 0.0, 0.0, forcing={"q": lambda t, p: p.force}, inputs={"force": "N"})
+    pushed = ns.Input([0.0, 1.0, 2.5], [4.0, 0.0, -4.0], between="steps", delay=0.25)
+    run = ns.simulate(cart, duration=3.0, inputs={"force": pushed})
+    recorded = json.loads(run.attrs["nonsmooth"])["options"]["inputs"]
+    assert recorded == {"force": {"samples": 3, "first": 0.0, "last": 2.5, "between": "steps", "delay": 0.25}}
