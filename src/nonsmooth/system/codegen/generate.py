@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from sympy import Basic, Expr, Integer
+from sympy import Basic, Expr, Integer, preorder_traversal
 
 from nonsmooth.system.codegen.jet import JetCode, chain, jet_code
-from nonsmooth.system.symbolic.printing import Printer, assignments
+from nonsmooth.system.symbolic.printing import Printer, assignments, shared_terms
 from nonsmooth.system.symbolic.traced import Traced
 
 MOST_MODELS = 32  # whose code is kept though nobody uses it: a third of a MB each
@@ -104,13 +104,13 @@ def model_source(traced: Traced) -> str:
         for mode in modes
     ]
     jet = jet_code(traced.t, traced.u, constants_of(traced), traced.fields, rows)
-    writers = {
-        "field": [_field(traced, mode) for mode in modes],
-        "values": [_values(traced, mode) for mode in modes],
-        "jump": [_jump(traced, i) for i in range(len(traced.transitions))],
+    code = {
+        "field": choosing_code(traced, fields_of(traced)),
+        "values": choosing_code(traced, [_values(traced, mode) for mode in modes]),
+        "jump": choosing_code(traced, [_jump(traced, i) for i in range(len(traced.transitions))]),
     }
-    functions = jet.functions.union(*(used for parts in writers.values() for _, used in parts))
-    inlined = sorted({_INLINED[f] for _, used in writers["field"] for f in used & _INLINED.keys()})
+    functions = jet.functions.union(*(used for _, _, used in code.values()))
+    inlined = sorted(_INLINED[f] for f in code["field"][2] & _INLINED.keys())
     always = {
         "values": [f"for i in range({len(rows[0])}):", "    out[i] = 0.0"],
         "jump": [
@@ -118,8 +118,6 @@ def model_source(traced: Traced) -> str:
             *(f"for i in range({len(traced.p) + len(traced.m)}):", "    q_new[i] = q[i]"),
         ],
     }
-    bodies = {name: [lines for lines, _ in parts] for name, parts in writers.items()}
-    bodies["field"] = [_inlined(lines) for lines in bodies["field"]]
     smooth = tuple(all(mode[len(traced.indicators) + i] for mode in jet.smooth) for i in range(len(traced.outputs)))
     parts = [
         "from numpy import array",
@@ -133,8 +131,8 @@ def model_source(traced: Traced) -> str:
         if name == "jet":
             parts += jet_functions(jet, f'callback("{signature}")', _ARGUMENTS[name])
         else:
-            tables, lines = by_case(bodies[name])
-            lines = [*always.get(name, []), *lines]
+            tables, lines, _ = code[name]
+            lines = [*always.get(name, []), *(_inlined(lines) if name == "field" else lines)]
             parts.append(function_of(name, f'callback("{signature}")', _ARGUMENTS[name], tables, lines))
     return "\n".join(part for part in parts if part) + "\n"
 
@@ -187,6 +185,11 @@ def unpacked(lines: Iterable[str]) -> list[str]:
     return [f"q{i} = q[{i}]" for i in sorted(used)]
 
 
+def fields_of(traced: Traced) -> list[list[tuple[str, Expr]]]:
+    """Targets and expressions of the vector field in each mode."""
+    return [[(f"du[{i}]", e) for i, e in enumerate(field)] for field in traced.fields]
+
+
 def constants_of(traced: Traced) -> dict[Basic, str]:
     """Names of parameters and memory in generated code."""
     return {symbol: f"q{i}" for i, symbol in enumerate([*traced.p, *traced.m])}
@@ -194,27 +197,56 @@ def constants_of(traced: Traced) -> dict[Basic, str]:
 
 def scalar_code(traced: Traced, targets: Sequence[tuple[str, Expr]]) -> tuple[list[str], set[str]]:
     """Straight code for some expressions at one point, and the functions of ``math`` that it uses."""
+    return choosing_code(traced, [targets])[1:]
+
+
+def choosing_code(
+    traced: Traced, cases: Sequence[Sequence[tuple[str, Expr]]]
+) -> tuple[dict[str, list[int]], list[str], set[str]]:
+    """Tables for ``function_of``, lines that give targets their values in one of some cases, and functions of ``math``.
+
+    Targets that change together are chosen together. A term that several expressions hold and at least half of the
+    cases need is computed ahead of the choice.
+    """
+    rows = [dict(case) for case in cases]
+    together: dict[tuple[int, ...], list[tuple[str, list[Expr | None]]]] = {}
+    needed: dict[Basic, int] = {}  # the cases, as bits, in which a term is
+    for target in dict.fromkeys(target for row in rows for target in row):
+        choices: dict[Expr | None, int] = {}
+        chosen = tuple(choices.setdefault(row.get(target), len(choices)) for row in rows)
+        together.setdefault(chosen, []).append((target, list(choices)))
+        for expression, number in choices.items():
+            if expression is not None:
+                bits = sum(1 << i for i, choice in enumerate(chosen) if choice == number)
+                for term in preorder_traversal(expression):
+                    needed[term] = needed.get(term, 0) | bits
     names = {**constants_of(traced), traced.t: "t", **{symbol: f"x{i}" for i, symbol in enumerate(traced.u)}}
     printer = Printer(names)
-    used = set().union(*(e.free_symbols for _, e in targets)) if targets else set()
-    lines = [f"x{i} = u[{i}]" for i, symbol in enumerate(traced.u) if symbol in used]
-    lines += assignments(targets, printer, "g")
-    return lines, printer.used
+    every = [e for group in together.values() for _, choices in group for e in choices if e is not None]
+    lines = [f"x{i} = u[{i}]" for i, symbol in enumerate(traced.u) if symbol in needed]
+    lines += shared_terms(every, printer, "g", lambda e: 2 * needed[e].bit_count() >= len(cases))
+    tables, used = {}, printer.used
+    for number, (chosen, group) in enumerate(together.items()):
+        branches = []
+        for k in range(max(chosen) + 1):
+            own = Printer(dict(printer.names))
+            found = [(target, choices[k]) for target, choices in group]
+            body = assignments([(target, e) for target, e in found if e is not None], own, "b")
+            branches.append((f"w{number} == {k}", body))
+            used |= own.used
+        tables[f"w{number}"] = list(chosen)
+        lines += chain(branches)
+    return tables, lines, used
 
 
-def _field(traced: Traced, mode: int) -> tuple[list[str], set[str]]:
-    return scalar_code(traced, [(f"du[{i}]", e) for i, e in enumerate(traced.fields[mode])])
-
-
-def _values(traced: Traced, mode: int) -> tuple[list[str], set[str]]:
+def _values(traced: Traced, mode: int) -> list[tuple[str, Expr]]:
     rows = [*_asked(traced, mode), *(output[mode] for output in traced.outputs)]
-    return scalar_code(traced, [(f"out[{i}]", e) for i, e in enumerate(rows) if e != 0])
+    return [(f"out[{i}]", e) for i, e in enumerate(rows) if e != 0]
 
 
-def _jump(traced: Traced, index: int) -> tuple[list[str], set[str]]:
-    """Code for what a transition changes; the rest has been copied before."""
+def _jump(traced: Traced, index: int) -> list[tuple[str, Expr]]:
+    """Changes by a transition; the rest has been copied before."""
     transition = traced.transitions[index]
     reset = traced.u if transition.reset is None else transition.reset
     targets = [(f"u_new[{i}]", e) for i, e in enumerate(reset) if e != traced.u[i]]
-    targets += [(f"q_new[{len(traced.p) + i}]", e) for i, e in transition.writes]
-    return scalar_code(traced, targets)
+    return targets + [(f"q_new[{len(traced.p) + i}]", e) for i, e in transition.writes]

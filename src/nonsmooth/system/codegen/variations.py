@@ -22,7 +22,9 @@ from nonsmooth.system.codegen.generate import (
     MOST_MODELS,
     SIGNATURES,
     by_case,
+    choosing_code,
     constants_of,
+    fields_of,
     function_of,
     jet_functions,
     scalar_code,
@@ -83,17 +85,19 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
         traced.t, traced.u, constants_of(traced), traced.fields, [[jac[i][j] for i, j in entries] for jac in jacobians]
     )
     changes, small = by_case([_small_changes(entries, kind, n, len(wanted)) for kind in kinds], "change")
-    fields = [scalar_code(traced, [(f"du[{i}]", e) for i, e in enumerate(field)]) for field in traced.fields]
-    switches = [scalar_code(traced, _switch(traced, jump, wanted)) for jump in traced.transitions]
-    functions = jet.functions.union(*(used for _, used in [*fields, *switches]))
+    field, field_lines, used = choosing_code(traced, fields_of(traced))
+    switch, switch_lines, used_by_switch = choosing_code(
+        traced, [_switch(traced, jump, wanted) for jump in traced.transitions]
+    )
+    functions = jet.functions | used | used_by_switch
     parts = [
         "from numpy import array",
         "from nonsmooth.kernels.compile.cache import callback, device",
         "from nonsmooth.kernels.compile.lanes import load, plus, store, times",
         f"from math import {', '.join(sorted(functions))}" if functions else "",
         *jet_functions(jet, _kind(_JET), "mode, order, t, u, q, C, W, D", small, **changes),
-        function_of("field", _kind(SIGNATURES["field"]), "mode, t, u, q, du", *by_case([lines for lines, _ in fields])),
-        function_of("switch", _kind(_SWITCH), "transition, t, u, q, out", *by_case([lines for lines, _ in switches])),
+        function_of("field", _kind(SIGNATURES["field"]), "mode, t, u, q, du", field, field_lines),
+        function_of("switch", _kind(_SWITCH), "transition, t, u, q, out", switch, switch_lines),
     ]
     module = load_module("\n".join(part for part in parts if part) + "\n", "variations", lasting=False)
     return VariationalModel(

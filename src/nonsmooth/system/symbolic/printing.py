@@ -8,7 +8,7 @@ subexpression that occurs twice is computed once.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import sympy
@@ -213,18 +213,19 @@ def _number(e: Basic) -> str:
 
 
 def assignments(targets: Iterable[tuple[str, Basic]], printer: Printer, prefix: str) -> list[str]:
-    """Lines ``target = expression``, after lines for what is shared between them.
-
-    Parameters
-    ----------
-    targets
-        (text of the left-hand side, expression) pairs.
-    printer
-        Its ``names`` learn the shared subexpressions, so that later calls use them too.
-    prefix
-        The shared ones are called ``prefix`` and a number.
-    """
+    """Lines ``target = expression`` of (text of the left-hand side, expression), behind lines for what they share."""
     targets = list(targets)
+    lines = shared_terms([expression for _, expression in targets], printer, prefix)
+    return lines + [f"{left} = {printer(expression)}" for left, expression in targets]
+
+
+def shared_terms(
+    expressions: Iterable[Basic], printer: Printer, prefix: str, wanted: Callable[[Basic], bool] = lambda e: True
+) -> list[str]:
+    """Lines that name what some expressions share, if it is ``wanted``.
+
+    The ``names`` of the printer learn them, so that later calls use them too: ``prefix`` and a number.
+    """
     counts: dict[Basic, int] = {}
     order: list[Basic] = []
 
@@ -237,16 +238,15 @@ def assignments(targets: Iterable[tuple[str, Basic]], printer: Printer, prefix: 
                 visit(argument)
             order.append(e)
 
-    for _, expression in targets:
+    for expression in expressions:
         visit(expression)
     lines: list[str] = []
     for e in order:
-        if counts[e] > 1 and _worth_a_name(e):
+        if counts[e] > 1 and _worth_a_name(e) and wanted(e):
             name = f"{prefix}{len(lines)}"
             text = printer(e)
             printer.names[e] = name
             lines.append(f"{name} = {text}")
-    lines.extend(f"{left} = {printer(expression)}" for left, expression in targets)
     return lines
 
 
