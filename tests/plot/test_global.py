@@ -61,7 +61,7 @@ def test_basins_show_their_attractors(support: ns.System) -> None:
     assert len(words) == 2 and {word.split(":")[0] for word in words} == {"period 3", "period 4"}
     assert sum(len(line.get_xdata()) for line in ax.lines) == 7
     np.testing.assert_array_equal(ax.collections[0].get_array().ravel(), found["label"].values.T.ravel())
-    assert len({attractor_color(k) for k in range(9)}) == 9 and attractor_color(-1) == "#FFFFFF"
+    assert len({attractor_color(k) for k in range(-1, 9)}) == 10 and attractor_color(-1) == "#FFFFFF"
 
 
 def test_one_value_has_a_cell_and_any_order_is_drawn_rising(support: ns.System) -> None:

@@ -66,6 +66,11 @@ def test_steady_pictures_write_the_frequency() -> None:
     assert written == [pytest.approx(20.123, abs=5 * found.frequency_error)]
     ax = pictures.steady_amplitude(found)
     assert any("fastest free decay" in text.get_text() for text in ax.get_legend().get_texts())
+    bars = [np.ptp(bar, axis=0)[1] for bar in ax.collections[0].get_segments()]  # 1/1000 of the amplitude, either side
+    blocks = found.blocks["amplitude_error"] / found.blocks["amplitude"]
+    assert bars == pytest.approx(2e3 * blocks.values, rel=0.05)
+    smaller = pictures.steady_amplitude(steady_response(t, 1e-3 * x))
+    assert [np.ptp(bar, axis=0)[1] for bar in smaller.collections[0].get_segments()] == pytest.approx(bars)
 
 
 def impacts(single: list[bool]) -> xr.Dataset:
