@@ -156,3 +156,33 @@ def test_a_reset_at_a_phase_counts_where_it_changes_nothing(r: float, period_num
     orbit = ns.find_orbit(system, start={"x": 0.3})
     assert orbit.period_number == period_number
     assert orbit.floquet_multipliers == pytest.approx([multiplier], abs=1e-12)
+
+
+def test_an_orbit_with_memory_has_its_own_extremes_and_clearance() -> None:
+    """x'' + x = m, which changes its sign at each half of T: x = m (1 - cos(t - T/4) / cos(T/4)) in the first half."""
+
+    def field(t: Any, u: Any, p: Any) -> Any:
+        return u.v, p.m - u.x
+
+    def rebound(t: Any, u: Any, p: Any) -> Any:
+        return u.x, -u.v
+
+    system = ns.System(
+        states=["x", "v"],
+        parameters={"T": 3.0},
+        memory={"m": (1.0, "")},
+        modes={"up": field, "down": field},
+        indicators={"level": lambda t, u, p: u.x - 1.0},
+        transitions=[
+            ns.Transition("up", "down", at=0.5, write={"m": lambda t, u, p: -1.0}),
+            ns.Transition("down", "up", at=0.0, write={"m": lambda t, u, p: 1.0}),
+            *(ns.Transition(mode, mode, when="level > 0", reset=rebound) for mode in ("up", "down")),
+        ],
+        period=lambda p: p.T,
+    )
+    orbit = ns.find_orbit(system, start={"v": -np.tan(0.75)}, transient=0, period_number=1)
+    assert not orbit.virtual
+    highest = 1.0 / np.cos(0.75) - 1.0
+    assert orbit.maximum == pytest.approx([highest, np.tan(0.75)], abs=1e-12)
+    assert orbit.minimum == pytest.approx([-highest, -np.tan(0.75)], abs=1e-12)
+    assert orbit.clearance["level"] == pytest.approx(1.0 - highest, abs=1e-12)

@@ -84,11 +84,12 @@ class Walk:
         self.net, (jet, n_scratch) = pack_net(traced), shooting.flow.path()
         self.functions = addresses(jet)
         jumps, visits, self.modes = traced.transitions, shooting.signature.visits, shooting.modes
-        n, m = len(traced.u), shooting.m + 1
+        n, m = shooting.flow.n_moving, shooting.m + 1  # with the memory that the jet moves as states
         both = [_in_net(traced, self.net, v.transition, v.row) for v in visits]
         self.fired, self.fired_row = np.array(both, dtype=np.int64).T.copy()
-        self.lacking = np.array(traced.lacking, dtype=np.int64).reshape(len(traced.mode_names), n)
-        self.weight = system.scale_vector() * 1e-3
+        self.lacking = np.zeros((len(traced.mode_names), n), dtype=np.int64)
+        self.lacking[:, : len(traced.u)] = traced.lacking
+        self.weight = shooting.flow.scale[:n] * 1e-3
         rows = n + len(traced.indicators) + len(traced.outputs)
         self.scratch = (
             np.zeros((rows, ORDER + 1)),
@@ -96,7 +97,7 @@ class Walk:
             np.zeros(n),
             np.zeros(len(traced.indicators)),
         )
-        self.memory, self.shape, self.n = len(traced.m), (m, len(jumps)), n
+        self.memory, self.shape, self.states = len(traced.m), (m, len(jumps)), len(traced.u)
         sources = np.array([jump.source for jump in jumps], dtype=np.int64)
         fires = np.array([jump.fires for jump in jumps], dtype=bool) & (self.net.at < 0)
         self.armed = (sources == self.modes[:, None]) & fires
@@ -144,7 +145,7 @@ class Walk:
         from nonsmooth.kernels.tangent.orbit_path import Margins, Visits, follow
 
         m, n_t = self.shape
-        extremes = np.empty((2, self.n))
+        extremes = np.empty((2, len(self.weight)))
         inner, place, begin, size, end = np.empty((5, m, n_t))
         begin_row, which = np.empty((2, m, n_t), dtype=np.int64)
         slope = np.empty((m, 2))
@@ -195,8 +196,7 @@ class Walk:
         landing = held.argmax(axis=1)
         extremes[~np.isfinite(extremes)] = np.nan  # states that no visit has
         return Path(
-            extremes[0],
-            extremes[1],
+            *extremes[:, : self.states],
             inner,
             place,
             which,
