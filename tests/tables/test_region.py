@@ -50,6 +50,8 @@ def test_a_state_stands_for_all_its_values(forced) -> None:
         assert (ns.region(response, f"abs(v_q)/w < {bound}").values == (exact < bound)).all()
     assert not ns.region(response, "abs(q) > 0.001").any()  # it passes zero
     assert not ns.region(response, "q > 0 or q < 0").any()
+    assert not ns.region(response, "q != 0").any() and not ns.region(response, "abs(q) != 0.1").any()
+    assert (ns.region(response, "q != 2").values == (exact < 2.0)).all()
 
 
 def test_against_a_chart_evaluated_by_hand(struck) -> None:

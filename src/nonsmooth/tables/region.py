@@ -27,7 +27,6 @@ _COMPARE: dict[Any, Callable[[Any, Any], Any]] = {
     sp.StrictGreaterThan: operator.gt,
     sp.GreaterThan: operator.ge,
     sp.Eq: operator.eq,
-    sp.Ne: operator.ne,
 }
 #: Loads that are asked for without their element: then of each of them.
 _OF_ELEMENTS = ("force", "friction_force", "impact_speed", "impacts", "impulse", "energy")
@@ -176,6 +175,8 @@ def _holds(read: Any, held: Mapping[sp.Symbol, _Range], condition: str) -> Any:
         for part in parts[1:]:
             found = join(found, part)
         return found
+    if isinstance(read, sp.Ne):  # of a range both ends may differ from what lies between them
+        return operator.or_(*(_holds(one(*read.args, evaluate=False), held, condition) for one in (sp.Lt, sp.Gt)))
     if type(read) not in _COMPARE:
         raise ValueError(f"{shortened(condition)} is no condition: write {_FORM}")
     left, right = read.args
