@@ -197,3 +197,17 @@ def test_two_frictions_whose_shares_depend_on_a_parameter_are_one_of_their_sum()
         np.testing.assert_allclose(runs[0].P, runs[1].P, atol=1e-11)
     with pytest.raises(ns.SystemDefinitionError, match="depends on a parameter in which derivatives"):
         ns.sensitivity(two.with_parameters(F=0.1), duration=30.0, start={"x": 0.4}, parameters=["a"])  # it sticks
+
+
+@pytest.mark.parametrize("pulls", [True, False])
+def test_a_damping_of_zero_has_a_derivative(pulls):
+    """A mass of speed 1 is thrown back by a unit spring, in contact for pi: the damper takes c pi / 2 to first order."""
+    elements = {
+        "spring": E.ElasticStop(at="q", position=0.0, stiffness=1.0, damping="c", pulls=pulls),
+        "rub": E.Coulomb(at="q", friction=0.0),
+        "wall": E.Stop(at="q", position=-50.0, side=-1),
+    }
+    system = ns.mechanical(1.0, 0.0, 0.0, parameters={"c": 0.0}, elements=elements)
+    found = ns.sensitivity(system, duration=6.0, start={"q": -1.0, "v_q": 1.0}, parameters=["c"])
+    assert found.end.values == pytest.approx([np.pi - 5.0, -1.0], abs=1e-12)
+    assert float(found.P.sel(state="v_q", parameter="c")) == pytest.approx(0.5 * np.pi, abs=1e-11)

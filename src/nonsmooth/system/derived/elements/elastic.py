@@ -181,4 +181,5 @@ class PreloadedSpring(Displaced):
 def damped(here: Place) -> Any:
     """The damper's force; without one no speed is asked for, and states need not have one."""
     damping = here.law("damping")
-    return 0 if here.vanishes(damping) else -damping * here.rate()
+    none = here.vanishes(damping) and here.vanishes(1j * damping)  # nor a derivative, where numbers carry one
+    return 0 if none else -damping * here.rate()
