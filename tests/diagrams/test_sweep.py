@@ -462,3 +462,26 @@ def test_without_judgement_the_points_are_those_of_poincare_and_no_period_is_cla
         ns.sweep(system, "rho", values, density=True, judge=False)
     with pytest.raises(TypeError, match="judge = .no."):
         ns.sweep(system, "rho", values, judge="no")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("elements", [0, 1, 3])
+def test_an_output_that_is_not_affine_takes_no_extremes_from_the_others(elements: int) -> None:
+    """x = X cos(w t - phi) of any amplitude between far stops; by series its square is known too."""
+    w, c = np.array([0.5, 1.4]), 0.2
+    system = ns.mechanical(
+        1.0,
+        c,
+        1.0,
+        parameters={"w": 1.0},
+        forcing={"q": lambda t, p: np.cos(p.w * t)},
+        outputs={"twice": lambda t, u, p: 2 * u.q, "square": lambda t, u, p: u.q**2},
+        elements={f"s{k}": ns.elements.ElasticStop(at="q", position=50.0, stiffness=1.0) for k in range(elements)},
+    )
+    X = 1 / np.hypot(1 - w**2, c * w)
+    swept = ns.sweep(system, "w", w, **QUIET)
+    assert swept["twice_maximum"].values == pytest.approx(2 * X, rel=1e-9)
+    assert np.isnan(swept["square_maximum"]).all() and np.isnan(swept["square_minimum"]).all()
+    assert all((swept[f"s{k}_force_maximum"] == 0.0).all() for k in range(elements))
+    if not elements:
+        by_series = ns.sweep(system, "w", w, method="taylor", **QUIET)
+        assert by_series["square_maximum"].values == pytest.approx(X**2, rel=1e-8)

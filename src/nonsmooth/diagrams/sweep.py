@@ -100,7 +100,8 @@ def sweep(
     xarray.Dataset
         Over the parameter (and ``direction``, ``start``): ``section(..., iterate, state)``, true extremes ``maximum``,
         ``minimum``, ``period_number`` (0: none found), ``residual``, ``crossings_per_period``,
-        ``contacts_per_period``, ``clearance``, extremes of the outputs, ``status``. Where some point stands:
+        ``contacts_per_period``, ``clearance``, extremes of the outputs (of one that is not affine in the states
+        NaN by the exact flow: give ``method="taylor"``), ``status``. Where some point stands:
         ``equilibrium``, its name (empty where it moves), and the extent of the set of equilibria that it belongs to,
         ``equilibrium_minimum`` and ``equilibrium_maximum``. With ``density``, in place of
         ``section``: ``density(..., state, bin)`` (section points in each bin), ``outside(..., state)`` (those beyond
@@ -298,10 +299,10 @@ class _Sweep:
             high, low = (np.split(whole(gather(f"kept.{end}")), [n, n + n_i], axis=-1) for end in ("high", "low"))
             arrays["maximum"], arrays["minimum"] = high[0], low[0]
             arrays["clearance"] = np.where(armed_signs(system) > 0, -high[1], low[1])
-            if system.outputs and high[2].shape[-1] == len(system.outputs):
-                beyond = out_of_bounds(system.traced, self.points, high[2], low[2])
+            if system.outputs:
+                unknown = out_of_bounds(system.traced, self.points, high[2], low[2]) | np.isinf(high[2])
                 arrays["output_maximum"], arrays["output_minimum"] = (
-                    np.where(beyond, np.nan, one[2]) for one in (high, low)
+                    np.where(unknown, np.nan, one[2]) for one in (high, low)
                 )
         if asked["judge"] and self.edges is None:
             arrays |= standing_in_sweep(settler, self.points, arrays, gather("kept.section")[..., 0, :])

@@ -69,12 +69,6 @@ class LinearEngine(Engine):
         t = self.form.evaluate(points)
         n_points, n_modes = t.b.shape[:2]
         n_i, n_h = t.ia.shape[1], len(self.form.multiples)
-        if self.form.affine_outputs:
-            outputs = (t.oa, t.ob, t.oc, t.os)
-        else:
-            shape = (n_points, 0, n_modes)
-            waves = np.zeros((*shape, n_h))
-            outputs = (np.zeros((*shape, t.A.shape[-1])), np.zeros(shape), waves, waves)
         multiples = np.array(self.form.multiples, dtype=np.int64)
         from nonsmooth.kernels.compile.cache import compiled
         from nonsmooth.kernels.hybrid.records import Form
@@ -92,7 +86,10 @@ class LinearEngine(Engine):
             t.ib,
             t.ic,
             t.is_,
-            *outputs,
+            t.oa,
+            t.ob,
+            t.oc,
+            t.os,
             t.ra,
             t.rb,
             t.rc,
@@ -103,7 +100,7 @@ class LinearEngine(Engine):
             form = _with_harmonic(form)
         if n_points > 1:  # threads may share them
             compiled(self.module().run)
-        return LinearPoints(points, form, form.period, (n_modes, n_i, outputs[0].shape[1], len(self.net.rows)))
+        return LinearPoints(points, form, form.period, (n_modes, n_i, t.oa.shape[1], len(self.net.rows)))
 
     @property
     def is_planar(self) -> bool:

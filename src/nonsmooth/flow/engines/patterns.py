@@ -181,10 +181,8 @@ class PatternTables:
         self.capacity = 0
         self.add(patterns.visited[0])
 
-    def _outputs(self, linear: LinearTables, i: int) -> FloatArray | None:
-        """The user's own outputs as rows; None where they are not affine."""
-        if not self.patterns.form.affine_outputs:
-            return None
+    def _outputs(self, linear: LinearTables, i: int) -> FloatArray:
+        """The user's own outputs as rows."""
         found = np.zeros((linear.oa.shape[1], self.rows.field.shape[1]))
         put_together(found, self.rows.n, linear.oa[i, :, 0], linear.ob[i, :, 0], linear.oc[i, :, 0], linear.os[i, :, 0])
         return found
@@ -326,8 +324,6 @@ class PatternTables:
         return len(self.maps) - 1
 
     def _output_rows(self, forces: dict[int, Any]) -> FloatArray:
-        if self.own_outputs is None:
-            return np.zeros((0, self.rows.field.shape[1]))
         found = np.zeros((len(self.rows.parts), self.rows.field.shape[1]))
         for k, force in forces.items():
             if hasattr(force, "values"):

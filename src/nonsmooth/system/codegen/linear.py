@@ -67,13 +67,12 @@ class LinearForm:
     ----------
     multiples : tuple of int
         The harmonics k_h >= 1 that occur anywhere, ascending.
-    affine_indicators, affine_outputs, affine_resets : bool
-        Whether all of them have the form above.
+    affine_indicators, affine_resets : bool
+        Whether all of them have the form above; an output that has not is NaN.
     """
 
     multiples: tuple[int, ...]
     affine_indicators: bool
-    affine_outputs: bool
     affine_resets: bool
     _code: _TablesCode = field(repr=False, compare=False)
     _fills: dict[Any, Callable[..., None]] = field(default_factory=dict, repr=False, compare=False)
@@ -132,12 +131,11 @@ def linear_form(traced: Traced) -> LinearForm | None:
     for mode, vector in enumerate(fields):
         code.add(vector or [], "A", "b", "c", "s", (mode,), split=True)
     code.add(indicators or [], "ia", "ib", "ic", "is_", (), split=False)
-    affine_outputs = all(row is not None for row in outputs)
-    for i, row in enumerate(outputs if affine_outputs else []):
-        code.add(row or [], "oa", "ob", "oc", "os", (i,), split=False)
+    for i, row in enumerate(outputs):
+        code.add(row or [{"1": sympy.nan}] * len(fields), "oa", "ob", "oc", "os", (i,), split=False)
     for i, vector in enumerate(resets):
         code.add((vector if affine_resets else None) or taking.identity(), "ra", "rb", "rc", "rs", (i,), split=True)
-    return LinearForm(code.multiples(), indicators is not None, affine_outputs, affine_resets, code)
+    return LinearForm(code.multiples(), indicators is not None, affine_resets, code)
 
 
 def _map_of(transition: TracedTransition, traced: Traced) -> tuple[Expr, ...]:
