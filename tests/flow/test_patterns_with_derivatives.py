@@ -201,7 +201,7 @@ def test_two_frictions_whose_shares_depend_on_a_parameter_are_one_of_their_sum()
 
 @pytest.mark.parametrize("pulls", [True, False])
 def test_a_damping_of_zero_has_a_derivative(pulls):
-    """A mass of speed 1 is thrown back by a unit spring, in contact for pi: the damper takes c pi / 2 to first order."""
+    """A mass of speed 1 is thrown back by a unit spring within pi: the damper takes c pi / 2 of it to first order."""
     elements = {
         "spring": E.ElasticStop(at="q", position=0.0, stiffness=1.0, damping="c", pulls=pulls),
         "rub": E.Coulomb(at="q", friction=0.0),

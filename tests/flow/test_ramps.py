@@ -107,3 +107,26 @@ def test_ramps_are_recorded(relaxation: ns.System) -> None:
 
     run = ns.simulate(relaxation, duration=1.0, ramps={"f": (0.0, 2.0)})
     assert read_provenance(run)["options"]["ramps"] == {"f": [0.0, 2.0]}
+
+
+@pytest.mark.parametrize(
+    "element",
+    [
+        ns.elements.Stop(at="q", position="place"),
+        ns.elements.ElasticStop(at="q", position="place", stiffness=4.0, damping=0.5),
+        ns.elements.Coulomb(at="q", friction=0.5, belt="place"),
+    ],
+)
+def test_a_ramp_that_moves_an_element_is_refused(element: ns.elements.Stop) -> None:
+    """The equations of elements hold the speed of a stop and of a belt; that of a ramp they would leave out."""
+    system = ns.mechanical(1.0, 0.0, 0.0, parameters={"place": 1.0}, elements={"one": element})
+    with pytest.raises(ValueError, match="a ramp moves element 'one'"):
+        ns.simulate(system, duration=20.0, ramps={"place": (1.0, -1.0)})
+
+
+def test_a_spring_whose_place_is_ramped() -> None:
+    """x'' = -k (x - 1 + t / 10) from t = 10 on: x = (s - sin(w s) / w) times -1 / 10, s = t - 10, w = 2."""
+    spring = ns.elements.ElasticStop(at="q", position="place", stiffness=4.0)
+    system = ns.mechanical(1.0, 0.0, 0.0, parameters={"place": 1.0}, elements={"spring": spring})
+    run = ns.simulate(system, duration=11.0, ramps={"place": (1.0, -0.1)})
+    assert float(run.u[-1, 0]) == pytest.approx(-0.1 * (1.0 - np.sin(2.0) / 2.0), abs=1e-11)

@@ -38,7 +38,7 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
     ------
     ValueError, TypeError, SystemDefinitionError
         A parameter that does not exist, a ramp that is none of these, or has a corner, or passes through a value
-        that the equations do not allow.
+        that the equations do not allow, or moves an element whose force or impacts depend on that speed.
     """
     from sympy import Float
 
@@ -63,6 +63,14 @@ def with_ramps(system: System, ramps: Mapping[str, Any], t_begin: float, t_end: 
             system.parameter_points({name: np.linspace(first, last, WATCHED)})
             slope = Float((last - first) / (t_end - t_begin))
             changes[symbol] = Float(first) + slope * (traced.t - Float(t_begin))
+
+    loads = system._description.loads
+    for load in loads.elements if loads else ():
+        if load.where.free_symbols & set(changes) and (load.element.held or "damping" in load.text):
+            raise ValueError(
+                f"a ramp moves element {load.name!r}, whose equations know no speed that is not written in them: give "
+                f"its {load.element.kinematics}, position or belt as a function of time, lambda t, u, p: p.a + p.b * t"
+            )
 
     def put(expressions: Any) -> Any:
         return tuple(expression.xreplace(changes) for expression in expressions)
