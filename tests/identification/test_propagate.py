@@ -281,3 +281,21 @@ def test_a_response_without_a_jump_has_bands() -> None:
         factor[:, None] * height,
         rtol=1e-6,
     )
+
+
+def test_a_branch_of_a_system_without_contacts_has_bands() -> None:
+    """Of a linear oscillator in closed form; it has no clearances, whose bands there are none of."""
+    s = ns.mechanical(
+        1.0,
+        0.15,
+        "k",
+        parameters={"k": 9.0, "omega": 2.6},
+        coordinates=["q"],
+        forcing={"q": lambda t, p: np.cos(p.omega * t)},
+    )
+    band = ns.propagate(
+        known(s, {"k": 0.05}), ns.continue_orbit, ns.find_orbit(s), "omega", (2.5, 2.8), draws=6, **QUIET
+    )
+    omega, k = band["omega"].values, band["drawn_k"].values[:, None]
+    expected = np.quantile(1 / np.hypot(k - omega**2, 0.15 * omega), band["quantile"].values, axis=0)
+    np.testing.assert_allclose(band["maximum_quantiles"].sel(state="q").values, expected, rtol=2e-3)

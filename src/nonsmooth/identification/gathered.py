@@ -31,10 +31,11 @@ class Gathered:
         self.centre = centre
         self.branch = str(centre.attrs.get("parameter", "")) if "point" in centre.dims else ""
         names = [*centre.data_vars, *([self.branch] if self.branch else [])]
-        numbers = [str(name) for name in names if centre[name].dtype.kind in "fiub" and name != "status"]
+        held = [str(name) for name in names if centre[name].size and name != "status"]
+        numbers = [name for name in held if centre[name].dtype.kind in "fiub"]
         listed = {str(name) for name in numbers if set(centre[name].dims) & set(LISTS)}
         along = {name for name in numbers if "point" in centre[name].dims}
-        self.plain = [name for name in numbers if name not in listed | along and centre[name].size]
+        self.plain = [name for name in numbers if name not in listed | along]
         left = {self.branch, "unknowns", "tangent", "layout", "mode"}
         self.along = [] if "branch" in centre else [name for name in along if name not in left]  # one branch alone
         self.lists = [dim for dim in LISTS if centre.sizes.get(dim) and (dim != "special" or self.branch)]
