@@ -181,3 +181,24 @@ def test_a_knock_in_one_of_two_driven_runs_with_a_stop() -> None:
 def test_what_does_not_fit_is_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
         ns.fit(oscillator(), {"q": (T, decay(T))}, ["k"], progress=False, **options)
+
+
+@pytest.mark.parametrize("name", ["phase", "clock"])
+def test_a_parameter_of_the_system_may_be_called_as_an_unknown_of_the_recording(name: str) -> None:
+    """Two forced runs in closed form, whose forces lead by angles of their own: a parameter, in rad."""
+    rng, leads = np.random.default_rng(6), (0.2, 0.5)
+    s = ns.mechanical(
+        1.0,
+        0.15,
+        "k",
+        parameters={"k": 8.8, name: 0.3},
+        coordinates=["q"],
+        forcing={"q": lambda t, p: np.cos(2.0 * t + getattr(p, name))},
+    )
+    runs = [
+        {"q": (T, np.real(np.exp(1j * (2 * T + lead)) / (5 + 0.3j)) + decay(T) + 1e-3 * rng.standard_normal(T.size))}
+        for lead in leads
+    ]
+    found = ns.fit(s, runs, ["k", name], per_run=[name], progress=False, tries=2)
+    within(found, {"k": 9.0, **{f"{name}, {run}": lead for run, lead in enumerate(leads)}})
+    assert found.estimate(f"{name}, 0").unit == "" and not found.anomalies

@@ -76,7 +76,8 @@ def read_unknowns(
     steady: int = 0,
 ) -> Unknowns:
     """Read the unknowns of a fit from names, bounds and priors, and those of which each run has its own; the last
-    ``steady`` runs have no phase. A parameter that is set in a run is known there.
+    ``steady`` runs have no phase. A parameter that is set in a run is known there; one that is called ``clock`` or
+    ``phase`` is a parameter as any other.
 
     Raises
     ------
@@ -96,7 +97,8 @@ def read_unknowns(
             raise ValueError(unknown(name, "an unknown of this fit", repr(system.name), allowed))
         if all(name in own for own in settings):
             raise ValueError(f"{name!r} stands in parameters, to be found, and in settings, as known: leave one out")
-    if "phase" in given and (system.period() is None or steady == len(runs)):
+    clock, phase = (name in given and name not in system.values for name in ("clock", "phase"))
+    if phase and (system.period() is None or steady == len(runs)):
         why = "it has no forcing period" if system.period() is None else "readings of steady states have none"
         raise ValueError(f"the phase of {system.name!r} cannot be found: {why}; leave 'phase' out")
     active = tuple(name for name in given if name in system.values)
@@ -105,26 +107,26 @@ def read_unknowns(
     for name in own:
         if name not in given:
             raise ValueError(f"per_run: {unknown(name, 'an unknown', 'this fit', dict.fromkeys(given, ''))}")
-    clock, phases = "clock" in given, len(runs) - steady if "phase" in given else 0
-    each = {*own, *(["phase"] if phases else [])} if len(runs) > 1 else set()
-    local = [*active, *(f"{q}.{what}" for q, what in of_sensors), *["clock"] * clock, *["phase"] * bool(phases)]
+    phases = (len(runs) - steady) * phase
+    each = {*own, *["phase"] * phase} if len(runs) > 1 else set()
+    local = [*active, *(f"{q}.{what}" for q, what in of_sensors), *["clock"] * clock, *["phase"] * phase]
     order = [*(n for n in active if n not in each), *(n for n in active if n in each), *local[len(active) :]]
     base: list[str] = []
     names: list[str] = []
     first: dict[str, int] = {}
     for name in order:
         first[name] = len(names)
-        mine = (runs[:phases] if name == "phase" else runs) if name in each else [""]
+        mine = (runs[:phases] if phase and name == "phase" else runs) if name in each else [""]
         base += [name] * len(mine)
         names += [f"{name}, {run}" for run in mine] if name in each else [name]
-    steps = [[min(run, phases - 1) if n == "phase" else run for n in local] for run in range(len(runs))]
+    steps = [[min(run, phases - 1) if phase and n == "phase" else run for n in local] for run in range(len(runs))]
     places = np.array(
         [[first[n] + k * (n in each) for n, k in zip(local, row, strict=True)] for row in steps], dtype=np.intp
     )
     guess = np.array([known[name][0] for name in base])
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
     for i, name in enumerate(names):
-        if name.partition(",")[0] == "clock":
+        if clock and base[i] == "clock":
             low[i], high[i] = _CLOCKS
         pair = bounds.get(base[i])
         if pair is not None:
@@ -154,7 +156,7 @@ def _known_unknowns(system: System, sensors: Mapping[str, Sensor]) -> dict[str, 
             inverse = f"1/({unit})" if unit and sensors[q].gain != 1 else ""
             for what, own in zip(OF_A_SENSOR, (inverse, unit, ""), strict=True):  # gain, offset, delay
                 found[f"{q}.{what}"] = (getattr(sensors[q], what), own)
-    return {**found, "clock": (1.0, ""), "phase": (0.0, "periods")}
+    return {"clock": (1.0, ""), "phase": (0.0, "periods"), **found}
 
 
 def _bounds(name: str, pair: Any, guess: float) -> tuple[float, float]:
