@@ -202,3 +202,19 @@ def test_a_parameter_of_the_system_may_be_called_as_an_unknown_of_the_recording(
     found = ns.fit(s, runs, ["k", name], per_run=[name], progress=False, tries=2)
     within(found, {"k": 9.0, **{f"{name}, {run}": lead for run, lead in enumerate(leads)}})
     assert found.estimate(f"{name}, 0").unit == "" and not found.anomalies
+
+
+def test_a_channel_that_a_run_lacks_or_that_holds_few_readings() -> None:
+    """Of five decays the velocity is known in one; of one decay at three instants."""
+    rng, sizes = np.random.default_rng(4), 1.0 + 0.1 * np.arange(5)
+    w = np.sqrt(9.0 - 0.15**2 / 4)
+    q = [size * decay(T) + 1e-3 * rng.standard_normal(T.size) for size in sizes]
+    v = -9.0 / w * np.exp(-0.15 / 2 * T) * np.sin(w * T) + 3e-3 * rng.standard_normal(T.size)
+    runs = [{"time": T, "q": one, "v_q": np.where(k == 0, v, np.nan)} for k, one in enumerate(q)]
+    few = {"time": T, "q": q[0], "v_q": np.where(np.arange(T.size) % 150 == 30, v, np.nan)}
+    for given in (runs, few):
+        found = ns.fit(oscillator(k=8.7), given, ["k", "c"], progress=False, tries=1)
+        within(found, {"k": 9.0, "c": 0.15, "v_q.noise": 3e-3})
+        assert not found.anomalies
+    with pytest.raises(ValueError, match=r"measured\['v_q'\]: channel 'v_q' holds no number"):
+        ns.fit(oscillator(), runs[1], ["k", "c"], progress=False)

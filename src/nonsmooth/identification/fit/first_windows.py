@@ -31,7 +31,8 @@ def first_length(problem: Windows) -> float:
     found = []
     n = problem.marcher.flow.n
     for record in problem.records:
-        swings = [_turns(record.values[np.isfinite(record.values[:, c]), c]) for c in range(record.values.shape[1])]
+        columns = [y[np.isfinite(y)] for y in record.values.T]
+        swings = [_turns(y) for y in columns if len(y)]
         longest = _OF_A_SWING * 2.0 * record.duration / max(min(swings), 4)
         found.append(max(longest, (3 * n + 6) * record.duration / (len(record.time) - 1)))
     return float(np.median(found))
@@ -39,8 +40,6 @@ def first_length(problem: Windows) -> float:
 
 def _turns(y: FloatArray) -> int:
     """Number of turns of a quantity by more than a part of its range."""
-    if not len(y):
-        return 0
     low, high = np.quantile(y, [0.05, 0.95])
     least, turns, rising, extreme = _SWING * (high - low), 0, True, y[0]
     for value in y.tolist():
@@ -140,15 +139,17 @@ def told_start(problem: Windows, theta: FloatArray, window: Window) -> FloatArra
 
 def states_from_samples(problem: Windows, theta: FloatArray, run: int, which: slice) -> FloatArray:
     """States (N, n_u) that the samples tell: those measured, and those that are the rate of one; NaN elsewhere."""
-    record, measured = problem.records[run], problem.sensor_values(theta, run)
-    at = record.time[which]
+    record = problem.records[run]
+    at, held = record.time[which], np.isfinite(record.values)
+    sensors = problem.sensor_values(theta, run).items()
+    measured = {q: (sensor, c) for c, (q, sensor) in enumerate(sensors) if held[:, c].any()}
     system, names = problem.system, list(problem.system.states)
     told = np.full((len(at), len(names)), np.nan)
     known = rates(system)
-    for c, (quantity, sensor) in enumerate(measured.items()):
+    for quantity, (sensor, c) in measured.items():
         if quantity not in names:
             continue
-        k, have = names.index(quantity), np.flatnonzero(np.isfinite(record.values[:, c]))
+        k, have = names.index(quantity), np.flatnonzero(held[:, c])
         t, y = record.time[have], (record.values[have, c] - sensor.offset) / sensor.gain
         value, slope = _local(t, y, at)
         told[:, k] = value

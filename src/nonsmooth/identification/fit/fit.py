@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 _PHASES = 8  # first guesses of an unknown phase
 _LONGER = 3.3  # the other length of first windows, in every second try
+_PART = 0.05  # of the largest reading: the noise at first, where readings show none
 _LOSSES = {"linear": np.inf, "huber": 2.5}  # noise deviations from which on a residual counts linearly
 _MORE = 3  # guesses that are looked at, for each that is fitted
 _KNOWN, _ROUGH = 4.0, 0.25  # mean squared residual of a fit near the steady states: over known noise, and over a guess
@@ -236,7 +237,7 @@ def problem_of(
     if system.inputs and (unknowns.phases or unknowns.clock):
         raise ValueError("inputs have the time of the recording: with them neither 'phase' nor 'clock' can be found")
     within = [
-        [record.values[sensor.limit(y) == 0, c] for record in records for y in [record.values[:, c]]]
+        [y[sensor.limit(y) == 0] for record in records for y in [record.values[:, c]] if np.isfinite(y).any()]
         for c, sensor in enumerate(sensors.values())
     ]
 
@@ -245,7 +246,12 @@ def problem_of(
 
     irregular = np.array(  # of a channel without noise that is mostly zero, as a contact's force, what moves
         [
-            (max(noise(readings), sensor.floor) or max(noise(readings, moving=True), 1e-300)) if readings else np.inf
+            max(noise(readings), sensor.floor)
+            or noise(readings, moving=True)
+            or sensor.noise  # of a few readings, which show none
+            or max(_PART * float(np.nanmax(np.abs(np.concatenate(readings)), initial=0.0)), 1e-300)
+            if readings
+            else np.inf
             for readings, sensor in zip(within, sensors.values(), strict=True)
         ]
     )

@@ -117,6 +117,9 @@ def read_records(
                 )
             columns.append(table[sensor.channel])
         records.append(replace(_joined(label, columns, per_run[label]), drive=_driven(system, inputs, label, table)))
+    for c, (quantity, sensor) in enumerate(sensors.items()):
+        if records and not any(np.isfinite(one.values[:, c]).any() for one in records):
+            raise ValueError(f"measured[{quantity!r}]: channel {sensor.channel!r} holds no number; leave it out")
     return sensors, records, steady
 
 
