@@ -329,6 +329,16 @@ def test_models_are_ranked_by_what_they_predict():
     assert ranked.rms.sel(model="undamped") > 3.0
     more = ranked.sel(model=["true", "with one more"])
     assert float(abs(more.squared_error.diff("model").mean())) < 0.05
+    end = 0.3 * np.max(np.abs(x))
+    ranked = ns.select_model(  # a reading at the limit of its sensor is predicted by a motion beyond
+        {"true": (system, ["k", "c"]), "undamped": (system.with_parameters(c=0.0), ["k"])},
+        {"x": (t, np.clip(x, -end, end))},
+        measured={"x": ns.Sensor("x", range=(-end, end))},
+        folds=2,
+        tries=1,
+        progress=False,
+    )
+    assert ranked.rms.sel(model="true") < 1.1 and ranked.rms.sel(model="undamped") > 3.0
     with pytest.raises(ValueError, match="at least two systems"):
         ns.select_model({"one": (system, ["k"])}, {"x": (t, x)})
     with pytest.raises(ValueError, match="too short for folds = 50"):

@@ -49,6 +49,20 @@ def test_the_uncertainties_of_a_free_decay_are_the_closed_form(free: bool) -> No
     assert float(found["log_det"][0]) == pytest.approx(log_det, abs=1e-5)
 
 
+def test_readings_beyond_the_limits_of_a_sensor_tell_hardly_anything() -> None:
+    """Those within them have the bound of the closed form; a few beside them tell a little more."""
+    t = np.linspace(0.0, 30.0, 1201)
+    inside = np.abs(decay(t, C, K, 1.0, 0.0)) < 0.3
+    for gain in (1.0, -1e3):
+        limits = 0.3 * abs(gain) * np.array([-1.0, 1.0])
+        sensor = ns.Sensor(noise=NOISE * abs(gain), gain=gain, range=limits)
+        run = {"duration": 30.0, "samples": t, "start": {"q": 1.0}}
+        found = ns.plan_experiment(oscillator(), {"decay": run}, ["c", "k"], measured={"q": sensor})
+        ratio = found["uncertainty"].values[0] / np.sqrt(np.diag(covariance(t[inside], True)))
+        assert (ratio < 1.01).all() and (ratio > 0.85).all()
+    assert (covariance(t, True)[0, 0] / covariance(t[inside], True)[0, 0]) < 0.2
+
+
 def test_a_long_decay_has_the_variance_of_the_books() -> None:
     r"""var delta = var omega_d = 16 delta^3 sigma^2 / (A^2 f_s) for a decay followed to its end, delta << omega."""
     rate, delta = 40.0, C / (2 * M)

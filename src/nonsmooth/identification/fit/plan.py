@@ -163,9 +163,7 @@ def _information(
     from nonsmooth.identification.fit.fit import problem_of
 
     settings = dict(run.get("settings", {}))
-    asked: dict[str, Any] = {key: run.get(key) for key in ("samples", "start", "mode")}
-    asked |= {key: run[key] for key in ("duration", "periods") if key in run}
-    motion = simulate(system.with_parameters(settings), **asked)
+    motion = simulate(system.with_parameters(settings), **{key: run[key] for key in run if key != "settings"})
     mode = list(system.modes)[int(motion["mode"].values[0])] if motion["mode"].dtype.kind in "iu" else None
     priors, mode = known_before["priors"], run.get("mode") or mode
     problem = problem_of(system, motion, parameters, sensors, priors, settings, None, "time", mode)
@@ -173,9 +171,12 @@ def _information(
     theta = problem.unknowns.guess
     begin = motion["u"].values[:1]
     whole = problem.of(first_windows(problem, theta, np.inf, np.nan_to_num(begin), known_before["free_start"]))
-    state = whole.derivatives(theta, whole.starts)
-    if not whole.pieces or not all(np.isfinite(r).all() for r in state.residuals):
+    read = whole.residuals(theta, whole.starts).fitted
+    if not whole.pieces or not all(np.isfinite(y).all() for y in read):
         raise SolveError(f"run {name!r} cannot be followed to its end; shorten it", status="no_convergence")
+    for window, y in zip(whole.pieces, read, strict=True):
+        window.values[window.readings] = whole.shown(window, y[:, 0])
+    state = whole.derivatives(theta, whole.starts)
     normal = reduced(whole, state, whole.weights(None), len(theta))[0]
     shared = len(theta) - problem.unknowns.phases
     own = np.linalg.pinv(normal[shared:, shared:], hermitian=True)

@@ -50,8 +50,7 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
         columns["mode"].append(motion.mode[here])
         columns["place"].append(_of_samples(system, motion, marks)[here])
         columns["measured"].append(window.values[k, c])
-        limits = np.array([sensor.range or (-np.inf, np.inf) for sensor in problem.sensors.values()])[c]
-        columns["fitted"].append(np.clip(predicted, *limits.T))
+        columns["fitted"].append(problem.shown(window, predicted))
         columns["beyond"].append(predicted - columns["fitted"][-1])
         columns["noise"].append(problem.noise[c])
     table = {name: np.concatenate(parts) for name, parts in columns.items()}

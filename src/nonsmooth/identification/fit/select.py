@@ -166,4 +166,5 @@ def _predict(problem: Windows, grown: Grown, far: list[FloatArray]) -> None:
         if motion is not None:
             predicted, _ = fitted.readings(grown.theta, whole, motion, False)
             k, c = whole.readings
-            far[window.record][window.first + k, c] = (whole.values[k, c] - predicted) / problem.noise[c]
+            left = whole.values[k, c] - fitted.shown(whole, predicted)
+            far[window.record][window.first + k, c] = left / problem.noise[c]

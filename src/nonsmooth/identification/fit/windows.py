@@ -249,6 +249,11 @@ class Windows:
         at = np.stack([sensor.limit(window.values[:, j]) for j, sensor in enumerate(self.sensors.values())], axis=1)
         return np.asarray(at[k, c])
 
+    def shown(self, window: Window, predicted: FloatArray) -> FloatArray:
+        """Predicted readings as their sensors show them, which end at their limits."""
+        limits = np.array([sensor.range or (-np.inf, np.inf) for sensor in self.sensors.values()])
+        return np.clip(predicted, *limits[window.readings[1]].T)
+
     def _censored(self, window: Window, r: FloatArray, table: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residuals and derivatives where those at a limit are of the likelihood of being there or beyond."""
         side = self.limits(window)
