@@ -77,7 +77,7 @@ def test_derivatives_are_those_of_differences(system, start, measured, names):
         getattr(one, "channel", "") or (one if isinstance(one, str) else q): (t, np.cos(t))
         for q, one in measured.items()
     }
-    problem = problem_of(made, data, names, measured)
+    problem = problem_of(made, data, names, {"measured": measured})
     theta = problem.unknowns.guess.copy()
     if "phase" in names:
         theta[-1] = 0.3
@@ -428,7 +428,7 @@ def test_a_channel_in_another_unit_is_told_of_unless_its_gain_is_given(recwarn):
     x = xr.Dataset({"disp": ("time", 5.0 * np.exp(-t / 10) * np.cos(w * t), {"units": "mm"})}, coords={"time": t})
     mass = ns.mechanical(1.0, "c", "k", coordinates={"x": "m"}, parameters={"c": 0.15, "k": 4.2})
     with pytest.warns(UserWarning, match="channel 'disp' is in mm, the model in m"):
-        problem_of(mass, x, ["c", "k"], {"x": "disp"})
+        problem_of(mass, x, ["c", "k"], {"measured": {"x": "disp"}})
     recwarn.clear()
     found = ns.fit(mass, x, ["c", "k"], measured={"x": ns.Sensor("disp", gain=1e3)}, tries=1, progress=False)
     assert not [one for one in recwarn if "the model in" in str(one.message)]

@@ -260,3 +260,15 @@ def test_a_recording_is_compared_in_the_states_that_it_shows() -> None:
         ns.compare([record, record], system, channels=channels)
     with pytest.raises(ValueError, match="`nothing` is not a state or an output"):
         ns.compare(record, system, channels={"nothing": "sensor"})
+
+
+@pytest.mark.parametrize("lost", [slice(3000, 3001), slice(3000, 3400)])
+def test_readings_that_are_missing_leave_the_period_number(lost: slice) -> None:
+    """A motion of two periods of the drive in closed form, less a reading, or those of two and a half periods."""
+    t, w = np.arange(0, 120, 0.02), 2.0
+    q = np.cos(w * t) + 0.5 * np.cos(w * t / 2 + 0.3) + 1e-3 * np.random.default_rng(0).standard_normal(t.size)
+    system = ns.mechanical(1.0, 0.15, 9.0, coordinates=["q"], forcing={"q": lambda t, p: np.cos(w * t)})
+    held = np.ones(t.size, dtype=bool)
+    held[lost] = False
+    for record in ({"q": (t, np.where(held, q, np.nan))}, {"q": (t[held], q[held])}):
+        assert int(ns.compare(record, system)["measured_period_number"]) == 2

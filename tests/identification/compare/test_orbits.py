@@ -108,3 +108,10 @@ def test_missing_samples_leave_their_periods_out() -> None:
 def test_what_cannot_be_folded(phase: np.ndarray, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         fold(phase, harmonic(phase), 16)
+
+
+def test_an_interval_without_samples_leaves_its_periods_out() -> None:
+    phase = np.arange(64 * 10 + 1) / 64
+    kept = (phase < 3.2) | (phase > 5.7)
+    folded = fold(phase[kept], harmonic(phase[kept]), 32)
+    assert np.isnan(folded[3:6]).all() and np.isfinite(np.delete(folded, [3, 4, 5], axis=0)).all()

@@ -147,3 +147,15 @@ def test_settings_are_checked() -> None:
         read_settings({"g": (0.0, -1.0)}, model)
     with pytest.raises(ValueError, match="write \\{value"):
         read_settings({"g": {"val": 0.0}}, model)
+
+
+@pytest.mark.parametrize("drifting", [False, True])
+def test_a_missing_point_does_not_end_a_period(drifting: bool) -> None:
+    """Of period 3 with white noise: the returns of 3 that are there stay at 1."""
+    rng = np.random.default_rng(3)
+    points = np.tile([[1.0, 0.0], [0.2, 0.5], [-0.7, 0.1]], (40, 1)) + 1e-3 * rng.standard_normal((120, 2))
+    points[[50, 51, 52, 53, 77]] = np.nan
+    found = measured_period(points, [1e-3, 1e-3], drifting=drifting)
+    assert found.number == 3 and found.returns[2] == pytest.approx(1.0, abs=0.2)
+    with pytest.raises(ValueError, match="4 section points are too few"):
+        measured_period(np.where(np.arange(120)[:, None] < 4, points, np.nan), [1e-3, 1e-3])

@@ -112,9 +112,7 @@ def _measured(
     section = measured["section"]
     if name in section.dims:
         stacked = section.transpose(name, "iterate", "state").values
-        numbers = [
-            measured_period(one[np.isfinite(one).all(axis=1)], noise, max_period=max_period).number for one in stacked
-        ]
+        numbers = [measured_period(one, noise, max_period=max_period).number for one in stacked]
         at = np.repeat(measured[name].values.astype(float), stacked.shape[1])
         points, found = stacked.reshape(-1, stacked.shape[2]), np.repeat(numbers, stacked.shape[1])
     else:

@@ -116,7 +116,7 @@ def recorded_motion(
 
     from nonsmooth.identification.fit.records import irregularity, read_records
 
-    sensors, records, _ = read_records(system, recording, channels, runs=run)
+    sensors, records, _ = read_records(system, recording, {"measured": channels, "runs": run})
     if len(records) > 1:
         raise ValueError(
             f"compare lays one run over the model: run = ... one of {', '.join(record.name for record in records)}"

@@ -38,9 +38,10 @@ def compare_motion(
     splits: int,
 ) -> dict[str, Any]:
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
-    folded, sections = _measured(measured, phases, grid)
+    folded, returns = _measured(measured, phases, grid)
+    sections = [points[np.isfinite(points).all(axis=1)] for points in returns]
     scale = np.maximum(np.concatenate(sections).std(axis=0), noise)
-    number = measured_period(sections[0], noise, max_period=max_period).number
+    number = measured_period(returns[0], noise, max_period=max_period).number
     rng = np.random.default_rng(model.seed)
     motions = None
     if model.system is not None:
@@ -51,7 +52,7 @@ def compare_motion(
         predicted = from_result(model.theory, model.states, phases, grid, max_period)
     blurred = [points + noise * rng.standard_normal(points.shape) for points in predicted.sections]
     variables = _clouds(sections, blurred, predicted.sections, scale, splits, model.seed)
-    variables |= _periods(number, predicted, sections[0], scale, model.states)
+    variables |= _periods(number, predicted, returns[0], scale, model.states)
     if motions is not None and sorted(model.places) == list(range(len(motions.system.states))):
         predicted = _begun_with_the_measurement(motions, folded, number, predicted, grid)
     variables |= _orbits(folded, number, predicted, grid)
@@ -79,13 +80,9 @@ def compare_motion(
 
 def _measured(measured: xr.Dataset, phases: list[float], grid: int) -> tuple[FloatArray | None, list[FloatArray]]:
     if "u" not in measured:
-        return None, [_finite(np.asarray(measured["section"].values, dtype=float))]
+        return None, [np.asarray(measured["section"].values, dtype=float)]
     turns, u = np.asarray(measured["phase"].values, dtype=float), np.asarray(measured["u"].values, dtype=float)
-    return fold(turns, u, grid), [_finite(fold(turns - phase, u, 8)[:, 0]) for phase in phases]
-
-
-def _finite(points: FloatArray) -> FloatArray:
-    return points[np.isfinite(points).all(axis=1)]
+    return fold(turns, u, grid), [fold(turns - phase, u, 8)[:, 0] for phase in phases]
 
 
 def _starts(points: FloatArray | None, folded: FloatArray | None, model: Model, start: Any) -> Any:
@@ -95,7 +92,7 @@ def _starts(points: FloatArray | None, folded: FloatArray | None, model: Model, 
     """
     if start is not None:
         return np.atleast_2d(np.asarray(start, dtype=float))
-    at_zero = _finite(folded[:, 0]) if folded is not None else points
+    at_zero = points if folded is None else folded[np.isfinite(folded[:, 0]).all(axis=1), 0]
     count = 0 if at_zero is None else min(MEASURED_STARTS, len(at_zero))
     starts = np.zeros((1 + count, len(model.theory.states)))
     if at_zero is not None:
@@ -189,8 +186,8 @@ def _doubled(single: FloatArray, doubled: FloatArray, scale: FloatArray, number:
 
     Near: the middle of each pair is closer to a point of the orbit that is not doubled than the pair to each other.
     """
-    points = np.array([single[k::number].mean(axis=0) for k in range(number)])
-    split = np.array([doubled[k :: 2 * number].mean(axis=0) for k in range(2 * number)])
+    points = np.array([np.nanmean(single[k::number], axis=0) for k in range(number)])
+    split = np.array([np.nanmean(doubled[k :: 2 * number], axis=0) for k in range(2 * number)])
     middle, apart = 0.5 * (split[:number] + split[number:]), split[:number] - split[number:]
     away = np.min(np.linalg.norm((middle[:, None] - points) / scale, axis=2), axis=1)
     return np.abs(apart).max(axis=0) if np.linalg.norm(away) < np.linalg.norm(apart / scale) else None

@@ -35,7 +35,8 @@ def fold(phase: ArrayLike, u: ArrayLike, grid: int) -> FloatArray:
     phase : array (samples,)
         In forcing periods, rising through all of them.
     u : array (samples, states)
-        NaN where a sample is missing; a period that touches one is NaN.
+        NaN where a sample is missing; a period that touches one is NaN, or an interval of more than a quarter of a
+        period without samples.
     grid : int
         Samples per forcing period in the result; the first is at phase 0.
 
@@ -63,9 +64,10 @@ def fold(phase: ArrayLike, u: ArrayLike, grid: int) -> FloatArray:
         raise ValueError(f"{rate:.3g} samples per forcing period are too few; at least {FEWEST_SAMPLES} are needed")
     at = first + np.arange((last - first) * grid) / grid
     good = np.isfinite(values).all(axis=1)
-    inside = np.clip(at, turns[good][0], turns[good][-1])
-    folded = _cubic(turns[good], values[good], inside).reshape(-1, grid, values.shape[1])
-    for missing in np.unique(np.floor(turns[~good]).astype(int) - first):
+    turns, lost = turns[good], turns[~good]
+    folded = _cubic(turns, values[good], np.clip(at, turns[0], turns[-1])).reshape(-1, grid, values.shape[1])
+    step = np.diff(turns)[np.clip(np.searchsorted(turns, at), 1, len(turns) - 1) - 1]
+    for missing in np.unique(np.floor(np.append(lost, at[step > 2 / FEWEST_SAMPLES])).astype(int) - first):
         if 0 <= missing < len(folded):
             folded[missing] = np.nan
     return folded

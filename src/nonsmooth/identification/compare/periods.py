@@ -53,7 +53,7 @@ def measured_period(
     Parameters
     ----------
     points : array (n, states)
-        In the order in which they came.
+        In the order in which they came; NaN where one is missing, across which the others keep their places.
     noise : array (states,)
         Standard error of a point in each state; positive.
     max_period : int
@@ -73,16 +73,19 @@ def measured_period(
     if not (np.isfinite(sigma).all() and (sigma > 0).all()):
         raise ValueError(f"noise must be a positive standard error for each state, got {sigma.tolist()}")
     order = 2 if drifting else 1
-    longest = min(max_period, (len(cloud) - FEWEST_RETURNS) // order)
+    count = int(np.isfinite(cloud).all(axis=1).sum())
+    longest = min(max_period, (count - FEWEST_RETURNS) // order)
     if longest < 1:
         raise ValueError(
-            f"{len(cloud)} section points are too few for a period number; at least {FEWEST_RETURNS + 1} are needed"
+            f"{count} section points are too few for a period number; at least {FEWEST_RETURNS + 1} are needed"
         )
     scaled = cloud / (np.sqrt(6.0 if drifting else 2.0) * sigma)
-    returns = np.empty(longest)
+    returns = np.full(longest, np.inf)
     for p in range(1, longest + 1):
         change = scaled[p:] - scaled[:-p]
-        returns[p - 1] = np.sqrt(np.mean((change[p:] - change[:-p] if drifting else change) ** 2))
+        change = change[p:] - change[:-p] if drifting else change
+        if len(known := change[np.isfinite(change).all(axis=1)]) >= FEWEST_RETURNS:
+            returns[p - 1] = np.sqrt(np.mean(known**2))
     found = np.flatnonzero(returns <= bound)
     return MeasuredPeriod(int(found[0]) + 1 if len(found) else 0, returns)
 

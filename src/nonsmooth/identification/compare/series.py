@@ -33,8 +33,8 @@ def section_points(motion: xr.Dataset) -> FloatArray:
 
 def _period_of(points: FloatArray, noise: FloatArray, longest: int) -> int:
     """The period number of section points with known noise; 0: none found, -1: too few turns."""
-    points = points[np.isfinite(points).all(axis=1)]
-    return measured_period(points, noise, max_period=longest).number if len(points) >= FEW else -1
+    enough = np.isfinite(points).all(axis=1).sum() >= FEW
+    return measured_period(points, noise, max_period=longest).number if enough else -1
 
 
 def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], *, settle: int = 4) -> xr.Dataset:

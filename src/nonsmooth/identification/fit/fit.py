@@ -148,20 +148,7 @@ def fit(
     from nonsmooth.identification.fit.outcome import outcome
     from nonsmooth.identification.fit.posterior import posterior_of
 
-    problem = problem_of(
-        system,
-        recording,
-        parameters,
-        options["measured"],
-        options["priors"],
-        options["settings"],
-        options["runs"],
-        options["time"],
-        mode,
-        loss,
-        per_run,
-        inputs,
-    )
+    problem = problem_of(system, recording, parameters, options, mode, loss, per_run, inputs)
     free, tries, seed, progress = options["free_start"], options["tries"], options["seed"], options["progress"]
     begin, profiles = _begun(problem, start, free, leave_out), _profiles(problem, profile)
     best, left = best_of(problem, begin, free, window or np.inf, tries, seed, progress), list[str]()
@@ -207,17 +194,13 @@ def problem_of(
     system: System,
     recording: Any,
     parameters: Any,
-    measured: Any = None,
-    priors: Any = None,
-    settings: Any = None,
-    runs: Any = None,
-    time: str = "time",
+    options: Mapping[str, Any],
     mode: Any = None,
     loss: Any = "linear",
     per_run: Sequence[str] = (),
     inputs: Any = None,
 ) -> Windows:
-    """The problem, without windows; the noise is the records' own irregularity."""
+    """The problem, without windows; the noise is the records' own irregularity. ``options``: those of `Fitting`."""
     check_system(system, "fit", inputs=True)
     system = system.written_out()  # any mode may be the first, and a force that is fitted needs its formula
     from nonsmooth.identification.fit.first_level import read_modes
@@ -228,12 +211,10 @@ def problem_of(
 
     if system.is_map:
         raise ValueError(f"{system.name!r} is a map, whose time is a count: fit takes systems with vector fields")
-    sensors, records, steady = read_records(
-        system, recording, measured, runs=runs, time=time, settings=settings, inputs=inputs
-    )
+    sensors, records, steady = read_records(system, recording, options, inputs)
     labels = [one.name for one in records] + [one.name for one in steady]
     known = [one.settings for one in records] + [one.settings for one in steady]
-    unknowns = read_unknowns(system, sensors, parameters, priors, labels, known, per_run, len(steady))
+    unknowns = read_unknowns(system, sensors, parameters, options.get("priors"), labels, known, per_run, len(steady))
     if system.inputs and (unknowns.phases or unknowns.clock):
         raise ValueError("inputs have the time of the recording: with them neither 'phase' nor 'clock' can be found")
     within = [

@@ -165,8 +165,8 @@ def _information(
     settings = dict(run.get("settings", {}))
     motion = simulate(system.with_parameters(settings), **{key: run[key] for key in run if key != "settings"})
     mode = list(system.modes)[int(motion["mode"].values[0])] if motion["mode"].dtype.kind in "iu" else None
-    priors, mode = known_before["priors"], run.get("mode") or mode
-    problem = problem_of(system, motion, parameters, sensors, priors, settings, None, "time", mode)
+    given = {"measured": sensors, "settings": settings, "priors": known_before["priors"]}
+    problem = problem_of(system, motion, parameters, given, run.get("mode") or mode)
     problem = replace(problem, noise=noise)
     theta = problem.unknowns.guess
     begin = motion["u"].values[:1]

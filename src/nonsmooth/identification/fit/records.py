@@ -64,35 +64,29 @@ def irregularity(y: FloatArray, moving: bool = False) -> float:
 
 
 def read_records(
-    system: System,
-    recording: Any,
-    measured: Any,
-    *,
-    runs: Sequence[str] | None = None,
-    time: str = "time",
-    settings: Any = None,
-    inputs: Any = None,
+    system: System, recording: Any, options: Mapping[str, Any], inputs: Any = None
 ) -> tuple[dict[str, Sensor], list[Record], tuple[SteadyReadings, ...]]:
-    """The sensors and the records of a recording, and its readings of steady states.
+    """The sensors and the records of a recording, and its readings of steady states; ``options`` as of `Recorded`.
 
     Raises
     ------
     ValueError, TypeError
         Something that is no recording, channels that do not exist, times that do not increase, too few samples.
     """
+    runs, measured = options.get("runs"), options.get("measured")
     given = list(recording) if isinstance(recording, list | tuple) else [recording]
     if not given:
         raise ValueError(f"the list of recordings is empty; give {FORMS}")
     tables: dict[str, dict[str, tuple[FloatArray, FloatArray]]] = {}
     still = {f"{i}" if len(given) > 1 else "steady": one for i, one in enumerate(given) if is_steady(one)}
     for i, one in enumerate(given):
-        found = {} if is_steady(one) else _tables(one, runs, time)
+        found = {} if is_steady(one) else _tables(one, runs, options.get("time", "time"))
         for name, table in found.items():
             label = name if len(given) == 1 else f"{i}" if len(found) == 1 else f"{i} {name}"
             tables[label] = table
     if runs is not None and not tables:
         raise ValueError("runs= chooses runs of a Recording; what is given here is none, so leave it out")
-    per_run = _settings(system, settings, [*tables, *still])
+    per_run = _settings(system, options.get("settings"), [*tables, *still])
     steady = tuple(read_steady(system, one, name, measured, per_run[name]) for name, one in still.items())
     channels = list(dict.fromkeys(name for table in tables.values() for name in table))
     quantities = [] if tables else [q for one in steady for q in one.quantities]

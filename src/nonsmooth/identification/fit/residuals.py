@@ -23,9 +23,6 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
     """Readings, fit and residuals over ``sample``, each with its run, quantity, window, mode and place."""
     import xarray as xr
 
-    from nonsmooth.results.labels import labels_of
-    from nonsmooth.results.provenance import provenance
-
     problem, theta = grown.problem, grown.theta
     system = _nominal(grown)
     labels, marks = _places(system)
@@ -65,26 +62,17 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
     }
     data = xr.Dataset({name: ("sample", values) for name, values in table.items()})
     data["residual"] = (data["measured"] - data["fitted"]) / data["noise"]
-    for name, words in flags.items():
-        data[name].attrs = {
-            "flag_values": np.arange(len(words)),
-            "flag_meanings": " ".join(word.replace(" ", "_") for word in words),
-        }
     for name in ("measured", "fitted", "beyond", "noise"):
         data[name].attrs["units"] = unit
     data["beyond"].attrs["long_name"] = "how far the motion goes beyond the limits of the sensor"
     data["residual"].attrs = {"long_name": "residual over its standard deviation", "units": "1"}
-    data = data.set_coords("time")
-    return data.assign_attrs(provenance(labels_of(system), "fit", dict(options), method=problem.marcher.engine.name))
+    return _told(data.set_coords("time"), grown, system, options, flags)
 
 
 def steady_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
     """Readings of steady states, fit and residuals over ``sample``, each with its run, quantity, settings and place in
     the cycle."""
     import xarray as xr
-
-    from nonsmooth.results.labels import labels_of
-    from nonsmooth.results.provenance import provenance
 
     problem, system = grown.problem, _nominal(grown)
     names = [*system.values]
@@ -109,8 +97,6 @@ def steady_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
             columns.setdefault(name, []).append(values)
     data = xr.Dataset({name: ("sample", np.concatenate(parts)) for name, parts in columns.items()})
     units = {**system.states, **{name: parameter.unit for name, parameter in system.parameters.items()}}
-    for name, words in {"run": [one.name for one in problem.steady], "quantity": quantities}.items():
-        data[name].attrs = {"flag_values": np.arange(len(words)), "flag_meanings": " ".join(words)}
     for name in (names[place] for place in set_):
         data[name].attrs["units"] = units[name]
     for name in ("measured", "fitted", "measured_error"):
@@ -118,7 +104,22 @@ def steady_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
     kinds = {one.amplitude for one in problem.steady}
     data["measured"].attrs["long_name"] = "reading" if len(kinds) > 1 else "amplitude" if True in kinds else "section"
     data["residual"].attrs = {"long_name": "residual over its standard deviation", "units": "1"}
-    return data.assign_attrs(provenance(labels_of(system), "fit", dict(options), method=problem.marcher.engine.name))
+    flags = {"run": [one.name for one in problem.steady], "quantity": quantities}
+    return _told(data, grown, system, options, flags)
+
+
+def _told(
+    data: xr.Dataset, grown: Grown, system: System, options: Mapping[str, Any], flags: Mapping[str, list[str]]
+) -> xr.Dataset:
+    """The data with the words of its flags and the record of the fit."""
+    from nonsmooth.results.labels import labels_of
+    from nonsmooth.results.provenance import provenance
+
+    for name, words in flags.items():
+        meanings = " ".join(word.replace(" ", "_") for word in words)
+        data[name].attrs = {"flag_values": np.arange(len(words)), "flag_meanings": meanings}
+    method = grown.problem.marcher.engine.name
+    return data.assign_attrs(provenance(labels_of(system), "fit", dict(options), method=method))
 
 
 def by_place(data: xr.Dataset) -> list[tuple[str, float, int]]:
