@@ -153,6 +153,9 @@ def test_missing_samples_and_clocks_of_their_own():
     found = ns.fit(free().with_parameters(k=11.0, c=1.1), {"x": (t, x), "v": (slow, v)}, ["k", "c"])
     assert np.all(np.abs(normalized(found, {"k": K, "c": C})) < 3.5)
     assert found.residuals.sizes["sample"] == np.isfinite(x).sum() + len(slow)
+    masked = np.ma.masked_array(np.nan_to_num(x, nan=99.0), np.isnan(x))
+    again = ns.fit(free().with_parameters(k=11.0, c=1.1), {"x": (t, masked), "v": (slow, v)}, ["k", "c"])
+    assert dict(again) == dict(found)
     assert found.estimate("v.noise").value == pytest.approx(1e-3, rel=0.25)
 
 

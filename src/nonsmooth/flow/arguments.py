@@ -29,11 +29,14 @@ def ends(pair: Any, name: str) -> tuple[float, float]:
 
 
 def float_array(values: Any, name: str) -> FloatArray:
-    """``values`` as an array of real numbers of any shape; TypeError for words, complex numbers, ragged lists."""
+    """``values`` as an array of real numbers of any shape, NaN where they are masked; TypeError for words, complex
+    numbers, ragged lists."""
     try:
         array = np.asarray(values)
         if array.dtype.kind in "fiu":
-            return np.array(array, dtype=float)
+            found = np.array(array, dtype=float)
+            found[np.ma.getmask(values)] = np.nan
+            return found
         if array.dtype.kind == "O":
             return np.array([real_number(value, name) for value in array.ravel()]).reshape(array.shape)
     except (TypeError, ValueError) as error:

@@ -241,3 +241,11 @@ def test_dropped_samples_are_a_gap_not_an_even_rate() -> None:
     uneven = np.arange(200) / 100 + np.where(np.arange(200) % 7 < 2, 0.008, 0.0)
     with pytest.raises(ValueError, match="not evenly spaced; .*take smooth"):
         savitzky_golay(uneven, uneven, resolution=COUNT)
+
+
+def test_a_masked_value_is_a_missing_one() -> None:
+    t = np.arange(64) / 100.0
+    x = np.ma.masked_greater(np.where(np.arange(64) == 20, 99.0, np.sin(9.0 * t)), 2.0)
+    with pytest.raises(ValueError, match="1 of 64 values are not finite numbers"):
+        spectrum(x, 100.0)
+    assert x.data[20] == 99.0

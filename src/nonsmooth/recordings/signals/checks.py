@@ -54,7 +54,8 @@ def signal(
         ``missing="error"``), or there are too few of them.
     """
     name = whose(x)
-    t, values = np.asarray(time, np.float64), np.asarray(x, np.float64)
+    t, values = np.asarray(time, np.float64), np.array(x, np.float64)
+    values[np.ma.getmask(x)] = np.nan
     if t.ndim != 1 or t.shape != values.shape:
         raise ValueError(f"{name}: time and values must be arrays of one length, got {t.shape} and {values.shape}")
     if not np.isfinite(t).all():
