@@ -64,7 +64,8 @@ def beginnings(
         size = np.array([np.where(window.spread > 0, window.spread, np.inf) for window in now.pieces])
         for theta, starts in tried:
             try:
-                found, moved, state = settle_soft(_from(now, starts), theta, starts)
+                begun = now.of([replace(window, start=z) for window, z in zip(now.pieces, starts, strict=True)])
+                found, moved, state = settle_soft(begun, theta, starts)
             except SolveError:
                 continue
             cost = float(np.mean(misfits(now, state)))
@@ -86,10 +87,6 @@ def _cut(problem: Windows, windows: list[Window], length: float) -> Windows:
         last = max(int(np.searchsorted(record.time, record.time[0] + length, "right")), window.last)
         pieces.append(replace(window, last=last, time=record.time[:last], values=record.values[:last]))
     return problem.of(pieces)
-
-
-def _from(problem: Windows, starts: FloatArray) -> Windows:
-    return problem.of([replace(window, start=z) for window, z in zip(problem.pieces, starts, strict=True)])
 
 
 def _best_drawn(problem: Windows, rng: np.random.Generator) -> list[tuple[FloatArray, FloatArray]]:

@@ -334,12 +334,23 @@ def _guesses(
     where there are such, every second guess comes from the beginnings of the records.
     """
     from nonsmooth.identification.fit.beginnings import beginnings, drawn
-    from nonsmooth.identification.fit.first_windows import states_from_samples
+    from nonsmooth.identification.fit.first_windows import first_windows, states_from_samples
 
     u = problem.unknowns
 
     def far(guess: FloatArray) -> FloatArray:
-        return _distances(problem, guess, start, free, length)
+        """Mean squared residual of the first windows of each record before any fit, infinite where there is none."""
+        total, count = np.zeros(len(problem.records)), np.zeros(len(problem.records))
+        windows = problem.of(first_windows(problem, guess, length, start, free))
+        if windows.pieces:
+            weights = windows.weights(None)
+            for w, r, weight in zip(
+                windows.pieces, windows.residuals(guess, windows.starts).residuals, weights, strict=True
+            ):
+                if np.isfinite(r).all():
+                    total[w.record] += float(np.sum((r * weight) ** 2))
+                    count[w.record] += len(r)
+        return np.where(count > 0, total / np.maximum(count, 1), np.inf)
 
     def with_phases(guess: FloatArray) -> FloatArray:
         """The guess with the phase of each run, of a few, at which its first windows fit best."""
@@ -366,20 +377,3 @@ def _guesses(
         if hidden and (begun := beginnings(problem, length, start, rng)) is not None:
             yield begun[0], _LONGER, begun[1]
         yield other
-
-
-def _distances(problem: Windows, guess: FloatArray, start: FloatArray | None, free: bool, length: float) -> FloatArray:
-    """Mean squared residual of the first windows of each record before any fit, infinite where there is none."""
-    from nonsmooth.identification.fit.first_windows import first_windows
-
-    total, count = np.zeros(len(problem.records)), np.zeros(len(problem.records))
-    windows = problem.of(first_windows(problem, guess, length, start, free))
-    if windows.pieces:
-        weights = windows.weights(None)
-        for w, r, weight in zip(
-            windows.pieces, windows.residuals(guess, windows.starts).residuals, weights, strict=True
-        ):
-            if np.isfinite(r).all():
-                total[w.record] += float(np.sum((r * weight) ** 2))
-                count[w.record] += len(r)
-    return np.where(count > 0, total / np.maximum(count, 1), np.inf)

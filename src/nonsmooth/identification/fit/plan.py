@@ -117,7 +117,8 @@ def plan_experiment(
     alone = np.array([_uncertainties(one + precision) for one in found])
     size = np.where(theta != 0, np.abs(theta), 1.0)
     order, totals = _ordered(found, precision, size)
-    labels, units = (np.array([*map(str, each)], dtype=object) for each in (runs, _units(system, names)))
+    units = [system.parameters[name].unit if name in system.parameters else "" for name in names]
+    labels = np.array([*map(str, runs)])
     return xr.Dataset(
         {
             "uncertainty": labelled(("run", "parameter"), alone, "standard uncertainty by this run"),
@@ -126,9 +127,9 @@ def plan_experiment(
                 [_log_det(one + precision, size) for one in found],
                 "log det of the information, in units of the parameters' values",
             ),
-            "best": labelled("parameter", labels[alone.argmin(axis=0)].astype(str), "run with the least uncertainty"),
+            "best": labelled("parameter", labels[alone.argmin(axis=0)], "run with the least uncertainty"),
             "information": labelled(("run", "parameter", "other"), np.array(found), "Fisher information"),
-            "order": labelled("step", labels[order].astype(str), "run that adds most to the determinant"),
+            "order": labelled("step", labels[order], "run that adds most to the determinant"),
             "uncertainty_after": labelled(
                 ("step", "parameter"),
                 np.array([*map(_uncertainties, totals)]),
@@ -139,11 +140,11 @@ def plan_experiment(
             ),
         },
         {
-            "run": labels.astype(str),
+            "run": labels,
             "parameter": names,
             "other": names,
             "step": np.arange(1, len(order) + 1),
-            "unit": ("parameter", units.astype(str)),
+            "unit": ("parameter", units),
         },
     )
 
@@ -214,7 +215,3 @@ def _gain(information: FloatArray, size: FloatArray) -> float:
     """The determinant with a little known of every direction, so that runs can be compared that leave one open."""
     scaled = information * np.outer(size, size)
     return float(np.linalg.slogdet(scaled + 1e-9 * max(float(np.trace(scaled)), 1e-300) * np.eye(len(size)))[1])
-
-
-def _units(system: System, names: Sequence[str]) -> list[str]:
-    return [system.parameters[name].unit if name in system.parameters else "" for name in names]
