@@ -228,3 +228,20 @@ def test_a_rig_and_a_theory_on_either_side_of_a_flip(rig: float, theory: float, 
     measured = record(MODEL.with_parameters(settings, omega=rig))
     found = compare(measured, MODEL, settings={**settings, "omega": theory})
     assert str(found["period_relation"].values).startswith(words)
+
+
+def test_a_table_of_amplitudes_is_a_response() -> None:
+    """As ``fit`` takes it: a mapping, or a DataFrame; of a linear oscillator in closed form."""
+    import pandas as pd
+
+    system = ns.mechanical(
+        1.0, 0.15, 9.0, parameters={"omega": 2.0}, coordinates=["q"], forcing={"q": lambda t, p: np.cos(p.omega * t)}
+    )
+    omega = np.array([2.0, 3.1, 2.6, 4.0])
+    table = {"omega": omega, "amplitude": 1.1 / np.hypot(9 - omega**2, 0.15 * omega), "direction": ["up", "down"] * 2}
+    for measured in (table, pd.DataFrame(table), pd.DataFrame(table).set_index("omega")):
+        found = compare(measured, system)
+        np.testing.assert_allclose(found["relative_difference"], 1 / 1.1 - 1, atol=1e-9)
+        assert found["measured_omega"].values.tolist() == [3.1, 4.0, 2.0, 2.6]
+    with pytest.raises(ValueError, match="one number of each kind"):
+        compare({**table, "amplitude": [1.0]}, system)

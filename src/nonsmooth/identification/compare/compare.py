@@ -13,6 +13,7 @@ from nonsmooth.flow.options import solver_of
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
 from nonsmooth.identification.compare.measured import recorded_motion
+from nonsmooth.identification.fit.steady import is_steady, of_table
 from nonsmooth.identification.options import Comparing
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.arguments import checked
@@ -139,7 +140,11 @@ def compare(
     if not isinstance(measured, xr.Dataset) or channels is not None:
         if not isinstance(theory, System):
             raise TypeError(f"a recording is laid over a System, not over a result; of a measured motion: {FORMS}")
-        measured = recorded_motion(measured, nominal(theory, parameters, set_), channels, run, _phase_found(parameters))
+        if is_steady(measured):
+            measured = of_table(theory, measured, run or "steady")
+        else:
+            here, phase = nominal(theory, parameters, set_), _phase_found(parameters)
+            measured = recorded_motion(measured, here, channels, run, phase)
     kind, states = _kind(measured, parameter), _states(measured, theory)
     model = Model(
         theory,

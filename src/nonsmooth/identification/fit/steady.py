@@ -22,6 +22,8 @@ from nonsmooth.flow.starts import start_states
 from nonsmooth.identification.fit.sensors import Sensor
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from nonsmooth.attractors.settler import Settler
     from nonsmooth.identification.fit.motion import Marcher, SampledMotion
     from nonsmooth.system.system import System
@@ -31,6 +33,7 @@ TRANSIENT = 300
 ROUNDING = 1e-13  # of the largest reading: none has less noise
 _FINE = 256  # instants of a period among which an extreme is looked for
 _BESIDE = 1e-6  # of a period: on either side of an extreme
+_COLUMNS = ("amplitude", "section", "amplitude_error", "section_error", "period_number")
 _FIRST = 0.05  # of the largest reading: the noise at first, where none is known
 
 
@@ -94,6 +97,22 @@ def is_steady(one: Any) -> bool:
     return "time" not in held and ("amplitude" in held or "section" in held)
 
 
+def of_table(system: System, one: Any, name: str) -> xr.Dataset:
+    """Readings of steady states of a table, or of a mapping, as a Dataset over ``run``."""
+    import xarray as xr
+
+    if isinstance(one, xr.Dataset):
+        return one
+    one = one.reset_index() if hasattr(one, "reset_index") else one
+    told = [key for key in (*_COLUMNS, *system.values) if key in one]
+    columns = {key: float_array(one[key], f"run {name!r}: {key}") for key in told}
+    if {column.shape for column in columns.values()} != {(columns[told[0]].size,)}:
+        sizes = ", ".join(f"{key} of {column.size}" for key, column in columns.items())
+        raise ValueError(f"run {name!r} must hold one number of each kind for every reading; it has {sizes}")
+    words = {"direction": np.asarray(one["direction"], dtype=str)} if "direction" in one else {}
+    return xr.Dataset({key: ("run", column) for key, column in {**columns, **words}.items()})
+
+
 def read_steady(system: System, one: Any, name: str, measured: Any, settings: Mapping[str, float]) -> SteadyReadings:
     """Readings of a response or of sections.
 
@@ -103,20 +122,11 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
         A system without forcing, a parameter that is missing, quantities that are no states, sections without period
         numbers.
     """
-    import xarray as xr
-
     if system.period() is None or system.inputs:
         why = "inputs" if system.inputs else "no forcing period"
         raise ValueError(f"{system.name!r} has {why}; a response and sections are of steady states under a forcing")
+    one = of_table(system, one, name)
     kind = "amplitude" if "amplitude" in one else "section"
-    if not isinstance(one, xr.Dataset):
-        one = one.reset_index() if hasattr(one, "reset_index") else one
-        told = [key for key in (kind, f"{kind}_error", "period_number", *system.values) if key in one]
-        columns = {key: float_array(one[key], f"run {name!r}: {key}") for key in told}
-        if any(column.shape != columns[kind].shape or column.ndim != 1 for column in columns.values()):
-            sizes = ", ".join(f"{key} of {column.size}" for key, column in columns.items())
-            raise ValueError(f"run {name!r} must hold one number of each kind for every reading; it has {sizes}")
-        one = xr.Dataset({key: ("run", column) for key, column in columns.items()})
     over = [str(dim) for dim in one[kind].dims if dim not in ("state", "iterate")]
     set_ = [key for key in system.values if key in one.variables and {*one[key].dims} & {*over}]
     extra = [each for each in (f"{kind}_error", "period_number") if each in one]
