@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 #: Dims over which results list what they found, however much it was: the value of each and what its rows share.
-LISTS = {"jump": ("jump_value", ("jump_variable", "jump_direction")), "special": (None, ("special_kind", "kind"))}
+LISTS = {
+    "jump": ("jump_value", ("jump_variable", "jump_direction")),
+    "special": ("special_value", ("special_kind", "kind")),
+}
 FINER = 8  # points to a step of a drawn branch, on a cubic
 MOST = 10**8  # numbers kept over all draws
 FAILURES = 3  # reasons that are repeated
@@ -78,7 +81,7 @@ class Gathered:
             if kept := [row[name] for row in self.rows if name in row]:
                 found |= self._of(name, np.stack(kept), edges)
         for dim in self.lists:
-            value = LISTS[dim][0] or "special_value"
+            value = LISTS[dim][0]
             dims, size = self.centre[value].dims, self.centre[value].shape
             kept = [row.get(dim, np.full(size, np.nan)) for row in self.rows]
             if kept:
@@ -152,9 +155,8 @@ class _Sheets:
 
     def _first(self, sheet: FloatArray, result: xr.Dataset) -> int:
         """Number by which sheets are counted differently, where a draw has fewer turning points before the same one."""
-        begins = self.centre[self.name].values[:2], result[self.name].values[:2]
-        same = np.sign(np.diff(begins[0])) == np.sign(np.diff(begins[1]))
-        return 0 if same.all() else 1
+        ours, theirs = (np.sign(np.diff(one[self.name].values[:2])) for one in (self.centre, result))
+        return int((ours != theirs).any())
 
 
 def _sheet_numbers(value: FloatArray) -> FloatArray:
@@ -210,7 +212,6 @@ def matched(centre: xr.Dataset, result: xr.Dataset, dim: str) -> FloatArray:
     from scipy.optimize import linear_sum_assignment
 
     value, shared = LISTS[dim]
-    value = value or "special_value"
     found = np.full(centre[value].shape, np.nan)
     if value not in result or not result[value].size or not found.size:
         return found

@@ -272,3 +272,23 @@ def test_readings_that_are_missing_leave_the_period_number(lost: slice) -> None:
     held[lost] = False
     for record in ({"q": (t, np.where(held, q, np.nan))}, {"q": (t[held], q[held])}):
         assert int(ns.compare(record, system)["measured_period_number"]) == 2
+
+
+def test_each_run_is_laid_at_the_phase_that_the_fit_found_of_it() -> None:
+    """Two records of a resonance in closed form that began at other phases of the drive."""
+    t, leads = np.arange(0, 60, 0.05), {"a": 0.7, "b": 2.0}
+    system = ns.mechanical(
+        1.0, 0.15, "k", parameters={"k": 9.0}, coordinates=["q"], forcing={"q": lambda t, p: np.cos(2.0 * t)}
+    )
+    runs = {}
+    for run, lead in leads.items():
+        q = np.real(np.exp(1j * (2.0 * t + lead)) / (5 + 0.3j)) + 1e-3 * np.random.default_rng(1).normal(size=t.size)
+        runs[run] = {"laser": xr.Dataset({"q": ("time", q, {"units": ""})}, {"time": t})}
+    recording = ns.Recording.from_runs(runs, synthetic=False)
+    found = ns.fit(system, recording, ["k", "phase"], tries=1, progress=False)
+    for run in leads:
+        laid = ns.compare(recording, system, run=run, parameters=found, draws=0)
+        assert float(laid["orbit_distance"]) < 0.01 and abs(float(laid["phase_shift"])) < 1e-3
+    with pytest.warns(UserWarning, match="none of run 'run': it is taken as 0"):
+        other = ns.compare({"q": (t, q)}, system, parameters=found, draws=0)
+    assert float(other["phase_shift"]) == pytest.approx(-leads["b"] / (2 * np.pi), abs=1e-3)

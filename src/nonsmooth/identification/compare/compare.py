@@ -70,7 +70,7 @@ def compare(
         for a response, ``sweep`` for a diagram.
     channels : mapping of str to str or Sensor, optional
         Of a recording: which channel shows which state, as ``measured`` of :func:`nonsmooth.fit`. Times are those of
-        the model: the forcing begins at t = 0, or at the ``phase`` that the fit found.
+        the model: the forcing begins at t = 0, or at the ``phase`` that the fit found (of this run, by its name).
     run : str, optional
         Of a recording that has several.
     parameters : ParameterSet or mapping, optional
@@ -143,8 +143,8 @@ def compare(
         if is_steady(measured):
             measured = of_table(theory, measured, run or "steady")
         else:
-            here, phase = nominal(theory, parameters, set_), _phase_found(parameters)
-            measured = recorded_motion(measured, here, channels, run, phase)
+            here, told = nominal(theory, parameters, set_), getattr(parameters, "extra", {})
+            measured = recorded_motion(measured, here, channels, run, told)
     kind, states = _kind(measured, parameter), _states(measured, theory)
     model = Model(
         theory,
@@ -273,19 +273,12 @@ def _states(measured: xr.Dataset, theory: Any) -> list[str]:
     return held
 
 
-def _phase_found(parameters: Any) -> float:
-    """Phase of the forcing at t = 0, in periods, where a fit has found it."""
-    found = getattr(parameters, "extra", {}).get("phase")
-    return 0.0 if found is None else float(found.value)
-
-
 def _noise(measured: xr.Dataset, noise: Any, states: list[str]) -> np.ndarray:
     if noise is None:
         for name in ("section_error", "u_error"):
             if name in measured:
-                array = measured[name]
-                others = [dim for dim in array.dims if dim != "state"]
-                return np.asarray(array.median(others).values, dtype=float)
+                others = [dim for dim in measured[name].dims if dim != "state"]
+                return np.asarray(measured[name].median(others).values, dtype=float)
         raise ValueError(
             f"the standard error of the measured states is not known: give "
             f"noise={{{', '.join(map(repr, states))}: ...}}, or `u_error` or `section_error` in the measured Dataset"

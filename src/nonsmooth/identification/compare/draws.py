@@ -54,15 +54,14 @@ def read_settings(settings: Mapping[str, Any] | None, system: System) -> dict[st
     read: dict[str, Setting] = {}
     for name, given in (settings or {}).items():
         check_parameter(name, system)
+        pair: Any = (given, 0.0)
         if isinstance(given, Mapping):
             extra = set(given) - {"value", "uncertainty"}
             if extra or "value" not in given:
                 raise ValueError(f"setting {name!r} is {dict(given)!r}; write {{value = ..., uncertainty = ...}}")
             pair = (given["value"], given.get("uncertainty", 0.0))
         elif isinstance(given, tuple | list) and len(given) == 2:
-            pair = (given[0], given[1])
-        else:
-            pair = (given, 0.0)
+            pair = given
         value = pair[0] if callable(pair[0]) else real_number(pair[0], f"setting {name!r}")
         error = real_number(pair[1], f"uncertainty of {name!r}")
         if error < 0:

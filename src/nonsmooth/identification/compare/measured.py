@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from nonsmooth.results.labels import labelled
 if TYPE_CHECKING:
     import xarray as xr
 
+    from nonsmooth.identification.finding import Estimate
     from nonsmooth.recordings.recording import Recording
     from nonsmooth.system.system import System
 
@@ -90,7 +93,7 @@ def _motion(smoothed: xr.Dataset, phase: FloatArray, states: tuple[str, str] = (
 
 
 def recorded_motion(
-    recording: Any, system: System, channels: Any = None, run: str | None = None, phase: float = 0.0
+    recording: Any, system: System, channels: Any, run: str | None, found: Mapping[str, Estimate]
 ) -> xr.Dataset:
     """The readings of states as a motion over the drive's phase, their errors from the record's own irregularity.
 
@@ -103,8 +106,8 @@ def recorded_motion(
         Which channel shows which state; channels named as states where not given.
     run : str, optional
         Needed where there are several.
-    phase : float
-        Of the forcing at t = 0, in periods.
+    found : mapping of str to Estimate
+        Unknowns beside the parameters that a fit has found: the phase of the forcing at t = 0, or that of this run.
 
     Raises
     ------
@@ -135,12 +138,20 @@ def recorded_motion(
     ]
     u = (record.values - offset) / gain
     time = record.time - next(iter(sensors.values())).delay
+    told = {} if "phase" in system.values else found
+    shift = told.get("phase", told.get(f"phase, {record.name}"))
+    if shift is None and any(name.startswith("phase, ") for name in told):
+        warnings.warn(
+            f"the fit found the phases of its runs, but none of run {record.name!r}: it is taken as 0, which "
+            "orbit_distance_any_phase does not need",
+            stacklevel=4,
+        )
     synthetic = "yes" if getattr(recording, "synthetic", False) else "no"
     return xr.Dataset(
         {
             "u": (("time", "state"), u),
             "u_error": (("time", "state"), np.broadcast_to(error / np.abs(gain), u.shape)),
-            "phase": ("time", time / period + phase),
+            "phase": ("time", time / period + (shift.value if shift else 0.0)),
         },
         {"time": time, "state": list(sensors)},
         {"synthetic": synthetic, "title": record.name},

@@ -340,16 +340,13 @@ def _guesses(
 
     def far(guess: FloatArray) -> FloatArray:
         """Mean squared residual of the first windows of each record before any fit, infinite where there is none."""
-        total, count = np.zeros(len(problem.records)), np.zeros(len(problem.records))
+        total, count = np.zeros((2, len(problem.records)))
         windows = problem.of(first_windows(problem, guess, length, start, free))
-        if windows.pieces:
-            weights = windows.weights(None)
-            for w, r, weight in zip(
-                windows.pieces, windows.residuals(guess, windows.starts).residuals, weights, strict=True
-            ):
-                if np.isfinite(r).all():
-                    total[w.record] += float(np.sum((r * weight) ** 2))
-                    count[w.record] += len(r)
+        residuals, weights = windows.residuals(guess, windows.starts).residuals, windows.weights(None)
+        for w, r, weight in zip(windows.pieces, residuals, weights, strict=True):
+            if np.isfinite(r).all():
+                total[w.record] += float(np.sum((r * weight) ** 2))
+                count[w.record] += len(r)
         return np.where(count > 0, total / np.maximum(count, 1), np.inf)
 
     def with_phases(guess: FloatArray) -> FloatArray:
