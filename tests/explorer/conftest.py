@@ -19,7 +19,10 @@ from typing import Any
 import pytest
 
 FEW = "columns=61&transient=100&keep=40"  # so that nothing takes long where many columns do not matter
+SIZE = {"width": 1280, "height": 800}
 ROOT = Path(__file__).parents[2]
+MOST_UNDONE = 12  # steps; beyond them a page is opened sooner than undone
+CHANNEL = "name => Bokeh.documents[0].get_model_by_name(name).value"
 PATIENCE = 120.0  # seconds; a cold cache compiles in them
 
 
@@ -62,6 +65,7 @@ class Page:
     def __init__(self, tab: Any) -> None:
         self.tab = tab
         self.faults: list[str] = []
+        self.first: Any = None  # what it showed once it had been opened
         tab.on("pageerror", lambda error: self.faults.append(str(error)))
         tab.on("console", lambda line: self.faults.append(line.text) if line.type == "error" else None)
 
@@ -83,6 +87,30 @@ class Page:
             "(() => { const told = document.documentElement.dataset;"
             " return told.sent === told.heard && told.busy === ''; })()"
         )
+
+    def begin(self, address: str) -> None:
+        """Show what the page at an address shows first: undo all that was done to it, or else open it."""
+        if self.first is None or self.first[0] != address or not self._undone():
+            self.open(address)
+            self.until_done()
+            self.first = address, self._shown()
+
+    def _undone(self) -> bool:
+        for _ in range(MOST_UNDONE):
+            if not self.tab.is_enabled("#undo"):
+                self.until_done()
+                return bool(self.first[1] == self._shown())
+            self.tab.click("#undo")
+            self.until_done()
+        return False
+
+    def _shown(self) -> dict[str, Any]:
+        """Channels by which one page differs from another at the same place in its history."""
+        names = ("ui", "readout", "notes", "recording", "building", "equations")
+        channels = {name: json.loads(self.tab.evaluate(CHANNEL, name) or "null") for name in names}
+        for passing in ("heard", "can", "tabs"):
+            channels["ui"].pop(passing)
+        return {**channels, "open": self.tab.locator("dialog[open]").count(), "play": self.tab.inner_text("#play")}
 
     def readout(self) -> dict[str, str]:
         return dict(json.loads(self.tab.evaluate('Bokeh.documents[0].get_model_by_name("readout").value')))
@@ -161,17 +189,30 @@ def with_browser() -> Iterator[Server]:
     one.close()
 
 
+def new_tab(browser: Any, first_visit: bool = False, **options: Any) -> Page:
+    """A tab of somebody else: with cookies and storage of its own."""
+    tab = browser.new_context(viewport=SIZE, accept_downloads=True, **options).new_page()
+    tab.set_default_timeout(30_000)
+    if not first_visit:
+        tab.add_init_script("localStorage.setItem('nonsmooth-tour', 'seen')")
+    return Page(tab)
+
+
+@pytest.fixture(scope="session")
+def tab(browser: Any) -> Iterator[Page]:
+    """The tab in which one test after the other looks at a page: a new one compiles all scripts again."""
+    one = new_tab(browser, reduced_motion="reduce")
+    yield one
+    one.tab.context.close()
+
+
 @pytest.fixture
 def new_page(browser: Any) -> Iterator[Callable[..., Page]]:
     """Open tabs, and see that none of them had an error."""
     pages: list[Page] = []
 
-    def make(width: int = 1280, height: int = 800, first_visit: bool = False) -> Page:
-        tab = browser.new_context(viewport={"width": width, "height": height}, accept_downloads=True).new_page()
-        tab.set_default_timeout(30_000)
-        if not first_visit:
-            tab.add_init_script("localStorage.setItem('nonsmooth-tour', 'seen')")
-        pages.append(Page(tab))
+    def make(first_visit: bool = False) -> Page:
+        pages.append(new_tab(browser, first_visit))
         return pages[-1]
 
     yield make
@@ -181,10 +222,19 @@ def new_page(browser: Any) -> Iterator[Callable[..., Page]]:
 
 
 @pytest.fixture
-def page(server: Server, new_page: Callable[..., Page]) -> Page:
-    one = new_page()
-    one.open(f"{server.address}&{FEW}")
-    return one
+def only_tab(tab: Page) -> Iterator[Page]:
+    """The tab that tests share, with no page yet or that of an earlier one; it must not have an error."""
+    tab.faults.clear()
+    yield tab
+    tab.tab.set_viewport_size(SIZE)
+    assert tab.faults == []
+
+
+@pytest.fixture
+def page(server: Server, only_tab: Page) -> Page:
+    """A page that nobody has done anything to yet."""
+    only_tab.begin(f"{server.address}&{FEW}")
+    return only_tab
 
 
 def wait_until(fact: Callable[[], object], seconds: float = PATIENCE) -> None:

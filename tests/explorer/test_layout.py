@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from tests.explorer.conftest import FEW
 
-LARGE = "localStorage.setItem('nonsmooth-look', JSON.stringify({dark: false, large: true}))"
-SIZES = [(1280, 800, False), (1280, 800, True), (400, 800, False), (400, 800, True)]
+LARGE = "localStorage.clear(); localStorage.setItem('nonsmooth-look', JSON.stringify({dark: false, large: true}))"
+SIZES = [(1280, False), (1280, True), (400, True), (400, False)]
 #: Notes what is written on every canvas since it was cleared: words, and the box that they take on it.
 NOTE = """(() => {
     const of = CanvasRenderingContext2D.prototype, {fillText, clearRect} = of;
@@ -27,16 +27,6 @@ NOTE = """(() => {
 })()"""
 
 
-def opened(server: Any, new_page: Callable[..., Any], width: int, height: int, large: bool, more: str = "") -> Any:
-    page = new_page(width, height)
-    page.tab.add_init_script(NOTE)
-    if large:
-        page.tab.add_init_script(LARGE)
-    page.open(f"{server.address}&{FEW}{more}")
-    page.until_done()
-    return page
-
-
 def box(page: Any, which: str) -> dict[str, float]:
     return dict(page.tab.locator(which).first.bounding_box())
 
@@ -50,11 +40,22 @@ def frame(page: Any, figure: str) -> list[float]:
     )
 
 
-@pytest.mark.parametrize(("width", "height", "large"), SIZES)
-def test_every_picture_and_every_word_has_room_and_numbers_stand_apart(
-    server: Any, new_page: Callable[..., Any], width: int, height: int, large: bool
-) -> None:
-    page = opened(server, new_page, width, height, large, "&upper=response")
+def test_every_picture_and_every_word_has_room_and_numbers_stand_apart(page: Any) -> None:
+    page.tab.evaluate(NOTE)
+    page.tab.click("#tab-response")
+    for width, large in SIZES:
+        page.tab.set_viewport_size({"width": width, "height": 800})
+        if page.ui()["large"] != large:
+            page.tab.click("#large")
+        page.until_done()
+        page.until(
+            f"innerWidth === {width} && document.documentElement.classList.contains('large') === {str(large).lower()}"
+        )
+        page.tab.wait_for_timeout(300)
+        check_room(page, width, large)
+
+
+def check_room(page: Any, width: int, large: bool) -> None:
     assert page.tab.evaluate("document.documentElement.scrollWidth") <= width
     type_size = 19 if large else 13
     for figure in ("response", "portrait", "history", "section"):
@@ -85,7 +86,6 @@ def test_every_picture_and_every_word_has_room_and_numbers_stand_apart(
         )
         assert wide[0] == words
         assert wide[1] <= frame(page, figure)[0] + 1
-    page.tab.wait_for_timeout(300)
     written = page.tab.evaluate("""[...window.written].filter(([canvas]) => canvas.id !== "sketch").map(([, some]) =>
         some.filter(([words]) => /^[\\d\\u2212.]+$/.test(words)))""")
     axes = [some for some in written if some]
@@ -104,23 +104,23 @@ def test_the_tour_covers_nothing(server: Any, new_page: Callable[..., Any]) -> N
             return box.bottom <= tour.top + 1 || box.top >= tour.bottom - 1 || !box.width;
         });
     }"""
+    page = new_page(first_visit=True)
     for large in (False, True):
-        page = new_page(first_visit=True)
-        if large:
-            page.tab.add_init_script(LARGE)
         page.open(f"{server.address}&{FEW}")
+        assert page.tab.evaluate("document.documentElement.classList.contains('large')") is large
         for _ in range(3):
             for width in (1280, 400):
                 page.tab.set_viewport_size({"width": width, "height": 800})
                 page.until(f"innerWidth === {width} && ({free})()", 5)
             page.tab.click("#tour-next")
         assert not page.tab.is_visible("#tour")
+        page.tab.evaluate(LARGE)
 
 
-def test_one_colour_says_up_in_every_view_and_marks_of_branches_are_told(
-    server: Any, new_page: Callable[..., Any]
-) -> None:
-    page = opened(server, new_page, 1280, 800, False, "&branches.show=yes&low=0.38&high=0.42")
+def test_one_colour_says_up_in_every_view_and_marks_of_branches_are_told(server: Any, only_tab: Any) -> None:
+    page = only_tab
+    page.open(f"{server.address}&{FEW}&branches.show=yes&low=0.38&high=0.42")
+    page.until_done()
     legends = page.ui()["legends"]
     up = {words: color for words, color, *_ in legends["diagram"]}["up"]
     assert up == dict(legends["response"])["up"]
@@ -147,7 +147,9 @@ def test_one_colour_says_up_in_every_view_and_marks_of_branches_are_told(
     page.until('!document.getElementById("legend-diagram").textContent.includes("flip")')
 
 
-def test_equations_and_a_moving_sketch_stand_beside_the_sliders(page: Any) -> None:
+def test_equations_and_a_moving_sketch_stand_beside_the_sliders(server: Any, new_page: Callable[..., Any]) -> None:
+    page = new_page()
+    page.open(f"{server.address}&{FEW}")
     page.until_done()
     equations = page.tab.inner_text("#equations")
     assert "free" in equations
@@ -164,8 +166,8 @@ def test_equations_and_a_moving_sketch_stand_beside_the_sliders(page: Any) -> No
     places = page.tab.evaluate(mass)
     assert len(places) == 36  # one period
     x = page.tab.evaluate("""(() => {
-        const run = Bokeh.documents[0].get_model_by_name("history").renderers.map(one => one.data_source.data);
-        return run.flatMap(one => [...(one.y ?? [])]).filter(y => y === y);
+        const {ys} = Bokeh.documents[0].get_model_by_name("history curves").data;
+        return ys.flatMap(one => [...one]).filter(y => y === y);
     })()""")
     # the mass lies as the motion says, to one scale: its first place is that of the section point
     first = page.tab.evaluate('Bokeh.documents[0].get_model_by_name("section points").data.x[0]')

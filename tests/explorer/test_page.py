@@ -50,9 +50,9 @@ def test_figure_11_a_dragged_slider_and_a_click_on_a_column_of_period_4(page: An
     np.testing.assert_allclose(sorted(points), sorted(known), rtol=1e-6)
 
 
-def test_a_moved_slider_redraws_the_diagram_live(server: Any, new_page: Callable[..., Any]) -> None:
-    page = new_page()
-    page.open(server.address)  # Fig. 11, 600 columns of 300 and 100 periods
+def test_a_moved_slider_redraws_the_diagram_live(server: Any, only_tab: Any) -> None:
+    page = only_tab
+    page.begin(server.address)  # Fig. 11, 600 columns of 300 and 100 periods
     page.until_done()
     page.tab.evaluate("""() => {
         const source = Bokeh.documents[0].get_model_by_name("diagram image");

@@ -5,14 +5,13 @@ from __future__ import annotations
 import base64
 import os
 import signal
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from tests.explorer.conftest import FEW, wait_until
+from tests.explorer.conftest import wait_until
 
 import nonsmooth as ns
 from nonsmooth.explorer.measured import read, strand_distance
@@ -169,9 +168,7 @@ def test_a_fit_is_cancelled_and_a_crash_of_it_is_said(page: Any, server: Any, ri
     assert page.value("k") == 8.47
 
 
-def test_a_file_beyond_the_limit_is_refused_with_its_size(server: Any, new_page: Callable[..., Any]) -> None:
-    page = new_page()
-    page.open(f"{server.address}&{FEW}")
+def test_a_file_beyond_the_limit_is_refused_with_its_size(page: Any) -> None:
     page.tab.evaluate(
         """size => {
             const transfer = new DataTransfer();

@@ -64,7 +64,7 @@ class Tab:
         found = {}
         for root in self.session.document.roots:
             for source in root.select({"type": ColumnDataSource}):
-                columns = [np.asarray(column) for name, column in source.data.items() if name in ("x", "value")]
+                columns = [np.asarray(column) for name, column in source.data.items() if name in ("x", "xs", "value")]
                 if "image" in source.data:
                     columns = [np.nan_to_num(np.asarray(source.data["image"][0])).ravel()]
                     columns = [column[column != 0] for column in columns]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import socket
 import sys
 import webbrowser
 from collections.abc import Callable
 from contextlib import nullcontext
 from functools import partial
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl
 
@@ -92,6 +94,7 @@ def explore(
     print(f"nonsmooth explorer: {address}\nCtrl-C ends it", file=sys.stderr, flush=True)
     if told is not None:
         told(address)
+    server.io_loop.add_callback(_load)
     with access.page_for_browser(origin) if browser else nullcontext() as page:
         if page is not None:
             server.io_loop.add_callback(webbrowser.open, page)
@@ -100,6 +103,13 @@ def explore(
         finally:
             server.stop()
             end_spare()
+
+
+def _load() -> None:
+    """Load what pages need while the browser starts. None of it is looked through again as a page is closed."""
+    import_module("nonsmooth.explorer.session")
+    gc.collect()
+    gc.freeze()
 
 
 def _open(catalogue: Catalogue, query: str, tabs: list[Page], document: Any) -> None:

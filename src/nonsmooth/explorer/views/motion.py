@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from bokeh.models import BoxAnnotation
+from bokeh.models import BoxAnnotation, Line, MultiLine, Scatter
 
 from nonsmooth.explorer.figures import BLUE, MOST, Panel, extent
 from nonsmooth.explorer.labels import number, plain_of
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from nonsmooth.explorer.state import PageState
 
 _MODES = [BLUE, *((COLORS[name],) * 2 for name in ("second", "third", "fourth"))]
-_MANY_MODES = 8
 
 
 class _Curves(View):
@@ -28,20 +27,28 @@ class _Curves(View):
 
     def build(self) -> None:
         self.figure = Panel(self.name)
-        self.sources = [self.figure.source("x", "y") for _ in range(_MANY_MODES)]
-        self.lines = [self.figure.plot.line("x", "y", source=source, line_width=1.6) for source in self.sources]
-        for k, line in enumerate(self.lines):
-            self.ink(_MODES[k % len(_MODES)], line)
+        self.curves = self.figure.source("xs", "ys", "color", name=f"{self.name} curves")
+        self.lines = self.figure.draw(self.curves, MultiLine(line_color="color", line_width=1.6))
+        self._modes: list[int] = []  # of the lines
 
     def put(self, run: Any, xs: Any, ys: Any) -> None:
         """Draw a curve of a trajectory."""
         mode, *cut = with_gaps(run, run["mode"].values.astype(float), xs, ys)
         pieces = pieces_by_mode(np.nan_to_num(mode, nan=-1).astype(int), *cut)
-        for k, source in enumerate(self.sources):
-            x, y = pieces[k] if k < len(pieces) else (np.empty(0), np.empty(0))
-            before: Any = source.data["x"]
-            if x.size or len(before):  # each change is a message of its own
-                source.data = {"x": x, "y": y}
+        self._modes = [k for k, (x, _) in enumerate(pieces) if np.isfinite(x).any()]
+        self.curves.data = {
+            **{key: [pieces[k][i] for k in self._modes] for i, key in enumerate(("xs", "ys"))},
+            "color": self._colors(),
+        }
+
+    def _colors(self) -> list[str]:
+        return [_MODES[k % len(_MODES)][self.dark] for k in self._modes]
+
+    def paint(self, dark: bool) -> None:
+        """Take the colours that show on a light or a dark ground."""
+        super().paint(dark)
+        if self._modes:
+            self.curves.data = {**self.curves.data, "color": self._colors()}
 
 
 class Portrait(_Curves):
@@ -66,9 +73,7 @@ class Portrait(_Curves):
         )
         self.figure.plot.add_layout(self.zone)
         self.points = self.figure.source("x", "y")
-        self.figure.plot.scatter(
-            "x", "y", source=self.points, size=7, fill_color=COLORS["zone"], line_color="#1B1F24", line_width=1.0
-        )
+        self.figure.draw(self.points, Scatter(size=7, fill_color=COLORS["zone"], line_color="#1B1F24", line_width=1.0))
 
     def show(self, job: Request, found: Mapping[str, Any]) -> None:
         """Its exponents are not known yet."""
@@ -83,8 +88,7 @@ class Portrait(_Curves):
         run, state, figure = self.results["run"], self.state, self.figure
         curves = [column(run, "u", name).values for name in (state.x, state.y)]
         self.put(run, *curves)
-        for line in self.lines:  # of a map the iterates alone
-            line.visible = not self.system.is_map
+        self.lines.visible = not self.system.is_map  # of a map the iterates alone
         for axis, values, also in zip((figure.x, figure.y), curves, figure.beside, strict=True):
             low, high = extent(np.concatenate([values, also]))
             start, end = axis.range.start, axis.range.end
@@ -122,7 +126,7 @@ class TimeHistory(_Curves):
         """Lines, and rings at the crossings."""
         super().build()
         self.crossings = self.figure.source("x", "y")
-        self.figure.plot.scatter("x", "y", source=self.crossings, size=5, fill_color=None, line_color=COLORS["muted"])
+        self.figure.draw(self.crossings, Scatter(size=5, fill_color=None, line_color=COLORS["muted"]))
 
     def redraw(self) -> None:
         """Draw the last of the trajectory."""
@@ -159,11 +163,10 @@ class SectionPoints(View):
     def build(self) -> None:
         """Points over the orbit."""
         self.figure = Panel("section")
-        plot = self.figure.plot
         self.orbit = self.figure.source("x", "y")
-        plot.line("x", "y", source=self.orbit, line_color=COLORS["muted"], line_alpha=0.6, line_width=1)
+        self.figure.draw(self.orbit, Line(line_color=COLORS["muted"], line_alpha=0.6, line_width=1))
         self.points = self.figure.source("x", "y", name="section points")
-        self.dots = plot.scatter("x", "y", source=self.points, size=4, line_color=None, fill_alpha=0.75)
+        self.dots = self.figure.draw(self.points, Scatter(size=4, line_color=None, fill_alpha=0.75))
         self.ink(BLUE, self.dots, field="fill_color")
 
     def redraw(self) -> None:
