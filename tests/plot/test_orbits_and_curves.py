@@ -183,3 +183,13 @@ def test_a_legend_that_a_curve_found_is_not_cut(special: xr.Dataset) -> None:
         plot.curve(ns.continue_curve(flip, {"omega": (3.4, 4.6), "rho": (0.13, 0.16)}), ax)
     ax.figure.canvas.draw()
     assert before is not ax.get_legend() and before.get_window_extent().x1 <= ax.figure.bbox.x1
+
+
+def test_a_part_of_a_branch_has_the_special_points_that_are_in_it(branch: xr.Dataset) -> None:
+    """They stand in the branch by number: without the points before them each number is that of another point."""
+    part = branch.isel(point=slice(60, None))
+    assert list(ns.special_points(part)["omega"].values) == list(branch["special_value"].values[3:])
+    assert words(plot.branch(part)) == ["stable branch", "unstable branch", "fold", "grazing"]
+    with pytest.raises(ValueError, match="only some of its points are there"):
+        ns.continue_orbit(part, range=(3.0, 8.0))
+    assert ns.special_points(part.isel(point=slice(0, 20))).sizes["special"] == 0

@@ -17,7 +17,7 @@ def special_points(branch: Any) -> xr.Dataset:
     Parameters
     ----------
     branch : xarray.Dataset
-        A result of :func:`nonsmooth.continue_orbit` or :func:`nonsmooth.continue_equilibrium`.
+        A result of :func:`nonsmooth.continue_orbit` or :func:`nonsmooth.continue_equilibrium`, or some of its points.
 
     Returns
     -------
@@ -40,13 +40,20 @@ def special_points(branch: Any) -> xr.Dataset:
     """
     import xarray as xr
 
-    from nonsmooth.results.branches import EQUILIBRIUM, ORBIT, SPECIAL_EQUILIBRIUM, SPECIAL_ORBIT, STEMS
+    from nonsmooth.results.branches import (
+        EQUILIBRIUM,
+        ORBIT,
+        SPECIAL_EQUILIBRIUM,
+        SPECIAL_ORBIT,
+        STEMS,
+        with_marks_in_place,
+    )
 
     if not isinstance(branch, xr.Dataset):
         raise TypeError(f"special_points takes a branch, a result of continue_orbit; not {type(branch).__name__}")
     if "special_point" not in branch or "parameter" not in branch.attrs:
         raise ValueError("special_points takes a branch, a result of continue_orbit; this Dataset is another result")
-    name = str(branch.attrs["parameter"])
+    name, branch = str(branch.attrs["parameter"]), with_marks_in_place(branch)
     points, marks = (EQUILIBRIUM, SPECIAL_EQUILIBRIUM) if "eigenvalues" in branch else (ORBIT, SPECIAL_ORBIT)
     at = branch[[column.name for column in points]]
     table = at.isel(point=branch["special_point"].values).rename({"point": "special"}).reset_coords(name)

@@ -88,10 +88,13 @@ def draw_branch(
 
     ``behind``: over points of a sweep, which lie on the stable parts: those become a pale, wide seam under them.
     """
+    from nonsmooth.results.branches import with_marks_in_place
+
     variable_along(result, "stable", "continue_orbit")
     if quantity not in _WORDS:
         raise ValueError(f"quantity = {quantity!r}; allowed: {', '.join(map(repr, _WORDS))}")
     (name,) = only_states(result, y)
+    result = with_marks_in_place(result)
     values = result[result.attrs["parameter"]].values
     ordinates = ordinates_of(result, name, quantity)
     shade = color or style.COLORS["first"]

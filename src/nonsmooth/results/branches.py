@@ -99,6 +99,17 @@ FOUND = (
 )
 
 
+def with_marks_in_place(branch: xr.Dataset) -> xr.Dataset:
+    """The branch, of which points may have been selected, with its special points where they are now; those whose point
+    is gone are left out."""
+    values, own = branch[branch.attrs["parameter"]].values, branch["special_value"].values
+    if np.array_equal(values.take(branch["special_point"].values.astype(int), mode="clip"), own):
+        return branch
+    there = [np.flatnonzero(values == one) for one in own]
+    kept = branch.isel(special=[one.size > 0 for one in there])
+    return kept.assign(special_point=kept["special_point"].copy(data=[one[0] for one in there if one.size]))
+
+
 def line(
     labels: Labels,
     attrs: Mapping[str, Any],

@@ -92,10 +92,14 @@ def read_branch(dataset: xr.Dataset) -> tuple[System, BranchRecord]:
     ValueError
         A Dataset that is damaged.
     """
+    from nonsmooth.results.branches import with_marks_in_place
+
     source, system = recorded(dataset, "branch")
     with undamaged("branch"):
         name, period_number = str(dataset.attrs["parameter"]), int(dataset["period_number"])
         points = _points(dataset, system, name, period_number)
+        if with_marks_in_place(dataset) is not dataset:
+            raise ValueError("special points are not where they were: only some of its points are there")
         for mark in marks_of(dataset, system):
             points[_place(mark.point, len(points), "point")].marks.append(mark)
         words = list(ENDINGS)
