@@ -236,3 +236,37 @@ def test_loads_are_drawn_with_their_units() -> None:
     assert ax.get_ylabel() == "wall energy (J)"
     (line,) = ax.get_lines()
     assert np.array_equal(np.asarray(line.get_ydata(), dtype=float), curve["wall_energy"].values)
+
+
+def test_a_point_between_two_that_failed_is_a_dot(responded: xr.Dataset) -> None:
+    """No line leads to it; and where all failed, the axis is that of the values."""
+    gone = xr.ones_like(responded["omega"]).where(np.arange(responded.sizes["omega"]) % 2 == 0)
+    names = ("maximum", "minimum", "amplitude")
+    half = responded.assign({name: gone * responded[name] for name in names})
+    assert len(plot.frequency_response(half, jumps=False).lines[0].get_markevery()) > responded.sizes["omega"] // 2 - 3
+    none = responded.assign({name: np.nan * responded[name] for name in names})
+    assert plot.frequency_response(none, plt.subplots()[1]).get_xlim() == tuple(responded["omega"].values[[0, -1]])
+
+
+def test_words_stay_within_the_picture(responded: xr.Dataset) -> None:
+    """A long condition is written in lines; the value of a jump stands on the side where there is room."""
+    condition = " and ".join(
+        ["abs(x) < 0.03", "period_number == 1", "abs(v) < 0.5", "contacts_per_period < 2", "omega > 1"]
+    )
+    edge = responded.isel(omega=slice(int((responded["omega"] < 5.1).sum()), None))
+    for ax in (plot.frequency_response(responded, region=condition), plot.frequency_response(edge)):
+        ax.figure.draw_without_rendering()
+        inside = ax.figure.bbox
+        for text in [*ax.texts, *ax.get_legend().get_texts()]:
+            box = text.get_window_extent()
+            assert inside.x0 <= box.x0 and box.x1 <= inside.x1, text.get_text()
+        assert ax.get_window_extent().width > 0.5 * inside.width
+
+
+@pytest.mark.parametrize("figure", ["bifurcation", "comparison_response", "branch"])
+def test_an_orbit_where_another_result_is_wanted(figure: str, points: xr.Dataset) -> None:
+    for given in (ns.find_orbit(ns.models.impact_oscillator(), progress=False), points):
+        with pytest.raises(
+            (TypeError, ValueError), match=r"draws the result of|not the result of|no result of compare"
+        ):
+            getattr(plot, figure)(given)

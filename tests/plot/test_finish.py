@@ -113,3 +113,21 @@ def test_slides_have_a_style_of_their_own(run, tmp_path) -> None:
     assert journal.figure.get_size_inches()[0] == pytest.approx(84 / 25.4)
     assert journal.lines[0].get_linewidth() == 0.8
     plt.close("all")
+
+
+def test_a_mark_without_a_face_shows() -> None:
+    """The dots of a cloud have no edge, and a cross is nothing else."""
+    points = ns.poincare(ns.models.impact_oscillator(), n=5)
+    (line,) = ns.plot.section(points, marker="+", markersize=5).lines
+    assert line.get_markeredgewidth() > 0
+    plt.close("all")
+
+
+def test_a_title_stands_above_what_a_figure_says_of_itself() -> None:
+    plane = {"omega": [3.0, 4.0, 5.0], "rho": [0.1, 0.2]}
+    chart = ns.chart(ns.models.discontinuous_support(g=0.02), plane, transient=10, keep=12, progress=False)
+    ax = ns.plot.chart(chart, region="abs(x) < 0.03", title="a safe region")
+    ax.figure.draw_without_rendering()
+    own, said = (text.get_window_extent() for text in (ax.title, ax._left_title))
+    assert ax.get_title().strip() == "a safe region" and own.y1 > said.y1 and "\n" in ax.get_title()
+    plt.close("all")

@@ -29,7 +29,7 @@ def measured_label(result: xr.Dataset | Any) -> str:
 
 def check_kind(result: xr.Dataset, *kinds: str) -> None:
     """ValueError where ``result`` is no comparison of one of these kinds."""
-    kind = result.attrs.get("comparison", "")
+    kind = getattr(result, "attrs", {}).get("comparison", "")
     if kind not in kinds:
         what = f"a comparison of a {kind}" if kind else "no result of compare"
         raise ValueError(f"this picture needs a comparison of a {' or '.join(kinds)}; this is {what}")

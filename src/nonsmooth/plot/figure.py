@@ -81,6 +81,8 @@ def _finish(
         signs = [] if shown is None else [one for one in shown.legend_handles if hasattr(one, "get_markersize")]
         for line in (*lines, *signs):
             line.set(**looks)
+            if "marker" in looks:  # at all points; a cross is nothing but an edge
+                line.set(markevery=None, markeredgewidth=0.7)
     if unit is not None:
         from nonsmooth.plot.units import in_unit
 
@@ -89,6 +91,7 @@ def _finish(
                 raise ValueError(f"unit = {unit!r}: a unit of the ordinate, or {{'x': 'mm', 'y': 'mm/s'}}")
             in_unit(ax.xaxis if name == "x" else ax.yaxis, wanted)
     if title is not None:
-        ax.set_title(title)
+        said = ax.get_title(loc="left")  # of contours and regions: the title stands above it
+        ax.set_title(title + "\n" * len(said.splitlines()))
     if not legend and shown is not None:
         shown.remove()

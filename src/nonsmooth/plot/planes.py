@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill as in_lines
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,6 +49,7 @@ def _box(color: str, words: str = "") -> Any:
     return Patch(facecolor=color, edgecolor="black", linewidth=0.4, label=words)
 
 
+_LONGEST = 46  # characters of a line above the axes
 #: A legend above the axes, in the middle.
 _ABOVE: dict[str, Any] = {"loc": "lower center", "columnspacing": 1.0}
 
@@ -162,7 +164,7 @@ def _outlined(ax: Axes, inside: xr.DataArray) -> None:
     across = np.argwhere(padded[1:, 1:-1] != padded[:-1, 1:-1])
     edges = [[(x[i], y[j]), (x[i], y[j + 1])] for j, i in up] + [[(x[i], y[j]), (x[i + 1], y[j])] for j, i in across]
     ax.add_collection(LineCollection(edges, colors=style.COLORS["section"], linewidths=1.4, capstyle="round"))
-    _title(ax, f"outlined: {inside.attrs.get('long_name', 'region')}")
+    _title(ax, in_lines(f"outlined: {inside.attrs.get('long_name', 'region')}", _LONGEST))
 
 
 def _title(ax: Axes, words: str) -> None:

@@ -185,6 +185,12 @@ def once(ax: Axes, words: str) -> str | None:
     return None if words in ax.get_legend_handles_labels()[1] else words
 
 
+def line(ax: Axes, x: Any, y: Any, *form: str, **looks: Any) -> None:
+    """Draw a curve with breaks (NaN); a point without a neighbour to be joined to is a dot."""
+    alone = np.flatnonzero(np.convolve(np.isfinite(x * y), [1, 4, 1])[1:-1] == 4).tolist()
+    ax.plot(x, y, *form, **({"marker": ".", "markersize": 4.0, "markevery": alone} | looks if alone else looks))
+
+
 def cloud(ax: Axes, points: Iterable[Any], size: float, color: str, label: str | None = None) -> None:
     """Draw many points (x, y) as dots without edges; they are pixels in a vector figure."""
     looks: dict[str, Any] = {"markersize": size, "markeredgewidth": 0, "rasterized": True}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill as in_lines
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,6 @@ from nonsmooth.plot.labels import (
     name_axes,
     name_plane,
     only_states,
-    variable_along,
 )
 from nonsmooth.plot.planes import edges_of, held
 from nonsmooth.tables.quantities import quantities_of
@@ -29,10 +29,11 @@ if TYPE_CHECKING:
 
 _LINES = ("section", "third", "fourth")
 _COLORS = {"up": "first", "down": "second", "none": "section"}
+_LONGEST = 30  # characters of a line of a condition in a legend
 _SEAM = 2.0  # a rising point over a falling one, which lies on it: both show
 
 
-@figure()
+@figure("sweep", "residual")
 def bifurcation(
     ax: Axes,
     result: xr.Dataset,
@@ -67,7 +68,6 @@ def bifurcation(
     """
     if "section" not in result and "density" in result:
         raise ValueError("this sweep counted its section points (density=...): draw it with plot.density")
-    variable_along(result, "section", "sweep")
     (name,) = first_states(result, y)
     parameter = str(result["maximum"].dims[0])
     _share_an_axis(over, parameter)
@@ -88,12 +88,16 @@ def bifurcation(
         style.cloud(ax, (values, cloud), size * (_SEAM if under else 1.0), shade, words)
     for k, one in enumerate(over):
         draw_branch(ax, one, y=name, color=style.COLORS[_LINES[k % len(_LINES)]], behind=True)
-    # The whole sweep shows, its ends too where every point diverged.
-    ax.dataLim.update_from_data_x(result[parameter].values, ignore=False)
-    ax.margins(x=0)
+    _whole(ax, result[parameter].values)
     _name(ax, result, parameter, name, points)
     if len(directions) > 1 or over:
         style.even_dots(style.clear_legend(ax))
+
+
+def _whole(ax: Axes, values: Any) -> None:
+    """Show the whole range of a parameter, its ends too where every point diverged."""
+    ax.dataLim.update_from_data_x(values, ignore=False)
+    ax.margins(x=0)
 
 
 def _name(ax: Axes, result: xr.Dataset, parameter: str, name: str, values: xr.DataArray, before: str = "") -> None:
@@ -137,8 +141,7 @@ def bifurcation_diagram(
     style.cloud(ax, (values, swept), size, style.COLORS["pale"], "sweeps")
     for k in range(result.sizes["branch_id"]):
         draw_branch(ax, one_branch(result, k), y=name, special=special)
-    ax.dataLim.update_from_data_x(result["swept_value"].values, ignore=False)
-    ax.margins(x=0)
+    _whole(ax, result["swept_value"].values)
     name_plane(ax, result, parameter, name)
     style.even_dots(style.clear_legend(ax))
 
@@ -213,12 +216,12 @@ def frequency_response(
             found = _intervals(values, curve, _jumps(result, name, direction, k))
             at = [i for _, i in found]
             broken = np.insert(values, at, np.nan), np.insert(curve, at, np.nan)
-            ax.plot(*broken, label=_WORDS[direction] if k == 0 else None, **_LOOKS[direction])
+            style.line(ax, *broken, label=_WORDS[direction] if k == 0 else None, **_LOOKS[direction])
             for place, i in found if jumps else ():
-                marks.append(_mark(ax, curve, i, values[0] <= values[-1], place, direction, digits))
+                marks.append(_mark(ax, values, curve, i, place, direction, digits))
     for behind in over:
         draw_branch(ax, behind, y=name, quantity=quantity, color=style.COLORS["section"], width=0.7, behind=True)
-    ax.margins(x=0)
+    _whole(ax, values)
     if inside is not None:
         _shade(ax, inside, parameter)
     _name(ax, result, parameter, name, heights, "" if alone else f"{quantity} of ")
@@ -230,7 +233,7 @@ def _shade(ax: Axes, inside: xr.DataArray, parameter: str) -> None:
     """Shade the cells of an axis in which a condition holds."""
     whole = inside.all([dim for dim in inside.dims if dim != parameter]).sortby(parameter)
     edges = edges_of(whole[parameter].values)
-    words = str(inside.attrs.get("long_name", "region"))
+    words = in_lines(str(inside.attrs.get("long_name", "region")), _LONGEST)
     looks: dict[str, Any] = {"color": style.COLORS["third"], "alpha": 0.15, "linewidth": 0, "zorder": 0}
     for i in np.flatnonzero(whole.values):
         ax.axvspan(edges[i], edges[i + 1], label=style.once(ax, words), **looks)
@@ -268,14 +271,23 @@ def _intervals(values: NDArray[np.float64], curve: NDArray[np.float64], places: 
 
 
 def _mark(
-    ax: Axes, curve: NDArray[np.float64], at: int, rising: bool, place: float, direction: str, digits: int
+    ax: Axes,
+    values: NDArray[np.float64],
+    curve: NDArray[np.float64],
+    at: int,
+    place: float,
+    direction: str,
+    digits: int,
 ) -> Any:
     """An arrow from the height before the jump to the height after it, in the sense of the sweep; its label."""
-    before, after = (curve[at - 1], curve[at]) if (direction == "up") == rising else (curve[at], curve[at - 1])
+    before, after = (
+        (curve[at - 1], curve[at]) if (direction == "up") == (values[0] <= values[-1]) else (curve[at], curve[at - 1])
+    )
     color = _LOOKS[direction]["color"]
     arrow = {"arrowstyle": "->", "color": color, "linestyle": ":", "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
     ax.annotate("", (place, after), (place, before), arrowprops=arrow)
-    side = 2 if direction == "up" else -2
+    share = (place - values.min()) / np.ptp(values)
+    side = 2 if share < 0.05 or (direction == "up" and share < 0.95) else -2  # not beyond the edge of the picture
     small = abs(after - before) < 0.2 * np.ptp(curve[np.isfinite(curve)])  # no room beside the arrow: below it
     where, offset = (min(before, after), (side, -3)) if small else ((before + after) / 2, (side, 0))
     sides = {"va": "top" if small else "center", "ha": "left" if side > 0 else "right"}
