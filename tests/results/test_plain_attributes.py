@@ -66,3 +66,10 @@ def test_a_result_read_back_does_not_have_them(saved) -> None:
     assert again.identical(result)
     assert not [name for name in again.attrs if str(name).startswith("nonsmooth_")]
     assert np.array_equal(again.section, result.section)
+
+
+def test_a_unit_keeps_its_last_digit(tmp_path: Path) -> None:
+    system = ns.mechanical(1.0, 0.1, "k", parameters={"k": (2.0, "N m^-1"), "w": 1.0}, coordinates={"q": "m"})
+    ns.save(ns.simulate(system, duration=1.0, start={"q": 1.0}), tmp_path / "run.nc")
+    with h5py.File(tmp_path / "run.nc") as file:
+        assert file.attrs["nonsmooth_parameters"] == "k = 2 N m^-1, w = 1"

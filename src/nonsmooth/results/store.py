@@ -257,17 +257,16 @@ def _plain(result: xr.Dataset) -> dict[str, str]:
         record = read_provenance(result)
     except ValueError:  # a part of it was dropped
         record = {}
-    units = {
-        name: (float(one), str(one.attrs["units"]))
+    pairs = [
+        f"{name} = {float(one):.15g} {one.attrs['units']}".removesuffix(" 1")
         for name, one in result.coords.items()
         if not one.dims and one.dtype.kind == "f" and "units" in one.attrs
-    }
+    ]
     told: dict[str, str] = {key: str(record[key]) for key in ("verb", "version") if key in record}
     if isinstance(system := record.get("system"), dict):
         told["system"] = str(system.get("name"))
-    if units:
-        pairs = [f"{name} = {value:.15g} {unit.removesuffix('1')}" for name, (value, unit) in units.items()]
-        told["parameters"] = ", ".join(map(str.strip, pairs))
+    if pairs:
+        told["parameters"] = ", ".join(pairs)
     if "state_unit" in result.coords:
         states = zip(result["state"].values.ravel(), result["state_unit"].values.ravel(), strict=True)
         told["states"] = ", ".join(f"{name} ({unit})" if unit != "1" else str(name) for name, unit in states)
