@@ -370,3 +370,18 @@ def test_other_shells_read_their_script(shell: str) -> None:
     if found := shutil.which(shell):
         done = subprocess.run([found, "-n"], input=text, capture_output=True, text=True)
         assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_an_output_that_cannot_write_a_letter_is_written_all_the_same(tmp_path: Path) -> None:
+    """On Windows a pipe takes the letters of one language only."""
+    command = [
+        sys.executable,
+        "-m",
+        "nonsmooth",
+        "init",
+        "discontinuous_support",
+        "--out",
+        str(tmp_path / "\u03c9.toml"),
+    ]
+    done = subprocess.run(command, env={**os.environ, "PYTHONIOENCODING": "ascii"}, capture_output=True, text=True)
+    assert done.returncode == 0 and "\\u03c9.toml" in done.stdout, done.stderr

@@ -133,6 +133,7 @@ keep = 20
         ('store = "a"', "must end in .zarr"),
         ("store = 3", "a name in quotes"),
         ('data = "a.csv"', "must end in .nc, .zarr"),
+        ('data = "A.NC"', "must end in .nc, .zarr"),
         ('figure = "a.doc"', "must end in .pdf"),
         ('data = "taken/a.nc"', "nothing may be written"),
     ],
@@ -175,6 +176,22 @@ def test_a_figure_of_two_states_needs_two(write, tmp_path: Path, capsys) -> None
     study = '[system]\nmodel = "mine.py:decay"\n[simulate]\nduration = 1.0\n[output]\nfigure = "r.svg"\n'
     assert cli.main(["run", str(write(study))]) == 2
     assert "the figure is of two states, and the system has one (x)" in capsys.readouterr().err
+
+
+def test_a_file_of_another_editor_is_read(write, tmp_path: Path) -> None:
+    """Notepad writes a mark in front of the first letter."""
+    path = write(SYSTEM + SIMULATE)
+    path.write_text(path.read_text(), encoding="utf-8-sig")
+    assert read_study(path).options == {"periods": 2}
+
+
+def test_a_name_that_the_disk_refuses_costs_no_result(write, tmp_path: Path, monkeypatch, capsys) -> None:
+    """A long one leaves no room for that of the unfinished file."""
+    monkeypatch.chdir(tmp_path)
+    study = str(write(SYSTEM + SIMULATE + f'[output]\ndata = "{"n" * 250}.nc"\n'))
+    assert cli.main(["run", study, "--quiet"]) == 2
+    (kept,) = tmp_path.glob("*.nc")
+    assert f"the result is kept in {kept}" in capsys.readouterr().err and ns.load(kept)["u"].size
 
 
 def test_a_figure_that_fails_costs_no_result(write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:

@@ -60,6 +60,8 @@ def test_a_session_reads(tmp_path: Path) -> None:
 
 def test_a_bare_notebook_is_enough(tmp_path: Path) -> None:
     folder = bench(tmp_path, ENTRY)
+    notebook = folder / "session.toml"
+    notebook.write_text(notebook.read_text(), encoding="utf-8-sig")  # as Notepad does
     session = load_session(str(folder))
     assert session.title == folder.name and not session.synthetic and not session.apparatus
 

@@ -129,7 +129,7 @@ def _run_study(
         given.setdefault("direction", "up")
     result = compare(measured, system, parameters=parameters, settings=settings, **given)
     output = study.get("output", {})
-    written = write(result, output, folder, folder / "comparison.nc", lambda plot: _draw(plot, result, output))
+    written = write(result, output, folder, lambda plot: _draw(plot, result, output))
     if not quiet:
         print(_summary(result))
         for path in written:

@@ -53,7 +53,7 @@ def read_tables(
     if path.suffix in (".nc", ".zarr") and path.exists():
         raise ValueError(f"{path}: is a saved result and no {what}; `nonsmooth show {path}` shows it")
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise ValueError(f"{path}: no such {what}") from None
     except (ValueError, RecursionError) as error:  # TOML's and Unicode's own errors, thousands of digits or brackets
@@ -98,18 +98,14 @@ def keep(result: xr.Dataset, path: Path) -> Path:
     try:
         return save(result, with_folder(path))
     except Exception as error:
-        raise DataFileError(f"{error}\n{_elsewhere(result, path)}") from error
+        raise DataFileError(f"{error}\n{_elsewhere(result)}") from error
 
 
-def write(
-    result: xr.Dataset, output: Mapping[str, str], folder: Path, name: Path, draw: Callable[[Any], Any]
-) -> list[Path]:
+def write(result: xr.Dataset, output: Mapping[str, str], folder: Path, draw: Callable[[Any], Any]) -> list[Path]:
     """Save the data and the figure that ``[output]`` asks for; returns what was written.
 
     Parameters
     ----------
-    name : Path
-        What to call the result where it must be kept elsewhere, because it was not saved and its figure fails.
     draw : function
         Draws the figure with ``nonsmooth.plot``, which it is given.
 
@@ -126,7 +122,7 @@ def write(
             plot = without_screen()
             written.append(plot.save_figure(draw(plot), with_folder(folder / output["figure"])))
         except Exception as error:
-            where = f"the result is in {written[0]}" if written else _elsewhere(result, name)
+            where = f"the result is in {written[0]}" if written else _elsewhere(result)
             raise DataFileError(f"{error}\n{where}") from error
     return written
 
@@ -141,11 +137,11 @@ def without_screen() -> Any:
     return plot
 
 
-def _elsewhere(result: xr.Dataset, path: Path) -> str:
-    """Save a result under a name of its own in the current folder, at home, or among temporary files; say where."""
+def _elsewhere(result: xr.Dataset) -> str:
+    """Save a result in the current folder, at home, or among temporary files, by a name that none refuses; say it."""
     from nonsmooth.results.store import save
 
-    name = f"{path.stem}-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}.nc"
+    name = f"nonsmooth-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}.nc"
     for folder in (Path.cwd(), Path(os.path.expanduser("~")), Path(tempfile.gettempdir())):
         try:
             return f"the result is kept in {save(result, folder / name)}"

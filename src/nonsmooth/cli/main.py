@@ -55,6 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _answer(arguments: Sequence[str] | None) -> int:
+    with suppress(AttributeError):  # an output that cannot write a letter writes its escape, as that of errors does
+        sys.stdout.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     known = parser()
     options = known.parse_args(arguments)
     if options.run is None:

@@ -95,7 +95,6 @@ class Study:
             result,
             self.output,
             self.path.parent,
-            self.path.with_suffix(".nc"),
             lambda plot: getattr(plot, figure)(result, **axes),
         )
 
@@ -196,9 +195,9 @@ def _check_output(output: Mapping[str, Any], path: Path) -> None:
         if name not in output or not endings:
             continue
         target = path.parent / output[name]
-        if target.suffix.lower() not in endings:
+        if (target.suffix.lower() if name == "figure" else target.suffix) not in endings:
             raise ValueError(f"{place}: {name} = {output[name]!r} must end in {', '.join(endings)}")
-        if target.suffix.lower() == ".zarr":
+        if target.suffix == ".zarr":
             needs_zarr(target)
         folder = next((one for one in target.parents if one.exists()), path.parent)
         if not (folder.is_dir() and os.access(folder, os.W_OK)):

@@ -287,7 +287,7 @@ def load_session(folder: str | os.PathLike[str]) -> Session:
     place = Path(folder)
     notebook = place / NOTEBOOK
     try:
-        document = tomllib.loads(content_of(notebook).decode("utf-8"))
+        document = tomllib.loads(content_of(notebook).decode("utf-8-sig"))
     except DataFileError as error:
         raise DataFileError(f"{error}; a session has a {NOTEBOOK}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
