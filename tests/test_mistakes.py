@@ -128,6 +128,14 @@ MISTAKES = {
         "must be positive",
         "the mass of coordinate 'q'",
     ),
+    "masses that are coupled too much": (
+        "M = lambda p: [[p.m, p.d], [p.d, p.m]]\n"
+        "rig = ns.mechanical(M, np.eye(2), np.eye(2), parameters={'m': 1.0, 'd': 0.0})\n"
+        "rig.with_parameters(d=2.0)",
+        "d = 2.0",
+        "must be positive definite",
+        "the mass matrix",
+    ),
     "a force of time alone": (
         "ns.mechanical(1.0, 0.1, 1.0, forcing={'q': lambda t: np.cos(t)})",
         "too many positional arguments",
@@ -182,6 +190,18 @@ MISTAKES = {
         "it returned 1 values",
         "must return 2 values",
         "one for each of x, v",
+    ),
+    "derivatives in braces": (
+        FIELD.format("{u.v, -u.x}"),
+        "it returned a set, { }",
+        "one for each of x, v",
+        "write ( ) or [ ]",
+    ),
+    "a state that is set": (
+        "def swing(t, u, p):\n    u.x = u.x - p.g\n    return u.v, -u.x\n\nsystem(modes={'free': swing})",
+        "mode 'free': x, a state,",
+        "cannot be set",
+        "a function returns",
     ),
     "a parameter in capitals": (
         FIELD.format("(u.v, -p.K * u.x)"),
@@ -241,6 +261,12 @@ MISTAKES = {
         "give a number",
     ),
     "states as one string": ("system(states='x v')", "not 'x v'", "or be a list of names", '{"x": "m"}'),
+    "a state twice": (
+        "system(states=['x', 'v', 'x'])",
+        "`states` = ['x', 'v', 'x']",
+        "one name is given twice",
+        "system",
+    ),
     "parts by position": (
         "ns.System({'x': 'm'}, {'k': 1.0}, {'free': lambda t, u, p: -u.x})",
         "not 3",

@@ -273,6 +273,8 @@ def _units(given: Any, what: str, system: str, raw: bool = False) -> dict[str, A
             f"not {shortened(given)}"
         )
     if not isinstance(given, Mapping):
+        if len({*given}) < len(given):
+            raise SystemDefinitionError(f"{system!r}: `{what}` = {shortened(given)}: one name is given twice")
         return dict.fromkeys(given, "")
     for key, unit in given.items():
         if not raw and not isinstance(unit, str):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from typing import Any, NoReturn
 
 import numpy as np
@@ -77,6 +77,13 @@ class _Named:
             known = {key: self._units.get(key, "") for key in self._values}
             raise SystemDefinitionError(unknown(name, self._of, self._owner, known)) from None
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name not in _Named.__slots__:
+            raise SystemDefinitionError(
+                f"{name}, {self._of}, cannot be set: a function returns; memory is written by Transition(..., write=)"
+            )
+        object.__setattr__(self, name, value)
+
 
 class States(_Named, np.lib.mixins.NDArrayOperatorsMixin):
     """The state vector in a user's function: ``x, v = u``, ``u.x``, ``u[0]``, ``A @ u``."""
@@ -119,11 +126,6 @@ class Parameters(_Named):
             )
         return getattr(self, name)
 
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name not in _Named.__slots__:
-            raise SystemDefinitionError(f"p.{name} cannot be set: memory is written by Transition(..., write=...)")
-        object.__setattr__(self, name, value)
-
 
 class KnownFunction:
     """A function whose expressions are known, one or a list of them, as those of elements and those of a text are.
@@ -154,6 +156,8 @@ def call_vector(function: Callable[..., Any], arguments: Sequence[Any], names: S
     result = _call(function, arguments, what)
     if isinstance(result, Scalar) or np.isscalar(result):
         result = (result,)
+    if isinstance(result, Set):
+        _shape(what, names, "it returned a set, { }, which has no order: write ( ) or [ ]")
     if isinstance(result, Mapping):  # by name
         if set(result) != set(names):
             _shape(what, names, f"it returned values of {', '.join(map(str, result)) or 'none'}")
