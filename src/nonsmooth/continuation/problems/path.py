@@ -196,7 +196,8 @@ class Walk:
         landing = held.argmax(axis=1)
         extremes[~np.isfinite(extremes)] = np.nan  # states that no visit has
         return Path(
-            *extremes[:, : self.states],
+            extremes[0, : self.states],
+            extremes[1, : self.states],
             inner,
             place,
             which,
