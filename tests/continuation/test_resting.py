@@ -294,3 +294,20 @@ def test_what_stands_moves_in_steps_of_its_place() -> None:
     assert branch.section.sel(state="q2").values == pytest.approx(branch.mu.values, abs=1e-12)
     assert [branch.mu.values.min(), branch.mu.values.max()] == pytest.approx([1.0, 3.0])
     assert branch.sizes["point"] < 60
+
+
+@pytest.mark.parametrize("w", [1.3, 13.0])
+def test_what_rests_all_the_time_has_multipliers_zero(w: float) -> None:
+    """A mass pressed on a stop beside one that moves: x'' + .2 x' + 2 x = cos w t has exp(-.1 T) twice, the stop 0."""
+    system = ns.mechanical(
+        np.eye(2),
+        np.diag([0.0, 0.2]),
+        [[1.0, -1.0], [-1.0, 2.0]],
+        parameters={"w": w, "P": 5.0},
+        forcing={"q1": lambda t, p: p.P, "q2": lambda t, p: np.cos(p.w * t)},
+        elements={"stop": E.Stop(at="q1", position=0.0, restitution=0.5)},
+    )
+    orbit = ns.find_orbit(system, progress=False)
+    assert np.abs(orbit.floquet_multipliers) == pytest.approx([np.exp(-0.2 * np.pi / w)] * 2 + [0.0] * 2, abs=1e-7)
+    branch = ns.continue_orbit(orbit, "P", (4.0, 6.0))
+    assert np.abs(branch["floquet_multipliers"].values[:, 2:]).max() < 1e-12

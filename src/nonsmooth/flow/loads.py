@@ -336,6 +336,18 @@ def meter_of(system: System) -> Meter | None:
     return found
 
 
+def within_held(system: System, mode: int, values: FloatArray, z: FloatArray) -> FloatArray:
+    """The projection onto the small changes of a state at phase 0, and of the memory, that what holds there allows.
+
+    A held contact takes each neighbour to its place in a finite time; at which rate the equations bring rounding errors
+    back to it means nothing."""
+    meter, n, allowed = meter_of(system), len(system.states), np.eye(len(z))
+    if meter is not None:
+        rows = meter.constraints(system.modes[mode], values, 0.0, z[:n], z[n:])
+        allowed[:n, :n] -= np.linalg.pinv(rows, rcond=1e-7) @ rows
+    return allowed
+
+
 def checked_loads(system: System, wanted: bool, verb: str) -> Quantities:
     """The quantities of a system whose loads are wanted; none where they are not.
 

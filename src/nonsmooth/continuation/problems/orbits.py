@@ -16,6 +16,7 @@ from nonsmooth.continuation.problems.path import Path, Walk
 from nonsmooth.continuation.problems.rounds import Rounds
 from nonsmooth.continuation.problems.shooting import Shooting, Solved, plane_across
 from nonsmooth.continuation.problems.signature import Round, Signature
+from nonsmooth.flow.loads import within_held
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
@@ -149,11 +150,12 @@ class Orbits(Curve[OrbitPoint]):
 
     def described(self, point: Point) -> OrbitPoint | None:
         """The orbit with its multipliers and its path."""
-        M = point.solved.monodromy
-        path = self.walk.along(point.solved, self.shooting.split(point.X)[1])
+        solved, states = point.solved, self.shooting.split(point.X)[1]
+        M = solved.monodromy @ within_held(self.shooting.system, self.shooting.modes[0], solved.values, states[0])
+        path = self.walk.along(solved, states)
         if path is None or not np.isfinite(M).all():
             return None
-        return OrbitPoint(**vars(point), M=M, multipliers=point.solved.multipliers_of(M), path=path)
+        return OrbitPoint(**vars(point), M=M, multipliers=solved.multipliers_of(M), path=path)
 
     def word(self) -> Signature:
         """The signature."""

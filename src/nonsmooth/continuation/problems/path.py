@@ -97,7 +97,7 @@ class Walk:
             np.zeros(n),
             np.zeros(len(traced.indicators)),
         )
-        self.memory, self.shape, self.states = len(traced.m), (m, len(jumps)), len(traced.u)
+        self.shape, self.states = (m, len(jumps)), len(traced.u)
         sources = np.array([jump.source for jump in jumps], dtype=np.int64)
         fires = np.array([jump.fires for jump in jumps], dtype=bool) & (self.net.at < 0)
         self.armed = (sources == self.modes[:, None]) & fires
@@ -162,7 +162,7 @@ class Walk:
             self.net,
             q,
             Visits(self.modes, solved.times[:-1], tau, np.ascontiguousarray(states), self.fired, self.fired_row),
-            (*room, np.zeros(len(q) + self.memory), sizes),
+            (*room, np.zeros(len(q) + states.shape[1]), sizes),
             extremes,
             Margins(inner, place, which, begin, begin_row, size, end, slope),
         )
