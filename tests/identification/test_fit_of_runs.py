@@ -218,3 +218,24 @@ def test_a_channel_that_a_run_lacks_or_that_holds_few_readings() -> None:
         assert not found.anomalies
     with pytest.raises(ValueError, match=r"measured\['v_q'\]: channel 'v_q' holds no number"):
         ns.fit(oscillator(), runs[1], ["k", "c"], progress=False)
+
+
+@pytest.mark.parametrize("gain", [1.0, 20.0])
+def test_a_gain_that_another_start_makes_up_for_is_not_determined(gain: float) -> None:
+    """Of a linear decay from an unknown start: the readings are gain times start, whatever either is."""
+    rng = np.random.default_rng(0)
+    y = gain * (decay(T) + 1e-2 * rng.standard_normal(T.size))
+    found = ns.fit(oscillator(k=8.8), {"q": (T, y)}, ["k", "c", "q.gain"], progress=False)
+    assert found.estimate("q.gain").uncertainty == np.inf
+    assert "another start makes up for it" in found.identifiability["q.gain"]
+    within(found, {"k": 9.0, "c": 0.15})
+    run = {"duration": 20.0, "samples": T, "start": {"q": 1.0}}
+    plan = ns.plan_experiment(
+        oscillator(), {"decay": run}, ["k", "c", "q.gain"], measured={"q": ns.Sensor(noise=gain * 1e-2, gain=gain)}
+    )
+    known = [found.uncertainty["k"], found.uncertainty["c"]]
+    assert plan["uncertainty"].values[0] == pytest.approx([*known, np.inf], rel=0.25)
+    forced = ns.plan_experiment(  # the gain of a known force is told
+        oscillator(F=1.0), {"run": run}, ["k", "q.gain"], measured={"q": ns.Sensor(noise=1e-2)}
+    )
+    assert float(forced["uncertainty"].sel(parameter="q.gain")[0]) < 0.01

@@ -22,6 +22,7 @@ from nonsmooth.identification.uncertainty import newey_west, not_below
 
 _LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction counts as determined
 _SETTLED = 1e-3  # of a standard uncertainty
+_TOLD = 1e-8  # of a column: what is left of it behind the start's, below which a start makes up for it
 _RIDGE = 1e-13  # of a start's column: what keeps a start that is known or not seen from being divided by
 _LITTLE = 1e-4  # of the sum of squares: what a rough fit leaves to be gained
 _ACCURACY = 0.05  # of a standard uncertainty: how near the minimum is told where the derivatives' accuracy ends
@@ -107,6 +108,7 @@ def reduced(
         back.append((inverse, factor[:n, n : n + m], factor[:n, n + m]))
         if used is None or used[i]:
             left, rest = factor[n:, n : n + m], factor[n:, n + m]
+            left[:, np.linalg.norm(left, axis=0) < _TOLD * np.linalg.norm(g, axis=0)] = 0.0
             normal[np.ix_(piece.which, piece.which)] += left.T @ left
             right[piece.which] += left.T @ rest
     return normal, right, back

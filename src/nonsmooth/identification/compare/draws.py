@@ -73,7 +73,7 @@ def read_settings(settings: Mapping[str, Any] | None, system: System) -> dict[st
 def nominal(system: System, parameters: Mapping[str, float] | None, settings: Settings) -> System:
     """The system at the identified parameters and at the run's settings; settings win."""
     if parameters is not None:
-        system = system.with_parameters({name: parameters[name] for name in parameters})
+        system = system.with_parameters(dict(parameters))
     return system.with_parameters(settled(settings, system.values))
 
 
@@ -120,7 +120,7 @@ def draw_systems(
     base = nominal(system, parameters, settings)
     allowed = _ends(bounds or {}, system)
     systems: list[System] = []
-    kept: dict[str, list[float]] = {}
+    kept: list[dict[str, float]] = []
     refused = 0
     while len(systems) < draws:
         missing = draws - len(systems)
@@ -145,14 +145,13 @@ def draw_systems(
                 refused += 1
                 continue
             systems.append(drawn)
-            for name, value in row.items():
-                kept.setdefault(name, []).append(value)
+            kept.append(row)
         if refused > MOST_REFUSED * draws:
             raise ValueError(
                 f"of {refused + len(systems)} draws only {len(systems)} are allowed by {system.name!r}: a parameter's "
                 "uncertainty is many times its value; identify it better, or leave it out of the covariance"
             )
-    return systems, {name: np.array(column) for name, column in kept.items()}
+    return systems, {name: np.array([row[name] for row in kept]) for name in (kept[0] if kept else ())}
 
 
 def _ends(bounds: Mapping[str, Any], system: System) -> dict[str, tuple[float, float]]:

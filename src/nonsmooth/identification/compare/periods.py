@@ -46,7 +46,7 @@ class MeasuredPeriod:
 
 
 def measured_period(
-    points: ArrayLike, noise: ArrayLike, *, max_period: int = 16, bound: float = BOUND, drifting: bool = False
+    points: ArrayLike, noise: ArrayLike, *, max_period: int = 16, drifting: bool = False
 ) -> MeasuredPeriod:
     r"""The period number of successive section points with known noise.
 
@@ -58,8 +58,6 @@ def measured_period(
         Standard error of a point in each state; positive.
     max_period : int
         The longest searched; at least four returns of it must be there.
-    bound : float
-        Largest scaled return that counts.
     drifting : bool
         Judge second differences, :math:`s_{k+2p} - 2 s_{k+p} + s_k` over :math:`\sqrt{6} \sigma`, which a motion of
         period p that drifts evenly leaves at 1, too.
@@ -86,13 +84,11 @@ def measured_period(
         change = change[p:] - change[:-p] if drifting else change
         if len(known := change[np.isfinite(change).all(axis=1)]) >= FEWEST_RETURNS:
             returns[p - 1] = np.sqrt(np.mean(known**2))
-    found = np.flatnonzero(returns <= bound)
+    found = np.flatnonzero(returns <= BOUND)
     return MeasuredPeriod(int(found[0]) + 1 if len(found) else 0, returns)
 
 
-def period_numbers(
-    points: ArrayLike, noise: ArrayLike, *, window: int = 24, max_period: int = 8, bound: float = BOUND
-) -> IntArray:
+def period_numbers(points: ArrayLike, noise: ArrayLike, *, window: int = 24, max_period: int = 8) -> IntArray:
     """The period number in a window that moves along a slow rise of a parameter, one for each point.
 
     The points of an orbit drift with the parameter: an even drift within the window is no return's fault.
@@ -104,15 +100,15 @@ def period_numbers(
     count = len(cloud) - window + 1
     numbers = np.array(
         [
-            measured_period(cloud[i : i + window], noise, max_period=max_period, bound=bound, drifting=True).number
+            measured_period(cloud[i : i + window], noise, max_period=max_period, drifting=True).number
             for i in range(count)
         ]
     )
     return np.pad(numbers, (window // 2, window - 1 - window // 2), mode="edge").astype(np.int64)
 
 
-def flips(values: ArrayLike, numbers: ArrayLike, *, last: int = 4) -> dict[str, float]:
-    """Values at which the period number doubles: ``{"1-2": value, "2-4": value, ...}`` up to period ``last``.
+def flips(values: ArrayLike, numbers: ArrayLike) -> dict[str, float]:
+    """Values at which the period number doubles: ``{"1-2": value, "2-4": value}``.
 
     Parameters
     ----------
@@ -120,8 +116,6 @@ def flips(values: ArrayLike, numbers: ArrayLike, *, last: int = 4) -> dict[str, 
         The parameter, in either order of time.
     numbers : array (n,)
         The period number at each; 0 where none was found.
-    last : int
-        The longest period asked for.
 
     Notes
     -----
@@ -132,12 +126,10 @@ def flips(values: ArrayLike, numbers: ArrayLike, *, last: int = 4) -> dict[str, 
     order = np.argsort(np.asarray(values, dtype=float), kind="stable")
     x, n = np.asarray(values, dtype=float)[order], np.asarray(numbers)[order]
     found = {}
-    p = 1
-    while 2 * p <= last:
+    for p in (1, 2):
         is_single, is_double = n == p, n == 2 * p
         if is_single.any() and is_double.any():
             found[f"{p}-{2 * p}"] = _parting(x, is_single, is_double)
-        p *= 2
     return found
 
 

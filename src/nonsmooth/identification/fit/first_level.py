@@ -228,7 +228,7 @@ def _sizes(problem: Windows, state: Residuals) -> FloatArray:
     for c in range(len(found)):
         rows = [r[w.readings[1] == c] for w, r in problem.rows(state)]
         each = [float(np.mean(r**2)) for r in rows if len(r)]
-        found[c] = np.sqrt(np.median(each))
+        found[c] = np.sqrt(np.median(each or [0.0]))
     return found
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.arrow import Sandwich, inverted, sandwich
+from nonsmooth.identification.arrow import Sandwich, inverted, reduced, sandwich
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.first_level import BETTER
 from nonsmooth.identification.fit.growth import SHORT, Grown
@@ -47,8 +47,8 @@ def outcome(
     problem, theta = grown.problem, grown.theta
     u = problem.unknowns
     found = sandwich(problem, theta, grown.starts)
-    normal = found.normal + u.precision
-    loose = _undetermined(inverted(normal)[1])
+    read, *_ = reduced(problem, found.state, problem.weights(found.state, starts=False), len(theta))
+    loose = _undetermined(inverted(read + u.precision)[1])
     starts = _starts(grown, found)
     noise = _noise(grown, found)
     jacobian = np.vstack([np.eye(len(theta)), starts.jacobian])
@@ -59,8 +59,8 @@ def outcome(
     covariance[m:s, m:s] += starts.own
     covariance[range(s, s + q), range(s, s + q)] = [one.uncertainty**2 for one in noise.values()]
     lost = np.flatnonzero(~(np.diag(covariance) >= 0.0))  # of a fit that went so wrong that nothing is left of it
-    for i in sorted({*loose, *lost.tolist()}):
-        covariance[i, :], covariance[:, i] = 0.0, 0.0
+    for i in {*loose, *lost.tolist()}:
+        covariance[i] = covariance[:, i] = 0.0
         covariance[i, i] = np.inf
     values, units = [*theta, *starts.values], [*u.units, *starts.units]
     rows = [
@@ -77,7 +77,7 @@ def outcome(
         beside = [_of_steady(grown, steady, rows[0]), *beside]
         samples += steady.sizes["sample"]
     known = [name for name in profiles if np.isfinite(rows[u.names.index(name)].uncertainty)]
-    beside = [*profiled(grown, known, normal, found.covariance, synthetic, watched), *beside]
+    beside = [*profiled(grown, known, found.normal + u.precision, found.covariance, synthetic, watched), *beside]
     notes = [*left, *(_notes(grown, found, data) if data is not None else [])]
     notes += [note for finding in beside for note in finding.notes]
     finding = Finding(
@@ -152,7 +152,7 @@ def _undetermined(directions: FloatArray) -> dict[int, list[int]]:
     """Places of unknowns that the records leave open, each with those that it may be traded for."""
     found: dict[int, list[int]] = {}
     for direction in directions.T:
-        together = [int(i) for i in np.flatnonzero(np.abs(direction) > 1e-3 * np.max(np.abs(direction)))]
+        together = np.flatnonzero(np.abs(direction) > 1e-3 * np.max(np.abs(direction))).tolist()
         for i in together:
             found[i] = sorted({*found.get(i, []), *together})
     return found
@@ -172,7 +172,7 @@ def _sentences(grown: Grown, covariance: FloatArray, loose: Mapping[int, list[in
         if i in loose and others:
             text = f"not identifiable: only a combination of it and {', '.join(others)} is; give one its value"
         elif i in loose:
-            text = "not identifiable: the recorded motion does not depend on it"
+            text = "not identifiable: the recorded motion does not depend on it, or another start makes up for it"
         elif theta[i] in (u.low[i], u.high[i]):
             text = "at its bound: the record draws it beyond, so its uncertainty does not hold"
         elif error[i] > abs(theta[i]) and name in u.active:

@@ -107,13 +107,12 @@ def plan_experiment(
     for name, size in zip(sensors, noise, strict=True):
         if not size > 0:
             raise ValueError(f"measured[{name!r}] says no noise: give ns.Sensor(noise=...) or resolution=")
-    names: list[str] = []
-    found, precision, theta = [], np.zeros((0, 0)), np.zeros(0)
     for name, run in runs.items():
         for key in sorted(run.keys() - {*_OF_A_RUN}):
             raise ValueError(f"runs[{name!r}]: {unknown(key, 'a property', 'a run', _OF_A_RUN)}")
-        names, told, precision, theta = _information(system, str(name), run, parameters, sensors, noise, options)
-        found.append(told)
+    rows = [_information(system, str(name), run, parameters, sensors, noise, options) for name, run in runs.items()]
+    names, _, precision, theta = rows[-1]
+    found = [told for _, told, *_ in rows]
     alone = np.array([_uncertainties(one + precision) for one in found])
     size = np.where(theta != 0, np.abs(theta), 1.0)
     order, totals = _ordered(found, precision, size)
@@ -178,7 +177,7 @@ def _information(
     for window, y in zip(whole.pieces, read, strict=True):
         window.values[window.readings] = whole.shown(window, y[:, 0])
     state = whole.derivatives(theta, whole.starts)
-    normal = reduced(whole, state, whole.weights(None), len(theta))[0]
+    normal = reduced(whole, state, whole.weights(None, starts=False), len(theta))[0]
     shared = len(theta) - problem.unknowns.phases
     own = np.linalg.pinv(normal[shared:, shared:], hermitian=True)
     eliminated = normal[:shared, :shared] - normal[:shared, shared:] @ own @ normal[shared:, :shared]

@@ -83,13 +83,12 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
     ]
     if not steps > _ENOUGH * tau:
         notes.append(f"too few steps for the chains' memory: take {_ENOUGH * tau:.0f} or more")
-    name, estimate = next(iter(rows.items()))
+    (_, estimate), *others = rows.items()
     data = xr.Dataset(
         {"value": (("draw", "parameter"), draws, {"long_name": "draws from the posterior"})},
         {"parameter": list(u.names), "unit": ("parameter", list(u.units))},
     )
-    others = {other: row for other, row in rows.items() if other != name}
-    return Finding("posterior", estimate, METHOD, grown.readings, grown.runs, tuple(notes), others, data=data)
+    return Finding("posterior", estimate, METHOD, grown.readings, grown.runs, tuple(notes), dict(others), data=data)
 
 
 def _drawn(

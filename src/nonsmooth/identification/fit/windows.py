@@ -362,13 +362,14 @@ class Windows:
                     table[mine, k] = of[mine, a if what == "gain" else a + 1]
         return fitted, periodic, table
 
-    def weights(self, state: Residuals | None) -> list[FloatArray]:
-        """One over the standard deviation of each row; less for those that the loss weighs down."""
+    def weights(self, state: Residuals | None, starts: bool = True) -> list[FloatArray]:
+        """One over the standard deviation of each row; less for those that the loss weighs down. Those of the
+        ``starts``, which hold what a window does not determine, are no readings, and 0 on request."""
         found = []
         for i, w in enumerate(self.pieces):
             weight = 1.0 / self.noise[w.readings[1]]
             if state is not None and np.isfinite(self.loss):
                 z = np.abs(state.residuals[i][: len(weight)] * weight)
                 weight = weight * np.sqrt(self.loss / np.maximum(z, self.loss))
-            found.append(np.concatenate([weight, 1.0 / w.spread[w.free]]))
+            found.append(np.concatenate([weight, starts / w.spread[w.free]]))
         return found
