@@ -303,3 +303,40 @@ def test_models_are_chosen_by_records() -> None:
         ns.select_model({"a": (linear(), "c"), "b": (linear(), "k")}, response(amplitude()), progress=False)
     with pytest.raises(ValueError, match=r"steady states are in \.steady"):
         _ = ns.fit(linear(), response(amplitude()), "k", progress=False).residuals
+
+
+def test_a_force_that_only_the_response_tells_stays_where_it_is_until_then() -> None:
+    """A decay without the drive, in mm with an offset, and amplitudes in mm under it; both in closed form."""
+    rng, t, k, c, F = np.random.default_rng(0), np.arange(0, 20, 0.05), 9.0, 0.3, 1.0
+    system = ns.mechanical(
+        1.0,
+        "c",
+        "k",
+        parameters={"k": 8.5, "c": 0.25, "F": 1.2, "omega": 2.0},
+        coordinates=["q"],
+        forcing={"q": lambda t, p: p.F * np.cos(p.omega * t)},
+    )
+    rate, omega = np.sqrt(k - c**2 / 4), np.linspace(1.5, 4.5, 25)
+    decay = 0.1 * np.exp(-c / 2 * t) * (np.cos(rate * t) + c / (2 * rate) * np.sin(rate * t))
+    amplitude = F / np.hypot(k - omega**2, c * omega)
+    readings = [
+        {"laser": (t, 1e3 * decay + 5.0 + 0.2 * rng.standard_normal(t.size))},
+        {
+            "omega": omega,
+            "amplitude": 1e3 * amplitude + 2.0 * rng.standard_normal(25),
+            "amplitude_error": np.full(25, 2.0),
+        },
+    ]
+    found = ns.fit(
+        system,
+        readings,
+        ["k", "c", "F", "q.offset", "q.gain"],
+        measured={"q": ns.Sensor("laser", gain=1e3)},
+        settings={"0": {"F": 0.0}},
+        priors={"q.gain": (1000.0, 10.0)},
+        progress=False,
+    )
+    for name, value in {"k": k, "c": c, "F": F, "q.offset": 5.0, "q.gain": 1000.0}.items():
+        estimate = found.estimate(name)
+        assert abs(estimate.value - value) < 4 * estimate.uncertainty, name
+    assert found.uncertainty["F"] == pytest.approx(0.01, rel=0.15) and not found.anomalies  # that of the gain

@@ -119,9 +119,9 @@ def inverted(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     Small eigenvalues make such a direction; it is left out of the inverse.
     """
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    scale[scale == 0.0] = 1.0  # what nothing depends on is a direction of its own
     shrunk = matrix / np.outer(scale, scale)
-    shrunk[np.diag(matrix) <= 0.0] = 0.0  # what nothing depends on is a direction of its own
     values, vectors = np.linalg.eigh(shrunk)
     known = values > _LEAST
     inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
@@ -161,7 +161,8 @@ def settle(
             normal, right, back = reduced(problem, state, weights, p, used, damping)
             full = normal + prior
             pull = right - prior @ (theta - u.centre)
-            scale = np.sqrt(np.maximum(np.diag(full), 1e-300))
+            scale = np.sqrt(np.diag(full))
+            scale[scale == 0.0] = 1.0  # else rounding moves what nothing depends on
             shrunk = full / np.outer(scale, scale)
             if not np.isfinite(shrunk).all():
                 raise SolveError(
