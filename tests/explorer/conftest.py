@@ -22,6 +22,7 @@ FEW = "columns=61&transient=100&keep=40"  # so that nothing takes long where man
 SIZE = {"width": 1280, "height": 800}
 ROOT = Path(__file__).parents[2]
 MOST_UNDONE = 12  # steps; beyond them a page is opened sooner than undone
+HEARD = "(({sent, heard}) => sent === heard)(document.documentElement.dataset)"
 CHANNEL = "name => Bokeh.documents[0].get_model_by_name(name).value"
 PATIENCE = 120.0  # seconds; a cold cache compiles in them
 
@@ -83,10 +84,7 @@ class Page:
 
     def until_done(self) -> None:
         """Wait until everything that was asked for is shown."""
-        self.until(
-            "(() => { const told = document.documentElement.dataset;"
-            " return told.sent === told.heard && told.busy === ''; })()"
-        )
+        self.until(f"{HEARD} && document.documentElement.dataset.busy === ''")
 
     def begin(self, address: str) -> None:
         """Show what the page at an address shows first: undo all that was done to it, or else open it."""
@@ -101,7 +99,7 @@ class Page:
                 self.until_done()
                 return bool(self.first[1] == self._shown())
             self.tab.click("#undo")
-            self.until_done()
+            self.until(HEARD)  # and not until it is done: what lies between is not computed again
         return False
 
     def _shown(self) -> dict[str, Any]:

@@ -8,8 +8,11 @@ from typing import Any
 import pytest
 from tests.explorer.conftest import FEW
 
+import nonsmooth as ns
+from nonsmooth.explorer.sketch import equations_of
+
 LARGE = "localStorage.clear(); localStorage.setItem('nonsmooth-look', JSON.stringify({dark: false, large: true}))"
-SIZES = [(1280, False), (1280, True), (400, True), (400, False)]
+SIZES = [(400, False), (400, True), (1280, True), (1280, False)]  # all is drawn anew for each
 #: Notes what is written on every canvas since it was cleared: words, and the box that they take on it.
 NOTE = """(() => {
     const of = CanvasRenderingContext2D.prototype, {fillText, clearRect} = of;
@@ -96,6 +99,17 @@ def check_room(page: Any, width: int, large: bool) -> None:
                 assert right <= a or c <= left or bottom <= b or d <= top, (words, other, large, width)
 
 
+def test_nothing_is_loaded_or_drawn_that_nobody_sees(page: Any) -> None:
+    loaded = page.tab.evaluate("[...document.scripts].filter(one => one.src).map(one => new URL(one.src).pathname)")
+    assert loaded == ["/static/js/bokeh.min.js", "/static/js/bokeh-widgets.min.js"]
+    seen = "[...document.querySelectorAll('.view')].filter(one => one.checkVisibility()).map(one => one.dataset.view)"
+    assert page.tab.evaluate(seen) == ["diagram", "portrait", "history", None]  # and the section
+    page.tab.click("#tab-response")
+    page.until_done()
+    assert page.tab.evaluate(seen) == ["response", "portrait", "history", None]
+    assert min(frame(page, "response")) > 100
+
+
 def test_the_tour_covers_nothing(server: Any, new_page: Callable[..., Any]) -> None:
     free = """() => {
         const tour = document.getElementById("tour").getBoundingClientRect();
@@ -166,7 +180,7 @@ def test_equations_and_a_moving_sketch_stand_beside_the_sliders(server: Any, new
     places = page.tab.evaluate(mass)
     assert len(places) == 36  # one period
     x = page.tab.evaluate("""(() => {
-        const {ys} = Bokeh.documents[0].get_model_by_name("history curves").data;
+        const [{data_source: {data: {ys}}}] = Bokeh.documents[0].get_model_by_name("history").renderers;
         return ys.flatMap(one => [...one]).filter(y => y === y);
     })()""")
     # the mass lies as the motion says, to one scale: its first place is that of the section point
@@ -179,10 +193,16 @@ def test_equations_and_a_moving_sketch_stand_beside_the_sliders(server: Any, new
     held = page.tab.evaluate('document.getElementById("sketch").dataset.at')
     page.tab.wait_for_timeout(300)
     assert page.tab.evaluate('document.getElementById("sketch").dataset.at') == held
-    page.tab.select_option("#model", "chua_circuit")
+    page.tab.select_option("#model", "buck_converter")
     page.until_done()
     assert not page.tab.is_visible("#sketch")
-    assert "diode" in page.tab.inner_text("#equations")
+    assert "closed" in page.tab.inner_text("#equations")
+
+
+def test_an_element_stands_in_the_equations_in_its_own_words() -> None:
+    heading, words = equations_of(ns.models.chua_circuit())[-1]
+    assert heading == "diode"
+    assert words.startswith("Backlash(displacement=x,")
 
 
 def test_numbers_that_no_form_of_ours_has_are_refused(page: Any) -> None:

@@ -20,8 +20,10 @@ from bokeh.models import ColumnDataSource
 
 from nonsmooth.explorer import session as sessions
 from nonsmooth.explorer.catalogue import Catalogue
+from nonsmooth.explorer.figures import BLUE
 from nonsmooth.explorer.session import Page
 from nonsmooth.explorer.worker import _Process
+from nonsmooth.plot.style import COLORS
 
 FEW = "columns=10&transient=20&keep=8&low=0.2&high=0.3"
 PATIENCE = 120.0
@@ -100,6 +102,19 @@ def test_nothing_of_a_model_stands_under_the_name_of_the_next(tabs: list[Page]) 
     assert not tab.session.sheet.views["portrait"].zone.visible
     for plot in [tab.session.sheet.views[name].figure.plot for name in ("portrait", "history", "section")]:
         assert (plot.xaxis[0].axis_label, plot.title.text) == (None, "")
+
+
+def test_curves_have_the_colour_of_their_mode_on_a_light_and_on_a_dark_ground(tabs: list[Page]) -> None:
+    tab = Tab(tabs, f"{FEW}&p.rho=0.45")
+    tab.say("begin")
+    tab.until_done()
+    for dark in (False, True):
+        tab.say("look", "", {"dark": dark, "large": False})
+        for name in ("portrait", "history"):
+            view = tab.session.sheet.views[name]
+            assert view.curves.data["mode"] == [0, 1]  # out of contact, and in it
+            palette = view.lines.glyph.line_color.transform.palette
+            assert palette[:2] == (BLUE[dark], COLORS["second"])
 
 
 @pytest.mark.usefixtures("new_processes")

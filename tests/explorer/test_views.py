@@ -63,6 +63,8 @@ def test_branches_lie_over_the_diagram_and_special_points_say_what_they_are(page
     assert abs(np.nanmean(data(page, "stable branches")["y"])) < 0.02  # m, where it was m/s
     page.tab.select_option("#over", "omega")
     page.until("Bokeh.documents[0].get_model_by_name('special points').data.x.length === 0")
+    page.write("low", "3.6")
+    page.write("high", "3.8")
     page.until_done()
     assert page.notes() == ""
 
@@ -140,6 +142,8 @@ def test_a_jump_of_figure_9_and_the_orbits_of_two_quick_clicks_on_its_branches(p
 
 def test_a_chart_gets_finer_and_a_click_shows_the_orbit_of_that_cell(page: Any) -> None:
     stage = 'Bokeh.documents[0].get_model_by_name("chart cells").data.stage[0]'
+    page.write("transient", "40")
+    page.write("keep", "16")
     page.tab.click("#tab-chart")
     page.until(f'{stage} === "first chart"')
     page.until(f'{stage} === "chart"')

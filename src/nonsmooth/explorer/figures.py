@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from bokeh.models import ColumnDataSource, CustomJSTickFormatter, Glyph, HoverTool, NoOverlap, Range1d, Span
+from bokeh.models import ColumnDataSource, CustomJSTickFormatter, HoverTool, NoOverlap, Range1d, Span
 from bokeh.plotting import figure
 from bokeh.themes import Theme
 
@@ -111,10 +111,6 @@ class Panel:
         data = {**{key: [] for key in keys}, **columns}
         self._sources.append((ColumnDataSource(name=name, data=data), data))
         return self._sources[-1][0]
-
-    def draw(self, source: ColumnDataSource, glyph: Glyph, **options: Any) -> Any:
-        """Draw what a source holds; ``figure``'s own verbs make two more glyphs of each, which nobody sees."""
-        return self.plot.add_glyph(source, glyph, **options)
 
     def tell(self, *renderers: Any, **options: Any) -> None:
         """Show the ``words`` of what lies below the mouse."""

@@ -108,7 +108,6 @@ def explore(
 def _load() -> None:
     """Load what pages need while the browser starts. None of it is looked through again as a page is closed."""
     import_module("nonsmooth.explorer.session")
-    gc.collect()
     gc.freeze()
 
 

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl
@@ -126,7 +126,6 @@ class Page:
         document.template = Environment(loader=DictLoader(texts)).get_template("page.html")
         program = "\n".join(text for name, text in texts.items() if name.endswith(".js"))
         document.template_variables.update(
-            scripts=_scripts(),
             link=LINK,
             kinds=KINDS,
             style=texts["page.css"],
@@ -354,13 +353,3 @@ class Page:
         self.workshop.tell()
         self.tell("equations", equations_of(self.system))
         self.tell_ui()
-
-
-@lru_cache(maxsize=1)
-def _scripts() -> list[str]:
-    """Of Bokeh's five scripts, 4 MB, the two that the page needs."""
-    from bokeh.resources import Resources
-    from bokeh.server.views.static_handler import StaticHandler
-
-    version = StaticHandler.append_version
-    return Resources("server", root_url="/", path_versioner=version, components=["bokeh", "bokeh-widgets"]).js_files

@@ -55,11 +55,6 @@ class Sheet:
         """Results of all views, by name."""
         return {name: result for view in self.views.values() for name, result in view.results.items()}
 
-    @property
-    def plots(self) -> list[Any]:
-        """The figures of the page."""
-        return [view.figure.plot for view in self.views.values() if view.figure is not None]
-
     def paint(self, dark: bool) -> None:
         """Take the colours that show on a light or a dark ground."""
         for view in self.views.values():

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from bokeh.models import BoxAnnotation, Line, MultiLine, Scatter
+from bokeh.models import BoxAnnotation, LinearColorMapper
 
 from nonsmooth.explorer.figures import BLUE, MOST, Panel, extent
 from nonsmooth.explorer.labels import number, plain_of
@@ -27,28 +27,18 @@ class _Curves(View):
 
     def build(self) -> None:
         self.figure = Panel(self.name)
-        self.curves = self.figure.source("xs", "ys", "color", name=f"{self.name} curves")
-        self.lines = self.figure.draw(self.curves, MultiLine(line_color="color", line_width=1.6))
-        self._modes: list[int] = []  # of the lines
+        self.curves = self.figure.source("xs", "ys", "mode")
+        mapper = LinearColorMapper(low=0, high=len(_MODES))
+        color = {"field": "mode", "transform": mapper}
+        self.lines = self.figure.plot.multi_line("xs", "ys", color=color, source=self.curves, line_width=1.6)
+        self._inked.append((mapper, "palette", tuple(zip(*_MODES, strict=True))))
 
     def put(self, run: Any, xs: Any, ys: Any) -> None:
         """Draw a curve of a trajectory."""
         mode, *cut = with_gaps(run, run["mode"].values.astype(float), xs, ys)
         pieces = pieces_by_mode(np.nan_to_num(mode, nan=-1).astype(int), *cut)
-        self._modes = [k for k, (x, _) in enumerate(pieces) if np.isfinite(x).any()]
-        self.curves.data = {
-            **{key: [pieces[k][i] for k in self._modes] for i, key in enumerate(("xs", "ys"))},
-            "color": self._colors(),
-        }
-
-    def _colors(self) -> list[str]:
-        return [_MODES[k % len(_MODES)][self.dark] for k in self._modes]
-
-    def paint(self, dark: bool) -> None:
-        """Take the colours that show on a light or a dark ground."""
-        super().paint(dark)
-        if self._modes:
-            self.curves.data = {**self.curves.data, "color": self._colors()}
+        seen = [(k % len(_MODES), *piece) for k, piece in enumerate(pieces) if k in mode]
+        self.curves.data = {key: [one[i] for one in seen] for i, key in enumerate(("mode", "xs", "ys"))}
 
 
 class Portrait(_Curves):
@@ -73,7 +63,9 @@ class Portrait(_Curves):
         )
         self.figure.plot.add_layout(self.zone)
         self.points = self.figure.source("x", "y")
-        self.figure.draw(self.points, Scatter(size=7, fill_color=COLORS["zone"], line_color="#1B1F24", line_width=1.0))
+        self.figure.plot.scatter(
+            "x", "y", source=self.points, size=7, fill_color=COLORS["zone"], line_color="#1B1F24", line_width=1.0
+        )
 
     def show(self, job: Request, found: Mapping[str, Any]) -> None:
         """Its exponents are not known yet."""
@@ -126,7 +118,7 @@ class TimeHistory(_Curves):
         """Lines, and rings at the crossings."""
         super().build()
         self.crossings = self.figure.source("x", "y")
-        self.figure.draw(self.crossings, Scatter(size=5, fill_color=None, line_color=COLORS["muted"]))
+        self.figure.plot.scatter("x", "y", source=self.crossings, size=5, fill_color=None, line_color=COLORS["muted"])
 
     def redraw(self) -> None:
         """Draw the last of the trajectory."""
@@ -163,10 +155,11 @@ class SectionPoints(View):
     def build(self) -> None:
         """Points over the orbit."""
         self.figure = Panel("section")
+        plot = self.figure.plot
         self.orbit = self.figure.source("x", "y")
-        self.figure.draw(self.orbit, Line(line_color=COLORS["muted"], line_alpha=0.6, line_width=1))
+        plot.line("x", "y", source=self.orbit, line_color=COLORS["muted"], line_alpha=0.6, line_width=1)
         self.points = self.figure.source("x", "y", name="section points")
-        self.dots = self.figure.draw(self.points, Scatter(size=4, line_color=None, fill_alpha=0.75))
+        self.dots = plot.scatter("x", "y", source=self.points, size=4, line_color=None, fill_alpha=0.75)
         self.ink(BLUE, self.dots, field="fill_color")
 
     def redraw(self) -> None:

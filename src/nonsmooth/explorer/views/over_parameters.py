@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from bokeh.models import ImageRGBA, Line, Scatter, Segment
 
 from nonsmooth.explorer.figures import BLUE, GREY, INK, Panel, extent
 from nonsmooth.explorer.labels import number
@@ -53,20 +52,28 @@ class Diagram(View):
     def build(self) -> None:
         """The image, and bars that tell the period numbers of a column."""
         self.figure = Panel("diagram")
-        empty = np.zeros((1, 1), np.uint32)
+        plot, empty = self.figure.plot, np.zeros((1, 1), np.uint32)
         ends: dict[str, Any] = {"x": [0.0], "y": [0.0], "dw": [1.0], "dh": [1.0]}
         self._image = self.figure.source(name="diagram image", image=[empty], **ends, stage=[""], of=[""])
-        self.figure.draw(self._image, ImageRGBA())
+        plot.image_rgba("image", "x", "y", "dw", "dh", source=self._image)
         self._columns = self.figure.source("value", "low", "high", "words", "period", "status", name="columns")
-        bar = {"x0": "value", "y0": "low", "x1": "value", "y1": "high", "line_width": 4}
-        seen = Segment(**bar, line_alpha=0.25, line_color=COLORS["muted"])
-        bars = self.figure.draw(self._columns, Segment(**bar, line_alpha=0.0), hover_glyph=seen)
+        bars = plot.segment(
+            "value",
+            "low",
+            "value",
+            "high",
+            source=self._columns,
+            line_alpha=0.0,
+            line_width=4,
+            hover_line_alpha=0.25,
+            hover_line_color=COLORS["muted"],
+        )
         self.figure.tell(bars, mode="vline", line_policy="interp", attachment="right", point_policy="follow_mouse")
         self._here = self.figure.mark()
         self._shown: dict[str, Any] = {}  # the request of what is drawn
         self._pixels = _HEIGHT
         self._fitted: tuple[str, ...] = ()
-        self.figure.plot.on_change("inner_height", lambda attr, old, new: self._resize(int(new)))
+        plot.on_change("inner_height", lambda attr, old, new: self._resize(int(new)))
 
     def _resize(self, pixels: int) -> None:
         self._pixels = max(pixels, 50)
@@ -225,15 +232,15 @@ class Branches(View):
         figure = self.sheet.views["diagram"].figure
         self._lines = {line: figure.source("x", "y", name=f"{one[0]} branches") for line, one in _LINES.items()}
         self._drawn = [
-            figure.draw(self._lines[line], Line(line_dash=dash, line_width=width))
+            figure.plot.line("x", "y", source=self._lines[line], line_dash=dash, line_width=width)
             for line, (_, dash, width) in _LINES.items()
         ]
         self.ink(INK, *self._drawn)
         self._points = figure.source("x", "y", "words")
-        near = figure.draw(self._points, Scatter(size=9, fill_alpha=0.0, line_alpha=0.0))
+        near = figure.plot.scatter("x", "y", source=self._points, size=9, fill_alpha=0.0, line_alpha=0.0)
         figure.tell(near, attachment="left", limit=1)
         self._marks = figure.source("x", "y", "words", "marker", name="special points")
-        special = figure.draw(self._marks, Scatter(marker="marker", size=9, line_width=1.4))
+        special = figure.plot.scatter("x", "y", marker="marker", source=self._marks, size=9, line_width=1.4)
         self.ink(INK, special)
         self.ink(("#FFFFFF", "#171B20"), special, field="fill_color")
         self._drawn += [near, special]
@@ -328,13 +335,14 @@ class Response(View):
     def build(self) -> None:
         """Up solid, down dashed, and a line at the parameter's value."""
         self.figure = Panel("response")
+        plot = self.figure.plot
         self._curves = {word: self.figure.source("x", "y", "words", name=f"response {word}") for word in ("up", "down")}
-        up, down = (self.figure.draw(source, Line(line_width=2)) for source in self._curves.values())
+        up, down = (plot.line("x", "y", source=source, line_width=2) for source in self._curves.values())
         down.glyph.line_dash = "dashed"
         self.figure.tell(up, down, mode="vline")
         self._here = self.figure.mark()
         self._measured = self.figure.source("x", "y", name="recorded response")
-        rings = self.figure.draw(self._measured, Scatter(size=8, fill_color=None, line_width=1.3))
+        rings = plot.scatter("x", "y", source=self._measured, size=8, fill_color=None, line_width=1.3)
         self.ink(_DIRECTIONS["up"], up)
         self.ink(_DIRECTIONS["down"], down)
         self.ink(GREY, rings)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from bokeh.models import CustomJSHover, Image, LinearColorMapper, Scatter
+from bokeh.models import CustomJSHover, LinearColorMapper
 
 from nonsmooth.explorer.catalogue import first_state
 from nonsmooth.explorer.figures import Panel
@@ -34,11 +34,11 @@ class CellImage(View):
     def build(self) -> None:
         """The image, its words, marks, and the place of the page."""
         self.figure = Panel(self.name)
-        empty = np.full((1, 1), np.nan)
+        plot, empty = self.figure.plot, np.full((1, 1), np.nan)
         ends: dict[str, Any] = {"x": [0.0], "y": [0.0], "dw": [1.0], "dh": [1.0]}
         self._image = self.figure.source(name=f"{self.name} cells", image=[empty], more=[empty], **ends, stage=[""])
         self._mapper = LinearColorMapper(palette=["#FFFFFF"], low=-0.5, high=0.5, nan_color="rgba(0,0,0,0)")
-        image = self.figure.draw(self._image, Image(color_mapper=self._mapper), level="image")
+        image = plot.image("image", "x", "y", "dw", "dh", source=self._image, color_mapper=self._mapper, level="image")
         self._places = {
             axis: CustomJSHover(args={"power": 0, "unit": ""}, code=f"value = special_vars.{axis}; {_PLACE}")
             for axis in "xy"
@@ -51,12 +51,12 @@ class CellImage(View):
             tooltips='<div style="font:13px system-ui">$x{custom}, $y{custom}: @image{custom}@more{custom}</div>',
             formatters={"$x": self._places["x"], "$y": self._places["y"], "@image": self._words, "@more": self._more},
         )
-        self.figure.plot.grid.visible = False
+        plot.grid.visible = False
         self.points = self.figure.source("x", "y", "marker", name=f"{self.name} points")
-        self.figure.draw(self.points, Scatter(marker="marker", size=8, fill_color="#FFFFFF", line_color="#1B1F24"))
+        plot.scatter("x", "y", marker="marker", source=self.points, size=8, fill_color="#FFFFFF", line_color="#1B1F24")
         self.here = self.figure.source("x", "y", name=f"{self.name} here")
         for color, width in (("#FFFFFF", 5), (COLORS["section"], 2)):  # seen on every colour
-            self.figure.draw(self.here, Scatter(marker="cross", size=18, line_color=color, line_width=width))
+            plot.scatter("x", "y", marker="cross", source=self.here, size=18, line_color=color, line_width=width)
 
     def put(
         self,

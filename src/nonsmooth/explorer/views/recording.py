@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from bokeh.models import Line, Scatter
 
 from nonsmooth.explorer.figures import GREY, MOST
 from nonsmooth.explorer.views.view import Request, Requests, View
@@ -30,12 +29,18 @@ class RecordingOverlay(View):
         for key in ("curve", "history"):
             self.ink(
                 GREY,
-                figures[places[key]].draw(self._sources[key], Line(line_width=1, line_alpha=0.6), level="underlay"),
+                figures[places[key]].plot.line(
+                    "x", "y", source=self._sources[key], line_width=1, line_alpha=0.6, level="underlay"
+                ),
             )
         self._rings = [
-            figures[key].draw(
-                self._sources[key],
-                Scatter(fill_color=None, line_width=1.2, line_alpha=0.7),
+            figures[key].plot.scatter(
+                "x",
+                "y",
+                source=self._sources[key],
+                fill_color=None,
+                line_width=1.2,
+                line_alpha=0.7,
                 level="annotation" if key == "diagram" else "underlay",
             )
             for key in ("diagram", "portrait", "section")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from bokeh.models import Line, Scatter, Segment
 
 from nonsmooth.explorer.figures import BLUE, Panel
 from nonsmooth.explorer.labels import axis_label, number
@@ -25,10 +24,10 @@ class AmplitudeSpectrum(View):
     def build(self) -> None:
         """Lines with a dot on each where the motion is periodic, a curve where it is not."""
         self.figure = Panel("spectrum", y_axis_type="log")
-        self._source, figure = self.figure.source("x", "y", "low", "words", name="lines"), self.figure
-        self._curve = figure.draw(self._source, Line(line_width=1.2))
-        self._stems = figure.draw(self._source, Segment(x0="x", y0="low", x1="x", y1="y"))
-        self._dots = figure.draw(self._source, Scatter(size=6, line_color=None))
+        self._source, plot = self.figure.source("x", "y", "low", "words", name="lines"), self.figure.plot
+        self._curve = plot.line("x", "y", source=self._source, line_width=1.2)
+        self._stems = plot.segment("x", "low", "x", "y", source=self._source)
+        self._dots = plot.scatter("x", "y", source=self._source, size=6, line_color=None)
         self.ink(BLUE, self._curve, self._stems)
         self.ink(BLUE, self._dots, field="fill_color")
         self.figure.tell(self._curve, mode="vline", attachment="right", point_policy="snap_to_data")
