@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.campaign.store import ChunkStore
 from nonsmooth.campaign.work import ChunkedWork
-from nonsmooth.errors import not_installed
+from nonsmooth.errors import not_installed, shortened
 
 MISSING = f"a cluster needs {not_installed('distributed', 'cluster')}"
 AHEAD = 2  # chunks that wait at each thread of the cluster
@@ -85,6 +85,8 @@ def on_cluster(
         from distributed.scheduler import KilledWorker
     except ImportError as error:
         raise ImportError(MISSING) from error
+    if not hasattr(client, "scheduler"):
+        raise TypeError(f"client = {shortened(client)}: give dask.distributed.Client(address)")
     path, key = (None, "") if store is None else (str(store.path.resolve()), store.key)
     family = uuid.uuid4().hex[:16]  # never the names of a client that is gone: its tasks may be half forgotten
     order = iter(chunks)
