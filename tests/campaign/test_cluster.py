@@ -186,7 +186,5 @@ def test_killed_workers_and_clients_change_nothing(
 
 
 def test_an_address_is_no_client() -> None:
-    with pytest.raises(
-        TypeError, match=r"client = 'tcp.*give dask\.distributed\.Client\(address\)"
-    ):
+    with pytest.raises(TypeError, match=r"client = 'tcp.*give dask\.distributed\.Client\(address\)"):
         run(Squares(size=4, step=2, seconds=0.0), client="tcp://127.0.0.1:8786", **QUIET)

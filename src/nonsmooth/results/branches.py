@@ -105,9 +105,8 @@ def with_marks_in_place(branch: xr.Dataset) -> xr.Dataset:
     values, own = branch[branch.attrs["parameter"]].values, branch["special_value"].values
     if np.array_equal(values.take(branch["special_point"].values.astype(int), mode="clip"), own):
         return branch
-    there = [np.flatnonzero(values == one) for one in own]
-    kept = branch.isel(special=[one.size > 0 for one in there])
-    return kept.assign(special_point=kept["special_point"].copy(data=[one[0] for one in there if one.size]))
+    at = np.array([next(iter(np.flatnonzero(values == one)), -1) for one in own])
+    return branch.assign(special_point=branch["special_point"].copy(data=at)).isel(special=at >= 0)
 
 
 def line(
