@@ -190,3 +190,9 @@ def test_parameters_with_their_uncertainties() -> None:
         ["k", 8.0, 0.1, "N/m"],
         ["m", 2.0, 0.2, "kg"],
     ]
+
+
+def test_counts_of_a_state_have_no_unit() -> None:
+    dense = ns.sweep(ns.models.discontinuous_support(), "rho", [0.3], keep=5, transient=5, density=True, progress=False)
+    assert ns.table(dense, ["x_outside", "x_maximum"]).columns.tolist() == ["rho (N)", "x_outside", "x_maximum (m)"]
+    assert "x_density" in ns.table(dense, over="bin").columns

@@ -89,7 +89,8 @@ def _spread(result: xr.Dataset, name: str, array: xr.DataArray, dim: str = "") -
         return [(name, array)]
     labels = result[dim].values if dim in result.coords else np.arange(1, array.sizes[dim] + 1)
     text = labels.dtype.kind == "U"
-    own = result["state_unit"].values if dim == "state" and "state_unit" in result.coords else None
+    counted = array.dtype.kind in "iu"  # of a state, without its unit
+    own = result["state_unit"].values if dim == "state" and "state_unit" in result.coords and not counted else None
     parts = []
     for i, label in enumerate(labels):
         one = array.isel({dim: i}, drop=True)
