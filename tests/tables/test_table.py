@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import csv
+import errno
 import importlib.util
 import math
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import nonsmooth as ns
@@ -196,3 +199,14 @@ def test_counts_of_a_state_have_no_unit() -> None:
     dense = ns.sweep(ns.models.discontinuous_support(), "rho", [0.3], keep=5, transient=5, density=True, progress=False)
     assert ns.table(dense, ["x_outside", "x_maximum"]).columns.tolist() == ["rho (N)", "x_outside", "x_maximum (m)"]
     assert "x_density" in ns.table(dense, over="bin").columns
+
+
+def test_a_file_that_is_open_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Excel holds a table that it shows."""
+
+    def held(*_: object, **__: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(pd.DataFrame, "to_csv", held)
+    with pytest.raises(ns.DataFileError, match=r"run\.csv: it may not be written .*close it where it is open"):
+        ns.table(ns.simulate(ns.models.impact_oscillator(), periods=1), file=tmp_path / "run.csv")

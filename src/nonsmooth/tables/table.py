@@ -13,6 +13,7 @@ import numpy as np
 from nonsmooth.errors import DataFileError
 from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
 from nonsmooth.results.statuses import in_words
+from nonsmooth.results.whole import told
 from nonsmooth.system.arguments import checked
 from nonsmooth.tables.quantities import coordinates_of, dataset_of, quantities_of, quantity, rows_of
 from nonsmooth.tables.sampled import once, sampled
@@ -70,6 +71,8 @@ def table(
         What is no result; a name that it does not have; instants outside the run.
     ImportError
         A file whose package is not installed.
+    DataFileError
+        A folder that does not exist, a file that is open elsewhere, a full disk.
 
     Examples
     --------
@@ -102,7 +105,8 @@ def table(
         frame["unit"] = record["units"]
     frame.attrs = _about(data)
     if target is not None:
-        _write(frame, target)
+        with told(target, "close it where it is open, make room, or give another name"):
+            _write(frame, target)
     return frame
 
 
