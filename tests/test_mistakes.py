@@ -199,7 +199,7 @@ MISTAKES = {
     ),
     "a state that is set": (
         "def swing(t, u, p):\n    u.x = u.x - p.g\n    return u.v, -u.x\n\nsystem(modes={'free': swing})",
-        "mode 'free': x, a state,",
+        "mode 'free': x",
         "cannot be set",
         "a function returns",
     ),
@@ -500,6 +500,12 @@ MISTAKES = {
         "not of shape (2,)",
         "a square array",
         "np.diag(masses)",
+    ),
+    "a coordinate twice": (
+        "ns.mechanical(np.eye(2), np.eye(2), np.eye(2), coordinates=['a', 'a'])",
+        "coordinates: ['a', 'a']",
+        "give a name of its own",
+        "to each row of the mass matrix",
     ),
     "a gap with a coordinate": (
         "ns.elements.Stop(at='q', gap=0.1)",

@@ -274,7 +274,7 @@ def _units(given: Any, what: str, system: str, raw: bool = False) -> dict[str, A
         )
     if not isinstance(given, Mapping):
         if len({*given}) < len(given):
-            raise SystemDefinitionError(f"{system!r}: `{what}` = {shortened(given)}: one name is given twice")
+            raise SystemDefinitionError(f"{system!r}: `{what}` = {given}: one name is given twice")
         return dict.fromkeys(given, "")
     for key, unit in given.items():
         if not raw and not isinstance(unit, str):

@@ -150,14 +150,14 @@ def mechanical(
     )
     d = system._description
     p = Symbols(name, d.states, dict.fromkeys(d.parameters, ""), {}, tuple(d.states)[2 * size :]).parameters()
-    mass = matrices(p)[3]
-    powers = _powers(*matrices(p)[1:], *outside(Scalar(d.traced.t), p), d.traced.u[: 2 * size])
+    *_, mass = found = matrices(p)
+    powers = _powers(*found[1:], *outside(Scalar(d.traced.t), p), d.traced.u[: 2 * size])
     units_of = {symbol: read_unit(unit) for symbol, unit in d.symbol_units.items()}
     energies = (product(unit_of(mass[i, i], units_of), *2 * [units_of[d.traced.u[size + i]]]) for i in range(size))
     energy = next((one for one in energies if one is not None), None)
     loads = d.loads or Loads((), {"all": d.traced.fields[0]})
     positive = [(mass[i, i], f"the mass of coordinate {key!r} must be positive") for i, key in enumerate(names)]
-    positive += [(mass[:i, :i].det(), "the mass matrix must be positive definite") for i in range(2, size + 1)]
+    positive += [(mass[:i, :i].det(), "the mass matrix must be positive definite") for i in range(size + 1)]
     positive = [one for one in positive if one[0].free_symbols]
     new = d.with_loads(replace(loads, powers=powers, energy=write_unit(energy)))
     if positive:
@@ -291,8 +291,8 @@ def _coordinates(given: Any, size: int) -> list[str]:
     if given is None:
         return ["q"] if size == 1 else [f"q{i + 1}" for i in range(size)]
     names = [given] if isinstance(given, str) else list(given)
-    if len(names) != size:
-        raise SystemDefinitionError(f"coordinates: {len(names)} names for a mass matrix of {size} rows")
+    if len({*names}) != size:
+        raise SystemDefinitionError(f"coordinates: {names}: give a name of its own to each row of the mass matrix")
     return names
 
 

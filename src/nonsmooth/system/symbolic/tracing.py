@@ -80,7 +80,7 @@ class _Named:
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in _Named.__slots__:
             raise SystemDefinitionError(
-                f"{name}, {self._of}, cannot be set: a function returns; memory is written by Transition(..., write=)"
+                f"{name} cannot be set: a function returns; memory is written by Transition(..., write=)"
             )
         object.__setattr__(self, name, value)
 
