@@ -454,6 +454,7 @@ def test_without_judgement_the_points_are_those_of_poincare_and_no_period_is_cla
     assert ns.plot.bifurcation(looked)
     bare = ns.sweep(system, "rho", values, direction=None, transient=60, keep=20, judge=False, extremes=False, **QUIET)
     np.testing.assert_allclose(bare["section"], looked["section"], atol=1e-12)
+    assert ns.plot.bifurcation(bare)
     assert np.array_equal(bare["contacts_per_period"], looked["contacts_per_period"])
     assert not {"maximum", "minimum", "clearance"} & set(bare.variables)
     with pytest.raises(ValueError, match="rests on the size"):

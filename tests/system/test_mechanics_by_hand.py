@@ -103,9 +103,8 @@ def test_a_mass_that_rests_on_a_stop_goes_where_the_stop_goes(others: dict[str, 
     assert (swept["period_number"].values == 1).all()
 
 
-def test_a_stop_that_moves_by_a_ramp_pushes_the_mass() -> None:
-    """A mass that rests on it stays within 1e-4 of the scale: the ramp moves by a hundred times that."""
-    stop = E.Stop(at="q", position="d")
+def test_a_stop_that_moves_in_time_pushes_the_mass() -> None:
+    stop = E.Stop(at="q", position=lambda t, u, p: p.d - t / 60)
     system = ns.mechanical(
         1.0,
         0.2,
@@ -115,8 +114,10 @@ def test_a_stop_that_moves_by_a_ramp_pushes_the_mass() -> None:
         elements={"stop": stop},
         coordinates=["q"],
     )
-    run = ns.simulate(system, duration=0.6, start={"q": 0.8}, ramps={"d": (0.8, 0.79)})
-    assert run["u"].sel(state="q").values == pytest.approx(0.8 - 0.01 * run["time"].values / 0.6, abs=1.1e-4)
+    run = ns.simulate(system, duration=0.6, start={"q": 0.8, "v_q": -1 / 60})
+    assert run["u"].sel(state="q").values == pytest.approx(0.8 - run["time"].values / 60, abs=1e-12)
+    with pytest.raises(ValueError, match="a ramp moves element 'stop'"):
+        ns.simulate(system, duration=0.6, start={"q": 0.8}, ramps={"d": (0.8, 0.79)})
 
 
 def test_an_impact_slower_than_creep_under_a_pull_rebounds(others: dict[str, Any]) -> None:
@@ -169,3 +170,26 @@ def test_a_gap_between_regions_of_a_map_is_shown_in_the_units_of_its_states() ->
             indicators={"low": lambda u, p: u.x - 200 * p.a, "high": lambda u, p: u.x - 500 * p.a},
         )
     assert 200.0 < float(re.search(r"x = (\S+) lies", str(caught.value))[1]) < 500.0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("growth", [1.0, -1.0])
+def test_one_breaks_away_and_how_its_friction_grows_decides_about_the_other(side: float, growth: float) -> None:
+    """M = [[2, 1], [1, 2]] at rest under loads 3 and -.5 with bounds 2 + r t and 1: the first breaks away with
+    a1 = (1 - r t) / 2, the force on the second is -.5 - a1, which is at its bound at t = 0. It holds where r > 0, and
+    else both move, M a = (1 - r t, .5)."""
+    system = ns.mechanical(
+        [[2.0, 1.0], [1.0, 2.0]],
+        np.zeros((2, 2)),
+        np.zeros((2, 2)),
+        forcing={"q1": lambda t, p: p.f + 0 * t, "q2": lambda t, p: p.h + 0 * t},
+        parameters={"f": 3.0 * side, "h": -0.5 * side, "r": growth},
+        elements={
+            "a": ns.elements.Coulomb(at="q1", friction=lambda t, u, p: 2.0 + p.r * t),
+            "b": ns.elements.Coulomb(at="q2", friction=1.0),
+        },
+    )
+    t, speeds = 0.5, ns.simulate(system, duration=0.5).u.values[-1, 2:]
+    impulse = t - growth * t**2 / 2
+    exact = [impulse / 2, 0.0] if growth > 0 else np.linalg.solve([[2.0, 1.0], [1.0, 2.0]], [impulse, 0.5 * t])
+    np.testing.assert_allclose(speeds, side * np.asarray(exact), atol=1e-13)

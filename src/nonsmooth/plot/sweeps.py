@@ -33,7 +33,7 @@ _LONGEST = 30  # characters of a line of a condition in a legend
 _SEAM = 2.0  # a rising point over a falling one, which lies on it: both show
 
 
-@figure("sweep", "residual")
+@figure("sweep", "direction")
 def bifurcation(
     ax: Axes,
     result: xr.Dataset,
@@ -69,7 +69,7 @@ def bifurcation(
     if "section" not in result and "density" in result:
         raise ValueError("this sweep counted its section points (density=...): draw it with plot.density")
     (name,) = first_states(result, y)
-    parameter = str(result["maximum"].dims[0])
+    parameter = str(result["status"].dims[0])
     _share_an_axis(over, parameter)
     of_state = name in result["state"].values
     if of_state:
@@ -200,7 +200,7 @@ def frequency_response(
     if quantity not in ("amplitude", "maximum", "minimum"):
         raise ValueError(f"quantity is {quantity!r}; allowed: 'amplitude', 'maximum', 'minimum'")
     (name,) = first_states(result, y)
-    parameter = str(result["maximum"].dims[0])
+    parameter = str(result["status"].dims[0])
     values = result[parameter].values
     known = quantities_of(result)
     alone = f"{name}_{quantity}" not in known

@@ -35,7 +35,7 @@ class View:
         self.page, self.kind, self.results = sheet.page, KINDS[self.name], dict[str, Any]()
         self.sheet = sheet
         self.figure: Any = None
-        self._inked: list[tuple[Any, str, tuple[str, str]]] = []
+        self._inked: list[tuple[Any, str, tuple[Any, ...]]] = []
         self.build()
         self.paint(dark=False)
 

@@ -150,8 +150,8 @@ def mechanical(
     )
     d = system._description
     p = Symbols(name, d.states, dict.fromkeys(d.parameters, ""), {}, tuple(d.states)[2 * size :]).parameters()
-    *_, mass = found = matrices(p)
-    powers = _powers(*found[1:], *outside(Scalar(d.traced.t), p), d.traced.u[: 2 * size])
+    *_, mass = matrices(p)
+    powers = _powers(*matrices(p)[1:], *outside(Scalar(d.traced.t), p), d.traced.u[: 2 * size])
     units_of = {symbol: read_unit(unit) for symbol, unit in d.symbol_units.items()}
     energies = (product(unit_of(mass[i, i], units_of), *2 * [units_of[d.traced.u[size + i]]]) for i in range(size))
     energy = next((one for one in energies if one is not None), None)
