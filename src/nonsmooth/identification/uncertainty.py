@@ -91,10 +91,16 @@ def factor_interval(value: float, relative: float, level: float = 0.95) -> tuple
 
 def normal_draws(mean: Any, covariance: FloatArray, n: int, seed: int, logarithmic: Any = False) -> FloatArray:
     """``n`` rows drawn from a normal law; of a quantity that is ``logarithmic`` the logarithm is normal."""
-    mean, sizes = np.asarray(mean, dtype=float), np.sqrt(np.diag(covariance))
+    mean, sizes = np.asarray(mean, float), np.sqrt(np.diag(covariance))
+    if np.isinf(sizes).any():
+        raise ValueError(
+            "a quantity with an infinite uncertainty has no law to draw from: give its value, and take the others by "
+            "found.only([...])"
+        )
     scale = np.where(sizes > 0, sizes, 1.0)  # parameters differ by 10^5 in size: draw in units of their own errors
-    rng = np.random.default_rng(seed)
-    unit = rng.multivariate_normal(np.zeros(len(mean)), covariance / np.outer(scale, scale), n, method="eigh")
+    unit = np.random.default_rng(seed).multivariate_normal(
+        np.zeros(len(mean)), covariance / np.outer(scale, scale), n, method="eigh"
+    )
     relative = np.where(logarithmic, scale / np.where(logarithmic, mean, 1.0), 0.0)  # d ln x = dx / x
     return np.where(logarithmic, mean * np.exp(unit * relative), mean + unit * scale)
 
@@ -142,16 +148,16 @@ def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = Non
     array (p, p)
         Never smaller, along any parameter, than the covariance of white residuals of the same size.
     """
-    j = np.asarray(jacobian, dtype=np.float64)
-    r = np.asarray(residuals, dtype=np.float64)
+    j = np.asarray(jacobian, float)
+    r = np.asarray(residuals, float)
     n, p = j.shape
-    lengths = [n] if pieces is None else [int(length) for length in pieces]
+    lengths = [n] if pieces is None else list(map(int, pieces))
     if sum(lengths) != n or len(r) != n:
         raise ValueError(f"pieces {lengths} must add up to the {n} rows of the Jacobian and the {len(r)} residuals")
     scale = np.linalg.norm(j, axis=0)
     scale[scale == 0] = 1.0
     inverse = np.linalg.pinv((j / scale).T @ (j / scale))
-    white = inverse * max(float(r @ r) / max(n - p, 1), 0.0)
+    white = inverse * float(r @ r) / max(n - p, 1)
     meat = np.zeros((p, p))
     begin = 0
     for length in lengths:
