@@ -130,3 +130,15 @@ def test_the_error_of_a_spin_is_as_stated() -> None:
         flight = _Flight(t, np.zeros((60, 3)), off * Rotation.from_rotvec(np.outer(t, spin)), slice(None), -9.81)
         z.append((flight.spin - spin) / flight.spin_error)
     assert np.sqrt(np.mean(np.square(z))) == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_flight_that_noise_has_parted_has_no_restitution() -> None:
+    """A body in free fall all the time: its velocity does not jump, wherever the record seems to leave the fall."""
+    t = np.arange(0, 0.6, 1 / 240)
+    rng, parted = np.random.default_rng(0), 0
+    for _ in range(10):
+        z = 2.0 - 4.905 * t**2 + 3e-5 * rng.standard_normal(t.size)
+        found = restitution(t, z, flights(t, z))
+        parted += found.sizes["impact"]
+        assert np.isnan(found["restitution"]).all()
+    assert parted > 5

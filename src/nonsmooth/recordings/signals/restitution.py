@@ -109,7 +109,8 @@ def restitution(
     Dataset
         Over ``impact``: ``impact_time``, ``impact_height``, ``v_before``, ``v_after`` with errors, ``restitution`` and
         ``restitution_error`` (to first order, from the scatter about the fits; NaN where the point does not come down
-        by three errors of v_before: something else was hit), ``duration`` (from the last free
+        by three errors of v_before: something else was hit; and where the velocity does not jump by three of its own:
+        nothing was, and noise has parted a flight), ``duration`` (from the last free
         sample to the next), ``flight`` (the number of the flight before).
 
     Raises
@@ -170,7 +171,7 @@ def impacts_of(rows: Sequence[Mapping[str, Any]], more: Mapping[str, tuple[type,
         data[f"v_{word}"] = labelled("impact", v, f"velocity {word} the impact")
         data[f"v_{word}_error"] = ("impact", error)
     with np.errstate(divide="ignore", invalid="ignore"):
-        e = np.where(v0 < -3.0 * e0, -v1 / v0, np.nan)
+        e = np.where((v0 < -3.0 * e0) & (v1 - v0 > 3.0 * np.hypot(e0, e1)), -v1 / v0, np.nan)
         e_error = np.hypot(e1, e * e0) / np.abs(v0)
     data |= {"restitution": labelled("impact", e, "restitution"), "restitution_error": ("impact", e_error)}
     data["flight"] = labelled("impact", column("flight", int), "flight before")
