@@ -119,7 +119,6 @@ def test_a_motion_moves_in_a_file_and_other_views_say_that_they_do_not(results: 
 
     with Image.open(write(tmp_path, "portrait", "gif", results)) as picture:
         assert picture.n_frames == 60
-    assert "<script>" in write(tmp_path, "history", "html", results).read_text()
     with pytest.raises(ValueError, match="'Phase plane' and 'Time history'"):
         exported("diagram", "gif", results, STATE)
 
@@ -153,6 +152,8 @@ def test_figures_and_data(kind: str, results: dict[str, Any], tmp_path: Path) ->
     assert path.read_bytes().startswith(begins)
     if kind == "nc":
         same(path, results["run"])
+    if kind == "html":
+        assert "<script>" in path.read_text()  # it moves
 
 
 def test_a_first_look_is_not_saved(results: dict[str, Any]) -> None:
