@@ -135,6 +135,7 @@ def test_one_colour_says_up_in_every_view_and_marks_of_branches_are_told(server:
     page = only_tab
     page.open(f"{server.address}&{FEW}&branches.show=yes&low=0.38&high=0.42")
     page.until_done()
+    assert page.notes() == ""
     legends = page.ui()["legends"]
     up = {words: color for words, color, *_ in legends["diagram"]}["up"]
     assert up == dict(legends["response"])["up"]
