@@ -486,3 +486,18 @@ def test_an_output_that_is_not_affine_takes_no_extremes_from_the_others(elements
     if not elements:
         by_series = ns.sweep(system, "w", w, method="taylor", **QUIET)
         assert by_series["square_maximum"].values == pytest.approx(X**2, rel=1e-8)
+
+
+def test_transitions_are_counted_over_whole_cycles() -> None:
+    """Whatever the number of returns that are kept: a cycle's count is a whole number, that of its orbit."""
+    system, values = ns.models.discontinuous_support(omega=3.69, g=-0.0045), [0.25, 0.26, 0.38, 0.45]
+    numbers = []
+    for keep in (33, 50):
+        found = ns.sweep(system, "rho", values, transient=300, keep=keep, direction=None, **QUIET)
+        q = found["period_number"].values
+        assert q[1] > 1 and (q > 0).all()
+        numbers += [q * found["crossings_per_period"].values, q * found["contacts_per_period"].values]
+    for value, number, crossings in zip(values, q, numbers[0], strict=True):
+        orbit = ns.find_orbit(system.with_parameters(rho=value), period_number=int(number), progress=False)
+        assert crossings == pytest.approx(len(orbit.signature.visits) - 1, abs=1e-12)
+    np.testing.assert_allclose(numbers[:2], numbers[2:], atol=1e-12)

@@ -282,8 +282,8 @@ class _Sweep:
             return np.where(failed.reshape(failed.shape + (1,) * (values.ndim - 3)), np.nan, values)
 
         arrays: dict[str, Any] = {
-            "crossings_per_period": whole(gather("kept.crossings") / float(settler.keep)),
-            "contacts_per_period": whole(gather("kept.contacts") / float(settler.keep)),
+            "crossings_per_period": whole(gather("crossings")),
+            "contacts_per_period": whole(gather("contacts")),
             "status": gather("status"),
         }
         if self.edges is None:

@@ -30,7 +30,7 @@ class Slot:
         self.counter = None if edges is None else Counter(points, edges)
         self.kept = settler.engine.kept(points, settler.keep if edges is None else 0)
         self.period_number = np.zeros(points, dtype=np.int64)
-        self.residual = np.full(points, np.nan)
+        self.residual, self.crossings, self.contacts = np.full((3, points), np.nan)
         self.status = np.full(points, codes.INTERRUPTED, dtype=np.int8)
 
     def march(
@@ -64,7 +64,7 @@ class Slot:
 
     def put(self, rows: Any, found: Settled, loaded: bool = True) -> None:
         """Take the verdicts on some parameter values; the loads too."""
-        for name in ("period_number", "residual", "status"):
+        for name in ("period_number", "residual", "crossings", "contacts", "status"):
             getattr(self, name)[rows] = getattr(found, name)
         if self.loads and loaded:
             for name, values in self.settler.loads(self.at, np.arange(len(self.at))[rows], found).items():
