@@ -46,6 +46,7 @@ def frame(page: Any, figure: str) -> list[float]:
 def test_every_picture_and_every_word_has_room_and_numbers_stand_apart(page: Any) -> None:
     page.tab.evaluate(NOTE)
     page.tab.click("#tab-response")
+    page.until_done()
     for width, large in SIZES:
         page.tab.set_viewport_size({"width": width, "height": 800})
         if page.ui()["large"] != large:
@@ -89,8 +90,9 @@ def check_room(page: Any, width: int, large: bool) -> None:
         )
         assert wide[0] == words
         assert wide[1] <= frame(page, figure)[0] + 1
-    written = page.tab.evaluate("""[...window.written].filter(([canvas]) => canvas.id !== "sketch").map(([, some]) =>
-        some.filter(([words]) => /^[\\d\\u2212.]+$/.test(words)))""")
+    written = page.tab.evaluate("""[...window.written]
+        .filter(([canvas]) => canvas.id !== "sketch" && canvas.checkVisibility())
+        .map(([, some]) => some.filter(([words]) => /^[\\d\\u2212.]+$/.test(words)))""")
     axes = [some for some in written if some]
     assert sum(map(len, axes)) >= 16  # of eight axes
     for some in axes:
@@ -121,7 +123,7 @@ def test_the_tour_covers_nothing(server: Any, new_page: Callable[..., Any]) -> N
     page = new_page(first_visit=True)
     for large in (False, True):
         page.open(f"{server.address}&{FEW}")
-        assert page.tab.evaluate("document.documentElement.classList.contains('large')") is large
+        page.until(f"document.documentElement.classList.contains('large') === {str(large).lower()}")
         for _ in range(3):
             for width in (1280, 400):
                 page.tab.set_viewport_size({"width": width, "height": 800})
