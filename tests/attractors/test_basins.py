@@ -200,3 +200,32 @@ def test_where_no_run_settles_there_is_no_attractor() -> None:
         s, "rho", [0.14], n_starts=3, box={"x": (0.0, 0.01)}, transient=10, keep=12, order=2, progress=False
     )
     assert found.sizes["attractor"] == 0 and found["not_converged"].values == [1.0]
+
+
+@pytest.mark.parametrize("rubbing", [False, True])
+@pytest.mark.parametrize("speed", [-1.0, 0.0, 1.0])
+def test_a_start_beyond_a_stop_is_run_by_no_verb(rubbing: bool, speed: float) -> None:
+    """Whatever its speed, and whatever decides beside the stop; where states are carried, all begins with the first
+    value at which the start is on the right side."""
+    elements = {"stop": ns.elements.Stop(at="q", position="d", restitution=0.5)}
+    if rubbing:
+        elements["rub"] = ns.elements.Coulomb(at="q", friction=0.01)
+    forcing, values = {"q": lambda t, p: 0.3 * np.cos(t)}, {"d": 0.5, "c": 0.2}
+    system = ns.mechanical(
+        1.0, lambda p: p.c, 1.0, parameters=values, forcing=forcing, coordinates=["q"], elements=elements
+    )
+    start = {"q": 0.8, "v_q": speed}
+    few = {"transient": 100, "keep": 10, "progress": False}
+    for verb in (ns.simulate, ns.lyapunov):
+        with pytest.raises(ns.SolveError, match="the start lies beyond a stop: 'stop'"):
+            verb(system, start=start, periods=50)
+    plane = ns.basins(system, {"q": [0.2, 0.8, 2.0], "v_q": [speed - 0.5, speed]}, **few)
+    assert plane["label"].values.tolist() == [[0, 0], [-1, -1], [-1, -1]]
+    for direction in ("up", None):
+        swept = ns.sweep(system, "d", [0.5, 0.6, 0.9, 1.0], start=start, direction=direction, **few)
+        assert swept["period_number"].values.tolist() == [0, 0, 1, 1]
+        assert (swept["status"].values[2:] == 0).all() and (swept["status"].values[:2] != 0).all()
+    grid = {"d": [0.5, 0.9], "c": [0.1, 0.3]}
+    for carry in (None, {"d": "up"}):
+        numbers = ns.chart(system, grid, start=start, carry=carry, **few)["period_number"].transpose("d", "c").values
+        assert numbers.tolist() == [[0, 0], [1, 1]]

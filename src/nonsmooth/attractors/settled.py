@@ -96,5 +96,10 @@ class Settled:
         self.status[failed] = [result_status(code) for code in self.status[failed]]
         return self
 
+    def put(self, which: Any, some: Settled) -> None:
+        """Take the results of some jobs."""
+        for item in fields(self):
+            getattr(self, item.name)[which] = getattr(some, item.name)
+
     def __getitem__(self, which: Any) -> Settled:
         return Settled(*(getattr(self, item.name)[which] for item in fields(self)))

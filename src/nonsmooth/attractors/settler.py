@@ -19,9 +19,10 @@ from nonsmooth.attractors.settle_cuda import separate_on_gpu, settle_on_gpu
 from nonsmooth.attractors.settled import ROUNDED, Settled, least_sizes, usable
 from nonsmooth.attractors.trace import SectionTrace, mode_at
 from nonsmooth.flow.engines.devices import engine_on_gpu, on_gpu
-from nonsmooth.flow.engines.engine import FloatArray, State
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import RTOL, engine_for
+from nonsmooth.flow.failure import beyond_stops
 from nonsmooth.flow.loads import meter_of
 from nonsmooth.flow.options import Settling, Solver, longest_period, solver_of
 from nonsmooth.flow.scales import LEAST
@@ -117,7 +118,8 @@ class Settler:
         carried : bool
             Job j goes on from where job j - 1 ended (from its own start where that failed).
         modes : array (J,) of int, optional
-            Mode at the start; that of the phase (:func:`.mode_at`) where not given.
+            Mode at the start; that of the phase (:func:`.mode_at`) where not given. Then a start beyond a rigid stop is
+            not run: ``no_convergence``.
         begin : float
             Phase of the forcing at the starts, in periods, where they do not say it themselves.
         attempts : int
@@ -127,6 +129,14 @@ class Settler:
         starts = np.ascontiguousarray(starts, dtype=float)
         points = np.ascontiguousarray(points, dtype=float)
         if modes is None:
+            which = self.admissible(points[rows], starts, begin, carried)
+            if len(which) < len(rows):
+                found = Settled.empty(len(rows), len(self.system.states), self.width)
+                found.status[:] = codes.NO_CONVERGENCE
+                if len(which):
+                    some = self.run(points, rows[which], starts[which], carried=carried, begin=begin, attempts=attempts)
+                    found.put(which, some)
+                return found
             one = varying_phases(self.system.traced) is None
             modes = np.array([mode_at(self.system, begin, values) for values in points[: 1 if one else None]])
             modes = np.full(len(rows), modes[0]) if one else modes[rows]
@@ -140,6 +150,14 @@ class Settler:
         mapper = Mapper(replace(self, plan=plan), self.engine.prepare(points), rows, starts, modes, begin)
         mapper.settle(self.rules(attempts, beyond), int(carried), self.extremes or not beyond)(len(rows))
         return mapper.settled()
+
+    def admissible(self, points: FloatArray, starts: FloatArray, begin: float = 0.0, carried: bool = False) -> IntArray:
+        """The starts, one for each point, that lie beyond no stop; where states are carried, all from the first on."""
+        time: Any = 0.0
+        if begin and self.system.period() is not None:
+            time = begin * np.array([self.system.period_at(point) for point in points])
+        good = ~beyond_stops(self.system, points, starts[:, : len(self.system.states)], time)
+        return np.flatnonzero(np.logical_or.accumulate(good) if carried else good)
 
     def rules(self, attempts: int = ATTEMPTS, beyond: int = 0) -> Rules:
         """The rules of judgement; ``beyond`` as in :class:`nonsmooth.kernels.judging.settle.Rules`."""

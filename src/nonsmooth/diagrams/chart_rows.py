@@ -6,13 +6,11 @@ so on: it is as fast as there are rows (times starts).
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
 
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.attractors.settler import Settler
-from nonsmooth.flow.engines.engine import FloatArray, IntArray
+from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.kernels.hybrid import codes
 
 
@@ -56,17 +54,12 @@ def side_by_side(settler: Settler, points: FloatArray, length: int, starts: Floa
         if len(which):
             last, mode = parts[-1].last[which], parts[-1].mode[which]
             carried = settler.run(points, rows[which], last, modes=mode, begin=settler.section_phase)
-            _put(found, which, carried)
+            found.put(which, carried)
             goes_on[which] = carried.status != codes.NO_CONVERGENCE  # with this flow: a start beyond a stop
         which = np.flatnonzero(~goes_on)
         if len(which):
-            _put(found, which, settler.run(points, rows[which], begin[which]))
+            found.put(which, settler.run(points, rows[which], begin[which]))
         parts.append(found)
         goes_on = usable(found.status)
     order = np.arange(len(points) * n_starts).reshape(length, n_rows, n_starts)
     return Settled.joined(parts)[order.transpose(1, 0, 2).ravel()]
-
-
-def _put(found: Settled, which: IntArray, part: Settled) -> None:
-    for item in fields(found):
-        getattr(found, item.name)[which] = getattr(part, item.name)

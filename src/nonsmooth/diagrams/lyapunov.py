@@ -30,7 +30,7 @@ from nonsmooth.flow.arguments import swept_values
 from nonsmooth.flow.engines.devices import on_gpu
 from nonsmooth.flow.engines.engine import FloatArray, IntArray, State
 from nonsmooth.flow.engines.methods import engine_for
-from nonsmooth.flow.failure import solve_error
+from nonsmooth.flow.failure import refuse_beyond_stops, solve_error
 from nonsmooth.flow.options import LONGEST_RUN, Length, Solver, Varied, as_called, solver_of
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.flow.scales import warn_if_slow
@@ -158,6 +158,8 @@ def lyapunov(
             done = _on_gpu(system, engine, points, first.copy(), length.units, length.wait, advance)
             done = [at_rest(one, system, at, first, first) for one, at in zip(done, points, strict=True)]
         return _dataset(system, engine.name, asked, numbers, done)
+    if numbers is None:
+        refuse_beyond_stops(system, first.u[None])
     order = np.arange(len(points)) if numbers is None else np.argsort(numbers, kind="stable")
     order = order[::-1] if direction == "down" else order
     with progress_bar(len(points), "lyapunov", progress if numbers is not None else False) as advance:

@@ -43,12 +43,16 @@ class Slot:
         stop: threading.Event,
     ) -> None:
         """Run some parameter values from a start, the state carried from each to the next or not, until ``stop``."""
-        rows, n = np.array(order, dtype=np.int64), len(order)
+        rows = np.array(order, dtype=np.int64)
+        fit = self.settler.admissible(self.at[rows], np.tile(start, (len(rows), 1)), carried=carried)
+        self.status[np.delete(rows, fit)] = codes.NO_CONVERGENCE
+        advance(len(rows) - len(fit))
+        rows, n = rows[fit], len(fit)
         room: dict[str, Any] = {"kept": self.kept, "into": rows} if self.counter is None else {}
         mapper = Mapper(self.settler, tables, rows, np.tile(start, (n, 1)), **room)
         run, done = mapper.settle(self.settler.rules(), 2 * carried, False), 0
         try:
-            for j, i in enumerate(order):
+            for j, i in enumerate(rows):
                 if stop.is_set():
                     return
                 run(j + 1)
@@ -93,3 +97,7 @@ def run_on_gpu(
         for k, start in enumerate(starts):
             slot = slots[0, k]
             slot.put(slice(None), sweep_on_gpu(slot.settler, points, start, slot.kept, advance))
+            beyond = np.delete(
+                np.arange(len(points)), slot.settler.admissible(points, np.tile(start, (len(points), 1)))
+            )
+            slot.status[beyond], slot.period_number[beyond] = codes.NO_CONVERGENCE, 0

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.loads import meter_of
+from nonsmooth.flow.loads import Meter, meter_of
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.derived.elements.element import SMALL
 
@@ -53,16 +53,35 @@ def refuse_beyond_stops(system: System, starts: FloatArray) -> None:
             raise SolveError(named, status="beyond_stop", time=0.0, state=where)
 
 
+def beyond_stops(system: System, points: FloatArray, starts: FloatArray, time: Any = 0.0) -> BoolArray:
+    """Marks of starts (J, n), at parameter points (J, n_parameters), that lie beyond a rigid stop by more than rounding
+    leaves."""
+    meter = meter_of(system)
+    if meter is None or not meter.striking:
+        return np.zeros(len(starts), dtype=bool)
+    return np.asarray(_beyond(system, meter, points, starts, time, SMALL)[0].any(axis=1))
+
+
+def _beyond(
+    system: System, meter: Meter, points: FloatArray, starts: FloatArray, time: Any, least: float
+) -> tuple[BoolArray, FloatArray]:
+    """Whether starts lie beyond each rigid stop by more than ``least`` of its scale, and the gaps."""
+    memory = np.tile(system.memory_vector(), (len(starts), 1))
+    gaps = meter.values(points, np.broadcast_to(time, len(starts)), starts, memory)[0]
+    sizes = np.array([system.scale_vector()[some].max(initial=0.0) for some in meter.places])
+    return gaps < -least * sizes, gaps
+
+
 def _beyond_stop(system: System, u: FloatArray, time: float, least: float = 0.0) -> str:
     """A sentence that names the rigid stop beyond which a state lies, by more than ``least`` of its scale; nothing
     where it lies beyond none."""
     meter = meter_of(system)
     if meter is None or not meter.striking:
         return ""
-    at = np.array([time]), np.asarray(u, dtype=float)[None, :], system.memory_vector()[None, :]
-    gaps = meter.values(system.parameter_vector(), *at)[0][0]
-    sizes = np.array([system.scale_vector()[some].max(initial=0.0) for some in meter.places])
-    if not (gaps < -least * sizes).any():
+    beyond, gaps = _beyond(
+        system, meter, system.parameter_vector()[None], np.asarray(u, dtype=float)[None], time, least
+    )
+    if not beyond.any():
         return ""
     load = meter.elements[meter.striking[int(gaps.argmin())]]
     sides = (
