@@ -136,6 +136,7 @@ def test_the_tour_covers_nothing(server: Any, new_page: Callable[..., Any]) -> N
 def test_one_colour_says_up_in_every_view_and_marks_of_branches_are_told(server: Any, only_tab: Any) -> None:
     page = only_tab
     page.open(f"{server.address}&{FEW}&branches.show=yes&low=0.38&high=0.42")
+    page.until('document.getElementById("legend-diagram").textContent.includes("flip")')
     page.until_done()
     assert page.notes() == ""
     legends = page.ui()["legends"]
@@ -153,7 +154,6 @@ def test_one_colour_says_up_in_every_view_and_marks_of_branches_are_told(server:
         up,
     )
     assert drawn
-    page.until('document.getElementById("legend-diagram").textContent.includes("flip")')
     told = page.tab.inner_text("#legend-diagram").replace("\n", "")
     assert "━stable" in told
     assert "╍unstable" in told

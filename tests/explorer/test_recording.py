@@ -78,6 +78,14 @@ def test_a_dropped_recording_lies_over_the_model_and_its_parameters_are_found(pa
     page.write("factor-x", repr(TRAVEL))
     page.until('document.getElementById("recording-remarks").textContent.includes("13 forcing periods compared")')
     page.until_done()
+    page.write("v-p.omega", "3.5")
+    page.until_done()
+    page.tab.click("#recording-drive")  # the frequency of the record
+    page.until_done()
+    assert page.value("omega") == pytest.approx(ns.models.discontinuous_support().values["omega"], rel=1e-4)
+    page.tab.click("#undo")
+    page.tab.click("#undo")
+    page.until_done()
     far = distance(page)
     for name, value in TRUTH.items():
         page.write(f"v-p.{name}", repr(value))

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.explorer.conftest import FEW
+from tests.explorer.conftest import FEW, wait_until
 
 import nonsmooth as ns
 
@@ -35,10 +35,19 @@ def click(page: Any, figure: str, x: float, y: float) -> None:
     page.until_done()
 
 
-def until_tip(page: Any, words: str) -> str:
-    """The text of the tooltip, once it holds some words."""
-    page.until(f"{TIPS}.includes({json.dumps(words)})", 20)
-    return str(page.tab.evaluate(TIPS))
+def tip(page: Any, figure: str, x: float, y: float, words: str) -> str:
+    """The tooltip at a point of a figure, once it holds some words: a picture that is drawn anew takes its tip away."""
+    found = [""]
+
+    def seen() -> bool:
+        found[0] = str(page.tab.evaluate(TIPS))
+        if words not in found[0]:
+            page.tab.mouse.move(0, 0)
+            page.tab.mouse.move(*page.place(figure, x, y))
+        return words in found[0]
+
+    wait_until(seen)
+    return found[0]
 
 
 def test_branches_lie_over_the_diagram_and_special_points_say_what_they_are(page: Any) -> None:
@@ -55,8 +64,7 @@ def test_branches_lie_over_the_diagram_and_special_points_say_what_they_are(page
     unstable, stable = data(page, "unstable branches"), data(page, "stable branches")
     assert np.nanmin(unstable["x"]) == 0.2  # the orbit of period 1 is followed beyond its flip
     assert np.nanmax(stable["x"]) == 0.5
-    page.tab.mouse.move(*page.place("diagram", value, special["y"][first]))
-    assert "multipliers" in until_tip(page, "flip (period doubling) at 0.401")
+    assert "multipliers" in tip(page, "diagram", value, special["y"][first], "flip (period doubling) at 0.401")
     page.picture("branches")
     page.tab.select_option("#shown", "x")
     page.until_done()
@@ -102,8 +110,7 @@ def test_a_period_4_motion_has_lines_at_quarters(page: Any) -> None:
     lines = data(page, "lines")
     np.testing.assert_allclose(4 * lines["x"], np.round(4 * lines["x"]), atol=1e-9)
     assert {0.25, 0.5, 0.75, 1.0} <= set(np.round(lines["x"], 9))
-    page.tab.mouse.move(*page.place("spectrum", 1.0, float(lines["y"].max()) / 30))
-    until_tip(page, "1 · ")
+    assert tip(page, "spectrum", 1.0, float(lines["y"].max()) / 30, "1 · ")
     page.picture("spectrum")
 
 
@@ -155,10 +162,8 @@ def test_a_chart_gets_finer_and_a_click_shows_the_orbit_of_that_cell(page: Any) 
             if ([-2, -1, 0, 1, 2].every(k => at(i + k, j) === 2 && at(i, j + k) === 2))
                 return [data.x[0] + (j + 0.5) * data.dw[0] / columns, data.y[0] + (i + 0.5) * data.dh[0] / rows];
     })()""")
-    place = page.place("chart", *place)
-    page.tab.mouse.move(*place)
-    assert "exponent near \u2212" in until_tip(page, ": period 3,")
-    page.tab.mouse.click(*place)
+    assert "exponent near \u2212" in tip(page, "chart", *place, ": period 3,")
+    page.tab.mouse.click(*page.place("chart", *place))
     page.until('JSON.parse(Bokeh.documents[0].get_model_by_name("readout").value)[0][1] === "period 3"')
     page.until_done()
     page.picture("chart")
@@ -199,8 +204,7 @@ def test_a_click_in_a_basin_starts_there_and_reaches_its_attractor(page: Any) ->
         reached = sorted(data(page, "section points")["x"])
         known = sorted(marks["x"][marks["marker"] == kind])
         np.testing.assert_allclose(reached, known, rtol=1e-3)
-    page.tab.mouse.move(*page.place("basins", *place))
-    assert "NaN" not in until_tip(page, "period 2 (b)")
+    assert "NaN" not in tip(page, "basins", *place, "period 2 (b)")
     page.picture("basins")
 
 

@@ -65,7 +65,7 @@ def beyond_stops(system: System, points: FloatArray, starts: FloatArray, time: A
 def _beyond(
     system: System, meter: Meter, points: FloatArray, starts: FloatArray, time: Any, least: float
 ) -> tuple[BoolArray, FloatArray]:
-    """Whether starts lie beyond each rigid stop by more than ``least`` of its scale, and the gaps."""
+    """Marks of starts that lie beyond each rigid stop by more than ``least`` of its scale, and the gaps."""
     memory = np.tile(system.memory_vector(), (len(starts), 1))
     gaps = meter.values(points, np.broadcast_to(time, len(starts)), starts, memory)[0]
     sizes = np.array([system.scale_vector()[some].max(initial=0.0) for some in meter.places])
