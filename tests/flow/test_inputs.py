@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -152,6 +153,33 @@ def test_steps_of_two_inputs_that_bring_a_reset_about_are_warned_of() -> None:
     }
     with pytest.warns(RuntimeWarning, match="two inputs with delays of their own change at one instant"):
         ns.sensitivity(rig, duration=2.0, start={"v": 1.0}, parameters=["late"], inputs=inputs)
+
+
+@pytest.mark.parametrize(
+    ("element", "between", "told"),
+    [
+        (ns.elements.Stop(gap=lambda t, u, p: u.x - p.y, on={"v": 1.0}), "linear", True),
+        (ns.elements.Stop(gap=lambda t, u, p: u.x - p.y, on={"v": 1.0}), "steps", True),
+        (ns.elements.Coulomb(speed=lambda t, u, p: u.v - p.y, friction=0.5, on={"v": 1.0}), "steps", True),
+        (ns.elements.Coulomb(speed=lambda t, u, p: u.v - p.y, friction=0.5, on={"v": 1.0}), "linear", False),
+        (ns.elements.ElasticStop(gap=lambda t, u, p: u.x - p.y, stiffness=9.0, on={"v": 1.0}), "steps", False),
+        (ns.elements.Stop(gap=lambda t, u, p: u.x, on={"v": 1.0}), "steps", False),
+    ],
+)
+def test_jumps_of_what_an_element_holds_are_warned_of(element: Any, between: Any, told: bool) -> None:
+    system = ns.System(
+        states=["x", "v"],
+        parameters={},
+        inputs={"y": ""},
+        modes={"all": lambda t, u, p: [u.v, -u.v - 1.0 + 0.0 * p.y]},
+        elements={"one": element},
+    )
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        ns.simulate(
+            system, duration=1.0, start={"x": 0.5}, inputs={"y": ns.Input([0, 0.5, 2], [0, 0.1, 0], between=between)}
+        )
+    assert told == any("'one' moves with the input 'y'" in str(one.message) for one in said)
 
 
 def test_a_mass_pressed_on_a_stop_lifts_where_the_load_turns() -> None:
