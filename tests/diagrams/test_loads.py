@@ -11,6 +11,7 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.elements import Backlash, Coulomb, ElasticStop, PreloadedSpring, Stop
+from nonsmooth.flow.loads import _highest, _rule
 
 
 def balance(loads: Any) -> Any:
@@ -424,3 +425,37 @@ def test_a_contact_at_rest_takes_impulses_without_impacts(phase: float) -> None:
     struck = np.isfinite(run["strike_impact_speed"].values)
     assert struck.any() and (run["floor_impact_speed"].values[struck] == 0.0).all()
     np.testing.assert_allclose(run["floor_impulse"], run["strike_impulse"], rtol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_largest_of_several_peaks_is_found_between_the_samples(seed: int) -> None:
+    """A stop that never opens: its force is k (q - d), q'' + c q' + (1 + k) q = k d + the sum of f_n cos(n t + a_n)."""
+    rng = np.random.default_rng(seed)
+    f, a, c, k, d = rng.uniform(0.5, 1.0, 4), rng.uniform(0.0, 2 * np.pi, 4), 0.1, 2.0, -20.0
+    system = ns.mechanical(
+        1.0,
+        c,
+        1.0,
+        forcing={"q": lambda t, p: sum(f[n] * np.cos((3 * n + 9) * t + a[n]) for n in range(4))},
+        coordinates=["q"],
+        elements={"stop": ns.elements.ElasticStop(at="q", position=d, stiffness=k)},
+        period=2 * np.pi / 3,
+    )
+    n = 3 * np.arange(4) + 9
+    size = f * np.exp(1j * a) / (1 + k - n**2 + 1j * c * n)
+
+    def force(t: np.ndarray) -> np.ndarray:
+        return k * ((size * np.exp(1j * np.multiply.outer(t, n))).real.sum(axis=-1) + k * d / (1 + k) - d)
+
+    t = np.linspace(0.0, 2 * np.pi / 3, 200_001)
+    found = ns.find_orbit(system, loads=True, progress=False).loads["stop_force_maximum"]
+    assert found == pytest.approx(force(t).max(), abs=1e-8)
+
+
+def test_a_peak_between_samples_is_found_though_another_piece_has_a_larger_sample() -> None:
+    """x ends at 1; 1.001 - x^2 is at most .992 at the nodes beside its peak; a kink is what its samples say."""
+    x, _, back = _rule()
+    values = np.stack([x, 1.001 - x**2, 2.0 - np.abs(x - 0.01)])[:, :, None]
+    fine = np.array([True, True, False])[:, None]
+    assert _highest(values[:2], back, fine[:2]) == pytest.approx([1.001], abs=1e-14)
+    assert _highest(values, back, fine) == [values[2].max()]

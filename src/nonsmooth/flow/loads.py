@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth.arrays import BoolArray
 from nonsmooth.flow.engines.engine import FloatArray, State, TrajectoryLog
 from nonsmooth.flow.outputs import output_values
 from nonsmooth.kernels.hybrid import codes
@@ -237,7 +238,7 @@ class Meter:
                 names = list(traced.output_names)
                 force = outputs[:, [names.index(f"{load.name}_force") for load in self.elements]]
                 seen = np.hstack([force, -force * moved, power]).reshape(len(half), NODES, -1)
-                tails = np.abs(np.einsum("kx,pxi->pki", back[-2:], seen)).max(axis=(0, 1), initial=0.0)
+                tails = np.abs(np.einsum("kx,pxi->pki", back[-2:], seen)).max(axis=1, initial=0.0)
                 fine = tails <= tail * np.abs(seen).max(axis=(0, 1), initial=0.0)
                 if fine.all() or piece * FINEST * returns * PIECES < duration:
                     break
@@ -246,8 +247,7 @@ class Meter:
             return None
         count = len(self.elements)
         total = np.einsum("p,x,pxi->i", half, weight, seen[..., count:]) / returns
-        # Where no polynomial describes it, the largest sample: one overshoots at a kink.
-        highest = np.where(fine[:count], _highest(seen[..., :count], back), force.max(axis=0))
+        highest = _highest(seen[..., :count], back, fine[:, :count])
         size = np.nanmax(np.abs(np.vstack([log.sample_u, log.u_before, log.u_after])), axis=0)
         impulses, speed, _, taken = self.impacts(
             values, log.crossing_time, log.u_before, log.u_after, log.memory_after, size
@@ -286,20 +286,24 @@ def _rule() -> tuple[FloatArray, FloatArray, FloatArray]:
     return x, weight, (np.arange(NODES)[:, None] + 0.5) * every.T * weight
 
 
-def _highest(values: FloatArray, back: FloatArray) -> list[float]:
-    """The maxima of functions (pieces, nodes, i), by their polynomials on the pieces."""
+def _highest(values: FloatArray, back: FloatArray, fine: BoolArray) -> list[float]:
+    """The maxima of functions (pieces, nodes, i): by their polynomials on pieces (pieces, i) that these describe; on
+    others, where one would overshoot at a kink, the largest sample."""
     from numpy.polynomial import Legendre
 
     found = []
-    for own in np.moveaxis(values, 2, 0):
+    for own, smooth in zip(np.moveaxis(values, 2, 0), fine.T, strict=True):
         rows = own @ back.T
-        both = np.stack([rows.sum(axis=1), rows[:, ::2].sum(axis=1) - rows[:, 1::2].sum(axis=1)], axis=1)
-        every = np.hstack([own, both])
-        at, highest = int(every.max(axis=1).argmax()), float(every.max())
-        some = Legendre(np.where(np.abs(rows[at]) > 1e-14 * np.abs(rows[at]).max(), rows[at], 0.0)).trim()
-        turns = some.deriv().roots() if some.degree() > 1 else np.zeros(0)
-        inside = turns.real[(np.abs(turns.imag) < 1e-8) & (np.abs(turns.real) <= 1.0)]
-        found.append(float(some(inside).max(initial=highest)))
+        left, right = rows[:, ::2].sum(axis=1) - rows[:, 1::2].sum(axis=1), rows.sum(axis=1)
+        every = np.column_stack([np.where(smooth, left, own[:, 0]), own, np.where(smooth, right, own[:, -1])])
+        highest, tops = float(every.max()), every.max(axis=1)
+        between = np.abs(np.diff(every, axis=1)).max(axis=1)  # by which it may rise between two samples
+        for at in np.flatnonzero(smooth & (tops + between > highest)):
+            some = Legendre(np.where(np.abs(rows[at]) > 1e-14 * np.abs(rows[at]).max(), rows[at], 0.0)).trim()
+            turns = some.deriv().roots() if some.degree() > 1 else np.zeros(0)
+            inside = turns.real[(np.abs(turns.imag) < 1e-8) & (np.abs(turns.real) <= 1.0)]
+            highest = float(some(inside).max(initial=highest))
+        found.append(highest)
     return found
 
 
