@@ -9,7 +9,6 @@ import pytest
 import xarray as xr
 
 import nonsmooth as ns
-from nonsmooth.identification import Estimate
 
 pytestmark = pytest.mark.physics
 
@@ -300,16 +299,3 @@ def test_a_branch_of_a_system_without_contacts_has_bands() -> None:
     omega, k = band["omega"].values, band["drawn_k"].values[:, None]
     expected = np.quantile(1 / np.hypot(k - omega**2, 0.15 * omega), band["quantile"].values, axis=0)
     np.testing.assert_allclose(band["maximum_quantiles"].sel(state="q").values, expected, rtol=2e-3)
-
-
-def test_what_is_not_determined_is_not_drawn() -> None:
-    s = support()
-    found = ns.ParameterSet(
-        {"k": Estimate(s.values["k"], 0.01), "k_s": Estimate(s.values["k_s"], np.inf)}, np.diag([1e-4, np.inf])
-    )
-    with pytest.raises(ValueError, match=r"an infinite uncertainty has no law to draw from.*found.only"):
-        found.draw(10)
-    with pytest.raises(ValueError, match="an infinite uncertainty"):
-        ns.propagate(found, ns.sweep, s, "omega", [3.0], draws=5, **QUIET)
-    band = ns.propagate(found.only(["k"]), ns.sweep, s, "omega", [3.0], draws=5, **QUIET)
-    assert "drawn_k" in band and "drawn_k_s" not in band

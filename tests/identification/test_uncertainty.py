@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import nonsmooth as ns
 from nonsmooth.identification.arrow import Residuals, Unsettled, sandwich, settle
 from nonsmooth.identification.finding import Estimate
 from nonsmooth.identification.fit.profile import profile_of
@@ -104,3 +105,16 @@ def test_a_profile_that_does_not_rise_has_no_limit():
     value = np.linspace(0.1, 3, 59)
     profile = profile_of(value, np.minimum(40 * (value - 1) ** 2, np.where(value > 1, 2.0, np.inf)), 1.0)
     assert np.isnan(profile.high) and profile.low == pytest.approx(1 - np.sqrt(3.8415 / 40), abs=0.01)
+
+
+def test_what_is_not_determined_is_not_drawn() -> None:
+    s = ns.models.discontinuous_support(g=0.02, rho=0.14)
+    found = ns.ParameterSet(
+        {"k": Estimate(s.values["k"], 0.01), "k_s": Estimate(s.values["k_s"], np.inf)}, np.diag([1e-4, np.inf])
+    )
+    with pytest.raises(ValueError, match=r"an infinite uncertainty has no law to draw from.*found.only"):
+        found.draw(10)
+    with pytest.raises(ValueError, match="an infinite uncertainty"):
+        ns.propagate(found, ns.sweep, s, "omega", [3.0], draws=5, progress=False)
+    band = ns.propagate(found.only(["k"]), ns.sweep, s, "omega", [3.0], draws=5, progress=False)
+    assert "drawn_k" in band and "drawn_k_s" not in band
