@@ -42,7 +42,8 @@ SWAPS: dict[type, type] = {
 DROPPED = (ast.Assign, ast.AugAssign, ast.Expr, ast.Continue, ast.Break)
 SILENT = (ast.Raise, ast.JoinedStr, ast.Assert, ast.AnnAssign, ast.arguments, ast.Import, ast.ImportFrom)
 FOR_CUDA = ["tests/diagrams/test_gpu.py", "tests/diagrams/test_gpu_series.py"]
-FOR_KERNELS = ["tests/kernels", "tests/flow", "tests/diagrams/test_sweep.py", "tests/diagrams/test_lyapunov.py"]
+FOR_KERNELS = ["tests/kernels", "tests/flow"]
+FOR_KERNELS += [f"tests/diagrams/test_{one}.py" for one in ("sweep", "lyapunov", "chart_known_answers")]
 
 
 @dataclass
