@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from nonsmooth import models
+from nonsmooth import System, models
 from nonsmooth.cli import main as cli
 from nonsmooth.cli.init import study_text
 from nonsmooth.cli.study import named_model, read_study
@@ -301,6 +301,22 @@ def test_the_schema_takes_every_study_of_the_documentation_and_of_init() -> None
     assert [sorted(set(study) & set(VERBS)) for study in wrong] == [["sweep"], ["simulate", "sweep"]]  # under "Errors"
     for model, verb in POSSIBLE:
         judge.validate(tomllib.loads(study_text(once(model), model, verb, "study")))
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_names_in_other_letters_are_read_back(verb: str) -> None:
+    """Also those in comments, when the comment sign is taken away."""
+    system = System(
+        states=["weg", "größe"],
+        parameters={"ω": 1.0, "härte": 2.0},
+        modes={"frei": lambda t, u, p: (u.größe, p.ω - p.härte * u.weg)},
+        name="Schwinger",
+    )
+    text = study_text(system, "schwinger.py:system", verb, "study")
+    bare = re.sub(r"(?m)^# (?=[a-z_]+ = )", "", text)
+    for study in (tomllib.loads(text), tomllib.loads(bare)):
+        assert study["system"]["model"] == "schwinger.py:system"
+    assert study["system"]["parameters"] == {"ω": 1.0, "härte": 2.0}
 
 
 @pytest.mark.parametrize(

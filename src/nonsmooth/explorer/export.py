@@ -160,7 +160,11 @@ def as_toml(value: Any, name: str = "") -> str:
         ends = _even(value)
         return as_toml(value.tolist() if ends is None else dict(zip(("from", "to", "n"), ends, strict=True)))
     if isinstance(value, Mapping):
-        pairs = ", ".join(f"{k} = {as_toml(v)}" for k, v in value.items() if k != "type" and v is not None)
+        pairs = ", ".join(
+            f"{k if k.isascii() else as_toml(k)} = {as_toml(v)}"
+            for k, v in value.items()
+            if k != "type" and v is not None
+        )
         return f"{{ {pairs} }}" if pairs else "{}"
     if isinstance(value, list):
         return "[" + ", ".join(map(as_toml, value)) + "]"
