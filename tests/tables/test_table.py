@@ -210,3 +210,37 @@ def test_a_file_that_is_open_elsewhere(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(pd.DataFrame, "to_csv", held)
     with pytest.raises(ns.DataFileError, match=r"run\.csv: it may not be written .*close it where it is open"):
         ns.table(ns.simulate(ns.models.impact_oscillator(), periods=1), file=tmp_path / "run.csv")
+
+
+WRITERS = {
+    ".csv": lambda run, file: ns.table(run, file=file),
+    ".xlsx": lambda run, file: ns.table(run, file=file),
+    ".pdf": lambda run, file: ns.plot.save_figure(ns.plot.time_history(run), file),
+    ".gif": lambda run, file: ns.animate(run, seconds=0.2, rate=10, pixels=150).save(file),
+}
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_a_file_that_cannot_be_written_leaves_the_old_one(suffix: str, tmp_path: Path) -> None:
+    """A table, a figure and an animation say the same."""
+    run = ns.simulate(ns.models.impact_oscillator(), periods=1)
+    write = WRITERS[suffix]
+    with pytest.raises(ns.DataFileError, match="does not exist; create it first"):
+        write(run, tmp_path / "no" / f"run{suffix}")
+    (tmp_path / f"folder{suffix}").mkdir()
+    with pytest.raises(ns.DataFileError, match="a folder stands there .*give another name"):
+        write(run, tmp_path / f"folder{suffix}")
+    old = tmp_path / f"run{suffix}"
+    old.write_bytes(b"old")
+    with pytest.MonkeyPatch.context() as patched:
+
+        def full(*_: object) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        patched.setattr("nonsmooth.tables.table.replace", full)
+        with pytest.raises(ns.DataFileError, match="the disk is full .*make room"):
+            write(run, old)
+    assert old.read_bytes() == b"old"
+    write(run, old)
+    assert len(old.read_bytes()) > 100
+    assert sorted(one.name for one in tmp_path.iterdir()) == [f"folder{suffix}", f"run{suffix}"]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from nonsmooth.errors import Answering, DataFileError
+from nonsmooth.errors import Answering
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import column, first_states, name_plane, variable_along
 from nonsmooth.plot.mechanism import sketch_of_run
@@ -22,6 +22,7 @@ from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import above, at_least
 from nonsmooth.system.origin import system_of
 from nonsmooth.tables.sampled import sampled
+from nonsmooth.tables.table import placed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -200,23 +201,22 @@ class Animation(Answering):
         ImportError
             ``.mp4`` where there is no ffmpeg.
         DataFileError
-            A folder that does not exist.
+            A folder that does not exist, a file that cannot be written, a full disk; what stood there stays.
         """
         target = Path(path)
         if target.suffix not in (".gif", ".mp4", ".html"):
             raise ValueError(f"{target}: an animation is saved as .gif, .mp4 or .html")
-        if not target.parent.is_dir():
-            raise DataFileError(f"{target}: the folder {target.parent} does not exist; create it first")
-        if target.suffix == ".mp4":
-            self._film(target)
-        elif target.suffix == ".gif":
-            first, *others = self.images()
-            looks: dict[str, Any] = {"duration": round(1000 / self.rate), "loop": 0, "optimize": False, "disposal": 1}
-            first.save(target, save_all=True, append_images=others, **looks)
-        else:
-            head = '<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>nonsmooth</title>\n'
-            head += '<meta name="viewport" content="width=device-width">\n'
-            target.write_text(f"{head}<body>{self._repr_html_()}</body></html>\n", encoding="utf-8")
+        with placed(target) as fresh:
+            if target.suffix == ".mp4":
+                self._film(fresh)
+            elif target.suffix == ".gif":
+                first, *others = self.images()
+                looks: dict[str, Any] = {"duration": round(1000 / self.rate), "loop": 0, "disposal": 1}
+                first.save(fresh, save_all=True, append_images=others, optimize=False, **looks)
+            else:
+                head = '<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>nonsmooth</title>\n'
+                head += '<meta name="viewport" content="width=device-width">\n'
+                fresh.write_text(f"{head}<body>{self._repr_html_()}</body></html>\n", encoding="utf-8")
         return target
 
     def _film(self, target: Path) -> None:
@@ -229,7 +229,7 @@ class Animation(Answering):
                 import imageio_ffmpeg
             except ImportError:
                 raise ImportError(
-                    f"{target}: .mp4 needs the program ffmpeg, which is not there: python -m pip install "
+                    f"{target.name}: .mp4 needs the program ffmpeg, which is not there: python -m pip install "
                     "imageio-ffmpeg; a .gif or a .html needs nothing"
                 ) from None
             settings = {"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()}

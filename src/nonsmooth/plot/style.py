@@ -19,7 +19,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from nonsmooth.errors import DataFileError, shortened
+from nonsmooth.errors import shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -330,8 +330,11 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
     """Save a figure (or the figure of some axes) in the format of the path's ending.
 
     Lines and text stay vectors in PDF and SVG; point clouds are pixels at 600 dpi. The file holds no date,
-    so equal input gives equal files. The path is returned, with the ending ``.png`` where it has none.
+    so equal input gives equal files. The path is returned, with the ending ``.png`` where it has none. A file that
+    cannot be written is a DataFileError, and what stood there before stays.
     """
+    from nonsmooth.tables.table import placed
+
     owner: Any = getattr(figure, "figure", figure)
     if not hasattr(owner, "savefig"):
         raise TypeError(f"save_figure takes the figure (or its axes) first, then the file; not {shortened(figure)}")
@@ -340,9 +343,7 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
         target = target.with_name(f"{target.name}.{owner.canvas.get_default_filetype()}")
     if target.suffix[1:].lower() not in (known := owner.canvas.get_supported_filetypes()):
         raise ValueError(f"{target}: the ending is that of no format of figures; allowed: {', '.join(sorted(known))}")
-    if not target.parent.is_dir():
-        raise DataFileError(f"{target}: the folder {target.parent} does not exist; create it first")
     metadata: dict[str, Any] | None = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}.get(target.suffix)
-    with _in(_made.get(owner, "journal")):
-        owner.savefig(target, metadata=metadata)
+    with _in(_made.get(owner, "journal")), placed(target) as fresh:
+        owner.savefig(fresh, metadata=metadata)
     return target

@@ -31,8 +31,7 @@ def beside(target: Path) -> Iterator[Path]:
     """A new folder beside ``target``, gone at the end; folders that killed processes left there are gone before."""
     clear(target)
     with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
-        whose = {"place": _place(), "process": os.getpid()}
-        (Path(folder) / _WRITER).write_text(json.dumps(whose), encoding="utf-8")
+        Path(folder, _WRITER).write_text(json.dumps({"place": _place(), "process": os.getpid()}), encoding="utf-8")
         yield Path(folder)
 
 
@@ -84,6 +83,7 @@ def told(path: Path, remedy: str) -> Iterator[None]:
             errno.EROFS: "the disk is read-only",
             errno.EACCES: "it may not be written",
             errno.EPERM: "it may not be written",
+            errno.EISDIR: "a folder stands there",
             errno.EFBIG: "the file would be larger than the disk allows",
         }.get(error.errno or 0)
         if why is None:
