@@ -138,9 +138,21 @@ MISTAKES = {
     ),
     "a force of time alone": (
         "ns.mechanical(1.0, 0.1, 1.0, forcing={'q': lambda t: np.cos(t)})",
-        "too many positional arguments",
-        "forcing of 'q' is a function of t and p",
-        "`lambda t, p: ...`",
+        "forcing of 'q': its arguments are (t)",
+        "called as f(t, p): time, parameters",
+        "write them so",
+    ),
+    "a mass of time": (
+        "ns.mechanical(M=lambda t, p: 1.0, C=0.1, K=1.0)",
+        "M: its arguments are (t, p)",
+        "called as f(p): parameters",
+        "write them so",
+    ),
+    "a stiffness of time": (
+        "ns.mechanical(1.0, 0.1, lambda t, p: 1.0)",
+        "K: its arguments are (t, p)",
+        "called as f(p): parameters",
+        "write them so",
     ),
     "an expression for the name of a parameter": (
         "ns.mechanical(1.0, 0.1, 1.0, parameters={'d': 0.1}, elements=[ns.elements.Stop(at='q', position='-d')])",

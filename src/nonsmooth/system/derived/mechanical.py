@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -16,7 +15,7 @@ from nonsmooth.system.derived.combinations import element_names
 from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.derived.loads import Loads
 from nonsmooth.system.symbolic.scalar import Scalar, to_expression
-from nonsmooth.system.symbolic.tracing import Symbols
+from nonsmooth.system.symbolic.tracing import Symbols, call
 from nonsmooth.system.system import System
 from nonsmooth.system.units import product, read_unit, unit_of, write_unit
 from nonsmooth.system.variant import variant_of
@@ -191,13 +190,7 @@ def _function(given: Any, what: str) -> Callable[..., Any]:
     """A load as a function of time and parameters; it may be a number or the name of a parameter."""
     if not callable(given):
         return lambda t, p: p[given] if isinstance(given, str) else given
-    try:
-        inspect.signature(given).bind(None, None)
-    except TypeError as error:
-        raise SystemDefinitionError(f"{what} is a function of t and p, `lambda t, p: ...` ({error})") from error
-    except ValueError:  # a function of C
-        pass
-    return given
+    return lambda t, p: call(given, (t, p), what)
 
 
 def _placed(label: str, element: Any, names: list[str], inverse: Callable[[Any], sp.Matrix], system: str) -> Any:
@@ -266,7 +259,7 @@ def _between(names: list[str]) -> str:
 
 def _size(M: Any) -> int:
     if callable(M):
-        return _size(M(_Any()))
+        return _size(call(M, (_Any(),), "M"))
     found = np.asarray(M.toarray() if hasattr(M, "toarray") else M, dtype=object)
     if found.ndim == 0:
         return 1
@@ -297,7 +290,7 @@ def _coordinates(given: Any, size: int) -> list[str]:
 
 
 def _matrix(given: Any, p: Any, size: int, what: str) -> sp.Matrix:
-    found = given(p) if callable(given) else given.toarray() if hasattr(given, "toarray") else given
+    found = call(given, (p,), what) if callable(given) else given.toarray() if hasattr(given, "toarray") else given
     array = np.asarray(found, dtype=object)
     if array.ndim == 0:
         array = array.reshape(1, 1)

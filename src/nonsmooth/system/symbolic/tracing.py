@@ -153,7 +153,7 @@ def call_vector(function: Callable[..., Any], arguments: Sequence[Any], names: S
     what : str
         Which function this is, for messages: "the vector field of mode 'free'".
     """
-    result = _call(function, arguments, what)
+    result = call(function, arguments, what)
     if isinstance(result, Scalar) or np.isscalar(result):
         result = (result,)
     if isinstance(result, Set):
@@ -173,7 +173,7 @@ def call_vector(function: Callable[..., Any], arguments: Sequence[Any], names: S
 
 def call_scalar(function: Callable[..., Any], arguments: Sequence[Any], what: str) -> sp.Expr:
     """Call a user's function and return the one expression it gives."""
-    result = _call(function, arguments, what)
+    result = call(function, arguments, what)
     if isinstance(result, (tuple, list, States)) or (isinstance(result, np.ndarray) and result.ndim):
         if len(result) != 1:
             raise SystemDefinitionError(f"{what} must return one number; it returned {len(result)} values")
@@ -187,7 +187,8 @@ def _shape(what: str, names: Sequence[str], got: str) -> NoReturn:
     )
 
 
-def _call(function: Callable[..., Any], arguments: Sequence[Any], what: str) -> Any:
+def call(function: Callable[..., Any], arguments: Sequence[Any], what: str) -> Any:
+    """Return what a user's function gives; the message says which function, and what it is called with."""
     if not callable(function):
         raise SystemDefinitionError(f"{what} must be a function, not {function!r}")
     name = getattr(function, "__name__", "")
@@ -206,8 +207,8 @@ def _call(function: Callable[..., Any], arguments: Sequence[Any], what: str) -> 
         ) from error
 
 
-#: What a function is called with, by the type of the argument.
-_ROLES = {"Scalar": ("t", "time"), "States": ("u", "states"), "Parameters": ("p", "parameters")}
+#: What a function is called with, by the type of the argument; parameters otherwise.
+_ROLES = {"Scalar": ("t", "time"), "States": ("u", "states")}
 
 
 def _order(function: Callable[..., Any], arguments: Sequence[Any]) -> str:
@@ -216,7 +217,7 @@ def _order(function: Callable[..., Any], arguments: Sequence[Any]) -> str:
         signature = inspect.signature(function)
     except (TypeError, ValueError):  # a function of C
         return ""
-    roles = [_ROLES.get(type(argument).__name__, ("x", "number")) for argument in arguments]
+    roles = [_ROLES.get(type(argument).__name__, ("p", "parameters")) for argument in arguments]
     expected = [letter for letter, _ in roles]
     own = list(signature.parameters)
     if own == expected:
