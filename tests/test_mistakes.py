@@ -154,6 +154,8 @@ MISTAKES = {
         "called as f(p): parameters",
         "write them so",
     ),
+    "the rest of a division of time": (FIELD.format("(u.v, -(t % 1.0))"), "mode 'free'", "`floor` of", "with `at=`"),
+    "the rest by NumPy": (FIELD.format("(u.v, -np.mod(u.x, 1.0))"), "mode 'free'", "`floor` of", "two modes"),
     "an expression for the name of a parameter": (
         "ns.mechanical(1.0, 0.1, 1.0, parameters={'d': 0.1}, elements=[ns.elements.Stop(at='q', position='-d')])",
         "'-d'",

@@ -101,6 +101,10 @@ def _compare(make: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
     return compare
 
 
+def _rest(a: Any, b: Any) -> Any:
+    return a - b * sp.floor(a / b)
+
+
 class Scalar:
     """A real number known only by its SymPy expression."""
 
@@ -117,6 +121,7 @@ class Scalar:
     __mul__, __rmul__ = _binary(lambda a, b: a * b)
     __truediv__, __rtruediv__ = _binary(lambda a, b: a / b)
     __pow__, __rpow__ = _binary(lambda a, b: a**b)
+    __mod__, __rmod__ = _binary(_rest)
 
     def __xor__(self, other: Any) -> Any:
         raise SystemDefinitionError(
@@ -284,6 +289,7 @@ _BINARY: dict[str, Callable[[Any, Any], Any]] = {
     "true_divide": lambda x, y: x / y,
     "power": lambda x, y: x**y,
     "float_power": lambda x, y: x**y,
+    "remainder": _rest,
     "arctan2": sp.atan2,
     "hypot": lambda x, y: sp.sqrt(x**2 + y**2),
     "maximum": sp.Max,
