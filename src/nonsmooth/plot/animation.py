@@ -211,8 +211,15 @@ class Animation(Answering):
                 self._film(fresh)
             elif target.suffix == ".gif":
                 first, *others = self.images()
-                looks: dict[str, Any] = {"duration": round(1000 / self.rate), "loop": 0, "disposal": 1}
-                first.save(fresh, save_all=True, append_images=others, optimize=False, **looks)
+                first.save(
+                    fresh,
+                    save_all=True,
+                    append_images=others,
+                    duration=round(1000 / self.rate),
+                    loop=0,
+                    optimize=False,
+                    disposal=1,
+                )
             else:
                 head = '<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>nonsmooth</title>\n'
                 head += '<meta name="viewport" content="width=device-width">\n'

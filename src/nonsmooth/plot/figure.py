@@ -47,7 +47,10 @@ def figure(verb: str = "", *variables: str, **size: float) -> Callable[[Callable
                     if one is not None and not hasattr(one, "data_vars"):
                         options["ax"] = one
                 given = given[:1] + tuple(one for one in given[1:] if hasattr(one, "data_vars"))
-            bound = taken.bind(*given, **options)
+            try:
+                bound = taken.bind(*given, **options)
+            except TypeError as error:
+                raise TypeError(f"{draw.__name__}: {error}") from None
             ax = bound.arguments.pop("ax", None)
             for variable in variables:
                 variable_along(bound.args[0], variable, verb)
