@@ -225,6 +225,10 @@ def test_a_start_beyond_a_stop_is_run_by_no_verb(rubbing: bool, speed: float) ->
         swept = ns.sweep(system, "d", [0.5, 0.6, 0.9, 1.0], start=start, direction=direction, **few)
         assert swept["period_number"].values.tolist() == [0, 0, 1, 1]
         assert (swept["status"].values[2:] == 0).all() and (swept["status"].values[:2] != 0).all()
+        spectrum = ns.lyapunov(
+            system, parameter="d", values=[0.5, 0.9], start=start, periods=50, direction=direction, progress=False
+        )
+        assert (np.isfinite(spectrum["exponents"].values).any(axis=1) == [False, True]).all()
     grid = {"d": [0.5, 0.9], "c": [0.1, 0.3]}
     for carry in (None, {"d": "up"}):
         numbers = ns.chart(system, grid, start=start, carry=carry, **few)["period_number"].transpose("d", "c").values

@@ -30,7 +30,7 @@ from nonsmooth.flow.arguments import swept_values
 from nonsmooth.flow.engines.devices import on_gpu
 from nonsmooth.flow.engines.engine import FloatArray, IntArray, State
 from nonsmooth.flow.engines.methods import engine_for
-from nonsmooth.flow.failure import refuse_beyond_stops, solve_error
+from nonsmooth.flow.failure import beyond_stops, refuse_beyond_stops, solve_error
 from nonsmooth.flow.options import LONGEST_RUN, Length, Solver, Varied, as_called, solver_of
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.flow.scales import warn_if_slow
@@ -205,7 +205,8 @@ def _along(
     """The spectrum at each point, in the order in which a state is carried along; with the sizes of states met."""
     tables, sizes = engine.prepare(points), []
     found: dict[int, Spectrum] = {}
-    state = first.copy()
+    beyond = beyond_stops(system, points, np.tile(first.u, (len(points), 1)))
+    state, fresh = first.copy(), True
     for i in order:
         kept = state.copy() if carry else first.copy()
         here = system.period_at(points[i]) if system.period() is not None else None
@@ -215,12 +216,15 @@ def _along(
             return spectrum_along(system, engine, tables, i, points[i], begun, here, unit, length.units, length.wait)
 
         state = kept.copy()
-        one = run(state)
-        if one.status == codes.BEYOND_STOP and found and carry:  # a stop has moved past it: begin anew, as in a sweep
+        one = failed_spectrum(len(first.u), 0.0, codes.BEYOND_STOP) if fresh and beyond[i] else run(state)
+        if (
+            one.status == codes.BEYOND_STOP and carry and not fresh
+        ):  # a stop has moved past it: begin anew, as in a sweep
             kept, state = first.copy(), first.copy()
             one = run(state)
         found[int(i)] = one
         sizes.append(np.abs([kept.u, state.u]))
+        fresh = fresh and not (carry and one.status in GOOD)
         if one.status not in GOOD:
             state = kept if len(found) > 1 else first.copy()
         advance(1)
