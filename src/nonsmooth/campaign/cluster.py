@@ -79,7 +79,7 @@ def on_cluster(
     ConnectionError
         The scheduler is gone; what has come back, or is in the store, stands.
     """
-    if not hasattr(client, "scheduler"):
+    if client is not None and not hasattr(client, "scheduler"):
         raise TypeError(f"client = {shortened(client)}: give dask.distributed.Client(address)")
     try:
         from distributed import as_completed
