@@ -289,6 +289,41 @@ def test_each_run_is_laid_at_the_phase_that_the_fit_found_of_it() -> None:
     for run in leads:
         laid = ns.compare(recording, system, run=run, parameters=found, draws=0)
         assert float(laid["orbit_distance"]) < 0.01 and abs(float(laid["phase_shift"])) < 1e-3
-    with pytest.warns(UserWarning, match="none of run 'run': it is taken as 0"):
+    with pytest.warns(UserWarning, match="none of run 'run': it is taken as 0") as told:
         other = ns.compare({"q": (t, q)}, system, parameters=found, draws=0)
+    assert told[0].filename == __file__
     assert float(other["phase_shift"]) == pytest.approx(-leads["b"] / (2 * np.pi), abs=1e-3)
+
+
+def test_a_channel_is_read_by_the_sensor_and_the_clock_that_the_fit_found() -> None:
+    """Two records of a resonance in closed form: of gains of their own, one offset, a delay and a slow clock."""
+    t, gains, noise = np.arange(0, 60, 0.05), {"a": 100.0, "b": -60.0}, 0.02
+    system = ns.mechanical(
+        1.0, "c", 9.0, parameters={"c": 0.15}, coordinates=["q"], forcing={"q": lambda t, p: np.cos(2.0 * t)}
+    )
+    q = np.real(np.exp(2j * (1.01 * t - 0.2)) / (5 + 0.3j))
+    runs = {}
+    for run, gain in gains.items():
+        y = gain * q + 7.0 + noise * np.random.default_rng(int(gain**2)).normal(size=t.size)
+        runs[run] = {"laser": xr.Dataset({"volts": ("time", y, {"units": ""})}, {"time": t})}
+    recording = ns.Recording.from_runs(runs, synthetic=False)
+    found = ns.fit(
+        system,
+        recording,
+        ["c", "q.gain", "q.offset", "q.delay", "clock"],
+        measured={"q": ns.Sensor("volts", gain=80.0)},
+        per_run=["q.gain"],
+        priors={"c": (0.15, 1e-3)},
+        tries=3,
+        progress=False,
+    )
+    assert found.extra["q.gain, b"].value == pytest.approx(-60.0, rel=1e-3)
+    for run in gains:
+        laid = ns.compare(recording, system, run=run, channels={"q": "volts"}, parameters=found, draws=0)
+        assert float(laid["orbit_distance"]) < 0.01 and abs(float(laid["phase_shift"])) < 1e-3
+    own = {"q": ns.Sensor("volts", gain=120.0, offset=7.0, delay=0.2)}
+    with pytest.warns(UserWarning, match=r"gain=120\.0, .* stands; the fit found .*gain=(99\.9|100\.0)") as told:
+        other = ns.compare(recording, system, run="a", channels=own, parameters=found, draws=0)
+    assert [one.filename for one in told] == [__file__]
+    size = np.sqrt(0.5 * (1 + (100 / 120) ** 2))
+    assert float(other["orbit_distance"]) == pytest.approx((1 - 100 / 120) / size, rel=0.02)

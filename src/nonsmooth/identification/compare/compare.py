@@ -70,7 +70,9 @@ def compare(
         for a response, ``sweep`` for a diagram.
     channels : mapping of str to str or Sensor, optional
         Of a recording: which channel shows which state, as ``measured`` of :func:`nonsmooth.fit`. Times are those of
-        the model: the forcing begins at t = 0, or at the ``phase`` that the fit found (of this run, by its name).
+        the model: the forcing begins at t = 0, or at the ``phase`` that the fit found (of this run, by its name). Of
+        the ``parameters`` of a fit, gain, offset and delay that it found hold for a channel given by its name alone
+        (a Sensor stands as it is given, with a warning where it differs), and its clock for all.
     run : str, optional
         Of a recording that has several.
     parameters : ParameterSet or mapping, optional

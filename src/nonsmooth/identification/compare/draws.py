@@ -118,7 +118,9 @@ def draw_systems(
     """
     rng = np.random.default_rng(seed)
     base = nominal(system, parameters, settings)
-    allowed = _ends(bounds or {}, system)
+    for name in bounds or {}:
+        check_parameter(name, system)
+    allowed = {name: ends(pair, name) for name, pair in (bounds or {}).items()}
     systems: list[System] = []
     kept: list[dict[str, float]] = []
     refused = 0
@@ -152,12 +154,6 @@ def draw_systems(
                 "uncertainty is many times its value; identify it better, or leave it out of the covariance"
             )
     return systems, {name: np.array([row[name] for row in kept]) for name in (kept[0] if kept else ())}
-
-
-def _ends(bounds: Mapping[str, Any], system: System) -> dict[str, tuple[float, float]]:
-    for name in bounds:
-        check_parameter(name, system)
-    return {name: ends(pair, name) for name, pair in bounds.items()}
 
 
 def check_parameter(name: str, system: System) -> None:

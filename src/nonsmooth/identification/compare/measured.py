@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -107,7 +108,8 @@ def recorded_motion(
     run : str, optional
         Needed where there are several.
     found : mapping of str to Estimate
-        Unknowns beside the parameters that a fit has found: the phase of the forcing at t = 0, or that of this run.
+        Unknowns beside the parameters that a fit has found, of all runs or of this one: the phase of the forcing at
+        t = 0, the clock, and gain, offset and delay of a channel that is given by its name alone.
 
     Raises
     ------
@@ -118,6 +120,7 @@ def recorded_motion(
     import xarray as xr
 
     from nonsmooth.identification.fit.records import irregularity, read_records
+    from nonsmooth.identification.fit.sensors import Sensor
 
     sensors, records, _ = read_records(system, recording, {"measured": channels, "runs": run})
     if len(records) > 1:
@@ -129,29 +132,43 @@ def recorded_motion(
         raise ValueError(f"{system.name!r} has no forcing period; compare takes forced systems")
     if outputs := [name for name in sensors if name not in system.states]:
         raise ValueError(f"{', '.join(outputs)}: no state of {system.name!r}; compare lays states over the model")
+    found = {key: one for key, one in found.items() if key.split(",")[0] not in system.values}
+
+    def told(name: str, known: float) -> float:
+        """Return the finding of this run, or else what is known."""
+        one = found.get(name, found.get(f"{name}, {record.name}"))
+        if one is None and any(key.startswith(f"{name}, ") for key in found):
+            warnings.warn(
+                f"the fit found {name!r} of its runs, but none of run {record.name!r}: it is taken as {known:g}",
+                stacklevel=6,
+            )
+        return one.value if one else known
+
+    for q, sensor in sensors.items():
+        gain, offset = told(q + ".gain", sensor.gain), told(q + ".offset", sensor.offset)
+        read = replace(sensor, gain=gain, offset=offset, delay=told(q + ".delay", sensor.delay))
+        if sensor == Sensor(sensor.channel):
+            sensors[q] = read
+        elif read != sensor:
+            warnings.warn(
+                f"{sensor} of {q} stands; the fit found {read}: give the channel's name alone to read it so",
+                stacklevel=5,
+            )
     if len({sensor.delay for sensor in sensors.values()}) > 1 or np.isnan(record.values).any(axis=1).mean() > 0.5:
         raise ValueError("the channels have clocks or delays of their own: compare them one by one, channels={...}")
-    gain, offset = (np.array([getattr(sensor, word) for sensor in sensors.values()]) for word in ("gain", "offset"))
+    scale = np.array([sensor.gain for sensor in sensors.values()])
     error = [
         max(irregularity(y), sensor.floor) if sensor.noise is None else np.hypot(sensor.noise, sensor.floor)
         for sensor, y in zip(sensors.values(), record.values.T, strict=True)
     ]
-    u = (record.values - offset) / gain
-    time = record.time - next(iter(sensors.values())).delay
-    told = {} if "phase" in system.values else found
-    shift = told.get("phase", told.get(f"phase, {record.name}"))
-    if shift is None and any(name.startswith("phase, ") for name in told):
-        warnings.warn(
-            f"the fit found the phases of its runs, but none of run {record.name!r}: it is taken as 0, which "
-            "orbit_distance_any_phase does not need",
-            stacklevel=4,
-        )
+    u = (record.values - [sensor.offset for sensor in sensors.values()]) / scale
+    time = told("clock", 1.0) * record.time - next(iter(sensors.values())).delay
     synthetic = "yes" if getattr(recording, "synthetic", False) else "no"
     return xr.Dataset(
         {
             "u": (("time", "state"), u),
-            "u_error": (("time", "state"), np.broadcast_to(error / np.abs(gain), u.shape)),
-            "phase": ("time", time / period + (shift.value if shift else 0.0)),
+            "u_error": (("time", "state"), np.broadcast_to(error / np.abs(scale), u.shape)),
+            "phase": ("time", time / period + told("phase", 0.0)),
         },
         {"time": time, "state": list(sensors)},
         {"synthetic": synthetic, "title": record.name},
@@ -252,9 +269,9 @@ def _smoothed(time: Any, x: xr.DataArray, step: float, omega: float, support: bo
     piece = x.isel({x.dims[0]: inside})
     found = touching(time[inside], piece)
     quiet = smooth(time[inside], piece, resolution=step, contacts=found).attrs
-    if not support or not found.sizes["contact"]:
-        if not support:
-            return smooth(time, x, resolution=step, contacts=((), ()), intensity=quiet["intensity"])
+    if not support:
+        return smooth(time, x, resolution=step, contacts=((), ()), intensity=quiet["intensity"])
+    if not found.sizes["contact"]:
         return smooth(time, x, resolution=step, contacts=touching(time, x))
     gap = float(found["gap"])
     rough = smooth(time[inside], piece, resolution=step).attrs["intensity"]

@@ -135,8 +135,8 @@ def flips(values: ArrayLike, numbers: ArrayLike) -> dict[str, float]:
 
 def _parting(x: FloatArray, single: BoolArray, double: BoolArray) -> float:
     """The value with the fewest singles on the doubles' side and the other way round; in the middle of a tie."""
-    below = np.concatenate([[0], np.cumsum(single)]) + (double.sum() - np.concatenate([[0], np.cumsum(double)]))
-    above = np.concatenate([[0], np.cumsum(double)]) + (single.sum() - np.concatenate([[0], np.cumsum(single)]))
+    below = double.sum() + np.concatenate([[0], np.cumsum(single.astype(int) - double)])
+    above = single.sum() + double.sum() - below
     # `below`: misplaced points if doubles lie below the cut and singles above it; `above` the other way round.
     wrong = below if below.min() <= above.min() else above
     best = np.flatnonzero(wrong == wrong.min())
@@ -248,8 +248,8 @@ def _fitted(rho: FloatArray, size: FloatArray, time: float) -> tuple[float, floa
     if guess is None:
         return None
     edge = -2 * np.log(max(size[forward][:4].mean(), 0.3))
-    tried = [_one_fit(place, size, forward, [*guess, 0.0, edge, *more]) for more in ([], [0.0])]
-    held = sorted(one for one in tried if one is not None)
+    tried = (_one_fit(place, size, forward, [*guess, 0.0, edge, *more]) for more in ([], [0.0]))
+    held = sorted(filter(None, tried))
     if not held:
         return None
     _, flip, error = held[0]

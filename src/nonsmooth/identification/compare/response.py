@@ -138,13 +138,9 @@ def _jumps(values: FloatArray, curves: FloatArray, directions: list[str]) -> Jum
     found = {}
     for d, word in enumerate(directions):
         x, heights = (values, curves[:, d]) if word == "up" else (values[::-1], curves[::-1, d])
-        found[word] = [_jump(x, heights, i) for i in jumps_in(heights)]
+        steps = [(x[i : i + 2], heights[i : i + 2].tolist()) for i in jumps_in(heights)]
+        found[word] = [AmplitudeJump(float(at.mean()), 0.5 * float(np.ptp(at)), *both) for at, both in steps]
     return found
-
-
-def _jump(x: FloatArray, heights: FloatArray, i: int) -> AmplitudeJump:
-    middle, half = 0.5 * float(x[i] + x[i + 1]), 0.5 * float(abs(x[i + 1] - x[i]))
-    return AmplitudeJump(middle, half, float(heights[i]), float(heights[i + 1]))
 
 
 def _measured_jumps(measured: xr.Dataset, runs: dict[str, NDArray[Any]], directions: list[str]) -> Jumps:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,7 @@ _JUMPS = {
     "after": ("amplitude behind it", "m"),
 }
 _WHOLE = np.array([[1.0], [2.0], [1.0], [1.0]])  # of a half step
+_NUMBER = "period number (0: none found, -1: too few turns)"
 FEW = 6  # turns of the drive below which no period number is sought
 
 
@@ -74,7 +75,7 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
         pairs = whole[: len(whole) // 2 * 2].reshape(-1, 2 * whole.shape[1]) if len(whole) > 1 else whole
         half = 0.5 * np.ptp(pairs, axis=1)
         heights.append(float(half.mean()))
-        sample = float(np.median(motion["u_error"].values[:, 0])) / np.sqrt(2)
+        sample = noise[0] / np.sqrt(2)
         scatter = float(half.std(ddof=1) / np.sqrt(len(half))) if len(half) > 1 else 0.0
         errors.append(float(np.hypot(scatter, sample / np.sqrt(len(half)))))
     omega = np.array([float(motion["omega"]) for motion in motions])
@@ -82,25 +83,26 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
     jumps = jumps_of_runs(omega, np.array(heights), np.array(errors), words)
     met = [word for word, found in jumps.items() for _ in found]
     steps = np.array([one for found in jumps.values() for one in found], dtype=float).reshape(-1, 4).T * _WHOLE
-    attrs = {key: motions[0].attrs[key] for key in ("synthetic", "file", "sha256") if key in motions[0].attrs}
-    attrs["title"] = f"{attrs.get('file') or 'in memory'}, {len(motions)} runs"
     return xr.Dataset(
         {
             "amplitude": labelled("run", np.array(heights), "half the range of x", "m"),
             "amplitude_error": labelled("run", np.array(errors), "standard error of it", "m"),
             "omega": labelled("run", omega, "frequency of the drive", "rad/s"),
             "direction": labelled("run", words, "how the run was reached"),
-            "period_number": labelled(
-                "run", np.array(periods, dtype=np.int64), "period number (0: none found, -1: too few turns)"
-            ),
+            "period_number": labelled("run", np.array(periods, dtype=np.int64), _NUMBER),
             "jump_direction": labelled("jump", np.array(met, dtype=str), "how it was met"),
             **{
                 f"jump_{name}": labelled("jump", column, *words_of)
                 for (name, words_of), column in zip(_JUMPS.items(), steps, strict=True)
             },
         },
-        attrs=attrs,
+        attrs=_attributes(motions),
     )
+
+
+def _attributes(motions: Sequence[xr.Dataset]) -> dict[str, Any]:
+    kept = {key: value for key, value in motions[0].attrs.items() if key != "run"}
+    return kept | {"title": f"{kept.get('file') or 'in memory'}, {len(motions)} runs"}
 
 
 def measured_rise(motion: xr.Dataset, parameter: str, first: float, last: float, *, unit: str = "") -> xr.Dataset:
@@ -171,20 +173,16 @@ def measured_sections(
         for i, cloud in zip(order, clouds, strict=True)
     ]
     first = motions[0]
-    attrs = {**first.attrs, "title": f"{first.attrs.get('file') or 'in memory'}, {len(motions)} runs"}
-    attrs.pop("run", None)
     return xr.Dataset(
         {
             "section": labelled((parameter, "iterate", "state"), points, "section points"),
             "section_error": ("state", error),
-            "period_number": labelled(
-                parameter, np.array(numbers, dtype=np.int64), "period number (0: none found, -1: too few turns)"
-            ),
+            "period_number": labelled(parameter, np.array(numbers, dtype=np.int64), _NUMBER),
         },
         {
             parameter: labelled(parameter, np.asarray(values, dtype=float)[order], parameter, unit),
             "state": first["state"].values,
             "state_unit": ("state", first["state_unit"].values),
         },
-        attrs,
+        _attributes(motions),
     )

@@ -234,9 +234,9 @@ def _notes(grown: Grown, found: Sandwich, data: xr.Dataset) -> list[str]:
     if n == records:
         notes = [f"one window for each of {records} records" if records > 1 else "one window over the whole record"]
     else:
-        length = float(np.median([window.time[-1] - window.time[0] for window in problem.pieces]))
         notes = [
-            f"{n} windows of about {length:.4g}, each with its own start: over longer ones the motion is not followed"
+            f"{n} windows of about {_length(grown):.4g}, each with its own start: over longer ones the motion is not "
+            "followed"
         ]
     for c in range(len(problem.sensors)):
         notes += _of_readings(grown, c, data)
@@ -255,6 +255,10 @@ def _notes(grown: Grown, found: Sandwich, data: xr.Dataset) -> list[str]:
             "rms of the residuals, over all: 1; " + "; ".join(f"{name}: {rms:.2f}" for name, rms, _ in places[:4])
         )
     return notes
+
+
+def _length(grown: Grown) -> float:
+    return float(np.median([window.time[-1] - window.time[0] for window in grown.problem.pieces]))
 
 
 def _of_readings(grown: Grown, c: int, data: xr.Dataset) -> list[str]:
@@ -316,10 +320,9 @@ def _anomalies(grown: Grown, data: xr.Dataset | None) -> list[str]:
             "there (it begins beyond a stop, or does not come to an end)"
         )
     if grown.stuck:
-        length = float(np.median([window.time[-1] - window.time[0] for window in grown.problem.pieces]))
         found.append(
-            f"the model follows this record over windows of {length:.3g} only, though neighbouring motions do not "
-            "separate faster: it does not describe the record over longer times, or another first guess does"
+            f"the model follows this record over windows of {_length(grown):.3g} only, though neighbouring motions do "
+            "not separate faster: it does not describe the record over longer times, or another first guess does"
         )
     if grown.short > SHORT:
         found.append(
