@@ -80,3 +80,16 @@ def test_a_set_without_one_says_how_to_get_it() -> None:
     found = ns.fit(line(), {"x": (T, y + 1e-3 * np.sin(50 * T))}, ["a"], progress=False)
     with pytest.raises(ValueError, match=r"ns\.fit\(\.\.\., posterior=2000\)"):
         found.posterior  # noqa: B018
+
+
+def test_an_unknown_that_a_start_makes_up_for_is_not_sampled() -> None:
+    """Of a free linear decay a gain and the size of the start are one factor: only their product shows."""
+    w = np.sqrt(9.0 - 0.1**2)
+    t = np.linspace(0.0, 10.0, 301)
+    y = 2.0 * np.exp(-0.1 * t) * np.cos(w * t) + 1e-3 * np.random.default_rng(2).standard_normal(t.size)
+    system = ns.mechanical(1.0, "c", "k", parameters={"c": 0.2, "k": 9.0}, coordinates=["q"])
+    with pytest.raises(ns.SolveError, match=r"do not determine q\.gain: give a prior or a value"):
+        ns.fit(system, {"q": (t, y)}, ["k", "c", "q.gain"], posterior=30, progress=False)
+    known = {"q.gain": (1.0, 0.05)}
+    found = ns.fit(system, {"q": (t, y)}, ["k", "c", "q.gain"], posterior=30, priors=known, progress=False)
+    assert np.isfinite(found.posterior.values).all()

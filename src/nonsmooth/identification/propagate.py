@@ -207,14 +207,14 @@ DIFFERENCE = 0.1  # of a standard uncertainty, to either side
 
 def _sources(found: Any, settings: Mapping[str, Setting], system: System) -> tuple[list[tuple[str, float]], FloatArray]:
     """Uncertain parameters with their standard uncertainties, and their covariance."""
+    from scipy.linalg import block_diag
+
     covariance = getattr(found, "covariance", None)
     names = [] if covariance is None else [str(n) for n in covariance[covariance.dims[0]].values]
     held = [i for i, n in enumerate(names) if n in found and n in system.values and n not in settings]
     joint = np.zeros((0, 0)) if covariance is None else np.asarray(covariance.values, float)[np.ix_(held, held)]
     own = [(n, one.uncertainty) for n, one in settings.items() if one.uncertainty > 0 and not one.follows]
-    matrix = np.zeros((len(held) + len(own), len(held) + len(own)))
-    matrix[: len(held), : len(held)] = joint
-    matrix[range(len(held), len(matrix)), range(len(held), len(matrix))] = [error**2 for _, error in own]
+    matrix = block_diag(joint, np.diag([error**2 for _, error in own]))
     return [(names[i], float(np.sqrt(joint[k, k]))) for k, i in enumerate(held)] + own, matrix
 
 

@@ -187,11 +187,10 @@ class ResponseFit:
 
 def _all_or_none(curves: Sequence[Any], name: str) -> bool:
     """Return whether all curves have it."""
-    having = [c.name for c in curves if getattr(c, name) is not None]
-    if having and len(having) < len(curves):
-        lacking = [c.name for c in curves if c.name not in having]
+    lacking = [c.name for c in curves if getattr(c, name) is None]
+    if 0 < len(lacking) < len(curves):
         raise ValueError(f"some curves have a {name} and {', '.join(map(repr, lacking))} have none; fit them apart")
-    return bool(having)
+    return len(lacking) < len(curves)
 
 
 def _knots(knots: int | ArrayLike, size: FloatArray) -> FloatArray:

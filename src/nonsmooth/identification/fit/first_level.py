@@ -138,11 +138,8 @@ def other_beginnings(
 
 def _stays(problem: Windows, theta: FloatArray, window: Window, starts: list[FloatArray]) -> bool:
     """Return whether a motion may begin in the mode of this window: no condition ends it at once."""
-    for start in starts:
-        motion = problem.motion(theta, window, start)
-        if motion is not None and int(motion.log.sample_mode[0]) == window.mode:
-            return True
-    return False
+    begun = (problem.motion(theta, window, start) for start in starts)
+    return any(motion is not None and int(motion.log.sample_mode[0]) == window.mode for motion in begun)
 
 
 _ROUNDS = 10

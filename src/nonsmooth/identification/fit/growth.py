@@ -15,7 +15,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.arrow import Residuals, Unsettled, settle
+from nonsmooth.identification.arrow import Residuals, Unsettled, inverted, reduced, settle
 from nonsmooth.identification.fit.first_level import BETTER, level, other_beginnings, rechosen, settle_first
 from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
@@ -87,6 +87,11 @@ class Grown:
     def whole(self) -> bool:
         """Return whether one window holds each record."""
         return len(self.problem.pieces) == len(self.problem.records)
+
+    def loose(self, state: Residuals) -> FloatArray:
+        """Directions of the unknowns that readings and priors leave open; the starts' own wide prior tells nothing."""
+        read, *_ = reduced(self.problem, state, self.problem.weights(state, starts=False), len(self.theta))
+        return inverted(read + self.problem.unknowns.precision)[1]
 
     @property
     def rank(self) -> tuple[bool, bool, bool, float]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.arrow import Sandwich, inverted, reduced, sandwich
+from nonsmooth.identification.arrow import Sandwich, sandwich
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.first_level import BETTER
 from nonsmooth.identification.fit.growth import SHORT, Grown
@@ -47,8 +47,7 @@ def outcome(
     problem, theta = grown.problem, grown.theta
     u = problem.unknowns
     found = sandwich(problem, theta, grown.starts)
-    read, *_ = reduced(problem, found.state, problem.weights(found.state, starts=False), len(theta))
-    loose = _undetermined(inverted(read + u.precision)[1])
+    loose = _undetermined(grown.loose(found.state))
     starts = _starts(grown, found)
     noise = _noise(grown, found)
     jacobian = np.vstack([np.eye(len(theta)), starts.jacobian])

@@ -98,10 +98,10 @@ def _drawn(
     problem, u, p = grown.problem, grown.problem.unknowns, len(grown.theta)
     state = problem.derivatives(grown.theta, grown.starts)
     normal, _, back = reduced(problem, state, weights, p)
-    covariance, loose = inverted(normal + u.precision)
-    if loose.size:
-        names = [u.names[i] for i in np.flatnonzero(np.abs(loose).max(axis=1) > 1e-3)]
-        raise SolveError(f"the records do not determine {', '.join(names)}: give a prior or a value, then sample")
+    covariance = inverted(normal + u.precision)[0]
+    if (loose := grown.loose(state)).size:
+        names = ", ".join(u.names[i] for i in np.flatnonzero(np.abs(loose).max(axis=1) > 1e-3))
+        raise SolveError(f"the records do not determine {names}: give a prior or a value, then sample")
     scale = np.sqrt(np.diag(covariance))
     steps = rng.multivariate_normal(np.zeros(p), covariance / np.outer(scale, scale), count, method="eigh") * scale
     found = np.empty((count, p + len(at)))
