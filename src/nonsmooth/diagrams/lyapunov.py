@@ -217,9 +217,8 @@ def _along(
 
         state = kept.copy()
         one = failed_spectrum(len(first.u), 0.0, codes.BEYOND_STOP) if fresh and beyond[i] else run(state)
-        if (
-            one.status == codes.BEYOND_STOP and carry and not fresh
-        ):  # a stop has moved past it: begin anew, as in a sweep
+        if one.status == codes.BEYOND_STOP and carry and not fresh:
+            # a stop has moved past it: it begins anew, as in a sweep
             kept, state = first.copy(), first.copy()
             one = run(state)
         found[int(i)] = one

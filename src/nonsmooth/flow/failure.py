@@ -67,7 +67,8 @@ def _beyond(
 ) -> tuple[BoolArray, FloatArray]:
     """Marks of starts that lie beyond each rigid stop by more than ``least`` of its scale, and the gaps."""
     memory = np.tile(system.memory_vector(), (len(starts), 1))
-    gaps = meter.values(points, np.broadcast_to(time, len(starts)), starts, memory)[0]
+    with np.errstate(all="ignore"):  # beyond a stop the equations need have no values
+        gaps = meter.values(points, np.broadcast_to(time, len(starts)), starts, memory)[0]
     sizes = np.array([system.scale_vector()[some].max(initial=0.0) for some in meter.places])
     return gaps < -least * sizes, gaps
 

@@ -172,13 +172,6 @@ def jet_functions(jet: JetCode, kind: str, arguments: str, after: Sequence[str] 
     ]
 
 
-def by_case(branches: Sequence[list[str]], entry: str = "case") -> tuple[dict[str, list[int]], list[str]]:
-    """A table for ``function_of``, and lines that do one of some branches; those with the same text stand once."""
-    different = list(dict.fromkeys(map(tuple, branches)))
-    cases = [different.index(tuple(branch)) for branch in branches]
-    return {entry: cases}, chain([(f"{entry} == {i}", list(branch)) for i, branch in enumerate(different)])
-
-
 def unpacked(lines: Iterable[str]) -> list[str]:
     """Lines that give the parameters and the memory used in ``lines`` their names."""
     used = {int(number) for number in re.findall(r"\bq(\d+)\b", "\n".join(lines))}

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from nonsmooth.system.codegen.generate import (
     MOST_MODELS,
     SIGNATURES,
-    by_case,
     choosing_code,
     constants_of,
     fields_of,
@@ -30,7 +29,7 @@ from nonsmooth.system.codegen.generate import (
     scalar_code,
     unpacked,
 )
-from nonsmooth.system.codegen.jet import jet_code
+from nonsmooth.system.codegen.jet import chain, jet_code
 from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 ZERO, CONSTANT, VARYING = 0, 1, 2
@@ -84,7 +83,9 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
     jet = jet_code(
         traced.t, traced.u, constants_of(traced), traced.fields, [[jac[i][j] for i, j in entries] for jac in jacobians]
     )
-    changes, small = by_case([_small_changes(entries, kind, n, len(wanted)) for kind in kinds], "change")
+    small = [tuple(_small_changes(entries, kind, n, len(wanted))) for kind in kinds]
+    different = list(dict.fromkeys(small))
+    choice = chain([(f"change == {i}", [*lines]) for i, lines in enumerate(different)])
     field, field_lines, used = choosing_code(traced, fields_of(traced))
     switch, switch_lines, used_by_switch = choosing_code(
         traced, [_switch(traced, jump, wanted) for jump in traced.transitions]
@@ -95,7 +96,9 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
         "from nonsmooth.kernels.compile.cache import callback, device",
         "from nonsmooth.kernels.compile.lanes import load, plus, store, times",
         f"from math import {', '.join(sorted(functions))}" if functions else "",
-        *jet_functions(jet, _kind(_JET), "mode, order, t, u, q, C, W, D", small, **changes),
+        *jet_functions(
+            jet, _kind(_JET), "mode, order, t, u, q, C, W, D", choice, change=list(map(different.index, small))
+        ),
         function_of("field", _kind(SIGNATURES["field"]), "mode, t, u, q, du", field, field_lines),
         function_of("switch", _kind(_SWITCH), "transition, t, u, q, out", switch, switch_lines),
     ]

@@ -156,7 +156,7 @@ def mechanical(
     energy = next((one for one in energies if one is not None), None)
     loads = d.loads or Loads((), {"all": d.traced.fields[0]})
     positive = [(mass[i, i], f"the mass of coordinate {key!r} must be positive") for i, key in enumerate(names)]
-    positive += [(mass[:i, :i].det(), "the mass matrix must be positive definite") for i in range(size + 1)]
+    positive += [(one, "the mass matrix must be positive definite") for one in _pivots(mass)]
     positive = [one for one in positive if one[0].free_symbols]
     new = d.with_loads(replace(loads, powers=powers, energy=write_unit(energy)))
     if positive:
@@ -249,6 +249,17 @@ def _inverse(mass: sp.Matrix, system: str) -> sp.Matrix:
         return mass.inv()
     except (ValueError, sp.matrices.exceptions.NonInvertibleMatrixError) as error:
         raise SystemDefinitionError(f"{system!r}: the mass matrix cannot be inverted: {error}") from error
+
+
+def _pivots(mass: sp.Matrix) -> list[sp.Expr]:
+    """What elimination leaves on the diagonal, positive where the matrix is positive definite; not the diagonal's own."""
+    left, n = mass.as_mutable(), mass.rows
+    for i in range(n):
+        below = [j for j in range(i + 1, n) if left[j, i] != 0]
+        for j in below:
+            for k in below:
+                left[j, k] -= left[j, i] * left[i, k] / left[i, i]
+    return [left[i, i] for i in range(n) if left[i, i] != mass[i, i]]
 
 
 def _between(names: list[str]) -> str:
