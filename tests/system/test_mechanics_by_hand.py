@@ -193,3 +193,19 @@ def test_one_breaks_away_and_how_its_friction_grows_decides_about_the_other(side
     impulse = t - growth * t**2 / 2
     exact = [impulse / 2, 0.0] if growth > 0 else np.linalg.solve([[2.0, 1.0], [1.0, 2.0]], [impulse, 0.5 * t])
     np.testing.assert_allclose(speeds, side * np.asarray(exact), atol=1e-13)
+
+
+def test_masses_of_a_chain_are_positive_definite_up_to_the_known_coupling() -> None:
+    """M = m I + d (each with its neighbours), n = 20: its least eigenvalue is m - 2 |d| cos(pi / (n + 1))."""
+    n = 20
+
+    def masses(p: Any) -> Any:
+        near = {0: p.m, 1: p.d}
+        return [[near.get(abs(i - j), 0.0) for j in range(n)] for i in range(n)]
+
+    system = ns.mechanical(masses, np.eye(n), np.eye(n), parameters={"m": 2.0, "d": 0.1})
+    edge = 1.0 / np.cos(np.pi / (n + 1))
+    for sign in (1.0, -1.0):
+        assert system.with_parameters(d=sign * 0.9999 * edge)
+        with pytest.raises(ValueError, match="the mass matrix must be positive definite"):
+            system.with_parameters(d=sign * 1.0001 * edge)

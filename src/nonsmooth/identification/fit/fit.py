@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 _PHASES = 8  # first guesses of an unknown phase
 _LONGER = 3.3  # the other length of first windows, in every second try
-_PART = 0.05  # of the largest reading: the noise at first, where readings show none
 _LOSSES = {"linear": np.inf, "huber": 2.5}  # noise deviations from which on a residual counts linearly
 _MORE = 3  # guesses that are looked at, for each that is fitted
 _KNOWN, _ROUGH = 4.0, 0.25  # mean squared residual of a fit near the steady states: over known noise, and over a guess
@@ -206,6 +205,7 @@ def problem_of(
     from nonsmooth.identification.fit.first_level import read_modes
     from nonsmooth.identification.fit.motion import Marcher
     from nonsmooth.identification.fit.records import irregularity, read_records
+    from nonsmooth.identification.fit.steady import ROUGHLY
     from nonsmooth.identification.fit.unknowns import read_unknowns
     from nonsmooth.identification.fit.windows import Windows
 
@@ -230,7 +230,7 @@ def problem_of(
             max(noise(readings), sensor.floor)
             or noise(readings, moving=True)
             or sensor.noise  # of a few readings, which show none
-            or max(_PART * float(np.nanmax(np.abs(np.concatenate(readings)), initial=0.0)), 1e-300)
+            or max(ROUGHLY * float(np.nanmax(np.abs(np.concatenate(readings)), initial=0.0)), 1e-300)
             if readings
             else np.inf
             for readings, sensor in zip(within, sensors.values(), strict=True)

@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 KEPT, LONGEST = 33, 16  # section points looked at, and the longest period number looked for
 TRANSIENT = 300
 ROUNDING = 1e-13  # of the largest reading: none has less noise
+ROUGHLY = 0.05  # of the largest reading: the noise at first, where none is known
 _FINE = 256  # instants of a period among which an extreme is looked for
 _BESIDE = 1e-6  # of a period: on either side of an extreme
 _COLUMNS = ("amplitude", "section", "amplitude_error", "section_error", "period_number")
-_FIRST = 0.05  # of the largest reading: the noise at first, where none is known
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +167,7 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
         raise ValueError(f"run {name!r}: {kind}_error has the negative number {np.nanmin(error):g}; NaN: not known")
     error = np.where(error > 0.0, error, np.nan)
     values, setting = np.unique(np.array(runs), axis=0, return_inverse=True)
-    first = max(_FIRST * float(np.max(np.abs(y))), 1e-300)
+    first = max(ROUGHLY * float(np.max(np.abs(y))), 1e-300)
     return SteadyReadings(
         name,
         tuple(wanted),

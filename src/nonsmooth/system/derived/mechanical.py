@@ -252,7 +252,8 @@ def _inverse(mass: sp.Matrix, system: str) -> sp.Matrix:
 
 
 def _pivots(mass: sp.Matrix) -> list[sp.Expr]:
-    """What elimination leaves on the diagonal, positive where the matrix is positive definite; not the diagonal's own."""
+    """Pivots other than the diagonal's own: positive where the matrix is positive definite. Minors of a chain would be
+    written out with exponentially many terms."""
     left, n = mass.as_mutable(), mass.rows
     for i in range(n):
         below = [j for j in range(i + 1, n) if left[j, i] != 0]
