@@ -65,15 +65,17 @@ def _array(data: bytes, name: str, source: Source) -> Any:
 
 
 def _arrow(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+    # In this thread and from its own memory: of a damaged file Arrow's threads may go on when the error has been raised.
     pyarrow = needed("pyarrow", "pyarrow", source)
+    held = pyarrow.BufferReader(data)
     if data.startswith(b"PAR1"):
-        opened = needed("pyarrow.parquet", "pyarrow", source).ParquetFile(io.BytesIO(data))
+        opened = needed("pyarrow.parquet", "pyarrow", source).ParquetFile(held)
         shape = (opened.metadata.num_rows, opened.metadata.num_columns)
         if math.prod(shape) * 8 > inflation_limit(len(data)) or shape[1] > MAX_COLUMNS:
             raise source.error("", f"says it holds {shape[0]} rows of {shape[1]} columns, more than it warrants")
-        table = opened.read()
+        table = opened.read(use_threads=False)
     else:
-        table = pyarrow.ipc.open_file(io.BytesIO(data)).read_all()
+        table = pyarrow.ipc.open_file(held, options=pyarrow.ipc.IpcReadOptions(use_threads=False)).read_all()
     units = {}
     for field in table.schema:
         said = {key.decode().lower(): value.decode() for key, value in (field.metadata or {}).items()}
