@@ -65,7 +65,7 @@ def _array(data: bytes, name: str, source: Source) -> Any:
 
 
 def _arrow(data: bytes, source: Source, remarks: Remarks) -> Loaded:
-    # In this thread and from its own memory: of a damaged file Arrow's threads may go on when the error has been raised.
+    # In this thread and from its own memory: else threads may go on behind the error of a damaged file.
     pyarrow = needed("pyarrow", "pyarrow", source)
     held = pyarrow.BufferReader(data)
     if data.startswith(b"PAR1"):
