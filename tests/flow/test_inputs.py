@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -155,31 +154,91 @@ def test_steps_of_two_inputs_that_bring_a_reset_about_are_warned_of() -> None:
         ns.sensitivity(rig, duration=2.0, start={"v": 1.0}, parameters=["late"], inputs=inputs)
 
 
-@pytest.mark.parametrize(
-    ("element", "between", "told"),
-    [
-        (ns.elements.Stop(gap=lambda t, u, p: u.x - p.y, on={"v": 1.0}), "linear", True),
-        (ns.elements.Stop(gap=lambda t, u, p: u.x - p.y, on={"v": 1.0}), "steps", True),
-        (ns.elements.Coulomb(speed=lambda t, u, p: u.v - p.y, friction=0.5, on={"v": 1.0}), "steps", True),
-        (ns.elements.Coulomb(speed=lambda t, u, p: u.v - p.y, friction=0.5, on={"v": 1.0}), "linear", False),
-        (ns.elements.ElasticStop(gap=lambda t, u, p: u.x - p.y, stiffness=9.0, on={"v": 1.0}), "steps", False),
-        (ns.elements.Stop(gap=lambda t, u, p: u.x, on={"v": 1.0}), "steps", False),
-    ],
-)
-def test_jumps_of_what_an_element_holds_are_warned_of(element: Any, between: Any, told: bool) -> None:
-    system = ns.System(
-        states=["x", "v"],
-        parameters={},
+def on_a_plate(kind: str, e: float) -> ns.System:
+    """A mass under its weight 1 on a plate at y(t): alone, asked with a friction of zero, or with a law not linear."""
+    elements: dict[str, Any] = {"plate": ns.elements.Stop(at="q", side=-1, position=lambda t, u, p: p.y, restitution=e)}
+    if kind == "asked":
+        elements["rail"] = ns.elements.Coulomb(at="q", friction=0.0)
+    if kind == "nonlinear":
+        elements["far"] = ns.elements.ElasticStop(at="q", position=9.0, stiffness=lambda t, u, p: 1 + u.q**2)
+    return ns.mechanical(1.0, 0.0, 0.0, forcing={"q": -1.0}, inputs={"y": ""}, elements=elements)
+
+
+def flight(times: np.ndarray, places: np.ndarray, e: float, q: float, v: float, until: float) -> tuple[float, float]:
+    """Place and speed at the end, parabola by parabola; the mass strikes or leaves where the plate's speed jumps."""
+    t, rests, slow = 0.0, False, 1e-7
+    speeds = np.append(np.diff(places) / np.diff(times), 0.0)
+    for piece, end in enumerate([*times[1:], until]):
+        r = speeds[piece]
+        w = v - r
+        if rests and w > slow:
+            rests = False
+        elif rests:
+            v, rests = (r, True) if -w < slow or e == 0.0 else (r - e * w, False)
+        while t < end:
+            here = places[piece] + r * (t - times[piece])
+            if rests:
+                t, q, v = end, here + r * (end - t), r
+                break
+            w = v - r
+            fall = w + np.sqrt(max(w * w + 2 * max(q - here, 0.0), 0.0))
+            if t + fall >= end:
+                q, v, t = q + v * (end - t) - (end - t) ** 2 / 2, v - (end - t), end
+                break
+            t, q, v = t + fall, here + r * fall, v - fall
+            w = v - r
+            v, rests = (r, True) if -w < slow else (r - e * w, False)
+    return q, v
+
+
+@pytest.mark.parametrize("kind", ["alone", "asked", "nonlinear"])
+def test_a_mass_on_a_plate_whose_speed_jumps_strikes_it_or_leaves_it(kind: str) -> None:
+    seen = set()
+    for e in (0.0, 0.3, 0.6):
+        system = on_a_plate(kind, e)
+        for seed in range(6):
+            rng = np.random.default_rng(seed)
+            times = np.append(0.0, np.cumsum(rng.uniform(0.3, 1.2, 6)))
+            places = rng.uniform(-0.5, 0.5, 7)
+            q, v, until = places[0] + rng.uniform(0, 0.3), rng.uniform(-0.5, 0.5), float(times[-1]) + 0.5
+            run = ns.simulate(system, duration=until, start={"q": q, "v_q": v}, inputs={"y": (times, places)})
+            np.testing.assert_allclose(run.u.values[-1, :2], flight(times, places, e, q, v, until), atol=1e-11)
+            seen |= {"rest" in str(system.modes[int(m)]) for m in run.mode.values}
+    assert seen == {True, False}
+
+
+def test_derivatives_through_an_impact_that_a_jump_of_speed_begins() -> None:
+    """At rest on a plate until t = 1 + late, which then moves up with .5: the mass is thrown up with (1 + e) .5."""
+    system = ns.mechanical(
+        1.0,
+        0.0,
+        0.0,
+        forcing={"q": -1.0},
+        parameters={"e": 0.5, "late": 0.1},
         inputs={"y": ""},
-        modes={"all": lambda t, u, p: [u.v, -u.v - 1.0 + 0.0 * p.y]},
-        elements={"one": element},
+        elements={"plate": ns.elements.Stop(at="q", side=-1, position=lambda t, u, p: p.y, restitution="e")},
     )
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        ns.simulate(
-            system, duration=1.0, start={"x": 0.5}, inputs={"y": ns.Input([0, 0.5, 2], [0, 0.1, 0], between=between)}
-        )
-    assert told == any("'one' moves with the input 'y'" in str(one.message) for one in said)
+    plate = {"y": ns.Input([0, 1, 3], [0.0, 0.0, 1.0], delay="late")}
+    found = ns.sensitivity(system, duration=1.3, parameters=["e", "late"], inputs=plate)
+    left = 1.3 - 1.1
+    np.testing.assert_allclose(found.end[:2], [0.75 * left - left**2 / 2, 0.75 - left], atol=1e-13)
+    np.testing.assert_allclose(found.P.sel(parameter="e")[:2], [0.5 * left, 0.5], atol=1e-12)
+    np.testing.assert_allclose(found.P.sel(parameter="late")[:2], [-0.75 + left, 1.0], atol=1e-12)
+
+
+def test_a_belt_whose_speed_jumps_past_that_of_the_block_turns_the_friction_at_once() -> None:
+    """v falls by .5 t; the belt runs at 2 until t = 1 and then at -2: friction acts the other way at v = .5."""
+    belt = ns.elements.Coulomb(at="q", friction=0.5, belt=lambda t, u, p: p.y)
+    rig = ns.mechanical(1.0, 0.0, 0.0, inputs={"y": ""}, elements={"belt": belt})
+    steps = {"y": ns.Input([0, 1], [2.0, -2.0], between="steps")}
+    run = ns.simulate(rig, duration=2.5, samples=[1.0, 2.5], inputs=steps)
+    np.testing.assert_allclose(run.u.values[-1, :2], [0.25 + 0.75 - 0.25 * 1.5**2, 0.5 - 0.75], atol=1e-13)
+
+
+def test_a_stop_that_would_jump_into_a_mass_is_refused() -> None:
+    steps = {"y": ns.Input([0, 0.5], [0, 0.1], between="steps")}
+    with pytest.raises(ValueError, match=r"moves the stop 'plate' and is held between its samples"):
+        ns.simulate(on_a_plate("alone", 0.5), duration=1.0, start={"q": 0.5}, inputs=steps)
 
 
 def test_a_mass_pressed_on_a_stop_lifts_where_the_load_turns() -> None:

@@ -143,6 +143,22 @@ def test_a_delay_and_a_gain_are_found_beside_a_sensor_that_is_known():
     assert found.estimate("v.delay").value == pytest.approx(0.031, abs=0.002)
 
 
+def test_a_sensor_alone_is_found_of_a_system_without_parameters():
+    """q = cos 2t of q'' = -4 q, which has no parameter at all."""
+    rng, t = np.random.default_rng(3), np.linspace(0, 12, 400)
+    readings = 2.5 * np.cos(2 * t) + 0.1 + 0.01 * rng.standard_normal(len(t))
+    found = ns.fit(
+        ns.mechanical(1.0, 0.0, 4.0, parameters={}),
+        {"time": t, "encoder": readings},
+        ["q.gain", "q.offset"],
+        start={"q": 1.0, "v_q": 0.0},
+        free_start=False,
+        measured={"q": "encoder"},
+    )
+    assert np.all(np.abs(normalized(found, {"q.gain": 2.5, "q.offset": 0.1})) < 3.5)
+    assert found.estimate("q.gain").uncertainty == pytest.approx(0.01 * np.sqrt(2 / 400), rel=0.2)
+
+
 def test_missing_samples_and_clocks_of_their_own():
     rng, t = np.random.default_rng(2), np.arange(0, 15, 0.02)
     x = closed_form(t) + 1e-4 * rng.standard_normal(len(t))

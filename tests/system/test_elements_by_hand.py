@@ -123,3 +123,17 @@ def test_an_impact_turns_the_speed_round_by_the_restitution(side: int, e: float)
     for wrong in (1.1, -0.1):
         with pytest.raises(ValueError, match="restitution of element 's' lies between 0 and 1"):
             by_name.with_parameters(e=wrong)
+
+
+def test_a_block_leaves_a_belt_whose_speed_grows() -> None:
+    """It sticks until k (c t + d t^2 / 2) + d = mu, then slips back; what its slip is computed from is not small."""
+    belt = ns.elements.Coulomb(at="q", friction="mu", belt=lambda t, u, p: p.c + p.d * t)
+    rig = ns.mechanical(1.0, 0.0, "k", parameters={"k": 1.0, "mu": 0.5, "c": 1.0, "d": 0.1}, elements={"belt": belt})
+    for seed in range(40):
+        k, mu, c, d = np.random.default_rng(seed).uniform([0.5, 0.4, 0.2, 0.01], [3.0, 1.0, 1.0, 0.3])
+        leaves = (np.sqrt(c**2 + 2 * d * (mu - d) / k) - c) / d
+        run = ns.simulate(rig.with_parameters(k=k, mu=mu, c=c, d=d), duration=leaves + 0.5, start={"v_q": c})
+        w, off, speed = np.sqrt(k), -d / k, c + d * leaves  # of the place where the friction holds the spring
+        np.testing.assert_allclose(run.crossing_time.values, [leaves], atol=1e-13)
+        place = mu / k + off * np.cos(0.5 * w) + speed / w * np.sin(0.5 * w)
+        np.testing.assert_allclose(run.u.values[-1, 0], place, atol=1e-12)

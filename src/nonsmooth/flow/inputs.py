@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -15,7 +14,6 @@ from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.engines.engine import Changes
 from nonsmooth.flow.saltation import Jump
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.inputs import RATE
 
 if TYPE_CHECKING:
     from nonsmooth.flow.variational import VariationalFlow
@@ -267,23 +265,18 @@ def driven(system: System, given: Any) -> Driven | None:
                 f"the delay of {name!r}: {unknown(one.delay, 'a parameter', repr(system.name), system.values)}"
             )
         found[name] = one
-    _warn_of_jumps(system, found)
+    _refuse_jumps(system, found)
     return Driven(system, found)
 
 
-def _warn_of_jumps(system: System, inputs: Mapping[str, Input]) -> None:
-    """Warn of elements that may be held while what they hold jumps with an input: nothing is struck by that."""
-    traced, loads = system._description.traced, system._description.loads
-    of = dict(zip(traced.state_names, traced.u, strict=True))
+def _refuse_jumps(system: System, inputs: Mapping[str, Input]) -> None:
+    """Raise where the place of a rigid stop jumps: no motion goes on from beyond it."""
+    loads, description = system._description.loads, system._description
+    of = dict(zip(description.traced.state_names, description.traced.u, strict=True))
     for name, one in inputs.items():
-        jumping = {of[name + RATE], *([of[name]] if one.between == "steps" else [])}
-        for load in loads.elements if loads is not None else ():
-            held = load.where.free_symbols | getattr(load.rate, "free_symbols", set())
-            if load.element.held and jumping & held:
-                warnings.warn(
-                    f"element {load.name!r} moves with the input {name!r}, whose course has jumps in what the element "
-                    "holds: impacts and slips that begin by such a jump while it is held are left out. Write the "
-                    f"{load.element.kinematics} as a function of time where these matter",
-                    RuntimeWarning,
-                    stacklevel=5,
+        for load in loads.elements if loads is not None and one.between == "steps" else ():
+            if load.element.bears and of[name] in load.where.free_symbols:
+                raise ValueError(
+                    f"inputs[{name!r}] moves the stop {load.name!r} and is held between its samples: the stop would "
+                    'jump into the mass. Give it as linear between them, ns.Input(..., between="linear")'
                 )

@@ -178,7 +178,7 @@ def steps_between(
             found = flow.jump(values, chain, times[i], before[i])
         elif chain[1:]:
             assert course is not None
-            then, here = flow.jump(values, chain[1:], times[i], before[i]), slice(i, i + 1)
+            then, here = flow.jump(values, chain[1:], times[i], before[i], at_change=True), slice(i, i + 1)
             longer = lasting[np.count_nonzero(change[:i])]
             if course.moved(flow, times[here])[1].any():
                 warnings.warn(

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.flow.saltation import Jump, Touch, of_one_instant
+from nonsmooth.flow.saltation import Jump, Touch, chained, of_one_instant
 from nonsmooth.kernels.tangent.segments import Segments
 from nonsmooth.system.phases import phase_slopes, varying_phases
 
@@ -160,10 +160,13 @@ class VariationalFlow:
         march_legs(self.equations, modes, _floats(t0), _floats(tau), _floats(z0), values, out, work)
         return out
 
-    def jump(self, values: Any, k: int | Sequence[int], t: float, z: Any, row: int = -1) -> Jump:
+    def jump(
+        self, values: Any, k: int | Sequence[int], t: float, z: Any, row: int = -1, at_change: bool = False
+    ) -> Jump:
         """Transition ``k`` at (t, z), or several that are taken there one after the other.
 
-        ``row`` is the row of the (first) condition that is zero there, -1: the nearest to it. For a transition at a
+        ``row`` is the row of the (first) condition that is zero there, -1: the nearest to it; ``at_change``: a change
+        of inputs brings all of them about. For a transition at a
         given phase t must be the time since the orbit's beginning: dt/dp = (t / T) dT/dp + T d(at)/dp.
         """
         from nonsmooth.kernels.tangent.legs import Crossing, cross
@@ -172,7 +175,7 @@ class VariationalFlow:
             jumps: list[Jump] = []
             for one in k:
                 jumps.append(self.jump(values, one, t, jumps[-1].z_after if jumps else z, -1 if jumps else row))
-            return of_one_instant(jumps, self.scale)
+            return chained(jumps) if at_change else of_one_instant(jumps, self.scale)
 
         n, a = self.n, self.n_active
         values, timing = _floats(values), self._no_timing

@@ -64,7 +64,7 @@ class Marcher:
         self.flow = VariationalFlow.of(system, active)
         engine = engine_for(system)
         self.engine: Engine = engine if engine.name == "exact" else engine_for(system, rtol=RTOL)
-        self._tables: tuple[bytes, Any] = b"", None
+        self._tables: tuple[bytes | None, Any] = None, None
 
     def run(
         self,

@@ -6,21 +6,23 @@ A transition fires where the least of its rows rises through zero. The sign of a
 step (``side``: -1, 1, or 0 where nothing was established), so that no change falls between two steps.
 """
 
-from math import fabs, sqrt
+from math import fabs, inf, sqrt
 
 from nonsmooth.kernels.compile.cache import device, inline
 from nonsmooth.kernels.series.polynomial import NONE, UP, bounds, dense, first_crossing, load, row_bounds, shift, strip
 
 NOISE = 3.6e-15  # 16 roundings: an indicator this small against its own scale is zero
+OFF = 1e-7  # of the time and the states, to see of what size the terms of an indicator are
 
 
 @device
-def snap(C, m, n, n_indicators, h, scale, measured, side):
+def snap(C, m, n, n_indicators, h, scale, measured, near, side):
     """After-limits: set what is zero within rounding to zero in the jets of the indicators, and find their signs.
 
     ``side`` becomes the sign of the first coefficient that does not vanish (0: the indicator vanishes identically).
     ``measured`` is the size of indicators known to be zero here: their rounding error, seen. Others share its relative
-    size: where a stick ends, the speed begins with a slope that is the indicator that ended it.
+    size: where a stick ends, the speed begins with a slope that is the indicator that ended it. ``near`` are the first
+    coefficients with all that they are computed from off by about ``OFF``, which shows the size of their terms.
     """
     seen = 0.0
     for i in range(n_indicators):
@@ -29,6 +31,9 @@ def snap(C, m, n, n_indicators, h, scale, measured, side):
     for i in range(n_indicators):
         noise = max(NOISE * scale[i], 4.0 * measured[i], 16.0 * min(seen, 1e-12) * scale[i])
         sign, power = 0, 1.0
+        for k in range(3):
+            terms = fabs(near[n + i, k] - C[n + i, k]) * h**k / OFF
+            noise = max(noise, NOISE * terms) if terms < inf else noise
         for k in range(m + 1):
             c = C[n + i, k]
             if fabs(c) * power > noise:

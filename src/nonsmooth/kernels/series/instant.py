@@ -5,7 +5,7 @@ from math import fabs, inf
 import nonsmooth.kernels.series.places as place
 from nonsmooth.kernels.compile.cache import device, inline, once
 from nonsmooth.kernels.hybrid.places import MODE, TIME
-from nonsmooth.kernels.series.crossing import NOISE, rows_hold, snap
+from nonsmooth.kernels.series.crossing import NOISE, OFF, rows_hold, snap
 from nonsmooth.kernels.series.generated import jet_of, jump_of, values_of
 from nonsmooth.kernels.series.rkf45 import first_step
 from nonsmooth.kernels.series.step import jets_of, log_tolerance
@@ -42,6 +42,9 @@ def look(i, form, tables, work, mode):
     X = jets_of(form, work)
     m = 4 if form.method == place.RKF45 else form.order
     jet = jet_of(form)
+    for j in range(n):  # no two by the same, so that no terms stay equal
+        work.end[j] = u[j] * (1.0 + OFF * (1.0 + j / n) * (1 - 2 * (j % 2)))
+    jet(mode, 2, t * (1.0 + 0.7 * OFF), work.end, q, work.J1, work.W)
     jet(mode, m, t, u, q, X, work.W)
     h = work.usual[mode]
     if form.step > 0.0:
@@ -56,7 +59,7 @@ def look(i, form, tables, work, mode):
     for j in range(n_indicators):
         if scale[j] == 0.0:  # the slope of a speed is mere rounding where a stick ends
             scale[j] = max(fabs(X[n + j, 0]), fabs(X[n + j, 1]) * h, fabs(X[n + j, 2]) * h * h)
-    snap(X, m, n, n_indicators, h, scale, work.measured, work.side)
+    snap(X, m, n, n_indicators, h, scale, work.measured, work.J1, work.side)
     for j in range(n_indicators):
         scale[j] = max(scale[j], fabs(X[n + j, 0]))
     work.tally[place.READY] = 1

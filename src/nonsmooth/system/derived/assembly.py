@@ -27,7 +27,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.bounded import least_within
 from nonsmooth.system.derived.elements import Element, Rubbing
-from nonsmooth.system.derived.elements.element import Condition, Leaving
+from nonsmooth.system.derived.elements.element import CREEP, THROWN, Condition, Leaving
 from nonsmooth.system.derived.faces import as_sums, independent, weakest
 from nonsmooth.system.derived.place import Place
 
@@ -76,6 +76,7 @@ class Assembler(ABC):
     parts: list[Part]
     sequential: bool = False  # impacts of one instant come one after the other
     asks: bool = False  # what several elements decide together is asked at each instant (``deciding``)
+    inputs: list[int]  # of the states that stand for inputs
     draws: tuple[int, ...] = ()  # of states and parameters, at which numbers that must be constant are compared
 
     # The calculus
@@ -157,6 +158,16 @@ class Assembler(ABC):
     def size(self, expression: Any) -> Any:
         """The scale of the states that an expression involves."""
 
+    def driven(self, expression: Any) -> bool:
+        """Return whether an input, which may jump, is a part of an expression."""
+        return bool(self.slopes(expression)[self.inputs].any())
+
+    def gradient(self, k: int, mode: str, draw: int = 0) -> FloatArray:
+        """The derivatives of an element's rate in the states, but for inputs, which no force changes."""
+        found = self.slopes(self.rate(k, mode), draw).copy()
+        found[self.inputs] = 0.0
+        return found
+
     def tidy(self, states: Any) -> Any:
         """States behind an impulse in the form in which they are kept."""
         return states
@@ -205,7 +216,7 @@ class Assembler(ABC):
     def sharing(self, mode: str) -> list[int]:
         """Elements that may hold a rate together with others, so that their forces are not unique."""
         held = [k for k, part in enumerate(self.parts) if {*part.element.held} & {*part.element.phases}]
-        rows = np.array([self.slopes(self.rate(k, mode)) for k in held])
+        rows = np.array([self.gradient(k, mode) for k in held])
         rows /= np.linalg.norm(rows, axis=-1, keepdims=True)
         rank = len(independent(rows, range(len(held)))[0])
         rest = (np.delete(rows, i, axis=0) for i in range(len(held)))
@@ -252,7 +263,7 @@ class Assembler(ABC):
 
     def _basis(self, held: Sequence[int], mode: str, pattern: Pattern, draw: int) -> tuple[list[int], FloatArray]:
         """The same in one state."""
-        rows = np.array([self.slopes(self.rate(k, mode), draw) for k in held])
+        rows = np.array([self.gradient(k, mode, draw) for k in held])
         first = sorted(range(len(held)), key=lambda i: not self.parts[held[i]].element.bears)  # those with a place
         chosen, doubt = independent(rows / np.linalg.norm(rows, axis=1)[:, None], first)
         if doubt:
@@ -357,7 +368,16 @@ class Assembler(ABC):
 
     def leaving(self, k: int, mode: str, pattern: Pattern) -> list[Leaving]:
         """The ways of element k out of its phase; those that it decides with others have none behind it."""
-        together = k in self.rubbing or len(self.together(k, mode, pattern)) > 1
-        if self.asks and self.parts[k].element.held and together:
-            return self.asked(k, mode, pattern)
-        return self.parts[k].element.leaving(self.place(k, mode, pattern))
+        here, together = self.place(k, mode, pattern), k in self.rubbing or len(self.together(k, mode, pattern)) > 1
+        asked = self.asks and here.element.held and together
+        return [*self.thrown(here), *(self.asked(k, mode, pattern) if asked else here.element.leaving(here))]
+
+    def thrown(self, here: Place) -> list[Leaving]:
+        """The ways of an element out of the phase in which it is held where an input makes the held rate jump."""
+        if here.phase not in here.element.held or not self.driven(here.rate()):
+            return []
+        rate, off, prefix = here.rate(), CREEP * here.size(here.rate()), f"{here.name}_" if self.asks else ""
+        return [
+            Leaving(None if self.asks else side or here.element.phases[0], [Condition(rate - sign * off, sign, name)])
+            for side, sign, name in zip(here.element.sides, (1, -1), [prefix + one for one in THROWN], strict=True)
+        ]

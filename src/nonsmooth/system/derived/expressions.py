@@ -36,6 +36,7 @@ class Expressions(Assembler):
     ) -> None:
         self.symbols, self.fields, self.scale, self.values, self.draws = symbols, base, scale, values, (1, OTHER)
         self.u = tuple(symbols.u.values())
+        self.inputs = [i for i, name in enumerate(symbols.u) if name in symbols.inputs]
         self.parts = [self._part(name, element) for name, element in elements.items()]
         self.indicators: dict[str, sp.Expr] = {}
         self._known: dict[tuple[str, sp.Expr], str] = {}

@@ -47,9 +47,10 @@ class Instant:
         self.ends = ""
 
     def _is_still(self, k: int) -> bool:
-        """Return whether what is held has stayed where it was: a reset of the system's own may have moved it."""
-        both = (self.rates[k], self.parts[k].where)
-        return all(abs(self.numbers.value(one)) <= SMALL * float(self.make.size(one)) for one in both)
+        """Return whether what is held has stayed where it was: a reset of the system's own, or an input, may have moved
+        it."""
+        both = ((self.rates[k], CREEP), (self.parts[k].where, SMALL))
+        return all(abs(self.numbers.value(one)) <= part * float(self.make.size(one)) for one, part in both)
 
     def number(self, expression: Any) -> float:
         """The value of an expression, 0 where it is rounding."""

@@ -19,6 +19,7 @@ import sympy as sp
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.assembly import Pattern
+from nonsmooth.system.derived.elements.element import THROWN
 from nonsmooth.system.derived.rows import Row, Rows
 from nonsmooth.system.symbolic.period import forcing_period
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, TOGETHER, Traced, TracedCondition, TracedTransition
@@ -120,7 +121,16 @@ class Patterns:
     @cached_property
     def conditions(self) -> tuple[str, ...]:
         """Names of the conditions of all elements, the indicators of the system."""
-        return tuple(f"{name}_{one}" for name, element in self.elements.items() for one in element.conditions)
+        return tuple(name for names in self._conditions.values() for name in names)
+
+    @cached_property
+    def _conditions(self) -> dict[int, list[str]]:
+        """The names of the conditions of each element."""
+        make, found = self.make, {}
+        for k, (name, element) in enumerate(self.elements.items()):
+            thrown = THROWN if element.held and make.driven(make.rate(k, self.mode)) else ()
+            found[k] = [f"{name}_{one}" for one in (*element.conditions, *thrown)]
+        return found
 
     @cached_property
     def slots(self) -> dict[str, int]:
@@ -130,7 +140,7 @@ class Patterns:
     @cached_property
     def owners(self) -> list[int]:
         """The element of each condition."""
-        return [k for k, element in enumerate(self.elements.values()) for _ in element.conditions]
+        return [k for k, names in self._conditions.items() for _ in names]
 
     def ways_of(self, rows: Rows, pattern: Pattern, k: int) -> tuple[list[Out], dict[int, FloatArray], Armed]:
         """The ways of an element out of its phase in a pattern, the rows of its conditions by their numbers, and the

@@ -94,10 +94,11 @@ class Place:
         expressions: Any = self.make  # where nothing is asked: rows always are
         return expressions.shifted_back(states, self.where)
 
-    def is_struck(self) -> bool:
-        """Return whether the impact of a stop turns its speed."""
+    def is_turned(self) -> bool:
+        """Return whether the impact of a stop, or an input, may turn its speed at once."""
         strikes = (part for part in self.make.parts if part.element.strikes)
-        return any(not self.vanishes(self.make.across(self.where, part)) for part in strikes)
+        struck = any(not self.vanishes(self.make.across(self.where, part)) for part in strikes)
+        return struck or self.make.driven(self.where)
 
     def effect(self) -> tuple[Any, str]:
         """The effect of a unit force of the element on its own rate, with the sentence for where it is negative."""
@@ -111,6 +112,10 @@ class Place:
     def begins_alone(self) -> bool:
         """Return whether nothing is asked where a run begins, so that its conditions must lead out of its phase."""
         return not self.make.asks
+
+    def may_be_beyond(self) -> bool:
+        """Return whether its place may be any where it enters a phase: a run begins there, or an input jumps."""
+        return self.begins_alone() or self.make.driven(self.where)
 
     def vanishes(self, expression: Any) -> bool:
         """Return whether an expression is zero whatever the state."""

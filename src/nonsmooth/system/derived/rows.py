@@ -86,7 +86,7 @@ class Rows(Assembler):
         self.n, harmonics = tables.A.shape[-1], tables.c.shape[-2]
         self.rates = tables.omega[i] * np.array(patterns.form.multiples, dtype=float)
         self.scale, self.asks, self.mode = patterns.scale, True, patterns.mode
-        self.sequential = patterns.make.sequential
+        self.sequential, self.inputs = patterns.make.sequential, patterns.make.inputs
         self.field = np.zeros((self.n, self.n + 1 + 2 * harmonics), dtype=tables.A.dtype)
         put_together(self.field, self.n, tables.A[i, 0], tables.b[i, 0], tables.c[i, 0].T, tables.s[i, 0].T)
         every = np.zeros((len(tables.ib[i]), self.field.shape[1]), dtype=self.field.dtype)

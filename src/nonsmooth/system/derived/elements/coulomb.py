@@ -139,9 +139,9 @@ class Coulomb(Element):
         torn = Condition(over, 1, "over") if here.phase == "forward" else Condition(under, -1, "under")
         still = here.struck(0)
         tie = Leaving("stick", [stopped], still)  # a load as large as the friction, to all orders: it holds
-        if not here.is_struck():
+        if not here.is_turned():
             return [Leaving("stick", [stopped, *within], still), Leaving(other, [stopped, torn]), tie]
-        # An impact turns the speed round at once, and no finite force can stop it then.
+        # An impact or an input turns the speed round at once, and no finite force can stop it then.
         off = -sign * CREEP * here.size(v)
         slow, turned = (Condition(v + off, one * sign, f"turned_{here.phase}") for one in (-1, 1))
         return [

@@ -172,7 +172,7 @@ class PreloadedSpring(Displaced):
         side, rate = Condition(here.where, sign, "side"), here.rate()
         fast = Condition(rate - sign * self.slow * here.size(rate), sign, "fast")
         crossed = [Leaving(to, [side, one]) for one in (fast, over, under)]
-        if here.begins_alone():
+        if here.may_be_beyond():
             off = SMALL * here.size(here.where)
             crossed.insert(0, Leaving(to, [Condition(here.where - sign * off, sign, "beyond")]))
         return [*crossed, Leaving("held", [side], here.struck(0))]

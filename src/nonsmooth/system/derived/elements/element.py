@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 SMALL = 1e-4  # of the states' scale: what a rate or a gap that is held at zero may be off where a run begins
 CREEP = 1e-7  # of the same: the speed of approach below which impacts are not followed
+THROWN = ("rate_above", "rate_below")  # names of the conditions on a held rate that an input makes jump
 SLOW = 1e-5  # of the same: the speed at which a preloaded spring still takes hold
 Law = float | str | Callable[..., Any]
 
