@@ -137,3 +137,19 @@ def test_a_block_leaves_a_belt_whose_speed_grows() -> None:
         np.testing.assert_allclose(run.crossing_time.values, [leaves], atol=1e-13)
         place = mu / k + off * np.cos(0.5 * w) + speed / w * np.sin(0.5 * w)
         np.testing.assert_allclose(run.u.values[-1, 0], place, atol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor", "rkf45"])
+def test_a_motion_that_begins_at_the_edge_of_a_play_enters_it(method: str) -> None:
+    """q - h = (v / w) sin w t, w^2 = k / m, beside a stop and a friction of zero, which are asked what they do."""
+    elements = {
+        "play": ns.elements.Backlash(at="q", half_width=0.2, stiffness=10.0),
+        "far": ns.elements.Stop(at="q", position=5.0),
+        "rail": ns.elements.Coulomb(at="q", friction=0.0),
+    }
+    system = ns.mechanical(1.0, 0.0, 0.0, elements=elements)
+    for side in (1, -1):
+        run = ns.simulate(system, duration=0.5, start={"q": 0.2 * side, "v_q": 0.3 * side}, method=method)
+        w = np.sqrt(10.0)
+        exact = side * (0.2 + 0.3 / w * np.sin(0.5 * w)), side * 0.3 * np.cos(0.5 * w)
+        np.testing.assert_allclose(run.u.values[-1], exact, atol=1e-7 if method == "rkf45" else 1e-12)

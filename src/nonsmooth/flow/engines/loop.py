@@ -24,13 +24,18 @@ from nonsmooth.kernels.hybrid.stopping import flag
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.derived.deciding import begun, decide
 from nonsmooth.system.phases import phases, varying_phases
-from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, OWN, TOGETHER
+from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, FOUND, OWN, TOGETHER
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 DIVERGENCE = 1e9  # in units of a state's scale
-KINDS = {ALONE: places.ALONE, OWN: places.OWN, ASKS_BEHIND: places.ASKS_BEHIND}  # place 4 of ``Net.transitions``
+KINDS = {  # place 4 of ``Net.transitions``
+    ALONE: places.ALONE,
+    OWN: places.OWN,
+    ASKS_BEHIND: places.ASKS_BEHIND,
+    FOUND: places.ANSWER,
+}
 #: Called by the thread of a run whenever it pauses.
 at_pause: list[Callable[[], None]] = []
 SPARE = 64  # crossings that one leg may add to a log

@@ -85,8 +85,12 @@ def settle(i, form, net, tables, work):
         mode, t = tally[MODE], -1
         for k in range(net.mode_start[mode], net.mode_start[mode + 1]):
             one = net.mode_list[k]
-            if MAY_WAIT != 0 and tally[STARTS] != 0 and net.transitions[one, 4] < OWN:
-                continue  # what elements do has been asked
+            if (
+                MAY_WAIT != 0
+                and tally[STARTS] != 0
+                and (net.transitions[one, 0] < 0 or net.transitions[one, 4] == ALONE)
+            ):
+                continue  # what elements hold has been asked
             if holds(one, mode, tables, net, work):
                 impact = net.transitions[one, 1] == RESET
                 if impact and lies_beyond(one, form, net, work):

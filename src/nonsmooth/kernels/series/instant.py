@@ -4,7 +4,7 @@ from math import fabs, inf
 
 import nonsmooth.kernels.series.places as place
 from nonsmooth.kernels.compile.cache import device, inline, once
-from nonsmooth.kernels.hybrid.places import MODE, TIME
+from nonsmooth.kernels.hybrid.places import ANSWER, MODE, TIME
 from nonsmooth.kernels.series.crossing import NOISE, OFF, rows_hold, snap
 from nonsmooth.kernels.series.generated import jet_of, jump_of, values_of
 from nonsmooth.kernels.series.rkf45 import first_step
@@ -110,15 +110,16 @@ def take(i, t, fired, form, tables, net, work):
     for j in range(q.shape[0]):
         q[j] = work.q_new[j]
     mode = net.transitions[t, 0]
+    if net.transitions[t, 4] == ANSWER:  # what was asked there was zero by that measure
+        for k in range(net.meets_start[mode], net.meets_start[mode + 1]):
+            work.measured[net.meets[k]] = max(work.measured[net.meets[k]], TOGETHER * work.scale[net.meets[k]] / 4)
     look(i, form, tables, work, mode)
     if net.meets.shape[0] > 0:
         J = work.J0 if form.method == place.RKF45 else work.C
         for j in range(form.indicators):
             work.vals[j] = J[w.shape[0] + j, 0]
-    if fired >= 0:
-        work.measured[fired] = 0.0
-        if work.usual[mode] <= 0.0:
-            work.usual[mode] = work.memo[place.PLANNED]
+    if fired >= 0 and work.usual[mode] <= 0.0:
+        work.usual[mode] = work.memo[place.PLANNED]
     for j in range(work.rise.shape[0]):
         work.rise[j] = 0
     return mode

@@ -177,6 +177,8 @@ def make_step(i, form, net, section, wanted, work, r_max):
     pending, hit, x, calm, halvings, error, sure = -1, -1, NONE, False, 0, 0.0, 0.0
     if h < 0.0:
         return False
+    for j in range(n_i):
+        work.measured[j] = 0.0  # what an instant has shown of rounding is for all that follows at that instant
     while True:
         if rkf:
             h, error = runge_kutta(form, work, h, 1e-16 * t)
