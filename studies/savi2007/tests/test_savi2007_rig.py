@@ -11,14 +11,14 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth_savi2007.claims import response as claims_response
-from nonsmooth_savi2007.claims import rig as claims_rig
+from nonsmooth_savi2007.claims.diagrams import at_gap, f16
+from nonsmooth_savi2007.claims.response import between_cell, doubled_cell, grazing_cell, no_doubled_cell
 from nonsmooth_savi2007.claims.verdicts import Cell, Statement, Verdict, printed_cell
 from nonsmooth_savi2007.figures.motions import chosen, measured_periods_at, said
 from nonsmooth_savi2007.findings import Number, found_in, kept, the_finding
 from nonsmooth_savi2007.flows import Settings
-from nonsmooth_savi2007.measure import Interval, jumps, measured_periods
-from nonsmooth_savi2007.printed import FIGURE_14, NUMBERS, TABLE_1
+from nonsmooth_savi2007.measure import Interval, jumps, main_jump, measured_periods
+from nonsmooth_savi2007.printed import FIGURE_9, FIGURE_14, NUMBERS, TABLE_1
 
 STEP = 0.05
 
@@ -54,21 +54,22 @@ def test_jumps_and_periods_of_a_response_made_by_hand() -> None:
 
 
 def test_the_cells_of_figure_9_are_those_of_the_response() -> None:
-    data = {"fig09_rig": _response({"up": 5.86, "down": 5.26})}
-    region, rising = claims_response.f9a_rig(data)
+    region_at, rising, jump = (NUMBERS[key] for key in ("period 2 near", "jump rising", "jump falling"))
+    runs = _response({"up": 5.86, "down": 5.26})["runs"]
+    region = doubled_cell(runs, "up", region_at.value)
     assert region == Cell("period 2 from 3.600 to 4.000 rad/s (9 runs)", Verdict.AGREES)  # 3.63 lies within
-    assert rising.verdict == "agrees"  # 5.88 lies in the step 5.85 ... 5.90
-    falling, closed, again = claims_response.f9b_rig(data)
-    assert falling.verdict == "agrees"  # 5.29 in 5.25 ... 5.30, by its rounding
-    assert closed.verdict == "undecided"  # 5.275, known to 0.025, against grazing at 5.15986: 1.7 to 2.7 %
-    assert again.verdict == "agrees"
-    (between,) = claims_response.f9c_rig(data)
-    assert between.verdict == "agrees in part"
-    missing = claims_response.f9a_rig({"fig09_rig": _response({"up": 9.0, "down": 9.0})})[1]
+    assert printed_cell(rising, main_jump(runs, "up")).verdict == "agrees"  # 5.88 lies in the step 5.85 ... 5.90
+    falling = main_jump(runs, "down")
+    assert printed_cell(jump, falling).verdict == "agrees"  # 5.29 in 5.25 ... 5.30, by its rounding
+    # 5.275, known to 0.025, against grazing at 5.15986: 1.7 to 2.7 %
+    assert grazing_cell(falling, FIGURE_9, -1).verdict == "undecided"
+    assert doubled_cell(runs, "down").verdict == "agrees"
+    assert between_cell(runs).verdict == "agrees in part"
+    missing = printed_cell(rising, main_jump(_response({"up": 9.0, "down": 9.0})["runs"], "up"))
     assert missing.verdict == "undecided" and "not found" in missing.text
-    near, outside = (_response({"up": 5.86, "down": 5.26}, doubled=(low, 4.0)) for low in (3.65, 3.75))
-    assert claims_response.f9a_rig({"fig09_rig": near})[0].verdict == "undecided"  # runs at 3.60 and 3.65
-    assert claims_response.f9a_rig({"fig09_rig": outside})[0].verdict == "differs"
+    near, outside = (_response({"up": 5.86, "down": 5.26}, doubled=(low, 4.0))["runs"] for low in (3.65, 3.75))
+    assert doubled_cell(near, "up", region_at.value).verdict == "undecided"  # runs at 3.60 and 3.65
+    assert doubled_cell(outside, "up", region_at.value).verdict == "differs"
 
 
 def _steady(numbers: dict[str, int]) -> dict[str, xr.Dataset]:
@@ -83,8 +84,8 @@ def test_motions_at_a_gap_are_a_set_over_its_starts() -> None:
     assert measured_periods_at(data, 0.0009) == {0: 1, 2: 1}
     assert chosen(data, 0.0009, 2) is data["0.0009_2"]
     assert chosen(data, 0.0014, 3) is data["0.0014"]  # none has it: the first
-    verdicts = [cell.verdict for cell in claims_rig.f14({"fig14_rig": data})]
-    assert verdicts == ["agrees", "agrees", "differs", "agrees", "not asked"]
+    verdicts = [at_gap(data, g, period).verdict for g, period in FIGURE_14.items()]
+    assert verdicts == ["agrees", "agrees", "differs", "agrees"]
     assert "0.9 mm: no period and period 2 (model: period 1, period 3)" in said(data, FIGURE_14, "m")
 
 
@@ -97,10 +98,10 @@ def test_the_sections_of_figure_16_agree_below_twice_the_halves() -> None:
             "measured_section": (("section_phase", "measured_iterate"), np.zeros((2, 7))),
         }
     )
-    (row,) = claims_rig.f16({"fig16": {"attractor": far}})
+    (row,) = f16({"fig16": {"attractor": far}})
     assert (row.rig, row.rig_verdict) == ("no period, 7 turns", "agrees")
     worse = far.assign(measured_halves_p95=("section_phase", [0.1, 0.04]))
-    assert claims_rig.f16({"fig16": {"attractor": worse}})[0].rig_verdict == "differs"
+    assert next(f16({"fig16": {"attractor": worse}})).rig_verdict == "differs"
 
 
 def test_a_cell_beside_a_printed_number() -> None:
@@ -144,7 +145,6 @@ def test_what_is_not_there_is_said() -> None:
 
 
 def test_single_runs_with_period_two_make_no_range() -> None:
-    data = {"fig10_rig": _response({"up": 5.81, "down": 5.16}, doubled=(3.6, 3.6))}
-    cell = claims_response.f10_rig(data)[2]
+    cell = no_doubled_cell(_response({"up": 5.81, "down": 5.16}, doubled=(3.6, 3.6))["runs"])
     assert (cell.text, cell.verdict) == ("2 of 140 runs with period 2, no two neighbours", "agrees")
-    assert claims_response.f10_rig({"fig10_rig": _response({"up": 5.81, "down": 5.16})})[2].verdict == "differs"
+    assert no_doubled_cell(_response({"up": 5.81, "down": 5.16})["runs"]).verdict == "differs"

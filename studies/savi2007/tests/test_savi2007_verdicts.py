@@ -51,7 +51,7 @@ def _known(value: float, expanded: float) -> Interval:
     ],
 )
 def test_the_rule(printed: str, value: float, expanded: float, verdict: str) -> None:
-    row = against_printed("F1", "a number", Printed(printed, "N", "here"), _known(value, expanded), None)
+    row = against_printed("F1", "a number", Printed(printed, "N", "here"), [_known(value, expanded), None])
     assert row.verdict == verdict
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import TypeAlias
 
+import xarray as xr
+
+from nonsmooth_savi2007.figures.resonance import grazing_of
+from nonsmooth_savi2007.findings import Number
 from nonsmooth_savi2007.measure import Interval, with_uncertainty
 from nonsmooth_savi2007.printed import Printed
 
-if TYPE_CHECKING:
-    import xarray as xr
+#: Keys of the datasets of both flows.
+FLOWS = ("exact", "smoothed")
 
 CLOSE = 2.0  # percent; the paper's own two natural frequencies, 4.50 and 4.60 rad/s, are 2.2 % apart
 
@@ -65,21 +69,8 @@ class Cause(StrEnum):
     RIG = "the virtual rig"
 
 
-class Judged(Protocol):
-    """A number with its expanded uncertainty."""
-
-    @property
-    def value(self) -> float: ...
-
-    @property
-    def expanded(self) -> float: ...
-
-
-class UncertainNumber(Judged, Protocol):
-    """A number with its standard uncertainty too: a step that holds a change, a quantity identified."""
-
-    @property
-    def uncertainty(self) -> float: ...
+#: A number with its standard and its expanded uncertainty: a step that holds a change, a quantity identified.
+Uncertain: TypeAlias = Interval | Number
 
 
 def agreed(met: bool) -> Verdict:
@@ -87,7 +78,7 @@ def agreed(met: bool) -> Verdict:
     return Verdict.AGREES if met else Verdict.DIFFERS
 
 
-def judge(printed: float, found: Judged | None, resolution: float = 0.0) -> Verdict:
+def judge(printed: float, found: Uncertain | Beside | None, resolution: float = 0.0) -> Verdict:
     """The verdict on a printed number by ``RULE``; a number that was searched and not found differs."""
     if found is None:
         return Verdict.DIFFERS
@@ -98,7 +89,7 @@ def judge(printed: float, found: Judged | None, resolution: float = 0.0) -> Verd
     return Verdict.DIFFERS if distance - found.expanded > tolerance + rounding else Verdict.UNDECIDED
 
 
-def judge_step(closed: float, found: Judged | None) -> Verdict:
+def judge_step(closed: float, found: Uncertain | None) -> Verdict:
     """The verdict on a closed form by the step that holds the change; a step wider than the tolerance tells nothing."""
     if found is None or abs(found.value - closed) > 2 * found.expanded:
         return Verdict.DIFFERS
@@ -115,7 +106,7 @@ class Beside:
     expanded: float
 
     @classmethod
-    def of(cls, printed: float, resolution: float, found: Judged | None) -> Beside | None:
+    def of(cls, printed: float, resolution: float, found: Uncertain | None) -> Beside | None:
         """None where nothing was found."""
         return None if found is None else cls(printed, resolution, found.value, found.expanded)
 
@@ -137,7 +128,7 @@ class Beside:
 
 
 #: Datasets by figure and key.
-Data: TypeAlias = "Mapping[str, dict[str, xr.Dataset]]"
+Data: TypeAlias = Mapping[str, dict[str, xr.Dataset]]
 
 
 @dataclass(frozen=True)
@@ -169,7 +160,7 @@ class Statement:
     difference: str
     verdict: Verdict
     why: str = ""
-    rig: str = "not asked"
+    rig: str = "not asked: of the model"
     rig_verdict: Verdict = Verdict.NOT_ASKED
     cause: Cause | None = None
     exact_beside: Beside | None = None
@@ -196,8 +187,23 @@ class Statement:
         return Cause.REAL if self.verdict is Verdict.DIFFERS else Cause.RIG
 
 
+def of_both(
+    claim: str,
+    place: str,
+    says: str,
+    found: Iterable[str],
+    difference: str,
+    verdict: Verdict,
+    why: str = "",
+    cause: Cause | None = None,
+) -> Statement:
+    """A statement with what the exact flow and the smoothed one give."""
+    exact, smoothed = found
+    return Statement(claim, place, says, exact, smoothed, difference, verdict, why, cause=cause)
+
+
 def printed_cell(
-    printed: Printed, found: UncertainNumber | None, note: str = "", why: str = "", *, put_in: bool = False
+    printed: Printed, found: Uncertain | None, note: str = "", why: str = "", *, put_in: bool = False
 ) -> Cell:
     """The rig's number beside a printed one; ``put_in``: that the rig was given, or that follows from what it was."""
     verdict = judge(printed.value, found, printed.resolution)
@@ -213,57 +219,53 @@ def against_printed(
     claim: str,
     says: str,
     printed: Printed,
-    exact: UncertainNumber | None,
-    smoothed: UncertainNumber | None,
+    found: Sequence[Uncertain | None],
     why: str = "",
     cause: Cause | None = None,
 ) -> Statement:
     """A printed number beside what both flows give; the verdict is on the exact one."""
-    found = [Beside.of(printed.value, printed.resolution, one) for one in (exact, smoothed)]
-    words = [str(one) if one is not None else "not found" for one in found]
-    return Statement(
+    beside = [Beside.of(printed.value, printed.resolution, one) for one in found]
+    words = [str(one) if one is not None else "not found" for one in beside]
+    row = of_both(
         claim,
         printed.place,
         says,
-        _with_unit(exact, printed.unit),
-        _with_unit(smoothed, printed.unit),
+        (_with_unit(one, printed.unit) for one in found),
         f"exact {words[0]}, smoothed {words[1]}",
-        judge(printed.value, exact, printed.resolution),
+        judge(printed.value, found[0], printed.resolution),
         why,
-        cause=cause,
-        exact_beside=found[0],
-        smoothed_beside=found[1],
+        cause,
     )
+    return replace(row, exact_beside=beside[0], smoothed_beside=beside[1])
 
 
-def against_closed_form(
+def against_grazing(
     claim: str,
-    place: str,
     says: str,
-    closed: tuple[float, float],
-    exact: Interval | None,
-    smoothed: Interval | None,
+    swept: Sequence[xr.Dataset],
+    which: int,
+    met: Sequence[Interval | None],
     why: str = "",
+    place: str = "closed form, not printed",
 ) -> Statement:
-    """A frequency known in closed form, in rad/s, beside the sweeps: they agree within one of their steps.
+    """A closed-form grazing frequency, of the gap and for the smoothed switch of g - eta, beside what was met.
 
-    ``closed`` holds it for the gap g and, to compare the smoothed switch with, for g - eta.
+    They agree within a step of the sweeps.
     """
-    pairs = list(zip((exact, smoothed), closed, strict=True))
+    closed = [grazing_of(one)[which] for one in swept]
+    pairs = list(zip(met, closed, strict=True))
     off = ["not found" if found is None else f"{found.value - truth:+.4f} rad/s" for found, truth in pairs]
     verdicts = [judge_step(truth, found) for found, truth in pairs]
-    verdict = verdicts[0] if len(set(verdicts)) == 1 else Verdict.IN_PART
-    return Statement(
+    return of_both(
         claim,
         place,
         f"{says}: {closed[0]:.5f} rad/s (gap g - eta: {closed[1]:.5f})",
-        _with_unit(exact, "rad/s"),
-        _with_unit(smoothed, "rad/s"),
+        (_with_unit(found, "rad/s") for found in met),
         f"exact {off[0]}, smoothed {off[1]}",
-        verdict,
+        verdicts[0] if len(set(verdicts)) == 1 else Verdict.IN_PART,
         why,
     )
 
 
-def _with_unit(found: UncertainNumber | None, unit: str) -> str:
+def _with_unit(found: Uncertain | None, unit: str) -> str:
     return "not found" if found is None else f"{with_uncertainty(found.value, found.uncertainty)} {unit}".rstrip()
