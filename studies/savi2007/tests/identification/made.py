@@ -41,7 +41,7 @@ def decay_of(omega_0, b, f, zero=0.0, error=1e-6):
     """The free oscillator as a free decay would have told it, without a fit behind it."""
     noise = Estimate(COUNT / np.sqrt(12), 0.0, "m")
     fit = ParameterSet({}, np.zeros((1, 1)), extra={"x.noise": noise})
-    return DecayFit(np.array([omega_0, b, f, zero]), error**2 * np.eye(4), (0,), ((0, 2),), fit)
+    return DecayFit(np.array([omega_0, b, f, zero]), error**2 * np.eye(4), (), fit)
 
 
 def swinging(omega, amplitude, lag, mean, *, crank, duration=12.0, mark=0.0, rng=None, name="Run #1", second=0.0):

@@ -5,8 +5,7 @@ import pytest
 from studies.savi2007.tests.identification.made import run
 
 from nonsmooth.identification.finding import Estimate
-from nonsmooth_savi2007.identification.calibrations import crank_force, voltage_frequency
-from nonsmooth_savi2007.identification.least_squares import scattered_line
+from nonsmooth_savi2007.identification.calibrations import crank_force, scattered_line, voltage_frequency
 
 SLOPE, OFFSET = 1.25, 0.97
 

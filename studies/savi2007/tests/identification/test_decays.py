@@ -50,7 +50,7 @@ def test_the_decrements_error_is_that_of_a_mean_where_drops_differ():
     damped = np.array([0.56, 0.60, 0.62, 0.66])
     runs = [drops([0.011], c=c, seed=i, duration=5)[0] for i, c in enumerate(damped)]
     found, decay = support_damping(runs, resolution=COUNT, test_mass=Quantity(MASS, 0.0))
-    assert decay.runs == (0, 1, 2, 3) and any("no majority" in note for note in found.notes)
+    assert decay.runs == tuple(run.name for run in runs) and any("no majority" in note for note in found.notes)
     assert found.uncertainty == pytest.approx(damped.std(ddof=1) / np.sqrt(4), rel=0.05)
 
 
@@ -106,8 +106,7 @@ def slipped(one, counts, at=2.0):
 
 
 def fitted(runs, **options):
-    rows = [(r.time, r.positions) for r in runs]
-    return free_decay(rows, resolution=COUNT, names=[r.name for r in runs], **options)
+    return free_decay(runs, resolution=COUNT, **options)
 
 
 @pytest.mark.parametrize("counts", [1, 20])
@@ -115,7 +114,7 @@ def test_a_tap_that_slipped_is_named_and_left_out(counts):
     runs = taps((0.1, -0.09, 0.08, -0.07, 0.06, -0.05))
     runs[2] = slipped(runs[2], counts)
     decay = fitted(runs)
-    assert decay.runs == (0, 1, 3, 4, 5)
+    assert decay.runs == tuple(f"Run #{i}" for i in (1, 2, 4, 5, 6))
     (note,) = decay.notes
     assert "'Run #3'" in note and "left out" in note and "slipped" in note
     assert np.all(np.abs(decay.values - [4.5, 1.04, 0.012, 0.0]) < 4 * np.sqrt(np.diag(decay.covariance)))
@@ -125,7 +124,7 @@ def test_a_tap_that_slipped_is_named_and_left_out(counts):
 def test_taps_that_disagree_without_a_majority_are_all_used_and_widened():
     runs = [r if i < 3 else slipped(r, 4, -1.0) for i, r in enumerate(taps((0.1, -0.09, 0.08, -0.07, 0.06, -0.05)))]
     decay = fitted(runs)
-    assert decay.runs == (0, 1, 2, 3, 4, 5)
+    assert decay.runs == tuple(run.name for run in runs)
     (note,) = decay.notes
     assert "disagree" in note and "no majority" in note
     # half of the runs count from a place that is 4 counts off: the standard deviation of 0 0 0 4 4 4 is 2 root(6/5)
@@ -141,8 +140,8 @@ def test_one_tap_needs_no_other():
 def test_viscous_and_dry_are_told_apart():
     w, b, f, m = 4.5, 1.04, 0.012, 0.84
     runs = taps(w=w, b=b, f=f)
-    decay = free_decay([(r.time, r.positions) for r in runs], resolution=COUNT)
-    found = decay_damping(runs, decay, Quantity(m), resolution=COUNT)
+    decay = free_decay(runs, resolution=COUNT)
+    found = decay_damping(decay, Quantity(m), resolution=COUNT)
     assert abs(found.value - m * b) < 3.5 * found.uncertainty < 0.01
     assert abs(found.others["friction"].value - m * f) < 3.5 * found.others["friction"].uncertainty < 1e-3
     assert found.others["c_viscous_only"].value > 1.02 * m * b

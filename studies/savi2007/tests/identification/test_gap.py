@@ -112,7 +112,7 @@ def stepping(gap, place=2e-5, crank=0.010, scale=1.0, order=-1, seed=1, mixed=Fa
     """Frequency steps towards resonance; where the free motion would pass the gap, the mean is pushed back."""
     rng, found = np.random.default_rng(seed), []
     for i, omega in enumerate(np.arange(9.0, 7.99, -0.05)[::-order]):
-        size = scale * grazing_amplitude(omega, W, B, F, crank)
+        size = scale * grazing_amplitude(omega, crank, W, B, F)
         beyond = max(size - gap, 0.0)
         name = f"Run #{i + 1}"
         a = crank if not mixed or i else 2 * crank
@@ -121,7 +121,7 @@ def stepping(gap, place=2e-5, crank=0.010, scale=1.0, order=-1, seed=1, mixed=Fa
 
 
 def test_the_graze_brackets_the_gap():
-    gap = grazing_amplitude(8.43, W, B, F, 0.010)
+    gap = grazing_amplitude(8.43, 0.010, W, B, F)
     found = grazing_gap(stepping(gap), decay_of(W, B, F, 1e-6), resolution=COUNT, kappa=KAPPA)
     low, high = found.interval(0.999)
     assert low < gap < high and high - low < 8e-5
@@ -132,9 +132,9 @@ def test_the_graze_brackets_the_gap():
 
 
 def test_a_push_too_light_to_be_seen_widens_the_bracket():
-    gap, crank = grazing_amplitude(8.43, W, B, F, 0.010), 0.010
+    gap, crank = grazing_amplitude(8.43, 0.010, W, B, F), 0.010
     found = grazing_gap(stepping(gap), decay_of(W, B, F, 1e-6), resolution=COUNT, kappa=KAPPA)
-    a = [grazing_amplitude(w, W, B, F, crank) for w in (8.45, 8.40)]
+    a = [grazing_amplitude(w, crank, W, B, F) for w in (8.45, 8.40)]
     # the mean of a run is seen to 0.06 counts at best: by as much a car that goes p beyond the gap is pushed
     least = _unseen(0.06 * COUNT, a[0], KAPPA / W**2)
     assert least > 3e-6
@@ -162,14 +162,14 @@ def test_the_sensors_error_is_that_of_a_mean_of_four():
 def test_a_gap_by_graze_is_neither_too_sure_nor_too_vague():
     z = []
     for seed in range(12):
-        gap = grazing_amplitude(8.43 - 0.01 * (seed % 5), W, B, F, 0.010)
+        gap = grazing_amplitude(8.43 - 0.01 * (seed % 5), 0.010, W, B, F)
         found = grazing_gap(stepping(gap, seed=seed), decay_of(W, B, F, 1e-6), resolution=COUNT, kappa=KAPPA)
         z.append((found.value - gap) / found.uncertainty)
     assert 0.4 < np.sqrt(np.mean(np.square(z))) < 1.6
 
 
 def test_the_cranks_length_need_not_be_right():
-    gap = 1.004 * grazing_amplitude(8.43, W, B, F, 0.010)
+    gap = 1.004 * grazing_amplitude(8.43, 0.010, W, B, F)
     found = grazing_gap(stepping(gap, scale=1.004), decay_of(W, B, F), resolution=COUNT, kappa=KAPPA)
     low, high = found.interval(0.999)
     assert low < gap < high
@@ -186,7 +186,7 @@ def test_the_cranks_length_need_not_be_right():
     ],
 )
 def test_what_does_not_show_a_graze_is_refused(runs, said):
-    gap = grazing_amplitude(8.43, W, B, F, 0.010)
+    gap = grazing_amplitude(8.43, 0.010, W, B, F)
     with pytest.raises(ValueError, match=said):
         grazing_gap(runs(gap), decay_of(W, B, F), resolution=COUNT, kappa=KAPPA)
 
@@ -195,7 +195,7 @@ def early(omega, crank=0.006):
     """Steps down to a frequency at which a transient has led to contact before the free motion reaches the gap."""
     rng = np.random.default_rng(4)
     free = [
-        swinging(w, grazing_amplitude(w, made.W, made.B, made.F, crank), 0.3, made.PLACE, crank=crank, rng=rng)
+        swinging(w, grazing_amplitude(w, crank, made.W, made.B, made.F), 0.3, made.PLACE, crank=crank, rng=rng)
         for w in np.arange(omega + 0.5, omega + 0.01, -0.05)
     ]
     return [*free, *(driven(w, crank, duration=32.0, transient=20.0) for w in (omega, omega - 0.05))]
@@ -206,7 +206,7 @@ def test_contact_that_a_transient_begins_early_is_in_the_uncertainty(omega):
     decay = decay_of(made.W, made.B, made.F, made.PLACE)
     found = grazing_gap(early(omega), decay, resolution=COUNT, kappa=made.KAPPA)
     true = made.GAP - made.PLACE
-    free = grazing_amplitude(omega, made.W, made.B, made.F, 0.006)
+    free = grazing_amplitude(omega, 0.006, made.W, made.B, made.F)
     assert true - free > 4e-5  # the free motion does not reach the support
     low, high = found.interval()
     assert low < true < high and high - low < 2e-4

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nonsmooth_savi2007.identification.least_squares import nonlinear_fit
+from nonsmooth_savi2007.identification.response_fits import nonlinear_fit
 
 FREE = -np.inf
 

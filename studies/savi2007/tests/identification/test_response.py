@@ -49,7 +49,7 @@ def responding(f=0.0, cranks=(0.0165, 0.035), scale=1.0, mark=0.0, seed=0):
     rng, found = np.random.default_rng(seed), []
     for a in cranks:
         for omega in STEPS:
-            size = grazing_amplitude(omega, W, B, f, scale * a)
+            size = grazing_amplitude(omega, scale * a, W, B, f)
             lag = np.arctan2(B * omega * size + 4 * f / np.pi, (W**2 - omega**2) * size)
             # the gate sees the crank at the angle mark: at the time mark / omega
             found.append(swinging(omega, size, lag, 3e-4, crank=a, mark=mark / omega, rng=rng))
@@ -84,7 +84,7 @@ def test_half_power_of_steady_runs_and_what_friction_does_to_it():
 def test_at_one_frequency_the_viscous_bias_is_what_friction_takes_per_cycle():
     # b' omega A = b omega A + 4 f / pi
     omega, a, f = 5.0, 0.0165, 0.01
-    size = grazing_amplitude(omega, W, B, f, a)
+    size = grazing_amplitude(omega, a, W, B, f)
     expected = 4 * f / (np.pi * B * omega * size)
     assert viscous_bias(W, B, f, a, [omega, omega]) == pytest.approx(expected, rel=1e-6)
 

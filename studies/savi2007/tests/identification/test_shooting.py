@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from studies.savi2007.tests.identification.made import run
 
 from nonsmooth_savi2007.identification.free_decay import free_decay, swing
 
@@ -15,7 +16,7 @@ def viscous(w, b, height, rng):
     at = time + 5e-5 * rng.standard_normal(len(time)) - 0.5
     wd = np.sqrt(w**2 - b**2 / 4)
     x = np.where(at > 0, height * np.exp(-b / 2 * at) * np.sin(wd * at), 0.0)
-    return time, COUNT * np.rint(x / COUNT)
+    return run("impulse", time, COUNT * np.rint(x / COUNT))
 
 
 def test_free_decay_finds_frequency_and_damping_of_the_closed_form():
@@ -40,7 +41,7 @@ def test_free_decay_tells_viscous_damping_from_dry_friction():
             rate, (0, 10), (0.0, speed), "LSODA", dense_output=True, rtol=1e-9, atol=1e-11, max_step=0.02
         )
         x = np.where(at > 0, solved.sol(np.maximum(at, 0))[0], 0.0)
-        runs.append((time, COUNT * np.rint(x / COUNT)))
+        runs.append(run("impulse", time, COUNT * np.rint(x / COUNT)))
     found = free_decay(runs, resolution=COUNT)
     error = np.sqrt(np.diag(found.covariance))
     assert np.all(np.abs(found.values - [w, b, f, 0.0]) < 3.5 * error)

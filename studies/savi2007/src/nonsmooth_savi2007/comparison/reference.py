@@ -128,11 +128,7 @@ def gap_reference(
         return GapReference(offset=given, direction=evidence.direction, notes=tuple(notes))
     decay = None
     if taps := evidence.runs.get("impulse", ()):
-        decay = free_decay(
-            [(run.time, run.positions) for run in taps],
-            resolution=evidence.resolution,
-            names=[run.name for run in taps],
-        )
+        decay = free_decay(taps, resolution=evidence.resolution)
         notes += [f"impulse: {note}" for note in decay.notes]
     free = [run for run in evidence.runs.get("response", ()) if "gap" not in run.settings]
     seen, mark = steady(free), 0.0

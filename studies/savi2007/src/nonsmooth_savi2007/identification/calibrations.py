@@ -12,20 +12,51 @@ Both are straight lines with errors in both axes: what the notebook's voltages a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
+from scipy.optimize import brentq
 from scipy.special import ndtri
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, uniform
 from nonsmooth.recordings.signals.phase import drive_phase
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
-from nonsmooth_savi2007.identification.least_squares import StraightLine, scattered_line
 from nonsmooth_savi2007.identification.steady import harmonics_of
 
-if TYPE_CHECKING:
-    import xarray as xr
+
+class StraightLine(NamedTuple):
+    """y = intercept + slope x, the covariance (2, 2) of slope and intercept, and chi^2 per degree of freedom."""
+
+    slope: float
+    intercept: float
+    covariance: FloatArray
+    reduced: float
+
+
+def scattered_line(x: FloatArray, y: FloatArray, error: FloatArray) -> tuple[StraightLine, float]:
+    """The weighted line through points that scatter more than their errors say: with the scatter they have in common.
+
+    Returns the line and that scatter, the standard deviation s in y which, added to every error, brings chi^2 to its
+    expectation; 0 where the errors do. Widening all errors by one factor instead would leave the weight with the points
+    whose own errors are smallest.
+
+    References: R.C. Paule and J. Mandel, J. Res. Natl. Bur. Stand. 87 (1982) 377.
+    """
+
+    def fitted(s: float) -> StraightLine:
+        weight = 1.0 / np.hypot(error, s)
+        (slope, intercept), covariance = np.polyfit(x, y, 1, w=weight, cov="unscaled")
+        chi2 = float(np.sum((weight * (y - intercept - slope * x)) ** 2))
+        return StraightLine(float(slope), float(intercept), covariance, chi2 / max(len(x) - 2, 1))
+
+    line = fitted(0.0)
+    if len(y) < 3 or line.reduced <= 1:
+        return line, 0.0
+    high = float(np.std(y - np.polyval(np.polyfit(x, y, 1), x))) * np.sqrt(len(y)) + float(error.max())
+    s = float(brentq(lambda s: fitted(s).reduced - 1.0, 0.0, high, xtol=1e-4 * high))
+    return fitted(s), s
 
 
 def voltage_frequency(runs: Sequence[Run]) -> Finding:
@@ -159,8 +190,6 @@ def _data(
     read: tuple[str, str],
     runs: Sequence[Run],
 ) -> xr.Dataset:
-    import xarray as xr
-
     low = min(float(setting.min()), 0.0)
     fine = np.linspace(low, float(setting.max()), 200)
     rows = np.column_stack([fine, np.ones_like(fine)])

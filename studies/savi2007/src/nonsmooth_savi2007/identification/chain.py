@@ -268,15 +268,13 @@ class _Chain:
         if not runs:
             return None
         with _of("impulse"):
-            decay = free_decay(
-                [(run.time, run.positions) for run in runs], resolution=resolution, names=[run.name for run in runs]
-            )
+            decay = free_decay(runs, resolution=resolution)
         self.left_out("impulse", decay)
-        for sentence in slipped_late(runs, decay, resolution):
+        for sentence in slipped_late(decay, resolution):
             self.say(sentence)
         self.observe(("omega_0", "b", "f"), decay.values[:3], decay.covariance[:3, :3], "free decay")
-        self.beside("natural frequency (Fig. 5)", lambda: natural_frequency(runs, decay))
-        self.beside("damping by free decay", lambda: decay_damping(runs, decay, self.mass, resolution=resolution))
+        self.beside("natural frequency (Fig. 5)", lambda: natural_frequency(decay))
+        self.beside("damping by free decay", lambda: decay_damping(decay, self.mass, resolution=resolution))
         return decay
 
     def response(self, decay: DecayFit | None) -> Steady:
@@ -338,7 +336,7 @@ class _Chain:
             if counted is None:
                 self.notes.append("the graze was sought at another setting of the screw: its gap is not compared")
             else:
-                at_rest = Estimate(counted.value - float(decay.values[3]), counted.error, "m")
+                at_rest = Estimate(counted.value - decay.rest, counted.error, "m")
         found = cross_checks(
             self.findings,
             masses,

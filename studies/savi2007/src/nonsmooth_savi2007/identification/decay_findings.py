@@ -33,20 +33,17 @@ that one count makes of it, and beside it the whole decay in the time domain, wh
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth import SolveError
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit, free_decay
 from nonsmooth_savi2007.identification.picture_data import picture_data
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _SLOWEST = 0.02  # m/s, of the slowest half swing of the test mass that is used
 GRID = 2048  # samples of the paper's DFT: 100 Hz / 2048 * 15 = 0.732 Hz
@@ -93,15 +90,13 @@ def _between(time: FloatArray, x: FloatArray, low: float, high: float) -> tuple[
     return np.linspace(low, high, FINE), np.abs(lines)
 
 
-def natural_frequency(runs: Sequence[Run], decay: DecayFit) -> Finding:
+def natural_frequency(decay: DecayFit) -> Finding:
     r"""The undamped natural frequency by decay, with the DFT's peak, its grid and its interpolation beside it.
 
     Parameters
     ----------
-    runs : sequence of Run
-        The taps.
     decay : DecayFit
-        Their free decays.
+        Of the taps.
 
     Returns
     -------
@@ -109,26 +104,22 @@ def natural_frequency(runs: Sequence[Run], decay: DecayFit) -> Finding:
         :math:`\omega_0` (rad/s). ``others``: ``dft_grid``, the largest value of a DFT of 2048 samples, known to half a
         step; ``dft_peak``, its peak by interpolation; ``dft_undamped``, :math:`\sqrt{\omega_p^2 + b^2/2}` from it.
     """
-    used = [runs[i] for i in decay.runs]
-    largest = max(range(len(used)), key=lambda i: float(np.ptp(used[i].positions)))
-    run = used[largest]
-    time, x = run.time, run.positions - decay.values[3]
+    largest = max(range(len(decay.parts)), key=lambda i: float(np.ptp(decay.parts[i].run.positions)))
+    run, begin, end = decay.parts[largest]
+    time, x = run.time, run.positions - decay.rest
     rate = (len(time) - 1) / float(time[-1] - time[0])
-    record = np.zeros(max(GRID, len(x)))
-    record[: len(x)] = x
-    magnitude = np.abs(np.fft.rfft(record[:GRID])) / rate
+    magnitude = np.abs(np.fft.rfft(x, GRID)) / rate
     frequency = np.fft.rfftfreq(GRID, 1 / rate)
     grid_step = rate / GRID
     top = 1 + int(np.argmax(magnitude[1:]))
     peak, spread = spectral_peak(time, x, float(frequency[top]), grid_step, decay.noise)
-    value, error, b = float(decay.values[0]), decay.error("omega_0"), float(decay.values[1])
-    begin, end = decay.spans[largest]
+    (value, b, _), error = decay.law, decay.error("omega_0")
     fitted = np.full(len(x), np.nan)
-    fitted[begin:end] = decay.fitted(largest) - decay.values[3]
+    fitted[begin:end] = decay.fitted(largest) - decay.rest
     grid = 2 * np.pi * grid_step
     at_peak, peak_error = 2 * np.pi * peak, 2 * np.pi * spread
     undamped = float(np.sqrt(at_peak**2 + b**2 / 2))
-    below = 2 * np.pi * grid_step * np.floor(value / grid)
+    below = grid * np.floor(value / grid)
     notes = (
         f"the largest value of a DFT of {GRID} samples stands at {frequency[top]:.4f} Hz, "
         f"{2 * np.pi * frequency[top]:.3f} rad/s, on a grid of {grid_step:.4f} Hz = {grid:.3f} rad/s: it says no more "
@@ -158,7 +149,7 @@ def natural_frequency(runs: Sequence[Run], decay: DecayFit) -> Finding:
         Estimate(value, error, "rad/s"),
         "free decay in the time domain, viscous damping and dry friction",
         decay.samples,
-        tuple(r.name for r in used),
+        decay.runs,
         notes,
         {
             "dft_grid": Estimate(2 * np.pi * float(frequency[top]), grid / np.sqrt(12), "rad/s", half_width=grid / 2),
@@ -180,15 +171,13 @@ def envelope(time: FloatArray, first: float, omega_0: float, b: float, f: float)
     return np.maximum((first + below) * np.exp(-b * np.asarray(time) / 2) - below, 0.0)
 
 
-def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: Quantity, *, resolution: float) -> Finding:
+def decay_damping(decay: DecayFit, mass: Quantity, *, resolution: float) -> Finding:
     r"""Viscous damping and dry friction from the shape of free decays, with the decrement of the same decays beside it.
 
     Parameters
     ----------
-    runs : sequence of Run
-        The taps.
     decay : DecayFit
-        Their fit, by `free_decay`.
+        Of the taps, by `free_decay`.
     mass : Quantity
         Mass (kg) with its standard uncertainty.
     resolution : float
@@ -200,78 +189,69 @@ def decay_damping(runs: Sequence[Run], decay: DecayFit, mass: Quantity, *, resol
         c (N s/m). ``others``: ``friction`` (N), ``c_viscous_only`` by the logarithmic decrement of the same
         decays; ``covariance`` is that of c and friction.
     """
-    peaks = [_peaks(runs[i], span, decay, resolution) for i, span in zip(decay.runs, decay.spans, strict=True)]
-    viscous = np.array([decay_rate(*row) for row in peaks if len(row[0]) > 2]).reshape(-1, 3)
-    if not len(viscous):
+    peaks = []
+    for run, first, last in decay.parts:  # the first turning point lies within a sample of where the fit begins
+        used = slice(max(first - 3, 0), last)
+        peaks.append(log_decrement(run.time[used], run.positions[used], decay.rest, resolution=resolution))
+    lines = [decay_rate(*row) for row in peaks if len(row[0]) > 2]
+    if not lines:
         raise SolveError(
             f"no tap has three turning points that stand {resolution:g} m apart, so its decrement is not known: a "
             "motion that does not decay, or a length on the pulley that is wrong"
         )
-    weight = 1.0 / viscous[:, 2]
-    rate = -2 * float(np.average(viscous[:, 0], weights=weight))
-    rate_error = 2 * float(np.sqrt(1 / np.sum(weight)))
-    plain = mass.value * rate
+    slopes, _, variances = np.transpose(lines)
+    rate = Estimate(-2 * float(np.average(slopes, weights=1 / variances)), 2 / float(np.sqrt(np.sum(1 / variances))))
+    plain = rate.times(mass.value, mass.uncertainty, "N s/m")
     own = mass.value**2 * decay.covariance[1:3, 1:3]
     covariance = own + mass.uncertainty**2 * np.outer(decay.values[1:3], decay.values[1:3])
-    errors = np.sqrt(np.diag(covariance)).tolist()
     c, friction = (
-        Estimate(mass.value * value, error, unit)
-        for value, error, unit in zip(decay.values[1:3].tolist(), errors, ("N s/m", "N"), strict=True)
+        Estimate(mass.value * value, float(np.sqrt(variance)), unit)
+        for value, variance, unit in zip(decay.law[1:], np.diag(covariance), ("N s/m", "N"), strict=True)
     )
     related = float(own[0, 1] / np.sqrt(own[0, 0] * own[1, 1])) if own[1, 1] else 0.0
-    notes = [
-        f"by their logarithmic decrement, without friction, the same decays give {plain:.4g} N s/m, "
-        f"{100 * (plain / c.value - 1):+.1f} %",
-        f"c and the dry friction are told apart by the shape; correlation {related:+.2f}",
-        *decay.notes,
-    ]
     return Finding(
         "c_decay",
         c,
         "free decays, viscous damping and dry friction at once",
         decay.samples,
-        tuple(runs[i].name for i in decay.runs),
-        tuple(notes),
-        {
-            "friction": friction,
-            "c_viscous_only": Estimate(rate, rate_error).times(mass.value, mass.uncertainty, "N s/m"),
-        },
+        decay.runs,
+        (
+            f"by their logarithmic decrement, without friction, the same decays give {plain.value:.4g} N s/m, "
+            f"{100 * (plain.value / c.value - 1):+.1f} %",
+            f"c and the dry friction are told apart by the shape; correlation {related:+.2f}",
+            *decay.notes,
+        ),
+        {"friction": friction, "c_viscous_only": plain},
         covariance,
-        _data(runs, decay, peaks, c, friction),
+        _data(decay, peaks, c, friction),
         "free_decay",
     )
 
 
-def _peaks(run: Run, span: tuple[int, int], decay: DecayFit, resolution: float) -> tuple[FloatArray, ...]:
-    """Turning points of the part that is used; the first lies within a sample of where the fit begins."""
-    early = slice(max(span[0] - 3, 0), span[1])
-    return log_decrement(run.time[early], run.positions[early], float(decay.values[3]), resolution=resolution)
-
-
-def _data(
-    runs: Sequence[Run], decay: DecayFit, peaks: Sequence[tuple[FloatArray, ...]], c: Estimate, friction: Estimate
-) -> xr.Dataset:
-    natural, b, f, rest = (float(v) for v in decay.values)
-    widths = [np.ptp(runs[i].positions[slice(*at)]) for i, at in zip(decay.runs, decay.spans, strict=True)]
-    which = int(np.argmax(widths))
-    run, (begin, end) = runs[decay.runs[which]], decay.spans[which]
-    time, x = run.time[begin:end], run.positions[begin:end]
-    at, height, error = peaks[which]
+def _data(decay: DecayFit, peaks: Sequence[tuple[FloatArray, ...]], c: Estimate, friction: Estimate) -> xr.Dataset:
+    """The widest decay with its turning points and both envelopes."""
+    natural, b, f = decay.law
+    which = max(range(len(peaks)), key=lambda i: float(np.ptp(decay.parts[i].x)))
+    part, (at, height, error) = decay.parts[which], peaks[which]
+    time = part.time
     # the first turning point after the first fitted sample, and its height, to second order
     first, v = decay.begins(which)
     late = v / (natural**2 * first)
-    slope, intercept, _ = decay_rate(*peaks[which])
+    slope, intercept, _ = decay_rate(at, height, error)
     begun = time[0] + late
     at = at - begun
     fine = np.linspace(0.0, float(at[-1]), 200)
     plain = np.exp(intercept + slope * (begun + fine))
-    fitted = decay.fitted(which) - rest
     both = envelope(fine, float(abs(first) * (1 + (natural * late) ** 2 / 2)), natural, b, f)
     return picture_data(
-        [run],
+        [part.run],
         {
             "peak": {"peak_time": at, "peak_height": height, "peak_height_error": error},
-            "time": {"time": time - time[0], "x": x - rest, "fitted": fitted},
+            "time": {
+                "time": time - time[0],
+                "x": part.x - decay.rest,
+                "fitted": decay.fitted(which) - decay.rest,
+            },
             "fine_time": {"fine_time": fine, "envelope_both": both, "envelope_viscous": plain},
         },
         c=c,
@@ -285,11 +265,10 @@ def log_decrement(time: FloatArray, x: FloatArray, rest: float, *, resolution: f
     Only points higher than ten counts are taken.
     """
     away = x - rest
-    index = np.flatnonzero((np.abs(away[2:-2]) >= np.abs(away[1:-3])) & (np.abs(away[2:-2]) > np.abs(away[3:-1]))) + 2
+    size = np.abs(away)
+    top = (size[2:-2] >= size[1:-3]) & (size[2:-2] > size[3:-1]) & (size[2:-2] >= 10 * resolution)
     rows = []
-    for i in index:
-        if abs(away[i]) < 10 * resolution:
-            continue
+    for i in np.flatnonzero(top) + 2:
         t = time[i - 2 : i + 3] - time[i]
         c0, c1, c2 = np.polynomial.polynomial.polyfit(t, away[i - 2 : i + 3], 2)
         if c2 * c0 >= 0:
@@ -320,62 +299,53 @@ def support_damping(runs: Sequence[Run], *, resolution: float, test_mass: Quanti
     test_mass : Quantity
         Its mass (kg).
     """
-    decay = free_decay(
-        [(run.time, run.positions) for run in runs],
-        resolution=resolution,
-        slowest=_SLOWEST,
-        friction=False,
-        names=[run.name for run in runs],
-    )
-    slopes, weights, data = [], [], None
-    notes = list(decay.notes)
-    for i, (begin, end) in zip(decay.runs, decay.spans, strict=True):
-        time, x = runs[i].time[begin:end], runs[i].positions[begin:end]
-        t, height, error = log_decrement(time, x, float(decay.values[3]), resolution=resolution)
-        if len(t) < 4:
-            notes.append(f"run {runs[i].name!r}: no logarithmic decrement, {len(t)} turning points above ten counts")
-            continue
-        slope, intercept, variance = decay_rate(t, height, error)
-        slopes.append(slope)
-        weights.append(1 / variance)
-        if data is None:
-            ratio = -slope / decay.values[0]
-            spread = float(np.sqrt(variance))
-            data = picture_data(
-                [runs[i]],
-                {
-                    "time": {"time": runs[i].time, "x": runs[i].positions - decay.values[3]},
-                    "peak": {
-                        "peak_time": t,
-                        "peak_height": height,
-                        "log_height": np.log(height),
-                        "log_height_error": error / height,
-                        "used": np.ones(len(t), dtype=np.int8),
-                    },
-                },
-                intercept=intercept,
-                slope=Estimate(slope, spread, "1/s"),
-                damping_ratio=Estimate(ratio, spread / decay.values[0]),
+    decay = free_decay(runs, resolution=resolution, slowest=_SLOWEST, friction=False)
+    notes, lines = list(decay.notes), []
+    for part in decay.parts:
+        peaks = log_decrement(part.time, part.x, decay.rest, resolution=resolution)
+        if len(peaks[0]) < 4:
+            notes.append(
+                f"run {part.run.name!r}: no logarithmic decrement, {len(peaks[0])} turning points above ten counts"
             )
-    mass = test_mass.value
-    if not slopes:
+        else:
+            lines.append((part.run, peaks, decay_rate(*peaks)))
+    if not lines:
         raise ValueError("no drop has four turning points above ten counts: drop it from higher, or record longer")
-    rate = float(np.average(slopes, weights=weights))
+    slopes, _, variances = np.transpose([line for _, _, line in lines])
+    rate = float(np.average(slopes, weights=1 / variances))
     spread = float(np.std(slopes, ddof=1) / np.sqrt(len(slopes))) if len(slopes) > 1 else 0.0
-    rate_error = max(float(1 / np.sqrt(np.sum(weights))), spread)
+    rate_error = max(float(1 / np.sqrt(np.sum(1 / variances))), spread)
+    mass, natural = test_mass.value, decay.law[0]
     value = -2 * mass * rate
     error_total = abs(value) * float(np.hypot(rate_error / rate, test_mass.uncertainty / mass))
+    run, (t, height, error), (slope, intercept, variance) = lines[0]
+    data = picture_data(
+        [run],
+        {
+            "time": {"time": run.time, "x": run.positions - decay.rest},
+            "peak": {
+                "peak_time": t,
+                "peak_height": height,
+                "log_height": np.log(height),
+                "log_height_error": error / height,
+                "used": np.ones(len(t), dtype=np.int8),
+            },
+        },
+        intercept=intercept,
+        slope=Estimate(slope, float(np.sqrt(variance)), "1/s"),
+        damping_ratio=Estimate(-slope / natural, float(np.sqrt(variance)) / natural),
+    )
     finding = Finding(
         "c_s_drop",
         Estimate(value, error_total, "N s/m", logarithmic=value > 0),
         "logarithmic decrement, regression over all turning points (Fig. 7)",
         decay.samples,
-        tuple(runs[i].name for i in decay.runs),
+        decay.runs,
         tuple(notes),
         others={
-            "c_s_fit": Estimate(float(decay.values[1]), decay.error("b")).times(mass, test_mass.uncertainty, "N s/m"),
-            "omega_s": Estimate(float(decay.values[0]), decay.error("omega_0"), "rad/s"),
-            "damping_ratio": Estimate(-rate / float(decay.values[0]), rate_error / float(decay.values[0])),
+            "c_s_fit": Estimate(decay.law[1], decay.error("b")).times(mass, test_mass.uncertainty, "N s/m"),
+            "omega_s": Estimate(natural, decay.error("omega_0"), "rad/s"),
+            "damping_ratio": Estimate(-rate / natural, rate_error / natural),
         },
         data=data,
         plot="drop_decay",

@@ -23,18 +23,37 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
-from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth.arrays import FloatArray
 from nonsmooth_savi2007.identification.consistency import Consistent, consistent
+from nonsmooth_savi2007.identification.evidence import Run
 
 #: Speed (m/s) of the slowest half swing that is used.
 SLOWEST = 0.03
 _NAMES = ("omega_0", "b", "f", "x_e")
 _UNFITTING = 2.0  # residuals of a run over those of the median run, from which the law does not fit it
+
+
+class Decay(NamedTuple):
+    """The part of a run that is used: from its first sample to before its last."""
+
+    run: Run
+    first: int
+    last: int
+
+    @property
+    def time(self) -> FloatArray:
+        """Times in the run (s)."""
+        return self.run.time[self.first : self.last]
+
+    @property
+    def x(self) -> FloatArray:
+        """Positions (m), as counted."""
+        return self.run.positions[self.first : self.last]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +65,31 @@ class DecayFit:
 
     values: FloatArray
     covariance: FloatArray
-    runs: tuple[int, ...]
-    spans: tuple[tuple[int, int], ...]
+    parts: tuple[Decay, ...]
     fit: ParameterSet
     notes: tuple[str, ...] = ()
+
+    @property
+    def law(self) -> tuple[float, float, float]:
+        """Values of omega_0, b and f."""
+        natural, b, f, _ = self.values.tolist()
+        return natural, b, f
+
+    @property
+    def rest(self) -> float:
+        """Place of rest (m) in the sensor's count."""
+        return float(self.values[3])
+
+    @property
+    def held(self) -> float:
+        """As far as dry friction holds the car off its rest (m): F_C/2k."""
+        natural, _, f = self.law
+        return f / natural**2
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """Names of the runs that entered."""
+        return tuple(part.run.name for part in self.parts)
 
     @property
     def samples(self) -> int:
@@ -73,7 +113,7 @@ class DecayFit:
 
     def begins(self, which: int) -> tuple[float, float]:
         """Position from rest (m) and velocity (m/s) of one of the runs at its first sample."""
-        of = f", {which}" if len(self.runs) > 1 else ""
+        of = f", {which}" if len(self.parts) > 1 else ""
         return self.fit.extra[f"x(0){of}"].value, self.fit.extra[f"v_x(0){of}"].value
 
 
@@ -116,28 +156,19 @@ def swing(time: FloatArray, x: FloatArray, *, resolution: float, slowest: float 
     return begin, end
 
 
-def free_decay(
-    runs: Sequence[tuple[Any, Any]],
-    *,
-    resolution: float,
-    slowest: float = SLOWEST,
-    friction: bool = True,
-    names: Sequence[str] | None = None,
-) -> DecayFit:
+def free_decay(runs: Sequence[Run], *, resolution: float, slowest: float = SLOWEST, friction: bool = True) -> DecayFit:
     r"""Fit :math:`\omega_0`, c/m and F_C/m to free decays.
 
     Parameters
     ----------
-    runs : sequence of (time, x)
-        Records (s, m), each with one tap and its decay.
+    runs : sequence of Run
+        Each with one tap and its decay.
     resolution : float
         Length of a count (m).
     slowest : float
         Speed (m/s) of the slowest half swing that is used.
     friction : bool
         False: viscous damping only.
-    names : sequence of str, optional
-        Names of the records for the notes on those that cannot be used.
 
     Returns
     -------
@@ -151,55 +182,23 @@ def free_decay(
     SolveError
         If the fit does not settle.
     """
-    records, notes = _records(runs, resolution, slowest, names)
-    if not records:
+    method = _Method(resolution, slowest, friction)
+    used = method.used
+    parts, notes = method.parts(runs)
+    if not parts:
         raise ValueError("no free decay can be used; " + "; ".join(notes))
-    used, agreed, start = _used(friction), None, np.zeros(4)
-    if len(records) > 1:
-        chosen, agreed, said = _agreeing(records, runs, resolution, slowest, friction)
-        records, notes = [records[i] for i in chosen], notes + said
+    agreed, first = None, method.guess(parts)
+    if len(parts) > 1:
+        parts, agreed, said = _agreeing(method, parts, first)
+        notes, first = notes + said, method.guess(parts)
     if agreed is not None:
-        start[used] = agreed.mean
-    values, covariance, found = _fit(records, friction, resolution, _guess(records) if agreed is None else start)
+        first[used] = agreed.mean
+    values, covariance, found = method.fit(parts, first)
     if agreed is not None and not agreed.agree:
         values[used], covariance[np.ix_(used, used)] = agreed.mean, agreed.covariance + agreed.scatter
     else:
-        covariance += _doubt(records, runs, resolution, slowest, friction, values)
-    return DecayFit(
-        values, covariance, tuple(r.number for r in records), tuple(r.span for r in records), found, tuple(notes)
-    )
-
-
-class _Record(NamedTuple):
-    """The used part of a record: number of its run, name, first and last+1 sample, times (s) and positions (m)."""
-
-    number: int
-    name: str
-    span: tuple[int, int]
-    time: FloatArray
-    x: FloatArray
-
-
-def _records(
-    runs: Sequence[tuple[Any, Any]], resolution: float, slowest: float, names: Sequence[str] | None
-) -> tuple[list[_Record], list[str]]:
-    """The records that hold a decay, and a sentence on each that does not."""
-    found, notes = [], []
-    for i, (time, x) in enumerate(runs):
-        t, position = np.asarray(time, dtype=np.float64), np.asarray(x, dtype=np.float64)
-        name = f"decay {i + 1}" if names is None else f"run {names[i]!r}, channel 'Angle'"
-        try:
-            begin, end = swing(t, position, resolution=resolution, slowest=slowest)
-        except ValueError as error:
-            notes.append(f"{name}: not used: {error}")
-            continue
-        found.append(_Record(i, name, (begin, end), t[begin:end] - t[begin], position[begin:end]))
-    return found, notes
-
-
-def _used(friction: bool) -> list[int]:
-    """Indices of the parameters that are fitted."""
-    return [0, 1, 2, 3] if friction else [0, 1, 3]
+        covariance += method.doubt(parts, values)
+    return DecayFit(values, covariance, tuple(parts), found, tuple(notes))
 
 
 @cache
@@ -212,118 +211,126 @@ def _oscillator(friction: bool) -> System:
     )
 
 
-def _fit(
-    records: Sequence[_Record], friction: bool, resolution: float, first: FloatArray
-) -> tuple[FloatArray, FloatArray, ParameterSet]:
-    """The four values, their covariance and the fit; zeros for a friction that is not fitted."""
-    used = _used(friction)
-    names = [_NAMES[i] for i in used[:-1]]
-    system = _oscillator(friction).with_parameters(dict(zip(names, first[used[:-1]].tolist(), strict=True)))
-    found = fit(
-        system,
-        [{"x": (r.time, r.x)} for r in records],
-        [*names, "x.offset"],
-        measured={"x": Sensor(resolution=resolution, offset=float(first[3]))},
-        mode="dry_stick" if friction else None,
-        tries=1,
-        progress=False,
-    )
-    values, covariance = np.zeros(4), np.zeros((4, 4))
-    names.append("x.offset")
-    values[used] = [found.estimate(name).value for name in names]
-    covariance[np.ix_(used, used)] = found.full_covariance.sel(parameter=names, other=names)
-    if not np.isfinite(covariance).all():
-        raise SolveError(f"the decays do not determine {', '.join(names)}")
-    return values, covariance, found
+class _Method(NamedTuple):
+    """The fit of decays: length of a count (m), speed of the slowest half swing (m/s), and whether friction acts."""
+
+    resolution: float
+    slowest: float
+    friction: bool
+
+    @property
+    def used(self) -> list[int]:
+        """Indices of the parameters that are fitted."""
+        return [0, 1, 2, 3] if self.friction else [0, 1, 3]
+
+    def parts(self, runs: Sequence[Run]) -> tuple[list[Decay], list[str]]:
+        """The runs that hold a decay, and a sentence on each that does not."""
+        found, notes = [], []
+        for run in runs:
+            try:
+                span = swing(run.time, run.positions, resolution=self.resolution, slowest=self.slowest)
+                found.append(Decay(run, *span))
+            except ValueError as error:
+                notes.append(f"{_named(run)}: not used: {error}")
+        return found, notes
+
+    def guess(self, parts: Sequence[Decay]) -> FloatArray:
+        """From turning points: half a period between them; each swing is q times the one before."""
+        periods, ratios = [], []
+        for part in parts:
+            away = part.x - (float(np.mean(part.x[-20:])) if len(part.x) > 40 else 0.0)
+            turned = np.flatnonzero(np.sign(away[1:]) != np.sign(away[:-1]))
+            if len(turned) > 1:
+                periods.append(2 * float(np.mean(np.diff(part.time[turned]))))
+                heights = [np.max(np.abs(away[a:b])) for a, b in pairwise(turned)]
+                ratios += [h / g for g, h in pairwise(heights) if g > 0]
+        period = float(np.median(periods)) if periods else 1.4
+        ratio = min(float(np.median(ratios)), 0.99) if ratios else 0.7
+        b = -4 * np.log(ratio) / period  # swing to swing: exp(-b T/4)
+        return np.array([np.sqrt((2 * np.pi / period) ** 2 + b**2 / 4), b, 0.005, 0.0])
+
+    def fit(self, parts: Sequence[Decay], first: FloatArray) -> tuple[FloatArray, FloatArray, ParameterSet]:
+        """The four values, their covariance and the fit; zeros for a friction that is not fitted."""
+        names = [_NAMES[i] for i in self.used[:-1]]
+        found = fit(
+            _oscillator(self.friction).with_parameters(dict(zip(names, first[self.used].tolist(), strict=False))),
+            [{"x": (part.time - part.time[0], part.x)} for part in parts],
+            [*names, "x.offset"],
+            measured={"x": Sensor(resolution=self.resolution, offset=float(first[3]))},
+            mode="dry_stick" if self.friction else None,
+            tries=1,
+            progress=False,
+        )
+        values, covariance = np.zeros(4), np.zeros((4, 4))
+        names.append("x.offset")
+        values[self.used] = [found.estimate(name).value for name in names]
+        covariance[np.ix_(self.used, self.used)] = found.full_covariance.sel(parameter=names, other=names)
+        if not np.isfinite(covariance).all():
+            raise SolveError(f"the decays do not determine {', '.join(names)}")
+        return values, covariance, found
+
+    def doubt(self, parts: Sequence[Decay], values: FloatArray) -> FloatArray:
+        """Covariance of the law: how far the values move when half of the speed is let in."""
+        slower = self._replace(slowest=self.slowest / 2).parts([part.run for part in parts])[0]
+        moved = self.fit(slower, values)[0] - values
+        return np.outer(moved, moved)
 
 
-def _doubt(
-    records: Sequence[_Record],
-    runs: Sequence[tuple[Any, Any]],
-    resolution: float,
-    slowest: float,
-    friction: bool,
-    values: FloatArray,
-) -> FloatArray:
-    """Covariance of the law: how far the values move when half of the speed is let in."""
-    slower = _records([runs[r.number] for r in records], resolution, slowest / 2, None)[0]
-    moved = _fit(slower, friction, resolution, values)[0] - values
-    return np.outer(moved, moved)
+def _named(run: Run) -> str:
+    return f"run {run.name!r}, channel 'Angle'"
 
 
 def _agreeing(
-    records: Sequence[_Record], runs: Sequence[tuple[Any, Any]], resolution: float, slowest: float, friction: bool
-) -> tuple[list[int], Consistent | None, list[str]]:
-    """Records that are used, what they agree on where there are several, and a sentence on each that is left out.
+    method: _Method, parts: list[Decay], first: FloatArray
+) -> tuple[list[Decay], Consistent | None, list[str]]:
+    """Parts that are used, what they agree on where there are several, and a sentence on each that is left out.
 
     Each is fitted alone. One that the law does not fit (a string that slipped on the wheel, a hand that touched) leaves
     more than the others; one that it fits may still tell other values.
     """
-    alone: dict[int, tuple[FloatArray, FloatArray]] = {}
-    left: dict[int, float] = {}
-    first = _guess(records)
-    for i, r in enumerate(records):
+    used, alone, left = method.used, {}, {}
+    for i, part in enumerate(parts):
         try:
-            values, covariance, found = _fit([r], friction, resolution, first)
-            alone[i] = values, covariance + _doubt([r], runs, resolution, slowest, friction, values)
+            values, covariance, found = method.fit([part], first)
+            covariance += method.doubt([part], values)
         except SolveError:
             continue
-        left[i] = found.extra["x.noise"].value
+        alone[i], left[i] = (values[used], covariance[np.ix_(used, used)]), found.extra["x.noise"].value
     said = []
     typical = float(np.median(list(left.values()))) if left else 1.0
     good = [i for i, noise in left.items() if noise <= _UNFITTING * typical]
-    if 2 * len(good) <= len(records):
+    if 2 * len(good) <= len(parts):
         return (
-            list(range(len(records))),
+            parts,
             None,
             [
-                f"{len(records) - len(good)} of {len(records)} decays are not those of the law, and no majority is: "
+                f"{len(parts) - len(good)} of {len(parts)} decays are not those of the law, and no majority is: "
                 "see whether the string slips on the wheel, and tap again"
             ],
         )
-    for i, r in enumerate(records):
+    for i, part in enumerate(parts):
         if i not in good:
             by = (
                 "no decay fits it"
                 if i not in left
                 else f"it is {left[i] / typical:.1f} times as far from a decay as the others are (root of chi^2)"
             )
-            said.append(f"{r.name}: left out: {by}; see whether the string slipped on the wheel")
+            said.append(f"{_named(part.run)}: left out: {by}; see whether the string slipped on the wheel")
     if len(good) < 2:
-        return good, None, said
-    used = _used(friction)
-    told = [(alone[i][0][used], alone[i][1][np.ix_(used, used)]) for i in good]
-    agreed = consistent([values for values, _ in told], [covariance for _, covariance in told])
-    for i, keep, (values, covariance) in zip(good, agreed.used, told, strict=True):
+        return [parts[i] for i in good], None, said
+    agreed = consistent(*zip(*(alone[i] for i in good), strict=True))
+    for i, keep in zip(good, agreed.used, strict=True):
         if not keep:
-            off = agreed.off(values, covariance)
+            off = agreed.off(*alone[i])
             k = int(np.argmax(np.abs(off)))
             said.append(
-                f"{records[i].name}: left out: its {_NAMES[used[k]]} is {off[k]:+.1f} combined uncertainties from that "
-                f"of the {np.count_nonzero(agreed.used)} runs that agree; see whether the string slipped on the wheel"
+                f"{_named(parts[i].run)}: left out: its {_NAMES[used[k]]} is {off[k]:+.1f} combined uncertainties from "
+                f"that of the {np.count_nonzero(agreed.used)} runs that agree; see whether the string slipped on the "
+                "wheel"
             )
     if not agreed.agree:
         said.append(
             f"the {len(good)} decays disagree (Birge ratio {agreed.birge:.1f}) and no majority agrees: all are used, "
             "with the scatter between them as uncertainty; see whether the string slips on the wheel"
         )
-    return [i for i, keep in zip(good, agreed.used, strict=True) if keep], agreed, said
-
-
-def _guess(records: Sequence[_Record]) -> FloatArray:
-    """From turning points: half a period between them; each swing is q times the one before."""
-    periods, ratios, rests = [], [], []
-    for p in records:
-        rest = float(np.mean(p.x[-20:])) if len(p.x) > 40 else 0.0
-        away = p.x - rest
-        turned = np.flatnonzero(np.sign(away[1:]) != np.sign(away[:-1]))
-        if len(turned) > 1:
-            periods.append(2 * float(np.mean(np.diff(p.time[turned]))))
-            heights = [np.max(np.abs(away[a:b])) for a, b in pairwise(turned)]
-            ratios += [h / g for g, h in pairwise(heights) if g > 0]
-        rests.append(0.0)
-    period = float(np.median(periods)) if periods else 1.4
-    ratio = min(float(np.median(ratios)), 0.99) if ratios else 0.7
-    b = -4 * np.log(ratio) / period  # swing to swing: exp(-b T/4)
-    omega_d = 2 * np.pi / period
-    return np.array([np.sqrt(omega_d**2 + b**2 / 4), b, 0.005, float(np.mean(rests))])
+    return [parts[i] for i, keep in zip(good, agreed.used, strict=True) if keep], agreed, said

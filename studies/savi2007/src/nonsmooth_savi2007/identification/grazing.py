@@ -95,10 +95,10 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
     contact, limit = _touching(seen, resolution)
     last, first = _bracket(seen, contact)
     free = ~contact
-    a, (natural, b, f) = float(seen.crank[0]), (float(v) for v in decay.values[:3])
+    a, (natural, b, f) = float(seen.crank[0]), decay.law
 
     def model(omega: FloatArray) -> FloatArray:
-        return np.array([grazing_amplitude(float(w), natural, b, f, a) for w in omega])
+        return grazing_amplitude(omega, a, natural, b, f)
 
     height = _height(seen, free, last, model)
     ends = seen.omega[[last, first]]
@@ -117,7 +117,7 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
             by += f", and did, {1e6 * (0.5 * (least + most) - high):.0f} µm early"
         low, high = max(low, least), max(high, most)
     gap, half = 0.5 * (low + high), 0.5 * abs(high - low)
-    zero, zero_error = float(decay.values[3]), decay.error("x_e")
+    zero, zero_error = decay.rest, decay.error("x_e")
     at_rest = float(np.hypot(np.hypot(normal, zero_error), uniform(half)))
     total = float(np.hypot(normal, uniform(half)))
     width = 0.5 * float(np.ptp(ends))
@@ -199,7 +199,7 @@ def _by_push(
     """
     from scipy.optimize import brentq
 
-    run, (natural, _, f) = seen.runs[first], (float(v) for v in decay.values[:3])
+    run, (natural, _, f) = seen.runs[first], decay.law
     period = 2 * np.pi / float(seen.omega[first])
     turn = np.floor((run.time - run.time[0]) / period).astype(int)
     tops = np.array([run.positions[turn == i].max() for i in range(turn.max())]) - place

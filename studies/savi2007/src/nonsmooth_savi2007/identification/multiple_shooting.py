@@ -122,8 +122,8 @@ def _rig(wanders: bool) -> System:
 
 def known_before(run: Run, decay: DecayFit, mark: float = 0.0, **also: Estimate) -> ParameterSet:
     """Priors: what the decays, the settings of a run, and ``also`` others by themselves, tell of its motion."""
-    crank, rest = float(run.settings["crank_length"]), float(decay.values[3])
-    values = (*decay.values[:3], float(run.settings["gap"]) + rest, rest, crank, mark, 0.0, 0.0)
+    crank, rest = float(run.settings["crank_length"]), decay.rest
+    values = (*decay.law, float(run.settings["gap"]) + rest, rest, crank, mark, 0.0, 0.0)
     # the gap as read to 1.5 mm; the crank as set to 0.5 %, a phase of the mark to 0.05 rad, a second harmonic to 3 %
     covariance = np.diag([0.0, 0.0, 0.0, 1.5e-3, 1e-3, 5e-3 * crank, 0.05, 0.03 * crank, 0.03 * crank]) ** 2
     covariance[:3, :3] = decay.covariance[:3, :3] + 1e-12 * np.diag(np.diag(decay.covariance)[:3])
@@ -195,7 +195,7 @@ def shoot_contacts(
         If no run can be fitted.
     """
     rows: list[tuple[Run, ParameterSet, ParameterSet, FloatArray]] = []
-    left, touched = [], [run for run in runs if _touches(run, float(decay.values[3]))]
+    left, touched = [], [run for run in runs if _touches(run, decay.rest)]
     if not touched:
         raise ValueError("no run shows a contact: the gap and the support cannot be found from them")
     for run in touched:

@@ -161,11 +161,11 @@ def _length(run: Run, name: str) -> float:
     return value
 
 
-def slipped_late(taps: Sequence[Run], decay: DecayFit, resolution: float) -> Iterator[str]:
+def slipped_late(decay: DecayFit, resolution: float) -> Iterator[str]:
     """A sentence for each tap that ends farther from rest than friction can hold a car: the string slipped later."""
-    held = float(decay.values[2] / decay.values[0] ** 2) + 2 * resolution
-    for run in (taps[i] for i in decay.runs):
-        off = float(np.median(run.positions[-max(10, len(run.time) // 20) :])) - decay.values[3]
+    held = decay.held + 2 * resolution
+    for run in (part.run for part in decay.parts):
+        off = float(np.median(run.positions[-max(10, len(run.time) // 20) :])) - decay.rest
         if abs(off) > held:
             yield (
                 f"impulse: run {run.name!r}, channel 'Angle': ends {1e3 * off:+.2f} mm from where the car rests, and "

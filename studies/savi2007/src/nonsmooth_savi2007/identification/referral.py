@@ -304,7 +304,7 @@ def places(evidence: Evidence, decay: DecayFit | None, seen: Steady, *, held: fl
         Half width (m) of the range in which dry friction holds the car, F_C/2k; a millimetre where it is not known.
     """
     if decay is not None:
-        zero, error, dry = float(decay.values[3]), decay.error("x_e"), float(decay.values[2] / decay.values[0] ** 2)
+        zero, error, dry = decay.rest, decay.error("x_e"), decay.held
     else:
         zero, dry = 0.0, held or 0.0
         error = float(np.hypot(uniform(_HELD if held is None else held), uniform(evidence.resolution / 2)))

@@ -20,16 +20,18 @@ harmonic, and two crank lengths tell it from damping.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import xarray as xr
+from scipy.optimize import least_squares
 
 from nonsmooth import SolveError
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
-from nonsmooth_savi2007.arrays import ComplexArray, FloatArray
 from nonsmooth_savi2007.identification.free_decay import DecayFit
-from nonsmooth_savi2007.identification.least_squares import nonlinear_fit
 from nonsmooth_savi2007.identification.picture_data import picture_data
 from nonsmooth_savi2007.identification.steady import Steady
 
@@ -38,7 +40,7 @@ RANGE = (0.55, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3, 1.45, 1.7)
 LEAST, LEAST_COMPLEX = 5, 8  # runs
 
 
-def grazing_amplitude(omega: float, omega_0: float, b: float, f: float, crank_length: float) -> float:
+def grazing_amplitude(omega: Any, crank_length: Any, omega_0: float, b: float, f: float = 0.0) -> FloatArray:
     r"""Amplitude of the steady motion without contact, dry friction in its first harmonic.
 
     .. math::
@@ -47,11 +49,12 @@ def grazing_amplitude(omega: float, omega_0: float, b: float, f: float, crank_le
 
     Where it reaches the gap, the car grazes. Zero where friction holds the car.
     """
-    stiff, damp, dry, push = omega_0**2 - omega**2, b * omega, 4 * f / np.pi, 0.5 * omega_0**2 * crank_length
-    square = stiff**2 + damp**2
-    half = damp * dry
+    w, a = np.asarray(omega, dtype=np.float64), np.asarray(crank_length, dtype=np.float64)
+    stiff, damp, dry, push = omega_0**2 - w**2, b * w, 4 * f / np.pi, 0.5 * omega_0**2 * a
+    square, half = stiff**2 + damp**2, damp * dry
     inside = half**2 - square * (dry**2 - push**2)
-    return max(float((-half + np.sqrt(max(inside, 0.0))) / square), 0.0) if push > dry else 0.0
+    size = (-half + np.sqrt(np.maximum(inside, 0.0))) / square
+    return np.where(push > dry, np.maximum(size, 0.0), 0.0)
 
 
 def amplitude_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> list[Finding]:
@@ -77,20 +80,23 @@ def amplitude_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> list[Finding
         If there are fewer than five runs.
     """
     _enough(seen, LEAST)
-    natural = float(decay.values[0])
+    natural, b, f = decay.law
     # transients, steps of the encoder, the harmonic balance itself: some tenths of a percent of the amplitude
     spread = np.hypot(seen.error, 3e-3 * seen.amplitude)
-    start = (float(decay.values[1]), float(max(decay.values[2], 1e-4)))
-    both = _fit(seen.omega, seen.crank, seen.amplitude, spread, natural, start, friction=True)
-    viscous = _fit(seen.omega, seen.crank, seen.amplitude, spread, natural, start, friction=False)
-    c_viscous, c_both, dry = (
-        Estimate(*row).times(mass.value, mass.uncertainty, unit)
-        for row, unit in ((viscous["b"], "N s/m"), (both["b"], "N s/m"), (both["f"], "N"))
+    both, viscous = (
+        _fit(seen.omega, seen.crank, seen.amplitude, spread, natural, start) for start in ((b, max(f, 1e-4)), (b,))
+    )
+    (c_both, dry), (c_viscous,) = (
+        [
+            Estimate(*row).times(mass.value, mass.uncertainty, unit)
+            for row, unit in zip(fit, ("N s/m", "N"), strict=False)
+        ]
+        for fit in (both, viscous)
     )
     some = seen.only(seen.crank == np.min(seen.crank))
     fine = np.linspace(some.omega.min(), some.omega.max(), 300)
     joint, plain = (
-        _predicted(fine, np.full(300, some.crank[0]), natural, fit["b"][0], fit["f"][0]) for fit in (both, viscous)
+        grazing_amplitude(fine, some.crank[0], natural, *(value for value, _ in fit)) for fit in (both, viscous)
     )
     data = picture_data(
         some.runs,
@@ -108,8 +114,7 @@ def amplitude_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> list[Finding
         c_viscous=c_viscous,
         crank_length=some.crank[0],
     )
-    bias = 100 * (c_viscous.value / (mass.value * float(decay.values[1])) - 1)
-    b, f = float(decay.values[1]), float(decay.values[2])
+    bias = 100 * (c_viscous.value / (mass.value * b) - 1)
     alone = {a: viscous_bias(natural, b, f, a, seen.omega[seen.crank == a]) for a in np.unique(seen.crank).tolist()}
     expected = [f"{1e3 * a:.1f} mm {100 * off:+.1f} %" for a, off in alone.items()]
     return [
@@ -120,7 +125,7 @@ def amplitude_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> list[Finding
             seen.samples,
             seen.names,
             (
-                f"an equivalent, not the damper's c: dry friction of {1e3 * mass.value * decay.values[2]:.1f} mN adds "
+                f"an equivalent, not the damper's c: dry friction of {1e3 * mass.value * f:.1f} mN adds "
                 f"4 F_C/(pi omega A) to it; {bias:+.1f} % against the free decay",
                 f"what friction of this size does to such a fit by itself, at a crank of: {', '.join(expected)}",
             ),
@@ -157,43 +162,27 @@ def viscous_bias(omega_0: float, b: float, f: float, crank_length: float, omega:
     The amplitudes are those of the harmonic balance of friction, without noise; every one has the same relative weight.
     """
     at = np.asarray([r * omega_0 for r in RANGE] if omega is None else omega, dtype=np.float64)
-    crank = np.full(len(at), float(crank_length))
-    amplitude = _predicted(at, crank, omega_0, b, f)
+    amplitude = grazing_amplitude(at, crank_length, omega_0, b, f)
     moving = amplitude > 0
     if not moving.any():
         raise ValueError("this friction holds the car at all frequencies: the crank is too short")
-    fitted = _fit(
-        at[moving], crank[moving], amplitude[moving], 3e-3 * amplitude[moving], omega_0, (b, 0.0), friction=False
-    )
-    return fitted["b"][0] / b - 1
-
-
-def _predicted(omega: FloatArray, crank: FloatArray, natural: float, b: float, f: float) -> FloatArray:
-    return np.array([grazing_amplitude(float(w), natural, b, f, float(a)) for w, a in zip(omega, crank, strict=True)])
+    ((fitted, _),) = _fit(at[moving], crank_length, amplitude[moving], 3e-3 * amplitude[moving], omega_0, (b,))
+    return fitted / b - 1
 
 
 def _fit(
-    omega: FloatArray,
-    crank: FloatArray,
-    amplitude: FloatArray,
-    spread: FloatArray,
-    natural: float,
-    start: tuple[float, float],
-    *,
-    friction: bool,
-) -> dict[str, tuple[float, float]]:
-    """Values of b and f, each with its standard error; f is 0 where the fit is without friction."""
-
-    def residual(p: FloatArray) -> FloatArray:
-        return (_predicted(omega, crank, natural, p[0], p[1] if friction else 0.0) - amplitude) / spread
-
-    names = ("b", "f") if friction else ("b",)
-    fitted = nonlinear_fit(residual, start[: len(names)], (1e-6, -np.inf)[: len(names)])
+    omega: FloatArray, crank: Any, amplitude: FloatArray, spread: FloatArray, natural: float, start: tuple[float, ...]
+) -> list[tuple[float, float]]:
+    """Values of b, and of f where the start has one, each with its standard error."""
+    fitted = nonlinear_fit(
+        lambda p: (grazing_amplitude(omega, crank, natural, *p) - amplitude) / spread,
+        start,
+        (1e-6, -np.inf)[: len(start)],
+    )
     if fitted is None:
         raise SolveError("the fit of the amplitudes did not settle; look at them over frequency")
     values, covariance = fitted
-    rows = zip(names, values.tolist(), np.sqrt(np.diag(covariance)).tolist(), strict=True)
-    return {"f": (0.0, 0.0)} | {name: (value, error) for name, value, error in rows}
+    return list(zip(values.tolist(), np.sqrt(np.diag(covariance)).tolist(), strict=True))
 
 
 def receptance(
@@ -210,8 +199,8 @@ def receptance(
     scale, mark : float
         Of the drive, and the crank's angle at the photogate (rad).
     """
-    w, a = np.broadcast_arrays(np.asarray(omega, dtype=np.float64), np.asarray(crank_length, dtype=np.float64))
-    size = np.array([grazing_amplitude(float(u), omega_0, b, f, scale * float(v)) for u, v in zip(w, a, strict=True)])
+    w = np.asarray(omega, dtype=np.float64)
+    size = grazing_amplitude(w, scale * np.asarray(crank_length, dtype=np.float64), omega_0, b, f)
     # in phase with -x the springs and the inertia, in phase with -v the losses
     lag = np.arctan2(b * w * size + 4 * f / np.pi, (omega_0**2 - w**2) * size)
     return np.asarray(size * np.exp(1j * (mark - lag)))
@@ -276,18 +265,63 @@ def _complex_fit(seen: Steady, decay: DecayFit) -> tuple[FloatArray, FloatArray]
     """Values and covariance of b, omega_0, f, scale and mark."""
     # the balance of friction leaves out its third harmonic; transients leave some tenths of a percent
     spread = np.hypot(seen.error, 1e-3 * seen.amplitude)
-    natural, b, f = (float(value) for value in decay.values[:3])
-    start = (b, natural, max(f, 1e-4), 1.0, crank_mark(seen, decay))
+    natural, b, f = decay.law
 
     def residual(p: FloatArray) -> FloatArray:
-        b, natural, f, scale, mark = p
-        left = (seen.response - receptance(seen.omega, seen.crank, natural, b, f, scale, mark)) / spread
+        b, natural, *others = p
+        left = (seen.response - receptance(seen.omega, seen.crank, natural, b, *others)) / spread
         return np.concatenate([left.real, left.imag])
 
+    start = (b, natural, max(f, 1e-4), 1.0, crank_mark(seen, decay))
     fitted = nonlinear_fit(residual, start, (1e-6, 1e-6, -0.1, 0.1, -np.inf))
     if fitted is None or not np.isfinite(fitted[1]).all():
         raise SolveError("the fit of the complex response did not settle; look at the runs' amplitudes over frequency")
     return fitted
+
+
+def nonlinear_fit(
+    residual: Callable[[FloatArray], FloatArray], start: Any, lower: Any
+) -> tuple[FloatArray, FloatArray] | None:
+    r"""Values and covariance of parameters, by weighted residuals whose common scale is taken from themselves.
+
+    .. math::
+
+        C = (J^T J)^{-1} \frac{r^T r}{n - p}
+
+    Parameters
+    ----------
+    residual : callable
+        The n residuals, each over its standard uncertainty (or in proportion to it), at values of the p parameters.
+    start, lower : array (p,)
+        Where to begin, and lower bounds (-inf: none).
+
+    Returns
+    -------
+    tuple of array (p,) and array (p, p), or None
+        None where the iteration does not converge. Variances are infinite where the data do not tell the parameters
+        apart.
+    """
+    begin = np.asarray(start, dtype=np.float64)
+    size = np.where(begin != 0, np.abs(begin), 1.0)  # the steps of its differences are relative to numbers of order 1
+    found = least_squares(
+        lambda scaled: residual(scaled * size),
+        begin / size,
+        jac="3-point",
+        bounds=(np.asarray(lower) / size, np.inf),
+        x_scale="jac",
+        ftol=1e-12,
+        xtol=1e-12,
+        gtol=1e-12,
+    )
+    n, p = found.jac.shape
+    if not found.success or n <= p:
+        return None
+    scale = np.linalg.norm(found.jac, axis=0)
+    if not np.all(scale > 0) or np.linalg.cond(found.jac / scale) > 1 / np.sqrt(np.finfo(float).eps):
+        return found.x * size, np.diag(np.full(p, np.inf))
+    inverse = np.linalg.pinv(found.jac / scale)
+    covariance = inverse @ inverse.T / np.outer(scale, scale) * (2 * found.cost / (n - p))
+    return found.x * size, covariance * np.outer(size, size)
 
 
 def crank_mark(seen: Steady, decay: DecayFit) -> float:
@@ -296,11 +330,11 @@ def crank_mark(seen: Steady, decay: DecayFit) -> float:
     Angles count from where the crank pulls the car towards the support. A motor on the other side has the same mark at
     half a turn.
     """
-    expected = receptance(seen.omega, seen.crank, *(float(v) for v in decay.values[:3]))
+    expected = receptance(seen.omega, seen.crank, *decay.law)
     return float(np.angle(np.sum(seen.response * np.conj(expected))))
 
 
-def _complex_data(seen: Steady, rows: list[Estimate], mass: float) -> Any:
+def _complex_data(seen: Steady, rows: list[Estimate], mass: float) -> xr.Dataset:
     c, natural, friction, scale, mark = (row.value for row in rows)
     fine, lengths = np.linspace(seen.omega.min(), seen.omega.max(), 400), np.unique(seen.crank)
     curves = np.array([receptance(fine, a, natural, c / mass, friction / mass, scale, mark) / a for a in lengths])

@@ -18,19 +18,15 @@ is derived from them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from nonsmooth.identification import Estimate, Finding, uniform
+from nonsmooth.arrays import FloatArray
+from nonsmooth.identification import Estimate, Finding, correlated, uniform
 from nonsmooth.recordings.signals.savitzky_golay import savitzky_golay
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
-from nonsmooth_savi2007.identification.least_squares import linear_law
 from nonsmooth_savi2007.identification.picture_data import picture_data
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _WINDOW, _ORDER = 21, 4  # samples: follows a hand's tremor, 3 Hz, to 1 %
 
@@ -73,39 +69,51 @@ def stiffness(
         If a run's force and displacement are not over the same times, or the pull is too short to tell a slope.
     """
     rows = [_columns(run, resolution, mass, friction) for run in runs]
-    lengths = [len(row[1]) for row in rows]
-    width = 2 + friction  # slope, damping, friction; then one intercept per run
-    columns = np.zeros((sum(lengths), width + len(rows)))
-    force = np.concatenate([row[1] for row in rows])
-    begin = 0
-    for i, (part, _) in enumerate(rows):
-        columns[begin : begin + lengths[i], :width] = part
-        columns[begin : begin + lengths[i], width + i] = 1.0
-        begin += lengths[i]
-    if np.ptp(columns[:, 0]) < 50 * resolution:
+    lengths = [len(force) for _, force in rows]
+    terms, force = np.concatenate([part for part, _ in rows]), np.concatenate([force for _, force in rows])
+    if np.ptp(terms[:, 0]) < 50 * resolution:
         raise ValueError(f"{name}: the displacement changes by less than 50 counts in all runs; pull farther")
-    noise, slope = 1.0, 0.0
-    law = linear_law(columns, force, noise, lengths)
+    columns = np.hstack([terms, block_diag(*(np.ones((n, 1)) for n in lengths))])  # an intercept for each run
+    values, covariance, left = _linear_law(columns, force, np.ones(len(force)), lengths)
     for _ in range(3):
-        slope = float(law.values[0])
         # the force's own variance is what its residuals leave after the count's, projected by the slope
-        projected = slope**2 * resolution**2 / 12
-        noise = max(float(np.var(law.residuals)) - projected, 0.1 * float(np.var(law.residuals)))
-        law = linear_law(columns, force, noise + projected, lengths)
-    slope, error = float(law.values[0]), float(np.sqrt(law.covariance[0, 0]))
+        projected = float(values[0]) ** 2 * resolution**2 / 12
+        noise = max(float(np.var(left)) - projected, 0.1 * float(np.var(left)))
+        values, covariance, left = _linear_law(columns, force, np.full(len(force), noise + projected), lengths)
+    slope, error = float(values[0]), float(np.sqrt(covariance[0, 0]))
     half = gain_limit * slope
     others = {
-        "slope_a": Estimate(slope, error, "N/m"),
-        "damping": Estimate(float(law.values[1]), float(np.sqrt(law.covariance[1, 1])), "N s/m"),
+        key: Estimate(float(values[i]), float(np.sqrt(covariance[i, i])), unit)
+        for i, (key, unit) in enumerate((("slope_a", "N/m"), ("damping", "N s/m"), ("friction_force", "N")))
+        if i < terms.shape[1]
     }
-    if friction:
-        others["friction_force"] = Estimate(float(law.values[2]), float(np.sqrt(law.covariance[2, 2])), "N")
     notes = [
         f"type A {error:.2g} N/m; type B {uniform(half):.2g} N/m, the sensor's gain within ±{100 * gain_limit:g} %, "
         "common to all forces of this sensor",
     ]
     if mass:
         notes.append(f"the inertia of {mass:.4g} kg under the hand is put back")
+    number, ways = np.arange(len(runs)), (1.0, -1.0) if friction else (0.0,)
+    loop = float(values[2]) if friction else 0.0
+    data = picture_data(
+        runs,
+        {
+            "sample": {
+                "displacement": terms[:, 0],
+                "force": force,
+                "run": np.repeat(number, lengths),
+                "pull": np.sign(terms[:, 1]),
+            },
+            "line": {
+                "slope": np.full(len(runs) * len(ways), slope),
+                "slope_error": np.full(len(runs) * len(ways), error),
+                "intercept": np.add.outer(values[terms.shape[1] :], np.multiply(ways, loop)).ravel(),
+                "line_run": np.repeat(number, len(ways)),
+                "line_pull": np.tile(ways, len(runs)),
+            },
+        },
+        **{key: one for key, one in others.items() if key == "friction_force"},
+    )
     return Finding(
         name,
         Estimate(slope, float(np.hypot(error, uniform(half))), "N/m", half_width=half),
@@ -114,9 +122,22 @@ def stiffness(
         tuple(run.name for run in runs),
         tuple(notes),
         others,
-        data=_data(runs, rows, law.values, law.covariance, width, friction),
+        data=data,
         plot="force_displacement",
     )
+
+
+def _linear_law(
+    columns: FloatArray, y: FloatArray, variance: FloatArray, pieces: Sequence[int]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Coefficients, their covariance and the residuals by weighted least squares; records have lengths ``pieces``.
+
+    Residuals are correlated within each record (J. Orear, Am. J. Phys. 50 (1982) 912, for errors in x).
+    """
+    weight = 1.0 / np.sqrt(variance)
+    values, *_ = np.linalg.lstsq(columns * weight[:, None], y * weight, rcond=None)
+    residuals = y - columns @ values
+    return np.asarray(values), correlated(columns * weight[:, None], residuals * weight, pieces), residuals
 
 
 def _columns(run: Run, resolution: float, mass: float, friction: bool) -> tuple[FloatArray, FloatArray]:
@@ -140,29 +161,3 @@ def _columns(run: Run, resolution: float, mass: float, friction: bool) -> tuple[
                 "samples only, and 50 are needed: pull farther or faster, or record longer"
             )
     return np.array(parts).T[inside], force[inside]
-
-
-def _data(
-    runs: Sequence[Run], rows: Any, values: FloatArray, covariance: FloatArray, width: int, friction: bool
-) -> xr.Dataset:
-
-    x = np.concatenate([part[:, 0] for part, _ in rows])
-    pull = np.concatenate([np.sign(part[:, 1]) for part, _ in rows])
-    number = np.concatenate([np.full(len(force), i) for i, (_, force) in enumerate(rows)])
-    force = np.concatenate([force for _, force in rows])
-    lines = [(i, s) for i in range(len(rows)) for s in ((1.0, -1.0) if friction else (0.0,))]
-    loop = float(values[2]) if friction else 0.0
-    return picture_data(
-        runs,
-        {
-            "sample": {"displacement": x, "force": force, "run": number, "pull": pull},
-            "line": {
-                "slope": np.full(len(lines), values[0]),
-                "slope_error": np.full(len(lines), np.sqrt(covariance[0, 0])),
-                "intercept": np.array([values[width + i] + s * loop for i, s in lines]),
-                "line_run": np.array([i for i, _ in lines]),
-                "line_pull": np.array([s for _, s in lines]),
-            },
-        },
-        **({"friction_force": Estimate(loop, float(np.sqrt(covariance[2, 2])), "N")} if friction else {}),
-    )
