@@ -19,11 +19,11 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from nonsmooth_savi2007.figures.figure import Figure
-    from nonsmooth_savi2007.flows import Settings
+from nonsmooth_savi2007.figures.figure import Figure
+from nonsmooth_savi2007.finished import finish
+from nonsmooth_savi2007.flows import Settings
+from nonsmooth_savi2007.laboratory import Laboratory
 
 RIG = "rig"
 _LOG = "log.txt"
@@ -96,8 +96,6 @@ def measure(folder: Path, names: Sequence[str], quick: bool, full: bool = False)
     Identification comes first; what needs only its result is shared among processes, where the system can fork this
     one (which has no threads then).
     """
-    from nonsmooth_savi2007.flows import Settings
-    from nonsmooth_savi2007.laboratory import Laboratory
     from nonsmooth_savi2007.study import figures_of_the_study
 
     known = {figure.name: figure for figure in figures_of_the_study() if figure.rig}
@@ -140,8 +138,6 @@ class _Job:
 
     def task(self, names: Sequence[str]) -> list[str]:
         """Figures one after the other, and what there is to note."""
-        from nonsmooth_savi2007.finished import finish
-
         for name in names:
             begin, busy = time.perf_counter(), time.process_time()
             data = self.figures[name].compute(self.settings)

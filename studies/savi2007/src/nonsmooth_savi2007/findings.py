@@ -5,16 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+import xarray as xr
+
+from nonsmooth import ParameterSet
+from nonsmooth.identification import Estimate, Finding
 from nonsmooth_savi2007.laboratory import as_result
 from nonsmooth_savi2007.measure import with_uncertainty
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth import ParameterSet
-    from nonsmooth.identification import Estimate, Finding
 
 
 @dataclass(frozen=True)
@@ -65,8 +62,6 @@ def the_finding(identified: ParameterSet, name: str) -> Finding:
 
 def kept(finding: Finding) -> xr.Dataset:
     """The finding's data for its picture, with the finding itself in the attribute ``finding``."""
-    import xarray as xr
-
     data = xr.Dataset(attrs={"synthetic": "yes"}) if finding.data is None else finding.data.copy()
     record = {
         "name": finding.name,
@@ -98,7 +93,6 @@ def found_in(data: xr.Dataset) -> Found:
 
 def estimates_of(dataset: xr.Dataset) -> dict[str, Number]:
     """All parameters of a saved ``ParameterSet``, with their 95 % intervals."""
-    from nonsmooth import ParameterSet
 
     found = ParameterSet.from_dataset(dataset)
     rows = {**found.estimates, **found.extra}

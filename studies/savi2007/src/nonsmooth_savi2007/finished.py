@@ -7,13 +7,13 @@ import json
 from collections.abc import Collection, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
-from nonsmooth import DataFileError
+import xarray as xr
+
+import nonsmooth
+from nonsmooth import DataFileError, load, save
 from nonsmooth_savi2007.flows import Settings
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: The datasets of a figure by key, and the seconds that they took.
 Made: TypeAlias = "tuple[dict[str, xr.Dataset], float]"
@@ -21,7 +21,6 @@ Made: TypeAlias = "tuple[dict[str, xr.Dataset], float]"
 
 def finish(name: str, data: Mapping[str, xr.Dataset], seconds: float, settings: Settings) -> None:
     """Write the datasets of a figure, and last the record that it is finished."""
-    from nonsmooth import save
 
     folder = settings.place
     record = folder / f"{name}.json"
@@ -73,7 +72,6 @@ def just_made(name: str, settings: Settings) -> Made:
 
 
 def _loaded(folder: Path, name: str, keys: Sequence[str], seconds: float) -> Made | None:
-    from nonsmooth import load
 
     try:
         return {key: load(folder / f"{name}_{key}.nc") for key in keys}, seconds
@@ -89,7 +87,6 @@ def _made_by(settings: Settings) -> dict[str, str | bool]:
 @cache
 def _sources() -> str:
     """A hash of all sources of the toolbox and of this study."""
-    import nonsmooth
 
     digest = hashlib.sha256()
     for room in (Path(nonsmooth.__file__).parent, Path(__file__).parent):

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from nonsmooth import System, random_starts
 from nonsmooth.models import discontinuous_support
-
-if TYPE_CHECKING:
-    from nonsmooth_savi2007.laboratory import Laboratory
+from nonsmooth_savi2007.laboratory import Laboratory
 
 ETA = 1e-5  # Section 4: "it is assumed that eta = 1e-5 for all simulations"
 

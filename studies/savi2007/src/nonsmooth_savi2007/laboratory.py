@@ -12,19 +12,19 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
-from nonsmooth import __version__
+import numpy as np
+import xarray as xr
+
+from nonsmooth import ParameterSet, Recording, System, __version__, compare
 from nonsmooth.models import discontinuous_support
-from nonsmooth.recordings import RecordingWarning
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth import ParameterSet, Recording, System
-    from nonsmooth.recordings import Session
-    from nonsmooth_savi2007.comparison import GapOffset
-    from nonsmooth_savi2007.rig import VirtualRig
+from nonsmooth.recordings import RecordingWarning, Session, load_session
+from nonsmooth.recordings.signals.displacement import found_resolution
+from nonsmooth_savi2007.comparison import GapOffset, gap_offset, session_measurement
+from nonsmooth_savi2007.identification.chain import identify
+from nonsmooth_savi2007.rig import IDENTIFICATION, VirtualRig
+from nonsmooth_savi2007.rig.notebook import write_session
 
 SEED = 0  # of the rig's noise; its parameters are the published ones
 TRUTH = "truth.toml"
@@ -62,14 +62,12 @@ class Laboratory:
     @cached_property
     def rig(self) -> VirtualRig:
         """The rig of Table 1, with more physics than the model: friction, strings, an uneven motor, sensors."""
-        from nonsmooth_savi2007.rig import VirtualRig
 
         return VirtualRig.published(SEED)
 
     @cached_property
     def identified(self) -> ParameterSet:
         """The parameters, from the folder ``identification`` alone."""
-        from nonsmooth_savi2007.identification.chain import identify
 
         with self._noted():
             return identify(self._identification)
@@ -77,13 +75,11 @@ class Laboratory:
     @cached_property
     def session(self) -> Session:
         """The session that identification reads."""
-        from nonsmooth.recordings import load_session
 
         return load_session(self._identification)
 
     @cached_property
     def _identification(self) -> Path:
-        from nonsmooth_savi2007.rig import IDENTIFICATION
 
         options: dict[str, Any] = _FEWER if self.quick else {}
         wanted = IDENTIFICATION if self.procedures is None else self.procedures
@@ -91,17 +87,12 @@ class Laboratory:
         return self._write("identification", {name: self.rig.record(name, **options.get(name, {})) for name in names})
 
     def _write(self, name: str, made: Mapping[str, Recording]) -> Path:
-        from nonsmooth_savi2007.rig.notebook import write_session
 
         title = f"virtual rig with the published parameters, {name}"
         return write_session(self.rig, self.folder / name, made, self.folder / TRUTH, title=title)
 
     def sensors(self) -> xr.Dataset:
         """Sensors as the files of the session describe them: rate, steps, ranges used."""
-        import numpy as np
-        import xarray as xr
-
-        from nonsmooth.recordings.signals.displacement import found_resolution
 
         with self._noted():
             item = self.session.recordings("springs")[0]
@@ -127,7 +118,6 @@ class Laboratory:
 
     def record(self, name: str, made: Mapping[str, Recording]) -> Session:
         """Write recordings, by procedure, into the session folder ``name`` and read it."""
-        from nonsmooth.recordings import load_session
 
         return load_session(self._write(name, made))
 
@@ -140,7 +130,6 @@ class Laboratory:
         self, session: Session, procedure: str, runs: str | Sequence[str] | None = None
     ) -> tuple[xr.Dataset, dict[str, Any]]:
         """Arguments of ``compare``: a measurement, and the settings of the model that belong to it."""
-        from nonsmooth_savi2007.comparison import session_measurement
 
         offset = self._gap_offset
         with self._noted():
@@ -155,7 +144,6 @@ class Laboratory:
 
     def compare(self, measured: xr.Dataset, settings: Mapping[str, Any], **options: Any) -> xr.Dataset:
         """The measurement over the model with the identified parameters."""
-        from nonsmooth import compare
 
         return compare(measured, self.model, parameters=self.identified, settings=settings, **{"draws": 0, **options})
 
@@ -167,7 +155,6 @@ class Laboratory:
     @cached_property
     def _gap_offset(self) -> GapOffset:
         """Gap less the screw's reading, from the records with contact, and its uncertainty."""
-        from nonsmooth_savi2007.comparison import gap_offset
 
         with self._noted():
             return gap_offset(self.identified, self.session)

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
-from nonsmooth_savi2007.arrays import FloatArray
-
-if TYPE_CHECKING:
-    import xarray as xr
+from nonsmooth.arrays import FloatArray
 
 APERIODIC = 0  # no period found up to the longest looked for
 UNSETTLED = -1  # the transient did not decide it

@@ -7,24 +7,33 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import xarray as xr
+
+from nonsmooth.plot import journal, save_figure
 from nonsmooth_savi2007.bench import Measurement
+from nonsmooth_savi2007.claims.claims import Statement, measure_claims
+from nonsmooth_savi2007.figures import (
+    amplitude,
+    band,
+    charts,
+    coexisting,
+    frequency,
+    gap,
+    parameters,
+    regions,
+    resonance,
+)
 from nonsmooth_savi2007.figures.figure import Figure
 from nonsmooth_savi2007.finished import finish, finished, just_made, refuse_strange
 from nonsmooth_savi2007.flows import Settings
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth_savi2007.claims.claims import Statement
+from nonsmooth_savi2007.report.report import REPORTS, write_report
 
 PICTURE_DPI = 200
 PARAMETERS = "table1"
 #: Files that hold figures.
-FILES = ("regions", "resonance", "amplitude", "gap", "frequency", "coexisting", "charts", "band", "parameters")
+FILES = (regions, resonance, amplitude, gap, frequency, coexisting, charts, band, parameters)
 
 
 @dataclass(frozen=True)
@@ -43,8 +52,7 @@ def figures_of_the_study(full: bool = False) -> tuple[Figure, ...]:
 
     Those that take long only where ``full`` is asked for.
     """
-    files = [import_module(f"nonsmooth_savi2007.figures.{name}") for name in FILES]
-    figures = [figure for file in files for figure in file.FIGURES if full or not figure.full]
+    figures = [figure for file in FILES for figure in file.FIGURES if full or not figure.full]
     places = {PARAMETERS: 8.5}
     return tuple(sorted(figures, key=lambda figure: (places.get(figure.name, figure.place), figure.rig)))
 
@@ -93,8 +101,6 @@ def reproduce(
     RuntimeError
         If the measurement on the virtual rig failed.
     """
-    from nonsmooth_savi2007.claims.claims import measure_claims
-    from nonsmooth_savi2007.report.report import REPORTS, write_report
 
     chosen = _chosen(figures, full)
     folder = Path(out)
@@ -173,7 +179,6 @@ def _drawn(figure: Figure, folder: Path) -> bool:
 
 
 def _draw(figure: Figure, data: dict[str, xr.Dataset], folder: Path) -> None:
-    from nonsmooth.plot import journal, save_figure
 
     canvas = figure.draw(data)
     save_figure(canvas, folder / f"{figure.name}.pdf")

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 import xarray as xr
+from scipy.spatial import cKDTree
 
 from nonsmooth_savi2007.claims.verdicts import (
     FLOWS,
@@ -294,7 +295,6 @@ def at_gap(data: dict[str, xr.Dataset], g: float, period: int) -> Cell:
 
 def f15(data: Data) -> Iterator[Statement]:
     """The strange attractor: neighbouring trajectories separate, and both flows draw the same set."""
-    from scipy.spatial import cKDTree
 
     rates = [separation_rate(data["fig15"][f"{flow}_twins"]) for flow in FLOWS]
     worst = 0.0

@@ -8,18 +8,15 @@ sensor's count from elsewhere: both are referred (:mod:`nonsmooth_savi2007.compa
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.errors import unknown
 from nonsmooth.identification.compare import measured_motion, measured_response, measured_rise, measured_sections
+from nonsmooth.recordings import Session
 from nonsmooth_savi2007.comparison.reference import GapOffset, GapReference, gap_reference
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.recordings import Session
 
 #: What a run with each procedure shows.
 SHOWS = {"section": "motion", "contact": "motion", "grazing": "motion", "response": "response", "rise": "diagram"}

@@ -15,13 +15,15 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from nonsmooth.recordings import Session
-    from nonsmooth_savi2007.identification.referral import MeanShift
+from nonsmooth.recordings import RecordingWarning, Session
+from nonsmooth_savi2007.identification.evidence import gather
+from nonsmooth_savi2007.identification.free_decay import free_decay
+from nonsmooth_savi2007.identification.referral import MeanShift, mark_of, places
+from nonsmooth_savi2007.identification.steady import steady
 
 #: Procedures that tell the reference: taps, steady runs, and those that show the sensor's direction.
 _TELLING = ("impulse", "response", "contact", "grazing", "section", "rise")
@@ -115,11 +117,6 @@ def gap_reference(
     ValueError
         A run without the channels that it needs; the message names run and channel.
     """
-    from nonsmooth.recordings import RecordingWarning
-    from nonsmooth_savi2007.identification.evidence import gather
-    from nonsmooth_savi2007.identification.free_decay import free_decay
-    from nonsmooth_savi2007.identification.referral import mark_of, places
-    from nonsmooth_savi2007.identification.steady import steady
 
     given = _offset(offset)
     evidence = gather(session, procedures=_TELLING)

@@ -6,9 +6,10 @@ On the virtual rig a slow rise of the forcing, and steady records.
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.plot import comparison_diagram, shared_legend
 from nonsmooth_savi2007.figures.branches import BEGINNINGS
@@ -24,9 +25,6 @@ from nonsmooth_savi2007.figures.motions import GRID, compared, draw_pairs, motio
 from nonsmooth_savi2007.figures.portraits import describe, draw_portraits, portraits, sheet_size
 from nonsmooth_savi2007.flows import Settings
 from nonsmooth_savi2007.printed import FIGURE_11, FIGURE_12, NUMBERS
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 PRINTED = {NUMBERS[key].value: NUMBERS[key].text for key in ("period 4 from", "period 2 from", "period 1 from")}
 _WORDS = "printed in the paper (N)"

@@ -8,19 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
-from nonsmooth import SolveError, continue_orbit, find_orbit, poincare, special_points
+from nonsmooth import SolveError, System, continue_orbit, find_orbit, poincare, special_points
 from nonsmooth_savi2007.figures.figure import Datasets
 from nonsmooth_savi2007.flows import EXACT
 from nonsmooth_savi2007.printed import FIGURE_9, FIGURE_10, FIGURE_11, FIGURE_13, FIGURE_17
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth import System
 
 _CLOSED = 1e-6  # of the orbit's size
 _SAME = 1e-8  # of the value of a flip

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth import SolveError, chart, continue_curve, continue_orbit, find_orbit, plot
 from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, rows_of
@@ -19,9 +19,6 @@ from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth_savi2007.flows import EXACT, Settings
 from nonsmooth_savi2007.measure import status_names
 from nonsmooth_savi2007.printed import FIGURE_9, FIGURE_13
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _FULL, _QUICK = 1000, 24  # points along each parameter
 _FOLLOWED = ("fold", "flip", "neimark_sacker", "grazing")

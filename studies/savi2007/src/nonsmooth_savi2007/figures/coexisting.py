@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -16,9 +17,6 @@ from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth_savi2007.flows import EXACT, Settings
 from nonsmooth_savi2007.measure import period_word
 from nonsmooth_savi2007.printed import FIGURE_13, FIGURE_17
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: Parameters of each picture.
 BASINS = {"basins13": {**FIGURE_13, "g": 0.0014}, "basins17": {**FIGURE_17, "omega": 9.55}}

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
 
 from nonsmooth import plot, sweep
 from nonsmooth.plot import annotate, shared_legend
 from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, branches_of
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, only_outer
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Settings, starts
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
 
 _OTHER, _SHARE = 0.05, 0.25  # another motion: a quarter of its points so far off, in parts of the diagram's range
 

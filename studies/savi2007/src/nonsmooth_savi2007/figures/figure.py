@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as MatplotlibFigure
 
 from nonsmooth import plot
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as MatplotlibFigure
-
-    from nonsmooth_savi2007.flows import Settings
+from nonsmooth_savi2007.flows import Settings
 
 Canvas: TypeAlias = "MatplotlibFigure"
 Datasets: TypeAlias = "dict[str, xr.Dataset]"  # of a figure, by key
@@ -74,10 +71,9 @@ class Figure:
 
     def draw(self, data: Datasets) -> Canvas:
         """The figure of these data, which pyplot does not list."""
-        from matplotlib.figure import Figure as Sheet
 
         with plot.journal():
-            canvas = Sheet(figsize=(self.size[0] * plot.PAGE, self.size[1] * plot.PAGE))
+            canvas = MatplotlibFigure(figsize=(self.size[0] * plot.PAGE, self.size[1] * plot.PAGE))
             self.sheet(canvas, data)
         return canvas
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from nonsmooth import poincare, sweep
 from nonsmooth.plot import annotate, comparison_diagram, comparison_phase_portrait, shared_legend
@@ -40,9 +41,7 @@ from nonsmooth_savi2007.figures.portraits import (
 from nonsmooth_savi2007.figures.resonance import grazing_of
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Settings, starts
 from nonsmooth_savi2007.printed import FIGURE_17, FIGURE_18
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from nonsmooth_savi2007.rig.figures import SECTIONS
 
 _CHAOTIC = 9.55
 _JUST_ABOVE = 9.8  # rad/s, above the grazing frequency
@@ -145,7 +144,6 @@ def _caption_18(data: Datasets) -> str:
 
 
 def _measure_17(settings: Settings) -> Datasets:
-    from nonsmooth_savi2007.rig.figures import SECTIONS
 
     bench = settings.bench
     steps = [omega for omega, _, _ in SECTIONS[17]]

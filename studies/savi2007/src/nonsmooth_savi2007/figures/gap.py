@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
 
 from nonsmooth import Stroboscopic, plot, poincare, sweep
 from nonsmooth.plot import COLORS, comparison_diagram, name_plane, prefixed, shared_legend
@@ -37,13 +39,8 @@ from nonsmooth_savi2007.figures.motions import (
 )
 from nonsmooth_savi2007.figures.portraits import describe, draw_portraits, portraits, sheet_size, twins
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Settings, starts
+from nonsmooth_savi2007.laboratory import Laboratory
 from nonsmooth_savi2007.printed import FIGURE_13, FIGURE_14, FIGURE_14_TEXT
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-
-    from nonsmooth_savi2007.laboratory import Laboratory
 
 PHASES = {"0": 0.0, "quarter": 0.25, "half": 0.5, "three_quarters": 0.75}  # of a forcing period
 _ANGLES = ("0", r"\pi/2", r"\pi", r"3\pi/2")

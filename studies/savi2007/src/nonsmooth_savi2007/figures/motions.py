@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
 
-from nonsmooth import plot
+from nonsmooth import System, plot
 from nonsmooth.identification.compare import measured_sections
 from nonsmooth.plot import name_plane, prefixed, shade_zone, shared_legend
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, two_rows
 from nonsmooth_savi2007.figures.portraits import QUANTITIES, titles
-from nonsmooth_savi2007.laboratory import as_result
+from nonsmooth_savi2007.laboratory import Laboratory, as_result
 from nonsmooth_savi2007.measure import period_word
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-
-    from nonsmooth import System
-    from nonsmooth_savi2007.laboratory import Laboratory
 
 #: The two sides of a sheet, the model above the rig.
 SIDES = {"theory": "model, identified", "measured": "virtual rig (synthetic)"}
@@ -76,8 +71,6 @@ def model_at(bench: Laboratory, settings: Mapping[str, Any]) -> System:
 def runs_of(found: Motions, parameter: str) -> xr.Dataset:
     """Of each motion, at rising values of the parameter: its ``setting`` and measured ``value``, ``period_number``,
     ``contact`` (0 or 1); ``run`` is its key."""
-    import xarray as xr
-
     sections, _ = diagram_of(found, parameter)
     values = sections[parameter].values
     keys = sorted(found, key=lambda key: _value(found[key][1], parameter))  # as the sections are, and as stable

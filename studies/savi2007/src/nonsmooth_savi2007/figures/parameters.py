@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
 
 from nonsmooth import plot
 from nonsmooth.plot import identification as pictures
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
 from nonsmooth_savi2007.findings import Number, estimates_of, found_in, kept, the_finding
 from nonsmooth_savi2007.flows import Settings
+from nonsmooth_savi2007.laboratory import TRUTH, as_result
 from nonsmooth_savi2007.printed import NUMBERS, TABLE_1
-from nonsmooth_savi2007.rig import IDENTIFICATION
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
+from nonsmooth_savi2007.rig import IDENTIFICATION, UNITS, load_truth
 
 #: What Table 1 holds and what identification adds to it, with units and symbols.
 NAMES = {
@@ -107,10 +106,6 @@ def _caption_8(data: Datasets) -> str:
 
 
 def _compute_table(settings: Settings) -> Datasets:
-    import xarray as xr
-
-    from nonsmooth_savi2007.laboratory import TRUTH, as_result
-    from nonsmooth_savi2007.rig import UNITS, load_truth
 
     bench = settings.bench
     identified = bench.identified.to_dataset()  # first: it reads the session folder only

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
 
-from nonsmooth import plot, poincare, simulate, sweep
+from nonsmooth import System, plot, poincare, simulate, sweep
 from nonsmooth.plot import prefixed, shared_legend
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, two_rows
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Flow, Settings, starts
 from nonsmooth_savi2007.measure import APERIODIC, period_word, periods_reached
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-
-    from nonsmooth import System
 
 #: Units and symbols of what the figures vary.
 QUANTITIES = {"g": ("m", "g"), "omega": ("rad/s", r"\omega"), "rho": ("N", r"\rho")}

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
 
 from nonsmooth import frequency_response, plot
 from nonsmooth.plot import annotate, comparison_response, shared_legend
@@ -21,10 +23,7 @@ from nonsmooth_savi2007.grazing import grazing_frequencies
 from nonsmooth_savi2007.laboratory import as_result
 from nonsmooth_savi2007.measure import jumps, measured_periods
 from nonsmooth_savi2007.printed import NUMBERS
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
+from nonsmooth_savi2007.rig.motor import voltage_for
 
 
 def grazing_of(response: xr.Dataset) -> list[float]:
@@ -126,7 +125,6 @@ def _measure(settings: Settings, number: int) -> Datasets:
 
 def _steps(settings: Settings, number: int) -> dict[str, Any]:
     """Steps of the frequency: the rig's own for Fig. 9; for Fig. 10 finer about its small jump; few for a quick run."""
-    from nonsmooth_savi2007.rig.motor import voltage_for
 
     if settings.quick:
         omegas, options = np.arange(2.5, 6.6, 0.25), {"duration": 14.0}

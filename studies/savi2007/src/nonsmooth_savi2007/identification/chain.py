@@ -14,10 +14,10 @@ import scipy.linalg  # noqa: F401  it loads a library of its own, which is to ha
 from threadpoolctl import threadpool_limits
 
 from nonsmooth import ParameterSet, SolveError
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity, RecordingWarning, Session
 from nonsmooth.recordings.signals.phase import drive_phase
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.adjustment import Adjusted, Observation, adjust
 from nonsmooth_savi2007.identification.calibrations import crank_force, voltage_frequency
 from nonsmooth_savi2007.identification.contact_findings import contact_finding, one_contact

@@ -20,8 +20,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2 as distribution
 
-from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth.arrays import FloatArray
 
 #: Probability of a chi^2 this large by chance, below which measurements disagree.
 CHANCE = 1e-4
@@ -59,7 +60,6 @@ class Consistent(NamedTuple):
 
 def birge_ratio(chi2: float, freedom: int) -> tuple[float, bool]:
     """Root of chi^2 per degree of freedom, and whether chance explains it; NaN and True without any freedom."""
-    from scipy.stats import chi2 as distribution
 
     if freedom < 1:
         return float("nan"), True

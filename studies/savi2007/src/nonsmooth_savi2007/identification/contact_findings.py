@@ -7,9 +7,8 @@ many contacts fitted together have a smaller one, by the root of their number an
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 from scipy.special import ndtri
 
 from nonsmooth import SolveError
@@ -19,9 +18,6 @@ from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth_savi2007.identification.free_decay import DecayFit
 from nonsmooth_savi2007.identification.multiple_shooting import ContactFit, fit_contact, known_before
 from nonsmooth_savi2007.identification.picture_data import picture_data
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _KAPPA, _GAMMA = 3, 4  # indices of k_s/m and c_s/m among the parameters
 _TRIED = 5  # windows of which the median one is shown

@@ -36,6 +36,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
+from scipy.signal import zoom_fft
 
 from nonsmooth import SolveError
 from nonsmooth.arrays import FloatArray
@@ -83,7 +84,6 @@ def spectral_peak(time: FloatArray, x: FloatArray, about: float, step: float, no
 
 def _between(time: FloatArray, x: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray]:
     """Frequencies between two (Hz), and the modulus of the sum of the samples there."""
-    from scipy.signal import zoom_fft
 
     rate = (len(time) - 1) / float(time[-1] - time[0])
     lines = zoom_fft(x, [low, high], m=FINE, fs=rate, endpoint=True)

@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth_savi2007.identification.plausibility import few
-
 if TYPE_CHECKING:
     from nonsmooth_savi2007.identification.evidence import Run
 
@@ -122,6 +120,11 @@ def _slope(run: Run) -> float:
     if abs(common) <= _FOLLOWS * np.sqrt(spread * float(force @ force)):
         return 0.0
     return common / spread
+
+
+def few(names: Sequence[str]) -> str:
+    """The first three names."""
+    return ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
 
 
 def _turned(run: Run) -> Run:

@@ -30,21 +30,19 @@ The screw's zero does not enter, and the place about which the car swings is see
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, uniform
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit
 from nonsmooth_savi2007.identification.picture_data import picture_data
 from nonsmooth_savi2007.identification.response_fits import grazing_amplitude
 from nonsmooth_savi2007.identification.steady import Steady, steady
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _FIRST = 4  # runs that must be free
 _SIGMAS = 5.0  # by which the mean must leave its place
@@ -197,7 +195,6 @@ def _by_push(
     Where one contact is not like the other the push of each is not known: then the gap lies below the highest position,
     and the depth is infinite.
     """
-    from scipy.optimize import brentq
 
     run, (natural, _, f) = seen.runs[first], decay.law
     period = 2 * np.pi / float(seen.omega[first])

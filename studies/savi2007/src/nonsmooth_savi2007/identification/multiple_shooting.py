@@ -28,9 +28,9 @@ from typing import Any
 import numpy as np
 
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate
 from nonsmooth.recordings.signals.phase import DrivePhase, drive_phase
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray as xr
 
 from nonsmooth.identification import Estimate
 from nonsmooth_savi2007.identification.evidence import Run
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: Variables by unit; those that are not here are ratios, counts or logarithms.
 _MEASURED = {
@@ -51,8 +50,6 @@ _WORDS = {"setting": "frequency", "force": "force without the hand's inertia"}
 
 def picture_data(runs: Iterable[Run], over: Mapping[Any, Mapping[str, Any]], **numbers: float | Estimate) -> xr.Dataset:
     """Return variables over dims, and numbers; an estimate stands in its own unit, with its error beside it."""
-    import xarray as xr
-
     data: dict[str, Any] = {}
 
     def put(name: str, dim: Any, values: Any, unit: str) -> None:

@@ -8,15 +8,14 @@ where two procedures tell one quantity: see :mod:`nonsmooth_savi2007.identificat
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from nonsmooth.recordings import Quantity
-    from nonsmooth_savi2007.identification.evidence import Evidence, Run
-    from nonsmooth_savi2007.identification.free_decay import DecayFit
-    from nonsmooth_savi2007.identification.steady import Steady
+from nonsmooth.recordings import Quantity
+from nonsmooth_savi2007.identification.directions import few
+from nonsmooth_savi2007.identification.evidence import Evidence, Run
+from nonsmooth_savi2007.identification.free_decay import DecayFit
+from nonsmooth_savi2007.identification.steady import Steady
 
 #: Procedures in which the car (or the test mass) moves, and those in which a force changes.
 _MOVES = ("springs", "support", "impulse", "drop", "response", "grazing", "contact", "rise", "section")
@@ -141,11 +140,6 @@ def not_driven(seen: Steady, count: float) -> str:
         f"the car does not move with the crank in {len(loose)} of {len(seen)} runs of the response ({few(loose)}): "
         "does channel 'Turn' have one row for each turn, and is the time of both channels in one unit?"
     )
-
-
-def few(names: Sequence[str]) -> str:
-    """The first three names."""
-    return ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
 
 
 def _travel(run: Run) -> float:

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
+from nonsmooth_savi2007.claims.verdicts import Data
 from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches_of, rows_of
 from nonsmooth_savi2007.grazing import grazing_frequencies
 from nonsmooth_savi2007.report.pages import Table
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth_savi2007.claims.verdicts import Data
 
 _NAMES = {"fold": "fold", "flip": "flip", "grazing": "grazing", "neimark_sacker": "Neimark-Sacker"}
 _UNITS = {"omega": ("rad/s", 8), "rho": ("N", 8), "g": ("m", 11)}  # decimals: eight digits at least

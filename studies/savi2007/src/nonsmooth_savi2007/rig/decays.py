@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth import Recording, System
+from nonsmooth.arrays import FloatArray
 from nonsmooth_savi2007.rig import sensors
 from nonsmooth_savi2007.rig.physics import NO_SUPPORT, hanging_mass
 from nonsmooth_savi2007.rig.sampled import simulated
 
 if TYPE_CHECKING:
-    from nonsmooth import Recording, System
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
 GRAVITY = 9.81  # m/s^2

@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
+from nonsmooth import Recording, System
 from nonsmooth_savi2007.rig import sensors
 from nonsmooth_savi2007.rig.motor import frequency, passages
 from nonsmooth_savi2007.rig.physics import NO_SUPPORT, Wander
 from nonsmooth_savi2007.rig.sampled import simulated
 
 if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth import Recording, System
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
 

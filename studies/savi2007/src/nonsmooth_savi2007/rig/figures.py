@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nonsmooth import Recording
 from nonsmooth_savi2007.rig import driven
 from nonsmooth_savi2007.rig.driven import SteadyRun, records
 from nonsmooth_savi2007.rig.motor import mean_position, voltage_for
 
 if TYPE_CHECKING:
-    from nonsmooth import Recording
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
 #: Settings of the sections: frequency (rad/s), forcing (N), gap (m).

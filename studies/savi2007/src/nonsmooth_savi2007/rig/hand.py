@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth import Recording
+from nonsmooth.arrays import FloatArray
 from nonsmooth_savi2007.rig import sensors
 from nonsmooth_savi2007.rig.physics import friction
 
 if TYPE_CHECKING:
-    from nonsmooth import Recording
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
 Run = tuple[str, Mapping[str, Any], Mapping[str, Any]]

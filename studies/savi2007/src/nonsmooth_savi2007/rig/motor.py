@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth import Recording
+from nonsmooth.arrays import FloatArray
 from nonsmooth_savi2007.rig import sensors
 from nonsmooth_savi2007.rig.physics import Wander, crank_angle, drive
 
 if TYPE_CHECKING:
-    from nonsmooth import Recording
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
 MAX_VOLTAGE = 12.0  # V

@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nonsmooth import Recording
 from nonsmooth.recordings import SETTINGS, write_cap, write_capstone_csv
 from nonsmooth_savi2007.rig import sensors
+from nonsmooth_savi2007.rig.truth import FEATURES, UNITS
 
 if TYPE_CHECKING:
-    from nonsmooth import Recording
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
 _CAP = ("impulse",)  # the instrument's own format
@@ -93,7 +94,6 @@ def _apparatus(rig: VirtualRig) -> list[str]:
 
 
 def _truth(rig: VirtualRig) -> list[str]:
-    from nonsmooth_savi2007.rig.truth import FEATURES, UNITS
 
     on = ", ".join(name for name in (*FEATURES, "holding") if getattr(rig, name)) or "none"
     lines = [f"# What the virtual rig with seed {rig.seed} really is. Features that are on: {on}.", "[truth]"]

@@ -26,12 +26,11 @@ The same functions serve symbols (the ``System``) and numbers (the hand that pul
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from nonsmooth import System
+from nonsmooth import Mode, System, Transition
 
 NO_SUPPORT = 10.0  # m: a gap that the car never closes
 AT_REST = 1e-9  # m: a relaxing support that is nearer to its rest than this is there
@@ -87,7 +86,6 @@ def wander_of(p: Any) -> Wander:
 @cache
 def hanging_mass() -> System:
     """The support's spring with the test mass on it, about its equilibrium: M y'' + c_s y' + k_s y = 0."""
-    from nonsmooth import System
 
     def field(t: Any, u: Any, p: Any) -> Any:
         return u.v, -(p.k_s * u.x + p.c_s * u.v) / p.test_mass
@@ -125,7 +123,6 @@ def car(*, relaxing: bool = True, rising: bool = False, wandering: bool = False,
         ``relaxing``. It has no outputs, which would cost every run more than its integration; the forces are
         functions of this file.
     """
-    from nonsmooth import Mode, System, Transition
 
     def driven(t: Any, u: Any, p: Any) -> Any:
         return driven_tension(t, u.x, p, u.a if rising else p.crank_length, side, wander_of(p) if wandering else ())

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth import System, simulate
+from nonsmooth.arrays import FloatArray
 from nonsmooth_savi2007.rig.physics import driven_tension, fixed_tension, wander_of
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth import System
 
 #: The paper's method. Over 40 periods with 121 crossings of a rig with friction it differs from the Taylor series at
 #: rtol 1e-12 by 2e-10 m/s, far below what a sensor tells.
@@ -34,7 +31,6 @@ def simulated(
     SolveError
         If the run could not be completed.
     """
-    from nonsmooth import simulate
 
     with_strings = "pretension" in system.parameters
     samples = instants if end is None else np.append(instants, end)

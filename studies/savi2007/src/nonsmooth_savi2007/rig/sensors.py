@@ -14,13 +14,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings import RecordingWarning
-from nonsmooth_savi2007.arrays import FloatArray
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
 RATE = 100.0  # Hz
@@ -89,8 +88,6 @@ def turns(rig: VirtualRig, crossed: FloatArray) -> xr.Dataset:
 
 
 def _sensor(time: FloatArray, name: str, unit: str, values: FloatArray) -> xr.Dataset:
-    import xarray as xr
-
     attrs: Mapping[str, Any] = {"long_name": name, "measurement": name, "units": unit}
     rate = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else float("nan")
     sampling = "irregular" if name == "Turn" else "regular"

@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nonsmooth import SolveError
+from nonsmooth import Recording, SolveError
 from nonsmooth_savi2007.rig.driven import SteadyRun, records
 from nonsmooth_savi2007.rig.motor import frequency, mean_position, voltage_for
 from nonsmooth_savi2007.rig.truth import NOMINAL_GAP
 
 if TYPE_CHECKING:
-    from nonsmooth import Recording
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
 #: Relative to the natural frequency, dense where the curve bends.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -159,7 +160,6 @@ def load_truth(path: str | os.PathLike[str]) -> dict[str, float]:
     DataFileError
         If there is no such file, or it is not one written by a virtual rig.
     """
-    import tomllib
 
     file = Path(path)
     try:

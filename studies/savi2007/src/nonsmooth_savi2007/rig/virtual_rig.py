@@ -7,21 +7,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
+from nonsmooth import Recording, System
 from nonsmooth.errors import unknown
 from nonsmooth.recordings import PROCEDURES
 from nonsmooth_savi2007.rig import decays, figures, hand, motor, sensors, steps
-from nonsmooth_savi2007.rig.physics import WANDERING, Wander
+from nonsmooth_savi2007.rig.live import LiveRig
+from nonsmooth_savi2007.rig.notebook import write_session
+from nonsmooth_savi2007.rig.physics import WANDERING, Wander, car
 from nonsmooth_savi2007.rig.truth import FEATURES, HOLDING, NOMINAL_GAP, awkward, drawn, published, switched
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth import Recording, System
-    from nonsmooth_savi2007.rig.live import LiveRig
 
 #: The procedures of Section 3.1 and those for the gap: what identification needs.
 IDENTIFICATION = (
@@ -114,7 +112,6 @@ class VirtualRig:
 
     def system(self, *, rising: bool = False) -> System:
         """The rig as a ``System`` with the truth's parameters; ``rising`` with the crank's length as a slow state."""
-        from nonsmooth_savi2007.rig.physics import car
 
         side = int(self.truth["motor_side"])
         equations = car(relaxing=self.support_relaxation, rising=rising, wandering=self.wanders, side=side)
@@ -183,7 +180,6 @@ class VirtualRig:
 
     def recording(self, procedure: str, runs: Sequence[tuple[str, Mapping[str, Any], Mapping[str, Any]]]) -> Recording:
         """The runs (name, sensors, settings) as a Recording that says that it is synthetic."""
-        from nonsmooth import Recording
 
         record = {
             "file": "",
@@ -216,7 +212,6 @@ class VirtualRig:
         ValueError
             A motor that wanders: it has no phase to which a reference could be tied.
         """
-        from nonsmooth_savi2007.rig.live import LiveRig
 
         return LiveRig(self, gap=gap, crank_length=crank_length, omega=omega, run=run)
 
@@ -291,6 +286,5 @@ class VirtualRig:
         return self._write(folder, self.figure(number, **options), truth, title)
 
     def _write(self, folder: Any, made: Mapping[str, Recording], truth: Any, title: str) -> Path:
-        from nonsmooth_savi2007.rig.notebook import write_session
 
         return write_session(self, folder, made, truth, title=title)
