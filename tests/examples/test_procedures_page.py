@@ -10,7 +10,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.recordings.session import PROCEDURES
-from nonsmooth_savi2007.identification.evidence import _NEEDS
+from nonsmooth_savi2007.identification.evidence import NEEDS
 
 PAGE = Path(__file__).parents[2] / "docs" / "guides" / "what_each_procedure_needs.md"
 SECTIONS = dict(re.findall(r"^## `(\w+)`\n(.*?)(?=^## |\Z)", PAGE.read_text(encoding="utf-8"), flags=re.S | re.M))
@@ -18,7 +18,7 @@ UNITS = {"Angle": "rad", "Force": "N", "Turn": "turns"}
 
 
 def test_every_procedure_has_its_section() -> None:
-    assert set(SECTIONS) == set(PROCEDURES) == set(_NEEDS)
+    assert set(SECTIONS) == set(PROCEDURES) == set(NEEDS)
 
 
 @pytest.mark.parametrize("procedure", PROCEDURES)
@@ -33,6 +33,6 @@ def test_a_procedure_is_as_the_page_says(procedure: str, tmp_path: Path) -> None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ns.recordings.RecordingWarning)
         recording = ns.load_recording(file)
-    assert recording.units == {name: UNITS[name] for name in _NEEDS[procedure]}
-    if "Turn" in _NEEDS[procedure]:
+    assert recording.units == {name: UNITS[name] for name in NEEDS[procedure]}
+    if "Turn" in NEEDS[procedure]:
         assert recording.channel("Turn").size >= 1

@@ -170,8 +170,8 @@ def test_the_page_is_whole_by_itself(tmp_path: Path) -> None:
 
 
 def test_what_a_cell_holds_is_text() -> None:
-    from nonsmooth_savi2007.report.pages import Table
+    from nonsmooth_savi2007.report.pages import table
 
-    table = Table(("a", "b"), (("<b>", "x | y"),), ("<i>",))
-    assert "<b>" not in to_html([table], "t").partition("<body>")[2]
-    assert "x \\| y" in to_markdown([table])
+    block = table(("a", "b"), (("<b>", "x | y"),), ("<i>",))
+    assert "<b>" not in to_html([block], "t").partition("<body>")[2]
+    assert "x \\| y" in to_markdown([block])

@@ -124,10 +124,10 @@ def gap_reference(
     if not referred:
         return GapReference(offset=given, direction=evidence.direction, notes=tuple(notes))
     decay = None
-    if taps := evidence.runs.get("impulse", ()):
+    if taps := evidence.runs["impulse"]:
         decay = free_decay(taps, resolution=evidence.resolution)
         notes += [f"impulse: {note}" for note in decay.notes]
-    free = [run for run in evidence.runs.get("response", ()) if "gap" not in run.settings]
+    free = [run for run in evidence.runs["response"] if "gap" not in run.settings]
     seen, mark = steady(free), 0.0
     found = places(evidence, decay, seen, held=given.held)
     if decay is not None:

@@ -17,11 +17,12 @@ Phys. Rev. 40 (1932) 207.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from nonsmooth import SolveError
 from nonsmooth.arrays import FloatArray
@@ -48,7 +49,6 @@ LAWS: Mapping[str, Callable[[Any], Any]] = {
     "test_mass": lambda u: u["test_mass"],
     "spring_slope": lambda u: 2 * u["k"] * u["gain"],
     "support_slope": lambda u: u["k_s"] * u["gain"],
-    "crank_slope": lambda u: u["k"] * u["gain"],
     "omega_0": lambda u: np.sqrt(2 * u["k"] / u["m"]),
     "b": lambda u: u["c"] / u["m"],
     "f": lambda u: u["friction"] / u["m"],
@@ -56,17 +56,33 @@ LAWS: Mapping[str, Callable[[Any], Any]] = {
     "b_s": lambda u: u["c_s"] / u["test_mass"],
     "kappa": lambda u: u["k_s"] / u["m"],
     "gamma": lambda u: u["c_s"] / u["m"],
+    "gain": lambda u: u["gain"],
 }
+
+#: First values of the unknowns, each by the first row of which all was seen.
+_FIRST: Sequence[tuple[str, tuple[str, ...], Callable[..., float]]] = (
+    ("m", ("mass",), lambda m: m),
+    ("k", ("mass", "omega_0"), lambda m, omega: m * omega**2 / 2),
+    ("k", ("spring_slope",), lambda slope: slope / 2),
+    ("c", ("mass", "b"), lambda m, b: m * b),
+    ("friction", ("mass", "f"), lambda m, f: m * f),
+    ("test_mass", ("test_mass",), lambda m: m),
+    ("k_s", ("test_mass", "omega_s"), lambda m, omega: m * omega**2),
+    ("k_s", ("support_slope",), lambda slope: slope),
+    ("k_s", ("mass", "kappa"), lambda m, kappa: m * kappa),
+    ("c_s", ("test_mass", "b_s"), lambda m, b: m * b),
+    ("c_s", ("mass", "gamma"), lambda m, gamma: m * gamma),
+    ("gain", ("gain",), lambda gain: gain),
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """Values measured together: names of `LAWS`, values, covariance, and where they come from."""
+    """Values measured together: names of `LAWS`, values, covariance."""
 
     names: tuple[str, ...]
     values: FloatArray
     covariance: FloatArray
-    source: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +112,16 @@ class Adjusted:
         error = float(np.sqrt(self.covariance[i, i]))
         return Estimate(self[name], error, UNKNOWNS[name], logarithmic=name == "c_s")
 
+    def ratio(self, name: str, other: str) -> Estimate:
+        """One unknown over another."""
+        i, j, value = self.names.index(name), self.names.index(other), self[name] / self[other]
+        row = np.array([1 / self[name], -1 / self[other]])
+        return Estimate(value, value * float(np.sqrt(row @ self.covariance[np.ix_([i, j], [i, j])] @ row)))
+
+    def known(self, name: str) -> Estimate | None:
+        """The estimate of an unknown that may not be determined."""
+        return self.estimate(name) if name in self.names else None
+
 
 def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
     """Adjust the unknowns to the observations.
@@ -116,35 +142,30 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
     labels = [name for o in observations for name in o.names]
     if "mass" not in labels:
         raise ValueError("the mass of the car is needed: motions tell only ratios to it; weigh it")
+    if {"spring_slope", "support_slope"}.intersection(labels):
+        prior = np.array([[max(uniform(gain_limit), 1e-12) ** 2]])
+        observations = [*observations, Observation(("gain",), np.array([1.0]), prior)]
+        labels.append("gain")
     y = np.concatenate([o.values for o in observations])
-    n = len(y)
-    covariance = np.zeros((n, n))
-    begin = 0
-    for o in observations:
-        rows = slice(begin, begin + len(o.values))
-        covariance[rows, rows] = o.covariance
-        begin += len(o.values)
-    first = _first(dict(zip(labels, y, strict=True)))
+    covariance = block_diag(*(o.covariance for o in observations))
+    seen, first = dict(zip(labels, y.tolist(), strict=True)), dict[str, float]()
+    for name, needed, law in _FIRST:
+        if name not in first and seen.keys() >= set(needed):
+            first[name] = law(*(seen[label] for label in needed))
     names = tuple(name for name in UNKNOWNS if name in first)
-    scale = np.array([first[name] if first[name] else 1.0 for name in names])
     u = np.array([first[name] for name in names])
-    size = np.sqrt(np.diag(covariance))
+    scale, size = np.where(u != 0, u, 1.0), np.sqrt(np.diag(covariance))
     weight = np.linalg.inv(covariance / np.outer(size, size))
-    prior = np.zeros((len(names), len(names)))
-    known = u.copy()
-    if "gain" in names:
-        i = names.index("gain")
-        known[i] = 1.0
-        prior[i, i] = (scale[i] / max(uniform(gain_limit), 1e-12)) ** 2
-    for _ in range(_ROUNDS):
+
+    def expected(u: Any) -> Any:
         at = dict(zip(names, u, strict=True))
-        left = (y - np.array([LAWS[label](at) for label in labels])) / size
-        beside = u + 1e-30j * np.diag(scale)  # derivatives by imaginary parts
-        jacobian = np.array(
-            [[LAWS[label](dict(zip(names, row, strict=True))).imag for row in beside] for label in labels]
-        ) / (1e-30 * size[:, None])
-        normal = jacobian.T @ weight @ jacobian + prior
-        change = np.linalg.solve(normal, jacobian.T @ weight @ left - prior @ ((u - known) / scale))
+        return np.array([LAWS[label](at) for label in labels])
+
+    for _ in range(_ROUNDS):
+        # derivatives by imaginary parts
+        jacobian = np.transpose([expected(row).imag for row in u + 1e-30j * np.diag(scale)]) / (1e-30 * size[:, None])
+        normal = jacobian.T @ weight @ jacobian
+        change = np.linalg.solve(normal, jacobian.T @ weight @ ((y - expected(u)) / size))
         u = u + change * scale
         off = np.abs(change) / np.sqrt(np.diag(np.linalg.inv(normal)))
         if np.max(off) < _CONVERGED:
@@ -152,50 +173,18 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
     else:
         raise SolveError(
             f"the adjustment has not converged after {_ROUNDS} rounds: {names[int(np.argmax(off))]!r} still changes by "
-            f"{np.max(off):.1g} of its standard uncertainty. The observations ({', '.join(labels)}) contradict each "
-            "other by far: look at the mass, the wheel and the units, and leave out what is in doubt"
+            f"{np.max(off):.1g} of its standard uncertainty. The observations "
+            f"({', '.join(label for label in labels if label != 'gain')}) contradict each other by far: look at the "
+            "mass, the wheel and the units, and leave out what is in doubt"
         )
-    found = np.linalg.inv(normal) * np.outer(scale, scale)
-    at = dict(zip(names, u, strict=True))
-    residual = y - np.array([LAWS[label](at) for label in labels])
-    chi2 = float((residual / size) @ weight @ (residual / size)) + float(
-        ((u - known) / scale) @ prior @ ((u - known) / scale)
-    )
-    freedom = n + int("gain" in names) - len(names)
-    pulls = {}
+    left = (y - expected(u)) / size
+    chi2 = float(left @ weight @ left)
+    freedom = len(y) - len(names)
+    pulls = dict[str, float]()
     for i, label in enumerate(labels):
-        pulls[label if label not in pulls else f"{label} ({i})"] = float(residual[i] / np.sqrt(covariance[i, i]))
+        if label != "gain":
+            pulls[label if label not in pulls else f"{label} ({i})"] = float(left[i])
     birge = float(np.sqrt(chi2 / freedom)) if freedom > 0 else float("nan")
     influence = np.linalg.solve(normal, jacobian.T @ weight) * scale[:, None] / size
-    return Adjusted(names, u, np.asarray(found, dtype=np.float64), birge, freedom, pulls, influence, tuple(labels))
-
-
-def _first(seen: Mapping[str, float]) -> dict[str, float]:
-    """First values of the unknowns that what was seen determines."""
-    m = seen["mass"]
-    found = {"m": m}
-    if "omega_0" in seen:
-        found["k"] = m * seen["omega_0"] ** 2 / 2
-    elif "spring_slope" in seen:
-        found["k"] = seen["spring_slope"] / 2
-    elif "crank_slope" in seen:
-        found["k"] = seen["crank_slope"]
-    if "b" in seen:
-        found["c"] = m * seen["b"]
-    if "f" in seen:
-        found["friction"] = m * seen["f"]
-    if "test_mass" in seen and "omega_s" in seen:
-        found["test_mass"] = seen["test_mass"]
-        found["k_s"] = seen["test_mass"] * seen["omega_s"] ** 2
-        found["c_s"] = seen["test_mass"] * seen["b_s"]
-    elif "test_mass" in seen:
-        found["test_mass"] = seen["test_mass"]
-    if "k_s" not in found and "support_slope" in seen:
-        found["k_s"] = seen["support_slope"]
-    if "k_s" not in found and "kappa" in seen:
-        found["k_s"] = m * seen["kappa"]
-    if "c_s" not in found and "gamma" in seen:
-        found["c_s"] = m * seen["gamma"]
-    if any(name in seen for name in ("spring_slope", "support_slope", "crank_slope")):
-        found["gain"] = 1.0
-    return found
+    found = np.linalg.inv(normal) * np.outer(scale, scale)
+    return Adjusted(names, u, found, birge, freedom, pulls, influence, tuple(labels))

@@ -23,7 +23,7 @@ _KAPPA, _GAMMA = 3, 4  # indices of k_s/m and c_s/m among the parameters
 _TRIED = 5  # windows of which the median one is shown
 
 
-def contact_finding(found: ContactFit, mass: Quantity, *, resolution: float) -> Finding:
+def contact_finding(found: ContactFit, mass: Quantity | Estimate, *, resolution: float) -> Finding:
     r"""Support damping, stiffness and the gap of each run from records with contact.
 
     Parameters

@@ -36,7 +36,7 @@ class Check(NamedTuple):
 
 
 #: What is compared: its name, finding and which of its others ("" for itself), the same of the other, the mass that
-#: both share, and what to look at.
+#: both share, and what to look at. Beside findings stand what is adjusted, the contacts' gap, and 1.
 PAIRS: Sequence[tuple[str, tuple[str, str], tuple[str, str], str, str]] = (
     (
         "omega_0: free decay, complex response",
@@ -87,6 +87,28 @@ PAIRS: Sequence[tuple[str, tuple[str, str], tuple[str, str], str, str]] = (
         "mass",
         "the record of that piece",
     ),
+    (
+        "drive: complex response over what the crank's length says, 1",
+        ("c_frequency_response", "drive_scale"),
+        ("one", ""),
+        "",
+        "the crank's lengths, or springs that are not equal",
+    ),
+    ("k: crank's force, all others", ("crank_force", ""), ("adjusted", "k"), "", "the crank's lengths"),
+    (
+        "gain: force sensor against motions and masses, 1 within ±{:g} %",
+        ("adjusted", "gain"),
+        ("one", "within limits"),
+        "",
+        "the force sensor's calibration, the mass, or the wheel",
+    ),
+    (
+        "gap at rest: graze, contacts",
+        ("gap_grazing", "at_rest"),
+        ("contacts", "at_rest"),
+        "",
+        "the screw: was it turned between the two? a string that slipped, or steps that are too coarse",
+    ),
 )
 
 
@@ -113,47 +135,22 @@ def cross_checks(
     gap : Estimate, optional
         The gap at rest by contacts at the setting of the screw at which the graze was sought.
     """
-    known = {finding.name: finding for finding in findings}
+    known: dict[tuple[str, str], Estimate | None] = {
+        ("one", ""): Estimate(1.0, 0.0),
+        ("one", "within limits"): Estimate(1.0, uniform(gain_limit), half_width=gain_limit) if gain_limit else None,
+        ("adjusted", "k"): k,
+        ("adjusted", "gain"): gain,
+        ("contacts", "at_rest"): gap,
+    }
+    for finding in findings:
+        known |= {(finding.name, other): one for other, one in {"": finding.estimate, **finding.others}.items()}
     found = []
     for name, first, second, shared, remedy in PAIRS:
-        one, other = _taken(known, *first), _taken(known, *second)
+        one, other = known.get(first), known.get(second)
         if one is not None and other is not None:
             common = masses[shared].uncertainty / masses[shared].value if shared in masses else 0.0
-            found.append(Check(name, one, other, _off(one, other, common), remedy))
-    if (scale := _taken(known, "c_frequency_response", "drive_scale")) is not None:
-        unit = Estimate(1.0, 0.0)
-        found.append(
-            Check(
-                "drive: complex response over what the crank's length says, 1",
-                scale,
-                unit,
-                _off(scale, unit),
-                "the crank's lengths, or springs that are not equal",
-            )
-        )
-    if (seen := _taken(known, "crank_force", "")) is not None and k is not None:
-        found.append(Check("k: crank's force, all others", seen, k, _off(seen, k), "the crank's lengths"))
-    if gain is not None and gain_limit:
-        beyond = float(np.sign(gain.value - 1)) * max(abs(gain.value - 1) - gain_limit, 0.0)
-        found.append(
-            Check(
-                f"gain: force sensor against motions and masses, 1 within ±{100 * gain_limit:g} %",
-                gain,
-                Estimate(1.0, uniform(gain_limit), half_width=gain_limit),
-                _over(beyond, gain.uncertainty**2),
-                "the force sensor's calibration, the mass, or the wheel",
-            )
-        )
-    if (graze := _taken(known, "gap_grazing", "at_rest")) is not None and gap is not None:
-        found.append(
-            Check(
-                "gap at rest: graze, contacts",
-                graze,
-                gap,
-                _off(graze, gap),
-                "the screw: was it turned between the two? a string that slipped, or steps that are too coarse",
-            )
-        )
+            words = name.format(100 * other.half_width)
+            found.append(Check(words, one, other, _off(one, other, common), remedy))
     return found
 
 
@@ -169,22 +166,17 @@ def sentences(checks: Sequence[Check]) -> tuple[list[str], list[str]]:
     ]
 
 
-def _taken(known: Mapping[str, Finding], name: str, other: str) -> Estimate | None:
-    if name not in known:
-        return None
-    return known[name].others.get(other) if other else known[name].estimate
-
-
-def _off(one: Estimate, other: Estimate, common: float = 0.0) -> float:
-    """Difference over its uncertainty, without the relative uncertainty that both share."""
+def _off(one: Estimate, other: Estimate, common: float) -> float:
+    """Difference over its uncertainty, without the relative uncertainty that both share; beyond limits, if any."""
     if (one.logarithmic or other.logarithmic) and one.value > 0 and other.value > 0:
+        difference = float(np.log(one.value / other.value))
         square = one.relative**2 + other.relative**2 - 2 * common**2
-        return _over(float(np.log(one.value / other.value)), square)
-    square = one.uncertainty**2 + other.uncertainty**2 - 2 * common**2 * one.value * other.value
-    return _over(one.value - other.value, square)
-
-
-def _over(difference: float, square: float) -> float:
+    else:
+        difference = one.value - other.value
+        square = one.uncertainty**2 + other.uncertainty**2 - 2 * common**2 * one.value * other.value
+    if other.half_width:
+        difference = float(np.sign(difference)) * max(abs(difference) - other.half_width, 0.0)
+        square = one.uncertainty**2
     if square <= 0:
         return float("inf") * difference if difference else 0.0
     return float(difference / np.sqrt(square))

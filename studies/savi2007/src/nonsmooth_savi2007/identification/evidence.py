@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from nonsmooth.recordings.signals.displacement import position
 from nonsmooth_savi2007.identification.directions import oriented
 
 #: Channels that a procedure cannot do without.
-_NEEDS: Mapping[str, tuple[str, ...]] = {
+NEEDS: Mapping[str, tuple[str, ...]] = {
     "springs": ("Angle", "Force"),
     "support": ("Angle", "Force"),
     "impulse": ("Angle",),
@@ -79,19 +79,16 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """All runs by procedure, what is known of the apparatus, and what was turned (`oriented`).
+    """Runs of every procedure, what is known of the apparatus, and what was turned (`oriented`).
 
     ``direction`` is -1 where the rotary sensor counts away from the support: positions have the other sign then.
     """
 
     runs: Mapping[str, tuple[Run, ...]]
     apparatus: Mapping[str, Quantity]
-    title: str = ""
-    source: str = ""
     synthetic: bool = False
-    missing: tuple[str, ...] = field(default=())
     direction: int = 1
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
 
     @property
     def resolution(self) -> float:
@@ -144,9 +141,9 @@ def gather(
         known = dict(recordings.apparatus)
         names = [name for name in recordings.procedures if procedures is None or name in procedures]
         taken = {name: [tuple(row) for row in recordings.recordings(name)] for name in names}
-        title, source, synthetic = recordings.title, str(recordings.folder), recordings.synthetic
+        synthetic = recordings.synthetic
     elif isinstance(recordings, Mapping):
-        known, title, source, synthetic = {}, "", "recordings in memory", False
+        known, synthetic = {}, False
         taken = {str(name): _rows(str(name), given) for name, given in recordings.items()}
     else:
         raise TypeError(
@@ -166,8 +163,8 @@ def gather(
         runs[procedure] = tuple(_run(procedure, row[0], row[1], row[2], known) for row in rows)
     runs, direction, notes = oriented(runs)
     synthetic = synthetic or any(run.synthetic for rows in runs.values() for run in rows)
-    missing = tuple(p for p in PROCEDURES if p not in runs)
-    return Evidence(runs, known, title, source, synthetic, missing, direction, notes)
+    runs |= {procedure: () for procedure in PROCEDURES if procedure not in runs}
+    return Evidence(runs, known, synthetic, direction, notes)
 
 
 def _rows(procedure: str, given: Any) -> list[Any]:
@@ -189,30 +186,25 @@ def _run(
 ) -> Run:
     if lacking := [key for key in PROCEDURES[procedure] if key not in settings]:
         raise ValueError(f"{procedure}, run {name!r} must state {', '.join(lacking)} in its settings")
+
+    def has(channel: str) -> bool:
+        try:
+            recording.channel(channel, name)
+        except ValueError:
+            return channel in NEEDS[procedure]
+        return True
+
     found: dict[str, Any] = {}
-    for channel in ("Angle", "Force", "Turn"):
-        needed = channel in _NEEDS[procedure]
-        if not needed and not _has(recording, name, channel):
-            continue
-        if channel == "Angle":
-            angle = take(recording, channel, name, units=_ANGLES)
-            found["x"] = position(
-                angle,
-                distance_per_turn=known["distance_per_turn"].value,
-                counts_per_turn=round(known["counts_per_turn"].value),
-            )
-        elif channel == "Force":
-            found["force"] = take(recording, channel, name, units=("N",))
-        else:
-            passages = take(recording, channel, name, samples=_PASSAGES)
-            found["turns"] = np.asarray(passages["time"].values, dtype=np.float64)
-            found["backwards"] = bool(np.all(np.diff(np.asarray(passages.values, dtype=np.float64)) < 0))
+    if has("Angle"):
+        found["x"] = position(
+            take(recording, "Angle", name, units=_ANGLES),
+            distance_per_turn=known["distance_per_turn"].value,
+            counts_per_turn=round(known["counts_per_turn"].value),
+        )
+    if has("Force"):
+        found["force"] = take(recording, "Force", name, units=("N",))
+    if has("Turn"):
+        passages = take(recording, "Turn", name, samples=_PASSAGES)
+        found["turns"] = np.asarray(passages["time"].values, dtype=np.float64)
+        found["backwards"] = bool(np.all(np.diff(np.asarray(passages.values, dtype=np.float64)) < 0))
     return Run(procedure, name, dict(settings), synthetic=recording.synthetic, **found)
-
-
-def _has(recording: Recording, run: str, channel: str) -> bool:
-    try:
-        recording.channel(channel, run)
-    except ValueError:
-        return False
-    return True

@@ -13,13 +13,10 @@ import numpy as np
 
 from nonsmooth.recordings import Quantity
 from nonsmooth_savi2007.identification.directions import few
-from nonsmooth_savi2007.identification.evidence import Evidence, Run
+from nonsmooth_savi2007.identification.evidence import NEEDS, Evidence, Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit
 from nonsmooth_savi2007.identification.steady import Steady
 
-#: Procedures in which the car (or the test mass) moves, and those in which a force changes.
-_MOVES = ("springs", "support", "impulse", "drop", "response", "grazing", "contact", "rise", "section")
-_PULLS = ("springs", "support", "crank")
 FASTEST = 20.0  # m/s: no car on a table goes faster
 LARGEST = 50.0  # times the crank: a car that swings so much further would need a damping ratio of 0.5 %
 SMALLEST = 0.02  # of the crank: the largest amplitude of all steps of a response; far above resonance it is smaller
@@ -46,14 +43,12 @@ def check_plausible(evidence: Evidence) -> None:
 
 
 def _constant(runs: Sequence[Run], count: float) -> Iterator[str]:
-    for channel, procedures in (("Angle", _MOVES), ("Force", _PULLS)):
+    for channel, still in (("Angle", STILL * count), ("Force", 0.0)):
         dead = []
         for run in runs:
             signal = run.x if channel == "Angle" else run.force
-            if run.procedure in procedures and signal is not None and signal.size:
-                values = np.asarray(signal.values, dtype=np.float64)
-                if float(np.nanmax(values) - np.nanmin(values)) <= (STILL * count if channel == "Angle" else 0.0):
-                    dead.append(run.label)
+            if channel in NEEDS[run.procedure] and np.nanmax(signal.values) - np.nanmin(signal.values) <= still:
+                dead.append(run.label)
         if dead:
             yield (
                 f"channel {channel!r} does not change in {len(dead)} of {len(runs)} runs ({few(dead)}): was the sensor "
@@ -97,9 +92,9 @@ def _speed(run: Run) -> float:
 
 
 def _cranks(runs: Mapping[str, Sequence[Run]]) -> Iterator[str]:
-    for procedure in ("response", "grazing", "contact", "rise", "section"):
-        rows = [run for run in runs.get(procedure, ()) if run.x is not None]
-        if not rows:
+    for procedure, channels in NEEDS.items():
+        rows = runs[procedure]
+        if not rows or channels != ("Angle", "Turn"):
             continue
         ratio = np.array([0.5 * _travel(run) / _length(run, "crank_length") for run in rows])
         long = [run.label for run, r in zip(rows, ratio, strict=True) if r < SMALLEST]

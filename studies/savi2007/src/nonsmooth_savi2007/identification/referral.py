@@ -14,6 +14,7 @@ Where the car rests and about which place it swings comes from one function, :fu
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -122,68 +123,50 @@ def mean_shift(
     """
     size = 1 / (8 * string_length) if string_length else 0.1
     told = max(string_error, 1e-4 * string_length) / (8 * string_length**2) if string_length else 0.0
-    free = _fitted(seen, zero, zero_error, None, 0.0, 2 * size if string_length else 0.25, dry)
-    side, notes = 0, []
+
+    def fitted(length: float | None, alpha: float, alpha_error: float) -> MeanShift:
+        """Rest, alpha and beta by least squares; alpha is known beforehand to its error, beta to a ripple of 0.03."""
+        # of the string's term the next order too, 0.1 % at a = 39 mm and L = 0.5 m
+        further = 3 * seen.crank**2 / (16 * length**2) if length else np.zeros(len(seen))
+        matrix = np.column_stack([np.ones(len(seen)), seen.crank**2 * (1 + further), seen.crank])
+        y = seen.mean + dry * seen.lean
+        known = np.array([max(zero_error, 1e-9), alpha_error, 0.03 / 4]) ** -2.0
+        spread = 1e-5
+        for _ in range(3):  # the scatter of the means from what the fit leaves of them
+            normal = matrix.T @ matrix / spread**2 + np.diag(known)
+            found = np.linalg.solve(normal, matrix.T @ y / spread**2 + known * [zero, alpha, 0.0])
+            covariance: FloatArray = np.asarray(np.linalg.inv(normal), dtype=np.float64)
+            left = y - matrix @ found
+            spread = max(float(np.sqrt(left @ left / max(len(y) - 2, 1))), 1e-6)
+        rest, curved, straight = found.tolist()
+        return MeanShift(rest, curved, straight, covariance, covariance[:, 0] * known[0], len(y), length)
+
+    free = fitted(None, 0.0, 2 * size if string_length else 0.25)
     error = float(np.sqrt(free.covariance[1, 1]))
-    if abs(free.alpha) > _CLEAR * error:
-        side = int(np.sign(free.alpha))
-    if not side:
+    if abs(free.alpha) <= _CLEAR * error:
         several = f"the {len(seen)} runs without the support do not tell"
-        notes.append(
+        note = (
             f"{several if len(seen) else 'no run without the support tells'} on which side the motor is, and with it "
             "which way its string moves the mean position: the gap is uncertain by as much at other crank lengths than "
             "theirs. Record such runs (response, no gap) at two crank lengths or more, and taps of the car (impulse)"
         )
-        return _fitted(seen, zero, zero_error, string_length, 0.0, size, dry)._replace(notes=tuple(notes))
-    where = "the support's side" if side > 0 else "the side away from the support"
+        return fitted(string_length, 0.0, size)._replace(notes=(note,))
+    side, note = int(np.sign(free.alpha)), ""
     if not string_length:
         return free._replace(side=side)
     off = abs(free.alpha - side * size) / float(np.hypot(error, told))
     if off > _CLEAR:
-        notes.append(
+        note = (
             f"the mean positions say a string of {1 / (8 * abs(free.alpha)):.3g} m, the notebook {string_length:.3g} "
             f"m ({off:.0f} uncertainties apart): string_length is not used. Measure it from crank to driven spring"
         )
-        return free._replace(side=side, notes=tuple(notes))
+        return free._replace(side=side, notes=(note,))
     if side < 0:
-        notes.append(f"the motor pulls from {where}: its string moves the mean position away from the support")
-    found = _fitted(seen, zero, zero_error, string_length, side * size, told, dry)
-    return found._replace(side=side, notes=tuple(notes))
-
-
-def _fitted(
-    seen: Steady,
-    zero: float,
-    zero_error: float,
-    string_length: float | None,
-    alpha: float,
-    alpha_error: float,
-    dry: float,
-) -> MeanShift:
-    """Rest, alpha and beta by least squares; alpha is known beforehand to its error, beta to a ripple of 0.03 rad."""
-    # of the string's term the next order too, 0.1 % at a = 39 mm and L = 0.5 m
-    further = 3 * seen.crank**2 / (16 * string_length**2) if string_length else np.zeros(len(seen))
-    matrix = np.column_stack([np.ones(len(seen)), seen.crank**2 * (1 + further), seen.crank])
-    y = seen.mean + dry * seen.lean
-    known = np.array([max(zero_error, 1e-9), alpha_error, 0.03 / 4]) ** -2.0
-    before = known * [zero, alpha, 0.0]
-    spread = 1e-5
-    for _ in range(3):  # the scatter of the means from what the fit leaves of them
-        normal, right = matrix.T @ matrix / spread**2 + np.diag(known), matrix.T @ y / spread**2 + before
-        found = np.linalg.solve(normal, right)
-        covariance = np.linalg.inv(normal)
-        left = y - matrix @ found
-        spread = max(float(np.sqrt(left @ left / max(len(y) - 2, 1))), 1e-6)
-    rest, curved, straight = (float(value) for value in found)
-    return MeanShift(
-        rest,
-        curved,
-        straight,
-        np.asarray(covariance, dtype=np.float64),
-        covariance[:, 0] * known[0],
-        len(y),
-        string_length,
-    )
+        note = (
+            "the motor pulls from the side away from the support: its string moves the mean position away from the "
+            "support"
+        )
+    return fitted(string_length, side * size, told)._replace(side=side, notes=(note,) if note else ())
 
 
 _MOUNTED = 0.15  # rad: within which a mark is taken as put where it should be
@@ -243,11 +226,11 @@ class Referred:
 
     Attributes
     ----------
-    gap, at_rest, shift, rest : Estimate
-        Counted from the mean position under the drive, from where the car rests, the one less the other, and where the
-        car rests in the sensor's count (m).
+    estimates : mapping of str to Estimate
+        ``g``, counted from the mean position under the drive, ``gap_at_rest``, from where the car rests,
+        ``mean_shift``, the one less the other, and ``rest_position``, where the car rests in the sensor's count (m).
     covariance : array (4, 4)
-        Of gap, at_rest, shift and rest.
+        Of these four.
     cross : array (4, p)
         With the unknowns of the adjustment: the same records tell the gap and k_s/m, the same decays zero and omega_0.
     crank_length, reading : float
@@ -256,10 +239,7 @@ class Referred:
         The gap in the sensor's count.
     """
 
-    gap: Estimate
-    at_rest: Estimate
-    shift: Estimate
-    rest: Estimate
+    estimates: Mapping[str, Estimate]
     covariance: FloatArray
     cross: FloatArray
     crank_length: float
@@ -269,23 +249,23 @@ class Referred:
 
     def finding(self, contacts: ContactFit) -> Finding:
         """The gap as a finding."""
+        gap, at_rest, shift, _ = self.estimates.values()
         notes = [
             f"counted from the mean position under the drive at a crank of {1e3 * self.crank_length:.2f} mm, "
-            f"{1e6 * self.shift.value:+.0f} µm from where the car rests (string and uneven turning); as read at rest, "
+            f"{1e6 * shift.value:+.0f} µm from where the car rests (string and uneven turning); as read at rest, "
             "the model would stand at another gap by as much",
             f"stands for a reading of {1e3 * self.reading:.4g} mm at the screw, whose zero is off by "
-            f"{1e6 * (self.at_rest.value - self.reading):+.0f} µm",
+            f"{1e6 * (at_rest.value - self.reading):+.0f} µm",
             *self.counted.notes,
         ]
-        others = {"gap_at_rest": self.at_rest, "mean_shift": self.shift, "rest_position": self.rest}
         return Finding(
             "g",
-            self.gap,
+            gap,
             "multiple shooting over records with contact, referred to the mean position",
             contacts.samples,
             tuple(run.name for run in contacts.runs),
             tuple(notes),
-            others,
+            {name: one for name, one in self.estimates.items() if name != "g"},
             self.covariance,
         )
 
@@ -375,13 +355,15 @@ def refer(
     known[0, 0], known[1:, 1:] = counted.error**2, found.covariance
     covariance = rows @ known @ rows.T
     values = rows @ [counted.value, found.rest, found.alpha, found.beta]
-    gap, at_rest, by, place = (
-        Estimate(float(value), float(np.sqrt(covariance[i, i])), "m") for i, value in enumerate(values)
-    )
+    names = ("g", "gap_at_rest", "mean_shift", "rest_position")
+    estimates = {
+        name: Estimate(float(value), float(np.sqrt(square)), "m")
+        for name, value, square in zip(names, values, np.diag(covariance), strict=True)
+    }
     with_counted = _cross(adjusted, ("kappa", "gamma"), contacts.covariance[3:5][:, counted.places] @ counted.weight)
     with_zero = _cross(adjusted, ("omega_0", "b", "f"), decay.covariance[:3, 3])
     cross = rows @ np.array([with_counted, *np.outer(found.by_zero, with_zero)])
-    return Referred(gap, at_rest, by, place, covariance, cross, crank, reading, counted, found.notes)
+    return Referred(estimates, covariance, cross, crank, reading, counted, found.notes)
 
 
 def _cross(adjusted: Adjusted, labels: tuple[str, ...], shared: FloatArray) -> FloatArray:

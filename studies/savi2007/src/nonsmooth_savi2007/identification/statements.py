@@ -36,7 +36,7 @@ def agreement(adjusted: Adjusted, evidence: Evidence) -> list[str]:
             f"the procedures agree: Birge ratio {adjusted.birge:.2f}, {adjusted.freedom} degree"
             f"{'s' if adjusted.freedom > 1 else ''} of freedom"
         )
-    if lacking := [name for name in _NEEDED if name in evidence.missing]:
+    if lacking := [name for name in _NEEDED if not evidence.runs[name]]:
         notes.append(f"no recordings of: {', '.join(lacking)}")
     return notes
 
@@ -142,8 +142,8 @@ def require(found: ParameterSet, names: Iterable[str]) -> None:
             raise ValueError(f"{name!r} was not identified: it needs {_RESTS_ON[name]}; {lacking or 'see the notes'}")
 
 
-_PARAMETERS = ("m", "k", "k_s", "c", "c_s")
-_BESIDE = ("friction", "gain")
+_PARAMETERS = ("m", "k", "k_s", "c", "c_s", "g")
+_BESIDE = ("friction", "gain", "omega_0", "gap_at_rest", "mean_shift", "rest_position")
 
 
 def joined(
@@ -166,33 +166,23 @@ def joined(
     findings, identifiability, notes, anomalies, synthetic
         Of the :class:`ParameterSet`.
     """
-    size, names = len(adjusted.names), adjusted.names
-    unit = np.eye(size)
-    rows = {name: (adjusted.estimate(name), unit[names.index(name)]) for name in names}
-    if {"m", "k"} <= set(names):
-        omega, row = float(np.sqrt(2 * adjusted["k"] / adjusted["m"])), np.zeros(size)
-        row[names.index("k")], row[names.index("m")] = omega / (2 * adjusted["k"]), -omega / (2 * adjusted["m"])
-        error = float(np.sqrt(row @ adjusted.covariance @ row))
-        rows["omega_0"] = (Estimate(omega, error, "rad/s"), row)
-    inner = [name for name in _PARAMETERS if name in rows]
-    outer = [name for name in (*_BESIDE, "omega_0") if name in rows]
-    jacobian = np.array([rows[name][1] for name in inner + outer]).reshape(-1, size)
-    estimates = {name: rows[name][0] for name in inner}
-    extra = {name: rows[name][0] for name in outer}
-    covariance = jacobian @ adjusted.covariance @ jacobian.T
+    names, size = adjusted.names, len(adjusted.names)
+    matrix, unit = np.zeros((size + 4, size + 4)), np.eye(size + 4)
+    matrix[:size, :size] = adjusted.covariance
+    told = {name: (adjusted.estimate(name), unit[i]) for i, name in enumerate(names)}
+    if {"m", "k"} <= told.keys():
+        omega = float(np.sqrt(2 * adjusted["k"] / adjusted["m"]))
+        row = omega / 2 * (unit[names.index("k")] / adjusted["k"] - unit[names.index("m")] / adjusted["m"])
+        told["omega_0"] = Estimate(omega, float(np.sqrt(row @ matrix @ row)), "rad/s"), row
     if gap is not None:
-        n = len(inner)
-        cross = gap.cross @ jacobian.T
-        stacked = np.block([[covariance, cross.T], [cross, gap.covariance]])
-        m = len(covariance)
-        order = [*range(n), m, *range(n, m), *range(m + 1, m + 4)]
-        covariance = stacked[np.ix_(order, order)]
-        estimates["g"] = gap.gap
-        extra |= {"gap_at_rest": gap.at_rest, "mean_shift": gap.shift, "rest_position": gap.rest}
+        matrix[size:, :size], matrix[:size, size:], matrix[size:, size:] = gap.cross, gap.cross.T, gap.covariance
+        told |= {name: (one, row) for (name, one), row in zip(gap.estimates.items(), unit[size:], strict=True)}
+    inner, outer = ([name for name in some if name in told] for some in (_PARAMETERS, _BESIDE))
+    jacobian = np.array([told[name][1] for name in (*inner, *outer)])
     return ParameterSet(
-        estimates,
-        covariance,
-        extra=extra,
+        {name: told[name][0] for name in inner},
+        jacobian @ matrix @ jacobian.T,
+        extra={name: told[name][0] for name in outer},
         findings=findings,
         identifiability=identifiability,
         notes=notes,

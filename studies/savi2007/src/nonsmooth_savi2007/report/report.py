@@ -15,16 +15,16 @@ from nonsmooth_savi2007.figures.parameters import NAMES, table_rows
 from nonsmooth_savi2007.flows import ETA, SMOOTHED, Settings
 from nonsmooth_savi2007.report.pages import (
     Block,
-    Bullets,
-    Comparison,
-    Contents,
-    Heading,
-    Image,
-    Lines,
-    Notice,
-    Paragraph,
-    Table,
-    Tally,
+    bullets,
+    comparison,
+    contents,
+    heading,
+    image,
+    notice,
+    paragraph,
+    sentences,
+    table,
+    tally,
     to_html,
     to_markdown,
 )
@@ -66,39 +66,40 @@ def write_report(
 def _blocks(
     folder: Path, figures: Sequence[Figure], data: Data, rows: Sequence[Statement], settings: Settings, complete: bool
 ) -> list[Block]:
-    blocks: list[Block] = [Heading(TITLE, 1), Paragraph(_PAPER)]
+    blocks: list[Block] = [heading(TITLE, 1), paragraph(_PAPER)]
     if settings.quick:
-        blocks.append(Notice("A quick run: coarse grids and short transients. Verdicts are provisional."))
+        blocks.append(notice("A quick run: coarse grids and short transients. Verdicts are provisional."))
     if not complete:
         names = ", ".join(figure.name for figure in figures)
-        blocks.append(Notice(f"A partial run ({names}): only the statements that these figures decide are listed."))
+        blocks.append(notice(f"A partial run ({names}): only the statements that these figures decide are listed."))
     if rows:
-        blocks += [Lines(_in_short(rows)), Tally(_counts(rows))]
+        blocks += [sentences(_in_short(rows)), tally(_counts(rows))]
         blocks += _numbers(rows)
         blocks += _differences(rows)
-    blocks.append(Contents())
+    first = len(blocks)
     if rows:
-        blocks += [Heading("The rule"), Bullets(RULE)]
-        blocks.append(Table(("verdict", "meaning"), tuple((str(one), text) for one, text in MEANING.items())))
+        blocks += [heading("The rule"), bullets(RULE)]
+        blocks.append(table(("verdict", "meaning"), [(str(one), text) for one, text in MEANING.items()]))
         for letters, title in _PARTS.items():
             mine = [row for row in rows if row.id[0] in letters]
-            blocks += [Heading(title), _table(mine)] if mine else []
+            blocks += [heading(title), _table(mine)] if mine else []
     if "table1" in data:
-        blocks += [Heading("Table 1, identified"), _parameters(data)]
+        blocks += [heading("Table 1, identified"), _parameters(data)]
     points = table_of_points(data)
     if points:
-        blocks += [Heading("Special points"), Paragraph(_about_points(points)), special_table(points)]
-    blocks.append(Heading("Figures"))
+        blocks += [heading("Special points"), paragraph(_about_points(points)), special_table(points)]
+    blocks.append(heading("Figures"))
     for figure in figures:
         title = figure.title if figure.number is None else f"Fig. {figure.number}: {figure.title}"
         title += f" (not in the paper; beside Fig. {figure.beside})" if figure.beside is not None else ""
         title += " (virtual rig, synthetic)" if figure.rig else ""
         caption = figure.caption(data[figure.name])
-        blocks += [Heading(title, 3), Image(folder / f"{figure.name}.png", f"{figure.name}.pdf", caption)]
-    blocks += [Heading("The computation"), Paragraph(_about_the_model())]
+        blocks += [heading(title, 3), image(folder / f"{figure.name}.png", f"{figure.name}.pdf", caption)]
+    blocks += [heading("The computation"), paragraph(_about_the_model())]
     if any(figure.rig for figure in figures):
-        blocks.append(Paragraph(_ABOUT_THE_RIG))
-    return [*blocks, Heading("What the paper leaves open"), Bullets(_OPEN)]
+        blocks.append(paragraph(_ABOUT_THE_RIG))
+    blocks += [heading("What the paper leaves open"), bullets(_OPEN)]
+    return [*blocks[:first], contents(blocks), *blocks[first:]]
 
 
 def _counts(rows: Sequence[Statement]) -> dict[str, dict[Verdict, int]]:
@@ -174,7 +175,7 @@ def _numbers(rows: Sequence[Statement]) -> list[Block]:
         "came back are left out."
     )
     sides = ("exact flow", "smoothed switch", "virtual rig")
-    return [Heading("Printed numbers"), Comparison(sides, tuple(shown), CLOSE, caption)]
+    return [heading("Printed numbers"), comparison(sides, shown, CLOSE, caption)]
 
 
 def _differences(rows: Sequence[Statement]) -> list[Block]:
@@ -190,10 +191,10 @@ def _differences(rows: Sequence[Statement]) -> list[Block]:
     if not cells:
         return []
     header = ("claim", "the paper says", "found", "difference", "by", "cause")
-    return [Heading("Differences and their cause"), Table(header, tuple(cells), tuple(notes))]
+    return [heading("Differences and their cause"), table(header, cells, notes)]
 
 
-def _table(rows: Sequence[Statement]) -> Table:
+def _table(rows: Sequence[Statement]) -> Block:
     """The long table: a row per statement, its reasons below."""
     header = (
         "claim",
@@ -205,7 +206,7 @@ def _table(rows: Sequence[Statement]) -> Table:
         "virtual rig (synthetic)",
         "verdict, rig",
     )
-    cells = tuple(
+    cells = [
         (
             row.id,
             f"{row.says} ({row.place})",
@@ -217,11 +218,11 @@ def _table(rows: Sequence[Statement]) -> Table:
             str(row.rig_verdict),
         )
         for row in rows
-    )
-    return Table(header, cells, tuple(row.why for row in rows))
+    ]
+    return table(header, cells, [row.why for row in rows])
 
 
-def _parameters(data: Data) -> Table:
+def _parameters(data: Data) -> Block:
     """Paper, identified with its 95 % interval, truth of the rig."""
     rows = []
     for name, (printed, number, truth) in table_rows(data["table1"]).items():
@@ -250,7 +251,7 @@ def _parameters(data: Data) -> Table:
         "truth is",
         "identified from truth",
     )
-    return Table(header, tuple(rows))
+    return table(header, rows)
 
 
 def _about_the_model() -> str:

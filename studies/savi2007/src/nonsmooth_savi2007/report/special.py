@@ -11,7 +11,7 @@ import xarray as xr
 from nonsmooth_savi2007.claims.verdicts import Data
 from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches_of, rows_of
 from nonsmooth_savi2007.grazing import grazing_frequencies
-from nonsmooth_savi2007.report.pages import Table
+from nonsmooth_savi2007.report.pages import Block, table
 
 _NAMES = {"fold": "fold", "flip": "flip", "grazing": "grazing", "neimark_sacker": "Neimark-Sacker"}
 _UNITS = {"omega": ("rad/s", 8), "rho": ("N", 8), "g": ("m", 11)}  # decimals: eight digits at least
@@ -47,11 +47,11 @@ def table_of_points(data: Data) -> list[SpecialPoint]:
 
 def _points(figure: str, branch: xr.Dataset) -> list[SpecialPoint]:
     parameter = str(branch.attrs["parameter"])
-    table = rows_of(branch)
+    special = rows_of(branch)
     contacts = branch["contacts_per_period"].values
     found = []
-    for i in range(table.sizes["special"]):
-        row = table.isel(special=i)
+    for i in range(special.sizes["special"]):
+        row = special.isel(special=i)
         kind, value, at = str(row["kind"].values), float(row[parameter]), int(row["point"])
         contact = closed = None
         if kind == "grazing":
@@ -85,7 +85,7 @@ def _closed(branch: xr.Dataset, value: float) -> float:
     return min(grazing_frequencies(parameters), key=lambda omega: abs(omega - value))
 
 
-def special_table(points: Sequence[SpecialPoint]) -> Table:
+def special_table(points: Sequence[SpecialPoint]) -> Block:
     """The points as a table of the report."""
     header = (
         "figure",
@@ -114,7 +114,7 @@ def special_table(points: Sequence[SpecialPoint]) -> Table:
             )
         )
         last = here
-    return Table(header, tuple(rows))
+    return table(header, rows)
 
 
 def _number(value: complex) -> str:
