@@ -1,23 +1,22 @@
 """The rig's figures are measured by a process of their own, beside the numerical ones.
 
 Reading and smoothing records is Python with short compiled pieces, the sweeps are compiled and use all cores: two
-processes take little more than the longer of both. That process runs :func:`main`; it writes the figures' datasets,
+processes take little more than the longer of both. That process runs :func:`measure`; it writes the figures' datasets,
 and of each a record that it is finished. It is a fresh interpreter, not a fork: compiled kernels that run in threads
 cannot be forked, and a caller's script is not run a second time.
 """
 
 from __future__ import annotations
 
-import argparse
+import json
 import multiprocessing
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 
 from nonsmooth_savi2007.figures.figure import Figure
@@ -35,16 +34,16 @@ class Measurement:
     """A running measurement of some figures; ``with`` it, and it ends with the block whatever happens there."""
 
     def __init__(self, folder: Path, figures: Sequence[Figure], quick: bool, full: bool = False) -> None:
-        self.folder, self.figures = folder, figures
+        self.log = folder / RIG / _LOG
         self.process: subprocess.Popen[bytes] | None = None
         if figures:
-            (folder / RIG).mkdir(parents=True, exist_ok=True)
-            run = f"from {__name__} import main; main()"
-            # -P: with -c alone a file of the caller's folder (a pint.py, say) would stand for a library.
-            command = [sys.executable, "-P", "-c", run, str(folder), *(figure.name for figure in figures)]
-            with open(folder / RIG / _LOG, "wb") as log:
+            self.log.parent.mkdir(parents=True, exist_ok=True)
+            asked = json.dumps([str(folder), [figure.name for figure in figures], quick, full])
+            run = f"import json, sys; from {__name__} import measure; measure(*json.loads(sys.argv[1]))"
+            with open(self.log, "wb") as log:
+                # -P: with -c alone a file of the caller's folder (a pint.py, say) would stand for a library.
                 self.process = subprocess.Popen(
-                    command + ["--quick"] * quick + ["--full"] * full,
+                    [sys.executable, "-P", "-c", run, asked],
                     stdin=subprocess.DEVNULL,
                     stdout=log,
                     stderr=subprocess.STDOUT,
@@ -72,95 +71,66 @@ class Measurement:
         """
         if self.process is None:
             return
-        log = self.folder / RIG / _LOG
-        with open(log, encoding="utf-8", errors="replace") as lines:
-            while (code := self.process.poll()) is None:
-                _pass_on(lines.read(), heard)
+        with open(self.log, encoding="utf-8", errors="replace") as lines:
+            ended = False
+            while not ended:
+                ended = self.process.poll() is not None
+                for line in lines.read().splitlines():
+                    if line.endswith(_TIMED):  # what a person reads, without the notes on single recordings
+                        heard(f"virtual rig: {line}")
                 time.sleep(_LOOK)
-            _pass_on(lines.read(), heard)
-        if code != 0:
-            said = log.read_text(encoding="utf-8", errors="replace").strip().splitlines() or ["(nothing)"]
-            raise RuntimeError(f"the measurement on the virtual rig failed; see {log}. It said last: {said[-1]}")
+        if self.process.returncode != 0:
+            said = self.log.read_text(encoding="utf-8", errors="replace").strip().splitlines() or ["(nothing)"]
+            raise RuntimeError(f"the measurement on the virtual rig failed; see {self.log}. It said last: {said[-1]}")
 
 
-def _pass_on(text: str, heard: Callable[[str], None]) -> None:
-    """Print what a person reads: the times, without the notes on single recordings."""
-    for line in text.splitlines():
-        if line.endswith(_TIMED):
-            heard(f"virtual rig: {line}")
-
-
-def measure(folder: Path, names: Sequence[str], quick: bool, full: bool = False) -> None:
+def measure(folder: str, names: Sequence[str], quick: bool, full: bool = False) -> None:
     """Measure figures of the rig, and write what they show.
 
     Identification comes first; what needs only its result is shared among processes, where the system can fork this
     one (which has no threads then).
     """
-    from nonsmooth_savi2007.study import figures_of_the_study
-
-    known = {figure.name: figure for figure in figures_of_the_study() if figure.rig}
+    known = _known()
     if wrong := sorted(set(names) - set(known)):
         raise ValueError(f"{', '.join(wrong)}: not measured on the rig; that are {', '.join(sorted(known))}")
-    laboratory = Laboratory(folder / RIG, quick, {name for one in names for name in known[one].procedures})
-    settings = Settings(quick=quick, full=full, progress=False, laboratory=laboratory, folder=folder)
-    job = _Job(settings, known)
+    place = Path(folder)
+    laboratory = Laboratory(place / RIG, quick, {name for one in names for name in known[one].procedures})
+    global _settings
+    _settings = Settings(quick=quick, full=full, progress=False, laboratory=laboratory, folder=place)
     begin, busy = time.perf_counter(), time.process_time()
     n = len(laboratory.identified)  # kept there for all that follows
     took = time.perf_counter() - begin
     print(f"{n} parameters identified: {took:.1f} s, {time.process_time() - busy:.1f}{_TIMED}", flush=True)
     tasks = [[name for name in group if name in names] for group in _GROUPS]
     tasks += [[name] for name in names if not any(name in group for group in _GROUPS)]
-    rows = [row for done in job.shared([task for task in tasks if task]) for row in done]
+    tasks = [task for task in tasks if task]
+    workers = min(os.cpu_count() or 1, len(tasks))
+    if workers < 2 or "fork" not in multiprocessing.get_all_start_methods():
+        rows = [_task(task) for task in tasks]
+    else:
+        with ProcessPoolExecutor(workers, multiprocessing.get_context("fork")) as pool:
+            rows = list(pool.map(_task, tasks))
     for note in dict.fromkeys([*laboratory.notes, *(note for row in rows for note in row)]):
         print(f"note: {note}")
 
 
 #: Figures that use the same records, and the longest first.
 _GROUPS = (("fig10_rig",), ("fig09_rig",), ("fig13_rig", "fig14_rig"), ("fig11_rig",), ("fig12_rig",), ("fig17_rig",))
+_settings: Settings  # the forked processes have them, with all that was identified
 
 
-@dataclass(frozen=True)
-class _Job:
-    """Data that the processes share."""
+def _known() -> dict[str, Figure]:
+    from nonsmooth_savi2007.study import figures_of_the_study
 
-    settings: Settings
-    figures: Mapping[str, Figure]
-
-    def shared(self, tasks: Sequence[Sequence[str]]) -> list[list[str]]:
-        """Measure the figures; the notes of each task."""
-        workers = min(os.cpu_count() or 1, len(tasks))
-        if workers < 2 or "fork" not in multiprocessing.get_all_start_methods():
-            return [self.task(task) for task in tasks]
-        global _job
-        _job = self  # the forked processes have it; closures cannot be sent to them
-        with ProcessPoolExecutor(workers, multiprocessing.get_context("fork")) as pool:
-            return list(pool.map(_forked, tasks))
-
-    def task(self, names: Sequence[str]) -> list[str]:
-        """Figures one after the other, and what there is to note."""
-        for name in names:
-            begin, busy = time.perf_counter(), time.process_time()
-            data = self.figures[name].compute(self.settings)
-            took = time.perf_counter() - begin
-            finish(name, data, took, self.settings)
-            print(f"{name}: {took:.1f} s, {time.process_time() - busy:.1f}{_TIMED}", flush=True)
-        return list(self.settings.bench.notes)
+    return {figure.name: figure for figure in figures_of_the_study() if figure.rig}
 
 
-_job: _Job | None = None
-
-
-def _forked(names: Sequence[str]) -> list[str]:
-    assert _job is not None
-    return _job.task(names)
-
-
-def main() -> None:
-    """Measure the figures named on the command line."""
-    parser = argparse.ArgumentParser(description="Measure figures of Savi et al. (2007) on the virtual rig.")
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("names", nargs="+")
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--full", action="store_true")
-    options = parser.parse_args()
-    measure(options.folder, options.names, options.quick, options.full)
+def _task(names: Sequence[str]) -> list[str]:
+    """Measure figures one after the other; what there is to note."""
+    for name in names:
+        begin, busy = time.perf_counter(), time.process_time()
+        data = _known()[name].compute(_settings)
+        took = time.perf_counter() - begin
+        finish(name, data, took, _settings)
+        print(f"{name}: {took:.1f} s, {time.process_time() - busy:.1f}{_TIMED}", flush=True)
+    return list(_settings.bench.notes)

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from nonsmooth import ParameterSet, Recording, System, __version__, compare
+from nonsmooth import ParameterSet, Recording, __version__, compare
 from nonsmooth.models import discontinuous_support
 from nonsmooth.recordings import RecordingWarning, Session, load_session
 from nonsmooth.recordings.signals.displacement import found_resolution
@@ -36,8 +36,6 @@ _FEWER = {
     "contact": {"regimes": ((11.15, 0.039), (9.88, 0.027), (6.0, 0.0165)), "duration": 12.0},
 }
 
-_Measured = TypeVar("_Measured")
-
 
 class Laboratory:
     """A virtual rig and who measures with it.
@@ -53,10 +51,9 @@ class Laboratory:
         Those that are recorded for identification; all where not given.
     """
 
-    def __init__(self, folder: Path, quick: bool = False, procedures: Collection[str] | None = None) -> None:
+    def __init__(self, folder: Path, quick: bool = False, procedures: Collection[str] = IDENTIFICATION) -> None:
         self.folder, self.quick, self.procedures = Path(folder), quick, procedures
         self.notes: list[str] = []
-        self._kept: dict[str, Any] = {}
         self.folder.mkdir(parents=True, exist_ok=True)
 
     @cached_property
@@ -80,26 +77,24 @@ class Laboratory:
 
     @cached_property
     def _identification(self) -> Path:
-
         options: dict[str, Any] = _FEWER if self.quick else {}
-        wanted = IDENTIFICATION if self.procedures is None else self.procedures
-        names = [name for name in IDENTIFICATION if name in wanted and not (self.quick and name == "grazing")]
+        names = [one for one in IDENTIFICATION if one in self.procedures and not (self.quick and one == "grazing")]
         return self._write("identification", {name: self.rig.record(name, **options.get(name, {})) for name in names})
 
     def _write(self, name: str, made: Mapping[str, Recording]) -> Path:
-
         title = f"virtual rig with the published parameters, {name}"
         return write_session(self.rig, self.folder / name, made, self.folder / TRUTH, title=title)
 
     def sensors(self) -> xr.Dataset:
         """Sensors as the files of the session describe them: rate, steps, ranges used."""
 
+        def channels(procedure: str, name: str) -> list[xr.DataArray]:
+            return [one.recording.channel(name, one.run) for one in self.session.recordings(procedure)]
+
         with self._noted():
-            item = self.session.recordings("springs")[0]
-            angle, force = (item.recording.channel(name, item.run) for name in ("Angle", "Force"))
+            angle, force = (channels("springs", name)[0] for name in ("Angle", "Force"))
             volts = [float(one.settings["voltage"]) for one in self.session.recordings("voltage")]
-            pushed = [one.recording.channel("Force", one.run) for one in self.session.recordings("support")]
-            taps = [one.recording.channel("Angle", one.run) for one in self.session.recordings("impulse")]
+            pushed, taps = channels("support", "Force"), channels("impulse", "Angle")
         steps = np.diff(angle["time"].values)
         turning = max(float(np.abs(np.diff(tap.values) / np.diff(tap["time"].values)).max()) for tap in taps)
         values = {
@@ -131,26 +126,16 @@ class Laboratory:
     ) -> tuple[xr.Dataset, dict[str, Any]]:
         """Arguments of ``compare``: a measurement, and the settings of the model that belong to it."""
 
-        offset = self._gap_offset
+        k, offset = self.identified["k"], self._gap_offset
         with self._noted():
-            return session_measurement(session, procedure, runs, k=self.identified["k"], gap_offset=offset)
-
-    def once(self, name: str, measure: Callable[[], _Measured]) -> _Measured:
-        """Result of ``measure``, measured when first asked for."""
-        if name not in self._kept:
-            self._kept[name] = measure()
-        made: _Measured = self._kept[name]
-        return made
+            return session_measurement(session, procedure, runs, k=k, gap_offset=offset)
 
     def compare(self, measured: xr.Dataset, settings: Mapping[str, Any], **options: Any) -> xr.Dataset:
         """The measurement over the model with the identified parameters."""
 
-        return compare(measured, self.model, parameters=self.identified, settings=settings, **{"draws": 0, **options})
-
-    @property
-    def model(self) -> System:
-        """The paper's oscillator; the parameters are replaced by those identified."""
-        return discontinuous_support()
+        return compare(
+            measured, discontinuous_support(), parameters=self.identified, settings=settings, draws=0, **options
+        )
 
     @cached_property
     def _gap_offset(self) -> GapOffset:
@@ -168,8 +153,7 @@ class Laboratory:
         for item in caught:
             if issubclass(item.category, RecordingWarning):
                 self.notes.append(str(item.message))
-        for item in caught:
-            if not issubclass(item.category, RecordingWarning):
+            else:
                 warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
 
 

@@ -122,9 +122,7 @@ def _draw(canvas: Canvas, data: Datasets) -> None:
     hollow = {"color": "black", "markerfacecolor": "none", "markersize": 6}
     left.plot([], [], "s", label="rtol $10^{-6}$, as in the figures", **hollow)
     left.plot([], [], ":", color="black", label="general form")
-    left.axvline(1e6 * ETA, color="black", linewidth=0.6, linestyle="--", zorder=0, label=_PAPERS)
     left.set(
-        xlabel=_AXIS,
         title="(a) error of the smoothed switch after 4 periods",
         ylabel=r"$[(\Delta x / 1\,\mathrm{mm})^2 + (\Delta v / 10\,\mathrm{mm/s})^2]^{1/2}$",
     )
@@ -141,13 +139,13 @@ def _draw(canvas: Canvas, data: Datasets) -> None:
         color=plot.COLORS["first"],
         label="smoothed model, bisected",
     )
-    right.axvline(1e6 * ETA, color="black", linewidth=0.6, linestyle="--", zorder=0, label=_PAPERS)
     right.set(
-        xlabel=_AXIS,
         ylabel="shift of the grazing frequency (rad/s)",
         title="(b) grazing of Fig. 9, falling frequency",
     )
     for ax in (left, right):
+        ax.axvline(1e6 * ETA, color="black", linewidth=0.6, linestyle="--", zorder=0, label=_PAPERS)
+        ax.set_xlabel(_AXIS)
         ax.xaxis.set_major_formatter("{x:g}")
     plot.shared_legend(canvas, columns=4)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,7 +13,7 @@ from nonsmooth import plot, sweep
 from nonsmooth.plot import annotate, shared_legend
 from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, branches_of
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, only_outer
-from nonsmooth_savi2007.flows import EXACT, FLOWS, Settings, starts
+from nonsmooth_savi2007.flows import EXACT, FLOWS, Flow, Settings, starts
 
 _OTHER, _SHARE = 0.05, 0.25  # another motion: a quarter of its points so far off, in parts of the diagram's range
 
@@ -31,39 +32,32 @@ def diagrams(
     ``steps``: of the exact and of the smoothed sweep; the starts are tried at a half or a quarter of them.
     ``also``: values to be among those swept. ``patience``: transient of the exact flow from the starts.
     """
-    begin, data = BEGINNINGS[figure], {}
+    begin, data = BEGINNINGS[figure], dict[str, xr.Dataset]()
 
     def grid(steps: int) -> np.ndarray:
         return np.unique(np.round([*np.linspace(*begin.range, steps + 1), *also], 9))
 
+    def swept(flow: Flow, steps: int, transient: int, **options: Any) -> xr.Dataset:
+        system, options = flow.system(**begin.parameters), {**options, **flow.options, "progress": settings.progress}
+        found = sweep(system, begin.parameter, grid(steps), transient=transient, **options)
+        return found.assign_attrs(transient=transient)
+
     for flow in FLOWS:
-        system = flow.system(**begin.parameters)
-        n = settings.of(flow, exact=steps[0], smoothed=steps[1], quick=70)
-        transient = settings.of(flow, exact=600, smoothed=200, quick=100)
-        data[flow.key] = sweep(
-            system,
-            begin.parameter,
-            grid(n),
+        data[flow.key] = swept(
+            flow,
+            settings.of(flow, exact=steps[0], smoothed=steps[1], quick=70),
+            settings.of(flow, exact=600, smoothed=200, quick=100),
             direction="both",
-            progress=settings.progress,
-            transient=transient,
             keep=settings.of(flow, exact=200, smoothed=64, quick=40),
-            **flow.options,
-        ).assign_attrs(transient=transient)
-        fewer = 2 if patience <= 600 else 4
-        n = settings.of(flow, exact=steps[0] // fewer, smoothed=steps[1] // 4, quick=10)
-        transient = settings.of(flow, exact=patience, smoothed=150, quick=80)
-        data[f"{flow.key}_starts"] = sweep(
-            system,
-            begin.parameter,
-            grid(n),
+        )
+        data[f"{flow.key}_starts"] = swept(
+            flow,
+            settings.of(flow, exact=steps[0] // (2 if patience <= 600 else 4), smoothed=steps[1] // 4, quick=10),
+            settings.of(flow, exact=patience, smoothed=150, quick=80),
             direction=None,
             start=starts(settings.of(flow, exact=12, smoothed=8, quick=4)),
-            progress=settings.progress,
-            transient=transient,
             keep=32,
-            **flow.options,
-        ).assign_attrs(transient=transient)
+        )
     return data | branches(figure)
 
 

@@ -6,7 +6,7 @@ On the virtual rig steady records at four gaps, and a long one for the attractor
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -99,9 +99,10 @@ def _caption_15(data: Datasets) -> str:
     )
 
 
+@cache
 def _records(bench: Laboratory) -> Motions:
     """The steady records at four gaps, measured once for Figs. 13 and 14."""
-    return bench.once("fig14", lambda: motions(bench, 14, tuple(FIGURE_14), periods=60 if bench.quick else 100))
+    return motions(bench, 14, tuple(FIGURE_14), periods=60 if bench.quick else 100)
 
 
 def _measure_13(settings: Settings) -> Datasets:

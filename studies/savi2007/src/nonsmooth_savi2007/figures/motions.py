@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 
 from nonsmooth import System, plot
 from nonsmooth.identification.compare import measured_sections
+from nonsmooth.models import discontinuous_support
 from nonsmooth.plot import name_plane, prefixed, shade_zone, shared_legend
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, two_rows
 from nonsmooth_savi2007.figures.portraits import QUANTITIES, titles
@@ -60,7 +61,7 @@ def _value(settings: Mapping[str, Any], name: str) -> float:
 
 def model_at(bench: Laboratory, settings: Mapping[str, Any]) -> System:
     """The model with the parameters identified, at the settings of a measurement."""
-    system = bench.model.with_parameters(dict(bench.identified))
+    system = discontinuous_support().with_parameters(dict(bench.identified))
     values = {
         name: float(rule(system.values) if callable(rule) else np.atleast_1d(rule)[0])
         for name, rule in settings.items()

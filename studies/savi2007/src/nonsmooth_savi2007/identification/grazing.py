@@ -32,7 +32,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
@@ -90,8 +89,10 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
             "the graze is sought in steps of the frequency at one crank length, these runs have "
             f"{sorted(set(seen.crank.tolist()))} m: give one of them at a time"
         )
-    contact, limit = _touching(seen, resolution)
-    last, first = _bracket(seen, contact)
+    first, limit = _touching(seen, resolution)
+    if not np.all(seen.amplitude[:first] < seen.amplitude[first]):
+        raise ValueError("the motion does not grow towards the first contact; the steps must go towards resonance")
+    last, contact = first - 1, np.arange(len(seen)) >= first
     free = ~contact
     a, (natural, b, f) = float(seen.crank[0]), decay.law
 
@@ -135,13 +136,28 @@ def grazing_gap(runs: Sequence[Run], decay: DecayFit, *, resolution: float, kapp
             "at_rest": Estimate(gap + place - zero, at_rest, "m", half_width=half),
             "grazing_frequency": Estimate(float(ends.mean()), uniform(width), "rad/s", half_width=width),
         },
-        data=_data(seen, contact, place, ends, gap, total),
+        data=picture_data(
+            seen.runs,
+            {
+                "run": {
+                    "setting": seen.omega,
+                    "amplitude": seen.highest - place,
+                    "amplitude_error": np.hypot(seen.error, seen.mean_error),
+                    "contact": contact.astype(np.int8),
+                    "mean": seen.mean - place,
+                }
+            },
+            grazing_setting=ends.mean(),
+            grazing_low=ends.min(),
+            grazing_high=ends.max(),
+            gap=Estimate(gap, total, "m"),
+        ),
         plot="grazing",
     )
 
 
-def _touching(seen: Steady, resolution: float) -> tuple[NDArray[np.bool_], float]:
-    """Runs that touch, and the distance of a mean from that of the free runs that tells so.
+def _touching(seen: Steady, resolution: float) -> tuple[int, float]:
+    """The first run that touches, and the distance of a mean from that of the free runs that tells so.
 
     All runs from the first with contact on have left it: a single mean that strays among free runs is no contact.
     """
@@ -171,15 +187,7 @@ def _touching(seen: Steady, resolution: float) -> tuple[NDArray[np.bool_], float
         )
     if begun == n:
         raise ValueError(f"none of the {n} runs touches: step on from free motion into contact")
-    return np.arange(n) >= begun, limit
-
-
-def _bracket(seen: Steady, contact: NDArray[np.bool_]) -> tuple[int, int]:
-    """Indices of the last free run and of the first with contact, in the order of the steps."""
-    begun = int(np.argmax(contact))
-    if not np.all(seen.amplitude[:begun] < seen.amplitude[begun]):
-        raise ValueError("the motion does not grow towards the first contact; the steps must go towards resonance")
-    return begun - 1, begun
+    return begun, limit
 
 
 def _unseen(limit: float, amplitude: float, stiff: float) -> float:
@@ -241,24 +249,3 @@ def _sensor_error(
     n = int(np.count_nonzero(free))
     scatter = float(np.std(seen.highest[free] - seen.mean[free] - height(seen.omega[free]), ddof=1))
     return max(scatter, resolution / np.sqrt(12 * n)) / np.sqrt(min(n, _FIRST))
-
-
-def _data(
-    seen: Steady, contact: NDArray[np.bool_], place: float, ends: FloatArray, gap: float, error: float
-) -> xr.Dataset:
-    return picture_data(
-        seen.runs,
-        {
-            "run": {
-                "setting": seen.omega,
-                "amplitude": seen.highest - place,
-                "amplitude_error": np.hypot(seen.error, seen.mean_error),
-                "contact": contact.astype(np.int8),
-                "mean": seen.mean - place,
-            }
-        },
-        grazing_setting=ends.mean(),
-        grazing_low=ends.min(),
-        grazing_high=ends.max(),
-        gap=Estimate(gap, error, "m"),
-    )

@@ -96,17 +96,14 @@ def half_power(seen: Steady, mass: Quantity) -> Finding:
         :math:`c = 2 m \xi \omega_0` (N s/m). ``others``: ``damping_ratio``, ``omega_0``, and ``c_`` with the length of
         every other crank.
     """
-    found, others = {}, {}
-    for a in np.unique(seen.crank):
-        part = seen.only(seen.crank == a)
-        value = np.array(_damping(part.omega, part.amplitude))
-        found[float(a)] = (part, value, _scatter(part))
-    longest = max(found)
-    part, value, error = found[longest]
-    for a, (_, row, spread) in found.items():
-        if a != longest:
-            others[f"c_{1e3 * a:.1f}mm"] = _c(row, spread, mass)
-    c, ratio = _c(value, error, mass), Estimate(float(value[0]), float(error[0]))
+    by_crank = {}
+    for longest in np.unique(seen.crank).tolist():
+        part = seen.only(seen.crank == longest)
+        value, error = _damping(part.omega, part.amplitude), _scatter(part)
+        product = Estimate(2 * value[0] * value[1], 2 * float(error[5]))
+        by_crank[f"c_{1e3 * longest:.1f}mm"] = product.times(mass.value, mass.uncertainty, "N s/m")
+    *others, (_, c) = by_crank.items()
+    ratio = Estimate(value[0], float(error[0]))
     notes = [
         f"half power at {value[2]:.4f} and {value[3]:.4f} rad/s, by a cubic of 1/A^2 over omega^2; uncertainty by "
         f"bootstrap over the {len(part)} runs at a crank of {1e3 * longest:.1f} mm"
@@ -122,8 +119,8 @@ def half_power(seen: Steady, mass: Quantity) -> Finding:
         tuple(notes),
         {
             "damping_ratio": ratio,
-            "omega_0": Estimate(float(value[1]), float(error[1]), "rad/s"),
-            **others,
+            "omega_0": Estimate(value[1], float(error[1]), "rad/s"),
+            **dict(others),
         },
         data=picture_data(
             part.runs,
@@ -143,11 +140,6 @@ def half_power(seen: Steady, mass: Quantity) -> Finding:
         ),
         plot="half_power",
     )
-
-
-def _c(value: FloatArray, error: FloatArray, mass: Quantity) -> Estimate:
-    product = Estimate(2 * float(value[0] * value[1]), 2 * float(error[5]))
-    return product.times(mass.value, mass.uncertainty, "N s/m")
 
 
 def _scatter(part: Steady) -> FloatArray:

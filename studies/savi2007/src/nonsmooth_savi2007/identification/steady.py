@@ -103,13 +103,10 @@ def steady(runs: Sequence[Run]) -> Steady:
         If a run lasts for less than two turns, or has no photogate.
     """
     rows: list[tuple[Any, ...]] = []
-    turn = np.linspace(0, 2 * np.pi, 720, endpoint=False)
+    order, turn = np.arange(1, HARMONICS + 1), np.linspace(0, 2 * np.pi, 720, endpoint=False)
     for run in runs:
         fitted, omega, omega_error, mark = harmonics_of(run, run.time, run.x)
-        amplitude = float(fitted.amplitudes[0])
-        response = amplitude * np.exp(1j * (omega * mark - float(fitted.phases[0])))
-        order = np.arange(1, HARMONICS + 1)
-        shape = np.cos(np.multiply.outer(turn, order) - fitted.phases) @ fitted.amplitudes
+        amplitude, shape = float(fitted.amplitudes[0]), np.multiply.outer(turn, order) - fitted.phases
         rows.append(
             (
                 omega,
@@ -117,10 +114,10 @@ def steady(runs: Sequence[Run]) -> Steady:
                 float(run.settings["crank_length"]),
                 amplitude,
                 float(fitted.amplitude_errors[0]),
-                response,
+                amplitude * np.exp(1j * (omega * mark - float(fitted.phases[0]))),
                 fitted.mean,
                 fitted.mean_error,
-                fitted.mean + float(shape.max()),
+                fitted.mean + float((np.cos(shape) @ fitted.amplitudes).max()),
                 fitted.residual,
                 _lean(fitted),
             )

@@ -13,7 +13,7 @@ from nonsmooth_savi2007.claims.verdicts import Beside, Verdict
 from nonsmooth_savi2007.report.style import STYLE
 
 
-class Block(NamedTuple):
+class Written(NamedTuple):
     """A part of the document; of a heading its text and level."""
 
     markdown: str
@@ -22,12 +22,12 @@ class Block(NamedTuple):
     level: int = 0
 
 
-def to_markdown(blocks: Sequence[Block]) -> str:
+def to_markdown(blocks: Sequence[Written]) -> str:
     """The document as Markdown with tables; pictures are linked."""
     return "\n\n".join(block.markdown for block in blocks if block.markdown) + "\n"
 
 
-def to_html(blocks: Sequence[Block], title: str) -> str:
+def to_html(blocks: Sequence[Written], title: str) -> str:
     """The document as one HTML file: style inline, pictures embedded, no script."""
     body = "\n".join(block.html for block in blocks)
     return (
@@ -37,44 +37,44 @@ def to_html(blocks: Sequence[Block], title: str) -> str:
     )
 
 
-def heading(text: str, level: int = 2) -> Block:
+def heading(text: str, level: int = 2) -> Written:
     """A heading of level 1, 2 or 3."""
-    return Block(f"{'#' * level} {text}", f'<h{level} id="{_anchor(text)}">{escape(text)}</h{level}>', text, level)
+    return Written(f"{'#' * level} {text}", f'<h{level} id="{_anchor(text)}">{escape(text)}</h{level}>', text, level)
 
 
-def paragraph(text: str) -> Block:
+def paragraph(text: str) -> Written:
     """Plain text."""
-    return Block(text, f"<p>{escape(text)}</p>")
+    return Written(text, f"<p>{escape(text)}</p>")
 
 
-def notice(text: str) -> Block:
+def notice(text: str) -> Written:
     """A text that must be seen before the rest."""
-    return Block(f"**{text}**", f'<p class="notice">{escape(text)}</p>')
+    return Written(f"**{text}**", f'<p class="notice">{escape(text)}</p>')
 
 
-def sentences(items: Sequence[tuple[str, str]]) -> Block:
+def sentences(items: Sequence[tuple[str, str]]) -> Written:
     """A few sentences, each under a word."""
     lines = "".join(f"<dt>{escape(word)}</dt><dd>{escape(text)}</dd>" for word, text in items)
-    return Block("\n".join(f"- **{word}.** {text}" for word, text in items), f'<dl class="lines">{lines}</dl>')
+    return Written("\n".join(f"- **{word}.** {text}" for word, text in items), f'<dl class="lines">{lines}</dl>')
 
 
-def bullets(items: Sequence[str]) -> Block:
+def bullets(items: Sequence[str]) -> Written:
     """Plain texts, each a point."""
     points = "".join(f"<li>{escape(item)}</li>" for item in items)
-    return Block("\n".join(f"- {item}" for item in items), f"<ul>{points}</ul>")
+    return Written("\n".join(f"- {item}" for item in items), f"<ul>{points}</ul>")
 
 
-def image(path: Path, vector: str, caption: str) -> Block:
+def image(path: Path, vector: str, caption: str) -> Written:
     """A PNG file beside the report, with the vector file it stands for and its caption."""
     data, words = base64.b64encode(path.read_bytes()).decode("ascii"), escape(caption)
-    return Block(
+    return Written(
         f"![{vector}]({path.name})\n\n{caption} ([PDF]({vector}))",
         f'<figure id="{escape(path.stem)}"><img alt="{words}" src="data:image/png;base64,{data}">'
         f"<figcaption>{words} (vector file: {escape(vector)})</figcaption></figure>",
     )
 
 
-def contents(document: Iterable[Block]) -> Block:
+def contents(document: Iterable[Written]) -> Written:
     """The list of the headings of level 2, with those of level 3 below; in HTML only."""
     parts: list[tuple[str, list[str]]] = []
     for block in document:
@@ -86,7 +86,7 @@ def contents(document: Iterable[Block]) -> Block:
     for text, below in parts:
         inner = "".join(f"<li>{_link(one)}</li>" for one in below)
         items.append(f"<li>{_link(text)}{f'<ul>{inner}</ul>' if inner else ''}</li>")
-    return Block("", f'<nav aria-label="Contents"><p>Contents</p><ul>{"".join(items)}</ul></nav>')
+    return Written("", f'<nav aria-label="Contents"><p>Contents</p><ul>{"".join(items)}</ul></nav>')
 
 
 def _anchor(text: str) -> str:
@@ -102,7 +102,7 @@ def _kind(text: str) -> str:
     return f"v-{Verdict(text).name.lower()}" if text in list(Verdict) else ""
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str]], notes: Sequence[str] = ()) -> Block:
+def table(header: Sequence[str], rows: Sequence[Sequence[str]], notes: Sequence[str] = ()) -> Written:
     """Plain cells; a cell that is a verdict is coloured in HTML. ``notes``: why, below each row."""
     head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
     bodies = []
@@ -118,10 +118,10 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], notes: Sequence[
     lines = [header, ["---"] * len(header), *rows]
     markdown = "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
     body = "\n".join(bodies)
-    return Block(markdown, f'<div class="wide"><table>\n<thead><tr>{head}</tr></thead>\n{body}\n</table></div>')
+    return Written(markdown, f'<div class="wide"><table>\n<thead><tr>{head}</tr></thead>\n{body}\n</table></div>')
 
 
-def tally(counts: Mapping[str, Mapping[Verdict, int]]) -> Block:
+def tally(counts: Mapping[str, Mapping[Verdict, int]]) -> Written:
     """Number of statements with each verdict, by side, and their sum: a table, or a bar for each side."""
     sums = {whose: str(sum(mine.values())) for whose, mine in counts.items()}
     rows = [[str(verdict), *(str(mine.get(verdict, 0)) for mine in counts.values())] for verdict in Verdict]
@@ -135,7 +135,7 @@ def tally(counts: Mapping[str, Mapping[Verdict, int]]) -> Block:
         bars += f'<div class="who">{escape(whose)}: {sums[whose]} statements</div><div class="bar">{parts}</div>'
     shown = [verdict for verdict in Verdict if any(mine.get(verdict) for mine in counts.values())]
     key = "".join(f'<span class="{_kind(verdict)}">{verdict}</span>' for verdict in shown)
-    return Block(
+    return Written(
         table(["verdict", *counts], [*rows, ["all statements", *sums.values()]]).markdown,
         f'<div class="tally">{bars}<div></div><div class="chips">{key}</div></div>',
     )
@@ -143,7 +143,7 @@ def tally(counts: Mapping[str, Mapping[Verdict, int]]) -> Block:
 
 def comparison(
     sides: Sequence[str], rows: Sequence[tuple[str, Sequence[Beside | None]]], tolerance: float, caption: str
-) -> Block:
+) -> Written:
     """Printed numbers beside numbers found, in percent of the printed: a row has a label and numbers by side.
 
     Drawn as a line per printed number: zero in its middle, a mark per side with its expanded uncertainty.
@@ -184,7 +184,7 @@ def comparison(
     )
     key = "".join(f'<span><i class="m s{i}"></i>{escape(side)}</span>' for i, side in enumerate(sides))
     lines.append(f'<div class="axis ticks">{ticks}</div>')
-    return Block(
+    return Written(
         f"{table(['printed', *sides], cells).markdown}\n\n{caption}",
         f'<figure class="comparison"><div class="key">{key}<span><i class="zone"></i>tolerance</span></div>'
         f'<div class="grid">{"".join(lines)}</div><figcaption>{escape(caption)}</figcaption></figure>',

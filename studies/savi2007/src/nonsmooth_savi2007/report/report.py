@@ -14,7 +14,7 @@ from nonsmooth_savi2007.figures.figure import Figure
 from nonsmooth_savi2007.figures.parameters import NAMES, table_rows
 from nonsmooth_savi2007.flows import ETA, SMOOTHED, Settings
 from nonsmooth_savi2007.report.pages import (
-    Block,
+    Written,
     bullets,
     comparison,
     contents,
@@ -65,8 +65,8 @@ def write_report(
 
 def _blocks(
     folder: Path, figures: Sequence[Figure], data: Data, rows: Sequence[Statement], settings: Settings, complete: bool
-) -> list[Block]:
-    blocks: list[Block] = [heading(TITLE, 1), paragraph(_PAPER)]
+) -> list[Written]:
+    blocks: list[Written] = [heading(TITLE, 1), paragraph(_PAPER)]
     if settings.quick:
         blocks.append(notice("A quick run: coarse grids and short transients. Verdicts are provisional."))
     if not complete:
@@ -160,7 +160,7 @@ def _spread(counts: Mapping[Verdict, int]) -> str:
     return text + f", {n[Verdict.DIFFERS] or 'none'} {'differs' if n[Verdict.DIFFERS] == 1 else 'differ'}"
 
 
-def _numbers(rows: Sequence[Statement]) -> list[Block]:
+def _numbers(rows: Sequence[Statement]) -> list[Written]:
     """The picture of all printed numbers that something was found for."""
     shown = []
     for row in rows:
@@ -178,7 +178,7 @@ def _numbers(rows: Sequence[Statement]) -> list[Block]:
     return [heading("Printed numbers"), comparison(sides, shown, CLOSE, caption)]
 
 
-def _differences(rows: Sequence[Statement]) -> list[Block]:
+def _differences(rows: Sequence[Statement]) -> list[Written]:
     """The statements that differ, each with its cause."""
     cells, notes = [], []
     for row in sorted((row for row in rows if row.differs), key=lambda row: list(Cause).index(row.reason or Cause.RIG)):
@@ -194,7 +194,7 @@ def _differences(rows: Sequence[Statement]) -> list[Block]:
     return [heading("Differences and their cause"), table(header, cells, notes)]
 
 
-def _table(rows: Sequence[Statement]) -> Block:
+def _table(rows: Sequence[Statement]) -> Written:
     """The long table: a row per statement, its reasons below."""
     header = (
         "claim",
@@ -222,7 +222,7 @@ def _table(rows: Sequence[Statement]) -> Block:
     return table(header, cells, [row.why for row in rows])
 
 
-def _parameters(data: Data) -> Block:
+def _parameters(data: Data) -> Written:
     """Paper, identified with its 95 % interval, truth of the rig."""
     rows = []
     for name, (printed, number, truth) in table_rows(data["table1"]).items():

@@ -11,7 +11,7 @@ import xarray as xr
 from nonsmooth_savi2007.claims.verdicts import Data
 from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches_of, rows_of
 from nonsmooth_savi2007.grazing import grazing_frequencies
-from nonsmooth_savi2007.report.pages import Block, table
+from nonsmooth_savi2007.report.pages import Written, table
 
 _NAMES = {"fold": "fold", "flip": "flip", "grazing": "grazing", "neimark_sacker": "Neimark-Sacker"}
 _UNITS = {"omega": ("rad/s", 8), "rho": ("N", 8), "g": ("m", 11)}  # decimals: eight digits at least
@@ -85,7 +85,7 @@ def _closed(branch: xr.Dataset, value: float) -> float:
     return min(grazing_frequencies(parameters), key=lambda omega: abs(omega - value))
 
 
-def special_table(points: Sequence[SpecialPoint]) -> Block:
+def special_table(points: Sequence[SpecialPoint]) -> Written:
     """The points as a table of the report."""
     header = (
         "figure",

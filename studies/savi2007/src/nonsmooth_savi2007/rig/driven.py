@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from nonsmooth import Recording, System
+from nonsmooth import Recording
 from nonsmooth_savi2007.rig import sensors
 from nonsmooth_savi2007.rig.motor import frequency, passages
 from nonsmooth_savi2007.rig.physics import NO_SUPPORT, Wander
@@ -78,10 +78,9 @@ def _steady(
         system,
         name,
         instants=begin + at,
-        end=_end(omega, before, recorded),
+        turns=(before, recorded),
         start=start,
         side=rig.truth["motor_side"],
-        **_length(system, before, recorded, period),
     )
     crossed = passages(rig, omega, begin, begin + setting.duration, wander) - begin
     return rig.channels(rng, name, time, x, v, crossed=crossed), result
@@ -112,10 +111,9 @@ def rise(
         system,
         name,
         instants=np.array([0.0]),
-        end=_end(omega, 0, whole),
+        turns=(0, whole),
         start=start,
         side=side,
-        **_length(system, 0, whole, period),
     )
     time, at = sensors.instants(rig, rng, duration)
     x, v = simulated(
@@ -143,19 +141,6 @@ def named(wander: Wander) -> dict[str, float]:
     """The slow terms of the motor's angle as parameters of the system."""
     words = ("wander", "wander_rate", "wander_phase")
     return {f"{word}_{j}": term[i] for j, term in enumerate(wander, 1) for i, word in enumerate(words)}
-
-
-def _end(omega: float, before: int, recorded: int) -> float:
-    """The end of a run over whole turns, as ``simulate`` computes it."""
-    period = 2 * np.pi / omega
-    return before * period + recorded * period
-
-
-def _length(system: System, before: int, recorded: int, period: float) -> dict[str, float]:
-    """The length of a run for ``simulate``: in periods, or in time where a wandering motor leaves no period."""
-    if system.period() is None:
-        return {"transient": before * period, "duration": recorded * period}
-    return {"transient": before, "periods": recorded}
 
 
 def _at_rest(gap: float, place: float = 0.0) -> dict[str, float]:

@@ -71,9 +71,7 @@ def passages(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wa
     return np.asarray(at)
 
 
-def voltage(
-    rig: VirtualRig, *, voltages: Sequence[float] = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12), turns: int = 40
-) -> Recording:
+def voltage(rig: VirtualRig, *, voltages: Sequence[float] = range(2, 13), turns: int = 40) -> Recording:
     """The motor alone, at one voltage (V) per run, for about ``turns`` passages of the photogate: Fig. 8a."""
     runs = []
     for i, setting in enumerate(voltages):

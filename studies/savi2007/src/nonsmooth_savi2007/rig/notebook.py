@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 from nonsmooth import Recording
 from nonsmooth.recordings import SETTINGS, write_cap, write_capstone_csv
 from nonsmooth_savi2007.rig import sensors
-from nonsmooth_savi2007.rig.truth import FEATURES, UNITS
+from nonsmooth_savi2007.rig.truth import UNITS
 
 if TYPE_CHECKING:
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
+_toml = json.dumps  # of strings and numbers, which TOML writes alike
 _CAP = ("impulse",)  # the instrument's own format
 _COMMA = ("voltage",)  # an export under the other locale
 
@@ -41,14 +43,14 @@ def write_session(
     if not made:
         raise ValueError("a session needs at least one procedure")
     place.mkdir(parents=True, exist_ok=True)
-    lines = ["[session]", f"title = {_text(title)}", "synthetic = true", "", *_apparatus(rig)]
+    lines = ["[session]", f"title = {_toml(title)}", "synthetic = true", "", *_apparatus(rig)]
     for procedure, recording in made.items():
         name = f"{procedure}.cap" if procedure in _CAP else f"{procedure}.csv"
         if procedure in _CAP:
             write_cap(recording, place / name, sensors=[_ROTARY])
         else:
             write_capstone_csv(recording, place / name, decimal="," if procedure in _COMMA else ".")
-        lines += ["", "[[recording]]", f"file = {_text(name)}", f"procedure = {_text(procedure)}", "runs = ["]
+        lines += ["", "[[recording]]", f"file = {_toml(name)}", f"procedure = {_toml(procedure)}", "runs = ["]
         lines += [f"    {_run(run, recording.tree[run].attrs)}," for run in recording.runs]
         lines.append("]")
     (place / "session.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -94,23 +96,11 @@ def _apparatus(rig: VirtualRig) -> list[str]:
 
 
 def _truth(rig: VirtualRig) -> list[str]:
-
-    on = ", ".join(name for name in (*FEATURES, "holding") if getattr(rig, name)) or "none"
+    on = ", ".join(rig.on) or "none"
     lines = [f"# What the virtual rig with seed {rig.seed} really is. Features that are on: {on}.", "[truth]"]
     return lines + [f"{name} = {value!r}    # {UNITS[name]}".rstrip(" #") for name, value in rig.truth.items()]
 
 
 def _run(name: str, attrs: Mapping[Any, Any]) -> str:
     stated = {"run": name, **{key: attrs[key] for key in SETTINGS if key in attrs}}
-    return "{ " + ", ".join(f"{key} = {_value(value)}" for key, value in stated.items()) + " }"
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, str):
-        return _text(value)
-    return str(value) if isinstance(value, int) else repr(float(value))
-
-
-def _text(value: str) -> str:
-    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-    return f'"{escaped}"'
+    return "{ " + ", ".join(f"{key} = {_toml(value)}" for key, value in stated.items()) + " }"

@@ -31,10 +31,14 @@ from typing import Any
 import numpy as np
 
 from nonsmooth import Mode, System, Transition
+from nonsmooth_savi2007.rig.truth import UNITS, published
 
 NO_SUPPORT = 10.0  # m: a gap that the car never closes
 AT_REST = 1e-9  # m: a relaxing support that is nearer to its rest than this is there
 WANDERING = 3  # slow terms of a motor that wanders
+
+#: What of the truth the equations of the car hold.
+OF_THE_CAR = ("m", "k", "k_s", "c", "c_s", "g", "friction", "creep_velocity", "pretension", "ripple", "ripple_phase")
 
 #: Slow terms of the motor's angle: size (rad), rate (rad/s) and phase (rad) of each.
 Wander = tuple[tuple[Any, Any, Any], ...]
@@ -93,7 +97,7 @@ def hanging_mass() -> System:
     return System(
         name="support with test mass",
         states={"x": "m", "v": "m/s"},
-        parameters={"k_s": (1210.0, "N/m"), "c_s": (0.60, "N s/m"), "test_mass": (1.33, "kg")},
+        parameters={name: (published()[name], UNITS[name]) for name in ("k_s", "c_s", "test_mass")},
         modes={"hanging": field},
         scale={"x": 1e-3, "v": 1e-2},
     )
@@ -183,21 +187,8 @@ def car(*, relaxing: bool = True, rising: bool = False, wandering: bool = False,
         ]
     else:
         transitions.append(Transition("contact", "free", when="separation > 0"))
-    parameters = {
-        "m": (0.838, "kg"),
-        "k": (8.47, "N/m"),
-        "k_s": (1210.0, "N/m"),
-        "c": (0.87, "N s/m"),
-        "c_s": (0.60, "N s/m"),
-        "g": (0.0018, "m"),
-        "friction": (0.01, "N"),
-        "creep_velocity": (1e-3, "m/s"),
-        "pretension": (2.0, "N"),
-        "curvature": (1.0, "1/m"),
-        "omega": (4.5, "rad/s"),
-        "ripple": (0.01, "rad"),
-        "ripple_phase": (0.0, "rad"),
-    }
+    parameters = {name: (published()[name], UNITS[name]) for name in OF_THE_CAR}
+    parameters |= {"curvature": (1.0, "1/m"), "omega": (4.5, "rad/s")}
     parameters |= {"crank_rate": (0.0, "m/s")} if rising else {"crank_length": (0.0165, "m")}
     for j in range(1, WANDERING + 1) if wandering else ():
         parameters |= {f"wander_{j}": (0.0, "rad"), f"wander_phase_{j}": (0.0, "rad")}

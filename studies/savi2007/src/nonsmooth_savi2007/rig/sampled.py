@@ -18,11 +18,18 @@ METHOD: dict[str, Any] = {"method": "rkf45", "rtol": 1e-9}
 
 
 def simulated(
-    system: System, run: str, *, instants: FloatArray, end: float | None = None, side: float = 1.0, **options: Any
+    system: System,
+    run: str,
+    *,
+    instants: FloatArray,
+    turns: tuple[int, int] | None = None,
+    side: float = 1.0,
+    **options: Any,
 ) -> tuple[FloatArray, xr.Dataset]:
     """Position and velocity at the instants, (2, n), and the whole result of ``simulate``.
 
-    Its last sample is at ``end``, where given: a start for the run that follows.
+    ``turns`` of the crank that pass before and that are recorded, in place of a duration: the last sample is then at
+    their end, a start for the run that follows.
 
     Raises
     ------
@@ -33,7 +40,16 @@ def simulated(
     """
 
     with_strings = "pretension" in system.parameters
-    samples = instants if end is None else np.append(instants, end)
+    samples = instants
+    if turns is not None:
+        period = 2 * np.pi / system.values["omega"]
+        before, recorded = (n * period for n in turns)
+        samples = np.append(instants, before + recorded)
+        options |= (
+            {"transient": before, "duration": recorded}  # a wandering motor leaves no period
+            if system.period() is None
+            else {"transient": turns[0], "periods": turns[1]}
+        )
     result = simulate(system, samples=samples, **options, **(METHOD if with_strings else {}))
     if with_strings:
         _check_strings(system, run, result, side)

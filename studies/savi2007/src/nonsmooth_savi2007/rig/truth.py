@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -117,7 +117,7 @@ def awkward(seed: int) -> dict[str, float]:
     return {name: float(value) for name, value in found.items()}
 
 
-def switched(truth: Mapping[str, float], given: Mapping[str, Any] | None, on: Mapping[str, bool]) -> dict[str, float]:
+def switched(truth: Mapping[str, float], given: Mapping[str, Any], off: Iterable[str]) -> dict[str, float]:
     """The truth with the values of ``given`` put in, and without the features that are off.
 
     Raises
@@ -126,15 +126,14 @@ def switched(truth: Mapping[str, float], given: Mapping[str, Any] | None, on: Ma
         A name that is not among ``UNITS``, or a value that cannot be.
     """
     result = dict(truth)
-    for name, value in (given or {}).items():
+    for name, value in given.items():
         if name not in UNITS:
             raise ValueError(unknown(name, "a part of the truth", "a virtual rig", UNITS))
         if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
             raise TypeError(f"truth[{name!r}] = {value!r} must be a number")
         result[name] = float(value)
-    for feature, without in FEATURES.items():
-        if not on[feature]:
-            result |= without
+    for feature in off:
+        result |= FEATURES[feature]
     _check(result)
     return result
 

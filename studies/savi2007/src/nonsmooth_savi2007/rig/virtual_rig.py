@@ -18,21 +18,11 @@ from nonsmooth.recordings import PROCEDURES
 from nonsmooth_savi2007.rig import decays, figures, hand, motor, sensors, steps
 from nonsmooth_savi2007.rig.live import LiveRig
 from nonsmooth_savi2007.rig.notebook import write_session
-from nonsmooth_savi2007.rig.physics import WANDERING, Wander, car
+from nonsmooth_savi2007.rig.physics import OF_THE_CAR, WANDERING, Wander, car
 from nonsmooth_savi2007.rig.truth import FEATURES, HOLDING, NOMINAL_GAP, awkward, drawn, published, switched
 
 #: The procedures of Section 3.1 and those for the gap: what identification needs.
-IDENTIFICATION = (
-    "springs",
-    "support",
-    "impulse",
-    "response",
-    "drop",
-    "voltage",
-    "crank",
-    "grazing",
-    "contact",
-)
+IDENTIFICATION = ("springs", "support", "impulse", "response", "drop", "voltage", "crank", "grazing", "contact")
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,16 +73,17 @@ class VirtualRig:
             raise TypeError(f"truth must map names to numbers, got {self.truth!r}")
         if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
             raise ValueError(f"seed = {self.seed!r} must be a whole number, zero or more")
-        on = {}
-        for name in FEATURES:
-            on[name] = getattr(self, name)
-            if not isinstance(on[name], bool):
-                raise TypeError(f"{name} = {on[name]!r}: a feature is on (True) or off (False)")
-        if not isinstance(self.holding, bool):
-            raise TypeError(f"holding = {self.holding!r}: friction holds the car (True) or lets it creep (False)")
+        for name in (*FEATURES, "holding"):
+            if not isinstance(getattr(self, name), bool):
+                raise TypeError(f"{name} = {getattr(self, name)!r}: a feature is on (True) or off (False)")
         held = {"creep_velocity": HOLDING} if self.holding else {}
-        truth = switched(drawn(self.seed), {**self.truth, **held}, on)
+        truth = switched(drawn(self.seed), {**self.truth, **held}, [name for name in FEATURES if name not in self.on])
         object.__setattr__(self, "truth", MappingProxyType(truth))
+
+    @property
+    def on(self) -> list[str]:
+        """Features that are on."""
+        return [name for name in (*FEATURES, "holding") if getattr(self, name)]
 
     @classmethod
     def published(cls, seed: int = 0, **options: Any) -> VirtualRig:
@@ -134,23 +125,9 @@ class VirtualRig:
 
     def parameters(self, *, rising: bool = False, **settings: float) -> dict[str, float]:
         """Values of the system's parameters: the truth, and the settings of a run (omega, crank_length, g)."""
-        shared = (
-            "m",
-            "k",
-            "k_s",
-            "c",
-            "c_s",
-            "g",
-            "friction",
-            "creep_velocity",
-            "pretension",
-            "ripple",
-            "ripple_phase",
-        )
-        values = {name: self.truth[name] for name in shared}
+        values = {name: self.truth[name] for name in OF_THE_CAR}
         values |= {"curvature": 1.0 / self.truth["string_length"], "omega": 4.5}
-        values |= {"crank_rate": 0.0} if rising else {"crank_length": 0.0}
-        return values | settings
+        return {**values, "crank_rate" if rising else "crank_length": 0.0, **settings}
 
     def named_parameters(self, **settings: float) -> SimpleNamespace:
         """The same with the values as attributes, as the equations read them."""
@@ -186,7 +163,7 @@ class VirtualRig:
             "format": "virtual rig",
             "procedure": procedure,
             "seed": self.seed,
-            "features": [name for name in (*FEATURES, *(("holding",) if self.holding else ())) if getattr(self, name)],
+            "features": self.on,
         }
         return Recording.from_runs(
             {name: dict(channels) for name, channels, _ in runs},
@@ -268,7 +245,7 @@ class VirtualRig:
         if strange := [name for name in chosen if name not in names]:
             raise ValueError(f"options of {', '.join(strange)}: not recorded here; there are {', '.join(names)}")
         made = {name: self.record(name, **chosen.get(name, {})) for name in names}
-        return self._write(folder, made, truth, f"virtual rig, seed {self.seed}")
+        return write_session(self, folder, made, truth, title=f"virtual rig, seed {self.seed}")
 
     def write_figure(
         self,
@@ -283,8 +260,4 @@ class VirtualRig:
         The options are those of the figure's procedure, as for :meth:`figure`.
         """
         title = f"virtual rig, seed {self.seed}, Fig. {number}"
-        return self._write(folder, self.figure(number, **options), truth, title)
-
-    def _write(self, folder: Any, made: Mapping[str, Recording], truth: Any, title: str) -> Path:
-
-        return write_session(self, folder, made, truth, title=title)
+        return write_session(self, folder, self.figure(number, **options), truth, title=title)
