@@ -11,7 +11,8 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth_savi2007.claims.diagrams import at_gap, f16
+from nonsmooth_savi2007.claims.diagrams import f16
+from nonsmooth_savi2007.claims.portraits import at_gap
 from nonsmooth_savi2007.claims.response import between_cell, doubled_cell, grazing_cell, no_doubled_cell
 from nonsmooth_savi2007.claims.verdicts import Cell, Statement, Verdict, printed_cell
 from nonsmooth_savi2007.figures.motions import chosen, measured_periods_at, said

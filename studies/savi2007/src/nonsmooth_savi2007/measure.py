@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -19,6 +19,16 @@ UNSETTLED = -1  # the transient did not decide it
 def period_word(number: int) -> str:
     """``period 3``, ``no period``, ``unsettled``."""
     return {APERIODIC: "no period", UNSETTLED: "unsettled"}.get(number, f"period {number}")
+
+
+def period_words(numbers: Iterable[int]) -> str:
+    """``no period and period 3``."""
+    return " and ".join(map(period_word, numbers))
+
+
+def motion_word(number: int) -> str:
+    """``period 3``; ``chaos`` for a motion without a period, as the paper says."""
+    return "chaos" if number == APERIODIC else f"period {number}"
 
 
 @dataclass(frozen=True)

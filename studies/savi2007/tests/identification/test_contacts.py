@@ -21,8 +21,7 @@ from studies.savi2007.tests.identification.made import (
 )
 
 from nonsmooth.recordings.session import Quantity
-from nonsmooth_savi2007.identification.contact_findings import contact_finding, one_contact
-from nonsmooth_savi2007.identification.multiple_shooting import shoot_contacts
+from nonsmooth_savi2007.identification.multiple_shooting import contact_finding, one_contact, shoot_contacts
 from nonsmooth_savi2007.identification.referral import counted_gap
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from nonsmooth_savi2007.claims import diagrams, model, parameters, response
+from nonsmooth_savi2007.claims import diagrams, model, parameters, portraits, response
 from nonsmooth_savi2007.claims.verdicts import Data, Statement
 
 
@@ -38,16 +38,16 @@ CLAIMS = (
     Claim("F10", ("fig10", "fig10_rig"), response.f10),
     Claim("F10", ("fig09", "fig09_rig", "fig10"), response.grazing_behind_both),
     Claim("F11", ("fig11", "fig11_rig"), diagrams.f11),
-    Claim("F12", ("fig12", "fig12_rig"), diagrams.f12),
+    Claim("F12", ("fig12", "fig12_rig"), portraits.f12),
     Claim("F13", ("fig13", "fig13_rig"), diagrams.f13),
     Claim("F13", ("basins13",), diagrams.f13_basins),
-    Claim("F14", ("fig14", "fig14_rig"), diagrams.f14),
+    Claim("F14", ("fig14", "fig14_rig"), portraits.f14),
     Claim("F15", ("fig15",), diagrams.f15),
     Claim("F16", ("fig16",), diagrams.f16),
     Claim("F17", ("fig17", "fig17_rig"), diagrams.f17),
     Claim("F17", ("fig17", "fig17_rig"), diagrams.f17_grazing),
     Claim("F17", ("basins17",), diagrams.f17_basins),
-    Claim("F18", ("fig18", "fig18_rig"), diagrams.f18),
+    Claim("F18", ("fig18", "fig18_rig"), portraits.f18),
     Claim("C1", ("fig09_rig", "fig10_rig", "fig11_rig", "fig16", "fig09", "fig10", "fig11", "fig15"), model.c1),
     Claim("C1", ("eta",), model.c1_other_systems),
 )

@@ -1,8 +1,8 @@
-"""Claims F11 to F18: bifurcation diagrams, phase portraits, the strange attractor, basins, on model and rig."""
+"""Claims F11, F13 and F15 to F17: bifurcation diagrams, the strange attractor, basins, on model and rig."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import xarray as xr
@@ -24,8 +24,6 @@ from nonsmooth_savi2007.claims.verdicts import (
 from nonsmooth_savi2007.figures.amplitude import flip_of, rate_of, slowest
 from nonsmooth_savi2007.figures.coexisting import names_of
 from nonsmooth_savi2007.figures.gap import PHASES
-from nonsmooth_savi2007.figures.motions import measured_periods_at
-from nonsmooth_savi2007.figures.portraits import chosen_start, words_of
 from nonsmooth_savi2007.grazing import free_amplitude
 from nonsmooth_savi2007.measure import (
     APERIODIC,
@@ -34,13 +32,15 @@ from nonsmooth_savi2007.measure import (
     changes,
     highest,
     lowest,
+    motion_word,
     period_word,
+    period_words,
     periods_reached,
     range_of,
     regimes,
     separation_rate,
 )
-from nonsmooth_savi2007.printed import FIGURE_12, FIGURE_14, FIGURE_14_TEXT, FIGURE_17_TEXT, FIGURE_18, NUMBERS
+from nonsmooth_savi2007.printed import FIGURE_14, FIGURE_17_TEXT, NUMBERS
 
 
 def f11(data: Data) -> Iterator[Statement]:
@@ -125,84 +125,6 @@ def _below(rise: xr.Dataset, end: float, words: str) -> Cell:
     return Cell(f"{period_word(kind)} in {100 * share:.0f} % of the turns below {words}", agreed(kind == APERIODIC))
 
 
-def f12(data: Data) -> Iterator[Statement]:
-    """Portraits at four amplitudes."""
-    met = all(periods_reached(data["fig12"]["exact"], rho).keys() == {period} for rho, period in FIGURE_12.items())
-    yield _portraits(
-        data,
-        "fig12",
-        FIGURE_12,
-        "Fig. 12 with the ranges of Fig. 11",
-        "orbits and section points at rho = ",
-        met,
-        "The phase of the paper's section is not stated; 0 here.",
-    )
-
-
-def f18(data: Data) -> Iterator[Statement]:
-    """Portraits at three frequencies."""
-    met = all(period in periods_reached(data["fig18"]["exact"], omega) for omega, period in FIGURE_18.items())
-    rate, error = separation_rate(data["fig18"]["exact_twins"])
-    why = "Neighbouring trajectories on the chaotic orbit separate by a factor "
-    why += f"exp({rate:.2f} ± {error:.2f}) per period (exact)."
-    yield _portraits(data, "fig18", FIGURE_18, "Fig. 18, caption", "orbits at omega = ", met, why)
-
-
-def _portraits(
-    data: Data, figure: str, shown: Mapping[float, int], place: str, says: str, met: bool, why: str
-) -> Statement:
-    """The period numbers shown, beside those that starts of both flows and the rig's records have."""
-    found = {value: measured_periods_at(data[f"{figure}_rig"], value) for value in shown}
-    right = [period in found[value] for value, period in shown.items()]
-    return of_both(
-        figure[:1].upper() + figure[3:],
-        place,
-        says + _named(shown),
-        (_reached(data[figure][flow], shown) for flow in FLOWS),
-        _apart(data[figure], shown),
-        agreed(met),
-        why,
-    ).measured(
-        Cell(
-            "; ".join(f"{value:g}: {_words(numbers)}" for value, numbers in found.items()),
-            Verdict.AGREES if all(right) else Verdict.IN_PART if any(right) else Verdict.DIFFERS,
-        )
-    )
-
-
-def _named(shown: Mapping[float, int]) -> str:
-    return ", ".join(f"{value:g}: {_name(period)}" for value, period in shown.items())
-
-
-def _name(period: int) -> str:
-    return "chaos" if period == APERIODIC else f"period {period}"
-
-
-def _words(numbers: Iterable[int]) -> str:
-    return " and ".join(map(period_word, numbers))
-
-
-def _reached(survey: xr.Dataset, values: Iterable[float]) -> str:
-    return "; ".join(f"{value:g}: {words_of(periods_reached(survey, value))}" for value in values)
-
-
-def _apart(data: Mapping[str, xr.Dataset], shown: Mapping[float, int]) -> str:
-    """Largest distance between the section points of the exact and the smoothed periodic orbits drawn."""
-    worst = 0.0
-    for value, wanted in shown.items():
-        if wanted == APERIODIC:
-            continue
-        points = []
-        for flow in FLOWS:
-            survey = data[flow]
-            parameter = str(survey["maximum"].dims[0])
-            one = survey.sel({parameter: value}, method="nearest").isel(start=chosen_start(survey, value, wanted))
-            points.append(one["section"].transpose("iterate", "state").values[-wanted:])
-        distance = np.abs(points[0][:, None, :] - points[1][None, :, :])
-        worst = max(worst, float(distance[..., 0].min(axis=1).max()))
-    return f"section points of both flows within {1e6 * worst:.2g} micrometres"
-
-
 def f13(data: Data) -> Iterator[Statement]:
     """Periodic and chaotic responses over the gap, and what coexists with them."""
     texts, others = [], []
@@ -228,7 +150,7 @@ def f13(data: Data) -> Iterator[Statement]:
         agreed("no period" in texts[0]),
     ).measured(
         Cell(
-            "; ".join(f"{g:g}: {_words(sorted(set(one)))}" for g, one in numbers.items()),
+            "; ".join(f"{g:g}: {period_words(sorted(set(one)))}" for g, one in numbers.items()),
             agreed(APERIODIC in reached and len(reached) > 1),
         )
     )
@@ -257,40 +179,6 @@ def _coexisting(many: xr.Dataset) -> str:
     if not at:
         return "none found"
     return f"more than one motion at {len(at)} of {len(values)} gaps, from {at[0]:.5f} to {at[-1]:.5f} m"
-
-
-def f14(data: Data) -> Iterator[Statement]:
-    """Period numbers at the gaps of the caption, and at those printed in the text."""
-    both, as_printed = [data["fig14"][flow] for flow in FLOWS], True
-    for g, period in FIGURE_14.items():
-        reached = periods_reached(both[0], g)
-        as_printed = as_printed and period in reached
-        yield of_both(
-            "F14",
-            "Fig. 14, caption",
-            f"g = {g:g} m: {_name(period)}",
-            (words_of(periods_reached(one, g)) for one in both),
-            "none" if period in reached else "other period",
-            agreed(period in reached),
-            "" if reached.keys() == {period} else "Motions coexist here; which is met depends on the start.",
-        ).measured(at_gap(data["fig14_rig"], g, period))
-    right = sum(period in periods_reached(both[0], g) for g, period in FIGURE_14_TEXT.items())
-    yield of_both(
-        "F14",
-        "Section 4, on Fig. 14",
-        f"the text's gaps: {_named(FIGURE_14_TEXT)}",
-        (_reached(one, FIGURE_14_TEXT) for one in both),
-        f"{right} of {len(FIGURE_14_TEXT)} as printed",
-        agreed(right == len(FIGURE_14_TEXT)),
-        "The text prints other gaps than the caption; the caption's are those that show what is claimed.",
-        cause=Cause.MISPRINT if as_printed else None,
-    ).measured(Cell("not recorded at the text's gaps"))
-
-
-def at_gap(data: dict[str, xr.Dataset], g: float, period: int) -> Cell:
-    """Period numbers of the rig's records at a gap."""
-    found = measured_periods_at(data, g)
-    return Cell(_words(found), agreed(period in found))
 
 
 def f15(data: Data) -> Iterator[Statement]:
@@ -348,7 +236,7 @@ def f17(data: Data) -> Iterator[Statement]:
             one = data["fig17"][flow].sel(direction="up").sel(omega=omega, method="nearest")
             kinds.append(int(one["period_number"]))
             contacts.append(float(one["contacts_per_period"]))
-            texts.append(f"{_name(kinds[-1])}, {contacts[-1]:.2f} contacts per period")
+            texts.append(f"{motion_word(kinds[-1])}, {contacts[-1]:.2f} contacts per period")
         right, swapped = _as_stated(says, kinds[0], contacts[0] > 0)
         difference = "another motion" if not right else "contact and no contact swapped" if swapped else "none"
         near = runs.isel(run=int(np.abs(runs["value"].values - omega).argmin()))

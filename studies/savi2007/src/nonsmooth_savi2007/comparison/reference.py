@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,25 +48,20 @@ class GapReference:
 
     Attributes
     ----------
-    places : MeanShift, optional
-        Place of rest, and about which the car swings, in the sensor's count. None: x and g stay as read.
     offset : GapOffset
         What the gap at rest is more than the screw reads.
+    places : MeanShift, optional
+        Place of rest, and about which the car swings, in the sensor's count. None: x and g stay as read.
     direction : int
         -1 where the sensor counts away from the support.
     mark : float
         The crank's angle (rad) at the photogate, from where it pulls towards the support; 0 where it is near that.
-    taps : bool
-        Whether taps told the place of rest.
-    notes : tuple of str
     """
 
+    offset: GapOffset
     places: MeanShift | None = None
-    offset: GapOffset = field(default_factory=lambda: GapOffset(0.0, 0.0))
     direction: int = 1
     mark: float = 0.0
-    taps: bool = False
-    notes: tuple[str, ...] = field(default=())
 
     @property
     def runs(self) -> int:
@@ -122,35 +117,29 @@ def gap_reference(
     evidence = gather(session, procedures=_TELLING)
     notes = list(evidence.notes)
     if not referred:
-        return GapReference(offset=given, direction=evidence.direction, notes=tuple(notes))
-    decay = None
-    if taps := evidence.runs["impulse"]:
-        decay = free_decay(taps, resolution=evidence.resolution)
-        notes += [f"impulse: {note}" for note in decay.notes]
-    free = [run for run in evidence.runs["response"] if "gap" not in run.settings]
-    seen, mark = steady(free), 0.0
+        return GapReference(given, direction=evidence.direction)
+    taps, mark = evidence.runs["impulse"], 0.0
+    decay = free_decay(taps, resolution=evidence.resolution) if taps else None
+    seen = steady([run for run in evidence.runs["response"] if "gap" not in run.settings])
     found = places(evidence, decay, seen, held=given.held)
     if decay is not None:
         mark, said = mark_of(seen, decay)
-        notes += [said] if said else []
+        notes += [*(f"impulse: {note}" for note in decay.notes), *([said] if said else [])]
     else:
         notes.append(
             f"no taps of the car (impulse) in {session.folder}: where it rests is taken from the sensor's zero, to "
             f"±{1e3 * float(np.sqrt(found.covariance[0, 0])):.2g} mm, since a car with dry friction is zeroed where it "
             "sticks. Record a few taps in each session"
         )
-    notes += found.notes
-    for note in notes:
+    for note in (*notes, *found.notes):
         warnings.warn(note, RecordingWarning, stacklevel=3)
-    return GapReference(found, given, evidence.direction, mark, decay is not None, tuple(notes))
+    return GapReference(given, found, evidence.direction, mark)
 
 
 def _offset(given: float | Sequence[float] | GapOffset) -> GapOffset:
     if isinstance(given, GapOffset):
         return given
-    both = np.atleast_1d(np.asarray(given, dtype=float))
-    value, error = (*both, 0.0) if len(both) == 1 else both
-    return GapOffset(float(value), float(error))
+    return GapOffset(*(float(one) for one in (*np.atleast_1d(given), 0.0)[:2]))
 
 
 def gap_offset(parameters: Any, session: Session) -> GapOffset:

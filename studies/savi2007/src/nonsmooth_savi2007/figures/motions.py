@@ -16,7 +16,7 @@ from nonsmooth.plot import name_plane, prefixed, shade_zone, shared_legend
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, two_rows
 from nonsmooth_savi2007.figures.portraits import QUANTITIES, titles
 from nonsmooth_savi2007.laboratory import Laboratory, as_result
-from nonsmooth_savi2007.measure import period_word
+from nonsmooth_savi2007.measure import period_word, period_words
 
 #: The two sides of a sheet, the model above the rig.
 SIDES = {"theory": "model, identified", "measured": "virtual rig (synthetic)"}
@@ -121,7 +121,7 @@ def said(data: Datasets, shown: Mapping[float, int], unit: str) -> str:
     """Motions of the rig at each value, beside those of the model."""
     words = []
     for value in shown:
-        rig = " and ".join(period_word(n) for n in measured_periods_at(data, value))
+        rig = period_words(measured_periods_at(data, value))
         model = sorted({int(n) for run in runs_at(data, value) for n in run["coexisting_period_number"].values})
         words.append(f"{' '.join(prefixed(value, unit))}: {rig} (model: {', '.join(period_word(n) for n in model)})")
     return "; ".join(words)

@@ -7,23 +7,18 @@ out of a session.
 from nonsmooth_savi2007.identification.calibrations import crank_force, voltage_frequency
 from nonsmooth_savi2007.identification.chain import identify
 from nonsmooth_savi2007.identification.decay_findings import decay_damping, natural_frequency, support_damping
-from nonsmooth_savi2007.identification.evidence import Evidence, Run, gather
-from nonsmooth_savi2007.identification.free_decay import DecayFit, free_decay
+from nonsmooth_savi2007.identification.evidence import gather
+from nonsmooth_savi2007.identification.free_decay import free_decay
 from nonsmooth_savi2007.identification.grazing import grazing_gap
 from nonsmooth_savi2007.identification.half_power import half_power
-from nonsmooth_savi2007.identification.multiple_shooting import ContactFit, shoot_contacts
+from nonsmooth_savi2007.identification.multiple_shooting import shoot_contacts
 from nonsmooth_savi2007.identification.referral import mean_of_drive, mean_shift
 from nonsmooth_savi2007.identification.response_fits import amplitude_fit, receptance_fit, viscous_bias
 from nonsmooth_savi2007.identification.statements import require
-from nonsmooth_savi2007.identification.steady import Steady, steady
+from nonsmooth_savi2007.identification.steady import steady
 from nonsmooth_savi2007.identification.stiffness import stiffness
 
 __all__ = [
-    "ContactFit",
-    "DecayFit",
-    "Evidence",
-    "Run",
-    "Steady",
     "amplitude_fit",
     "crank_force",
     "decay_damping",

@@ -18,14 +18,18 @@ from nonsmooth.recordings import RecordingWarning, Session
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth_savi2007.identification.adjustment import Adjusted, Observation, adjust
 from nonsmooth_savi2007.identification.calibrations import crank_force, voltage_frequency
-from nonsmooth_savi2007.identification.contact_findings import contact_finding, one_contact
 from nonsmooth_savi2007.identification.cross_checks import cross_checks, sentences
 from nonsmooth_savi2007.identification.decay_findings import decay_damping, natural_frequency, support_damping
 from nonsmooth_savi2007.identification.evidence import Evidence, gather
 from nonsmooth_savi2007.identification.free_decay import DecayFit, free_decay
 from nonsmooth_savi2007.identification.grazing import grazing_gap
 from nonsmooth_savi2007.identification.half_power import half_power
-from nonsmooth_savi2007.identification.multiple_shooting import ContactFit, shoot_contacts
+from nonsmooth_savi2007.identification.multiple_shooting import (
+    ContactFit,
+    contact_finding,
+    one_contact,
+    shoot_contacts,
+)
 from nonsmooth_savi2007.identification.plausibility import check_plausible, not_driven, slipped_late
 from nonsmooth_savi2007.identification.referral import counted_gap, mark_of, refer
 from nonsmooth_savi2007.identification.response_fits import amplitude_fit, receptance_fit

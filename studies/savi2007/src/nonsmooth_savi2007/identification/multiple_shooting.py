@@ -16,6 +16,9 @@ run. The gap comes out in the sensor's own count, and the place of the swing wit
 Each run is fitted alone, and those whose residuals are the sensor's are joined: the information of all of them, with
 that of the decays once. How far the estimate moves with every other turn of the crank alone is added to its uncertainty
 where the motor wanders.
+
+A contact is eight samples, and none shows :math:`c_s/k_s`, half a millisecond: the speed that a contact takes, some
+3 %, shows in the free motion after it. The profile over one contact tells how well; many tell it better.
 """
 
 from __future__ import annotations
@@ -26,13 +29,17 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import xarray as xr
+from scipy.special import ndtri
 
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification import Estimate
+from nonsmooth.identification import Estimate, Finding
+from nonsmooth.recordings import Quantity
 from nonsmooth.recordings.signals.phase import DrivePhase, drive_phase
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit
+from nonsmooth_savi2007.identification.picture_data import picture_data
 
 SHARED = ("omega_0", "b", "f", "kappa", "gamma")
 OWN = ("g", "x_e", "crank", "mark", "cosine_2", "sine_2")  # of each run
@@ -40,6 +47,7 @@ _TURNING = ("omega", "turned")  # of an even drive: its angle is omega t + turne
 _WINDOW = 1.3  # s: about as long as a motion with contact is told by its start
 _LONGEST = 40.0  # s: of a run
 _BEGINS = 2.0  # s within which a run begins, at its farthest from the support
+_TRIED = 5  # windows with one contact, of which the median one is shown
 _FAR = 1.5  # times the sensor's noise: residuals of a run that is not of this law
 
 
@@ -64,6 +72,11 @@ class ContactFit:
     def place(self, run: int, which: int) -> int:
         """Index of a run's own parameter: 0 gap, 1 place, 2-5 drive."""
         return len(SHARED) + len(OWN) * run + which
+
+    def estimate(self, place: int, unit: str = "", logarithmic: bool = False) -> Estimate:
+        """The parameter at a place."""
+        value, error = float(self.values[place]), float(np.sqrt(self.covariance[place, place]))
+        return Estimate(value, error, unit, logarithmic=logarithmic and value > 0)
 
     @property
     def samples(self) -> int:
@@ -178,10 +191,8 @@ def shoot_contacts(
     ----------
     runs : sequence of Run
         With ``x``, ``turns``, and the settings ``crank_length`` and ``gap`` (a first guess).
-    decay : DecayFit
-        What the free decay told.
-    resolution : float
-        Length of a count (m).
+    decay, resolution
+        What the free decay told, and the length of a count (m).
     kappa, gamma : float
         First guess of k_s/m (1/s^2) and c_s/m (1/s).
     mark : float
@@ -285,3 +296,105 @@ def _joined(rows: Sequence[tuple[ParameterSet, ParameterSet, FloatArray]]) -> tu
         shift[here] += information @ (moved / scale[here])
     covariance = np.linalg.inv(total)
     return covariance @ pull * scale, covariance * np.outer(scale, scale), covariance @ shift * scale
+
+
+def contact_finding(found: ContactFit, mass: Quantity | Estimate, *, resolution: float) -> Finding:
+    """Support damping (known to a factor), and beside it stiffness and the gap of each run in the sensor's count."""
+    gaps = {f"gap, {run.name}": found.estimate(found.place(i, 0), "m") for i, run in enumerate(found.runs)}
+    notes = [
+        f"residuals {found.excess:.2f} times the sensor's noise",
+        "one contact is 8 samples at 100 Hz: what is known of c_s comes from many fitted together",
+        *found.left,
+    ]
+    notes += [
+        f"{run.name}: {note}"
+        for run, one in zip(found.runs, found.fits, strict=True)
+        for note in (*one.notes, *one.anomalies)
+        if note.startswith(("left out", "the fit stands"))
+    ]
+    return Finding(
+        "c_s_contact",
+        found.estimate(4, logarithmic=True).times(mass.value, mass.uncertainty, "N s/m"),
+        f"multiple shooting over {found.n_contacts} contacts",
+        found.samples,
+        tuple(run.name for run in found.runs),
+        tuple(notes),
+        {"k_s": found.estimate(3).times(mass.value, mass.uncertainty, "N/m"), **gaps},
+        data=_data(found, resolution),
+        plot="multiple_shooting",
+    )
+
+
+def one_contact(found: ContactFit, decay: DecayFit, mass: float, *, resolution: float, kappa_error: float) -> Finding:
+    r"""The profile of c_s over a window with a single contact: what one contact tells on its own.
+
+    Known besides is what does not come from contacts: the free oscillator, k_s/m to ``kappa_error``, and the drive as
+    set. Gap, place and the drive's details are this window's own to find, as they were for all together. Of some
+    windows the median one, in how well it tells c_s, is shown.
+    """
+    (kappa, gamma), windows = found.values[3:5].tolist(), found.single()
+    alone = []
+    for i, first, last in windows[:: max(len(windows) // _TRIED, 1)]:
+        run, drive = found.runs[i], drive_phase(found.runs[i].passages)
+        known = known_before(
+            run,
+            decay,
+            float(found.values[found.place(i, 3)]),
+            kappa=Estimate(kappa, kappa_error),
+            gamma=Estimate(gamma, 10 * gamma),
+        )
+        try:
+            one = fit_contact(
+                run, drive, not drive.wander()[1], known, known, resolution, (first, last), profile=["gamma"]
+            )
+        except SolveError:
+            continue
+        if np.isfinite(one.uncertainty["gamma"]):
+            alone.append((float(one.uncertainty["gamma"]), run, one))
+    if not alone:
+        raise ValueError("no contact can be fitted on its own")
+    width, run, one = sorted(alone, key=lambda row: row[0])[len(alone) // 2]
+    data = next(finding.data for finding in one.findings if finding.name == "gamma, profile")
+    assert data is not None
+    best, low, high = (mass * float(data[name]) for name in ("best", "low", "high"))
+    bounded = bool(0 < low and np.isfinite(high))
+    limits = f"95 % limits {low:.3g} to {high:.3g} N s/m" if bounded else "the profile does not bound it on both sides"
+    error = best * float(np.log(high / low)) / (2 * ndtri(0.975)) if bounded else mass * width
+    shown = data.assign({name: data[name] * mass for name in ("best", "low", "high")})
+    shown = shown.assign_coords(value=("value", mass * data["value"].values, {"units": "N s/m"}))
+    return Finding(
+        "c_s_one_contact",
+        Estimate(best, error, "N s/m", logarithmic=bounded),
+        "profile likelihood of one contact, its gap, place and drive found with it",
+        int(one.residuals.sizes["sample"]),
+        (run.name,),
+        (f"{limits}; the window is the median one of {len(alone)}",),
+        data=shown.assign_attrs(parameter="c_s", units="N s/m", synthetic="yes" if run.synthetic else "no"),
+        plot="profile",
+    )
+
+
+def _data(found: ContactFit, resolution: float) -> xr.Dataset:
+    """The longest run, sample by sample."""
+    which = max(range(len(found.runs)), key=lambda i: found.fits[i].residuals.sizes["sample"])
+    run, fitted_of = found.runs[which], found.fits[which].residuals
+    time, x = run.time, run.positions
+    fitted, segment = np.full(len(x), np.nan), np.full(len(x), -1)
+    at = np.searchsorted(time, fitted_of["time"].values)
+    fitted[at], segment[at] = fitted_of["fitted"].values, fitted_of["window"].values
+    gap = found.estimate(found.place(which, 0), "m")
+    return picture_data(
+        [run],
+        {
+            "time": {
+                "time": time,
+                "x": x,
+                "x_error": np.full(len(x), resolution / np.sqrt(12)),
+                "fitted": fitted,
+                "residual": x - fitted,
+                "segment": segment,
+                "in_contact": (np.where(np.isfinite(fitted), fitted, -np.inf) > gap.value).astype(np.int8),
+            }
+        },
+        gap=gap,
+    ).assign_attrs(run=run.name)
