@@ -25,8 +25,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from nonsmooth import SolveError
-from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, uniform
+from nonsmooth_savi2007.arrays import FloatArray
 
 _ROUNDS = 50
 _CONVERGED = 1e-6  # of a standard uncertainty

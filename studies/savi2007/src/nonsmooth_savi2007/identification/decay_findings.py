@@ -39,9 +39,9 @@ import xarray as xr
 from scipy.signal import zoom_fft
 
 from nonsmooth import SolveError
-from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
+from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit, free_decay
 from nonsmooth_savi2007.identification.picture_data import picture_data

@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
-from nonsmooth.arrays import FloatArray
+from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.consistency import Consistent, consistent
 from nonsmooth_savi2007.identification.evidence import Run
 

@@ -33,10 +33,10 @@ import xarray as xr
 from scipy.special import ndtri
 
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
-from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth.recordings.signals.phase import DrivePhase, drive_phase
+from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit
 from nonsmooth_savi2007.identification.picture_data import picture_data

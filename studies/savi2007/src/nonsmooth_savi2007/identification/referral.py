@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, uniform
+from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.adjustment import Adjusted
 from nonsmooth_savi2007.identification.consistency import consistent
 from nonsmooth_savi2007.identification.evidence import Evidence

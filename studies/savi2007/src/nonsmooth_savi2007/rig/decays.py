@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth import Recording, System
-from nonsmooth.arrays import FloatArray
+from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.rig import sensors
 from nonsmooth_savi2007.rig.physics import NO_SUPPORT, hanging_mass
 from nonsmooth_savi2007.rig.sampled import simulated

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth import System, simulate
-from nonsmooth.arrays import FloatArray
+from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.rig.physics import driven_tension, fixed_tension, wander_of
 
 #: The paper's method. Over 40 periods with 121 crossings of a rig with friction it differs from the Taylor series at
