@@ -311,3 +311,24 @@ def test_what_rests_all_the_time_has_multipliers_zero(w: float) -> None:
     assert np.abs(orbit.floquet_multipliers) == pytest.approx([np.exp(-0.2 * np.pi / w)] * 2 + [0.0] * 2, abs=1e-7)
     branch = ns.continue_orbit(orbit, "P", (4.0, 6.0))
     assert np.abs(branch["floquet_multipliers"].values[:, 2:]).max() < 1e-12
+
+
+@pytest.mark.parametrize("phase", [0.0, 2.0, 3.0])
+def test_a_lift_off_into_a_short_flight_is_no_graze(phase: float) -> None:
+    """A mass under weight 1 on a table A cos t: x'' + .1 x' + .3 x = A ((.3 - 1) cos t - .1 sin t) lifts off where the
+    amplitude is 1, at A = sqrt 2, and nothing else happens on the branch, whatever its flights last."""
+    system = ns.mechanical(
+        1.0,
+        0.1,
+        0.3,
+        parameters={"A": 1.45},
+        forcing={"q": -1.0},
+        elements={"table": E.Stop(at="q", position=lambda t, u, p: p.A * np.cos(t + phase), side=-1)},
+        period=2 * np.pi,
+    )
+    start = {"q": 1.45 * np.cos(phase) + 0.1}
+    branch = ns.continue_orbit(ns.find_orbit(system, start=start, transient=50), "A", (1.32, 2.4))
+    assert branch["A"].values[[0, -1]] == pytest.approx([1.32, 2.4], abs=1e-12)
+    special = ns.special_points(branch)
+    assert special["kind"].values.tolist() == ["grazing"]
+    assert special["A"].values == pytest.approx([np.sqrt(2)], abs=1e-9)

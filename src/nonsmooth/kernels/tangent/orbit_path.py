@@ -187,8 +187,9 @@ def follow(functions, order, rtol, weight, lacking, net, values, visits, work, e
                             else:
                                 hi = c
                         v, _, row = margin(C, order, n, net, k, lo, -1)
-                        size = size_of(C, order, n + rows[row, 0], h)
-                        # A visit may begin where the indicator and its slope are zero: rounding is no maximum.
+                        # A visit, however short, may begin where the indicator and its slope are zero: rounding is no
+                        # maximum.
+                        size = size_of(C, order, n + rows[row, 0], reach)
                         begins = steps == 1 and a == 0.0 and max(fabs(v), fabs(begun)) <= ROUNDING * size
                         if not begins and v > inner[leg, k]:
                             inner[leg, k], place[leg, k], which[leg, k] = v, t + lo, row
