@@ -191,6 +191,7 @@ class Meter:
         impulses[(np.abs(impulses[:, :, None] * D) <= ZERO * size).all(axis=2)] = 0.0
         one = self.striking
         approach = np.where(self.rubs, np.abs(rate[:, one]), np.maximum(-rate[:, one], 0.0))
+        approach[approach <= ZERO * np.where(D != 0.0, size, 0.0).max(axis=2)] = 0.0  # of what rests
         speed = np.where(impulses != 0.0, approach, np.nan)
         lost, taken = (-0.5 * impulses * (a + b)[:, one] for a, b in ((rate, rate_after), (moved, moved_after)))
         return impulses, speed, lost + 0.0, taken + 0.0
