@@ -110,6 +110,14 @@ MISTAKES = {
         "must not be less than its kinetic friction",
         "the static friction",
     ),
+    "a normal force that pulls": (
+        "ns.mechanical(np.eye(2), 0.0 * np.eye(2), np.eye(2), elements={'pad': ns.elements.Coulomb(at='q2',\n"
+        "    friction=0.3, normal='wall'), 'wall': ns.elements.ElasticStop(at='q1', stiffness=9.0, damping=0.5,"
+        " pulls=True)})",
+        "element 'pad': the damper of 'wall' pulls",
+        "no normal force",
+        "leave pulls out",
+    ),
     "an elastic stop without stiffness": (
         "ns.elements.ElasticStop(at='q', position=1.0)",
         "without which nothing stops",

@@ -72,8 +72,12 @@ class Coulomb(Element):
     def limits(self, here: Place) -> list[tuple[Any, str]]:
         kinetic, name = here.law("friction", 0), f"element {here.name!r}"
         rows = [(kinetic, f"the friction of {name} must not be negative")]
-        if self.normal is not None and here.named(self.normal) is None:
+        stop = here.named(self.normal)
+        if self.normal is not None and stop is None:
             rows.append((here.law("normal"), f"the normal force of {name} must not be negative"))
+        if stop is not None and getattr(stop.element, "pulls", False):
+            way = "which is no normal force; leave pulls out"
+            rows.append((-stop.law("damping"), f"{name}: the damper of {self.normal!r} pulls (pulls=True), {way}"))
         if self.static is not None:
             static = here.law("static")
             less = f"the static friction of {name} must not be less than its kinetic friction (it is no ratio of both)"
