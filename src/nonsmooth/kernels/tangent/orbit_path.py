@@ -21,6 +21,7 @@ from nonsmooth.kernels.series.taylor import dense_states, step_length
 PARTS = 8  # of a step of the series: an extremum shows as a change of the slope's sign over one part
 BISECTIONS = 60
 ROUNDING = 1e-13  # of an indicator's size
+BEGUN = 1e-6  # of a step: the square root of rounding
 MOST_STEPS = 100_000
 
 _i, _f = types.int64, types.float64
@@ -187,10 +188,11 @@ def follow(functions, order, rtol, weight, lacking, net, values, visits, work, e
                             else:
                                 hi = c
                         v, _, row = margin(C, order, n, net, k, lo, -1)
-                        # A visit, however short, may begin where the indicator and its slope are zero: rounding is no
-                        # maximum.
+                        # A visit, however short, may begin where the margin and its slope are zero: rounding is no
+                        # maximum, of whichever row.
                         size = size_of(C, order, n + rows[row, 0], reach)
-                        begins = steps == 1 and a == 0.0 and max(fabs(v), fabs(begun)) <= ROUNDING * size
+                        zero = steps == 1 and a == 0.0 and fabs(begun) <= ROUNDING * begin_size[leg, k]
+                        begins = zero and (lo <= BEGUN * reach or fabs(v) <= ROUNDING * size)
                         if not begins and v > inner[leg, k]:
                             inner[leg, k], place[leg, k], which[leg, k] = v, t + lo, row
                     a, rising = b, s
