@@ -70,6 +70,10 @@ class Page:
         tab.on("pageerror", lambda error: self.faults.append(str(error)))
         tab.on("console", lambda line: self.faults.append(line.text) if line.type == "error" else None)
 
+    def beside(self) -> Page:
+        """Another tab of the same browser, with its cookies and its storage."""
+        return Page(self.tab.context.new_page())
+
     def open(self, address: str) -> None:
         self.tab.goto(address)
         self.tab.wait_for_selector("html[data-ready]")

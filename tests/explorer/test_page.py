@@ -17,7 +17,6 @@ import nonsmooth as ns
 
 def test_figure_11_a_dragged_slider_and_a_click_on_a_column_of_period_4(page: Any) -> None:
     page.tab.select_option("#preset", "Fig. 11")
-    page.until_done()
     page.write("columns", "121")
     page.until_done()
     assert page.ui()["state"]["over"] == "rho"
@@ -50,10 +49,8 @@ def test_figure_11_a_dragged_slider_and_a_click_on_a_column_of_period_4(page: An
     np.testing.assert_allclose(sorted(points), sorted(known), rtol=1e-6)
 
 
-def test_a_moved_slider_redraws_the_diagram_live(server: Any, only_tab: Any) -> None:
-    page = only_tab
-    page.begin(server.address)  # Fig. 11, 600 columns of 300 and 100 periods
-    page.until_done()
+def test_a_moved_slider_redraws_the_diagram_live(page: Any) -> None:
+    page.write("columns", "600")
     page.tab.evaluate("""() => {
         const source = Bokeh.documents[0].get_model_by_name("diagram image");
         window.drawn = [];
@@ -104,8 +101,11 @@ def test_undo_redo_and_the_address_carry_the_state(page: Any, server: Any, new_p
     page.until('location.search.includes("p.k_s=800")')
     shared = page.tab.evaluate("location.href")
     assert server.token not in shared
-    page.open(shared)  # the cookie lets it in again
-    assert page.value("k_s") == 800
+    again = page.beside()
+    again.open(shared)  # the cookie lets it in again
+    assert again.value("k_s") == 800
+    assert again.faults == []
+    again.tab.close()
     colleague = new_page()
     answer = colleague.tab.goto(shared)
     assert answer.status == 403
@@ -154,8 +154,8 @@ def test_a_diagram_of_one_direction_stays_drawn_while_another_is_computed(page: 
     assert [word for word, _ in page.ui()["legends"]["diagram"]] == ["up", "down"]
 
 
-def test_two_tabs_do_not_disturb_each_other(page: Any, server: Any, new_page: Callable[..., Any]) -> None:
-    other = new_page()
+def test_two_tabs_do_not_disturb_each_other(page: Any, server: Any) -> None:
+    other = page.beside()
     other.open(f"{server.address}&{FEW}")
     page.write("v-p.rho", "0.26")
     other.write("v-p.rho", "0.45")
@@ -164,7 +164,8 @@ def test_two_tabs_do_not_disturb_each_other(page: Any, server: Any, new_page: Ca
     assert (page.readout()["motion"], other.readout()["motion"]) == ("period 4", "period 1")
     for one in (page, other):
         assert re.fullmatch(r"\d+ tabs", one.tab.inner_text("#tabs"))
-    other.tab.context.close()
+    other.tab.close()
+    assert other.faults == []
     page.until("document.getElementById('tabs').hidden")
 
 

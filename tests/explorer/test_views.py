@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.explorer.conftest import FEW, wait_until
+from tests.explorer.conftest import wait_until
 
 import nonsmooth as ns
 
@@ -206,28 +206,3 @@ def test_a_click_in_a_basin_starts_there_and_reaches_its_attractor(page: Any) ->
         np.testing.assert_allclose(reached, known, rtol=1e-3)
     assert "NaN" not in tip(page, "basins", *place, "period 2 (b)")
     page.picture("basins")
-
-
-def test_a_first_visit_is_shown_round_in_three_steps_by_keys_alone(server: Any, new_page: Any) -> None:
-    page = new_page(first_visit=True)
-    page.open(f"{server.address}&{FEW}")
-    seen = []
-    for part in ("parameters", "upper", "plane"):
-        assert page.tab.evaluate(f'document.getElementById("{part}").classList.contains("toured")')
-        box = page.tab.locator("#tour").bounding_box()
-        assert box["x"] >= 0
-        assert box["x"] + box["width"] <= 1280
-        assert box["y"] + box["height"] <= 800
-        seen.append(page.tab.inner_text("#tour-title"))
-        if part == "upper":
-            page.picture("tour")
-            page.tab.locator("#tour-next").focus()
-        page.tab.keyboard.press("Enter")
-    assert [title[:5] for title in seen] == ["1 / 3", "2 / 3", "3 / 3"]
-    assert not page.tab.is_visible("#tour")
-    page.open(f"{server.address}&{FEW}")
-    assert not page.tab.is_visible("#tour")  # a second visit
-    page.tab.click("#help")
-    page.tab.keyboard.press("Escape")
-    assert not page.tab.is_visible("#tour")
-    assert page.tab.locator(".toured").count() == 0
