@@ -254,8 +254,7 @@ def _smoothed(time: Any, x: xr.DataArray, step: float, omega: float, support: bo
     Of a long record a piece in the middle tells the support's place and the intensities of the smoother's noise; to
     find them in the whole would take ten passes over it.
     """
-    from nonsmooth.recordings.signals.contacts import contacts
-    from nonsmooth.recordings.signals.sections import poincare
+    from nonsmooth.recordings.signals.contacts import contacts, intervals
     from nonsmooth.recordings.signals.smoothing import smooth
 
     # Without a support the motion is smooth: no contact is an answer that the smoother takes, too.
@@ -276,13 +275,8 @@ def _smoothed(time: Any, x: xr.DataArray, step: float, omega: float, support: bo
     gap = float(found["gap"])
     rough = smooth(time[inside], piece, resolution=step).attrs["intensity"]
     first = smooth(time, x, resolution=step, intensity=rough)
-    motion = (time, first["x"], first["v"].values)
-    begin, end = (poincare(*motion, level=gap, rising=rising)["time"].values for rising in (True, False))
-    # A contact that the record cuts off is whole within it.
-    begin = np.concatenate([time[:1], begin]) if x.values[0] > gap else begin
-    end = np.concatenate([end, time[-1:]]) if len(end) < len(begin) else end
     levels = (quiet["intensity"], quiet["intensity_in_contact"])
-    return smooth(time, x, resolution=step, contacts=(begin, end), intensity=levels)
+    return smooth(time, x, resolution=step, contacts=intervals(first, gap)[:2], intensity=levels)
 
 
 def _attributes(recording: Recording, run: str) -> dict[str, str]:

@@ -28,6 +28,11 @@ def whose(x: Any, default: str = "the signal") -> str:
     return ", ".join(part for part in parts if part) or default
 
 
+def unit_of(x: Any, default: str = "m") -> str:
+    """The unit of a signal, as far as its attributes say it."""
+    return str(getattr(x, "attrs", {}).get("units", default))
+
+
 def warn(x: Any, sentence: str) -> None:
     """A RecordingWarning on the signal ``x``."""
     warnings.warn(f"{whose(x)}: {sentence}", RecordingWarning, stacklevel=3)
@@ -150,8 +155,7 @@ def take(
     """
     array = recording.channel(channel, run)
     array = array.assign_attrs(run=run if run is not None else recording.runs[0])
-    name = whose(array)
-    unit = str(array.attrs.get("units", ""))
+    name, unit = whose(array), unit_of(array, "")
     if units is not None and unit not in units:
         given = f"its unit is {unit!r}" if unit else "it has no unit"
         raise ValueError(

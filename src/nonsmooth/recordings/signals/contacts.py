@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.recordings.signals.checks import signal
+from nonsmooth.recordings.signals.checks import signal, unit_of
 from nonsmooth.recordings.signals.smoothing import smooth
 from nonsmooth.results.labels import labelled
 
@@ -70,13 +70,13 @@ def contacts(
     found = smooth(t, values, resolution=resolution)
     if gap is not None:
         place = (float(gap), 0.0, math.nan)
-        found = smooth(t, values, resolution=resolution, contacts=_intervals(found, place[0])[:2])
+        found = smooth(t, values, resolution=resolution, contacts=intervals(found, place[0])[:2])
     else:
         place = _support(found, omega, resolution)
         for _ in range(2):
             if math.isnan(place[0]):
                 break
-            inside = _intervals(found, place[0])[:2]
+            inside = intervals(found, place[0])[:2]
             if len(inside[0]) == 0:
                 break
             found = smooth(t, values, resolution=resolution, contacts=inside)
@@ -159,24 +159,19 @@ def _drive(t: FloatArray, left: FloatArray, free: BoolArray) -> float | None:
     return float(2 * np.pi * place * (n - 1) / (8 * n * (t[-1] - t[0])))
 
 
-def _intervals(found: xr.Dataset, gap: float) -> tuple[FloatArray, FloatArray, BoolArray]:
+def intervals(found: xr.Dataset, gap: float) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Begin and end of each interval with x > gap, and whether the record cuts it off."""
     from nonsmooth.recordings.signals.sections import poincare
 
     t, x = found["time"].values, found["x"].values
     motion = (t, found["x"], found["v"].values)
-    begin = poincare(*motion, level=gap, rising=True)["time"].values
-    end = poincare(*motion, level=gap, rising=False)["time"].values
-    cut_first, cut_last = bool(x[0] > gap), bool(x[-1] > gap)
-    begin = np.concatenate([[t[0]], begin]) if cut_first else begin
-    end = np.concatenate([end, [t[-1]]]) if cut_last else end
-    n = min(len(begin), len(end))
-    cut = np.zeros(n, np.bool_)
-    if n:
-        cut[0] |= cut_first
-        cut[-1] |= cut_last
-    keep = begin[:n] < end[:n]
-    return begin[:n][keep], end[:n][keep], cut[keep]
+    begin, end = (poincare(*motion, level=gap, rising=rising)["time"].values for rising in (True, False))
+    begin = np.append(t[:1][x[:1] > gap], begin)
+    end = np.append(end, t[-1:][x[-1:] > gap])[: len(begin)]
+    begin = begin[: len(end)]
+    cut = ((begin == t[0]) & (x[0] > gap)) | ((end == t[-1]) & (x[-1] > gap))
+    keep = begin < end
+    return begin[keep], end[keep], cut[keep]
 
 
 def _labelled(found: xr.Dataset, place: tuple[float, float, float], least: float, x: Any) -> xr.Dataset:
@@ -187,7 +182,7 @@ def _labelled(found: xr.Dataset, place: tuple[float, float, float], least: float
     if math.isnan(gap):
         begin, end, cut = np.zeros(0), np.zeros(0), np.zeros(0, np.bool_)
     else:
-        begin, end, cut = _intervals(found, gap)
+        begin, end, cut = intervals(found, gap)
     speed = [np.interp(at, t, found["v"].values) for at in (begin, end)]
     own = [np.interp(at, t, found["x_error"].values) for at in (begin, end)]
     errors = [np.hypot(e, gap_error) / np.maximum(np.abs(v), 1e-300) for e, v in zip(own, speed, strict=True)]
@@ -196,17 +191,17 @@ def _labelled(found: xr.Dataset, place: tuple[float, float, float], least: float
         here = (t >= b) & (t <= e)
         seen[k] = np.count_nonzero(here)
         depth[k] = position[here].max() - gap if here.any() else 0.25 * (e - b) * abs(speed[0][k])
-    unit = str(getattr(x, "attrs", {}).get("units", "m"))
-    second, metre, rate = {"units": "s"}, {"units": unit}, {"units": f"{unit}/s"}
+    unit = unit_of(x)
+    second, metre = {"units": "s"}, {"units": unit}
     return xr.Dataset(
         {
-            "begin": ("contact", begin, {"long_name": "begin of the contact", **second}),
-            "end": ("contact", end, {"long_name": "end of the contact", **second}),
+            "begin": labelled("contact", begin, "begin of the contact", "s"),
+            "end": labelled("contact", end, "end of the contact", "s"),
             "begin_error": ("contact", errors[0], second),
             "end_error": ("contact", errors[1], second),
-            "depth": ("contact", depth, {"long_name": "depth of the contact", **metre}),
-            "v_begin": ("contact", speed[0], {"long_name": "velocity at the begin", **rate}),
-            "v_end": ("contact", speed[1], {"long_name": "velocity at the end", **rate}),
+            "depth": labelled("contact", depth, "depth of the contact", unit),
+            "v_begin": labelled("contact", speed[0], "velocity at the begin", f"{unit}/s"),
+            "v_end": labelled("contact", speed[1], "velocity at the end", f"{unit}/s"),
             "uncertain": labelled("contact", (depth < least) | (seen < 2) | cut, "contact is uncertain"),
             "gap": ((), gap, metre),
             "gap_error": ((), gap_error, metre),

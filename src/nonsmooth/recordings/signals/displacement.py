@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.recordings.signals.checks import whose
+from nonsmooth.recordings.signals.checks import unit_of, whose
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,7 +57,7 @@ def position(
     ValueError
         If the unit of ``angle`` is none of these.
     """
-    unit = str(angle.attrs.get("units", ""))
+    unit = unit_of(angle, "")
     if not np.isfinite(distance_per_turn) or distance_per_turn == 0:
         raise ValueError(f"distance_per_turn must be a length in metres other than 0, got {distance_per_turn!r}")
     if unit in _TURNS:

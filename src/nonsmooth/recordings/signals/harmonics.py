@@ -131,14 +131,11 @@ def fit(
     tau = t - centre
     if refine:
         base = _best(tau, values, base, n, length)
-    A = _columns(tau, base, n)
-    solution, *_ = np.linalg.lstsq(A, values, rcond=None)
-    left = values - A @ solution
+    A, solution, left = _fitted(tau, values, base, n)
     cos, sin = solution[1::2], solution[2::2]
     names = ["mean"] + [f"{f}_{j}" for j in range(1, n + 1) for f in ("cos", "sin")]
     if refine:
-        j = np.arange(1, n + 1)
-        slope = tau * ((A[:, 2::2] * -cos + A[:, 1::2] * sin) @ j)
+        slope = _slope(tau, A, solution)
         A = np.column_stack([A, slope / subharmonic])
         names.append("omega")
     free = max(len(t) - A.shape[1], 1)
@@ -176,11 +173,18 @@ def fit(
     )
 
 
-def _columns(tau: FloatArray, omega: float, n: int) -> FloatArray:
+def _fitted(tau: FloatArray, values: FloatArray, omega: float, n: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Mean, cosines and sines in columns, their coefficients of the least squares, and what is left."""
     angle = np.multiply.outer(tau, omega * np.arange(1, n + 1))
     A = np.ones((len(tau), 2 * n + 1))
     A[:, 1::2], A[:, 2::2] = np.cos(angle), np.sin(angle)
-    return A
+    p, *_ = np.linalg.lstsq(A, values, rcond=None)
+    return A, np.asarray(p, np.float64), values - A @ p
+
+
+def _slope(tau: FloatArray, A: FloatArray, p: FloatArray) -> FloatArray:
+    """Derivative of the fitted signal in the frequency."""
+    return np.asarray(tau * ((A[:, 1::2] * p[2::2] - A[:, 2::2] * p[1::2]) @ np.arange(1, len(p) // 2 + 1)))
 
 
 def _best(tau: FloatArray, values: FloatArray, omega: float, n: int, length: float) -> float:
@@ -188,23 +192,11 @@ def _best(tau: FloatArray, values: FloatArray, omega: float, n: int, length: flo
 
     A few are tried, then Gauss-Newton steps change frequency and amplitudes together.
     """
-
-    def fitted(w: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        A = _columns(tau, w, n)
-        p, *_ = np.linalg.lstsq(A, values, rcond=None)
-        return A, np.asarray(p, np.float64), values - A @ p
-
-    def squares(w: float) -> float:
-        left = fitted(w)[2]
-        return float(left @ left)
-
     grid = omega + math.pi / length * np.linspace(-1.0, 1.0, 7)
-    best = float(grid[int(np.argmin([squares(w) for w in grid]))])
-    j = np.arange(1, n + 1)
+    best = float(grid[int(np.argmin([np.linalg.norm(_fitted(tau, values, w, n)[2]) for w in grid]))])
     for _ in range(20):
-        A, p, left = fitted(best)
-        slope = tau * ((A[:, 1::2] * p[2::2] - A[:, 2::2] * p[1::2]) @ j)
-        change, *_ = np.linalg.lstsq(np.column_stack([A, slope]), left, rcond=None)
+        A, p, left = _fitted(tau, values, best, n)
+        change, *_ = np.linalg.lstsq(np.column_stack([A, _slope(tau, A, p)]), left, rcond=None)
         step = float(np.clip(change[-1], -math.pi / length, math.pi / length))
         best += step
         if abs(step) < 1e-13 * omega:

@@ -54,11 +54,7 @@ class DrivePhase:
 
     def phase(self, time: ArrayLike) -> FloatArray:
         """Unwrapped phase in rad, 0 at ``t_0``; straight between turns, and with the mean frequency beyond them."""
-        t = np.asarray(time, np.float64)
-        inside = TURN * np.interp(t, self.turn_times, self.turns)
-        before = TURN * self.turns[0] + self.omega * (t - self.turn_times[0])
-        after = TURN * self.turns[-1] + self.omega * (t - self.turn_times[-1])
-        return np.where(t < self.turn_times[0], before, np.where(t > self.turn_times[-1], after, inside))
+        return _straight(np.asarray(time, np.float64), self.turn_times, TURN * self.turns, self.omega)
 
     @property
     def coarser(self) -> DrivePhase:
@@ -82,11 +78,13 @@ class DrivePhase:
         low, high = self.span
         first, last = self.phase(np.array([low, high])) / TURN - phase
         wanted = np.arange(math.ceil(first - 1e-12), math.floor(last + 1e-12) + 1) + phase
-        inside = np.interp(wanted, self.turns, self.turn_times)
-        before = self.turn_times[0] + (wanted - self.turns[0]) * self.period
-        after = self.turn_times[-1] + (wanted - self.turns[-1]) * self.period
-        found = np.where(wanted < self.turns[0], before, np.where(wanted > self.turns[-1], after, inside))
-        return np.asarray(np.clip(found, low, high))
+        return np.asarray(np.clip(_straight(wanted, self.turns, self.turn_times, self.period), low, high))
+
+
+def _straight(at: FloatArray, x: Any, y: Any, slope: float) -> FloatArray:
+    """Straight from point to point, and with this slope beyond the first and the last."""
+    beyond = np.minimum(at - x[0], 0.0) + np.maximum(at - x[-1], 0.0)
+    return np.asarray(np.interp(at, x, y) + slope * beyond)
 
 
 def drive_phase(

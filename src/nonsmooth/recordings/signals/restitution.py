@@ -126,7 +126,7 @@ def restitution(
         i, j = before.stop - 1, after.start
         left, right = _Side(t[before], z[before], t[i]), _Side(t[after], z[after], t[i])
         when = _meeting(left.p - right.p, float(t[j] - t[i]))
-        found.append((k, t[i] + when, t[j] - t[i], left.p @ _powers(when), when))
+        found.append((k, t[i] + when, t[j] - t[i], np.polyval(left.p, when), when))
         sides.append((left, right))
     freedom = sum(side.freedom for pair in sides for side in pair)
     noise = math.sqrt(sum(side.squares for pair in sides for side in pair) / freedom) if freedom else math.nan
@@ -211,25 +211,19 @@ class _Side:
     """A parabola fitted to the samples on one side, over the time since ``origin``."""
 
     def __init__(self, t: FloatArray, z: FloatArray, origin: float) -> None:
-        A = np.vander(t - origin, 3, increasing=True)
-        self.p, *_ = np.linalg.lstsq(A, z, rcond=None)
-        left = z - A @ self.p
+        self.p, self.C = np.polyfit(t - origin, z, 2, cov="unscaled")
+        left = z - np.polyval(self.p, t - origin)
         self.squares, self.freedom = float(left @ left), len(t) - 3
-        self.C = np.linalg.inv(A.T @ A)
 
     def slope(self, s: float, noise: float) -> tuple[float, float]:
         """The velocity and its error."""
-        along = np.array([0.0, 1.0, 2.0 * s])
+        along = np.array([2.0 * s, 1.0, 0.0])
         return float(self.p @ along), noise * math.sqrt(float(along @ self.C @ along))
-
-
-def _powers(s: float) -> FloatArray:
-    return np.array([1.0, s, s * s])
 
 
 def _meeting(d: FloatArray, length: float) -> float:
     """Zero of the difference of two parabolas within (0, length); the middle if there is none."""
-    roots = np.roots(d[::-1])
+    roots = np.roots(d)
     real = np.real(roots[np.abs(np.imag(roots)) < 1e-9])
     inside = real[(real >= 0.0) & (real <= length)]
     return float(inside[0]) if len(inside) == 1 else 0.5 * length

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.recordings.signals.checks import signal, whose
+from nonsmooth.recordings.signals.checks import signal, unit_of, whose
 from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
@@ -142,96 +142,56 @@ class _Between:
                 raise ValueError(f"{whose(x)}: {name} holds values that are not finite numbers; cut the record there")
             columns.append(column)
         self.states = np.column_stack(columns[:2])
-        self.a = None if a is None else columns[2]
         self.errors = np.column_stack(columns[3:])
-        self.unit = str(getattr(x, "attrs", {}).get("units", "m"))
-        self.hits = np.unique(np.asarray(impacts, np.float64).ravel())
-
-    def _interval(self, times: FloatArray) -> NDArray[np.intp]:
-        return np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.t) - 2)
+        self.unit = unit_of(x)
+        hits = np.unique(np.asarray(impacts, np.float64).ravel())
+        self.polynomial = _polynomial(self.t, columns[0], columns[1], None if a is None else columns[2], hits)
 
     def at(self, times: FloatArray, derivative: int = 0) -> FloatArray:
         """x and v (or their derivatives) at these times, shape (n, 2)."""
-        i = self._interval(times)
-        h = self.t[i + 1] - self.t[i]
-        s = (times - self.t[i]) / h
-        p = self._polynomial(i, h)
-        # An impact in this step: continue the sample on the same side of it.
-        hit = np.searchsorted(self.hits, self.t[i], side="right") < np.searchsorted(self.hits, self.t[i + 1])
-        if hit.any():
-            where = np.append(self.hits, np.inf)[np.searchsorted(self.hits, self.t[i], side="right")]
-            left = times <= where
-            one_sided = self._taylor(np.where(left, i, i + 1), np.where(left, 0.0, 1.0), h, p.shape[1])
-            p = np.where(hit[:, None], one_sided, p)
-        value, rate, bend = (_horner(p, s, k) for k in range(3))
-        if derivative == 0:
-            return np.column_stack([value, rate / h])
-        return np.column_stack([rate / h, bend / h**2])
-
-    def _polynomial(self, i: NDArray[np.intp], h: FloatArray) -> FloatArray:
-        """Coefficients in s = (t - t_i) / h: Hermite of order 3, or 5 with accelerations."""
-        x0, x1 = self.states[i, 0], self.states[i + 1, 0]
-        v0, v1 = self.states[i, 1] * h, self.states[i + 1, 1] * h
-        d = x1 - x0
-        if self.a is None:
-            return np.column_stack([x0, v0, 3 * d - 2 * v0 - v1, v0 + v1 - 2 * d])
-        a0, a1 = self.a[i] * h**2, self.a[i + 1] * h**2
-        return np.column_stack(
-            [
-                x0,
-                v0,
-                0.5 * a0,
-                10 * d - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1,
-                -15 * d + 8 * v0 + 7 * v1 + 1.5 * a0 - a1,
-                6 * d - 3 * v0 - 3 * v1 - 0.5 * a0 + 0.5 * a1,
-            ]
-        )
-
-    def _taylor(self, k: NDArray[np.intp], origin: FloatArray, h: FloatArray, terms: int) -> FloatArray:
-        """x + v dt + a dt^2 / 2 about sample k, whose place in the step is ``origin`` (0 or 1)."""
-        x, v = self.states[k, 0], self.states[k, 1] * h
-        b = np.zeros(len(k)) if self.a is None else 0.5 * self.a[k] * h**2
-        p = np.zeros((len(k), terms))
-        p[:, 0] = x - v * origin + b * origin
-        p[:, 1] = v - 2 * b * origin
-        p[:, 2] = b
-        return p
+        return np.column_stack([self.polynomial(times, derivative + k) for k in range(2)])
 
     def passing(self, i: NDArray[np.intp], which: int, level: float) -> FloatArray:
         """The times in steps i at which x or v passes a level, by halving until no number lies between."""
-
-        def away(times: FloatArray) -> FloatArray:
-            return np.asarray(self.at(times)[:, which] - level)
-
-        low, high = self.t[i], np.nextafter(self.t[i + 1], self.t[i])
-        at_low, at_high = away(low), away(high)
-        # Only an impact in this step, or rounding at its end, leaves no root inside.
-        rootless = (at_low == 0) | (at_low * at_high > 0)
-        after = np.searchsorted(self.hits, low, side="right")
-        hit = np.append(self.hits, np.inf)[after]
-        end = np.where(hit < high, hit, np.where(np.abs(at_low) <= np.abs(at_high), low, high))
+        low, high = self.t[i], self.t[i + 1]
+        before = self.states[i, which] < level
         while True:
             middle = low + 0.5 * (high - low)
             inside = (middle > low) & (middle < high)
             if not inside.any():
-                return np.where(rootless, end, high)
-            behind = inside & (np.sign(away(middle)) == np.sign(at_low))
+                return np.asarray(high)
+            value = self.at(middle)[:, which] - level
+            behind = inside & (np.where(before, -value, value) > 0)
             low, high = np.where(behind, middle, low), np.where(inside & ~behind, middle, high)
 
     def error_at(self, times: FloatArray) -> FloatArray:
         """Errors of x and v between samples: the larger one of the two ends."""
-        i = self._interval(times)
+        i = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.t) - 2)
         return np.maximum(self.errors[i], self.errors[i + 1])
 
 
-def _horner(p: FloatArray, s: FloatArray, derivative: int) -> FloatArray:
-    q = p
-    for _ in range(derivative):
-        q = q[:, 1:] * np.arange(1, q.shape[1])
-    value = np.zeros(len(s))
-    for k in range(q.shape[1] - 1, -1, -1):
-        value = value * s + q[:, k]
-    return value
+def _polynomial(t: FloatArray, x: FloatArray, v: FloatArray, a: FloatArray | None, hits: FloatArray) -> Any:
+    """Hermite's polynomial of order 3 in each step, or 5 with accelerations; in a step with impacts the samples at its
+    ends are continued to them."""
+    from scipy.interpolate import CubicHermiteSpline, PPoly
+
+    if a is None:
+        terms, bend = CubicHermiteSpline(t, x, v).c, np.zeros_like(x)
+    else:
+        h, bend = np.diff(t), 0.5 * a
+        d = np.diff(x) - v[:-1] * h - bend[:-1] * h**2  # what the sample at the beginning leaves, and its derivatives
+        dv, da = (np.diff(v) - a[:-1] * h) * h, np.diff(bend) * h**2
+        highest = (6 * d - 3 * dv + da) / h**5, (7 * dv - 15 * d - 2 * da) / h**4, (10 * d - 4 * dv + da) / h**3
+        terms = np.array([*highest, bend[:-1], v[:-1], x[:-1]])
+    step = np.searchsorted(t, hits) - 1  # an impact at a sample is none between two
+    inside = (step >= 0) & (step < len(t) - 1) & (hits < t[np.minimum(step + 1, len(t) - 1)])
+    hits, step = hits[inside], step[inside]
+    terms[:-3, step] = 0.0
+    terms[-3:, step] = bend[step], v[step], x[step]
+    since, ends = hits - t[step + 1], step + 1
+    behind = np.zeros((len(terms), len(hits)))
+    behind[-3:] = bend[ends], v[ends] + 2 * bend[ends] * since, x[ends] + (v[ends] + bend[ends] * since) * since
+    return PPoly(np.insert(terms, ends, behind, axis=1), np.insert(t, ends, hits))
 
 
 def _points(

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nonsmooth.arrays import BoolArray, FloatArray
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.recordings.signals.checks import signal, whose
+from nonsmooth.recordings.signals.checks import signal, unit_of, whose
 from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
@@ -96,9 +96,7 @@ def smooth(
     if not (math.isfinite(noise) and noise >= 0):
         raise ValueError(f"{whose(x)}: noise must be a standard deviation >= 0, got {noise!r}")
     t, values = signal(time, x, least=2 * order, purpose="smoothing", missing="keep")
-    begin, end = (contacts["begin"], contacts["end"]) if hasattr(contacts, "data_vars") else (contacts or ((), ()))
-    bounds = _Intervals(np.asarray(begin, np.float64), np.asarray(end, np.float64), x)
-    nodes = _Nodes(t, values, _places(t, impacts, x), bounds, order, resolution, noise)
+    nodes = _Nodes(t, values, _places(t, impacts, x), _bounds(contacts, x), order, resolution, noise)
     q = nodes.likeliest() if intensity is None else nodes.scaled(intensity)
     return nodes.result(q, model, x)
 
@@ -113,20 +111,13 @@ def _places(t: FloatArray, places: ArrayLike, x: Any) -> FloatArray:
     return found
 
 
-class _Intervals:
-    """Intervals of contact, in order and apart."""
-
-    def __init__(self, begin: FloatArray, end: FloatArray, x: Any) -> None:
-        if begin.ndim != 1 or begin.shape != end.shape or not (begin < end).all() or not (end[:-1] <= begin[1:]).all():
-            raise ValueError(
-                f"{whose(x)}: contacts must be a begin and an end each, begin before end, one after the other"
-            )
-        self.begin, self.end = begin, end
-
-    def hold(self, times: FloatArray) -> BoolArray:
-        """Mask of the times that lie inside one of them."""
-        k = np.searchsorted(self.begin, times, side="right") - 1
-        return (k >= 0) & (times < np.append(self.end, -np.inf)[k])
+def _bounds(contacts: Any, x: Any) -> FloatArray:
+    """Begin and end of each contact in turn."""
+    pair = (contacts["begin"], contacts["end"]) if hasattr(contacts, "data_vars") else (contacts or ((), ()))
+    begin, end = (np.asarray(side, np.float64) for side in pair)
+    if begin.ndim != 1 or begin.shape != end.shape or not (begin < end).all() or not (end[:-1] <= begin[1:]).all():
+        raise ValueError(f"{whose(x)}: contacts must be a begin and an end each, begin before end, one after the other")
+    return np.column_stack([begin, end]).ravel()
 
 
 class _Nodes:
@@ -137,7 +128,7 @@ class _Nodes:
         t: FloatArray,
         x: FloatArray,
         impacts: FloatArray,
-        contacts: _Intervals,
+        contacts: FloatArray,
         order: int,
         resolution: float | None,
         noise: float,
@@ -153,32 +144,23 @@ class _Nodes:
             rough = np.diff(x[good], 4) / math.sqrt(70.0)
             count, jitter = float(np.sqrt(np.mean(rough**2))) or 1e-9 * float(np.ptp(x[good])) or 1.0, 0.0
         self.sigma = math.hypot(count, jitter)
-        variance = np.full(len(t), (count / self.sigma) ** 2)
-        edges = _Edges(t, x, resolution) if resolution is not None else _Edges(t[:0], x[:0], 1.0)
-        if resolution is not None:
-            variance *= edges.stay
-        variance += (jitter / self.sigma) ** 2
         self.offset = float(x[good][0])
-        y = (x - self.offset) / self.sigma
-        bounds = np.concatenate([contacts.begin, contacts.end])
-        bounds = bounds[(bounds > t[0]) & (bounds < t[-1])]
+        stay, *edges = _stays(t, x, resolution) if resolution is not None else (np.ones(len(t)), *np.zeros((3, 0)))
         # kind 0: sample, 1: before an impact, 2: after it, 3: bound of a contact, 4: edge of a count
-        when = np.concatenate([t, impacts, impacts, bounds, edges.time])
-        kind = np.repeat([0, 1, 2, 3, 4], [len(t), len(impacts), len(impacts), len(bounds), len(edges.time)])
-        r = np.full(len(when), np.inf)
-        r[: len(t)] = np.where(good, variance, np.inf)
-        r[kind == 4] = edges.share**2 * (count / self.sigma) ** 2 + (jitter / self.sigma) ** 2
-        values = np.zeros(len(when))
-        values[: len(t)] = np.where(good, y, 0.0)
-        values[kind == 4] = (edges.value - self.offset) / self.sigma
+        places = [t, impacts, impacts, contacts[(contacts > t[0]) & (contacts < t[-1])], edges[0]]
+        kind, when = np.repeat(range(5), [*map(len, places)]), np.concatenate(places)
+        values, shares = np.full(len(when), self.offset), np.full(len(when), np.inf)
+        values[kind == 0], values[kind == 4] = np.where(good, x, self.offset), edges[1]
+        shares[kind == 0], shares[kind == 4] = np.where(good, stay, np.inf), edges[2]
         sort = np.lexsort((kind, when))
-        self.kind, self.y, self.r = kind[sort], np.ascontiguousarray(values[sort]), np.ascontiguousarray(r[sort])
+        self.kind, self.y = kind[sort], (values[sort] - self.offset) / self.sigma
+        self.r = (shares[sort] * count**2 + jitter**2) / self.sigma**2
         self.step = np.concatenate([[0.0], np.diff(when[sort])]) / self.h
         # At the bound of a soft contact the force turns off its course: the jerk jumps.
         self.jump = np.select([self.kind == 2, self.kind == 3], [1, min(3, order)], order).astype(np.int64)
         middle = when[sort] - 0.5 * self.step * self.h
-        self.inside = contacts.hold(middle)
-        self.wide = self._wide(t[good] / self.h, y[good])
+        self.inside = np.searchsorted(contacts, middle, side="right") % 2 == 1
+        self.wide = self._wide(t[good] / self.h, (x[good] - self.offset) / self.sigma)
         n, count_nodes = order, len(when)
         self.u, self.P = np.zeros((2, count_nodes, n)), np.zeros((2, count_nodes, n, n))  # predicted, filtered
         self.work, self.sums = np.zeros((5, n, n)), np.zeros(2)
@@ -267,15 +249,15 @@ class _Nodes:
         states[:, 0] += self.offset
         errors = np.sqrt(np.maximum(np.einsum("kii->ki", self.P[1]), 0.0)) * sigma * units
         sample, before, after = (self.kind == kind for kind in range(3))
-        unit = str(getattr(x, "attrs", {}).get("units", "m"))
+        unit = unit_of(x)
         speed = {"units": f"{unit}/s"}
         at_impacts = {
             "impact_time": labelled("impact", self.impacts, "time of the impact", "s"),
             "impact_x": labelled("impact", states[before, 0], "position at the impact", unit),
             "impact_x_error": ("impact", errors[before, 0], {"units": unit}),
-            "v_before": ("impact", states[before, 1], {"long_name": "velocity before the impact", **speed}),
+            "v_before": labelled("impact", states[before, 1], "velocity before the impact", f"{unit}/s"),
             "v_before_error": ("impact", errors[before, 1], speed),
-            "v_after": ("impact", states[after, 1], {"long_name": "velocity after the impact", **speed}),
+            "v_after": labelled("impact", states[after, 1], "velocity after the impact", f"{unit}/s"),
             "v_after_error": ("impact", errors[after, 1], speed),
         }
         attrs = {
@@ -297,12 +279,11 @@ def labelled_motion(
     """Position, velocity and acceleration (as many as are given) with their errors, in the unit of ``x``."""
     import xarray as xr
 
-    unit, data = str(getattr(x, "attrs", {}).get("units", "m")), {}
+    unit, data = unit_of(x), {}
     names = {"x": ("position", ""), "v": ("velocity", "/s"), "a": ("acceleration", "/s^2")}
     for (name, (long_name, per)), state, error in zip(names.items(), states, errors, strict=False):
-        attrs = {"units": unit + per}
-        data[name] = ("time", state, {"long_name": long_name, **attrs})
-        data[f"{name}_error"] = ("time", error, {"long_name": f"standard error of the {long_name}", **attrs})
+        data[name] = labelled("time", state, long_name, unit + per)
+        data[f"{name}_error"] = labelled("time", error, f"standard error of the {long_name}", unit + per)
     coords = {
         "time": labelled("time", t, "time", "s"),
         "segment": labelled("time", np.searchsorted(impacts, t, side="left"), "number of impacts before this sample"),
@@ -310,24 +291,19 @@ def labelled_motion(
     return xr.Dataset(data, coords)
 
 
-class _Edges:
-    """Instants at which the count of an encoder changes, which is all that it says of a slow motion.
+def _stays(t: FloatArray, x: FloatArray, resolution: float) -> tuple[FloatArray, ...]:
+    """Stays of an encoder on one count, and the instants at which it changes, which is all that it says of a slow
+    motion: how many samples share a count, for each; time, value and variance of the changes, in that of a sample.
 
     While a count stays for ``n`` samples their errors are one and the same, and together they say as much as one
-    sample: ``stay`` is n, by which the variance of each grows. In exchange the change by one count between two
-    samples is a position, the edge between the counts, known to the ``share`` 1/n of a count, n the shorter of the
-    two stays: the error of a motion that passes a count in n samples, in the middle of a step.
+    sample: the variance of each grows by n. In exchange the change by one count between two samples is a position, the
+    edge between the counts, known to 1/n of a count, n the shorter of the two stays: the error of a motion that passes
+    a count in n samples, in the middle of a step.
     """
-
-    def __init__(self, t: FloatArray, x: FloatArray, resolution: float) -> None:
-        changes = np.flatnonzero(np.diff(x) != 0) + 1
-        ends = np.concatenate([[0], changes, [len(x)]]) if len(x) else np.zeros(0, np.int64)
-        lengths = np.diff(ends)
-        self.stay = np.repeat(lengths, lengths).astype(np.float64)
-        last = ends[1:-1] - 1 if len(ends) else ends  # the last sample of each stay but the final one
-        shorter = np.minimum(lengths[:-1], lengths[1:])
-        single = np.abs(np.abs(x[last + 1] - x[last]) / resolution - 1.0) < 0.1
-        use = single & (shorter >= 2)
-        self.time = 0.5 * (t[last] + t[last + 1])[use]
-        self.value = 0.5 * (x[last] + x[last + 1])[use]
-        self.share = 1.0 / shorter[use]
+    ends = np.concatenate([[0], np.flatnonzero(np.diff(x) != 0) + 1, [len(x)]])
+    lengths, last = np.diff(ends), ends[1:-1] - 1  # the last sample of each stay but the final one
+    shorter = np.minimum(lengths[:-1], lengths[1:])
+    single = np.abs(np.abs(x[last + 1] - x[last]) / resolution - 1.0) < 0.1
+    use = single & (shorter >= 2)
+    time, value = (0.5 * (one[last] + one[last + 1])[use] for one in (t, x))
+    return np.repeat(lengths, lengths).astype(np.float64), time, value, 1.0 / shorter[use] ** 2

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.recordings.signals.checks import even_rate, signal, whose
+from nonsmooth.recordings.signals.checks import even_rate, signal, unit_of, whose
 from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
@@ -124,7 +125,7 @@ def spectrum(
     alone = [0] if n * padding % 2 else [0, -1]  # the lines at 0 and at half the sample rate have no mirror image
     for one_sided in (amplitude, density):
         one_sided[alone] *= 0.5
-    unit = str(getattr(x, "attrs", {}).get("units", ""))
+    unit = unit_of(x, "")
     name = window if isinstance(window, str) else repr(window)
     return xr.Dataset(
         {
@@ -239,7 +240,6 @@ class _Shape:
         name = spectrum.attrs["window"]
         self.weights = get_window(ast.literal_eval(name) if name.startswith("(") else name, self.n)
         self.total = float(self.weights.sum())
-        self._finely: Any = None
 
     def _lines(self, weights: FloatArray) -> FloatArray:
         """Transform of weights about the middle of the record at offsets k / FINE, k = 0, 1, ...; real part."""
@@ -249,19 +249,23 @@ class _Shape:
         lines = fft.rfft(weights, length)
         return np.asarray((lines * np.exp(1j * np.pi * (self.n - 1) * np.arange(len(lines)) / length)).real)
 
-    def at(self, offset: ArrayLike) -> FloatArray:
-        """Value at these distances from the peak, up to 3 spacings."""
+    @cached_property
+    def _all(self) -> FloatArray:
+        return self._lines(self.weights) / self.total
+
+    @cached_property
+    def _near(self) -> Any:
         from scipy.interpolate import CubicSpline
 
-        if self._finely is None:
-            self._all = self._lines(self.weights) / self.total
-            near = self._all[: 3 * FINE + 4]
-            self._finely = CubicSpline(np.arange(len(near)) / FINE, near, bc_type=((1, 0.0), "not-a-knot"))
-        return np.asarray(self._finely(np.abs(np.asarray(offset, np.float64))))
+        near = self._all[: 3 * FINE + 4]
+        return CubicSpline(np.arange(len(near)) / FINE, near, bc_type=((1, 0.0), "not-a-knot"))
+
+    def at(self, offset: ArrayLike) -> FloatArray:
+        """Value at these distances from the peak, up to 3 spacings."""
+        return np.asarray(self._near(np.abs(offset)))
 
     def image(self, place: float) -> float:
         """Largest modulus within an independent line of the mirror image, 2 ``place`` spacings away."""
-        self.at(0.0)
         low, high = (round((2.0 * place + side * self.padding) * FINE) for side in (-1, 1))
         return float(np.abs(self._all[max(low, 0) : min(high, len(self._all)) + 1]).max(initial=0.0))
 

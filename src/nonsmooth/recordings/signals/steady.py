@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.sampling import examine
-from nonsmooth.recordings.signals.checks import signal, whose
+from nonsmooth.recordings.signals.checks import signal, unit_of, whose
 from nonsmooth.recordings.signals.harmonics import fit
 from nonsmooth.recordings.signals.spectrum import largest_line, peak, spectrum
 from nonsmooth.results.labels import labelled
@@ -171,7 +171,7 @@ def steady_response(
         methods["spectrum"] = (line.frequency, math.hypot(line.error, line.bias))
     found = np.array(list(methods.values()))
     error = max(float(found[:2, 1].max()), 0.5 * float(np.ptp(found[:, 0])))
-    unit = str(getattr(x, "attrs", {}).get("units", ""))
+    unit = unit_of(x, "")
     table = xr.Dataset(
         {
             "time": labelled("block", middles, "middle of the block", "s"),
