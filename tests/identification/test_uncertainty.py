@@ -64,7 +64,7 @@ def test_parameters_known_mainly_together_keep_the_uncertainty_of_white_residual
     for _ in range(40):
         y = rng.standard_normal(n)
         r = y - table @ np.linalg.lstsq(table, y, rcond=None)[0]
-        state = Residuals([r], [r], [table], [np.zeros((n, 1))])
+        state = Residuals([r], [table], [np.zeros((n, 1))])
         problem = SimpleNamespace(
             pieces=[piece],
             derivatives=lambda theta, starts, now=state: now,
@@ -82,7 +82,7 @@ def test_a_fit_whose_minimum_no_step_reaches_is_refused():
     piece = SimpleNamespace(which=np.arange(1), n_free=0)
 
     def state(theta, starts):
-        return Residuals([], [np.full(4, theta[0] - 1.0)], [np.ones((4, 1))], [np.zeros((4, 1))])
+        return Residuals([np.full(4, theta[0] - 1.0)], [np.ones((4, 1))], [np.zeros((4, 1))])
 
     unknowns = SimpleNamespace(
         low=np.array([-np.inf]), high=np.array([np.inf]), centre=np.zeros(1), precision=np.zeros((1, 1))

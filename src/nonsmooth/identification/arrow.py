@@ -33,7 +33,6 @@ class Residuals:
     """Residuals and derivatives of all pieces at one point, not weighted; ``alone``, those of what depends on the
     unknowns alone, weighted, with the derivatives of what they are the residuals of."""
 
-    fitted: list[FloatArray]
     residuals: list[FloatArray]
     in_parameters: list[FloatArray]
     in_start: list[FloatArray]
@@ -114,17 +113,17 @@ def reduced(
     return normal, right, back
 
 
-def inverted(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+def inverted(matrix: FloatArray, damping: float = 0.0) -> tuple[FloatArray, FloatArray]:
     """Inverse of a normal matrix in units of its own diagonal, and directions (columns) that it does not determine.
 
-    Small eigenvalues make such a direction; it is left out of the inverse.
+    Small eigenvalues make such a direction; it is left out of the inverse. ``damping`` is added to the others.
     """
     scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     scale[scale == 0.0] = 1.0  # what nothing depends on is a direction of its own
     shrunk = matrix / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(shrunk)
     known = values > _LEAST
-    inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
+    inverse = (vectors[:, known] / (values[known] + damping)) @ vectors[:, known].T / np.outer(scale, scale)
     return inverse, vectors[:, ~known]
 
 
@@ -147,7 +146,7 @@ def settle(
     SolveError
         If it does not settle (`Unsettled`), within the iterations or at all.
     """
-    u, p, damping, iterations = problem.unknowns, len(theta), 1e-4, 30 if rough else 50
+    u, damping, iterations = problem.unknowns, 1e-4, 30 if rough else 50
     prior = u.precision if known is None else known
     state = problem.derivatives(theta, starts)
     weights = problem.weights(state)
@@ -158,23 +157,7 @@ def settle(
     best = cost(state, theta)
     for _ in range(iterations):
         while True:
-            normal, right, back = reduced(problem, state, weights, p, used, damping)
-            full = normal + prior
-            pull = right - prior @ (theta - u.centre)
-            scale = np.sqrt(np.diag(full))
-            scale[scale == 0.0] = 1.0  # else rounding moves what nothing depends on
-            shrunk = full / np.outer(scale, scale)
-            if not np.isfinite(shrunk).all():
-                raise SolveError(
-                    f"the motion of this fit over {len(problem.pieces)} pieces grows without bound: its records "
-                    "are not of the motion that they are taken for"
-                )
-            free = _free(problem, theta, pull)
-            step = np.zeros(p)
-            damped = shrunk[np.ix_(free, free)] + damping * np.eye(len(free))
-            step[free] = np.linalg.solve(damped, pull[free] / scale[free]) / scale[free]
-            _, loose = inverted(full[np.ix_(free, free)])
-            step[free] -= (loose @ (loose.T @ (step[free] * scale[free]))) / scale[free]
+            step, _, back = _step(problem, state, weights, used, theta, prior, damping)
             step = np.clip(theta + step, u.low, u.high) - theta
             moved = starts.copy()
             for i, (inverse, cross, part) in enumerate(back):
@@ -220,12 +203,7 @@ def _distance(
     problem: Fittable, state: Residuals, weights: list[FloatArray], used: Any, theta: FloatArray, prior: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Undamped steps in standard uncertainties: the largest of the parameters, then of each start; the parameters'."""
-    normal, right, back = reduced(problem, state, weights, len(theta), used)
-    pull = right - prior @ (theta - problem.unknowns.centre)
-    free = _free(problem, theta, pull)
-    covariance = np.zeros_like(normal)
-    covariance[np.ix_(free, free)] = inverted((normal + prior)[np.ix_(free, free)])[0]
-    step = covariance @ pull
+    step, covariance, back = _step(problem, state, weights, used, theta, prior)
     far = [float(np.max(np.abs(step) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))))]
     for i, (piece, (inverse, cross, part)) in enumerate(zip(problem.pieces, back, strict=True)):
         error = np.linalg.norm(inverse, axis=1)
@@ -234,10 +212,28 @@ def _distance(
     return np.array(far), np.asarray(step)
 
 
-def _free(problem: Fittable, theta: FloatArray, pull: FloatArray) -> Any:
-    """Places of the parameters that are not held at a bound, against which the data push them."""
-    u = problem.unknowns
-    return np.flatnonzero(~(((theta <= u.low) & (pull < 0)) | ((theta >= u.high) & (pull > 0))))
+def _step(
+    problem: Fittable,
+    state: Residuals,
+    weights: list[FloatArray],
+    used: Any,
+    theta: FloatArray,
+    prior: FloatArray,
+    damping: float = 0.0,
+) -> tuple[FloatArray, FloatArray, list[Any]]:
+    """A step of the parameters, those at a bound against which the data push them being held; their covariance, and
+    what gives the starts' steps."""
+    normal, right, back = reduced(problem, state, weights, len(theta), used, damping)
+    u, full, pull = problem.unknowns, normal + prior, right - prior @ (theta - problem.unknowns.centre)
+    if not np.isfinite(full).all():
+        raise SolveError(
+            f"the motion of this fit over {len(problem.pieces)} pieces grows without bound: its records are not of the "
+            "motion that they are taken for"
+        )
+    free = ~(((theta <= u.low) & (pull < 0)) | ((theta >= u.high) & (pull > 0)))
+    covariance, places = np.zeros_like(full), np.ix_(free, free)
+    covariance[places] = inverted(full[places], damping)[0]
+    return covariance @ pull, covariance, back
 
 
 class Sandwich(NamedTuple):

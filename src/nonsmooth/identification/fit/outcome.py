@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,27 +47,24 @@ def outcome(
     u = problem.unknowns
     found = sandwich(problem, theta, grown.starts)
     loose = _undetermined(grown.loose(found.state))
-    starts = _starts(grown, found)
+    starts, follow, own = _starts(grown, found)
     noise = _noise(grown, found)
-    jacobian = np.vstack([np.eye(len(theta)), starts.jacobian])
+    jacobian = np.vstack([np.eye(len(theta)), *follow])
     of_theta = found.covariance + np.outer(grown.left, grown.left)
     m, s, q = len(theta), len(jacobian), len(noise)
     covariance = np.zeros((s + q, s + q))
     covariance[:s, :s] = jacobian @ of_theta @ jacobian.T
-    covariance[m:s, m:s] += starts.own
+    covariance[m:s, m:s] += own
     covariance[range(s, s + q), range(s, s + q)] = [one.uncertainty**2 for one in noise.values()]
     lost = np.flatnonzero(~(np.diag(covariance) >= 0.0))  # of a fit that went so wrong that nothing is left of it
     for i in {*loose, *lost.tolist()}:
         covariance[i] = covariance[:, i] = 0.0
         covariance[i, i] = np.inf
-    values, units = [*theta, *starts.values], [*u.units, *starts.units]
-    rows = [
-        Estimate(float(v), float(np.sqrt(covariance[i, i])), unit)
-        for i, (v, unit) in enumerate(zip(values, units, strict=True))
-    ]
+    told = {name: (float(v), unit) for name, v, unit in zip(u.names, theta, u.units, strict=True)} | starts
+    rows = [Estimate(v, float(np.sqrt(covariance[i, i])), unit) for i, (v, unit) in enumerate(told.values())]
+    found_of = list(zip(told, rows, strict=True))
     a = sum(name in u.active for name in u.names)
-    estimates = dict(zip(u.names[:a], rows[:a], strict=True))
-    extra = {**dict(zip([*u.names[a:], *starts.names], rows[a:], strict=True)), **noise}
+    estimates, extra = dict(found_of[:a]), {**dict(found_of[a:]), **noise}
     mark, samples = {"synthetic": "yes" if synthetic else "no"}, grown.readings
     data = residual_data(grown, options).assign_attrs(mark) if problem.pieces else None
     if problem.steady:
@@ -101,22 +97,14 @@ def outcome(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Starts:
-    """Free starts of the records: how they follow the unknowns, and what their own readings leave open."""
-
-    values: list[float]
-    names: list[str]
-    units: list[str]
-    jacobian: FloatArray
-    own: FloatArray
-
-
-def _starts(grown: Grown, found: Sandwich) -> _Starts:
+def _starts(grown: Grown, found: Sandwich) -> tuple[dict[str, tuple[float, str]], list[FloatArray], FloatArray]:
+    """Free starts of the records with their units, how they follow the unknowns, and what their own readings leave
+    open."""
     from scipy.linalg import block_diag
 
-    problem, states = grown.problem, grown.problem.system.states
-    values, names, units, rows, own = [], [], [], [np.zeros((0, len(grown.theta)))], []
+    problem, states = grown.problem, list(grown.problem.system.states.items())
+    starts: dict[str, tuple[float, str]] = {}
+    rows, own = list[FloatArray](), [np.zeros((0, 0))]
     for i, window in enumerate(problem.pieces):
         if i and problem.pieces[i - 1].record == window.record:
             continue
@@ -124,13 +112,10 @@ def _starts(grown: Grown, found: Sandwich) -> _Starts:
         follows = np.zeros((len(window.start), len(grown.theta)))
         follows[:, window.which] = -inverse @ cross
         label = f", {problem.records[window.record].name}" if len(problem.records) > 1 else ""
-        values += grown.starts[i][window.free].tolist()
-        names += [f"{list(states)[k]}(0){label}" for k in window.free]
-        units += [list(states.values())[k] for k in window.free]
+        starts |= {f"{states[k][0]}(0){label}": (float(grown.starts[i][k]), states[k][1]) for k in window.free}
         rows.append(follows[window.free])
         own.append((inverse @ inverse.T)[np.ix_(window.free, window.free)] * found.reduced)
-    inner = np.asarray(block_diag(*own)) if values else np.zeros((0, 0))
-    return _Starts(values, names, units, np.vstack(rows), inner)
+    return starts, rows, np.asarray(block_diag(*own))
 
 
 def _noise(grown: Grown, found: Sandwich) -> dict[str, Estimate]:

@@ -171,11 +171,11 @@ def _information(
     theta = problem.unknowns.guess
     begin = motion["u"].values[:1]
     whole = problem.of(first_windows(problem, theta, np.inf, np.nan_to_num(begin), known_before["free_start"]))
-    read = whole.residuals(theta, whole.starts).fitted
-    if not whole.pieces or not all(np.isfinite(y).all() for y in read):
+    motions = [whole.motion(theta, window, window.start) for window in whole.pieces]
+    if not motions or None in motions:
         raise SolveError(f"run {name!r} cannot be followed to its end; shorten it", status="no_convergence")
-    for window, y in zip(whole.pieces, read, strict=True):
-        window.values[window.readings] = whole.shown(window, y[:, 0])
+    for window, course in zip(whole.pieces, motions, strict=True):
+        window.values[window.readings] = whole.shown(window, whole.readings(theta, window, course, False)[0])
     state = whole.derivatives(theta, whole.starts)
     normal = reduced(whole, state, whole.weights(None, starts=False), len(theta))[0]
     shared = len(theta) - problem.unknowns.phases

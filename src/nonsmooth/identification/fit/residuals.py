@@ -21,15 +21,10 @@ _GRAZING = 0.03  # clearance over the largest size of the indicator, below which
 
 def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
     """Readings, fit and residuals over ``sample``, each with its run, quantity, window, mode and place."""
-    import xarray as xr
-
     problem, theta = grown.problem, grown.theta
     system = _nominal(grown)
     labels, marks = _places(system)
-    columns: dict[str, list[Any]] = {
-        name: []
-        for name in ("time", "run", "quantity", "window", "mode", "place", "measured", "fitted", "beyond", "noise")
-    }
+    parts: list[dict[str, Any]] = []
     for i, (window, start) in enumerate(zip(problem.pieces, grown.starts, strict=True)):
         motion = problem.motion(theta, window, start)
         assert motion is not None
@@ -40,17 +35,21 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
         here = np.minimum(
             np.searchsorted(motion.time, clock * window.time[k] + shift - delays[c]), len(motion.time) - 1
         )
-        columns["time"].append(window.time[k])
-        columns["run"].append(np.full(len(k), window.record))
-        columns["quantity"].append(c)
-        columns["window"].append(np.full(len(k), i))
-        columns["mode"].append(motion.mode[here])
-        columns["place"].append(_of_samples(system, motion, marks)[here])
-        columns["measured"].append(window.values[k, c])
-        columns["fitted"].append(problem.shown(window, predicted))
-        columns["beyond"].append(predicted - columns["fitted"][-1])
-        columns["noise"].append(problem.noise[c])
-    table = {name: np.concatenate(parts) for name, parts in columns.items()}
+        shown = problem.shown(window, predicted)
+        parts.append(
+            {
+                "time": window.time[k],
+                "run": np.full(len(k), window.record),
+                "quantity": c,
+                "window": np.full(len(k), i),
+                "mode": motion.mode[here],
+                "place": _of_samples(system, motion, marks)[here],
+                "measured": window.values[k, c],
+                "fitted": shown,
+                "beyond": predicted - shown,
+                "noise": problem.noise[c],
+            }
+        )
     quantities = list(problem.sensors)
     units = {**system.states, **system.outputs}
     unit = " ".join(units[q] for q in quantities) if len(quantities) == 1 else "that of the quantity"
@@ -60,7 +59,7 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
         "mode": list(system.modes),
         "place": labels,
     }
-    data = xr.Dataset({name: ("sample", values) for name, values in table.items()})
+    data = _table(parts)
     data["residual"] = (data["measured"] - data["fitted"]) / data["noise"]
     for name in ("measured", "fitted", "beyond", "noise"):
         data[name].attrs["units"] = unit
@@ -72,30 +71,29 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
 def steady_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
     """Readings of steady states, fit and residuals over ``sample``, each with its run, quantity, settings and place in
     the cycle."""
-    import xarray as xr
-
     problem, system = grown.problem, _nominal(grown)
     names = [*system.values]
     set_ = sorted({int(place) for one in problem.steady for place in one.places})
-    columns: dict[str, list[Any]] = {}
+    parts: list[dict[str, Any]] = []
     quantities = [*dict.fromkeys(q for one in problem.steady for q in one.quantities)]
     for i, one in enumerate(problem.steady):
         fitted, count = problem.of_steady(grown.theta, i)[0], len(one.measured)
         at = np.full((count, len(names)), np.nan)
         at[:, one.places] = one.values[one.setting[one.run]]
-        for name, values in {
-            "run": np.full(count, i),
-            "quantity": np.array([quantities.index(q) for q in one.quantities])[one.quantity],
-            "iterate": one.iterate,
-            "measured": one.measured,
-            "fitted": fitted,
-            "measured_error": one.noise,
-            "used": one.used,
-            "residual": (one.measured - fitted) / one.noise,
-            **{names[place]: at[:, place] for place in set_},
-        }.items():
-            columns.setdefault(name, []).append(values)
-    data = xr.Dataset({name: ("sample", np.concatenate(parts)) for name, parts in columns.items()})
+        parts.append(
+            {
+                "run": np.full(count, i),
+                "quantity": np.array([quantities.index(q) for q in one.quantities])[one.quantity],
+                "iterate": one.iterate,
+                "measured": one.measured,
+                "fitted": fitted,
+                "measured_error": one.noise,
+                "used": one.used,
+                "residual": (one.measured - fitted) / one.noise,
+                **{names[place]: at[:, place] for place in set_},
+            }
+        )
+    data = _table(parts)
     units = {**system.states, **{name: parameter.unit for name, parameter in system.parameters.items()}}
     for name in (names[place] for place in set_):
         data[name].attrs["units"] = units[name]
@@ -106,6 +104,13 @@ def steady_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
     data["residual"].attrs = {"long_name": "residual over its standard deviation", "units": "1"}
     flags = {"run": [one.name for one in problem.steady], "quantity": quantities}
     return _told(data, grown, system, options, flags)
+
+
+def _table(parts: list[dict[str, Any]]) -> xr.Dataset:
+    """Columns over ``sample`` from those of each part."""
+    import xarray as xr
+
+    return xr.Dataset({name: ("sample", np.concatenate([part[name] for part in parts])) for name in parts[0]})
 
 
 def _told(

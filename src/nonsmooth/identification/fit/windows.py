@@ -305,30 +305,24 @@ class Windows:
         return self._state(theta, starts, True)
 
     def _state(self, theta: FloatArray, starts: FloatArray, slopes: bool) -> Residuals:
-        state = Residuals([], [], [], [])
+        state = Residuals([], [], [])
         for window, start in zip(self.pieces, starts, strict=True):
             motion = self.motion(theta, window, start, slopes)
-            k, c = window.readings
-            free, p = window.free, len(window.which)
-            pulled = (window.start - start)[free]
-            if motion is None:
-                state.fitted.append(np.full((len(k), 1), np.nan))
-                state.residuals.append(np.full(len(k) + len(free), np.inf))
-                state.in_parameters.append(np.zeros((len(k) + len(free), p)))
-                state.in_start.append(np.zeros((len(k) + len(free), len(start))))
-                continue
-            predicted, table = self.readings(theta, window, motion, slopes)
-            state.fitted.append(predicted[:, None])
-            r, table = self._censored(window, window.values[k, c] - predicted, table)
-            state.residuals.append(np.concatenate([self._whitened(window, r[:, None])[:, 0], pulled]))
-            if slopes:
-                table[~np.isfinite(table).all(axis=1)] = 0.0  # behind a graze, where there are no derivatives
-                table = self._whitened(window, table)
-                inner = np.zeros((len(k) + len(free), len(start)))
-                inner[: len(k), free] = table[:, p:][:, free]
-                inner[range(len(k), len(k) + len(free)), free] = 1.0
-                state.in_start.append(inner)
-                state.in_parameters.append(np.vstack([table[:, :p], np.zeros((len(free), p))]))
+            free, n, p = window.free, len(window.readings[0]), len(window.which)
+            rows = n + len(free)
+            left, in_parameters, in_start = np.full(rows, np.inf), np.zeros((rows, p)), np.zeros((rows, len(start)))
+            if motion is not None:
+                predicted, table = self.readings(theta, window, motion, slopes)
+                r, table = self._censored(window, window.values[window.readings] - predicted, table)
+                left[:n], left[n:] = self._whitened(window, r[:, None])[:, 0], (window.start - start)[free]
+                if slopes:
+                    table[~np.isfinite(table).all(axis=1)] = 0.0  # behind a graze, where there are no derivatives
+                    table = self._whitened(window, table)
+                    in_parameters[:n], in_start[:n, free] = table[:, :p], table[:, p:][:, free]
+                    in_start[range(n, rows), free] = 1.0
+            state.residuals.append(left)
+            state.in_parameters.append(in_parameters)
+            state.in_start.append(in_start)
         if not self.steady:
             return state
         parts = []
