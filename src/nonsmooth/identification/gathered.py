@@ -10,6 +10,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.draws import drawn_variables
+from nonsmooth.identification.compare.jumps import nearest_alike
 from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
@@ -209,8 +210,6 @@ def _at(wanted: FloatArray, value: FloatArray, other: FloatArray, flag: bool) ->
 
 def matched(centre: xr.Dataset, result: xr.Dataset, dim: str) -> FloatArray:
     """The value of each listed row in a draw: the nearest of the same kind; NaN where it has none."""
-    from scipy.optimize import linear_sum_assignment
-
     value, shared = LISTS[dim]
     found = np.full(centre[value].shape, np.nan)
     if value not in result or not result[value].size or not found.size:
@@ -218,10 +217,6 @@ def matched(centre: xr.Dataset, result: xr.Dataset, dim: str) -> FloatArray:
     keys = [key for key in shared if key in centre]
     ours = list(zip(*(centre[key].values.astype(str) for key in keys), strict=True))
     theirs = list(zip(*(result[key].values.astype(str) for key in keys), strict=True))
-    far = np.abs(centre[value].values[:, None] - result[value].values[None, :])
-    other = np.array([[a != b for b in theirs] for a in ours])
-    beyond = 1e3 * (far.max() + 1.0)
-    for i, j in zip(*linear_sum_assignment(far + beyond * other), strict=True):
-        if not other[i, j]:
-            found[i] = result[value].values[j]
+    for i, j in nearest_alike(centre[value].values, result[value].values, ours, theirs).items():
+        found[i] = result[value].values[j]
     return found

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+_COLUMNS = ("value", "uncertainty", "half_width", "logarithmic")
+
+
 class ParameterSet(Answering, Mapping[str, float]):
     """Parameters by name, with what is known of how well: ``system.with_parameters(parameter_set)``.
 
@@ -81,9 +84,19 @@ class ParameterSet(Answering, Mapping[str, float]):
             object.__setattr__(self, name, value)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        named: dict[str, Any] = {"extra": dict(self.extra), "identifiability": dict(self.identifiability)}
-        named |= {name: getattr(self, name) for name in ("findings", "notes", "anomalies", "synthetic")}
-        return partial(ParameterSet, dict(self.estimates), self._covariance, **named), ()
+        return partial(
+            ParameterSet, dict(self.estimates), self._covariance, extra=dict(self.extra), **self._beside()
+        ), ()
+
+    def _beside(self) -> dict[str, Any]:
+        """What is said of the numbers, as arguments."""
+        held = {name: getattr(self, name) for name in ("findings", "notes", "anomalies", "synthetic")}
+        return held | {"identifiability": dict(self.identifiability)}
+
+    @property
+    def _rows(self) -> dict[str, Estimate]:
+        """The parameters, then what is in ``extra``."""
+        return {**self.estimates, **self.extra}
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"a ParameterSet does not change (tried to set {name!r})")
@@ -118,7 +131,7 @@ class ParameterSet(Answering, Mapping[str, float]):
     @property
     def full_covariance(self) -> xr.DataArray:
         """Covariance of the parameters and of what is in ``extra``."""
-        return self._labelled([*self.estimates, *self.extra], self._covariance)
+        return self._labelled([*self._rows], self._covariance)
 
     @property
     def residuals(self) -> xr.Dataset:
@@ -177,11 +190,9 @@ class ParameterSet(Answering, Mapping[str, float]):
         ValueError
             If there is none of that name.
         """
-        for group in (self.estimates, self.extra):
-            if name in group:
-                return group[name]
-        known = ", ".join([*self.estimates, *self.extra])
-        raise ValueError(f"{name!r} was not identified; there are: {known}")
+        if name not in self._rows:
+            raise ValueError(f"{name!r} was not identified; there are: {', '.join(self._rows)}")
+        return self._rows[name]
 
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
         """The interval that holds a parameter (or an extra quantity) with this probability."""
@@ -189,20 +200,11 @@ class ParameterSet(Answering, Mapping[str, float]):
 
     def only(self, names: Sequence[str], note: str = "") -> ParameterSet:
         """The same set with these parameters alone; the others go to ``extra``, with their covariance."""
-        kept = [name for name in self.estimates if name in names]
-        moved = [name for name in self.estimates if name not in names]
-        every = [*self.estimates, *self.extra]
-        order = [every.index(name) for name in (*kept, *moved, *self.extra)]
-        return ParameterSet(
-            {name: self.estimates[name] for name in kept},
-            self._covariance[np.ix_(order, order)],
-            extra={**{name: self.estimates[name] for name in moved}, **self.extra},
-            findings=self.findings,
-            identifiability=self.identifiability,
-            notes=[*self.notes, note] if note else self.notes,
-            anomalies=self.anomalies,
-            synthetic=self.synthetic,
-        )
+        kept = {name: estimate for name, estimate in self.estimates.items() if name in names}
+        extra = {name: estimate for name, estimate in self._rows.items() if name not in kept}
+        matrix = self.full_covariance.sel(parameter=[*kept, *extra], other=[*kept, *extra])
+        notes = [*self.notes, note] if note else self.notes
+        return ParameterSet(kept, matrix, extra=extra, **self._beside() | {"notes": notes})
 
     def draw(self, n: int, seed: int = 0) -> dict[str, FloatArray]:
         """``n`` sets of the model's parameters, correlated as known; those known to a factor are log-normal.
@@ -224,9 +226,8 @@ class ParameterSet(Answering, Mapping[str, float]):
 
         from nonsmooth.results.provenance import attribute, package_version, with_short_record
 
-        rows = {**self.estimates, **self.extra}
-        columns = ("value", "uncertainty", "half_width", "logarithmic")
-        data = {name: ("parameter", [getattr(row, name) for row in rows.values()]) for name in columns}
+        rows = self._rows
+        data = {name: ("parameter", [getattr(row, name) for row in rows.values()]) for name in _COLUMNS}
         record = {
             "version": package_version(),
             "verb": "identify",
@@ -259,7 +260,7 @@ class ParameterSet(Answering, Mapping[str, float]):
         record = read_provenance(dataset) if ATTRIBUTE in dataset.attrs else {}
         if record.get("verb") != "identify":
             raise ValueError("this Dataset was not made by ParameterSet.to_dataset")
-        columns = [dataset[name].values.tolist() for name in ("value", "uncertainty", "half_width", "logarithmic")]
+        columns = [dataset[name].values.tolist() for name in _COLUMNS]
         rows = {
             str(name): Estimate(v, u, unit, h, bool(g))
             for name, v, u, h, g, unit in zip(dataset["parameter"].values, *columns, record["units"], strict=True)
@@ -299,7 +300,7 @@ class ParameterSet(Answering, Mapping[str, float]):
         """
         import xarray as xr
 
-        rows = {**self.estimates, **self.extra}
+        rows = self._rows
         low, high = zip(*(row.interval(level) for row in rows.values()), strict=True) if rows else ((), ())
         columns: dict[str, Any] = {
             "value": [row.value for row in rows.values()],

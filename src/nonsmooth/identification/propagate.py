@@ -12,7 +12,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.errors import Interrupted, SolveError, shortened, unknown
-from nonsmooth.identification.compare.draws import Setting, draw_systems, nominal, read_settings
+from nonsmooth.identification.compare.draws import Setting, draw_systems, known_together, nominal, read_settings
 from nonsmooth.identification.gathered import Gathered, matched
 from nonsmooth.results.labels import labelled
 from nonsmooth.results.progress import Progress
@@ -209,13 +209,10 @@ def _sources(found: Any, settings: Mapping[str, Setting], system: System) -> tup
     """Uncertain parameters with their standard uncertainties, and their covariance."""
     from scipy.linalg import block_diag
 
-    covariance = getattr(found, "covariance", None)
-    names = [] if covariance is None else [str(n) for n in covariance[covariance.dims[0]].values]
-    held = [i for i, n in enumerate(names) if n in found and n in system.values and n not in settings]
-    joint = np.zeros((0, 0)) if covariance is None else np.asarray(covariance.values, float)[np.ix_(held, held)]
+    names, joint = known_together(found, system.values.keys() - settings.keys())
     own = [(n, one.uncertainty) for n, one in settings.items() if one.uncertainty > 0 and not one.follows]
     matrix = block_diag(joint, np.diag([error**2 for _, error in own]))
-    return [(names[i], float(np.sqrt(joint[k, k]))) for k, i in enumerate(held)] + own, matrix
+    return [*zip(names, np.sqrt(np.diag(joint)).tolist(), strict=True), *own], matrix
 
 
 def to_first_order(

@@ -14,6 +14,7 @@ single points would be closer than two records are.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -67,9 +68,8 @@ def energy_distance(a: ArrayLike, b: ArrayLike) -> float:
     """
     from scipy.spatial.distance import cdist
 
-    x, y = _cloud(a, "a"), _cloud(b, "b")
-    _same_width(x, y)
-    return _root(2 * cdist(x, y).mean() - cdist(x, x).mean() - cdist(y, y).mean())
+    x, y = _two_clouds(a, b)
+    return float(_root(2 * cdist(x, y).mean() - cdist(x, x).mean() - cdist(y, y).mean()))
 
 
 def wasserstein(a: ArrayLike, b: ArrayLike, seed: int = 0) -> float:
@@ -81,8 +81,7 @@ def wasserstein(a: ArrayLike, b: ArrayLike, seed: int = 0) -> float:
     from scipy.optimize import linear_sum_assignment
     from scipy.spatial.distance import cdist
 
-    x, y = _cloud(a, "a"), _cloud(b, "b")
-    _same_width(x, y)
+    x, y = _two_clouds(a, b)
     size = min(len(x), len(y), ASSIGNED)
     rng = np.random.default_rng(seed)
     x, y = (cloud if len(cloud) == size else rng.choice(cloud, size, replace=False) for cloud in (x, y))
@@ -100,7 +99,7 @@ def block_length(points: ArrayLike) -> int:
     cloud = _cloud(points, "points")
     n = len(cloud)
     longest = max(1, n // FEWEST_BLOCKS)
-    overall = pdist(_thinned(cloud)).mean()
+    overall = pdist(cloud[:: max(1, n // 1000)]).mean()
     if overall == 0:
         return 1
     near = max(LIKENESS, 3 / np.sqrt(n))
@@ -135,15 +134,14 @@ def cloud_distance(
     """
     from scipy.spatial.distance import cdist
 
-    x, y = _cloud(a, "a"), _cloud(b, "b")
-    _same_width(x, y)
+    x, y = _two_clouds(a, b)
     for name, cloud in (("first", x), ("second", y)):
         if len(cloud) < 2 * FEWEST_BLOCKS:
             raise ValueError(
                 f"the {name} cloud has {len(cloud)} points; its halves are compared, which takes at least "
                 f"{2 * FEWEST_BLOCKS}: record longer"
             )
-    x, y = _stretch(x), _stretch(y)
+    x, y = x[-MOST:], y[-MOST:]  # thinning would separate successive points
     length = block_length(x) if block is None else block
     rng = np.random.default_rng(seed)
     xx, yy, xy = cdist(x, x), cdist(y, y), cdist(x, y)
@@ -154,22 +152,17 @@ def cloud_distance(
     first, second = (np.array([pair[i] for pair in others], dtype=float).T for i in (0, 1))
     to_left, to_right, to_first, to_second = xx @ left, xx @ right, yy @ first, yy @ second
     within, beyond = _mean(left, to_left, left), _mean(first, to_first, first)
-    halves = _energy(_mean(left, to_right, right), within, _mean(right, to_right, right))
-    other_halves = _energy(_mean(first, to_second, second), beyond, _mean(second, to_second, second))
-    matched = _energy(_mean(left, xy @ first, first), within, beyond)
-    return CloudDistance(
-        _root(2 * xy.mean() - xx.mean() - yy.mean()), float(np.median(matched)), halves, other_halves, length, size
-    )
+    halves = _root(2 * _mean(left, to_right, right) - within - _mean(right, to_right, right))
+    other_halves = _root(2 * _mean(first, to_second, second) - beyond - _mean(second, to_second, second))
+    matched = float(np.median(_root(2 * _mean(left, xy @ first, first) - within - beyond)))
+    whole = float(_root(2 * xy.mean() - xx.mean() - yy.mean()))
+    return CloudDistance(whole, matched, halves, other_halves, length, size)
 
 
 def _mean(part: FloatArray, product: FloatArray, other: FloatArray) -> FloatArray:
     """Mean distance between two parts, for many pairs at once: columns say which points are in, ``product`` is the
     matrix of distances times ``other``."""
     return np.asarray(np.einsum("ij,ij->j", part, product) / (part.sum(axis=0) * other.sum(axis=0)))
-
-
-def _energy(between: FloatArray, within: FloatArray, beyond: FloatArray) -> FloatArray:
-    return np.asarray(np.sqrt(np.maximum(2 * between - within - beyond, 0.0)))
 
 
 def _halves(n: int, block: int, rng: np.random.Generator) -> tuple[BoolArray, BoolArray]:
@@ -201,19 +194,12 @@ def _cloud(points: ArrayLike, name: str) -> FloatArray:
     return cloud
 
 
-def _same_width(x: FloatArray, y: FloatArray) -> None:
+def _two_clouds(a: ArrayLike, b: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    x, y = _cloud(a, "a"), _cloud(b, "b")
     if x.shape[1] != y.shape[1]:
         raise ValueError(f"the clouds have {x.shape[1]} and {y.shape[1]} states; compare the same ones")
+    return x, y
 
 
-def _stretch(cloud: FloatArray) -> FloatArray:
-    """The last points of a long cloud: thinning would separate successive points."""
-    return cloud[-MOST:]
-
-
-def _thinned(cloud: FloatArray) -> FloatArray:
-    return cloud[:: max(1, len(cloud) // 1000)]
-
-
-def _root(square: float) -> float:
-    return float(np.sqrt(max(square, 0.0)))
+def _root(square: Any) -> Any:
+    return np.sqrt(np.maximum(square, 0.0))

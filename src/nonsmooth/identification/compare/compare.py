@@ -189,10 +189,13 @@ def _settings(theory: Any, parameters: Any, given: Any) -> dict[str, Any]:
 
 def _laid(kind: str, measured: xr.Dataset, model: Model, states: list[str], asked: Mapping[str, Any]) -> dict[str, Any]:
     """The variables of a comparison of this kind, as ``asked``."""
+    if kind != "motion":
+        name = asked["parameter"] or ("omega" if kind == "response" else _swept(measured))
+        if model.system is not None:
+            check_parameter(name, model.theory)
     if kind == "response":
         from nonsmooth.identification.compare.response import compare_response
 
-        name = _parameter(asked["parameter"] or "omega", model.theory)
         return compare_response(measured, model, name=name, state=states[0])
     noise, phase, longest = _noise(measured, asked["noise"], states), asked["section_phase"], asked["max_period"]
     if kind == "diagram":
@@ -201,7 +204,7 @@ def _laid(kind: str, measured: xr.Dataset, model: Model, states: list[str], aske
         return compare_diagram(
             measured,
             model,
-            name=_parameter(asked["parameter"] or _swept(measured), model.theory),
+            name=name,
             noise=noise,
             direction=asked["direction"],
             values=asked["values"],
@@ -296,12 +299,6 @@ def _noise(measured: xr.Dataset, noise: Any, states: list[str]) -> np.ndarray:
     if values.shape != (len(states),) or not (values > 0).all():
         raise ValueError(f"noise must be a positive number for each of {', '.join(states)}; got {values.tolist()}")
     return values
-
-
-def _parameter(name: str, theory: Any) -> str:
-    if hasattr(theory, "parameters"):
-        check_parameter(name, theory)
-    return name
 
 
 def _swept(measured: xr.Dataset) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -64,18 +65,14 @@ def compare_diagram(
     drawn_flips: list[dict[str, float]] = []
     if model.system is not None and model.draws:
         systems, drawn = model.drawn()
-        lows, highs = [], []
+        clouds = []
         for one in systems:
-            cloud, counts = diagram(one)
-            lows.append(cloud[0].min(axis=1))
-            highs.append(cloud[0].max(axis=1))
+            (cloud, *_), counts = diagram(one)
+            clouds.append(cloud)
             drawn_flips.append(flips(grid, counts[0]))
-        q, _, _ = model.quantiles
-        for word, stack, at_q in (("low", lows, q), ("high", highs, 1 - q)):
+        for word, stack in (("low", np.min(clouds, axis=2)), ("high", np.max(clouds, axis=2))):
             variables[f"theory_{word}"] = labelled(
-                (name, "state"),
-                np.nanquantile(np.stack(stack), at_q, axis=0),
-                f"{word} edge of the section points for drawn parameters",
+                (name, "state"), model.band(stack)[word], f"{word} edge of the section points for drawn parameters"
             )
         variables |= drawn
     if name in measured["section"].dims:  # steady runs: a flip lies between two of them
@@ -147,10 +144,12 @@ def _flips(
     }
     if drawn:
         table = np.array([[one.get(word, np.nan) for word in words] for one in drawn], dtype=float)
-        known = np.isfinite(table).sum(axis=0) * 2 >= len(drawn)
-        for word, q in zip(("low", "high"), model.quantiles[::2], strict=True):
-            edge = [np.nanquantile(table[:, i], q) if known[i] else np.nan for i in range(len(words))]
+        table[:, np.isfinite(table).sum(axis=0) * 2 < len(drawn)] = np.nan  # too few draws have it
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            band = model.band(table)
+        for word in ("low", "high"):
             variables[f"theory_flip_{word}"] = labelled(
-                over, np.array(edge, dtype=float), f"{word} end of the interval for drawn parameters", unit
+                over, band[word], f"{word} end of the interval for drawn parameters", unit
             )
     return variables

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,6 +12,7 @@ import numpy as np
 from nonsmooth.errors import SystemDefinitionError, unknown
 from nonsmooth.flow.arguments import ends, real_number
 from nonsmooth.identification.uncertainty import normal_draws
+from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -166,7 +167,7 @@ def check_parameter(name: str, system: System) -> None:
 def drawn_variables(drawn: Mapping[str, np.ndarray], system: System) -> dict[str, Any]:
     """The draws as variables ``drawn_<name>`` over ``draw``, to be kept with a comparison."""
     return {
-        f"drawn_{name}": ("draw", column, {"long_name": f"drawn {name}", "units": system.parameters[name].unit or "1"})
+        f"drawn_{name}": labelled("draw", column, f"drawn {name}", system.parameters[name].unit or "1")
         for name, column in drawn.items()
     }
 
@@ -179,14 +180,20 @@ def _identified(parameters: Any, count: int, seed: int) -> dict[str, np.ndarray]
         drawn = own(count, seed)
         names = list(getattr(drawn, "data_vars", drawn))
         return {str(name): np.asarray(drawn[name], dtype=float) for name in names if name in parameters}
-    covariance = getattr(parameters, "covariance", None)
-    if covariance is None:
+    if not hasattr(parameters, "covariance"):
         return {name: np.full(count, float(parameters[name])) for name in parameters}
-    names = [str(name) for name in covariance[covariance.dims[0]].values]
-    held = [i for i, name in enumerate(names) if name in parameters]
-    mean, matrix = [float(parameters[names[i]]) for i in held], np.asarray(covariance.values, float)
-    table = normal_draws(mean, matrix[np.ix_(held, held)], count, seed)
-    return {names[i]: table[:, k] for k, i in enumerate(held)}
+    names, matrix = known_together(parameters, parameters)
+    table = normal_draws([float(parameters[name]) for name in names], matrix, count, seed)
+    return dict(zip(names, table.T, strict=True))
+
+
+def known_together(parameters: Any, allowed: Container[str]) -> tuple[list[str], np.ndarray]:
+    """Names of the allowed parameters that have a covariance, and this."""
+    covariance = getattr(parameters, "covariance", None)
+    names = [] if covariance is None else [str(name) for name in covariance[covariance.dims[0]].values]
+    held = [i for i, name in enumerate(names) if name in parameters and name in allowed]
+    matrix = np.zeros((0, 0)) if covariance is None else np.asarray(covariance.values, float)
+    return [names[i] for i in held], matrix[np.ix_(held, held)]
 
 
 @dataclass(frozen=True)
@@ -223,7 +230,7 @@ class Model:
         """Places of the compared states among those of the theory."""
         return [list(self.theory.states).index(name) for name in self.states]
 
-    @property
-    def quantiles(self) -> tuple[float, float, float]:
-        """Of the band: low, median, high."""
-        return (1 - self.level) / 2, 0.5, (1 + self.level) / 2
+    def band(self, stack: Any) -> dict[str, np.ndarray]:
+        """Low, median and high of the band of draws; NaN, which tells nothing, is passed over."""
+        edges = (1 - self.level) / 2, 0.5, (1 + self.level) / 2
+        return dict(zip(("low", "median", "high"), np.nanquantile(np.stack(stack), edges, axis=0), strict=True))

@@ -126,18 +126,26 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
 
 def _pairs(seen: list[AmplitudeJump], expected: list[AmplitudeJump]) -> dict[int, int]:
     """Pairs of predicted and measured jumps."""
-    from scipy.optimize import linear_sum_assignment
-
     # Jumps as an experimenter read them off do not say whether the amplitude rose.
     alike = any(np.isnan(jump.after) for jump in seen)
-    kinds = [[alike or jump.after > jump.before for jump in jumps] for jumps in (seen, expected)]
+    kinds = ([alike or jump.after > jump.before for jump in jumps] for jumps in (seen, expected))
+    return nearest_alike(*([jump.value for jump in jumps] for jumps in (seen, expected)), *kinds)
+
+
+def nearest_alike(ours: Any, theirs: Any, our_kinds: Sequence[Any], their_kinds: Sequence[Any]) -> dict[int, int]:
+    """Pairs of values of one kind, by their places, so that the sum of their distances is least; the order is kept."""
+    from scipy.optimize import linear_sum_assignment
+
     pairs: dict[int, int] = {}
-    for up in (False, True):
-        mine, theirs = (np.flatnonzero([rises == up for rises in kind]) for kind in kinds)
-        away = np.abs(np.subtract.outer([seen[i].value for i in mine], [expected[j].value for j in theirs]))
-        rows, columns = linear_sum_assignment(away.reshape(len(mine), len(theirs)))
+    for kind in dict.fromkeys(our_kinds):
+        mine, other = (
+            sorted((i for i, one in enumerate(kinds) if one == kind), key=values.__getitem__)
+            for values, kinds in ((ours, our_kinds), (theirs, their_kinds))
+        )
+        away = np.abs(np.subtract.outer([ours[i] for i in mine], [theirs[j] for j in other]))
         # Of numbers along a line those in order leave the least sum too.
-        pairs |= dict(zip(mine[np.sort(rows)].tolist(), theirs[np.sort(columns)].tolist(), strict=True))
+        rows, columns = map(sorted, linear_sum_assignment(away))
+        pairs |= {mine[i]: other[j] for i, j in zip(rows, columns, strict=True)}
     return pairs
 
 

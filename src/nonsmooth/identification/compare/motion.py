@@ -135,21 +135,22 @@ def _clouds(
         at, np.array(both), "Wasserstein distance of the section clouds in all states, scaled"
     )
 
-    def column(name: str, read: Any, long_name: str) -> None:
-        values = np.array([np.nan if one is None else read(one) for one in found], dtype=float)
-        variables[name] = labelled(at, values, long_name)
-
-    column("energy_distance", lambda c: c.distance, "energy distance of the section clouds (root), scaled")
-    column("energy_distance_matched", lambda c: c.matched, "median energy distance of parts as large as a half, scaled")
-    column("energy_ratio", lambda c: c.ratio, "energy_distance_matched over the 95th percentile of measured halves")
-    for side, key in (("measured", "halves"), ("theory", "other_halves")):
-        for word, q in (("median", 0.5), ("p95", 0.95)):
-            column(
-                f"{side}_halves_{word}",
-                lambda c, k=key, level=q: np.quantile(getattr(c, k), level),
-                f"energy distance of random halves of the {side} cloud: {'median' if q == 0.5 else '95th percentile'}",
-            )
-    column("block", lambda c: c.block, "successive section points kept together in random halves")
+    words = {
+        "energy_distance": "energy distance of the section clouds (root), scaled",
+        "energy_distance_matched": "median energy distance of parts as large as a half, scaled",
+        "energy_ratio": "energy_distance_matched over the 95th percentile of measured halves",
+        "measured_halves_median": "energy distance of random halves of the measured cloud: median",
+        "measured_halves_p95": "energy distance of random halves of the measured cloud: 95th percentile",
+        "theory_halves_median": "energy distance of random halves of the theory cloud: median",
+        "theory_halves_p95": "energy distance of random halves of the theory cloud: 95th percentile",
+        "block": "successive section points kept together in random halves",
+    }
+    rows = np.full((len(found), len(words)), np.nan)
+    for row, c in zip(rows, found, strict=True):
+        if c is not None:
+            halves = (np.quantile(one, (0.5, 0.95)) for one in (c.halves, c.other_halves))
+            row[:] = np.concatenate([[c.distance, c.matched, c.ratio], *halves, [c.block]])
+    variables |= {name: labelled(at, row, said) for (name, said), row in zip(words.items(), rows.T, strict=True)}
     return variables
 
 
@@ -314,10 +315,9 @@ def motion_band(
         (), len(orbits) / draws, "share of the draws that keep the period; these make the band"
     )
     if orbits:
-        stack = np.stack(orbits)
-        low, middle, high = np.quantile(stack, model.quantiles, axis=0)
-        for word, values in (("low", low), ("median", middle), ("high", high)):
+        band = model.band(orbits)
+        for word, values in band.items():
             variables[f"theory_{word}"] = labelled(("phase", "state"), values, f"{word} of the band")
-        inside = ((closed[0] >= low) & (closed[0] <= high)).mean(axis=0)
+        inside = ((closed[0] >= band["low"]) & (closed[0] <= band["high"])).mean(axis=0)
         variables["inside_band"] = labelled("state", inside, "share of the measured orbit that lies inside the band")
     return variables

@@ -61,12 +61,10 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: st
             stack.append(curve)
             stack_runs.append(points)
             drawn_jumps.append(_jumps(values, curve, directions))
-        q = model.quantiles
-        for word, curve in zip(("low", "median", "high"), np.nanquantile(np.stack(stack), q, axis=0), strict=True):
+        for word, curve in model.band(stack).items():
             variables[f"theory_{word}"] = labelled((name, "direction"), curve, f"{word} of the band")
-        low, _, high = np.nanquantile(np.stack(stack_runs), q, axis=0)
-        reach = 2 * np.nan_to_num(runs["error"])
-        inside = (runs["amplitude"] + reach >= low) & (runs["amplitude"] - reach <= high)
+        band, reach = model.band(stack_runs), 2 * np.nan_to_num(runs["error"])
+        inside = (runs["amplitude"] + reach >= band["low"]) & (runs["amplitude"] - reach <= band["high"])
         variables["inside_band"] = labelled(
             (), float(inside.mean()), "share of the runs within two standard errors of the band"
         )

@@ -32,10 +32,15 @@ def section_points(motion: xr.Dataset) -> FloatArray:
     return fold(motion["phase"].values, motion["u"].values, 8)[:, 0]
 
 
-def _period_of(points: FloatArray, noise: FloatArray, longest: int) -> int:
-    """The period number of section points with known noise; 0: none found, -1: too few turns."""
+def _period_of(motion: xr.Dataset, points: FloatArray, longest: int) -> int:
+    """The period number of a motion's section points; 0: none found, -1: too few turns."""
     enough = np.isfinite(points).all(axis=1).sum() >= FEW
-    return measured_period(points, noise, max_period=longest).number if enough else -1
+    return measured_period(points, _noise(motion), max_period=longest).number if enough else -1
+
+
+def _noise(*motions: xr.Dataset) -> FloatArray:
+    """The standard error of most samples in each state."""
+    return np.asarray(np.median(np.concatenate([motion["u_error"].values for motion in motions]), axis=0))
 
 
 def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], *, settle: int = 4) -> xr.Dataset:
@@ -66,8 +71,7 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
     heights, errors, periods = [], [], []
     for motion in motions:
         folded = fold(motion["phase"].values, motion["u"].values, 64)
-        points, noise = folded[:, 0], np.median(motion["u_error"].values, axis=0)
-        periods.append(_period_of(points, noise, 8))
+        periods.append(_period_of(motion, folded[:, 0], 8))
         whole = folded[:, :, 0]
         whole = whole[min(settle, len(whole) - 1) :]
         whole = whole[np.isfinite(whole).all(axis=1)]
@@ -75,7 +79,7 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
         pairs = whole[: len(whole) // 2 * 2].reshape(-1, 2 * whole.shape[1]) if len(whole) > 1 else whole
         half = 0.5 * np.ptp(pairs, axis=1)
         heights.append(float(half.mean()))
-        sample = noise[0] / np.sqrt(2)
+        sample = _noise(motion)[0] / np.sqrt(2)
         scatter = float(half.std(ddof=1) / np.sqrt(len(half))) if len(half) > 1 else 0.0
         errors.append(float(np.hypot(scatter, sample / np.sqrt(len(half)))))
     omega = np.array([float(motion["omega"]) for motion in motions])
@@ -131,7 +135,7 @@ def measured_rise(motion: xr.Dataset, parameter: str, first: float, last: float,
     return xr.Dataset(
         {
             "section": labelled(("iterate", "state"), points[:, :2], "section points"),
-            "section_error": ("state", np.median(motion["u_error"].values, axis=0)),
+            "section_error": ("state", _noise(motion)),
             parameter: labelled("iterate", at, parameter, unit),
         },
         {"state": motion["state"].values, "state_unit": ("state", motion["state_unit"].values)},
@@ -167,16 +171,12 @@ def measured_sections(
     points = np.full((len(clouds), max(map(len, clouds)), clouds[0].shape[1]), np.nan)
     for row, cloud in zip(points, clouds, strict=True):
         row[: len(cloud)] = cloud
-    error = np.median(np.concatenate([motion["u_error"].values for motion in motions]), axis=0)
-    numbers = [
-        _period_of(cloud, np.median(motions[i]["u_error"].values, axis=0), 16)
-        for i, cloud in zip(order, clouds, strict=True)
-    ]
+    numbers = [_period_of(motions[i], cloud, 16) for i, cloud in zip(order, clouds, strict=True)]
     first = motions[0]
     return xr.Dataset(
         {
             "section": labelled((parameter, "iterate", "state"), points, "section points"),
-            "section_error": ("state", error),
+            "section_error": ("state", _noise(*motions)),
             "period_number": labelled(parameter, np.array(numbers, dtype=np.int64), _NUMBER),
         },
         {

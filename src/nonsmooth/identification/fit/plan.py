@@ -171,10 +171,13 @@ def _information(
     theta = problem.unknowns.guess
     begin = motion["u"].values[:1]
     whole = problem.of(first_windows(problem, theta, np.inf, np.nan_to_num(begin), known_before["free_start"]))
-    motions = [whole.motion(theta, window, window.start) for window in whole.pieces]
-    if not motions or None in motions:
-        raise SolveError(f"run {name!r} cannot be followed to its end; shorten it", status="no_convergence")
-    for window, course in zip(whole.pieces, motions, strict=True):
+    refusal = SolveError(f"run {name!r} cannot be followed to its end; shorten it", status="no_convergence")
+    if not whole.pieces:
+        raise refusal
+    for window in whole.pieces:
+        course = whole.motion(theta, window, window.start)
+        if course is None:
+            raise refusal
         window.values[window.readings] = whole.shown(window, whole.readings(theta, window, course, False)[0])
     state = whole.derivatives(theta, whole.starts)
     normal = reduced(whole, state, whole.weights(None, starts=False), len(theta))[0]
