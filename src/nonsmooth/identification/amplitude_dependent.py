@@ -29,8 +29,7 @@ from numpy.typing import ArrayLike
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.identification.nonlinear_mode import NonlinearMode, interpolation
-from nonsmooth.identification.response_fit import FEWEST_CURVES, ResponseFit
+from nonsmooth.identification.nonlinear_mode import FEWEST_CURVES, NonlinearMode, ResponseFit, interpolation
 from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:

@@ -25,13 +25,16 @@ J. Sound Vib. 435 (2018) 346; T. Karaagacli and H.N. Ozguven, Mech. Syst. Signal
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import ComplexArray, FloatArray
+from nonsmooth.errors import SolveError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -158,3 +161,192 @@ def interpolation(knots: FloatArray, amplitude: ArrayLike, derivative: int = 0) 
         return np.full((*at.shape, 1), float(derivative == 0))
     found = np.asarray(CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")(a, derivative))
     return np.where((a == at)[..., None], found, 0.0) if derivative else found
+
+
+_ROUNDS = 40
+FEWEST_CURVES = 4  # curves: how far they differ cannot be told from fewer
+
+
+class ResponseFit:
+    """Fit of a nonlinear mode to curves; see :mod:`nonsmooth.identification.amplitude_dependent`.
+
+    Unknowns: ln omega_n^2 and ln D at the knots, then ln m or each curve's ln(F/m), the residual, and for each curve a
+    shift of the first two with a normal prior. Standard deviations of points and of shifts are found by expectation and
+    maximisation around the fit (A.P. Dempster et al., J. R. Stat. Soc. B 39 (1977) 1).
+    """
+
+    def __init__(self, curves: Sequence[Any], knots: int | ArrayLike, *, residual: bool, mass: float | None) -> None:
+        if not curves:
+            raise ValueError("there are no response curves")
+        self.names = tuple(str(c.name) for c in curves)
+        self.phased = _all_or_none(curves, "phase")
+        self.forced = _all_or_none(curves, "force")
+        if residual and not (self.phased and self.forced):
+            raise ValueError("the residual of other modes can be told only with forces and phases; leave it out")
+        if mass is not None and not (mass > 0 and self.forced):
+            raise ValueError("a modal mass is a positive number, and of use only with forces in N")
+        self.residual, self.mass = residual, mass
+        self.curve = np.repeat(np.arange(len(curves)), [len(c.frequency) for c in curves])
+        self.omega = 2 * np.pi * np.concatenate([c.frequency for c in curves])
+        size = np.concatenate([c.amplitude for c in curves])
+        self.phase = np.concatenate([c.phase for c in curves]) if self.phased else None
+        self.force = np.concatenate([c.force for c in curves]) if self.forced else None
+        self.measured = size * np.exp(1j * self.phase) if self.phase is not None else size.astype(complex)
+        self.knots = _knots(knots, size)
+        self.shifts = len(curves) >= FEWEST_CURVES
+        self._basis = interpolation(self.knots, size)
+        self._fit()
+
+    @cached_property
+    def at(self) -> dict[str, slice]:
+        """Places of the unknowns, by what they are of."""
+        K, n = len(self.knots), len(self.names)
+        load = 0 if self.mass is not None else 1 if self.forced else n
+        counts = {"square": K, "damping": K, "load": load, "residual": 2 * self.residual, "shift": 2 * n * self.shifts}
+        ends = np.cumsum(list(counts.values())).tolist()
+        return {name: slice(end - counts[name], end) for name, end in zip(counts, ends, strict=True)}
+
+    def _unpack(self, p: FloatArray) -> tuple[NonlinearMode, Any, FloatArray]:
+        """The mode, ln(F/m) of each point, and the shifts of ln omega_n^2 and of ln D of each curve."""
+        R = complex(*p[self.at["residual"]]) * self.unit if self.residual else 0j
+        if self.force is None:
+            mass, load = 1.0, p[self.at["load"]][self.curve]
+        else:
+            mass = self.mass if self.mass is not None else float(np.exp(p[self.at["load"]][0]))
+            load = np.log(self.force / mass)
+        mode = NonlinearMode(self.knots, np.exp(p[self.at["square"]]), p[self.at["damping"]], mass, R)
+        return mode, load, p[self.at["shift"]].reshape(2, -1) if self.shifts else np.zeros((2, len(self.names)))
+
+    def _own(self, R: complex) -> ComplexArray:
+        """Displacement of the mode alone at each point."""
+        return np.asarray(self.measured if self.force is None else self.measured - R * self.force)
+
+    def _left(self, p: FloatArray) -> FloatArray:
+        """ln of force over what the mode needs (and its phase), for all points."""
+        mode, load, shift = self._unpack(p)
+        own = self._own(mode.residual)
+        basis = interpolation(mode.knots, np.abs(own)) if self.residual else self._basis
+        square, damping = basis @ mode.squares, basis @ mode.log_damping
+        by_square, by_damping = shift[:, self.curve]
+        loss = np.exp(damping + by_damping) * self.omega
+        needed = (square * np.exp(by_square) - self.omega**2 + 1j * loss) * own
+        size = load - np.log(np.abs(needed))
+        return np.concatenate([size, -np.angle(needed)]) if self.phased else np.asarray(size)
+
+    def _fit(self) -> None:
+        from scipy.optimize import least_squares
+
+        count, shift, n = self.at["shift"].stop, self.at["shift"], len(self.names)
+        rows = len(self.omega) * (1 + self.phased)
+        if rows <= shift.start:
+            raise ValueError(
+                f"{rows} measured values cannot tell {shift.start} unknowns: take fewer knots, or more points"
+            )
+        p = self._start(count)
+        sigma, spread = 0.05, np.array([1e-3, 0.1])
+        for k in range(_ROUNDS):
+            prior = np.zeros(count)
+            prior[shift] = np.repeat(1 / spread**2, n) if self.shifts else 0.0
+            known = np.sqrt(prior)
+            found = least_squares(
+                lambda q, known=known, sigma=sigma: np.concatenate([self._left(q) / sigma, known * q]),
+                p,
+                method="lm",
+                x_scale="jac",
+            )
+            if not found.success:
+                raise SolveError(f"the fit of the responses has not converged: {found.message} Take fewer knots")
+            p, normal = found.x, found.jac.T @ found.jac
+            inverse = np.linalg.pinv(normal, hermitian=True)
+            left = self._left(p)
+            # Unknowns that the measurement determined: all but what the prior of the shifts did.
+            freedom = max(rows - (count - float(prior @ np.diag(inverse))), 1.0)
+            before, moved = (sigma, *spread), 0.0
+            # Points of a curve that err alike count less.
+            sigma = max(float(np.sqrt(left @ left / freedom * self._alike(left))), 1e-9)
+            if self.shifts:
+                own, own_error = p[shift].reshape(2, n), np.diag(inverse)[shift].reshape(2, n)
+                spread = np.sqrt(np.maximum(np.mean(own**2 + own_error, axis=1), 1e-18))
+                # by how much of what the points of a curve say of its shift: towards 0 the way is long
+                told = np.mean(np.maximum(np.diag(normal)[shift] - prior[shift], 1e-300).reshape(2, n), axis=1)
+                change = np.abs(spread - before[1:])
+                moved = float(np.max(np.minimum(change / spread, change * np.sqrt(told))))
+            if k > 2 and moved < 1e-2 and abs(sigma / before[0] - 1) < 1e-2:
+                break
+        else:
+            raise SolveError(
+                f"the scatter of points and curves has not settled in {_ROUNDS} rounds: {before} and "
+                f"{(sigma, *spread)} in the last two; take fewer knots, or leave out a curve that stands apart"
+            )
+        self.covariance = inverse
+        self.sigma = float(np.sqrt(left @ left / freedom))
+        self.spread = spread if self.shifts else np.array([np.nan, np.nan])
+        self.mode, _, by_curve = self._unpack(p)
+        self.modes = [
+            replace(self.mode, squares=self.mode.squares * np.exp(square), log_damping=self.mode.log_damping + damping)
+            for square, damping in by_curve.T
+        ]
+        self.amplitude = np.abs(self._own(self.mode.residual))
+
+    def _start(self, count: int) -> FloatArray:
+        """Natural frequencies by the tops of the curves; damping by the width of the lowest, the least bent of them."""
+        size = np.abs(self.measured)
+        gain = size if self.force is None else size / self.force
+        tops = [int(np.argmax(np.where(self.curve == c, gain, 0.0))) for c in range(len(self.names))]
+        lowest, *_ = tops = sorted(tops, key=lambda i: size[i])
+        w, h = (v[self.curve == self.curve[lowest]] for v in (self.omega, gain))
+        step = float(np.median(np.abs(np.diff(w)))) if len(w) > 1 else 0.01 * w[0]
+        D = max(float(np.ptp(w[h > h.max() / np.sqrt(2.0)])), step)
+        at_top = D * self.omega[lowest]  # displacement times this is force by mass there
+        self.unit = 1.0 / float(np.median(1.0 / gain)) if self.residual else 1.0
+        p = np.zeros(count)
+        p[self.at["square"]] = 2 * np.log(np.interp(self.knots, size[tops], self.omega[tops]))
+        p[self.at["damping"]] = np.log(D)
+        if self.force is None:
+            p[self.at["load"]] = [np.log(size[self.curve == c].max() * at_top) for c in range(len(self.names))]
+        else:
+            p[self.at["load"]] = -np.log(h.max() * at_top)
+        return p
+
+    def _alike(self, left: FloatArray) -> float:
+        """Number of neighbouring points of a curve that say as much as one."""
+        rows, same = left.reshape(-1, len(self.curve)), np.diff(self.curve) == 0
+        power = float(left @ left)
+        rho = min(max(float(np.sum((rows[:, 1:] * rows[:, :-1])[:, same])) / power, 0.0), 0.9) if power > 0 else 0.0
+        return (1 + rho) / (1 - rho)
+
+    def slopes(self) -> FloatArray:
+        """d ln F / d ln a at the points' frequencies, each curve's own shift taken into account."""
+        found = np.empty(len(self.omega))
+        for c, mode in enumerate(self.modes):
+            found[self.curve == c] = mode.slope(self.amplitude[self.curve == c], self.omega[self.curve == c])
+        return found
+
+    def own(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Natural frequency (Hz) and damping ratio of each curve alone, at the amplitude of its phase resonance."""
+        rows = []
+        for c, mode in enumerate(self.modes):
+            a, w = self.amplitude[self.curve == c], self.omega[self.curve == c]
+            place = a[int(np.argmin(np.abs(np.log(self.mode.square(a) / w**2))))]
+            rows.append((mode.natural_frequency(place), mode.damping_ratio(place), place))
+        frequency, ratio, place = np.array(rows, dtype=np.float64).T
+        return frequency, ratio, place
+
+
+def _all_or_none(curves: Sequence[Any], name: str) -> bool:
+    """Return whether all curves have it."""
+    lacking = [c.name for c in curves if getattr(c, name) is None]
+    if 0 < len(lacking) < len(curves):
+        raise ValueError(f"some curves have a {name} and {', '.join(map(repr, lacking))} have none; fit them apart")
+    return len(lacking) < len(curves)
+
+
+def _knots(knots: int | ArrayLike, size: FloatArray) -> FloatArray:
+    if isinstance(knots, int):
+        if knots < 1:
+            raise ValueError(f"knots must be at least 1, got {knots}")
+        return np.linspace(size.min(), size.max(), knots) if knots > 1 else np.array([float(np.median(size))])
+    given = np.asarray(knots, dtype=np.float64)
+    if given.ndim != 1 or len(given) < 1 or not (given > 0).all() or not (np.diff(given) > 0).all():
+        raise ValueError(f"knots must be positive, increasing amplitudes (m), got {given!r}")
+    return given

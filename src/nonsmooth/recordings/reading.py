@@ -12,6 +12,7 @@ import re
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from importlib import import_module
 from types import ModuleType
@@ -282,6 +283,18 @@ def needed(module: str, package: str, source: Source, extra: str = "experiment")
         return import_module(module)
     except ImportError as error:
         raise source.error("", f"reading it needs {not_installed(package, extra)}") from error
+
+
+@contextmanager
+def readable(what: str, source: Source, place: str = "") -> Iterator[None]:
+    """Turn what a damaged file makes a library raise, almost anything, into a DataFileError."""
+    try:
+        yield
+    except DataFileError:
+        raise
+    except Exception as error:
+        message = f"cannot be read as {what}, it is damaged or cut short ({type(error).__name__}: {error})"
+        raise source.error(place, message[:300]) from error
 
 
 class Group(dict[str, Any]):

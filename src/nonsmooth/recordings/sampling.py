@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray
 
 _BLOCK = 16  # steps per block; means over a block see a change of rate through jitter and rounding of the times
 _CHANGE = 0.05  # of the rate, between blocks
@@ -54,10 +54,14 @@ def missing_runs(values: FloatArray) -> tuple[int, int, int]:
     total = int(np.count_nonzero(bad))
     if total == 0:
         return 0, 0, 0
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(np.int8)))
-    starts, ends = edges[::2], edges[1::2]
-    longest = int(np.argmax(ends - starts))
-    return total, int(starts[longest]), int(ends[longest] - starts[longest])
+    start, end = max(runs_of(bad), key=lambda run: run[1] - run[0])
+    return total, start, end - start
+
+
+def runs_of(mask: BoolArray) -> list[tuple[int, int]]:
+    """First place of each run of True, and the place behind its last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def _change_of_rate(steps: FloatArray) -> tuple[int, float, float] | None:

@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import SolveError
 
 FEWEST_SAMPLES = 8  # per forcing period: fewer do not show an orbit
 
@@ -171,8 +170,6 @@ def orbit_distance(a: ArrayLike, b: ArrayLike, periods: int) -> OrbitDistance:
     best = int(np.argmin(whole))
     near = int(np.argmin(grid)) / n
     found = minimize_scalar(distance, bounds=(near - 1 / n, near + 1 / n), method="bounded", options={"xatol": 1e-10})
-    if not found.success:
-        raise SolveError(f"the shift between two orbits was not found: {found.message}")
     lead = float(found.x) if found.fun <= grid.min() else near
     shift = (lead * periods + 0.5) % 1.0 - 0.5
     return OrbitDistance(float(whole[best]), min(float(found.fun), float(grid.min())), best, shift)

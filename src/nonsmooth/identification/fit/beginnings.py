@@ -85,7 +85,7 @@ def _cut(problem: Windows, windows: list[Window], length: float) -> Windows:
     pieces = []
     for window, record in zip(windows, problem.records, strict=True):
         last = max(int(np.searchsorted(record.time, record.time[0] + length, "right")), window.last)
-        pieces.append(replace(window, last=last, time=record.time[:last], values=record.values[:last]))
+        pieces.append(window.cut(record, last))
     return problem.of(pieces)
 
 

@@ -9,6 +9,8 @@ all windows together (`level`), and of one alone at given parameters (`alone`).
 In a relay with hysteresis, or behind a play, no state tells the mode in which a record begins. It is a discrete unknown
 of each record: over the record's first window every other mode is tried whose conditions do not end it at once, at the
 unknowns as they are and in the end with all of them free, and the one that fits best is taken.
+
+Windows that disagree with the rest are found with parameters of the others, left out on request, and named.
 """
 
 from __future__ import annotations
@@ -19,11 +21,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError, shortened, unknown
 from nonsmooth.identification.arrow import Residuals, settle
-from nonsmooth.identification.fit.first_windows import first_windows, told_start
+from nonsmooth.identification.fit.first_windows import first_length, first_windows, told_start
 from nonsmooth.identification.fit.windows import Window, Windows
+from nonsmooth.recordings.sampling import runs_of
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -169,27 +172,31 @@ def settle_first(
     for _ in range(_ROUNDS):
         noise = np.maximum(problem.noise, _PART * _sizes(now, state))
         theta, starts, state = level(_soft(now, noise), theta, starts, used)
-        each = misfits(now, state)
-        bad = each > _FAR * max(float(np.median(each)), 1.0)
+        each, bad = _judged(now, state)
         changed = not np.array_equal(bad, ~used)
         if rechosen(now, theta, starts):
             state, changed = now.residuals(theta, starts), True
             each = misfits(now, state)
         if np.mean(bad) <= 0.5 and _mend(now, theta, starts, each, np.flatnonzero(bad), rng):
             state, changed = now.residuals(theta, starts), True
-            each = misfits(now, state)
-            bad = each > _FAR * max(float(np.median(each)), 1.0)
+            each, bad = _judged(now, state)
         used = ~bad
         if not changed and not _smaller(now, state, noise):
             break
     theta, starts, state = level(now, theta, starts, used)
     moves = [bool(np.isfinite(r).all()) for r in state.residuals]
-    if all(moves):
-        return now, theta, starts, state
-    kept, starts = now.of([w for w, whole in zip(now.pieces, moves, strict=True) if whole]), starts[moves]
-    if not kept.pieces:
+    if not any(moves):
         raise SolveError("no window of the record can be simulated at the parameters that fit it best")
-    return kept, theta, starts, kept.derivatives(theta, starts)
+    if not all(moves):
+        now, starts = now.of([w for w, whole in zip(now.pieces, moves, strict=True) if whole]), starts[moves]
+        state = now.derivatives(theta, starts)
+    return now, theta, starts, state
+
+
+def _judged(problem: Windows, state: Residuals) -> tuple[FloatArray, BoolArray]:
+    """Mean squared residual over the noise of each window, and which fit much worse than most."""
+    each = misfits(problem, state)
+    return each, each > _FAR * max(float(np.median(each)), 1.0)
 
 
 def settle_soft(problem: Windows, theta: FloatArray, starts: FloatArray) -> tuple[FloatArray, FloatArray, Residuals]:
@@ -259,4 +266,56 @@ def _others(
         w, z = found[k % len(found)]
         reach = np.where(known, 0.03, 0.2) * window.spread * rng.standard_normal(len(z))
         found.append((w, z + reach))
+    return found
+
+
+_DISAGREES = 8.0  # mean squared residual of a window over that of most, from which it disagrees
+_TOO_MANY = 0.5  # of the windows: if more disagree, nothing says which are right
+_CLOSED = 3  # windows: a shorter part between two that disagree is left out with them
+
+
+def without_disagreeing(problem: Windows, theta: FloatArray) -> tuple[Windows, list[str]]:
+    """The problem with its records cut where short windows do not fit, its guess the parameters of those that do.
+
+    Each part begins with a free start; unknowns of a run are those of all its parts. The sentences name what is left
+    out.
+    """
+    now, theta, _, state = settle_first(problem, theta, first_length(problem), None, True)
+    each = misfits(now, state)
+    usual = max(float(np.median(each)), 1.0)
+    bad = each > _DISAGREES * usual
+    if not bad.any() or np.mean(bad) > _TOO_MANY:
+        many = f"{np.mean(bad):.0%} of short windows disagree with the rest: too many, and none was left out"
+        return problem, [many] if bad.any() else []
+    of_window = np.array([window.record for window in now.pieces])
+    records, origin, modes = [], [], []
+    said: list[str] = []
+    for i, record in enumerate(problem.records):
+        mine = np.flatnonzero(of_window == i)
+        for first, behind in runs_of(_closed(bad[mine])):
+            begin, end = now.pieces[mine[first]].time[0], now.pieces[mine[behind - 1]].time[-1]
+            worst = float(np.sqrt(np.max(each[mine[first:behind]]) / usual))
+            said.append(
+                f"left out: run {record.name}, {begin:.6g} to {end:.6g}, whose residuals are up to {worst:.3g} times "
+                "those of the rest"
+            )
+        for first, behind in runs_of(~_closed(bad[mine])):
+            a = 0 if first == 0 else now.pieces[mine[first]].first
+            b = len(record.time) if behind == len(mine) else now.pieces[mine[behind - 1]].last
+            name = record.name if b - a == len(record.time) else f"{record.name} from {record.time[a]:.6g}"
+            records.append(replace(record, name=name, time=record.time[a:b], values=record.values[a:b]))
+            origin.append(i)
+            modes.append(problem.modes[i] if a == 0 else tuple(range(len(problem.system.modes))))
+    u = problem.unknowns
+    whose = [*origin, *range(len(problem.records), len(u.places))]
+    unknowns = replace(u, guess=np.clip(theta, u.low, u.high), places=u.places[whose])
+    return replace(problem, records=records, modes=modes, unknowns=unknowns), said
+
+
+def _closed(bad: BoolArray) -> BoolArray:
+    """The same, with short parts between two that disagree."""
+    found = bad.copy()
+    for first, behind in runs_of(~bad):
+        if behind - first < _CLOSED and bad.any():
+            found[first:behind] = True
     return found

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.fit.records import Record
 from nonsmooth.identification.fit.windows import Window, Windows
 
 if TYPE_CHECKING:
@@ -60,15 +59,14 @@ def first_windows(
     start : array (records, n_u), optional
         First guess of the states at the beginning of each record, or their values where not ``free``.
     """
-    found: list[Window] = []
-    for i, record in enumerate(problem.records):
-        found += _of_record(problem, theta, i, record, length, None if start is None else start[i], free)
-    return found
+    starts = [None] * len(problem.records) if start is None else start
+    return [w for i, own in enumerate(starts) for w in _of_record(problem, theta, i, length, own, free)]
 
 
 def _of_record(
-    problem: Windows, theta: FloatArray, i: int, record: Record, length: float, start: FloatArray | None, free: bool
+    problem: Windows, theta: FloatArray, i: int, length: float, start: FloatArray | None, free: bool
 ) -> list[Window]:
+    record = problem.records[i]
     n_u, early = len(problem.system.states), _lead(problem, theta, i)
     memory = problem.system.memory_vector()
     told = states_from_samples(problem, theta, i, slice(None))

@@ -143,7 +143,7 @@ def fit(
     >>> round(found["k"], 6) == system.values["k"]
     True
     """
-    from nonsmooth.identification.fit.disagreeing import without_disagreeing
+    from nonsmooth.identification.fit.first_level import without_disagreeing
     from nonsmooth.identification.fit.outcome import outcome
     from nonsmooth.identification.fit.posterior import posterior_of
 

@@ -227,15 +227,7 @@ def _joined(problem: Windows, starts: FloatArray, length: float) -> list[Window]
         behind = groups[k + 1][0][0] if k + 1 < len(groups) else head
         # samples between, of windows that could not be simulated, come back here
         last = behind.first if behind.record == head.record and behind is not head else len(record.time)
-        found.append(
-            replace(
-                head,
-                last=last,
-                start=start,
-                time=record.time[head.first : last],
-                values=record.values[head.first : last],
-            )
-        )
+        found.append(head.cut(record, last, start=start))
     return found
 
 

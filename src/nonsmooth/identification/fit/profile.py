@@ -104,11 +104,10 @@ def _side(grown: Grown, i: int, step: float, scale: float) -> list[tuple[float, 
         value = grown.theta[i] + k * _STEP * step
         if not u.low[i] <= value <= u.high[i]:
             break
-        low, high, theta = u.low.copy(), u.high.copy(), theta.copy()
-        low[i] = high[i] = theta[i] = value
+        theta = np.where(np.arange(len(theta)) == i, value, theta)
+        held = np.where(np.arange(len(theta)) == i, value, [u.low, u.high])
         try:
-            held = replace(problem, unknowns=replace(u, low=low, high=high))
-            theta, starts, _ = settle(held, theta, starts)
+            theta, starts, _ = settle(replace(problem, unknowns=replace(u, low=held[0], high=held[1])), theta, starts)
         except Unsettled as reason:
             theta, starts = reason.values, reason.starts
         rise = (problem.cost(theta, starts) - least) * scale

@@ -190,13 +190,11 @@ def _tables(one: Any, runs: Sequence[str] | None, time: str) -> dict[str, dict[s
         raise ValueError("runs= chooses runs of a Recording; what is given here is one run, so leave it out")
     if hasattr(one, "data_vars"):
         return {"run": _of_dataset(one, time)}
-    if hasattr(one, "columns") and hasattr(one, "index"):
-        by = time if time in one.columns else None
-        t = one[by].to_numpy() if by is not None else one.index.to_numpy()
-        return {"run": {str(c): _pair(t, one[c].to_numpy(), str(c)) for c in one.columns if c != by}}
+    if hasattr(one, "columns") and hasattr(one, "index") and time not in one:
+        one = one.rename_axis(index=time).reset_index()
+    if hasattr(one, "items") and time in one:
+        return {"run": {str(k): _pair(one[time], y, str(k)) for k, y in one.items() if k != time}}
     if isinstance(one, Mapping):
-        if time in one:
-            return {"run": {str(k): _pair(one[time], y, str(k)) for k, y in one.items() if k != time}}
         made = {}
         for name, pair in one.items():
             if not isinstance(pair, list | tuple) or len(pair) != 2:

@@ -152,7 +152,7 @@ def _predict(problem: Windows, grown: Grown, far: list[FloatArray]) -> None:
     """Errors over the noise of all readings of which the fit has a motion, in place."""
     fitted = grown.problem
     for window, start in zip(fitted.pieces, grown.starts, strict=True):
-        whole = replace(window, values=problem.records[window.record].values[window.first : window.last])
+        whole = window.cut(problem.records[window.record], window.last)
         motion = fitted.motion(grown.theta, whole, start)
         if motion is not None:
             predicted, _ = fitted.readings(grown.theta, whole, motion, False)

@@ -110,18 +110,15 @@ def read_unknowns(
     phases = (len(runs) - steady) * phase
     each = {*own, *["phase"] * phase} if len(runs) > 1 else set()
     local = [*active, *(f"{q}.{what}" for q, what in of_sensors), *["clock"] * clock, *["phase"] * phase]
-    order = [*(n for n in active if n not in each), *(n for n in active if n in each), *local[len(active) :]]
-    base: list[str] = []
-    names: list[str] = []
-    first: dict[str, int] = {}
-    for name in order:
-        first[name] = len(names)
-        mine = (runs[:phases] if phase and name == "phase" else runs) if name in each else [""]
-        base += [name] * len(mine)
-        names += [f"{name}, {run}" for run in mine] if name in each else [name]
-    steps = [[min(run, phases - 1) if phase and n == "phase" else run for n in local] for run in range(len(runs))]
+    rows = [
+        (n, run) for n in local for run in (runs[: phases if phase and n == "phase" else None] if n in each else [""])
+    ]
+    rows.sort(key=lambda row: 2 if row[0] not in active else row[0] in each)
+    base, names = [n for n, _ in rows], [f"{n}, {run}" if n in each else n for n, run in rows]
+    last = [base.count(n) - 1 for n in local]  # of each
     places = np.array(
-        [[first[n] + k * (n in each) for n, k in zip(local, row, strict=True)] for row in steps], dtype=np.intp
+        [[base.index(n) + min(run, most) for n, most in zip(local, last, strict=True)] for run in range(len(runs))],
+        dtype=np.intp,
     )
     guess = np.array([known[name][0] for name in base])
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)

@@ -61,6 +61,11 @@ class Window:
     time: FloatArray
     values: FloatArray
 
+    def cut(self, record: Record, last: int, **changes: Any) -> Window:
+        """The window up to another sample of its record."""
+        here = slice(self.first, last)
+        return replace(self, last=last, time=record.time[here], values=record.values[here], **changes)
+
     @cached_property
     def readings(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Sample and quantity of each reading, in the order of time."""

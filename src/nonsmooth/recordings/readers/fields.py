@@ -119,8 +119,6 @@ def traces_of(table: FieldTable, options: Options, source: Source, reading: Read
         reading.remarks.say(f"{axis.origin} is not used as the time, since rate= is given")
         axis = None
     if axis is None:
-        if rate is None:
-            raise source.error("", f"has no {options.axis}; name it, columns={{{options.axis!r}: ...}}, or give rate=")
         held, along, unit = np.arange(table.rows), np.empty(0), "s"
     else:
         held = np.arange(table.rows) if axis.rows is None else axis.rows
@@ -234,7 +232,10 @@ def seconds_of(axis: Field, lines: IntArray | None, source: Source) -> tuple[Flo
 
     if axis.values.dtype.kind in "mM":
         dates = axis.values.astype("datetime64[ns]" if axis.values.dtype.kind == "M" else "timedelta64[ns]")
-        return _since(dates.astype(np.int64)), str(dates[0]) if axis.values.dtype.kind == "M" and len(dates) else ""
+        nanoseconds = dates.astype(np.int64)
+        return np.asarray((nanoseconds - nanoseconds[:1]) * 1e-9), str(
+            dates[0]
+        ) if axis.values.dtype.kind == "M" and len(dates) else ""
     texts = [str(text).strip() for text in axis.values]
     given = axis.unit if "%" in axis.unit else None
     if given is None and texts and _CLOCK.fullmatch(texts[0]):
@@ -254,14 +255,9 @@ def seconds_of(axis: Field, lines: IntArray | None, source: Source) -> tuple[Flo
     return np.asarray((read - read[0]).total_seconds(), np.float64), str(read[0].isoformat())
 
 
-def _since(nanoseconds: IntArray) -> FloatArray:
-    return np.asarray((nanoseconds - nanoseconds[:1]) * 1e-9, np.float64)
-
-
 def _unread(texts: list[str], place: int, axis: Field, lines: IntArray | None, source: Source) -> Exception:
-    row = f"row {place + 1}" if lines is None else f"line {lines[place if axis.rows is None else axis.rows[place]]}"
     return source.error(
-        row,
+        row_of(place if lines is None or axis.rows is None else int(axis.rows[place]), lines),
         f"the time {texts[place][:40]!r} is neither a number nor a stamp as 2026-05-31T14:05:09.25 or 14:05:09.25"
         + (f" nor of the form {axis.unit!r}" if "%" in axis.unit else "")
         + "; say how it is written, units={'time': '%d.%m.%Y %H:%M:%S,%f'}, or give rate=",

@@ -15,11 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.readers.hdf5 import load_hdf5
 from nonsmooth.recordings.readers.matlab_v5 import load_v5
 from nonsmooth.recordings.readers.tdms import load_tdms
-from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Group, Remarks, Source, inflation_limit, needed
+from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Group, Remarks, Source, inflation_limit, needed, readable
 
 Loaded = tuple[Mapping[str, Any], dict[str, Any]]
 
@@ -48,19 +47,13 @@ def _array(data: bytes, name: str, source: Source) -> Any:
     """The array of one .npy file; a structured one as a group of its fields."""
     stream = io.BytesIO(data)
     form = np.lib.format
-    try:
+    with readable("a .npy array", source, name):
         version = form.read_magic(stream)
         shape, _, kind = (form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0)(stream)
-        size = math.prod(shape) * kind.itemsize
-        if kind.hasobject or size > len(data):
+        if kind.hasobject or math.prod(shape) * kind.itemsize > len(data):
             raise source.error(name, f"says it holds {kind} values of shape {shape}; expected numbers that fit it")
         stream.seek(0)
         values = np.load(stream, allow_pickle=False)
-    except DataFileError:
-        raise
-    # A damaged header surfaces as almost any exception of NumPy.
-    except Exception as error:
-        raise source.error(name, f"cannot be read as a .npy array ({type(error).__name__}: {error})"[:300]) from error
     return Group({field: values[field] for field in values.dtype.names}) if values.dtype.names else values
 
 
@@ -156,15 +149,10 @@ def _measured(data: bytes, source: Source, remarks: Remarks) -> Loaded:
 
 
 def load(data: bytes, source: Source, remarks: Remarks) -> Loaded:
-    """The arrays of a file; what a damaged one makes its library raise, almost anything, becomes a DataFileError."""
+    """The arrays of a file."""
     loader, what = _LOADERS[source.format]
-    try:
+    with readable(what, source):
         return loader(data, source, remarks)
-    except DataFileError:
-        raise
-    except Exception as error:
-        message = f"cannot be read as {what}, it is damaged or cut short ({type(error).__name__}: {error})"
-        raise source.error("", message[:300]) from error
 
 
 #: What loads each format of arrays, and its name in messages.

@@ -10,7 +10,7 @@ from typing import Any
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.readers.delimited import read_lines
-from nonsmooth.recordings.reading import Archive, Options, Reading, Source, needed
+from nonsmooth.recordings.reading import Archive, Options, Reading, Source, needed, readable
 
 
 def read(data: bytes, source: Source, options: Options) -> Reading:
@@ -21,15 +21,10 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
         for piece in archive.pieces(name):
             if name.endswith((".xml", ".rels")) and b"<!DOCTYPE" in piece:
                 raise source.error(name, "has a document type, which is refused")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True)
-            sheets = [(sheet.title, list(_lines(sheet))) for sheet in book.worksheets]
-    # What is wrong with a workbook surfaces as almost any exception of the library.
-    except Exception as error:
-        message = f"cannot be read as a workbook ({type(error).__name__}: {error})"
-        raise source.error("", message[:300]) from error
+    with readable("a workbook", source), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True)
+        sheets = [(sheet.title, list(_lines(sheet))) for sheet in book.worksheets]
     reading = Reading()
     refused: list[DataFileError] = []
     filled = [(title, lines) for title, lines in sheets if any(map(str.strip, lines))]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.recordings.sampling import runs_of
 from nonsmooth.recordings.signals.checks import even_rate, signal, whose
 from nonsmooth.results.labels import labelled
 
@@ -61,9 +62,8 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
     tolerance = min(threshold * spread, 0.4 * abs(fall))  # at rest is never in flight, however great the noise
     free = np.concatenate([[True], np.abs(bend - fall) < tolerance, [True]])
     # The middle of a second difference is free where it is; a stretch of free ones is a flight.
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], free.astype(np.int8), [0]])))
     # The first and the last sample have no second difference of their own: they belong to what lies beside them.
-    rows = [(a, b - 1) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= least]
+    rows = [(a, b - 1) for a, b in runs_of(free) if b - a >= least]
     if not rows or fall >= 0:
         raise ValueError(
             f"{whose(height)}: no interval of at least {least} samples falls freely; give the height of the centre of "
