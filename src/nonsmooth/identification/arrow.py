@@ -12,7 +12,7 @@ within a piece.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -46,25 +46,10 @@ class Residuals:
         return sum(each, float(self.alone @ self.alone))
 
 
-class Fittable(Protocol):
-    """Problem that the iteration and the covariance take: pieces, each with its start, and their residuals."""
-
-    @property
-    def pieces(self) -> Any:
-        """Each with ``which``, ``n_free``, ``by_instant`` and ``correlation``."""
-
-    @property
-    def unknowns(self) -> Any:
-        """With the bounds ``low`` and ``high``, and the ``precision`` of what is known about ``centre``."""
-
-    def residuals(self, theta: FloatArray, starts: FloatArray) -> Residuals:
-        """Residuals of all pieces."""
-
-    def derivatives(self, theta: FloatArray, starts: FloatArray) -> Residuals:
-        """The same with derivatives in the parameters of each piece and in its start."""
-
-    def weights(self, state: Residuals) -> list[FloatArray]:
-        """One over each residual's standard deviation."""
+#: A problem: ``pieces``, each with ``which``, ``n_free``, ``by_instant`` and ``correlation``; ``unknowns`` with bounds
+#: ``low`` and ``high`` and the ``precision`` of what is known about ``centre``; of parameters and starts ``residuals``
+#: and ``derivatives`` (both `Residuals`), and of a state ``weights``, one over each residual's standard deviation.
+Problem = Any
 
 
 class Unsettled(SolveError):
@@ -82,7 +67,7 @@ class Unsettled(SolveError):
 
 
 def reduced(
-    problem: Fittable, state: Residuals, weights: list[FloatArray], p: int, used: Any = None, damping: float = 0.0
+    problem: Problem, state: Residuals, weights: list[FloatArray], p: int, used: Any = None, damping: float = 0.0
 ) -> tuple[Any, ...]:
     """Normal equations without the starts, and what gives the starts' steps back; ``damping`` is that of the starts.
 
@@ -128,7 +113,7 @@ def inverted(matrix: FloatArray, damping: float = 0.0) -> tuple[FloatArray, Floa
 
 
 def settle(
-    problem: Fittable,
+    problem: Problem,
     theta: FloatArray,
     starts: FloatArray,
     used: Any = None,
@@ -200,7 +185,7 @@ def settle(
 
 
 def _distance(
-    problem: Fittable, state: Residuals, weights: list[FloatArray], used: Any, theta: FloatArray, prior: FloatArray
+    problem: Problem, state: Residuals, weights: list[FloatArray], used: Any, theta: FloatArray, prior: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Undamped steps in standard uncertainties: the largest of the parameters, then of each start; the parameters'."""
     step, covariance, back = _step(problem, state, weights, used, theta, prior)
@@ -213,7 +198,7 @@ def _distance(
 
 
 def _step(
-    problem: Fittable,
+    problem: Problem,
     state: Residuals,
     weights: list[FloatArray],
     used: Any,
@@ -250,7 +235,7 @@ class Sandwich(NamedTuple):
     back: list[Any]
 
 
-def sandwich(problem: Fittable, theta: FloatArray, starts: FloatArray) -> Sandwich:
+def sandwich(problem: Problem, theta: FloatArray, starts: FloatArray) -> Sandwich:
     """Covariance of the parameters at the best fit, never smaller along any than that of white residuals."""
     p, prior = len(theta), problem.unknowns.precision
     state = problem.derivatives(theta, starts)

@@ -45,14 +45,13 @@ class Gathered:
         self.lists = [dim for dim in LISTS if centre.sizes.get(dim) and (dim != "special" or self.branch)]
         self.rows: list[dict[str, Any]] = []
         self.failures: list[str] = []
-        self.sheets = _Sheets(centre, self.branch, self.along) if self.along else None
 
     def add(self, result: xr.Dataset) -> None:
         """Keep what a draw gave."""
         same = [name for name in self.plain if name in result and result[name].shape == self.centre[name].shape]
         row: dict[str, Any] = {name: result[name].values for name in same}
-        if self.sheets is not None:
-            row |= self.sheets.brought(result)
+        if self.along:
+            row |= _along_sheets(self.centre, result, self.branch, self.along)
         row |= {dim: matched(self.centre, result, dim) for dim in self.lists}
         if len(self.rows) * sum(np.size(values) for values in row.values()) > MOST:
             raise ValueError("the draws hold more than 1e8 numbers: take fewer draws, or a smaller result")
@@ -124,40 +123,29 @@ class Gathered:
         return found
 
 
-class _Sheets:
-    """A branch between its turning points: values of another one at the same parameter, on the same sheet."""
-
-    def __init__(self, centre: xr.Dataset, name: str, along: list[str]) -> None:
-        self.name, self.along, self.centre = name, along, centre
-        self.value = centre[name].values
-        self.sheet = _sheet_numbers(self.value)
-
-    def brought(self, result: xr.Dataset) -> dict[str, Any]:
-        """Values of a drawn branch at the points of the branch itself; NaN where its sheet does not reach."""
-        value = result[self.name].values
-        sheet, finer = _sheet_numbers(value), _finer(_length(result, self.name))
-        first = self._first(sheet, result)
-        found = {}
-        dense = finer(value)
-        of = np.repeat(sheet, FINER)[: len(dense)] if len(sheet) > 1 else sheet
-        for name in self.along:
-            if name not in result:
-                continue
-            values = np.asarray(result[name].values, float)
-            rows = np.full((len(self.value), *values.shape[1:]), np.nan)
-            flag = result[name].dtype.kind in "iub"
-            other = np.repeat(values, FINER, axis=0)[: len(dense)] if flag else finer(values)
-            for k in np.unique(self.sheet):
-                here, there = self.sheet == k, of == k - first
-                if np.count_nonzero(there) > 1:
-                    rows[here] = _at(self.value[here], dense[there], other[there], flag)
-            found[name] = rows
-        return found
-
-    def _first(self, sheet: FloatArray, result: xr.Dataset) -> int:
-        """Number by which sheets are counted differently, where a draw has fewer turning points before the same one."""
-        ours, theirs = (np.sign(np.diff(one[self.name].values[:2])) for one in (self.centre, result))
-        return int((ours != theirs).any())
+def _along_sheets(centre: xr.Dataset, result: xr.Dataset, name: str, along: list[str]) -> dict[str, Any]:
+    """Values of a drawn branch at the points of the branch itself, between the same turning points; NaN where its sheet
+    does not reach."""
+    value, drawn = centre[name].values, result[name].values
+    sheet, finer = _sheet_numbers(value), _finer(_length(result, name))
+    dense = finer(drawn)
+    of = np.repeat(_sheet_numbers(drawn), FINER)[: len(dense)]
+    # A draw may have fewer turning points before the same one.
+    first = int((np.sign(np.diff(value[:2])) != np.sign(np.diff(drawn[:2]))).any())
+    found = {}
+    for key in along:
+        if key not in result:
+            continue
+        values = np.asarray(result[key].values, float)
+        rows = np.full((len(value), *values.shape[1:]), np.nan)
+        flag = result[key].dtype.kind in "iub"
+        other = np.repeat(values, FINER, axis=0)[: len(dense)] if flag else finer(values)
+        for k in np.unique(sheet):
+            here, there = sheet == k, of == k - first
+            if np.count_nonzero(there) > 1:
+                rows[here] = _at(value[here], dense[there], other[there], flag)
+        found[key] = rows
+    return found
 
 
 def _sheet_numbers(value: FloatArray) -> FloatArray:

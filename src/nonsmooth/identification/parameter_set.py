@@ -345,16 +345,9 @@ class ParameterSet(Answering, Mapping[str, float]):
 
 
 def _as_record(finding: Finding) -> dict[str, Any]:
-    return {
-        "name": finding.name,
-        "estimate": list(astuple(finding.estimate)),
-        "method": finding.method,
-        "samples_used": finding.samples_used,
-        "runs": list(finding.runs),
-        "notes": list(finding.notes),
-        "others": {name: list(astuple(other)) for name, other in finding.others.items()},
-        "plot": finding.plot,
-    }
+    plain = {name: getattr(finding, name) for name in ("name", "method", "samples_used", "runs", "notes", "plot")}
+    others = {name: list(astuple(other)) for name, other in finding.others.items()}
+    return {**plain, "estimate": list(astuple(finding.estimate)), "others": others}
 
 
 def _from_record(item: Mapping[str, Any]) -> Finding:
@@ -362,13 +355,9 @@ def _from_record(item: Mapping[str, Any]) -> Finding:
         value, uncertainty, unit, half_width, logarithmic = row
         return Estimate(float(value), float(uncertainty), unit, float(half_width), logarithmic)  # "inf" is a text there
 
-    return Finding(
-        item["name"],
-        estimate(item["estimate"]),
-        item["method"],
-        item["samples_used"],
-        tuple(item["runs"]),
-        tuple(item["notes"]),
-        {name: estimate(row) for name, row in item["others"].items()},
-        plot=item["plot"],
-    )
+    read = {
+        "estimate": estimate(item["estimate"]),
+        "others": {name: estimate(row) for name, row in item["others"].items()},
+        **{name: tuple(item[name]) for name in ("runs", "notes")},
+    }
+    return Finding(**{**item, **read})

@@ -51,11 +51,8 @@ def jumps_in_steps(x: FloatArray, heights: FloatArray, error: FloatArray) -> lis
             carried.append(2 * step[i - 1] - step[i - 2] if i >= 2 else step[i - 1])
         if i + 1 < len(step):
             carried.append(2 * step[i + 1] - step[i + 2] if i + 2 < len(step) else step[i + 1])
-        if any(abs(step[i] - one) < 0.5 * abs(step[i]) for one in carried):
-            continue
-        if abs(step[i]) <= LEAST * max(abs(heights[i]), abs(heights[i + 1])):
-            continue
-        if abs(step[i]) <= CERTAIN * np.hypot(error[i], error[i + 1]):
+        least = max(LEAST * max(abs(heights[i : i + 2])), CERTAIN * np.hypot(*error[i : i + 2]))
+        if abs(step[i]) <= least or any(abs(step[i] - one) < 0.5 * abs(step[i]) for one in carried):
             continue
         middle, half = 0.5 * float(x[i] + x[i + 1]), 0.5 * float(abs(x[i + 1] - x[i]))
         found.append(AmplitudeJump(middle, half, float(heights[i]), float(heights[i + 1])))

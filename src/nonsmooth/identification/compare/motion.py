@@ -200,19 +200,23 @@ def _begun_with_the_measurement(
     """Begin the predicted motion at the first measured state that is shown, where neither has a period."""
     if folded is None or number or predicted.period_number:
         return predicted
-    whole = folded[np.isfinite(folded).all(axis=(1, 2))][-SHOWN:]
+    whole = _shown(folded)
     if not len(whole):
         return predicted
     at = np.empty(len(motions.places))
     at[motions.places] = whole[0, 0]
-    begun = SteadyState(0, at, 0)
+    begun = SteadyState(0, at)
     return replace(predicted, orbit=motions.orbit(0, begun, grid, len(whole)))
+
+
+def _shown(folded: FloatArray) -> FloatArray:
+    """The last whole periods of the record."""
+    return folded[np.isfinite(folded).all(axis=(1, 2))][-SHOWN:]
 
 
 def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, grid: int) -> dict[str, Any]:
     if folded is None or predicted.orbit is None:
         return {}
-    shown = folded[np.isfinite(folded).all(axis=(1, 2))][-SHOWN:]
     closed = number > 0 and predicted.period_number > 0
     distances = (np.nan, np.nan, np.nan)
     scatter = None
@@ -225,7 +229,7 @@ def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, grid:
         b = np.roll(b, found.whole_shift * grid, axis=0) if found.whole_shift else b
         distances = (found.distance, found.any_phase, found.phase_shift)
     else:
-        a, b = shown.reshape(-1, shown.shape[2]), predicted.orbit
+        a, b = _shown(folded).reshape(-1, folded.shape[2]), predicted.orbit
     over = ("phase", "state")
     names = ("phase", "phase") if closed else ("measured_phase", "theory_phase")
     variables: dict[str, Any] = {

@@ -150,14 +150,10 @@ def orbit_distance(a: ArrayLike, b: ArrayLike, periods: int) -> OrbitDistance:
     size = np.sqrt(0.5 * (x.var(axis=0) + y.var(axis=0)))
     size = np.where(size > 0, size, 1.0)
     n, states = x.shape
-    fx, fy = np.fft.rfft(x / size, axis=0) / n, np.fft.rfft(y / size, axis=0) / n
-    weight = np.full(len(fx), 2.0)
-    weight[0] = 1.0
-    if n % 2 == 0:
-        weight[-1] = 1.0
-    order = np.arange(len(fx))
-    power = float((weight[:, None] * (np.abs(fx) ** 2 + np.abs(fy) ** 2)).sum())
-    cross = weight * (np.conj(fx) * fy).sum(axis=1)
+    fx, fy = np.fft.fft(x / size, axis=0) / n, np.fft.fft(y / size, axis=0) / n
+    order = np.fft.fftfreq(n, 1 / n)
+    power = float((np.abs(fx) ** 2 + np.abs(fy) ** 2).sum())
+    cross = (np.conj(fx) * fy).sum(axis=1)
 
     def distance(lead: float) -> float:
         """``y`` led by this part of the whole length, against ``x``."""
@@ -165,7 +161,7 @@ def orbit_distance(a: ArrayLike, b: ArrayLike, periods: int) -> OrbitDistance:
         return float(np.sqrt(max(power - 2 * likeness, 0.0) / states))
 
     # At the n leads i / n the likeness is one Fourier sum.
-    grid = np.sqrt(np.maximum(power - 2 * np.fft.fft(cross, n).real, 0.0) / states)
+    grid = np.sqrt(np.maximum(power - 2 * np.fft.fft(cross).real, 0.0) / states)
     whole = grid[:: n // periods]
     best = int(np.argmin(whole))
     near = int(np.argmin(grid)) / n

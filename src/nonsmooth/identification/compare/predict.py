@@ -36,11 +36,10 @@ SAME = 1e-6  # orbits whose points are nearer to each other than this part of th
 
 @dataclass(frozen=True)
 class SteadyState:
-    """A steady motion: period number (0: none found), a section point on it at phase 0, the start that led to it."""
+    """A steady motion: period number (0: none found), and a section point on it at phase 0."""
 
     period_number: int
     point: FloatArray
-    start: int
 
 
 class Motions:
@@ -120,13 +119,10 @@ class Motions:
         """
         found: list[SteadyState] = []
         orbits: list[FloatArray] = []
-        statuses = set()
         begin = np.atleast_2d(np.asarray(starts, dtype=float))
         kept, runs = self._settled(np.full(len(begin), i), begin, 0)
-        for k, (points, number) in enumerate(zip(kept.section, runs.period_number, strict=True)):
-            statuses.add(int(runs.status[k]))
-            if not usable(runs.status[k]) or not np.isfinite(points).all():
-                continue
+        good = usable(runs.status) & np.isfinite(kept.section).all(axis=(1, 2))
+        for points, number in zip(kept.section[good], runs.period_number[good], strict=True):
             size = np.maximum(np.ptp(points, axis=0), 1e-3 * self.system.scale_vector())
             cycle = points[-max(int(number), 1) :]
             if any(
@@ -134,10 +130,10 @@ class Motions:
                 for one, other in zip(found, orbits, strict=True)
             ):
                 continue
-            found.append(SteadyState(int(number), points[-1].copy(), k))
+            found.append(SteadyState(int(number), points[-1].copy()))
             orbits.append(cycle)
         if not found:
-            words = "; ".join(by_code(code).sentence for code in sorted(statuses))
+            words = "; ".join(by_code(code).sentence for code in np.unique(runs.status).tolist())
             raise ValueError(f"no start of {self.system.name!r} leads to a motion that can be compared: {words}")
         return found
 

@@ -149,7 +149,10 @@ def fit(
 
     problem = problem_of(system, recording, parameters, options, mode, loss, per_run, inputs)
     free, tries, seed, progress = options["free_start"], options["tries"], options["seed"], options["progress"]
-    begin, profiles = _begun(problem, start, free, leave_out), _profiles(problem, profile)
+    begin = _begun(problem, start, free, leave_out)
+    for name in profile:
+        if name not in problem.unknowns.names:
+            raise ValueError(f"profile: {unknown(name, 'an unknown', 'this fit', list(problem.unknowns.names))}")
     best, left = best_of(problem, begin, free, window or np.inf, tries, seed, progress), list[str]()
     if leave_out:
         problem, left = without_disagreeing(problem, best.theta)
@@ -161,19 +164,11 @@ def fit(
         best,
         asked,
         synthetic=any(getattr(one, "synthetic", False) for one in given),
-        profiles=profiles,
+        profiles=profile,
         watched=progress,
         left=left,
         beside=[posterior_of(best, posterior, seed, progress)] if posterior else [],
     )
-
-
-def _profiles(problem: Windows, given: Sequence[str]) -> list[str]:
-    names = list(given)
-    for name in names:
-        if name not in problem.unknowns.names:
-            raise ValueError(f"profile: {unknown(name, 'an unknown', 'this fit', list(problem.unknowns.names))}")
-    return names
 
 
 def _begun(problem: Windows, start: Any, free: bool, leave_out: bool) -> FloatArray | None:

@@ -9,11 +9,12 @@ a decimal point, or by ``;`` with a decimal comma.
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.readers.fields import Field, FieldTable, split_unit, traces_of
 from nonsmooth.recordings.readers.text_table import Cells, Numerals, checked_header, decoded, read_cells, rows, sniffed
-from nonsmooth.recordings.reading import MAX_COLUMNS, TIME_WORDS, Options, Reading, Remarks, Source, Trace, names_of
+from nonsmooth.recordings.reading import MAX_COLUMNS, TIME_WORDS, Options, Reading, Remarks, Source, names_of
 
 #: What ``write_capstone_csv`` puts behind a run's name: the only free text of the format.
 SYNTHETIC = " [synthetic]"
@@ -60,7 +61,9 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     )
     tables: dict[int, list[Field]] = {}
     for column, (run, label) in channels.items():
-        tables.setdefault(_time_of(times, run, column), []).append(_field(column, label, cells))
+        own = [k for k, (r, _) in times.items() if r == run]
+        time_at = max((k for k in own if k < column), default=own[0])  # the one before this column, else the first
+        tables.setdefault(time_at, []).append(_field(column, label, cells))
     for column, (run, unit) in times.items():
         if column in tables:
             time = Field("time", unit, cells.values[column], f"column {column + 1}", cells.rows[column])
@@ -71,7 +74,7 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     runs = {run for run, _ in times.values()}
     reading.synthetic = any(run.endswith(SYNTHETIC) for run in runs)
     if reading.synthetic:
-        reading.traces = [_without_mark(trace) for trace in reading.traces]
+        reading.traces = [replace(trace, run=trace.run.removesuffix(SYNTHETIC)) for trace in reading.traces]
     reading.header = {"delimiter": delimiter, "columns": len(header), "rows": len(cells.lines)}
     return reading
 
@@ -107,24 +110,11 @@ def _layout(header: list[str], source: Source) -> tuple[dict[int, tuple[str, str
     return times, channels
 
 
-def _time_of(times: dict[int, tuple[str, str]], run: str, column: int) -> int:
-    """The run's time column before this one, else its first."""
-    own = [k for k, (r, _) in times.items() if r == run]
-    before = [k for k in own if k < column]
-    return before[-1] if before else own[0]
-
-
 def _field(column: int, label: str, cells: Cells) -> Field:
     name, unit = split_unit(label)
     match = _PORT.fullmatch(name)
     attrs = {"measurement": match["measurement"], "port": match["port"]} if match else {"measurement": name}
     return Field(name, unit, cells.values[column], f"column {column + 1}", cells.rows[column], attrs)
-
-
-def _without_mark(trace: Trace) -> Trace:
-    from dataclasses import replace
-
-    return replace(trace, run=trace.run.removesuffix(SYNTHETIC))
 
 
 def _delimiter(data: bytes, source: Source) -> str:

@@ -143,20 +143,14 @@ def traces_of(table: FieldTable, options: Options, source: Source, reading: Read
             elif whole and len(held) == table.rows:
                 taken = along  # the same array for all: told at once to be one clock
             else:
-                complaint = f"run {run!r}, channel {one.name!r} has a value where there is no {options.axis}"
-                place = places(at, held, table.lines, source, complaint)
+                place = np.minimum(np.searchsorted(held, at), max(len(held) - 1, 0))
+                missing = at[held[place] != at] if len(held) else at
+                if len(missing):
+                    complaint = f"run {run!r}, channel {one.name!r} has a value where there is no {options.axis}"
+                    raise source.error(row_of(int(missing[0]), table.lines), complaint)
                 taken = along[place]
             lines = None if table.lines is None else table.lines[at]
             yield Trace(run, one.name, one.unit, taken, values, one.origin, unit, lines=lines, attrs=one.attrs)
-
-
-def places(held: IntArray, axis: IntArray, lines: IntArray | None, source: Source, complaint: str) -> IntArray:
-    """Place among the rows of the axis of each row in which a channel has a value; all must be there."""
-    place = np.minimum(np.searchsorted(axis, held), max(len(axis) - 1, 0))
-    missing = held[axis[place] != held] if len(axis) else held
-    if len(missing):
-        raise source.error(row_of(int(missing[0]), lines), complaint)
-    return place
 
 
 def row_of(row: int, lines: IntArray | None) -> str:

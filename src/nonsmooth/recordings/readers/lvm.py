@@ -206,7 +206,7 @@ def _traces(
         rows, values = cells.rows[column], cells.values[column]
         if clocks == "Multi":
             axis, held = cells.values[column - 1], cells.rows[column - 1]
-        elif clocks == "One" and _same(step[k], step[0]) and len(cells.values[0]):
+        elif clocks == "One" and np.array_equal(step[k], step[0], equal_nan=True) and len(cells.values[0]):
             axis, held = cells.values[0] + (start[k] - start[0]), cells.rows[0]
         else:
             if len(values) > 1 and not step[k] > 0:
@@ -224,10 +224,6 @@ def _traces(
         clock = Field(options.axis, unit, axis, f"X_Value of {name}", held)
         channel = Field(name, units[k], values, origin, rows, {"started": begun} if begun else {})
         yield from traces_of(FieldTable(run, [clock, channel], len(cells.lines), cells.lines), options, source, reading)
-
-
-def _same(one: float, other: float) -> bool:
-    return one == other or (math.isnan(one) and math.isnan(other))
 
 
 def _texts(segment: _Segment, key: str, n: int) -> list[str]:

@@ -147,18 +147,18 @@ def steady_response(
         )
     whole = fit(t, values, omega, harmonics, refine=True)
     per = int(periods // count) * 2.0 * math.pi / whole.omega
-    middles, sizes, phases, size_errors, phase_errors = (np.zeros(count) for _ in range(5))
+    rows = []
     first = t[0] + 0.5 * (length - count * per)
     for b in range(count):
         begin = first + b * per
         here = (t >= begin - 1e-9 * per) & (t < begin + per * (1.0 - 1e-9))
         # Time from the block's middle: there amplitude and phase are independent of each other.
-        middles[b] = begin + 0.5 * per
-        one = fit(t[here] - middles[b], values[here], whole.omega, harmonics) if np.count_nonzero(here) else whole
-        sizes[b], size_errors[b] = one.amplitudes[0], one.amplitude_errors[0]
-        expected = whole.phases[0] - whole.omega * middles[b]
-        phases[b] = math.remainder(one.phases[0] - expected, 2.0 * math.pi)
-        phase_errors[b] = one.phase_errors[0]
+        middle = begin + 0.5 * per
+        one = fit(t[here] - middle, values[here], whole.omega, harmonics) if np.count_nonzero(here) else whole
+        expected = whole.phases[0] - whole.omega * middle
+        phase = math.remainder(one.phases[0] - expected, 2.0 * math.pi)
+        rows.append((middle, one.amplitudes[0], phase, one.amplitude_errors[0], one.phase_errors[0]))
+    middles, sizes, phases, size_errors, phase_errors = np.array(rows).T
     decay, decay_error = _slope(middles, np.log(sizes), size_errors / sizes)
     turn, turn_error = _slope(middles, phases, phase_errors)
     by_fit = whole.omega / (2.0 * math.pi)
