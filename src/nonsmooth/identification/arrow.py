@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray
+from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.uncertainty import newey_west, not_below
 
@@ -110,6 +110,11 @@ def inverted(matrix: FloatArray, damping: float = 0.0) -> tuple[FloatArray, Floa
     known = values > _LEAST
     inverse = (vectors[:, known] / (values[known] + damping)) @ vectors[:, known].T / np.outer(scale, scale)
     return inverse, vectors[:, ~known]
+
+
+def concerned(directions: FloatArray) -> BoolArray:
+    """Mark the parameters that have a part in each direction (columns)."""
+    return np.abs(directions) > 1e-3 * np.abs(directions).max(axis=0, initial=0.0)
 
 
 def settle(

@@ -89,7 +89,7 @@ def factor_interval(value: float, relative: float, level: float = 0.95) -> tuple
     return value / factor, value * factor, factor
 
 
-def normal_draws(mean: Any, covariance: FloatArray, n: int, seed: int, logarithmic: Any = False) -> FloatArray:
+def normal_draws(mean: Any, covariance: FloatArray, n: int, seed: Any, logarithmic: Any = False) -> FloatArray:
     """``n`` rows drawn from a normal law; of a quantity that is ``logarithmic`` the logarithm is normal."""
     mean, sizes = np.asarray(mean, float), np.sqrt(np.diag(covariance))
     if np.isinf(sizes).any():

@@ -40,7 +40,7 @@ def examine(time: FloatArray) -> Sampling:
     wide = np.flatnonzero(steps > _GAP * typical)
     if change is None and len(wide) <= max(3, len(steps) // 20):
         gaps = tuple((int(i), int(counts[i]) - 1) for i in wide if counts[i] > 1)
-        rate = float(counts.sum() / (time[-1] - time[0])) if len(wide) else float(len(steps) / (time[-1] - time[0]))
+        rate = float(counts.sum() / (time[-1] - time[0]))
     else:
         gaps, rate = (), 1.0 / typical
     expected = time[0] + np.concatenate([[0.0], np.cumsum(counts if gaps else np.ones(len(steps)))]) / rate

@@ -117,9 +117,8 @@ def _measured(
         at = np.asarray(measured[name].values, dtype=float)
         if at.shape != points.shape[:1]:
             raise ValueError(f"{name} must be given for each of the {len(points)} section points; got {at.shape}")
-        found = np.zeros(len(points), dtype=np.int64)
         good = np.isfinite(points).all(axis=1)
-        found[good] = period_numbers(points[good], noise, max_period=min(max_period, 8))
+        return at[good], points[good], period_numbers(points[good], noise, max_period=min(max_period, 8))
     good = np.isfinite(points).all(axis=1)
     return at[good], points[good], np.asarray(found, dtype=np.int64)[good]
 

@@ -234,9 +234,14 @@ def _joined(problem: Windows, starts: FloatArray, length: float) -> list[Window]
 def _reduced(problem: Windows, state: Residuals) -> float:
     """Sum of squared residuals over the noise, per degree of freedom."""
     rows = [r / problem.noise[w.readings[1]] for w, r in problem.rows(state)]
+    return sum(float(r @ r) for r in rows) / _freedom(problem)[0]
+
+
+def _freedom(problem: Windows) -> tuple[float, int]:
+    """Degrees of freedom of the readings, a tenth of these at least, and the number of readings."""
     free = sum(w.n_free for w in problem.pieces) + len(problem.unknowns.names)
-    total = sum(map(len, rows))
-    return float(sum(float(r @ r) for r in rows)) / max(total - free, 0.1 * total)
+    total = sum(len(w.readings[0]) for w in problem.pieces)
+    return max(total - free, 0.1 * total), total
 
 
 def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: FloatArray, rounds: int) -> Grown:
@@ -302,9 +307,8 @@ def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:
 
 def _noise(problem: Windows, state: Residuals) -> FloatArray:
     """Standard deviation of a reading of each quantity: from its residuals, or as it is known."""
-    free = sum(w.n_free for w in problem.pieces) + len(problem.unknowns.names)
-    total = sum(len(w.readings[0]) for w in problem.pieces)
-    grow = total / max(total - free, 0.1 * total, 1e-9)
+    freedom, total = _freedom(problem)
+    grow = total / max(freedom, 1e-9)
     found = np.empty(len(problem.sensors))
     for c, sensor in enumerate(problem.sensors.values()):
         r = np.concatenate([np.zeros(0), *parts(problem, state, c)])

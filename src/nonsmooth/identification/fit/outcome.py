@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.arrow import Sandwich, sandwich
+from nonsmooth.identification.arrow import Sandwich, concerned, sandwich
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.first_level import BETTER
 from nonsmooth.identification.fit.growth import SHORT, Grown
@@ -135,8 +135,8 @@ def _noise(grown: Grown, found: Sandwich) -> dict[str, Estimate]:
 def _undetermined(directions: FloatArray) -> dict[int, list[int]]:
     """Places of unknowns that the records leave open, each with those that it may be traded for."""
     found: dict[int, list[int]] = {}
-    for direction in directions.T:
-        together = np.flatnonzero(np.abs(direction) > 1e-3 * np.max(np.abs(direction))).tolist()
+    for direction in concerned(directions).T:
+        together = np.flatnonzero(direction).tolist()
         for i in together:
             found[i] = sorted({*found.get(i, []), *together})
     return found

@@ -10,7 +10,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, unknown
-from nonsmooth.identification.arrow import inverted, reduced
+from nonsmooth.identification.arrow import concerned, inverted, reduced
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.options import Prior
 from nonsmooth.results.labels import labelled
@@ -202,8 +202,7 @@ def _uncertainties(information: FloatArray) -> FloatArray:
     """Standard uncertainties; infinite of what a direction has in it that is not determined."""
     covariance, loose = inverted(information)
     found = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    for direction in loose.T:
-        found[np.abs(direction) > 1e-3 * np.abs(direction).max()] = np.inf
+    found[concerned(loose).any(axis=1)] = np.inf
     return found
 
 

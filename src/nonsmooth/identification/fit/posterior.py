@@ -8,9 +8,10 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, not_installed
-from nonsmooth.identification.arrow import inverted, reduced
+from nonsmooth.identification.arrow import concerned, inverted, reduced
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.growth import Grown
+from nonsmooth.identification.uncertainty import normal_draws
 from nonsmooth.results.progress import Progress, progress
 
 _MOST = 80  # unknowns and numbers of starts: beyond, an ensemble moves too slowly
@@ -100,10 +101,9 @@ def _drawn(
     normal, _, back = reduced(problem, state, weights, p)
     covariance = inverted(normal + u.precision)[0]
     if (loose := grown.loose(state)).size:
-        names = ", ".join(u.names[i] for i in np.flatnonzero(np.abs(loose).max(axis=1) > 1e-3))
+        names = ", ".join(u.names[i] for i in np.flatnonzero(concerned(loose).any(axis=1)))
         raise SolveError(f"the records do not determine {names}: give a prior or a value, then sample")
-    scale = np.sqrt(np.diag(covariance))
-    steps = rng.multivariate_normal(np.zeros(p), covariance / np.outer(scale, scale), count, method="eigh") * scale
+    steps = normal_draws(np.zeros(p), covariance, count, rng)
     found = np.empty((count, p + len(at)))
     found[:, :p] = np.clip(grown.theta + steps, u.low, u.high)
     for row, step in zip(found, steps, strict=True):

@@ -42,15 +42,11 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
         return reading
     containers = list(_containers("", variables, 0))
     holds = _is_vector if options.rate is None else _is_series
-    vectors = [
-        (path, node)
-        for path, node in containers
-        if any(map(_is_series if getattr(node, "rate", None) else holds, node.values()))
-    ]
-    found: list[tuple[str, Mapping[str, Any], str | None]] = []
+    vectors = [(path, node) for path, node in containers if any(map(_is_series if node.rate else holds, node.values()))]
+    found: list[tuple[str, Group, str | None]] = []
     for path, node in vectors:
         key = _axis_of(node, options.axis)
-        if key is not None or options.rate or getattr(node, "rate", None):
+        if key is not None or options.rate or node.rate:
             found.append((path, node, key))
     if not found:
         names = [f"{path}.{key}".lstrip(".") for path, node in vectors for key, v in node.items() if _is_vector(v)]
@@ -64,9 +60,9 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
         if path not in used:
             reading.remarks.say(f"{path or 'the file itself'}: holds vectors, but no {options.axis!r}; left out")
     for path, node, key in found:
-        run = getattr(node, "run", None) or path or _TOP
+        run = node.run or path or _TOP
         notes = {name: _note(v) for name, v in node.items() if _note(v)}
-        own = {**getattr(node, "notes", {}), **{f"note_{name}": text for name, text in notes.items()}}
+        own = {**node.notes, **{f"note_{name}": text for name, text in notes.items()}}
         reading.run_attrs.setdefault(run, {}).update(own)
         table = _table(run, path, node, key, options, reading.remarks)
         reading.traces += traces_of(table, options, source, reading)
@@ -75,12 +71,12 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
     return reading
 
 
-def _containers(path: str, node: Any, depth: int) -> Iterator[tuple[str, Mapping[str, Any]]]:
+def _containers(path: str, node: Any, depth: int) -> Iterator[tuple[str, Group]]:
     """Every dict, with its path in MATLAB's notation."""
     if depth > MAX_DEPTH:
         return
     if isinstance(node, dict):
-        yield path, node
+        yield path, node if isinstance(node, Group) else Group(node)
         for name, member in node.items():
             yield from _containers(f"{path}.{name}" if path else name, member, depth + 1)
     elif isinstance(node, list):
@@ -114,9 +110,7 @@ def _note(value: Any) -> str:
     return str(value.ravel()[0]) if _is_array(value) and value.size == 1 else ""
 
 
-def _table(
-    run: str, path: str, node: Mapping[str, Any], key: str | None, options: Options, remarks: Remarks
-) -> FieldTable:
+def _table(run: str, path: str, node: Group, key: str | None, options: Options, remarks: Remarks) -> FieldTable:
     arrays = {name: value for name, value in node.items() if _is_array(value) and value.size > 1}
     units = _units(node, list(arrays), remarks, run)
     lengths = [v.size for v in arrays.values() if _is_vector(v)] or [max(v.shape) for v in arrays.values()]
@@ -135,9 +129,9 @@ def _table(
             ours = options.axis if name == key else said if unit else name
             for k, column in enumerate(columns, 1):
                 number = f"({k})" if len(columns) > 1 else ""
-                attrs = getattr(node, "attrs", {}).get(name, {})
+                attrs = node.attrs.get(name, {})
                 fields.append(Field(ours + number, units.get(name, "") or unit, column, origin + number, attrs=attrs))
-    return FieldTable(run, fields, n, rate=getattr(node, "rate", None))
+    return FieldTable(run, fields, n, rate=node.rate)
 
 
 def _columns(value: NDArray[Any], n: int) -> list[NDArray[Any]] | None:
@@ -150,8 +144,8 @@ def _columns(value: NDArray[Any], n: int) -> list[NDArray[Any]] | None:
     return None
 
 
-def _units(node: Mapping[str, Any], names: list[str], remarks: Remarks, run: str) -> dict[str, str]:
-    if isinstance(node, Group):
+def _units(node: Group, names: list[str], remarks: Remarks, run: str) -> dict[str, str]:
+    if node.units:
         return node.units
     text = next((v for name, v in node.items() if name.casefold() in ("units", "unit") and isinstance(v, str)), "")
     words = [word.strip() for word in text.split(",")]
@@ -166,7 +160,7 @@ def _units(node: Mapping[str, Any], names: list[str], remarks: Remarks, run: str
 def _chosen(variables: Mapping[str, Any], options: Options, source: Source) -> FieldTable:
     """The channels that ``columns`` names by path: ``"data.x"``, ``"runs(2).x"``, ``"M(:,3)"``."""
     found = [
-        (f"{path}.{name}".lstrip("."), value, getattr(node, "units", {}).get(name, ""), getattr(node, "rate", None))
+        (f"{path}.{name}".lstrip("."), value, node.units.get(name, ""), node.rate)
         for path, node in _containers("", variables, 0)
         for name, value in node.items()
         if _is_array(value) and value.size > 1

@@ -88,15 +88,15 @@ def _support(found: xr.Dataset, omega: float | None, resolution: float) -> tuple
     """Gap, its error, and stiffness by mass; NaN where nothing pushes."""
     none = (math.nan, math.nan, math.nan)
     t, x = found["time"].values, found["x"].values
-    free = x <= np.median(x)
-    left, free = _beside_the_free_motion(found, omega, free)
+    low = x <= np.median(x)
+    left, free = _beside_the_free_motion(found, omega, low)
     if omega is None and len(left):
         drive = _drive(t, left, free)
         if drive is not None:
-            left, free = _beside_the_free_motion(found, drive, x <= np.median(x))
+            left, free = _beside_the_free_motion(found, drive, low)
     if len(left) == 0:
         return none
-    pushed = ~free & (x > np.median(x))
+    pushed = ~free & ~low
     if np.count_nonzero(pushed) < 4:
         return none
     # A straight line over x, and of the samples near its zero none: there the smoother rounds the corner.

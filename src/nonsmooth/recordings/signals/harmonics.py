@@ -69,10 +69,9 @@ class HarmonicFit:
         return self._errors(-np.sin(self.phases) / size, np.cos(self.phases) / size)
 
     def _errors(self, by_cos: FloatArray, by_sin: FloatArray) -> FloatArray:
-        C, found = self.covariance.values, []
-        for j, (a, b) in enumerate(zip(by_cos, by_sin, strict=True)):
-            block = C[1 + 2 * j : 3 + 2 * j, 1 + 2 * j : 3 + 2 * j]
-            found.append(a * a * block[0, 0] + 2 * a * b * block[0, 1] + b * b * block[1, 1])
+        own, both = (np.diag(self.covariance.values, k) for k in (0, 1))
+        cos = 1 + 2 * np.arange(len(by_cos))
+        found = by_cos**2 * own[cos] + 2 * by_cos * by_sin * both[cos] + by_sin**2 * own[cos + 1]
         return np.sqrt(np.maximum(found, 0.0))
 
     def evaluate(self, time: ArrayLike) -> FloatArray:
