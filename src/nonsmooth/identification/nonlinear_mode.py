@@ -179,8 +179,8 @@ class ResponseFit:
         if not curves:
             raise ValueError("there are no response curves")
         self.names = tuple(str(c.name) for c in curves)
-        self.phased = _all_or_none(curves, "phase")
-        self.forced = _all_or_none(curves, "force")
+        phase, self.force = (_column(curves, name) for name in ("phase", "force"))
+        self.phased, self.forced = phase is not None, self.force is not None
         if residual and not (self.phased and self.forced):
             raise ValueError("the residual of other modes can be told only with forces and phases; leave it out")
         if mass is not None and not (mass > 0 and self.forced):
@@ -189,9 +189,7 @@ class ResponseFit:
         self.curve = np.repeat(np.arange(len(curves)), [len(c.frequency) for c in curves])
         self.omega = 2 * np.pi * np.concatenate([c.frequency for c in curves])
         size = np.concatenate([c.amplitude for c in curves])
-        self.phase = np.concatenate([c.phase for c in curves]) if self.phased else None
-        self.force = np.concatenate([c.force for c in curves]) if self.forced else None
-        self.measured = size * np.exp(1j * self.phase) if self.phase is not None else size.astype(complex)
+        self.measured = size.astype(complex) if phase is None else size * np.exp(1j * phase)
         self.knots = _knots(knots, size)
         self.shifts = len(curves) >= FEWEST_CURVES
         self._basis = interpolation(self.knots, size)
@@ -333,12 +331,12 @@ class ResponseFit:
         return frequency, ratio, place
 
 
-def _all_or_none(curves: Sequence[Any], name: str) -> bool:
-    """Return whether all curves have it."""
+def _column(curves: Sequence[Any], name: str) -> FloatArray | None:
+    """The points of all curves, or None where none has it."""
     lacking = [c.name for c in curves if getattr(c, name) is None]
     if 0 < len(lacking) < len(curves):
         raise ValueError(f"some curves have a {name} and {', '.join(map(repr, lacking))} have none; fit them apart")
-    return len(lacking) < len(curves)
+    return None if lacking else np.concatenate([getattr(c, name) for c in curves])
 
 
 def _knots(knots: int | ArrayLike, size: FloatArray) -> FloatArray:

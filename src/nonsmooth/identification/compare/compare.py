@@ -167,7 +167,43 @@ def compare(
         **options,
         "draws": draws,
     }
-    variables = _laid(kind, measured, model, states, {**given, "noise": noise, "start": start, "values": values})
+    if kind != "motion":
+        name = parameter or ("omega" if kind == "response" else _swept(measured))
+        if model.system is not None:
+            check_parameter(name, model.theory)
+    if kind == "response":
+        from nonsmooth.identification.compare.response import compare_response
+
+        variables = compare_response(measured, model, name=name, state=states[0])
+    elif kind == "diagram":
+        from nonsmooth.identification.compare.diagram import compare_diagram
+
+        variables = compare_diagram(
+            measured,
+            model,
+            name=name,
+            noise=_noise(measured, noise, states),
+            direction=direction,
+            values=values,
+            phase=real_number(section_phase, "section_phase"),
+            max_period=options["max_period"],
+        )
+    else:
+        from nonsmooth.identification.compare.motion import compare_motion
+
+        phases = [real_number(phase, "section_phase") for phase in np.atleast_1d(section_phase)]
+        if "u" not in measured and len(phases) > 1:
+            raise ValueError("measured section points are of one phase: give section_phase as one number")
+        variables = compare_motion(
+            measured,
+            model,
+            noise=_noise(measured, noise, states),
+            start=start,
+            phases=phases,
+            grid=options["grid"],
+            max_period=options["max_period"],
+            splits=options["splits"],
+        )
     result = _dataset(variables, measured, model, kind, given)
     return result.squeeze("section_phase") if kind == "motion" and np.ndim(section_phase) == 0 else result
 
@@ -187,44 +223,6 @@ def _settings(theory: Any, parameters: Any, given: Any) -> dict[str, Any]:
     return {}
 
 
-def _laid(kind: str, measured: xr.Dataset, model: Model, states: list[str], asked: Mapping[str, Any]) -> dict[str, Any]:
-    """The variables of a comparison of this kind, as ``asked``."""
-    if kind != "motion":
-        name = asked["parameter"] or ("omega" if kind == "response" else _swept(measured))
-        if model.system is not None:
-            check_parameter(name, model.theory)
-    if kind == "response":
-        from nonsmooth.identification.compare.response import compare_response
-
-        return compare_response(measured, model, name=name, state=states[0])
-    noise, phase, longest = _noise(measured, asked["noise"], states), asked["section_phase"], asked["max_period"]
-    if kind == "diagram":
-        from nonsmooth.identification.compare.diagram import compare_diagram
-
-        return compare_diagram(
-            measured,
-            model,
-            name=name,
-            noise=noise,
-            direction=asked["direction"],
-            values=asked["values"],
-            phase=real_number(phase, "section_phase"),
-            max_period=longest,
-        )
-    from nonsmooth.identification.compare.motion import compare_motion
-
-    return compare_motion(
-        measured,
-        model,
-        noise=noise,
-        start=asked["start"],
-        phases=_phases(phase, "u" in measured),
-        grid=asked["grid"],
-        max_period=longest,
-        splits=asked["splits"],
-    )
-
-
 def _draws(given: int | None, theory: Any, parameters: Any, settings: Mapping[str, Any]) -> int:
     """The number of draws; where none is given, none of a theory in which no uncertainty shows."""
     if given is not None:
@@ -233,14 +231,6 @@ def _draws(given: int | None, theory: Any, parameters: Any, settings: Mapping[st
         pair.uncertainty > (0.0 if pair.follows else NEGLIGIBLE * abs(pair.at({}))) for pair in settings.values()
     )
     return DRAWS if uncertain and hasattr(theory, "parameters") else 0
-
-
-def _phases(given: Any, whole: bool) -> list[float]:
-    """Phases of the sections; one alone where the ``whole`` motion was not measured."""
-    phases = [real_number(phase, "section_phase") for phase in np.atleast_1d(given)]
-    if not whole and len(phases) > 1:
-        raise ValueError("measured section points are of one phase: give section_phase as one number")
-    return phases
 
 
 def _kind(measured: xr.Dataset, parameter: str | None) -> str:
