@@ -59,50 +59,46 @@ def first_windows(
     start : array (records, n_u), optional
         First guess of the states at the beginning of each record, or their values where not ``free``.
     """
-    starts = [None] * len(problem.records) if start is None else start
-    return [w for i, own in enumerate(starts) for w in _of_record(problem, theta, i, length, own, free)]
-
-
-def _of_record(
-    problem: Windows, theta: FloatArray, i: int, length: float, start: FloatArray | None, free: bool
-) -> list[Window]:
-    record = problem.records[i]
-    n_u, early = len(problem.system.states), _lead(problem, theta, i)
-    memory = problem.system.memory_vector()
-    told = states_from_samples(problem, theta, i, slice(None))
-    z = np.concatenate([np.zeros(n_u) if start is None else start, memory])
-    if problem.values(theta, i) is None:
-        return []
-    which, clock = problem.unknowns.places[i], problem.clock(theta, i)
-    sizes = np.max(np.abs(np.nan_to_num(told)), axis=0)
-    time, mode, first, windows = record.time, problem.modes[i][0], 0, []
-    while first < len(time) - 1:
-        rest = time[-1] - time[first]
-        until = time[-1] if rest < 1.75 * length else time[first] + 1.25 * length
-        end = max(int(np.searchsorted(time, until, "right")), first + 2)  # across a gap that is longer than a window
-        known = np.append(np.isfinite(told[first]), np.zeros(len(memory), dtype=bool))
-        set_ = np.where(known, np.append(np.nan_to_num(told[first]), memory), z)
-        begin = float(time[first]) - early
-        for candidate in [z] if first == 0 and start is not None else [set_, z]:  # beyond a stop: as it was going
-            motion = problem.march(theta, i, begin, clock * (time[first:end] - early), candidate, mode)
-            if motion is not None:
-                break
-        if motion is None:  # the samples of this window come back when windows are joined
-            first, mode = max(end - 1, first + 1), problem.modes[i][0]
+    n_u, memory = len(problem.system.states), problem.system.memory_vector()
+    found: list[Window] = []
+    for i, record in enumerate(problem.records):
+        early = _lead(problem, theta, i)
+        told = states_from_samples(problem, theta, i, slice(None))
+        z = np.concatenate([np.zeros(n_u) if start is None else start[i], memory])
+        if problem.values(theta, i) is None:
             continue
-        sizes = np.maximum(sizes, np.abs(motion.z[:, :n_u]).max(axis=0))
-        last = end if end == len(time) else first + _quiet(motion.time, motion.log.crossing_time, length)
-        spread = np.zeros(len(z)) if first == 0 and not free else np.append(np.ones(n_u), np.zeros(len(memory)))
-        if np.isfinite(record.values[first:last]).any():  # a gap is bridged where windows are joined
-            t, y = time[first:last], record.values[first:last]
-            windows.append(Window(i, first, last, begin, candidate, spread, mode, which, t, y))
-        if last == len(time):
-            break
-        z, mode = motion.z[last - first].copy(), int(motion.mode[last - first])
-        first = last
-    wide = WIDE * np.append(np.where(sizes > 0, sizes, problem.system.scale_vector()), np.ones(len(memory)))
-    wide[n_u - 2 * len(problem.system.inputs) : n_u] = 0.0  # inputs are known
-    return [replace(window, spread=window.spread * wide) for window in windows]
+        which, clock = problem.unknowns.places[i], problem.clock(theta, i)
+        sizes = np.max(np.abs(np.nan_to_num(told)), axis=0)
+        time, mode, first, windows = record.time, problem.modes[i][0], 0, []
+        while first < len(time) - 1:
+            rest = time[-1] - time[first]
+            until = time[-1] if rest < 1.75 * length else time[first] + 1.25 * length
+            # at least two samples, across a gap that is longer than a window
+            end = max(int(np.searchsorted(time, until, "right")), first + 2)
+            known = np.append(np.isfinite(told[first]), np.zeros(len(memory), dtype=bool))
+            set_ = np.where(known, np.append(np.nan_to_num(told[first]), memory), z)
+            begin = float(time[first]) - early
+            for candidate in [z] if first == 0 and start is not None else [set_, z]:  # beyond a stop: as it was going
+                motion = problem.march(theta, i, begin, clock * (time[first:end] - early), candidate, mode)
+                if motion is not None:
+                    break
+            if motion is None:  # the samples of this window come back when windows are joined
+                first, mode = max(end - 1, first + 1), problem.modes[i][0]
+                continue
+            sizes = np.maximum(sizes, np.abs(motion.z[:, :n_u]).max(axis=0))
+            last = end if end == len(time) else first + _quiet(motion.time, motion.log.crossing_time, length)
+            spread = np.zeros(len(z)) if first == 0 and not free else np.append(np.ones(n_u), np.zeros(len(memory)))
+            if np.isfinite(record.values[first:last]).any():  # a gap is bridged where windows are joined
+                t, y = time[first:last], record.values[first:last]
+                windows.append(Window(i, first, last, begin, candidate, spread, mode, which, t, y))
+            if last == len(time):
+                break
+            z, mode = motion.z[last - first].copy(), int(motion.mode[last - first])
+            first = last
+        wide = WIDE * np.append(np.where(sizes > 0, sizes, problem.system.scale_vector()), np.ones(len(memory)))
+        wide[n_u - 2 * len(problem.system.inputs) : n_u] = 0.0  # inputs are known
+        found += [replace(window, spread=window.spread * wide) for window in windows]
+    return found
 
 
 def _lead(problem: Windows, theta: FloatArray, run: int) -> float:

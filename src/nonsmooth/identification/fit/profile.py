@@ -78,6 +78,8 @@ def profiled(
     covariance : array (p, p)
         That of the fit, by which the rise of chi^2 is scaled.
     """
+    import xarray as xr
+
     u, white, found = grown.problem.unknowns, np.diag(inverted(normal)[0]), []
     with progress(2 * len(names), "profiles", watched) as advance:
         for name in names:
@@ -91,7 +93,19 @@ def profiled(
             least = int(np.argmin(rows[:, 1]))  # a better fit than the best, where the sum of squares has corners
             profile = profile_of(rows[:, 0], rows[:, 1] - rows[least, 1], rows[least, 0])
             estimate = Estimate(float(grown.theta[i]), error, u.units[i])
-            found.append(_finding(grown, name, profile, estimate, synthetic))
+            ends = {"low": profile.low, "high": profile.high}
+            low, high = (f"{end:.4g}" if np.isfinite(end) else "no limit" for end in ends.values())
+            by_error = " to ".join(f"{end:.4g}" for end in estimate.interval())
+            note = f"{name}: 95 % limits {low} to {high} by its profile; {by_error} by its standard uncertainty"
+            if not np.isfinite(list(ends.values())).all():
+                note += "; the record does not bound it on both sides"
+            data = xr.Dataset(
+                {"cost": ("value", profile.cost), "best": ((), profile.best), **{k: ((), v) for k, v in ends.items()}},
+                {"value": ("value", profile.values, {"units": estimate.unit})},
+                {"parameter": name, "units": estimate.unit, "synthetic": "yes" if synthetic else "no"},
+            )
+            used = grown.readings, grown.runs, (note,)
+            found.append(Finding(f"{name}, profile", estimate, METHOD, *used, data=data, plot="profile"))
     return found
 
 
@@ -117,28 +131,3 @@ def _side(grown: Grown, i: int, step: float, scale: float) -> list[tuple[float, 
         if rise > _ENOUGH:
             break
     return rows
-
-
-def _finding(grown: Grown, name: str, profile: Profile, estimate: Estimate, synthetic: bool) -> Finding:
-    import xarray as xr
-
-    ends = {"low": profile.low, "high": profile.high}
-    low, high = (f"{end:.4g}" if np.isfinite(end) else "no limit" for end in ends.values())
-    by_error = " to ".join(f"{end:.4g}" for end in estimate.interval())
-    note = f"{name}: 95 % limits {low} to {high} by its profile; {by_error} by its standard uncertainty"
-    if not np.isfinite(list(ends.values())).all():
-        note += "; the record does not bound it on both sides"
-    return Finding(
-        f"{name}, profile",
-        estimate,
-        METHOD,
-        grown.readings,
-        grown.runs,
-        (note,),
-        data=xr.Dataset(
-            {"cost": ("value", profile.cost), "best": ((), profile.best), **{k: ((), v) for k, v in ends.items()}},
-            {"value": ("value", profile.values, {"units": estimate.unit})},
-            {"parameter": name, "units": estimate.unit, "synthetic": "yes" if synthetic else "no"},
-        ),
-        plot="profile",
-    )
