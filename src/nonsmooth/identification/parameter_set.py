@@ -89,7 +89,7 @@ class ParameterSet(Answering, Mapping[str, float]):
         ), ()
 
     def _beside(self) -> dict[str, Any]:
-        """What is said of the numbers, as arguments."""
+        """Findings and sentences that go with the numbers, as arguments."""
         held = {name: getattr(self, name) for name in ("findings", "notes", "anomalies", "synthetic")}
         return held | {"identifiability": dict(self.identifiability)}
 
