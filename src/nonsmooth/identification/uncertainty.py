@@ -158,13 +158,9 @@ def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = Non
     scale[scale == 0] = 1.0
     inverse = np.linalg.pinv((j / scale).T @ (j / scale))
     white = inverse * float(r @ r) / max(n - p, 1)
-    meat = np.zeros((p, p))
-    begin = 0
-    for length in lengths:
-        piece = slice(begin, begin + length)
-        score = (j[piece] / scale) * r[piece, None]
-        meat += newey_west(score, correlation_times(r[piece]))
-        begin += length
+    meat, ends = np.zeros((p, p)), np.cumsum(lengths)[:-1]
+    for left, score in zip(np.split(r, ends), np.split(j / scale * r[:, None], ends), strict=True):
+        meat += newey_west(score, correlation_times(left))
     found = not_below(inverse @ meat @ inverse * n / max(n - p, 1), white)
     result: FloatArray = found / np.outer(scale, scale)
     return result

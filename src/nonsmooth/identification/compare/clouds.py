@@ -148,8 +148,7 @@ def cloud_distance(
     pairs = [_halves(len(x), length, rng) for _ in range(splits)]
     size = int(pairs[0][0].sum())
     others = [_parts(len(y), length, size, rng) for _ in range(splits)]
-    left, right = (np.array([pair[i] for pair in pairs], dtype=float).T for i in (0, 1))
-    first, second = (np.array([pair[i] for pair in others], dtype=float).T for i in (0, 1))
+    (left, right), (first, second) = (np.array(rows, dtype=float).transpose(1, 2, 0) for rows in (pairs, others))
     to_left, to_right, to_first, to_second = xx @ left, xx @ right, yy @ first, yy @ second
     within, beyond = _mean(left, to_left, left), _mean(first, to_first, first)
     halves = _root(2 * _mean(left, to_right, right) - within - _mean(right, to_right, right))

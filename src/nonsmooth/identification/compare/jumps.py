@@ -93,31 +93,29 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
         ``jump_difference`` (theory minus measurement), ``jump_tolerance`` (both half steps together: the difference is
         not known better), and with draws ``theory_jump_low``, ``theory_jump_high``.
     """
-    rows: list[tuple[str, float, float, float, float, float]] = []
+    rows: list[tuple[str, AmplitudeJump, AmplitudeJump]] = []
+    nothing = AmplitudeJump(np.nan)
     for word in dict.fromkeys([*measured, *theory]):
         seen, expected = list(measured.get(word, ())), list(theory.get(word, ()))
         pairs = _pairs(seen, expected)
-        for i, jump in enumerate(seen):
-            other, step, *_ = expected[pairs[i]] if i in pairs else AmplitudeJump(np.nan)
-            rows.append((word, jump.value, other, jump.half + step, *_interval(other, word, drawn, level)))
-        for j in sorted(set(range(len(expected))) - set(pairs.values())):
-            other, step, *_ = expected[j]
-            rows.append((word, np.nan, other, step, *_interval(other, word, drawn, level)))
-    words, values, others, steps, lows, highs = zip(*rows, strict=True) if rows else ((),) * 6
-    m, t = np.array(values, dtype=float), np.array(others, dtype=float)
+        rows += [(word, jump, expected[pairs[i]] if i in pairs else nothing) for i, jump in enumerate(seen)]
+        rows += [(word, nothing, jump) for j, jump in enumerate(expected) if j not in pairs.values()]
+    (m, half), (t, step) = (np.array([row[k][:2] for row in rows], dtype=float).reshape(-1, 2).T for k in (1, 2))
     over = "jump"
     variables: dict[str, Any] = {
-        "jump_direction": labelled(over, np.array(words, dtype=str), "direction in which the jump is met"),
+        "jump_direction": labelled(
+            over, np.array([row[0] for row in rows], dtype=str), "direction in which the jump is met"
+        ),
         "measured_jump": labelled(over, m, "measured jump (NaN: none was seen)", unit),
         "theory_jump": labelled(over, t, "predicted jump (NaN: none is predicted)", unit),
         "jump_difference": labelled(over, t - m, "predicted minus measured jump", unit),
-        "jump_tolerance": labelled(over, np.array(steps, dtype=float), "half steps of both", unit),
+        "jump_tolerance": labelled(over, half + step, "half steps of both", unit),
     }
     if drawn:
-        for word, column in (("low", lows), ("high", highs)):
-            variables[f"theory_jump_{word}"] = labelled(
-                over, np.array(column, dtype=float), f"{word} end of the interval for drawn parameters", unit
-            )
+        ends = [_interval(jump.value, word, drawn, level) for word, _, jump in rows]
+        for end, column in zip(("low", "high"), np.array(ends, dtype=float).reshape(-1, 2).T, strict=True):
+            said = f"{end} end of the interval for drawn parameters"
+            variables[f"theory_jump_{end}"] = labelled(over, column, said, unit)
     return variables
 
 
