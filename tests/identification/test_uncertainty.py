@@ -8,7 +8,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.identification.arrow import Residuals, Unsettled, sandwich, settle
 from nonsmooth.identification.finding import Estimate
-from nonsmooth.identification.fit.profile import profile_of
+from nonsmooth.identification.fit.likelihood import limits_of
 from nonsmooth.identification.uncertainty import (
     correlated,
     coverage_factor,
@@ -97,14 +97,14 @@ def test_a_fit_whose_minimum_no_step_reaches_is_refused():
 
 def test_profile_of_a_parabola_gives_the_normal_interval():
     value = np.linspace(0.5, 1.5, 101)
-    profile = profile_of(value, ((value - 1.0) / 0.1) ** 2, 1.0)
-    assert (profile.low, profile.high) == pytest.approx((1 - 0.19600, 1 + 0.19600), abs=1e-3)
+    limits = limits_of(value, ((value - 1.0) / 0.1) ** 2, 1.0)
+    assert limits == pytest.approx((1 - 0.19600, 1 + 0.19600), abs=1e-3)
 
 
 def test_a_profile_that_does_not_rise_has_no_limit():
     value = np.linspace(0.1, 3, 59)
-    profile = profile_of(value, np.minimum(40 * (value - 1) ** 2, np.where(value > 1, 2.0, np.inf)), 1.0)
-    assert np.isnan(profile.high) and profile.low == pytest.approx(1 - np.sqrt(3.8415 / 40), abs=0.01)
+    low, high = limits_of(value, np.minimum(40 * (value - 1) ** 2, np.where(value > 1, 2.0, np.inf)), 1.0)
+    assert np.isnan(high) and low == pytest.approx(1 - np.sqrt(3.8415 / 40), abs=0.01)
 
 
 def test_what_is_not_determined_is_not_drawn() -> None:

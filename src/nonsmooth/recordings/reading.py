@@ -185,12 +185,9 @@ class Options:
                 read[name] = (texts,) if isinstance(texts, str) else tuple(texts)
                 if not all(isinstance(text, str) and text.strip() for text in read[name]):
                     raise TypeError(f"{name} must be a text or several, {name}='#N/A', got {texts!r}")
-        options = cls(**read)
-        options.check()
-        return options
+        return cls(**read)
 
-    def check(self) -> None:
-        """Refuse values that do not fit."""
+    def __post_init__(self) -> None:
         columns, axis, rate, decimal, marks = self.columns or {}, self.axis, self.rate, self.decimal, self.thousands
         if self.columns is not None and (not isinstance(columns, Mapping) or not columns):
             raise TypeError("columns must map our names to the file's, as {'time': 't', 'x': ('pos', 'mm')}")

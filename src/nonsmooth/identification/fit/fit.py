@@ -144,8 +144,8 @@ def fit(
     True
     """
     from nonsmooth.identification.fit.first_level import without_disagreeing
+    from nonsmooth.identification.fit.likelihood import posterior_of
     from nonsmooth.identification.fit.outcome import outcome
-    from nonsmooth.identification.fit.posterior import posterior_of
 
     problem = problem_of(system, recording, parameters, options, mode, loss, per_run, inputs)
     free, tries, seed, progress = options["free_start"], options["tries"], options["seed"], options["progress"]

@@ -12,8 +12,8 @@ from nonsmooth.identification.arrow import Sandwich, concerned, sandwich
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.first_level import BETTER
 from nonsmooth.identification.fit.growth import SHORT, Grown
+from nonsmooth.identification.fit.likelihood import profiled
 from nonsmooth.identification.fit.noise import OUTLYING, robust_size
-from nonsmooth.identification.fit.profile import profiled
 from nonsmooth.identification.fit.residuals import by_place, residual_data, steady_data
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.results.progress import Progress

@@ -1,0 +1,219 @@
+"""Likelihood about the optimum of a fit: profiles of unknowns, and their posterior by an ensemble sampler (emcee).
+
+In a profile an unknown is held beside its best value while all others, and the starts, follow.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+
+from nonsmooth.arrays import FloatArray
+from nonsmooth.errors import SolveError, not_installed
+from nonsmooth.identification.arrow import Unsettled, concerned, inverted, reduced, settle
+from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification.fit.growth import Grown
+from nonsmooth.identification.uncertainty import normal_draws
+from nonsmooth.results.progress import Progress, progress
+
+
+def limits_of(values: FloatArray, rise: FloatArray, best: float, *, level: float = 0.95) -> tuple[float, float]:
+    """Limits of a parameter at this level, by its rising values and the rise of chi^2 above its least, at ``best``.
+
+    A limit is NaN where chi^2 does not rise to 3.84 (95 %) within the values: the data do not bound the parameter
+    there.
+    """
+    from scipy.stats import chi2
+
+    bound, middle = float(chi2.ppf(level, 1)), int(np.argmin(np.abs(values - best)))
+    low = _crossed(values[middle::-1], rise[middle::-1], bound)
+    return low, _crossed(values[middle:], rise[middle:], bound)
+
+
+def _crossed(values: FloatArray, rise: FloatArray, bound: float) -> float:
+    """Value at which the rise of chi^2 from the best value passes the bound; NaN where it does not."""
+    over = np.flatnonzero(rise > bound)
+    if len(over) == 0 or over[0] == 0:
+        return float("nan")
+    i = int(over[0])
+    part = (bound - rise[i - 1]) / (rise[i] - rise[i - 1])
+    return float(values[i - 1] + part * (values[i] - values[i - 1]))
+
+
+_STEP = 0.5  # of a standard uncertainty
+_STEPS = 16  # on either side, at most
+_HIGH = 5.0  # rise of chi^2 beyond which no limit at 95 % lies
+PROFILED = (
+    "profile likelihood: the unknown is held while all others and the starts follow; the limits are where chi^2, over "
+    "the residuals' own correlation, has risen by 3.84 (Wilks 1938)"
+)
+
+
+def profiled(
+    grown: Grown, names: list[str], normal: FloatArray, covariance: FloatArray, synthetic: bool, watched: Progress
+) -> list[Finding]:
+    """A finding for each of these unknowns.
+
+    Parameters
+    ----------
+    normal : array (p, p)
+        The normal matrix, priors included; its inverse would be the covariance of white residuals.
+    covariance : array (p, p)
+        That of the fit, by which the rise of chi^2 is scaled.
+    """
+    import xarray as xr
+
+    u, white, found = grown.problem.unknowns, np.diag(inverted(normal)[0]), []
+    with progress(2 * len(names), "profiles", watched) as advance:
+        for name in names:
+            i = u.names.index(name)
+            error = float(np.sqrt(covariance[i, i]))
+            above: list[tuple[float, float]] = []
+            for sign in (-1.0, 1.0):
+                above += _side(grown, i, sign * error, float(white[i] / covariance[i, i]))
+                advance()
+            values, rise = np.array(sorted([*above, (float(grown.theta[i]), 0.0)])).T
+            best = values[np.argmin(rise)]  # a better fit than the best, where the sum of squares has corners
+            rise = rise - rise.min()
+            estimate = Estimate(float(grown.theta[i]), error, u.units[i])
+            ends = dict(zip(("low", "high"), limits_of(values, rise, best), strict=True))
+            low, high = (f"{end:.4g}" if np.isfinite(end) else "no limit" for end in ends.values())
+            by_error = " to ".join(f"{end:.4g}" for end in estimate.interval())
+            note = f"{name}: 95 % limits {low} to {high} by its profile; {by_error} by its standard uncertainty"
+            if not np.isfinite(list(ends.values())).all():
+                note += "; the record does not bound it on both sides"
+            data = xr.Dataset(
+                {"cost": ("value", rise), "best": ((), best), **{k: ((), v) for k, v in ends.items()}},
+                {"value": ("value", values, {"units": estimate.unit})},
+                {"parameter": name, "units": estimate.unit, "synthetic": "yes" if synthetic else "no"},
+            )
+            used = grown.readings, grown.runs, (note,)
+            found.append(Finding(f"{name}, profile", estimate, PROFILED, *used, data=data, plot="profile"))
+    return found
+
+
+def _side(grown: Grown, i: int, step: float, scale: float) -> list[tuple[float, float]]:
+    """Values of an unknown on one side and the rise of chi^2 there, up to where it is enough."""
+    problem, u = grown.problem, grown.problem.unknowns
+    theta, starts, least = grown.theta, grown.starts, problem.cost(grown.theta, grown.starts)
+    rows: list[tuple[float, float]] = []
+    for k in range(1, _STEPS + 1):
+        value = grown.theta[i] + k * _STEP * step
+        if not u.low[i] <= value <= u.high[i]:
+            break
+        theta = np.where(np.arange(len(theta)) == i, value, theta)
+        held = np.where(np.arange(len(theta)) == i, value, [u.low, u.high])
+        try:
+            theta, starts, _ = settle(replace(problem, unknowns=replace(u, low=held[0], high=held[1])), theta, starts)
+        except Unsettled as reason:
+            theta, starts = reason.values, reason.starts
+        rise = (problem.cost(theta, starts) - least) * scale
+        if not np.isfinite(rise):
+            break
+        rows.append((float(value), rise))
+        if rise > _HIGH:
+            break
+    return rows
+
+
+_MOST = 80  # unknowns and numbers of starts: beyond, an ensemble moves too slowly
+_BURNT = 0.25  # of the steps, before the ensemble has forgotten where it began
+_SPANNED = 50.0  # autocorrelation times that the steps should span
+SAMPLED = (
+    "affine-invariant ensemble of walkers (Goodman and Weare 2010; Foreman-Mackey et al. 2013), started about the "
+    "optimum; noise and its correlation as the fit has found them, all starts among the unknowns"
+)
+
+
+def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Finding:
+    """Draws of the unknowns from their posterior; a note says whether there are enough.
+
+    Raises
+    ------
+    ImportError
+        Without emcee.
+    SolveError
+        Windows so many that an ensemble does not move, or a direction that nothing determines.
+    """
+    import xarray as xr
+
+    try:
+        import emcee
+    except ImportError as error:
+        raise ImportError(f"a posterior needs {not_installed('emcee', 'posterior')}") from error
+
+    problem, u = grown.problem, grown.problem.unknowns
+    p = len(grown.theta)
+    at = [(i, k) for i, window in enumerate(problem.pieces) for k in window.free]
+    size = p + len(at)
+    if size > _MOST:
+        raise SolveError(
+            f"a posterior over {size} numbers ({p} unknowns and the starts of {len(problem.pieces)} windows) does not "
+            f"mix; at most {_MOST}: fit a shorter part of the record"
+        )
+    weights = problem.weights(problem.residuals(grown.theta, grown.starts))
+
+    def log_density(x: FloatArray) -> float:
+        theta, starts = x[:p], grown.starts.copy()
+        if (theta < u.low).any() or (theta > u.high).any():
+            return -np.inf
+        for value, place in zip(x[p:], at, strict=True):
+            starts[place] = value
+        found = -0.5 * problem.cost(theta, starts, weights)
+        return found if np.isfinite(found) else -np.inf
+
+    rng = np.random.default_rng(seed)
+    walkers = 2 * size + 2
+    begin = _drawn(grown, weights, at, walkers, rng)
+    sampler = emcee.EnsembleSampler(walkers, size, log_density)
+    generator = np.random.RandomState(int(rng.integers(2**32)))  # of the kind that emcee takes
+    first = emcee.State(begin, random_state=generator.get_state())
+    with progress(steps, "posterior", watched) as advance:
+        for _ in sampler.sample(first, iterations=steps):
+            advance()
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        tau = float(np.max(sampler.get_autocorr_time(tol=0)))
+    thin = max(1, int(tau / 5)) if np.isfinite(tau) else 1
+    draws = sampler.get_chain(discard=int(_BURNT * steps), thin=thin, flat=True)[:, :p]
+    rows = {
+        name: Estimate(float(np.mean(draws[:, i])), float(np.std(draws[:, i], ddof=1)), u.units[i])
+        for i, name in enumerate(u.names)
+    }
+    notes = [
+        f"{walkers} walkers, {steps} steps, the first {_BURNT:.0%} left out, every {thin}th kept; the chains forget "
+        f"within {tau:.3g} steps"
+    ]
+    if not steps > _SPANNED * tau:
+        notes.append(f"too few steps for the chains' memory: take {_SPANNED * tau:.0f} or more")
+    (_, estimate), *others = rows.items()
+    data = xr.Dataset(
+        {"value": (("draw", "parameter"), draws, {"long_name": "draws from the posterior"})},
+        {"parameter": list(u.names), "unit": ("parameter", list(u.units))},
+    )
+    return Finding("posterior", estimate, SAMPLED, grown.readings, grown.runs, tuple(notes), dict(others), data=data)
+
+
+def _drawn(
+    grown: Grown, weights: list[FloatArray], at: list[tuple[int, int]], count: int, rng: np.random.Generator
+) -> FloatArray:
+    """First places of the walkers: from the normal law of the unknowns and the starts about the optimum."""
+    problem, u, p = grown.problem, grown.problem.unknowns, len(grown.theta)
+    state = problem.derivatives(grown.theta, grown.starts)
+    normal, _, back = reduced(problem, state, weights, p)
+    covariance = inverted(normal + u.precision)[0]
+    if (loose := grown.loose(state)).size:
+        names = ", ".join(u.names[i] for i in np.flatnonzero(concerned(loose).any(axis=1)))
+        raise SolveError(f"the records do not determine {names}: give a prior or a value, then sample")
+    steps = normal_draws(np.zeros(p), covariance, count, rng)
+    found = np.empty((count, p + len(at)))
+    found[:, :p] = np.clip(grown.theta + steps, u.low, u.high)
+    for row, step in zip(found, steps, strict=True):
+        starts = grown.starts.copy()
+        for i, (inverse, cross, _) in enumerate(back):
+            own = inverse @ rng.standard_normal(len(inverse))
+            starts[i] += own - inverse @ (cross @ step[problem.pieces[i].which])
+        row[p:] = [starts[place] for place in at]
+    return found
