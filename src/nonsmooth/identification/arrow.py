@@ -144,6 +144,10 @@ def settle(
     def cost(now: Residuals, at: FloatArray) -> float:
         return now.chi2(weights, used) + float((at - u.centre) @ prior @ (at - u.centre))
 
+    def unsettled(why: str) -> Unsettled:
+        said = f"the fit over {len(problem.pieces)} pieces did not settle{why}"
+        return Unsettled(said, distance, rest, theta, starts)
+
     best = cost(state, theta)
     for _ in range(iterations):
         while True:
@@ -161,14 +165,9 @@ def settle(
                 distance, rest = _distance(problem, state, weights, used, theta, prior)
                 if (far := float(np.max(distance))) < _ACCURACY or rough:
                     return theta, starts, state
-                raise Unsettled(
-                    f"the fit over {len(problem.pieces)} pieces did not settle: no step lowers the sum of squares, "
-                    f"though its minimum should be {far:.2g} standard uncertainties away; look at the records for "
-                    "jumps",
-                    distance,
-                    rest,
-                    theta,
-                    starts,
+                raise unsettled(
+                    f": no step lowers the sum of squares, though its minimum should be {far:.2g} standard "
+                    "uncertainties away; look at the records for jumps"
                 )
         theta, starts, gain, best = theta + step, moved, best - found, found
         state = problem.derivatives(theta, starts)
@@ -180,13 +179,7 @@ def settle(
         damping = max(damping / 10, 1e-9)
     if rough:
         return theta, starts, state
-    raise Unsettled(
-        f"the fit over {len(problem.pieces)} pieces did not settle in {iterations} iterations",
-        distance,
-        rest,
-        theta,
-        starts,
-    )
+    raise unsettled(f" in {iterations} iterations")
 
 
 def _distance(

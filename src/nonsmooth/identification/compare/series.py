@@ -27,11 +27,6 @@ _NUMBER = "period number (0: none found, -1: too few turns)"
 FEW = 6  # turns of the drive below which no period number is sought
 
 
-def section_points(motion: xr.Dataset) -> FloatArray:
-    """Points of a measured motion at phase 0, one for each whole period of the drive: (periods, states)."""
-    return fold(motion["phase"].values, motion["u"].values, 8)[:, 0]
-
-
 def _period_of(motion: xr.Dataset, points: FloatArray, longest: int) -> int:
     """The period number of a motion's section points; 0: none found, -1: too few turns."""
     enough = np.isfinite(points).all(axis=1).sum() >= FEW
@@ -167,7 +162,7 @@ def measured_sections(
     import xarray as xr
 
     order = np.argsort(values, kind="stable")
-    clouds = [section_points(motions[i]) for i in order]
+    clouds = [fold(motions[i]["phase"].values, motions[i]["u"].values, 8)[:, 0] for i in order]
     points = np.full((len(clouds), max(map(len, clouds)), clouds[0].shape[1]), np.nan)
     for row, cloud in zip(points, clouds, strict=True):
         row[: len(cloud)] = cloud
