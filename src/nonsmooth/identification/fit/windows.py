@@ -7,6 +7,7 @@ moved from where it was set, in units of a spread so wide that it only matters f
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -135,19 +136,31 @@ class Windows:
 
     def sensor_values(self, theta: FloatArray, run: int) -> dict[str, Sensor]:
         """The sensors in a run at these values of the unknowns."""
-        found, u = dict(self.sensors), self.unknowns
-        for i, (quantity, what) in zip(u.places[run][len(u.active) :], u.sensors, strict=False):
-            value: Any = float(theta[i]) or (1e-300 if what == "gain" else 0.0)
-            found[quantity] = replace(found[quantity], **{what: value})
-        return found
+        return self._at(theta, run)[1]
 
     def values(self, theta: FloatArray, run: int) -> FloatArray | None:
         """The system's parameters in a run; None where its equations do not allow them."""
-        own = dict(zip(self.unknowns.active, map(float, theta[self.unknowns.places[run]]), strict=False))
-        try:
-            return self.system.with_parameters({**own, **self.runs[run].settings}).parameter_vector()
-        except (SystemDefinitionError, ValueError):
-            return None
+        return self._at(theta, run)[0]
+
+    def _at(self, theta: FloatArray, run: int) -> tuple[FloatArray | None, dict[str, Sensor]]:
+        """The system's parameters and the sensors in a run; kept, since many windows ask at the same unknowns."""
+        u, key = self.unknowns, theta.tobytes()
+        if run in self._kept and self._kept[run][0] == key:
+            return self._kept[run][1:]
+        sensors = dict(self.sensors)
+        for i, (quantity, what) in zip(u.places[run][len(u.active) :], u.sensors, strict=False):
+            value: Any = float(theta[i]) or (1e-300 if what == "gain" else 0.0)
+            sensors[quantity] = replace(sensors[quantity], **{what: value})
+        own = dict(zip(u.active, map(float, theta[u.places[run]]), strict=False))
+        values: FloatArray | None = None
+        with suppress(SystemDefinitionError, ValueError):
+            values = self.system.with_parameters({**own, **self.runs[run].settings}).parameter_vector()
+        self._kept[run] = key, values, sensors
+        return values, sensors
+
+    @cached_property
+    def _kept(self) -> dict[int, tuple[bytes, FloatArray | None, dict[str, Sensor]]]:
+        return {}
 
     @property
     def runs(self) -> list[Record | SteadyReadings]:
