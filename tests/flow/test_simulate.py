@@ -170,6 +170,18 @@ def test_a_run_goes_on_from_a_result(method: str) -> None:
     assert second["crossing_time"].size + first["crossing_time"].size == whole["crossing_time"].size
 
 
+def test_instants_at_the_ends_of_a_run_may_be_off_by_rounding() -> None:
+    system = ns.mechanical(1.0, 0.2, 4.0, parameters={"w": 0.7}, forcing={"q": lambda t, p: np.cos(p.w * t)})
+    period = system.period()
+    assert period is not None
+    instants = np.linspace(1000 * period, 1100 * period, 301) * (1 - 4e-16)
+    assert instants[0] < 1000 * period
+    run = ns.simulate(system, periods=100, transient=1000, samples=instants)
+    assert run.sizes["time"] == 301
+    with pytest.raises(ValueError, match="lie outside the recorded time"):
+        ns.simulate(system, periods=100, transient=1000, samples=instants - 1e-6)
+
+
 def test_memory_and_mode_of_a_result_are_a_start() -> None:
     """A switch with hysteresis: up at x > 1, down at x < -1; in between only the mode tells. Memory counts. (A second
     state and a force of size 0: a shape of code that is there.)"""

@@ -209,6 +209,10 @@ def test_a_number_of_a_function_and_bounds() -> None:
     c = band["drawn_c"].values
     assert c.min() > 0.5 and c.max() < 1.2 and c.max() - c.min() > 0.4
     np.testing.assert_allclose(band["value_quantiles"], np.quantile(c**2, [0.025, 0.5, 0.975]), rtol=1e-12)
+    array = ns.propagate(
+        found, lambda one: xr.DataArray(one.values["c"] ** 2), s, draws=50, bounds={"c": (0.5, 1.2)}, **QUIET
+    )
+    np.testing.assert_array_equal(array["value_quantiles"], band["value_quantiles"])
 
 
 def test_draws_that_fail_are_counted() -> None:

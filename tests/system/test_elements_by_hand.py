@@ -153,3 +153,19 @@ def test_a_motion_that_begins_at_the_edge_of_a_play_enters_it(method: str) -> No
         w = np.sqrt(10.0)
         exact = side * (0.2 + 0.3 / w * np.sin(0.5 * w)), side * 0.3 * np.cos(0.5 * w)
         np.testing.assert_allclose(run.u.values[-1], exact, atol=1e-7 if method == "rkf45" else 1e-12)
+
+
+@pytest.mark.parametrize("method", ["auto", "taylor"])
+def test_a_mass_leaves_its_plate_where_its_friction_turns_round(method: str) -> None:
+    """At the top of a plate that goes down with .85: pulled by 1 and held by .3, the mass falls with .7."""
+    plate = ns.elements.Stop(at="q", side=-1, position=lambda t, u, p: 0.85 / p.w**2 * np.cos(p.w * t - p.late))
+    rail = ns.elements.Coulomb(at="q", friction=0.3)
+    table = {"w": 1.0, "late": 0.5}
+    system = ns.mechanical(1.0, 0, 0, forcing={"q": -1.0}, parameters=table, elements={"plate": plate, "rail": rail})
+    for seed in range(30):
+        w, late = np.random.default_rng(seed).uniform([0.5, 0.5], [3.0, 1.5])
+        size, top = 0.85 / w**2, late / w
+        start = {"q": size * np.cos(late), "v_q": size * w * np.sin(late)}
+        run = ns.simulate(system.with_parameters(w=w, late=late), duration=top + 0.2 / w, start=start, method=method)
+        fall = 0.7 * np.array([0.5 * 0.04 / w**2, 0.2 / w])
+        np.testing.assert_allclose(run.u.values[-1], [size - fall[0], -fall[1]], atol=1e-12)

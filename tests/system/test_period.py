@@ -28,6 +28,8 @@ def forced(force, period=None, **parameters):
         (lambda t, u, p: np.cos(1.1 * t) + np.cos(3.3 * t), 2 * np.pi / 1.1),
         (lambda t, u, p: np.cos(p.w * t / 3) ** 3 + np.exp(np.sin(p.w * t / 2)), 12 * np.pi / 3),
         (lambda t, u, p: np.cos(np.pi * t), 2.0),
+        (lambda t, u, p: np.cos(p.w * t - p.b), 2 * np.pi / 3),  # SymPy has it as cos(b - w t)
+        (lambda t, u, p: np.sin(p.b - p.w * t) + np.cos(2 * p.w * t - p.b), 2 * np.pi / 3),
         (lambda t, u, p: np.cos((p.w + p.b) * t) + np.cos(2 * (p.b + p.w) * t), 2 * np.pi / 3.7),
     ],
 )

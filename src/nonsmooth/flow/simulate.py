@@ -190,12 +190,13 @@ def _instants(samples: Any, t_begin: float, t_end: float, period: float | None, 
     instants = float_array(samples, "samples")
     if instants.ndim != 1 or not np.isfinite(instants).all() or (np.diff(instants) <= 0).any():
         raise ValueError("samples must be a number, or increasing finite instants")
-    if len(instants) and (instants[0] < t_begin or instants[-1] > t_end * (1 + 1e-15)):
+    rounding = 1e-12 * max(abs(t_begin), abs(t_end))
+    if len(instants) and (instants[0] < t_begin - rounding or instants[-1] > t_end + rounding):
         raise ValueError(
             f"samples from {instants[0]:.6g} to {instants[-1]:.6g} lie outside the recorded time "
             f"{t_begin:.6g} ... {t_end:.6g}; they are instants, in time and not in periods"
         )
-    return np.minimum(instants, t_end)
+    return np.clip(instants, t_begin, t_end)
 
 
 def check_complete(log: TrajectoryLog, system: System, state: State, period: float | None) -> None:

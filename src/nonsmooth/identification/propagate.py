@@ -188,14 +188,14 @@ class _Call:
             if coarse:  # said once, of the parameters found
                 warnings.simplefilter("ignore")
             result = self.verb(first, *self.args, **options)
-        if hasattr(result, "to_dataset"):
+        if isinstance(result, xr.DataArray):
+            result = result.to_dataset(name=result.name or "value")
+        elif hasattr(result, "to_dataset"):
             result = result.to_dataset()
         if isinstance(result, int | float | np.number):
             result = xr.Dataset({"value": ((), float(result))})
         if isinstance(result, Mapping) and not isinstance(result, xr.Dataset):
             result = xr.Dataset({name: ((), float(value)) for name, value in result.items()})
-        if isinstance(result, xr.DataArray):
-            result = result.to_dataset(name=result.name or "value")
         if not isinstance(result, xr.Dataset):
             given = type(result).__name__
             raise TypeError(f"the verb returned {given}; propagate takes Datasets, numbers and mappings of numbers")

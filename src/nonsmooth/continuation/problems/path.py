@@ -135,6 +135,7 @@ class Walk:
         answers = [jumps[self.fired[i]].rows != jumps[visits[i].transition].rows for i in self.conditional]
         self.alone = np.array(shooting.alone, dtype=bool)[self.conditional] | np.array(answers, dtype=bool)
         self.instants = np.flatnonzero(self.at_once)
+        self.answered = [v.transition >= 0 and jumps[v.transition].kind == FOUND for v in visits]
         self.every = np.arange(m)
         self.nothing = np.where((self.every == 0) | (self.every == m - 1), PASSED, NOTHING)
 
@@ -216,10 +217,10 @@ class Walk:
         """Margins where the visits begin; -inf for those that are ``zero`` there."""
         held = np.where(self.armed & ~zero, begin, -np.inf)
         held[0] = -np.inf
-        for i in self.instants:  # what happens at once must hold; the others: ``elsewhere``
+        for i in self.instants:  # what happens at once must hold; the others: ``elsewhere``; of an answer what follows
             k = self.fired[i]
             held[i] = -np.inf
-            if self.net.row_start[k] < self.net.row_start[k + 1]:
+            if self.net.row_start[k] < self.net.row_start[k + 1] and not self.answered[i]:
                 held[i, k] = 0.0 if zero[i, k] else -begin[i, k]
         return held
 

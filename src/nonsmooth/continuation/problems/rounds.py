@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.continuation.problems.signature import Round, Signature, Visit
+from nonsmooth.continuation.problems.signature import AT_ONCE, Round, Signature, Visit
 from nonsmooth.continuation.problems.visits import anchored, led, round_of, visits_of
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
@@ -117,7 +117,7 @@ class Rounds:
         once = None if log is None else round_of(self.flow, values, log, z, mode, period, self.period_number)
         if log is None or once is None:
             return None
-        first = self._behind(once)
+        first = self._behind(once, values)
         section, memory = np.nan_to_num(log.sample_u[0]), log.sample_memory[0]
         if first < len(once.times) and once.times[first] - period < ROUNDING * period:  # a transition at the section
             section, memory = np.nan_to_num(log.u_before[first]), once.states[first, len(section) :]
@@ -125,10 +125,17 @@ class Rounds:
         found.times = np.maximum(found.times, 0.0)
         return found
 
-    def _behind(self, once: Round) -> int:
-        """The first visit that ends at the section or behind it: a phase of 0 is at the section, whatever rounding."""
+    def _behind(self, once: Round, values: FloatArray) -> int:
+        """The first visit that ends at the section or behind it, whatever rounding: what happens at phase 0, with what
+        follows at once, is before it."""
+        before = True
         for j, visit in enumerate(once.signature.crossings):
-            if visit.turn >= self.period_number if visit.row == -1 else once.times[j] >= once.period:
+            if visit.row == -1:
+                turn = visit.turn + self.flow.phase(values, visit.transition)[0]
+                before = bool(turn <= self.period_number)
+            elif visit.row != AT_ONCE:
+                before = bool(once.times[j] < once.period)
+            if not before:
                 return j
         return len(once.times)
 

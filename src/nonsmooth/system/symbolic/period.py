@@ -77,8 +77,9 @@ def _collect(e: sp.Expr, t: sp.Symbol, parameters: set[sp.Symbol], found: list[s
         argument = sp.expand(e.args[0])
         slope = argument.diff(t)
         if t not in slope.free_symbols and slope.free_symbols <= parameters:
-            if slope not in found:
-                found.append(slope)
+            size = -slope if slope.could_extract_minus_sign() else slope  # SymPy writes cos(w t - c) as cos(c - w t)
+            if size not in found:
+                found.append(size)
             return True
     return bool(e.args) and all(_collect(part, t, parameters, found) for part in e.args)
 
