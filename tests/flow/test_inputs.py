@@ -226,6 +226,23 @@ def test_derivatives_through_an_impact_that_a_jump_of_speed_begins() -> None:
     np.testing.assert_allclose(found.P.sel(parameter="late")[:2], [-0.75 + left, 1.0], atol=1e-12)
 
 
+def test_derivatives_of_a_start_at_rest_on_a_plate_that_comes_up() -> None:
+    """It is struck at once: v = (1 + e) .5 - t behind it, where it begins at rest by name."""
+    system = ns.mechanical(
+        1.0,
+        0.0,
+        0.0,
+        forcing={"q": -1.0},
+        parameters={"e": 0.5},
+        inputs={"y": ""},
+        elements={"plate": ns.elements.Stop(at="q", side=-1, position=lambda t, u, p: p.y, restitution="e")},
+    )
+    plate = {"y": ([0, 2], [0.0, 1.0])}
+    found = ns.sensitivity(system, duration=0.2, mode="plate_rest", parameters=["e"], inputs=plate)
+    np.testing.assert_allclose(found.end[:2], [0.75 * 0.2 - 0.02, 0.75 - 0.2], atol=1e-13)
+    np.testing.assert_allclose(found.P.sel(parameter="e")[:2], [0.5 * 0.2, 0.5], atol=1e-12)
+
+
 def test_a_belt_whose_speed_jumps_past_that_of_the_block_turns_the_friction_at_once() -> None:
     """v falls by .5 t; the belt runs at 2 until t = 1 and then at -2: friction acts the other way at v = .5."""
     belt = ns.elements.Coulomb(at="q", friction=0.5, belt=lambda t, u, p: p.y)

@@ -214,10 +214,11 @@ def settled(
         mode = flow.traced.transitions[chain[-1]].target if chain else start[0]
         visited = {start[0], *(flow.traced.transitions[k].target for k in chain)}
         for k, jump in enumerate(flow.traced.transitions):
-            if jump.source != mode or jump.target in visited or jump.at is not None:
+            again = jump.target in visited and (jump.target != mode or jump.reset is None)  # an impact may lead back
+            if jump.source != mode or again or k in chain or jump.at is not None:
                 continue
             if jump.target == first[0]:
-                found = flow.jump(values, (*chain, k), t, start[1])
+                found = flow.jump(values, (*chain, k), t, start[1], at_change=True)
                 # a start within a forcing period is known to the rounding of its time
                 if (np.abs(found.z_after - first[1]) <= 1e-10 * (flow.scale + np.abs(first[1]))).all():
                     return found

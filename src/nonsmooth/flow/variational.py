@@ -165,9 +165,9 @@ class VariationalFlow:
     ) -> Jump:
         """Transition ``k`` at (t, z), or several that are taken there one after the other.
 
-        ``row`` is the row of the (first) condition that is zero there, -1: the nearest to it; ``at_change``: a change
-        of inputs brings all of them about. For a transition at a
-        given phase t must be the time since the orbit's beginning: dt/dp = (t / T) dT/dp + T d(at)/dp.
+        ``row`` is the row of the (first) condition that is zero there, -1: the nearest to it; ``at_change``: a start
+        or a change of inputs brings all of them about. For a transition at a given phase t must be the time since the
+        orbit's beginning: dt/dp = (t / T) dT/dp + T d(at)/dp.
         """
         from nonsmooth.kernels.tangent.legs import Crossing, cross
 
