@@ -12,7 +12,7 @@ within a piece.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -46,10 +46,25 @@ class Residuals:
         return sum(each, float(self.alone @ self.alone))
 
 
-#: A problem: ``pieces``, each with ``which``, ``n_free``, ``by_instant`` and ``correlation``; ``unknowns`` with bounds
-#: ``low`` and ``high`` and the ``precision`` of what is known about ``centre``; of parameters and starts ``residuals``
-#: and ``derivatives`` (both `Residuals`), and of a state ``weights``, one over each residual's standard deviation.
-Problem = Any
+class Problem(Protocol):
+    """Problem that the iteration and the covariance take: pieces, each with its start, and their residuals."""
+
+    @property
+    def pieces(self) -> Any:
+        """Each with ``which``, ``n_free``, ``by_instant`` and ``correlation``."""
+
+    @property
+    def unknowns(self) -> Any:
+        """With the bounds ``low`` and ``high``, and the ``precision`` of what is known about ``centre``."""
+
+    def residuals(self, theta: FloatArray, starts: FloatArray) -> Residuals:
+        """Residuals of all pieces."""
+
+    def derivatives(self, theta: FloatArray, starts: FloatArray) -> Residuals:
+        """The same with derivatives in the parameters of each piece and in its start."""
+
+    def weights(self, state: Residuals) -> list[FloatArray]:
+        """One over each residual's standard deviation."""
 
 
 class Unsettled(SolveError):

@@ -1,7 +1,8 @@
 """Random chains of masses with contacts, belts, plays and preloads: the exact flow, Taylor series, and restarted runs.
 
 The exact flow and the series share the loop over transitions, and nothing of a step, a crossing or a zero. A course
-given by samples is compared with runs that begin anew at each sample, the course being a function of time there.
+given by samples is compared with runs that begin anew at each sample, the course being a function of time there. Closed
+forms of single cases stand in ``test_inputs`` and ``system/test_elements_by_hand``.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ import pytest
 
 import nonsmooth as ns
 
-pytestmark = pytest.mark.physics
 E = ns.elements
 BY_METHOD = (0, 6, 13, 28, 29, 1)  # all but the last disagreed, or ended, before zero was judged by the size of terms
 BY_RESTARTS = (0, 2, 11, 12, 29, 1)  # before jumps of inputs were followed
