@@ -30,12 +30,8 @@ if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 DIVERGENCE = 1e9  # in units of a state's scale
-KINDS = {  # place 4 of ``Net.transitions``
-    ALONE: places.ALONE,
-    OWN: places.OWN,
-    ASKS_BEHIND: places.ASKS_BEHIND,
-    FOUND: places.ANSWER,
-}
+# Place 4 of ``Net.transitions``
+KINDS = {ALONE: places.ALONE, OWN: places.OWN, ASKS_BEHIND: places.ASKS_BEHIND, FOUND: places.ANSWER}
 #: Called by the thread of a run whenever it pauses.
 at_pause: list[Callable[[], None]] = []
 SPARE = 64  # crossings that one leg may add to a log
