@@ -1,9 +1,10 @@
-"""`Input`: a measured or chosen function of time that drives a run, held or linear between its samples."""
+"""`Input`: a measured or chosen function of time that drives a run: held, linear or smooth between its samples."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import factorial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -23,15 +24,16 @@ if TYPE_CHECKING:
 @checked
 @dataclass(frozen=True, eq=False)
 class Input:
-    """Samples of an input of a system: linear between them, or held until the next.
+    """Samples of an input of a system: linear between them, held until the next, or on a smooth curve.
 
     Parameters
     ----------
     time, values : array
         Instants, increasing, and the input there. Before the first and behind the last sample the nearest value holds.
         For a fit the name of a channel of the recording alone: ``Input("motor force", delay="late")``.
-    between : {"linear", "steps"}
-        The course between samples.
+    between : {"linear", "steps", "smooth"}, optional
+        The course between samples; ``"smooth"`` is a cubic spline (of ends "not a knot"), for inputs that are declared
+        as ``(unit, "smooth")`` and by default taken for such. Others are linear by default.
     delay : float or str
         The input acts so much later than its samples say; the name of a parameter of the system, so that it can be
         found by a fit.
@@ -48,7 +50,7 @@ class Input:
 
     time: Any
     values: Any = None
-    between: Literal["linear", "steps"] = "linear"
+    between: Literal["linear", "steps", "smooth"] | None = None
     delay: float | str = 0.0
 
     def __post_init__(self) -> None:
@@ -73,13 +75,18 @@ class Input:
             array.flags.writeable = False
             object.__setattr__(self, name, array)
 
-    def course(self, delay: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Instants of change, values and rates behind them."""
+    def course(self, delay: float, width: int) -> tuple[FloatArray, FloatArray]:
+        """Instants of change (K,), and the value and its derivatives behind them (K, ``width``)."""
         t, y = self.time + delay, self.values
-        rates = np.zeros(len(t))
-        if self.between == "linear":
-            rates[:-1] = np.diff(y) / np.diff(t)
-        return t, y, rates
+        found = np.zeros((len(t), width))
+        found[:, 0] = y
+        if self.between == "smooth" and len(t) > 1:
+            from scipy.interpolate import CubicSpline
+
+            found[:-1] = CubicSpline(t, y).c[::-1].T * [1.0, 1.0, 2.0, 6.0]
+        elif self.between == "linear":
+            found[:-1, 1] = np.diff(y) / np.diff(t)
+        return t, found
 
     def data(self) -> dict[str, Any]:
         """The input as data that a result can record."""
@@ -92,7 +99,8 @@ class Driven:
 
     def __init__(self, system: System, inputs: Mapping[str, Input]) -> None:
         self.inputs = {name: inputs[name] for name in system.inputs}
-        self.first = len(system.states) - 2 * len(system.inputs)
+        self.first = system._description.n_own
+        self.widths = [len(states) for states in system._description.driven.values()]
         self._known: dict[tuple[float, ...], DelayedInputs] = {}
 
     def at(self, values: Mapping[str, float]) -> DelayedInputs:
@@ -114,35 +122,30 @@ class DelayedInputs:
     ----------
     times : array (K,)
         Instants at which an input changes.
-    table : array (K, 2 m)
-        Values and rates of all m inputs behind them.
+    table : array (K, states)
+        The states of all m inputs behind them.
     own : array (K, m) of bool
         Those that change there; the others go on.
     """
 
     def __init__(self, drive: Driven, delays: Sequence[float]) -> None:
         self.first, self.delays = drive.first, [one.delay for one in drive.inputs.values()]
-        courses = [one.course(delay) for one, delay in zip(drive.inputs.values(), delays, strict=True)]
-        self.times = courses[0][0] if len(courses) == 1 else np.unique(np.concatenate([t for t, _, _ in courses]))
-        self.table = np.empty((len(self.times), 2 * len(courses)))
-        self.own = np.empty((len(self.times), len(courses)), dtype=bool)
-        for i, (t, y, rate) in enumerate(courses):
-            at = np.searchsorted(t, self.times, "right") - 1
-            k = np.maximum(at, 0)
-            slope = np.where(at >= 0, rate[k], 0.0)
-            self.table[:, 2 * i] = y[k] + slope * (self.times - t[k])
-            self.table[:, 2 * i + 1] = slope
-            self.own[:, i] = self.times == t[k]
+        self.of = np.repeat(np.arange(len(delays)), drive.widths)  # the input of each state
+        given = zip(drive.inputs.values(), delays, drive.widths, strict=True)
+        self.courses = [one.course(delay, width) for one, delay, width in given]
+        self.times = np.unique(np.concatenate([t for t, _ in self.courses]))
+        self.table = self.at(self.times)
+        self.own = np.stack([np.isin(self.times, t) for t, _ in self.courses], axis=1)
 
-    def at(self, time: float) -> FloatArray:
-        """Values and rates of all inputs just behind an instant."""
-        k = int(np.searchsorted(self.times, time, "right")) - 1
-        found: FloatArray = self.table[max(k, 0)].copy()
-        if k < 0:
-            found[1::2] = 0.0
-        else:
-            found[::2] += found[1::2] * (time - self.times[k])
-        return found
+    def at(self, times: Any) -> FloatArray:
+        """The states (..., n) of all inputs just behind some instants (...)."""
+        found = []
+        for t, course in self.courses:
+            k = np.searchsorted(t, times, "right") - 1
+            behind = np.where(k >= 0, times - t[k], 0.0)
+            rows = [np.where((k >= 0) | (i == 0), course[np.maximum(k, 0), i], 0.0) for i in range(course.shape[1])]
+            found += [sum(row * behind**i / factorial(i) for i, row in enumerate(rows[j:])) for j in range(len(rows))]
+        return np.stack(found, axis=-1)
 
     def changes(self, begin: float, until: float) -> Changes:
         """The changes between two instants, the ends left out."""
@@ -152,10 +155,9 @@ class DelayedInputs:
     def by_delays(self, flow: VariationalFlow, rates: FloatArray) -> FloatArray:
         """Derivatives (..., n, n_active) of the states that are inputs in the active parameters: in their delays."""
         found = np.zeros((*rates.shape[:-1], flow.n, flow.n_active))
-        for i, delay in enumerate(self.delays):
-            if delay in flow.active:
-                k = self.first + 2 * i
-                found[..., k, flow.active.index(str(delay))] = -rates[..., k]
+        for k, i in enumerate(self.of, start=self.first):
+            if self.delays[i] in flow.active:
+                found[..., k, flow.active.index(str(self.delays[i]))] = -rates[..., k]
         return found
 
     def moved(self, flow: VariationalFlow, times: FloatArray) -> tuple[BoolArray, BoolArray]:
@@ -184,7 +186,7 @@ class DelayedInputs:
         for j, some in enumerate(self.moved(flow, times)[1].T):
             if some.any():
                 z = states[0][some]
-                others = self.first + np.flatnonzero(np.repeat([delay != flow.active[j] for delay in self.delays], 2))
+                others = self.first + np.flatnonzero([self.delays[i] != flow.active[j] for i in self.of])
                 z[:, others] = states[1][some][:, others]
                 found[some, j] = flow.segments(values, modes[some], times[some], np.zeros(len(z)), z).f_begin
         return found
@@ -255,6 +257,14 @@ def driven(system: System, given: Any) -> Driven | None:
                     raise TypeError(f"inputs[{name!r}] is an array over its time: give (y.time, y) of such a y")
                 raise TypeError(f"inputs[{name!r}] = {shortened(one)}: give (time, values) or ns.Input(...)")
             one = Input(*one)
+        smooth = len(system._description.driven[name]) > 2
+        if one.between is None:
+            one = replace(one, between="smooth" if smooth else "linear")
+        elif one.between == "smooth" and not smooth:
+            raise ValueError(
+                f"inputs[{name!r}] is smooth between its samples, which {system.name!r} has to know: declare it with "
+                f"ns.System(..., inputs={{{name!r}: ({system.inputs[name]!r}, 'smooth')}})"
+            )
         if isinstance(one.time, str):
             raise ValueError(
                 f"inputs[{name!r}] names the channel {one.time!r}, which fit takes from its recording; here give its "

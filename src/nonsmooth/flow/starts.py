@@ -92,7 +92,7 @@ def plain_start(system: System, start: Any) -> Any:
     """``start`` as data that a result can record: arrays and results as lists of numbers."""
     if isinstance(start, Mapping) and not hasattr(start, "data_vars"):
         return start  # as it was named
-    states = start_states(system, start)[:, : len(system.states) - 2 * len(system.inputs)]
+    states = start_states(system, start)[:, : system._description.n_own]
     return states[0].tolist() if is_one_start(start) else states.tolist()
 
 
@@ -158,8 +158,8 @@ def mode_number(system: System, name: Any) -> int | None:
 
 def _state(system: System, start: Any) -> FloatArray:
     """One start as numbers; those of inputs, which a run sets, are zero."""
-    names, rest = list(system.states), np.zeros(2 * len(system.inputs))
-    own = names[: len(names) - len(rest)]
+    names, n_own = list(system.states), system._description.n_own
+    own, rest = names[:n_own], np.zeros(len(names) - n_own)
     if start is None:
         return np.zeros(len(names))
     if hasattr(start, "data_vars"):

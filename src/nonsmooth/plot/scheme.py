@@ -38,7 +38,7 @@ class _SchemeReader:
         t = system._description.traced
         self.t, self.u, self.p = t.t, list(t.u), list(t.p)
         first = self._smooth(t)
-        names, driven = list(system.states), {self.u[list(system.states).index(name)] for name in system.inputs}
+        names, driven = list(system.states), set(self.u[system._description.n_own :])
         pairs = [(i, self.u.index(e)) for i, e in enumerate(first) if e in self.u and self.u[i] not in driven | {e}]
         if not pairs:
             raise ValueError(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import sympy as sp
@@ -22,7 +22,7 @@ from nonsmooth.system.equations import (
     trace_surface,
     trace_system,
 )
-from nonsmooth.system.inputs import input_states, with_inputs
+from nonsmooth.system.inputs import input_states, read_inputs, with_inputs
 from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.names import check_names
 from nonsmooth.system.parameter import Parameter, finite_number
@@ -67,9 +67,19 @@ class Description:
     )  # without elements
     relays: bool = False  # the elements are the surfaces that were given
     loads: Loads | None = None  # of a system with elements
-    inputs: Mapping[str, str] = field(default_factory=dict)  # those of the states that stand for inputs, by unit
+    inputs: Mapping[str, Any] = field(default_factory=dict)  # the unit of each, with "smooth" where it is so
     written: Callable[[], Description] | None = field(default=None, compare=False, repr=False)
     variants: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)  # a cache, see variant.py
+
+    @cached_property
+    def driven(self) -> Mapping[str, Mapping[str, str]]:
+        """Of each input, names and units of the states that stand for it: the last ones of all."""
+        return input_states(self.inputs)
+
+    @cached_property
+    def n_own(self) -> int:
+        """Number of the states before those of inputs."""
+        return len(self.states) - sum(map(len, self.driven.values()))
 
     def written_out(self) -> Description:
         """The description with a mode for each combination of its elements' phases, made once."""
@@ -129,7 +139,7 @@ def describe(
     bands: Mapping[str, Band] | None,
     elements: Any = None,
     impacts: str = "simultaneous",
-    inputs: Mapping[str, str] | Sequence[str] | None = None,
+    inputs: Mapping[str, Any] | Sequence[str] | None = None,
     written: bool = False,
 ) -> Description:
     """Check everything, call each function once with symbols, and return the description.
@@ -137,11 +147,11 @@ def describe(
     Elements that decide together are ``written`` out as modes where that is asked for, or has to be.
     """
     asked = dict(locals())
-    given = asked | {"states": _units(states, "states", name), "inputs": _units(inputs or {}, "inputs", name)}
-    given |= {"indicators": indicators or {}, "outputs": outputs or {}}
+    given = asked | {"states": _units(states, "states", name), "indicators": indicators or {}, "outputs": outputs or {}}
+    given["inputs"] = read_inputs(_units(inputs or {}, "inputs", name, raw=True), name)
     _check_kinds(given)
     own = given["states"]
-    driven = input_states(given["inputs"])
+    driven = [key for states in input_states(given["inputs"]).values() for key in states]
     if driven:
         check_names({"state": own, "input": driven}, name)
         given |= with_inputs(given)

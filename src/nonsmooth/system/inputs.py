@@ -1,7 +1,8 @@
 """Inputs of a system: functions of time that come with a run, such as a measured force.
 
-An input stands as two states, its value and its rate, at the end of a system's own: what is linear between samples is a
-motion like any other, and a run changes both at the samples. Functions read them as ``p.<input>``, ``p.<input>_rate``.
+An input stands as states at the end of a system's own, its value and its derivatives: two of what is linear between
+samples, four of a smooth one, which is a cubic spline. So its course is a motion like any other, and a run changes
+these states at the samples. Functions read them as ``p.<input>``, ``p.<input>_rate``, ``p.<input>_rate2``.
 """
 
 from __future__ import annotations
@@ -11,20 +12,39 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from nonsmooth.errors import SystemDefinitionError
+from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.mode import Mode
 from nonsmooth.system.transition import Surface, Transition
 
-RATE = "_rate"
+RATES = ("", "_rate", "_rate2", "_rate3")
+TIMES = ("", "/s", "/s^2", "/s^3")
 
 
-def input_states(inputs: Mapping[str, str]) -> dict[str, str]:
-    """Names and units of the states that stand for inputs."""
-    return {
-        name: unit
-        for key, own in inputs.items()
-        for name, unit in ((key, own), (key + RATE, f"{own}/s" if own else ""))
-    }
+def read_inputs(given: Mapping[str, Any], system: str) -> dict[str, Any]:
+    """Inputs by their unit, or by it and ``"smooth"``."""
+    found: dict[str, Any] = {}
+    for key, one in given.items():
+        match one:
+            case str():
+                found[key] = one
+                continue
+            case [str(), "smooth"]:
+                found[key] = tuple(one)
+                continue
+        raise SystemDefinitionError(
+            f"{system!r}: the input {key!r} is given as its unit, or as (unit, 'smooth') where its course is smooth; "
+            f"not {shortened(one)}"
+        )
+    return found
+
+
+def input_states(inputs: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """Of each input, names and units of the states that stand for it."""
+    found = {}
+    for key, one in inputs.items():
+        unit, count = (one, 2) if isinstance(one, str) else (one[0], 4)
+        found[key] = {key + r: unit and unit + t for r, t in zip(RATES[:count], TIMES, strict=False)}
+    return found
 
 
 def with_inputs(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -33,8 +53,9 @@ def with_inputs(given: Mapping[str, Any]) -> dict[str, Any]:
     for what in ("symmetry", "bands"):
         if given[what]:
             raise SystemDefinitionError(f"{name!r}: a system with inputs has no `{what}`: leave it out")
-    more = input_states(inputs)
-    rates = [rate for key in inputs for rate in (key + RATE, None)]
+    states = input_states(inputs).values()
+    more = {name: unit for own in states for name, unit in own.items()}
+    rates = [rate for own in states for rate in (*list(own)[1:], None)]
 
     def moved(function: Callable[..., Any]) -> Callable[..., Any]:
         return _longer(function, lambda p: [0.0 if rate is None else p[rate] for rate in rates])

@@ -60,9 +60,10 @@ class System(Answering):
     impacts : {"simultaneous", "sequential"}, optional
         Impacts of several contacts at one instant: all at once by Newton's law, or one after the other, the fastest
         approach first, as of bodies that are not quite in touch.
-    inputs : mapping of str to str, or sequence of str, optional
+    inputs : mapping of str to str or (str, "smooth"), or sequence of str, optional
         Names and units of inputs, ``{"force": "N"}``: functions of time that come with a run, such as a measured force;
-        read as ``p.force``, its rate as ``p.force_rate``. Both stand among the states, behind the system's own.
+        read as ``p.force``, its rate as ``p.force_rate``. Both stand among the states, behind the system's own. Of one
+        whose course is smooth, ``{"base": ("m", "smooth")}``, ``p.base_rate2`` and ``p.base_rate3`` do too (`Input`).
     name : str
 
     Raises
@@ -97,7 +98,7 @@ class System(Answering):
         bands: Mapping[str, Band] | None = None,
         elements: Any = None,
         impacts: str = "simultaneous",
-        inputs: Mapping[str, str] | Sequence[str] | None = None,
+        inputs: Mapping[str, str | tuple[str, str]] | Sequence[str] | None = None,
         name: str = "system",
     ) -> None:
         description = describe(
@@ -197,7 +198,7 @@ class System(Answering):
     @property
     def inputs(self) -> Mapping[str, str]:
         """Names and units of the inputs."""
-        return MappingProxyType(dict(self._description.inputs))
+        return MappingProxyType({name: states[name] for name, states in self._description.driven.items()})
 
     @property
     def scale(self) -> Mapping[str, float]:

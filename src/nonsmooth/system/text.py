@@ -267,7 +267,7 @@ class _Reader:
     def __init__(self, content: Mapping[str, Any]) -> None:
         self.content = content
         self.bands = content.get("bands", {})
-        self.driven = input_states(content.get("inputs", {}))
+        self.driven = [name for own in input_states(content.get("inputs", {})).values() for name in own]
         memory = {key: entry["unit"] for key, entry in content.get("memory", {}).items()}
         parameters = {key: entry["unit"] for key, entry in content["parameters"].items()}
         symbols = Symbols(content["name"], content["states"], parameters, memory)

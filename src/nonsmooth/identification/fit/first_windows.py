@@ -96,7 +96,7 @@ def first_windows(
             z, mode = motion.z[last - first].copy(), int(motion.mode[last - first])
             first = last
         wide = WIDE * np.append(np.where(sizes > 0, sizes, problem.system.scale_vector()), np.ones(len(memory)))
-        wide[n_u - 2 * len(problem.system.inputs) : n_u] = 0.0  # inputs are known
+        wide[problem.system._description.n_own : n_u] = 0.0  # inputs are known
         found += [replace(window, spread=window.spread * wide) for window in windows]
     return found
 
@@ -149,7 +149,7 @@ def states_from_samples(problem: Windows, theta: FloatArray, run: int, which: sl
         told[:, k] = value
         if k in known and names[known[k]] not in measured:
             told[:, known[k]] = slope
-    told[:, len(names) - 2 * len(system.inputs) :] = 0.0  # inputs, which each run sets
+    told[:, system._description.n_own :] = 0.0  # inputs, which each run sets
     return told
 
 

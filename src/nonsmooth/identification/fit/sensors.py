@@ -12,7 +12,6 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened, unknown
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.inputs import input_states
 from nonsmooth.system.kinds import above, at_least
 
 if TYPE_CHECKING:
@@ -93,8 +92,8 @@ def read_sensors(system: System, measured: Any, channels: Sequence[str]) -> dict
     ValueError, TypeError
         A name that is no state and no output; nothing measured.
     """
-    driven = input_states(system.inputs)
-    known = {name: unit for name, unit in {**system.states, **system.outputs}.items() if name not in driven}
+    own = list(system.states)[: system._description.n_own]
+    known = {name: system.states[name] for name in own} | dict(system.outputs)
     if measured is None:
         found = {name: Sensor(name) for name in known if name in channels}
         if not found:

@@ -38,7 +38,7 @@ def mechanical(
     symmetry: Any = None,
     period: Any = None,
     impacts: str = "simultaneous",
-    inputs: Mapping[str, str] | Sequence[str] | None = None,
+    inputs: Mapping[str, str | tuple[str, str]] | Sequence[str] | None = None,
     name: str = "mechanical system",
 ) -> System:
     r"""A mechanical system of N degrees of freedom with contacts and friction, ready for every verb.
