@@ -16,13 +16,12 @@ from nonsmooth.attractors.basins_work import StartsWork, settled_from
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import inputs
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import swept_values
 from nonsmooth.flow.options import Campaign, Varied, as_called, kept_of
 from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import random_starts, start_states
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import at_least
+from nonsmooth.system.kinds import at_least, swept_values
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -22,7 +22,6 @@ from nonsmooth.attractors.settler import Settler, settler_for
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import CHUNK, STORED, inputs
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.engines.devices import BATCH
 from nonsmooth.flow.options import Campaign, as_called, kept_of
 from nonsmooth.flow.scales import warn_if_small
@@ -30,6 +29,7 @@ from nonsmooth.flow.sections import Poincare
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import float_array
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -32,9 +32,8 @@ def _run(options: argparse.Namespace) -> int:
     from nonsmooth.campaign.work import STORED
     from nonsmooth.cli.study import read_study
     from nonsmooth.diagrams.chart import plan_chart
-    from nonsmooth.flow.arguments import real_number
     from nonsmooth.flow.engines.devices import BATCH
-    from nonsmooth.system.kinds import whole_number
+    from nonsmooth.system.kinds import real_number, whole_number
 
     if options.workers is not None:
         whole_number(options.workers, "--workers", 1)

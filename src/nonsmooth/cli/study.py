@@ -262,9 +262,8 @@ def _options(verb: str, table: Mapping[str, Any], where: str) -> dict[str, Any]:
 def _values(value: Any, place: str) -> Any:
     import numpy as np
 
-    from nonsmooth.flow.arguments import float_array, real_number
     from nonsmooth.results.memory import room_for
-    from nonsmooth.system.kinds import whole_number
+    from nonsmooth.system.kinds import float_array, real_number, whole_number
 
     if isinstance(value, dict):
         check_keys(value, ("from", "to", "n"), f"{place}, values", "a key")

@@ -8,10 +8,9 @@ import numpy as np
 
 from nonsmooth.control.actuated import FORCE, actuated
 from nonsmooth.errors import unknown
-from nonsmooth.flow.arguments import real_number
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import above, at_least
+from nonsmooth.system.kinds import above, at_least, real_number
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

@@ -13,7 +13,6 @@ from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import CHUNK, STORED, inputs
 from nonsmooth.diagrams.chart_work import ChartWork
 from nonsmooth.errors import Interrupted, shortened
-from nonsmooth.flow.arguments import swept_values
 from nonsmooth.flow.engines.devices import BATCH
 from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.loads import Quantities, checked_loads
@@ -22,7 +21,7 @@ from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import at_least
+from nonsmooth.system.kinds import at_least, swept_values
 
 if TYPE_CHECKING:
     import xarray as xr

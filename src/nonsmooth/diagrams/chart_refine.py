@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import check_room
 from nonsmooth.diagrams.chart_work import ChartWork
-from nonsmooth.flow.arguments import real_number
 from nonsmooth.flow.engines.engine import IntArray
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
+from nonsmooth.system.kinds import real_number
 
 LEAST_POINTS = 4  # computed whatever the part
 LARGEST_PART = 0.25  # of the points, where no number is given

@@ -18,10 +18,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import Range, at_least
+from nonsmooth.system.kinds import Range, at_least, float_array
 
 if TYPE_CHECKING:
     import xarray as xr

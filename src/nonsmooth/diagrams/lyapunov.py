@@ -26,7 +26,6 @@ from nonsmooth.diagrams.spectrum import (
     failed_spectrum,
     spectrum_along,
 )
-from nonsmooth.flow.arguments import swept_values
 from nonsmooth.flow.engines.devices import on_gpu
 from nonsmooth.flow.engines.engine import FloatArray, IntArray, State
 from nonsmooth.flow.engines.methods import engine_for
@@ -40,7 +39,7 @@ from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 from nonsmooth.results.statuses import EQUILIBRIA
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import at_least, whole_number
+from nonsmooth.system.kinds import at_least, swept_values, whole_number
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -19,7 +19,6 @@ from nonsmooth.campaign.threads import cores, over_items
 from nonsmooth.diagrams.density import bin_edges, coarse_values, given_ranges
 from nonsmooth.diagrams.sweep_pieces import Slot, pieces_of, run_on_gpu
 from nonsmooth.errors import Interrupted
-from nonsmooth.flow.arguments import swept_values
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.methods import warn_if_coarse
 from nonsmooth.flow.equilibria import refuse_resting
@@ -33,7 +32,7 @@ from nonsmooth.results.memory import room_for
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import Range, at_least
+from nonsmooth.system.kinds import Range, at_least, swept_values
 
 if TYPE_CHECKING:
     import xarray as xr

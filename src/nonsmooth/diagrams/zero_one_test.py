@@ -19,11 +19,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import at_least
+from nonsmooth.system.kinds import at_least, float_array
 
 if TYPE_CHECKING:
     import xarray as xr

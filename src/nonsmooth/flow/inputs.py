@@ -11,10 +11,10 @@ import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.errors import shortened, unknown
-from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.engines.engine import Changes
 from nonsmooth.flow.saltation import Jump
 from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import float_array
 
 if TYPE_CHECKING:
     from nonsmooth.flow.variational import VariationalFlow

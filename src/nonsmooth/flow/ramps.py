@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.errors import shortened
-from nonsmooth.flow.arguments import real_number
+from nonsmooth.system.kinds import real_number
 
 if TYPE_CHECKING:
     from nonsmooth.arrays import FloatArray

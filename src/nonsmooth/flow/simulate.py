@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 
-from nonsmooth.flow.arguments import float_array, real_number
 from nonsmooth.flow.engines.engine import FloatArray, State, TrajectoryLog
 from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
@@ -21,7 +20,7 @@ from nonsmooth.flow.starts import first_state, is_one_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import above, at_least, whole_number
+from nonsmooth.system.kinds import above, at_least, float_array, real_number, whole_number
 
 if TYPE_CHECKING:
     import xarray as xr

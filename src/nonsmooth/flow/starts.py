@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from nonsmooth.errors import shortened, unknown
-from nonsmooth.flow.arguments import float_array, real_number
 from nonsmooth.flow.engines.engine import FloatArray, State
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import at_least
+from nonsmooth.system.kinds import at_least, float_array, real_number
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

@@ -20,8 +20,7 @@ from typing import Any, TypedDict
 
 from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.errors import DataFileError, check_keys, not_installed
-from nonsmooth.flow.arguments import real_number
-from nonsmooth.system.kinds import whole_number
+from nonsmooth.system.kinds import real_number, whole_number
 
 MAX_FILE_BYTES = 1 << 30  # read whole into memory, so that the hash is that of what was read
 MAX_COLUMNS = 4096  # over all runs of one file; each becomes a labelled array

@@ -17,10 +17,10 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from nonsmooth.errors import Answering, DataFileError, check_keys, unknown
-from nonsmooth.flow.arguments import real_number
 from nonsmooth.recordings.load import content_of, load_recording
 from nonsmooth.recordings.reading import Options
 from nonsmooth.recordings.recording import Recording, RecordingWarning
+from nonsmooth.system.kinds import real_number
 
 NOTEBOOK = "session.toml"
 

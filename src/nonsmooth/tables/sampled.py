@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.flow.arguments import float_array, real_number
 from nonsmooth.flow.simulate import simulate
 from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
-from nonsmooth.system.kinds import whole_number
+from nonsmooth.system.kinds import float_array, real_number, whole_number
 from nonsmooth.system.origin import recorded_system
 
 if TYPE_CHECKING:

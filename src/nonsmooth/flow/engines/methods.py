@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.loop import Engine
+from nonsmooth.system.kinds import float_array
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced

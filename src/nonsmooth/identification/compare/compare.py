@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 import numpy as np
 
 from nonsmooth.errors import unknown
-from nonsmooth.flow.arguments import real_number
 from nonsmooth.flow.options import solver_of
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.compare.draws import Model, check_parameter, nominal, read_settings
@@ -17,6 +16,7 @@ from nonsmooth.identification.fit.steady import is_steady, of_table
 from nonsmooth.identification.options import Comparing
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import real_number
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from nonsmooth.errors import SystemDefinitionError, unknown
-from nonsmooth.flow.arguments import ends, real_number
 from nonsmooth.identification.uncertainty import normal_draws
 from nonsmooth.results.labels import labelled
+from nonsmooth.system.kinds import ends, real_number
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

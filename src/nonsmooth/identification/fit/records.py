@@ -12,11 +12,11 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened, unknown
-from nonsmooth.flow.arguments import float_array, real_number
 from nonsmooth.flow.inputs import Driven, Input, driven
 from nonsmooth.identification.fit.sensors import Sensor, read_sensors
 from nonsmooth.identification.fit.steady import SteadyReadings, is_steady, read_steady
 from nonsmooth.recordings.recording import Recording
+from nonsmooth.system.kinds import float_array, real_number
 from nonsmooth.system.units import read_unit
 
 if TYPE_CHECKING:

@@ -17,9 +17,9 @@ import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.errors import unknown
-from nonsmooth.flow.arguments import float_array
 from nonsmooth.flow.starts import start_states
 from nonsmooth.identification.fit.sensors import Sensor
+from nonsmooth.system.kinds import float_array
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened, unknown
-from nonsmooth.flow.arguments import ends, real_number
 from nonsmooth.identification.fit.sensors import OF_A_SENSOR, Sensor
+from nonsmooth.system.kinds import ends, real_number
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
