@@ -16,8 +16,8 @@ from nonsmooth.attractors.basins_work import StartsWork, settled_from
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import inputs
 from nonsmooth.errors import shortened
+from nonsmooth.flow.failure import warn_if_small
 from nonsmooth.flow.options import Campaign, Varied, as_called, kept_of
-from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import random_starts, start_states
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.arguments import checked

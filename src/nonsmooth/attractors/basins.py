@@ -23,8 +23,8 @@ from nonsmooth.campaign.run import run
 from nonsmooth.campaign.work import CHUNK, STORED, inputs
 from nonsmooth.errors import shortened
 from nonsmooth.flow.engines.devices import BATCH
+from nonsmooth.flow.failure import warn_if_small
 from nonsmooth.flow.options import Campaign, as_called, kept_of
-from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.sections import Poincare
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
+from nonsmooth.flow.failure import LEAST
 from nonsmooth.flow.poincare import result_status
-from nonsmooth.flow.scales import LEAST
 from nonsmooth.kernels.hybrid import codes
 
 if TYPE_CHECKING:

@@ -22,10 +22,9 @@ from nonsmooth.flow.engines.devices import engine_on_gpu, on_gpu
 from nonsmooth.flow.engines.engine import FloatArray, IntArray, State
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.methods import RTOL, engine_for
-from nonsmooth.flow.failure import beyond_stops
+from nonsmooth.flow.failure import LEAST, beyond_stops
 from nonsmooth.flow.loads import meter_of
 from nonsmooth.flow.options import Settling, Solver, longest_period, solver_of
-from nonsmooth.flow.scales import LEAST
 from nonsmooth.flow.sections import section_plan
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Section

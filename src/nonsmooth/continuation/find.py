@@ -27,10 +27,9 @@ from nonsmooth.continuation.searches.settled import (
 )
 from nonsmooth.errors import SolveError
 from nonsmooth.flow.engines.methods import engine_for
-from nonsmooth.flow.failure import solve_error
+from nonsmooth.flow.failure import solve_error, warn_if_slow
 from nonsmooth.flow.loads import checked_loads
 from nonsmooth.flow.options import as_called
-from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress

@@ -16,9 +16,9 @@ from nonsmooth.attractors.settler import Settler
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.equilibria import refuse_resting
+from nonsmooth.flow.failure import warn_if_small
 from nonsmooth.flow.options import Solver, as_called, longest_period, solver_of
 from nonsmooth.flow.poincare import poincare
-from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.simulate import simulate
 from nonsmooth.flow.starts import is_one_start, start_states

@@ -15,9 +15,9 @@ from nonsmooth.diagrams.chart_work import ChartWork
 from nonsmooth.errors import Interrupted, shortened
 from nonsmooth.flow.engines.devices import BATCH
 from nonsmooth.flow.equilibria import refuse_resting
+from nonsmooth.flow.failure import warn_if_small
 from nonsmooth.flow.loads import Quantities, checked_loads
 from nonsmooth.flow.options import Campaign, as_called, kept_of, workers_of
-from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.arguments import checked

@@ -29,10 +29,9 @@ from nonsmooth.diagrams.spectrum import (
 from nonsmooth.flow.engines.devices import on_gpu
 from nonsmooth.flow.engines.engine import FloatArray, IntArray, State
 from nonsmooth.flow.engines.methods import engine_for
-from nonsmooth.flow.failure import beyond_stops, refuse_beyond_stops, solve_error
+from nonsmooth.flow.failure import beyond_stops, refuse_beyond_stops, solve_error, warn_if_slow
 from nonsmooth.flow.options import LONGEST_RUN, Length, Solver, Varied, as_called, solver_of
 from nonsmooth.flow.poincare import result_status
-from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state, is_one_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress

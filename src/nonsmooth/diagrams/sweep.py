@@ -22,10 +22,10 @@ from nonsmooth.errors import Interrupted
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.methods import warn_if_coarse
 from nonsmooth.flow.equilibria import refuse_resting
+from nonsmooth.flow.failure import warn_if_small
 from nonsmooth.flow.loads import Quantities, checked_loads
 from nonsmooth.flow.options import Settling, Varied, as_called, workers_of
 from nonsmooth.flow.outputs import out_of_bounds
-from nonsmooth.flow.scales import warn_if_small
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for

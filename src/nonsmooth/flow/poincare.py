@@ -9,9 +9,8 @@ import numpy as np
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.equilibria import refuse_resting
-from nonsmooth.flow.failure import refuse_beyond_stops, solve_error
+from nonsmooth.flow.failure import refuse_beyond_stops, solve_error, warn_if_slow
 from nonsmooth.flow.options import Solver, as_called, solver_of
-from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.sections import Poincare, Stroboscopic, section_plan
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.kernels.hybrid import codes

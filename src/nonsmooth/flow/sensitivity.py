@@ -12,10 +12,10 @@ import numpy as np
 from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.flow.engines.engine import State, TrajectoryLog
 from nonsmooth.flow.engines.methods import engine_for
+from nonsmooth.flow.failure import warn_if_slow
 from nonsmooth.flow.inputs import DelayedInputs, driven
 from nonsmooth.flow.options import Length, as_called
 from nonsmooth.flow.saltation import Jump
-from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.simulate import check_complete, run_length
 from nonsmooth.flow.starts import first_state
 from nonsmooth.flow.variational import Segments, VariationalFlow

@@ -11,11 +11,10 @@ import numpy as np
 from nonsmooth.flow.engines.engine import FloatArray, State, TrajectoryLog
 from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
 from nonsmooth.flow.equilibria import ROUNDING, equilibrium_at
-from nonsmooth.flow.failure import refuse_beyond_stops, solve_error, wrong_way
+from nonsmooth.flow.failure import refuse_beyond_stops, solve_error, warn_if_slow, wrong_way
 from nonsmooth.flow.inputs import driven
 from nonsmooth.flow.loads import meter_of
 from nonsmooth.flow.options import LONGEST_RUN, Length, Solver, as_called, solver_of
-from nonsmooth.flow.scales import warn_if_slow
 from nonsmooth.flow.starts import first_state, is_one_start
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
