@@ -19,7 +19,7 @@ from hypothesis.extra import numpy as hnp
 
 import nonsmooth as ns
 from nonsmooth.errors import DataFileError
-from nonsmooth.results import claims
+from nonsmooth.results import memory
 from nonsmooth.results.content import content, digest, seal, sealed, stamp, unstamp
 from nonsmooth.results.store import load, save
 
@@ -173,7 +173,7 @@ def test_a_damaged_file_is_not_given_to_the_library(tmp_path: Path, monkeypatch:
     whole = path.read_bytes()
     assert whole[-83:-65] == b"\nnonsmooth sha256 "
     assert hashlib.sha256(whole[:-83]).hexdigest().encode() == whole[-65:-1]
-    monkeypatch.setattr(claims, "of_netcdf", lambda source: pytest.fail("opened"))
+    monkeypatch.setattr(memory, "of_netcdf", lambda source: pytest.fail("opened"))
     for at in range(0, len(whole) - 83, 97):
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 4]) + whole[at + 1 :])
         with pytest.raises(DataFileError, match="not what was written"):

@@ -23,7 +23,7 @@ import numpy as np
 import xarray as xr
 
 from nonsmooth.errors import DataFileError, not_installed
-from nonsmooth.results import claims
+from nonsmooth.results import memory
 from nonsmooth.results.content import bytes_as_written, content, digest, stamp, trailer, unstamp
 from nonsmooth.results.memory import room_for
 from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
@@ -210,10 +210,10 @@ def _claimed(source: Path) -> int:
             raise DataFileError(f"{source}: is not a file; {_EXPECTED}")
         if not bytes_as_written(source):
             raise DataFileError(f"{source}: {_ALTERED}")
-        return claims.of_netcdf(source)
+        return memory.of_netcdf(source)
     if not (source.is_dir() and any((source / name).exists() for name in (".zgroup", "zarr.json"))):
         raise DataFileError(f"{source}: is not a Zarr store; {_EXPECTED}")
-    return claims.of_zarr(source)
+    return memory.of_zarr(source)
 
 
 @contextmanager
