@@ -17,7 +17,7 @@ from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 from sphinx.util import logging
 
-from nonsmooth.results.statuses import STATUSES
+from nonsmooth.results.labels import STATUSES
 
 project = "nonsmooth"
 author = "the nonsmooth authors"

@@ -14,9 +14,8 @@ import pytest
 import xarray as xr
 
 from nonsmooth.results import schema
-from nonsmooth.results.labels import Labels, QuantityLabel
+from nonsmooth.results.labels import Labels, QuantityLabel, by_name
 from nonsmooth.results.provenance import provenance
-from nonsmooth.results.statuses import by_name
 
 # With a cold cache most of a run is compiling. Files that bring a large kernel come first, in this order, so that two
 # workers with a file each do not compile the same one at the same time; then what takes long for other reasons.

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from nonsmooth import models
-from nonsmooth.results.labels import labels_of
-from nonsmooth.results.statuses import flag_attributes
+from nonsmooth.results.labels import flag_attributes, labels_of
 from nonsmooth.system.system import System
 
 

@@ -7,8 +7,7 @@ import pytest
 import xarray as xr
 
 from nonsmooth.results import schema
-from nonsmooth.results.labels import Labels, QuantityLabel
-from nonsmooth.results.statuses import STATUSES, by_code, by_name
+from nonsmooth.results.labels import STATUSES, Labels, QuantityLabel, by_code, by_name
 
 
 def arrays(directions: int, starts: int, points: int, keep: int = 3) -> dict[str, np.ndarray]:

@@ -91,7 +91,7 @@ def test_a_wide_band_kills_the_relays_limit_cycle(tmp_path: Path) -> None:
 
 
 def ns_code(name: str) -> int:
-    from nonsmooth.results.statuses import by_name
+    from nonsmooth.results.labels import by_name
 
     return by_name(name).code
 

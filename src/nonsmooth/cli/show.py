@@ -110,7 +110,7 @@ def _origin(record: Mapping[str, Any], result: xr.Dataset) -> list[str]:
 def _statuses(result: xr.Dataset) -> str:
     import numpy as np
 
-    from nonsmooth.results.statuses import STATUSES
+    from nonsmooth.results.labels import STATUSES
 
     known = {status.code: status for status in STATUSES}
     codes, counts = np.unique(result["status"].values, return_counts=True)

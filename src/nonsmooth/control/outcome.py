@@ -56,9 +56,9 @@ def branch_dataset(
     """The points in the order in which they were measured."""
     import xarray as xr
 
+    from nonsmooth.results.labels import flag_attributes
     from nonsmooth.results.provenance import attribute
     from nonsmooth.results.schema import strings
-    from nonsmooth.results.statuses import flag_attributes
 
     other = names.amplitude if parameter == names.frequency else names.frequency
     held = [point.held for point in points]

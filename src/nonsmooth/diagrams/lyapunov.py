@@ -34,9 +34,9 @@ from nonsmooth.flow.options import LONGEST_RUN, Length, Solver, Varied, as_calle
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.flow.starts import first_state, is_one_start
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.results.labels import EQUILIBRIA
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
-from nonsmooth.results.statuses import EQUILIBRIA
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import at_least, swept_values, whole_number
 

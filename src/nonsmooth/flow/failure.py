@@ -38,7 +38,7 @@ def solve_error(
 ) -> SolveError:
     """The error for a kernel's code; ``begun`` are the system and the state where the run began, to name a stop that it
     was beyond; ``where`` (time, state, mode) as :class:`SolveError` takes it."""
-    from nonsmooth.results.statuses import by_code
+    from nonsmooth.results.labels import by_code
 
     if code == codes.BEYOND_STOP:
         named = "" if begun is None else _beyond_stop(*begun, where.get("time", 0.0))

@@ -10,7 +10,7 @@ import numpy as np
 from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import name_and_unit, name_axes, name_plane, only_states, variable_along
-from nonsmooth.results.statuses import words_of_flags
+from nonsmooth.results.labels import words_of_flags
 
 if TYPE_CHECKING:
     import xarray as xr

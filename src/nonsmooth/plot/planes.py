@@ -11,8 +11,7 @@ from nonsmooth.plot import palette, style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import name_and_unit, name_axes, name_plane, only_states
 from nonsmooth.plot.prefixes import PREFIXES, power_for
-from nonsmooth.results.labels import kind_of
-from nonsmooth.results.statuses import in_words
+from nonsmooth.results.labels import in_words, kind_of
 from nonsmooth.tables.quantities import quantities_of, quantity
 
 if TYPE_CHECKING:

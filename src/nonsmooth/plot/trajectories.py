@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import column, first_states, name_and_unit, name_axes, name_plane, variable_along
-from nonsmooth.results.statuses import words_of_flags
+from nonsmooth.results.labels import words_of_flags
 
 if TYPE_CHECKING:
     import xarray as xr

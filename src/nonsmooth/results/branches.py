@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from nonsmooth.results.labels import Labels
+from nonsmooth.results.labels import Labels, flag_attributes
 from nonsmooth.results.provenance import with_short_record
 from nonsmooth.results.schema import (
     Column,
@@ -25,7 +25,6 @@ from nonsmooth.results.schema import (
     typed,
     varied,
 )
-from nonsmooth.results.statuses import flag_attributes
 
 #: One orbit of a branch; builder, writer and reader go by these tables.
 ORBIT = table(

@@ -33,9 +33,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from nonsmooth.results.labels import Labels, QuantityLabel, labelled
+from nonsmooth.results.labels import EQUILIBRIA, Labels, QuantityLabel, flag_attributes, labelled, status_attributes
 from nonsmooth.results.provenance import with_short_record
-from nonsmooth.results.statuses import EQUILIBRIA, flag_attributes, status_attributes
 
 
 class Column(NamedTuple):

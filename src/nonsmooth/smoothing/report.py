@@ -250,7 +250,7 @@ def _near(smooth: System, orbit: Orbit, near: Any, transient: int) -> tuple[Orbi
 
 def _code(error: SolveError) -> int:
     """The code of an error's status; of those that only a search has, that of a search without a result."""
-    from nonsmooth.results.statuses import STATUSES
+    from nonsmooth.results.labels import STATUSES
 
     return next((status.code for status in STATUSES if status.name == error.status), codes.NO_CONVERGENCE)
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.errors import DataFileError
+from nonsmooth.results.labels import in_words
 from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
-from nonsmooth.results.statuses import in_words
 from nonsmooth.results.whole import beside, replace, told
 from nonsmooth.system.arguments import checked
 from nonsmooth.tables.quantities import coordinates_of, dataset_of, quantities_of, quantity, rows_of

@@ -186,8 +186,7 @@ def orbits_dataset(
     The text of the system, the table of signatures and the unknowns of every point stand in it, so that a branch read
     from a file goes on from where it stopped."""
     from nonsmooth.results.branches import ORBIT, SPECIAL_ORBIT
-    from nonsmooth.results.labels import labels_of
-    from nonsmooth.results.statuses import flag_attributes, status_attributes
+    from nonsmooth.results.labels import flag_attributes, labels_of, status_attributes
 
     points, asked, system = record.points, branch.asked, branch.system
     layouts = {one: i for i, one in enumerate(dict.fromkeys(point.signature for point in points))}

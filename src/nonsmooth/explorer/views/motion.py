@@ -14,7 +14,7 @@ from nonsmooth.explorer.views.view import Request, Requests, View
 from nonsmooth.plot.labels import column
 from nonsmooth.plot.style import COLORS
 from nonsmooth.plot.trajectories import pieces_by_mode, with_gaps
-from nonsmooth.results.statuses import in_words
+from nonsmooth.results.labels import in_words
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import PageState

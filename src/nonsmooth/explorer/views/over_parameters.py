@@ -17,7 +17,7 @@ from nonsmooth.explorer.views.view import Ends, Request, Requests, View
 from nonsmooth.plot.branches import MARKS, lines_of, ordinates_of, with_breaks
 from nonsmooth.plot.style import COLORS
 from nonsmooth.plot.sweeps import one_branch
-from nonsmooth.results.statuses import in_words
+from nonsmooth.results.labels import in_words
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import PageState

@@ -24,7 +24,7 @@ from nonsmooth.identification.compare.orbits import fold, mean_orbit
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept, Section
-from nonsmooth.results.statuses import by_code
+from nonsmooth.results.labels import by_code
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,7 +11,7 @@ from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.identification.picture import Picture, data_of, number, picture
 from nonsmooth.plot.labels import symbol_of
-from nonsmooth.results.statuses import words_of_flags
+from nonsmooth.results.labels import words_of_flags
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
