@@ -1,4 +1,4 @@
-"""Integer codes shared by the kernels and the rooms above them (see results/statuses.py for their sentences)."""
+"""Integer codes shared by the kernels and the rooms above them (see results/labels.py for their sentences)."""
 
 OK = 0
 SLOW = 1
