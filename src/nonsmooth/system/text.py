@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
-from nonsmooth.system.condition import condition_text
 from nonsmooth.system.description import Description
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.inputs import input_states
@@ -23,7 +22,7 @@ from nonsmooth.system.symbolic.expressions import read_expression, write_express
 from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.traced import Traced, TracedCondition
 from nonsmooth.system.symbolic.tracing import KnownFunction, Symbols
-from nonsmooth.system.transition import Surface, Transition
+from nonsmooth.system.transition import Surface, Transition, condition_text
 from nonsmooth.system.variant import variant_of
 
 if TYPE_CHECKING:

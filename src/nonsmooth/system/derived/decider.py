@@ -17,9 +17,9 @@ import sympy as sp
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.system.condition import read_condition
 from nonsmooth.system.derived.instants import Numbers, RowNumbers, SeriesCode, SeriesNumbers
 from nonsmooth.system.symbolic.traced import FOUND, Traced, TracedCondition, TracedTransition
+from nonsmooth.system.transition import read_condition
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern

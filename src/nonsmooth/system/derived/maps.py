@@ -17,9 +17,8 @@ import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.condition import condition_text, read_condition
 from nonsmooth.system.system import System
-from nonsmooth.system.transition import Transition
+from nonsmooth.system.transition import Transition, condition_text, read_condition
 
 HOLD, CHOOSE = "hold", "choose"
 ESCAPED = 1e300  # a state beyond every limit: the run ends as diverged
