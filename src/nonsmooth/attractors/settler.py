@@ -29,7 +29,7 @@ from nonsmooth.flow.sections import section_plan
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Section
 from nonsmooth.results.memory import room_for
-from nonsmooth.system.phases import varying_phases
+from nonsmooth.system.transition import varying_phases
 
 if TYPE_CHECKING:
     from nonsmooth.kernels.judging.settle import Rules

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
-from nonsmooth.system.phases import phases, varying_phases
+from nonsmooth.system.transition import phases, varying_phases
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

@@ -22,7 +22,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.saltation import Jump, Touch, chained, of_one_instant
 from nonsmooth.kernels.tangent.segments import Segments
-from nonsmooth.system.phases import phase_slopes, varying_phases
+from nonsmooth.system.transition import phase_slopes, varying_phases
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced

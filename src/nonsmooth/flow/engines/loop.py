@@ -23,8 +23,8 @@ from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, FIRED, M
 from nonsmooth.kernels.hybrid.stopping import flag
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.derived.deciding import begun, decide
-from nonsmooth.system.phases import phases, varying_phases
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, FOUND, OWN, TOGETHER
+from nonsmooth.system.transition import phases, varying_phases
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced, TracedTransition
