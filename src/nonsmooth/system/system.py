@@ -16,13 +16,12 @@ from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.show import latex, page, table
-from nonsmooth.system.symbolic.derivatives import Derivatives
 from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 from nonsmooth.system.symmetry import Symmetry
 from nonsmooth.system.text import read_system, write_system
 from nonsmooth.system.transition import Surface, Transition
 from nonsmooth.system.values import changed_values, parameter_rows, smoothed_values
-from nonsmooth.system.variant import SHARP, Variant, variant_of
+from nonsmooth.system.variant import SHARP, Derivatives, Variant, variant_of
 
 
 class System(Answering):
