@@ -5,7 +5,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.errors import SolveError, SystemDefinitionError
-from nonsmooth.system.derived.bounded import least
+from nonsmooth.system.derived.faces import least
 from nonsmooth.system.derived.impact_with_friction import stronge
 
 E = ns.elements

@@ -24,8 +24,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.system.derived.bounded import is_symmetric, least
 from nonsmooth.system.derived.enumerating import HELD, Candidates, moving_by_trial
+from nonsmooth.system.derived.faces import is_symmetric, least
 from nonsmooth.system.derived.impacts import ZERO, Instant
 
 if TYPE_CHECKING:

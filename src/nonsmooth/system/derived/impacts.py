@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.system.derived.bounded import least
 from nonsmooth.system.derived.elements.element import CREEP, SMALL
+from nonsmooth.system.derived.faces import least
 from nonsmooth.system.derived.impact_with_friction import stronge
 
 if TYPE_CHECKING:
