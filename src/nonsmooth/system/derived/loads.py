@@ -17,7 +17,7 @@ import sympy as sp
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived import elements
 from nonsmooth.system.derived.elements import Element
-from nonsmooth.system.derived.elements.rubbing import RUBS
+from nonsmooth.system.derived.elements.stop import RUBS
 from nonsmooth.system.derived.expressions import SPEED, Expressions
 from nonsmooth.system.symbolic.expressions import write_expression
 from nonsmooth.system.units import Unit, product, read_unit, unit_of, write_unit

@@ -4,8 +4,7 @@ from nonsmooth.system.arguments import checked
 from nonsmooth.system.derived.elements.coulomb import Coulomb
 from nonsmooth.system.derived.elements.elastic import Backlash, ElasticStop, PreloadedSpring
 from nonsmooth.system.derived.elements.element import Element
-from nonsmooth.system.derived.elements.rubbing import Rubbing
-from nonsmooth.system.derived.elements.stop import Stop
+from nonsmooth.system.derived.elements.stop import Rubbing, Stop
 
 __all__ = ["Backlash", "Coulomb", "ElasticStop", "Element", "PreloadedSpring", "Rubbing", "Stop"]
 
