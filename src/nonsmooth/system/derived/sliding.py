@@ -35,7 +35,7 @@ import sympy as sp
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError, shortened
-from nonsmooth.system.derived.additions import Additions
+from nonsmooth.system.derived.sticking import Additions
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.symbolic.scalar import as_written
 from nonsmooth.system.symbolic.traced import NOT_UNIQUE, Traced, TracedCondition, TracedTransition

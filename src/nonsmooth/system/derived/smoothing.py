@@ -26,8 +26,7 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.derived.additions import Additions
-from nonsmooth.system.derived.sticking import without_sticking
+from nonsmooth.system.derived.sticking import Additions, without_sticking
 from nonsmooth.system.description import Description
 from nonsmooth.system.equations import TracedBand
 from nonsmooth.system.symbolic.traced import Traced, TracedCondition, TracedTransition
