@@ -20,8 +20,15 @@ from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 from nonsmooth.system.symmetry import Symmetry
 from nonsmooth.system.text import read_system, write_system
 from nonsmooth.system.transition import Surface, Transition
-from nonsmooth.system.values import changed_values, parameter_rows, smoothed_values
-from nonsmooth.system.variant import SHARP, Derivatives, Variant, variant_of
+from nonsmooth.system.variant import (
+    SHARP,
+    Derivatives,
+    Variant,
+    changed_values,
+    parameter_rows,
+    smoothed_values,
+    variant_of,
+)
 
 
 class System(Answering):
