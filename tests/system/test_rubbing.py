@@ -6,7 +6,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.errors import SolveError, SystemDefinitionError
 from nonsmooth.system.derived.faces import least
-from nonsmooth.system.derived.impact_with_friction import stronge
+from nonsmooth.system.derived.impacts import stronge
 
 E = ns.elements
 G = 9.81
