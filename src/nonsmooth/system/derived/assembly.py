@@ -26,9 +26,8 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.elements import Element, Rubbing
-from nonsmooth.system.derived.elements.element import CREEP, THROWN, Condition, Leaving
+from nonsmooth.system.derived.elements.element import CREEP, THROWN, Condition, Leaving, Place
 from nonsmooth.system.derived.faces import as_sums, independent, least_within, weakest
-from nonsmooth.system.derived.place import Place
 
 Pattern = tuple[int, ...]  # the phase of each element
 Method = TypeVar("Method", bound=Callable[..., Any])

@@ -13,8 +13,8 @@ from nonsmooth.system.derived.faces import least
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Pattern
+    from nonsmooth.system.derived.elements.element import Place
     from nonsmooth.system.derived.instants import Numbers
-    from nonsmooth.system.derived.place import Place
 
 
 ZERO = 1e-11  # of the sum of the terms of a row: what is smaller is zero

@@ -12,7 +12,7 @@ from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.elements.element import CREEP, SMALL, Condition, Contact, Element, Law, Leaving
 
 if TYPE_CHECKING:
-    from nonsmooth.system.derived.place import Place
+    from nonsmooth.system.derived.elements.element import Place
 
 
 @dataclass(frozen=True, kw_only=True)
