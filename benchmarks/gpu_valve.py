@@ -144,7 +144,7 @@ def compared(n: int = 400) -> list[str]:
 
 def march(inflows: np.ndarray, transient: int, keep: int) -> tuple[np.ndarray, np.ndarray]:
     """March the valve at each inflow: codes, and the seconds of each of three runs."""
-    from nonsmooth.flow.engines.launches import StatesOnGpu
+    from nonsmooth.flow.engines.devices import StatesOnGpu
     from nonsmooth.flow.engines.series_cuda import SeriesOnGpu
 
     engine, points = engine_and_points(inflows)

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.attractors.settled import Settled, usable
-from nonsmooth.flow.engines.devices import batch_size
+from nonsmooth.flow.engines.devices import StatesOnGpu, batch_size, batches
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
-from nonsmooth.flow.engines.launches import StatesOnGpu, batches
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.linear_cuda import SLICE, PlanarOnGpu
 from nonsmooth.flow.engines.loop import Engine

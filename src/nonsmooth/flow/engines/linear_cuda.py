@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from nonsmooth.flow.engines.devices import OnGpu, StatesOnGpu
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
-from nonsmooth.flow.engines.launches import OnGpu, StatesOnGpu
 from nonsmooth.flow.engines.linear import PlanarEngine
 from nonsmooth.flow.engines.loop import DIVERGENCE
 from nonsmooth.kernels.hybrid import codes

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from nonsmooth.flow.engines.devices import OnGpu, StatesOnGpu
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
-from nonsmooth.flow.engines.launches import OnGpu, StatesOnGpu
 from nonsmooth.flow.engines.series import SeriesEngine
 from nonsmooth.flow.engines.series_tables import SeriesPoints
 from nonsmooth.kernels.hybrid import codes
