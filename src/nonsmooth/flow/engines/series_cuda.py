@@ -8,8 +8,7 @@ import numpy as np
 
 from nonsmooth.flow.engines.devices import OnGpu, StatesOnGpu
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
-from nonsmooth.flow.engines.series import SeriesEngine
-from nonsmooth.flow.engines.series_tables import SeriesPoints
+from nonsmooth.flow.engines.series import SeriesEngine, SeriesPoints
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.series.places import METHODS
