@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nonsmooth.results.segments import with_crossings
+from nonsmooth.flow.simulate import with_crossings
 
 
 def merged(crossing: list[float], before: list[float], after: list[float], samples: list[float], segment: list[int]):

@@ -1,12 +1,13 @@
-"""``simulate``: one trajectory, with every crossing and touch."""
+"""``simulate``: one trajectory, with every crossing and touch, and both limits of each crossing between the samples."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Unpack
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nonsmooth.flow.engines.engine import FloatArray, State, TrajectoryLog
 from nonsmooth.flow.engines.methods import engine_for, warn_if_coarse
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from nonsmooth.system.system import System
+
 
 SAMPLES_PER_PERIOD = 256
 SAMPLES = 4096
@@ -226,7 +228,6 @@ def _dataset(
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
     from nonsmooth.results.schema import trajectory
-    from nonsmooth.results.segments import with_crossings
 
     labels = labels_of(system)
     source = np.array([jump.source for jump in traced.transitions], dtype=np.int64)
@@ -268,4 +269,46 @@ def _dataset(
         outputs=outputs,
         memory=memory,
         status=log.status,
+    )
+
+
+class Segmented(NamedTuple):
+    """``source[i]`` tells where row i comes from: k >= 0 the sample k; -1 a limit at a crossing."""
+
+    time: NDArray[np.float64]
+    u: NDArray[np.float64]
+    mode: NDArray[np.int64]
+    segment: NDArray[np.int64]
+    source: NDArray[np.int64]
+
+
+def with_crossings(
+    sample_time: NDArray[np.float64],
+    sample_u: NDArray[np.float64],
+    sample_mode: NDArray[np.int64],
+    sample_segment: NDArray[np.int64],
+    crossing_time: NDArray[np.float64],
+    u_before: NDArray[np.float64],
+    u_after: NDArray[np.float64],
+    mode_before: NDArray[Any],
+    mode_after: NDArray[Any],
+) -> Segmented:
+    """Samples and crossings in one list in which every crossing stands twice.
+
+    The limit before crossing k ends segment k, the limit after it begins segment k + 1; samples lie within
+    their segment in the order given. A sample exactly at a crossing is kept beside the limits.
+    """
+    n, count = len(sample_time), len(crossing_time)
+    index = np.arange(count)
+    segment = np.concatenate([sample_segment, index, index + 1]).astype(np.int64)
+    # Within a segment: the limit after the crossing that opened it, the samples, the limit before the next.
+    place = np.concatenate([np.ones(n), np.full(count, 2.0), np.zeros(count)])
+    inner = np.concatenate([np.arange(n), np.zeros(2 * count)])
+    order = np.lexsort((inner, place, segment))
+    return Segmented(
+        np.concatenate([sample_time, crossing_time, crossing_time])[order],
+        np.concatenate([sample_u, u_before, u_after])[order],
+        np.concatenate([sample_mode, mode_before, mode_after]).astype(np.int64)[order],
+        segment[order],
+        np.concatenate([np.arange(n), np.full(2 * count, -1)])[order],
     )

@@ -8,7 +8,7 @@ How to call them (``n`` states, ``I`` indicators, ``O`` outputs)::
     trajectory(d, attrs, time=(N,), u=(N, n), mode=(N,), segment=(N,), crossing_time=(C,), crossing_transition=(C,),
         u_before=(C, n), u_after=(C, n), touch_time=(K,), touch_indicator=(K,), touch_u=(K, n), touch_clearance=(K,),
         outputs=(N, O) or None, memory=(N, n_memory) or None, status=int)
-        # ``time`` already holds each crossing twice; results/segments.py merges samples and crossings so.
+        # ``time`` already holds each crossing twice; flow/simulate.py merges samples and crossings so.
 
     sweep(d, attrs, parameter, values, arrays, directions=("up", "down"), starts=(S, n), squeeze=("start",))
         # arrays, leading dims always (direction D, start S, point P), points in the order of ``values``:
