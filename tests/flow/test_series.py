@@ -455,7 +455,7 @@ def test_order_follows_the_tolerance() -> None:
 
 @pytest.mark.parametrize("method", ["rkf45", "taylor", "exact"])
 def test_a_run_that_pauses_goes_on_where_it_stood(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from nonsmooth.flow.engines import march
+    from nonsmooth.flow.engines import engine
 
     system = ns.models.discontinuous_support(omega=3.69, g=-0.0045, rho=0.29)
 
@@ -465,6 +465,6 @@ def test_a_run_that_pauses_goes_on_where_it_stood(method: str, monkeypatch: pyte
         return [swept.section.values, run.u.values, run.crossing_time.values]
 
     whole = runs()
-    monkeypatch.setattr(march, "PATIENCE", 30)
+    monkeypatch.setattr(engine, "PATIENCE", 30)
     for one, two in zip(whole, runs(), strict=True):
         np.testing.assert_array_equal(one, two)

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.attractors.settled import Settled
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, State
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, KernelMarch, State
 from nonsmooth.flow.engines.loop import end_if_not_wanted
-from nonsmooth.flow.engines.march import KernelMarch
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept
 from nonsmooth.kernels.hybrid.places import BEGUN, STARTS, WAITS

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import NO_CHANGES, Changes, FloatArray, State, TrajectoryLog
-from nonsmooth.flow.engines.march import KernelMarch
+from nonsmooth.flow.engines.engine import NO_CHANGES, Changes, FloatArray, KernelMarch, State, TrajectoryLog
 from nonsmooth.kernels.hybrid import codes, places
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, FIRED, MODE, RESET, STARTS, TIME, TOUCHES, WAITS

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import Changes, FloatArray, IntArray, State, TrajectoryLog
+from nonsmooth.flow.engines.engine import Changes, FloatArray, IntArray, KernelMarch, State, TrajectoryLog
 from nonsmooth.flow.engines.linear import table_bytes
 from nonsmooth.flow.engines.loop import Engine
-from nonsmooth.flow.engines.march import KernelMarch
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.hybrid.places import DEAD_END, FIRED, MODE, RESET, STARTS, TIME, WAITS
