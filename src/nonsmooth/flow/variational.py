@@ -135,7 +135,7 @@ class VariationalFlow:
         traced, scale = system.traced, tuple(system.scale_vector().tolist())
         if traced.patterns is None:
             return _flow(traced, traced.decider, names, scale, rows and not system.is_smoothed)
-        from nonsmooth.flow.variational_patterns import pattern_flow
+        from nonsmooth.flow.variational_rows import pattern_flow
 
         found: VariationalFlow = pattern_flow(traced.patterns, names, scale)
         found.catch_up()
