@@ -50,7 +50,7 @@ def test_range_from_a_coarse_run_holds_the_points_and_threads_do_not_matter() ->
 
 
 def test_edges_belong_to_bins_as_in_numpy_and_nothing_is_lost() -> None:
-    from nonsmooth.diagrams.density import Counter
+    from nonsmooth.diagrams.sweep_pieces import Counter
 
     rng = np.random.default_rng(5)
     edges = np.array([np.linspace(-0.3, 0.7, 11)])
