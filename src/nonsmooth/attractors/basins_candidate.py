@@ -13,8 +13,8 @@ import numpy as np
 
 from nonsmooth.attractors.basins_found import Attractor, Patience
 from nonsmooth.attractors.basins_newton import confirmed_cycle, exponent_on
+from nonsmooth.attractors.settled import SectionTrace
 from nonsmooth.attractors.settler import Settler
-from nonsmooth.attractors.trace import SectionTrace
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.kernels.hybrid import codes
 

@@ -1,4 +1,4 @@
-"""Ends of many starts: one array per quantity, one row per job."""
+"""Ends of many starts, one array per quantity, one row per job; the place of one, from which it can go on."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.flow.failure import LEAST
 from nonsmooth.flow.poincare import result_status
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.system.transition import phases, varying_phases
 
 if TYPE_CHECKING:
     from nonsmooth.kernels.judging.settle import Jobs
+    from nonsmooth.system.system import System
+
 
 ROUNDED = 1e-4  # of a state's value: what is smaller cannot be told from rounding where returns are to be nil
 
@@ -103,3 +106,30 @@ class Settled:
 
     def __getitem__(self, which: Any) -> Settled:
         return Settled(*(getattr(self, item.name)[which] for item in fields(self)))
+
+
+@dataclass(frozen=True)
+class SectionTrace:
+    """Section points of one run; none where it failed."""
+
+    points: FloatArray  # (keep, n)
+    modes: IntArray  # (keep,)
+    times: FloatArray  # (keep,) since the run began
+    end: FloatArray  # (width,): the place where it ended
+    mode: int
+
+
+def mode_at(system: System, phase: float, values: FloatArray) -> int:
+    """The mode in which a run begins at a phase of the forcing: the first, or where transitions before it lead.
+
+    ``values`` are those of the parameters.
+
+    A start says nothing of the mode. At phase 0 it is the first; a run that begins later in the period, on a bang-bang
+    force say, must not begin on the branch that is over by then."""
+    mode, jumps = 0, system.traced.transitions
+    varying = varying_phases(system.traced)
+    at = phases(system.traced) if varying is None else varying(values)
+    for k in np.argsort(at, kind="stable"):
+        if 0.0 < at[k] <= phase and jumps[k].source == mode:
+            mode = jumps[k].target
+    return mode

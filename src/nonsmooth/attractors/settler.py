@@ -16,8 +16,7 @@ import numpy as np
 from nonsmooth.attractors.exponents import rates, separation_sizes
 from nonsmooth.attractors.mapper import Mapper
 from nonsmooth.attractors.settle_cuda import separate_on_gpu, settle_on_gpu
-from nonsmooth.attractors.settled import ROUNDED, Settled, least_sizes, usable
-from nonsmooth.attractors.trace import SectionTrace, mode_at
+from nonsmooth.attractors.settled import ROUNDED, SectionTrace, Settled, least_sizes, mode_at, usable
 from nonsmooth.flow.engines.devices import engine_on_gpu, on_gpu
 from nonsmooth.flow.engines.engine import FloatArray, IntArray, State
 from nonsmooth.flow.engines.loop import Engine
