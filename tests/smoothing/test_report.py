@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import nonsmooth as ns
-from nonsmooth.smoothing.attractors import FoundAttractor, matched
+from nonsmooth.smoothing.report import FoundAttractor, matched
 
 ETA = 1e-2
 SHARES = {

@@ -1,4 +1,4 @@
-"""``smoothing_report``: how an orbit, its multipliers and exponents change with the width of the bands."""
+"""``smoothing_report``: how an orbit, its multipliers and exponents, and attractors change with the bands' width."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.attractors.basin_fractions import basin_fractions
 from nonsmooth.continuation.branches.orbit import Orbit
 from nonsmooth.continuation.find import find_orbit
 from nonsmooth.diagrams.lyapunov import lyapunov
@@ -17,7 +18,6 @@ from nonsmooth.flow.options import Length, as_called
 from nonsmooth.flow.sections import Poincare, Stroboscopic
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
-from nonsmooth.smoothing.attractors import Box, FoundAttractor, attractors_of, matched
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.derived.smoothing import BANDS
 from nonsmooth.system.kinds import at_least
@@ -26,7 +26,70 @@ from nonsmooth.system.parameter import finite_number
 if TYPE_CHECKING:
     import xarray as xr
 
+    from nonsmooth.flow.sections import Poincare, Stroboscopic
     from nonsmooth.system.system import System
+
+
+ALIKE = 0.1  # of the largest attractor: what extremes of counterparts may differ
+
+
+@dataclass(frozen=True)
+class Box:
+    """Random starts."""
+
+    n_starts: int
+    box: dict[str, tuple[float, float]]
+    section: Stroboscopic | Poincare | None
+    seed: int
+
+
+@dataclass(frozen=True)
+class FoundAttractor:
+    """An attractor: its period number (0 without a period), and its extremes."""
+
+    period_number: int
+    extremes: Any  # (2, n) maxima, minima
+
+
+def attractors_of(system: System, search: Box, parameter: str, value: float) -> list[FoundAttractor]:
+    """Attractors that the starts reach at one value of a parameter."""
+    found = basin_fractions(
+        system,
+        parameter,
+        [value],
+        n_starts=search.n_starts,
+        box=search.box,
+        section=search.section,
+        seed=search.seed,
+        progress=False,
+    ).isel({parameter: 0})
+    return [
+        FoundAttractor(int(one.period_number), np.array([one.maximum.values, one.minimum.values]))
+        for k in range(found.sizes["attractor"])
+        if (one := found.isel(attractor=k)).period_number >= 0
+    ]
+
+
+def matched(own: Sequence[FoundAttractor], others: Sequence[FoundAttractor]) -> tuple[int, int]:
+    """Numbers of attractors without a counterpart: of the first, of the others.
+
+    Pairs are taken in the order of their distances."""
+    if not own or not others:
+        return len(own), len(others)
+    size = np.max([one.extremes[0] - one.extremes[1] for one in (*own, *others)], axis=0)
+    size = np.where(size > 0, size, 1.0)
+    pairs = sorted(
+        (float(np.abs((a.extremes - b.extremes) / size).max()), i, j)
+        for i, a in enumerate(own)
+        for j, b in enumerate(others)
+        if a.period_number == b.period_number
+    )
+    left, free = set(range(len(own))), set(range(len(others)))
+    for distance, i, j in pairs:
+        if distance < ALIKE and i in left and j in free:
+            left.remove(i)
+            free.remove(j)
+    return len(left), len(free)
 
 
 @checked
