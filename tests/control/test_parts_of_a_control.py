@@ -12,12 +12,12 @@ import nonsmooth as ns
 from nonsmooth.arrays import ComplexArray
 from nonsmooth.control.controller import Controller, Samples
 from nonsmooth.control.course import course_of
-from nonsmooth.control.guard import Guard
 from nonsmooth.control.harmonics import FourierSeries
 from nonsmooth.control.held import Held, Holder
 from nonsmooth.control.holding import Holding
 from nonsmooth.control.outcome import Names
 from nonsmooth.control.release import STABLE, UNKNOWN, UNSTABLE, release
+from nonsmooth.control.rig import Guard
 
 PER_TURN = 16  # so that phases are exact
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from nonsmooth.arrays import ComplexArray
 from nonsmooth.control.controller import Controller, Samples
-from nonsmooth.control.guard import Guard
 from nonsmooth.control.harmonics import FourierSeries, fitted, mean_square
 from nonsmooth.control.holding import Holding
+from nonsmooth.control.rig import Guard
 
 REPEATS = 0.01  # scatter of the first harmonic over its size: beyond it a motion is not of the drive's period
 FORCE = 3.0  # the greatest where none is given, over that which answers to a displacement of the motion's size
