@@ -8,7 +8,7 @@ import pytest
 from tests.control.own_rig import DRIVE, OwnRig, true_frequency
 
 import nonsmooth as ns
-from nonsmooth.control.held import FORCE
+from nonsmooth.control.holding import FORCE
 
 FAULTS = {
     "NaN": (float("nan"), "not two finite numbers"),

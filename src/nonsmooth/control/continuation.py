@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 
 from nonsmooth.control.course import Course, course_of
-from nonsmooth.control.held import Held, Holder
-from nonsmooth.control.holding import Holding
+from nonsmooth.control.holding import Held, Holder, Holding
 from nonsmooth.control.march import Continuation, MeasuredPoint
 from nonsmooth.control.outcome import Names, branch_dataset
 from nonsmooth.control.release import UNKNOWN

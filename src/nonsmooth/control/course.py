@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from nonsmooth.control.held import Held
+from nonsmooth.control.holding import Held
 from nonsmooth.control.outcome import Names
 from nonsmooth.errors import unknown
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from nonsmooth.arrays import ComplexArray, FloatArray
-from nonsmooth.control.held import Held, Holder
+from nonsmooth.control.holding import Held, Holder
 from nonsmooth.errors import SolveError
 
 PROBE = 0.02  # displacement of a reference for a derivative, over the size of the motion
