@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nonsmooth.control.harmonics import fitted, mean_square, values_at
+from nonsmooth.control.holding import fitted, mean_square, values_at
 
 
 def test_uncertainties_of_white_noise() -> None:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nonsmooth.control.harmonics import fitted
-from nonsmooth.control.holding import Held, Holder
+from nonsmooth.control.holding import Held, Holder, fitted
 
 STABLE, UNSTABLE, UNKNOWN = 1, 0, -1
 PUSH, LARGEST = 0.01, 0.05  # of the motion's first harmonic
