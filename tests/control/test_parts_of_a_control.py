@@ -10,9 +10,8 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.arrays import ComplexArray
-from nonsmooth.control.controller import Controller, Samples
 from nonsmooth.control.course import course_of
-from nonsmooth.control.holding import FourierSeries, Held, Holder, Holding
+from nonsmooth.control.holding import Controller, FourierSeries, Held, Holder, Holding, Samples
 from nonsmooth.control.outcome import Names
 from nonsmooth.control.release import STABLE, UNKNOWN, UNSTABLE, release
 from nonsmooth.control.rig import Guard
