@@ -11,9 +11,19 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.arrays import ComplexArray
 from nonsmooth.control.course import course_of
-from nonsmooth.control.holding import Controller, FourierSeries, Held, Holder, Holding, Samples
+from nonsmooth.control.holding import (
+    STABLE,
+    UNKNOWN,
+    UNSTABLE,
+    Controller,
+    FourierSeries,
+    Held,
+    Holder,
+    Holding,
+    Samples,
+    release,
+)
 from nonsmooth.control.outcome import Names
-from nonsmooth.control.release import STABLE, UNKNOWN, UNSTABLE, release
 from nonsmooth.control.rig import Guard
 
 PER_TURN = 16  # so that phases are exact

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 
 from nonsmooth.control.course import Course, course_of
-from nonsmooth.control.holding import Held, Holder, Holding
+from nonsmooth.control.holding import UNKNOWN, Held, Holder, Holding
+from nonsmooth.control.holding import release as let_go
 from nonsmooth.control.march import Continuation, MeasuredPoint
 from nonsmooth.control.outcome import Names, branch_dataset
-from nonsmooth.control.release import UNKNOWN
-from nonsmooth.control.release import release as let_go
 from nonsmooth.control.rig import Guard, Rig
 from nonsmooth.errors import Interrupted, SolveError, shortened
 from nonsmooth.results.progress import Progress

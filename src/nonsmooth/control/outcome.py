@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.control.holding import values_at
+from nonsmooth.control.holding import STABLE, UNKNOWN, UNSTABLE, values_at
 from nonsmooth.control.march import Continuation, MeasuredPoint
-from nonsmooth.control.release import STABLE, UNKNOWN, UNSTABLE
 from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
