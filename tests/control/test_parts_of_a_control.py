@@ -10,7 +10,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.arrays import ComplexArray
-from nonsmooth.control.course import course_of
+from nonsmooth.control.continuation import course_of
 from nonsmooth.control.holding import (
     STABLE,
     UNKNOWN,

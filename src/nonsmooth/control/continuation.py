@@ -1,4 +1,4 @@
-"""``control_based_continuation``: the branch of a rig's periodic motions, stable or not, without a model."""
+"""``control_based_continuation``: the branch of a rig's periodic motions over a drive's settings, without a model."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
-from nonsmooth.control.course import Course, course_of
 from nonsmooth.control.holding import UNKNOWN, Held, Holder, Holding
 from nonsmooth.control.holding import release as let_go
 from nonsmooth.control.march import Continuation, MeasuredPoint
 from nonsmooth.control.outcome import Names, branch_dataset
 from nonsmooth.control.rig import Guard, Rig
-from nonsmooth.errors import Interrupted, SolveError, shortened
+from nonsmooth.errors import Interrupted, SolveError, shortened, unknown
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as bar
 from nonsmooth.results.provenance import options_as_data, package_version
@@ -23,6 +22,7 @@ from nonsmooth.system.kinds import Range, above, at_least
 
 if TYPE_CHECKING:
     import xarray as xr
+
 
 PER_HARMONIC = 2.5  # samples
 MOST_HARMONICS = 20
@@ -236,3 +236,48 @@ def _names(rig: Any) -> Names:
             f"{shortened(rig)} has no {' and no '.join(missing)}{hint}"
         )
     return Names(**getattr(rig, "names", {}), units=getattr(rig, "units", None))
+
+
+@dataclass(frozen=True)
+class Course:
+    """The drive at the beginning, and which of its two settings is varied over which range."""
+
+    parameter: str  # "frequency" or "amplitude"
+    low: float
+    high: float
+    frequency: float
+    amplitude: float
+    rising: bool
+
+    def setting(self, value: float) -> tuple[float, float]:
+        """Frequency and amplitude of the drive at a value of the parameter."""
+        return (value, self.amplitude) if self.parameter == "frequency" else (self.frequency, value)
+
+    def of(self, held: Held) -> float:
+        """The parameter that was really set."""
+        return float(getattr(held, self.parameter))
+
+    def inside(self, value: float) -> bool:
+        """Return whether a value lies in the range."""
+        return self.low <= value <= self.high
+
+
+def course_of(
+    names: Names, parameter: str, range: tuple[float, float], frequency: float, amplitude: float, direction: str
+) -> Course:
+    """The course that was asked for, checked.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Settings that do not fit the drive or each other.
+    """
+    own = {"frequency": "frequency", "amplitude": "amplitude"}
+    known = own | {names.frequency: "frequency", names.amplitude: "amplitude"}
+    if parameter not in known:
+        raise ValueError(unknown(parameter, "a parameter", "the drive", known))
+    (low, high), varied = range, known[parameter]
+    begin = {"frequency": frequency, "amplitude": amplitude}
+    if not low <= begin[varied] <= high:
+        raise ValueError(f"{varied} = {begin[varied]!r} lies outside the range {low:g} ... {high:g}: begin within it")
+    return Course(varied, low, high, rising=direction == "up", **begin)
