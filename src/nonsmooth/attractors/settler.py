@@ -1,8 +1,4 @@
-"""Many starts brought to their attractors and judged, to a tolerance: the work behind charts and basins.
-
-A *job* is a start at one parameter point. All jobs of a call run in one compiled loop (``mapper``), on a GPU in rounds.
-What is done is decided in one place (``kernels.judging.settle``): a period number is granted with a certificate only.
-"""
+"""Many starts brought to their attractors, judged, to a tolerance, with exponents: the work of charts and basins."""
 
 from __future__ import annotations
 
@@ -13,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.attractors.exponents import rates, separation_sizes
 from nonsmooth.attractors.mapper import Mapper
 from nonsmooth.attractors.settle_cuda import separate_on_gpu, settle_on_gpu
 from nonsmooth.attractors.settled import ROUNDED, SectionTrace, Settled, least_sizes, mode_at, usable
@@ -33,6 +28,7 @@ from nonsmooth.system.transition import varying_phases
 if TYPE_CHECKING:
     from nonsmooth.kernels.judging.settle import Rules
     from nonsmooth.system.system import System
+
 
 TOLERANCE = 1e-9  # of a return, in units of the motion's size
 ATTEMPTS = 3  # further transients for a point that is still settling: of 1, 2 and 4 times the first
@@ -314,3 +310,34 @@ def _remade(text: str, values: Mapping[str, float], method: str, given: Mapping[
     # "auto" takes tolerances that the exact flow has no use for
     engine = engine_for(system, **given["solver"] | {"method": "auto" if method == "exact" else method})
     return Settler(system, engine, **given)
+
+
+USUAL = 1.5  # powers of ten: a motion this near to its scale is taken to have that size
+SLENDER = 1e-6  # a state whose motion is smaller than this, beside the largest of the others, is at rest
+RESTING = 1e-9  # in units of the scales: a motion that has come to rest in all states
+AT_REST = 1e-3
+
+
+def separation_sizes(maximum: FloatArray, minimum: FloatArray, scale: FloatArray) -> FloatArray:
+    """Sizes (J, n) by which neighbours of J motions are told apart: those of the motions, in powers of ten.
+
+    The states' ``scale`` will not do: neighbours of a motion in micrometres would be as far apart as it is wide, and
+    those of a motion in pascals equal within rounding. Extremes that are not known (NaN) give the scale.
+    """
+    half = np.nan_to_num(0.5 * (maximum - minimum)) / scale
+    value = np.nan_to_num(np.maximum(np.abs(maximum), np.abs(minimum))) / scale
+    widest = half.max(axis=1, keepdims=True, initial=0.0)
+    size = np.maximum(half, SLENDER * widest)
+    size = np.maximum(np.where(widest < RESTING, AT_REST, size), ROUNDED * value)
+    power = np.log10(size)
+    power = np.where((np.abs(power) < USUAL) | np.isnan(maximum).all(axis=1, keepdims=True), 0.0, np.rint(power))
+    return np.asarray(scale * 10.0**power)
+
+
+def rates(sums: FloatArray, status: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Exponents per unit time and their standard errors (J,) from the sums of J jobs; NaN where a run failed."""
+    from nonsmooth.kernels.judging.exponent import BATCHES, MEAN_RATE, SQUARED_RATES
+
+    good = np.isin(status, (codes.OK, codes.NOT_GUARANTEED))
+    error = np.sqrt(sums[:, SQUARED_RATES] / (BATCHES * (BATCHES - 1)))
+    return np.where(good, sums[:, MEAN_RATE], np.nan), np.where(good, error, np.nan)
