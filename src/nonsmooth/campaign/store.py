@@ -1,19 +1,4 @@
-"""A Zarr store for the chunks of one work: written chunk by chunk, whole or not at all, and gone on with later.
-
-::
-
-    chart.zarr/              a Zarr group; the attribute ``nonsmooth_campaign`` says what the work is
-        results/             one array per column, one file per chunk, of zeros too (Zstandard, fixed level)
-        run/000017.json      chunk 17 is done: its key and the hash of its content, by whom, when, time worked
-        run/started.log      which chunks were begun: one begun twice was lost with its worker
-
-A chunk's key is a hash of the model, the parameters, the options, the source of kernels and rules, and the chunk's
-place. Its mark is written after its arrays, so that a chunk cut short counts as missing. Arrays hold results only:
-facts about the run (which machine, how long) stay in ``run``, so that equal work gives equal files.
-
-Processes write chunks without knowing of each other, so each chunk has its own hash, and they are compared whenever
-the store is read. The hash of a finished store is the hash of these: it says whether two stores hold the same.
-"""
+"""A Zarr store for the chunks of one work: written chunk by chunk, whole or not at all, marked, gone on with later."""
 
 from __future__ import annotations
 
@@ -22,7 +7,8 @@ import json
 import os
 import socket
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.campaign.identity import described, difference
-from nonsmooth.campaign.marks import mark_in, marks_of, started
 from nonsmooth.campaign.processors import processor_type
 from nonsmooth.campaign.work import ChunkedWork
 from nonsmooth.errors import DataFileError
@@ -321,3 +306,29 @@ def _content(arrays: Mapping[str, NDArray[Any]]) -> str:
         found.update(f"{name} {arrays[name].dtype.str} {arrays[name].shape} ".encode())
         found.update(np.ascontiguousarray(arrays[name]).reshape(-1).view(np.uint8).data)
     return found.hexdigest()
+
+
+def marks_of(path: Path) -> Iterator[dict[str, Any]]:
+    """The marks of a store's finished chunks."""
+    for file in sorted((path / "run").glob("*.json")):
+        mark = mark_in(file)
+        if mark is not None:
+            yield mark
+
+
+def started(log: Path) -> list[int]:
+    """The chunks that were begun, in their order; a line that was cut short or altered is passed over."""
+    found = []
+    for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
+        with suppress(ValueError, KeyError, TypeError):
+            found.append(int(json.loads(line)["chunk"]))
+    return found
+
+
+def mark_in(file: Path) -> dict[str, Any] | None:
+    """A mark; None where there is none, or it was cut short or altered."""
+    try:
+        mark = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return mark if sealed(mark) else None
