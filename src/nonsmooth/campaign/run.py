@@ -7,7 +7,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from nonsmooth.campaign.processors import clock
+from nonsmooth.campaign.identity import clock
 from nonsmooth.campaign.threads import on_threads
 from nonsmooth.campaign.work import ChunkedWork, check_room, empty_columns
 from nonsmooth.results.progress import Progress

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.campaign.identity import described, difference
-from nonsmooth.campaign.processors import processor_type
+from nonsmooth.campaign.identity import described, difference, processor_type
 from nonsmooth.campaign.work import ChunkedWork
 from nonsmooth.errors import DataFileError
 from nonsmooth.results.content import digest, seal, sealed
