@@ -18,7 +18,7 @@ SOURCES = Path(nonsmooth.__file__).parent
 #: Who may catch Ctrl-C without raising it at once, and why.
 CATCHES = {
     "continuation/march/march.py: march",  # unless_interrupted raises it with what was found
-    "campaign/threads.py: run",  # a worker hands it to the thread that waits, which raises it
+    "campaign/run.py: run",  # a worker hands it to the thread that waits, which raises it
     "cli/main.py: _answer",  # the exit code 130
     "explorer/worker.py: _answer",  # the process that asked is told that the work was cancelled
 }
@@ -32,7 +32,7 @@ def test_ctrl_c_is_caught_in_four_places_only() -> None:
                 own = [node for node in ast.walk(function) if isinstance(node, ast.ExceptHandler)]
                 if any(_catches(one) and not isinstance(one.body[-1], ast.Raise) for one in own):
                     found.add((function.name, path.relative_to(SOURCES).as_posix()))
-    found.discard(("over_items", "campaign/threads.py"))  # it holds `run`
+    found.discard(("over_items", "campaign/run.py"))  # it holds `run`
     assert {f"{path}: {name}" for name, path in found} == CATCHES
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.campaign.threads import cores
+from nonsmooth.campaign.run import cores
 from nonsmooth.campaign.work import ChunkedWork
 from nonsmooth.errors import not_installed
 

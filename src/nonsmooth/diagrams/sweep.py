@@ -15,7 +15,7 @@ import numpy as np
 from nonsmooth.attractors.settled import usable
 from nonsmooth.attractors.settler import Settler, settler_for
 from nonsmooth.attractors.standing import standing_in_sweep
-from nonsmooth.campaign.threads import cores, over_items
+from nonsmooth.campaign.run import cores, over_items
 from nonsmooth.diagrams.sweep_pieces import Slot, bin_edges, coarse_values, given_ranges, pieces_of, run_on_gpu
 from nonsmooth.errors import Interrupted
 from nonsmooth.flow.engines.engine import FloatArray
