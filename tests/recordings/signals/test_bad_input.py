@@ -23,9 +23,8 @@ from nonsmooth.recordings.signals.displacement import position
 from nonsmooth.recordings.signals.harmonics import fit
 from nonsmooth.recordings.signals.impacts import impacts
 from nonsmooth.recordings.signals.phase import drive_phase
-from nonsmooth.recordings.signals.savitzky_golay import savitzky_golay
 from nonsmooth.recordings.signals.sections import poincare
-from nonsmooth.recordings.signals.smoothing import smooth
+from nonsmooth.recordings.signals.smoothing import savitzky_golay, smooth
 from nonsmooth.recordings.signals.spectrum import spectrum
 
 WHO = "run 'Run #2', channel 'Angle'"

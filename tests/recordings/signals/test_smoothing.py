@@ -8,8 +8,7 @@ import xarray as xr
 from motions import COUNT, Motion, bounces, decay, rms, sine
 
 from nonsmooth.recordings import RecordingWarning
-from nonsmooth.recordings.signals.savitzky_golay import savitzky_golay
-from nonsmooth.recordings.signals.smoothing import smooth
+from nonsmooth.recordings.signals.smoothing import savitzky_golay, smooth
 
 MOTIONS = {
     "20 mm at 3.7 rad/s": sine(0.02, 3.7, 0.4),
