@@ -18,10 +18,9 @@ import nonsmooth as ns
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings import RecordingWarning
 from nonsmooth.recordings.signals.checks import take
-from nonsmooth.recordings.signals.contacts import contacts
+from nonsmooth.recordings.signals.contacts import contacts, impacts
 from nonsmooth.recordings.signals.displacement import position
 from nonsmooth.recordings.signals.harmonics import fit
-from nonsmooth.recordings.signals.impacts import impacts
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth.recordings.signals.sections import poincare
 from nonsmooth.recordings.signals.smoothing import savitzky_golay, smooth

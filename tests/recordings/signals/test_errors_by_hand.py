@@ -9,7 +9,7 @@ import pytest
 import scipy.signal
 from motions import bounces, rms
 
-from nonsmooth.recordings.signals.impacts import impacts
+from nonsmooth.recordings.signals.contacts import impacts
 from nonsmooth.recordings.signals.phase import DrivePhase
 from nonsmooth.recordings.signals.sections import poincare, stroboscopic
 from nonsmooth.recordings.signals.steady import steady_response

@@ -7,8 +7,7 @@ import pytest
 from motions import COUNT, Floats, bounces, decay, rms, sine
 
 import nonsmooth as ns
-from nonsmooth.recordings.signals.contacts import contacts
-from nonsmooth.recordings.signals.impacts import impacts
+from nonsmooth.recordings.signals.contacts import contacts, impacts
 
 TABLE_1 = {"k": 8.47, "k_s": 1210.0, "c": 0.87, "c_s": 0.60, "m": 0.838}
 
