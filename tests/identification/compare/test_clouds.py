@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from nonsmooth.identification.compare.clouds import block_length, cloud_distance, energy_distance, wasserstein
+from nonsmooth.identification.compare.orbits import block_length, cloud_distance, energy_distance, wasserstein
 
 
 def normal(n: int, seed: int, mean: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:

@@ -8,9 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.compare.clouds import cloud_distance, energy_distance, wasserstein
 from nonsmooth.identification.compare.draws import Model
-from nonsmooth.identification.compare.orbits import common_length, fold, mean_orbit, orbit_distance
+from nonsmooth.identification.compare.orbits import (
+    cloud_distance,
+    common_length,
+    energy_distance,
+    fold,
+    mean_orbit,
+    orbit_distance,
+    wasserstein,
+)
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.identification.compare.predict import Motions, Prediction, SteadyState, from_result, predict
 from nonsmooth.results.labels import labelled

@@ -18,9 +18,8 @@ from nonsmooth.flow.failure import solve_error
 from nonsmooth.flow.options import longest_period
 from nonsmooth.flow.sections import Stroboscopic, section_plan
 from nonsmooth.flow.simulate import check_complete
-from nonsmooth.identification.compare.clouds import energy_distance
 from nonsmooth.identification.compare.draws import Model
-from nonsmooth.identification.compare.orbits import fold, mean_orbit
+from nonsmooth.identification.compare.orbits import energy_distance, fold, mean_orbit
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept, Section
