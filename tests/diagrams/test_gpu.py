@@ -21,10 +21,10 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.kernels.compile.assembly import LINEAR_STEPPER
 from nonsmooth.kernels.compile.cache import reached
 from nonsmooth.kernels.cuda import ptx
 from nonsmooth.kernels.cuda.module import OBSERVERS, joined, stamp
-from nonsmooth.kernels.linear.module import STEPPER
 
 COMPILER = [importlib.util.find_spec(name) is not None for name in ("numba_cuda", "nvidia")]
 pytestmark = pytest.mark.skipif(not COMPILER[0], reason="numba-cuda is not installed (extra `test`, Linux only)")
@@ -133,7 +133,7 @@ def test_every_kernel_compiles_for_the_types_it_is_launched_with(
     """Twenty seconds, so not again for the same texts, types and compiler. Without optimising it refuses the same."""
     given = json.dumps([optimised, {name: simulated["launched"][name] for name in sorted(entries)}])
     compiler = [version(name) for name in ("numba-cuda", "nvidia-nvvm", "llvmlite")]
-    texts = [joined((*STEPPER, *parts)) for parts in OBSERVERS.values()]
+    texts = [joined((*LINEAR_STEPPER, *parts)) for parts in OBSERVERS.values()]
     texts += [stamp(), Path(ptx.__file__).read_text(), *(reached(text) for text in texts)]
     key = hashlib.sha256(repr([given, compiler, texts]).encode()).hexdigest()
     cache = getattr(request.config, "cache", None)  # there is none where pytest was told so

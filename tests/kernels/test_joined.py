@@ -9,18 +9,17 @@ from pathlib import Path
 
 import pytest
 
+from nonsmooth.kernels.compile import assembly
 from nonsmooth.kernels.compile.assembly import PLACES
 from nonsmooth.kernels.cuda import module as cuda_module
 from nonsmooth.kernels.cuda import series_module as cuda_series_module
-from nonsmooth.kernels.linear import module as linear_module
-from nonsmooth.kernels.series import module as series_module
 
 ROOM = "nonsmooth.kernels."
 FOLDER = Path(cuda_module.__file__).parents[1]
 TEXTS = {
-    "linear": (*linear_module.STEPPER, *linear_module.OBSERVERS),
-    **{f"cuda {name}": (*cuda_module.STEPPER, *parts) for name, parts in cuda_module.OBSERVERS.items()},
-    "series": (*series_module.STEPPER, *series_module.OBSERVERS),
+    "linear": (*assembly.LINEAR_STEPPER, *assembly.LINEAR_OBSERVERS),
+    **{f"cuda {name}": (*assembly.LINEAR_STEPPER, *parts) for name, parts in cuda_module.OBSERVERS.items()},
+    "series": (*assembly.SERIES_STEPPER, *assembly.SERIES_OBSERVERS),
     "cuda series": cuda_series_module.PARTS,
 }
 MARKERS = {"device", "inline", "kernel", "callback", "local", "once"}  # another compiler's on a GPU

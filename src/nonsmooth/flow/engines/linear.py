@@ -108,7 +108,7 @@ class LinearEngine(Engine):
         return len(self.scale) == 2 and not self.traced.m and len(self.form.multiples) <= 1
 
     def module(self) -> ModuleType:
-        from nonsmooth.kernels.linear.module import linear_module
+        from nonsmooth.kernels.compile.assembly import linear_module
 
         return linear_module(self.is_planar)
 

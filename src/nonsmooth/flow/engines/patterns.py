@@ -61,7 +61,7 @@ class PatternEngine(Engine):
         return Points(np.asarray(points, dtype=float), linear, linear.period)
 
     def module(self) -> ModuleType:
-        from nonsmooth.kernels.linear.module import linear_module
+        from nonsmooth.kernels.compile.assembly import linear_module
 
         return linear_module()
 
@@ -147,7 +147,7 @@ class PatternTables:
     """The tables of one parameter point: those of the patterns that were visited there, and room for more."""
 
     def __init__(self, engine: PatternEngine, tables: Points, i: int) -> None:
-        from nonsmooth.kernels.linear.module import linear_module
+        from nonsmooth.kernels.compile.assembly import linear_module
 
         patterns = engine.patterns
         self.patterns = patterns

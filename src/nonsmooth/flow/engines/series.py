@@ -139,7 +139,7 @@ class SeriesEngine(Engine):
         return SeriesPoints(points, periods(self.traced, points))
 
     def module(self) -> ModuleType:
-        from nonsmooth.kernels.series.module import series_module
+        from nonsmooth.kernels.compile.assembly import series_module
 
         return series_module()
 

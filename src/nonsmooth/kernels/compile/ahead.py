@@ -26,9 +26,9 @@ JOINED = ("kernels.hybrid.run", "kernels.linear.modes")  # texts of modules that
 _ROOT = Path(__file__).parents[2]
 _Task = tuple[str, str, tuple[Any, ...]]  # a module, or a function in it that makes one and its arguments
 MARCHES: dict[str, _Task] = {  # the longest first
-    "linear": ("nonsmooth.kernels.linear.module", "linear_module", (False,)),
-    "series": ("nonsmooth.kernels.series.module", "series_module", ()),
-    "planar": ("nonsmooth.kernels.linear.module", "linear_module", (True,)),
+    "linear": ("nonsmooth.kernels.compile.assembly", "linear_module", (False,)),
+    "series": ("nonsmooth.kernels.compile.assembly", "series_module", ()),
+    "planar": ("nonsmooth.kernels.compile.assembly", "linear_module", (True,)),
 }
 STEPPERS = tuple(MARCHES)
 

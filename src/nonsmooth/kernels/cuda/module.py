@@ -14,9 +14,8 @@ from pathlib import Path
 from types import ModuleType
 
 from nonsmooth.kernels.compile import assembly
-from nonsmooth.kernels.compile.assembly import with_numbers
+from nonsmooth.kernels.compile.assembly import LINEAR_STEPPER, with_numbers
 from nonsmooth.kernels.compile.cache import load_module
-from nonsmooth.kernels.linear.module import STEPPER
 
 OBSERVERS = {
     "sections": (
@@ -67,7 +66,7 @@ def cuda_linear_module(
         "GROWS": 2 if observer == "growth" else 0,
         "MAY_WAIT": 0,
     }
-    text = with_numbers(joined((*STEPPER, *OBSERVERS[observer])), sizes)
+    text = with_numbers(joined((*LINEAR_STEPPER, *OBSERVERS[observer])), sizes)
     name = "_".join(map(str, (harmonics, modes, indicators, outputs, transitions, rows)))
     return load_module(text + stamp(), f"cuda_{observer}_{name}")
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from nonsmooth.kernels.compile.assembly import is_planar
 from nonsmooth.kernels.compile.block import one_block
 from nonsmooth.kernels.hybrid.places import N_MEMO, N_TALLY
 from nonsmooth.kernels.hybrid.records import Tables, Work
 from nonsmooth.kernels.linear.bands import BANDED
-from nonsmooth.kernels.linear.module import is_planar
 from nonsmooth.kernels.linear.search import WIDTH
 from nonsmooth.kernels.linear.tables import DEGREE, NODES, TERMS
 

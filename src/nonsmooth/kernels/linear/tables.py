@@ -5,7 +5,7 @@ sin k_1 w t, ...) this is w' = M w, whose flow exp(M tau) needs no eigenvectors:
 matrices are no special case. ``build.build`` sums the Taylor series of the upper n rows of exp(M tau) at 33 equidistant
 nodes of a step that is a quarter of the mode's fastest period.
 
-These files become two modules (``linear.module``): one in which the numbers of states and harmonics are constants, so
+These files become two modules (``assembly``): one in which the numbers of states and harmonics are constants, so
 that every inner loop has constant bounds, and one for all other numbers, which are then those of the tables. With n
 states, the last of them memory, and h harmonics w has m = n + 1 + 2 h entries: w[n] = 1, w[n + 1 + 2 h] a cosine, w[n +
 2 + 2 h] its sine. Arrays (functionals = indicators, states, affine outputs):
