@@ -16,13 +16,8 @@ PAGE = 4096
 
 def one_block(*arrays: Any) -> tuple[Any, ...]:
     """Copies of arrays (and of tuples of arrays), behind each other in one block of memory that begins on a page."""
-    block = np.zeros(sum(_room(array) for array in arrays) + PAGE, dtype=np.uint8)
-    first = -block.ctypes.data % PAGE
-    found = []
-    for array in arrays:
-        found.append(_put(array, block, first))
-        first += _room(array)
-    return tuple(found)
+    block = np.zeros(_room(arrays) + PAGE, dtype=np.uint8)
+    return _put(arrays, block, -block.ctypes.data % PAGE)
 
 
 def _room(array: Any) -> int:
