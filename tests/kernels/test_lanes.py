@@ -7,8 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from nonsmooth.kernels.compile.block import LINE, one_block
 from nonsmooth.kernels.compile.cache import load_module
+from nonsmooth.kernels.compile.pointers import LINE, one_block
 from nonsmooth.kernels.linear.tables import DEGREE
 
 CALLABLE = """

@@ -263,8 +263,8 @@ class VariationalFlow:
 
     def steps(self, order: int, accuracy: float) -> Any:
         """Working memory of steps by series of this order, whose last terms are so small."""
-        from nonsmooth.kernels.compile.block import one_block
         from nonsmooth.kernels.compile.lanes import FOUR
+        from nonsmooth.kernels.compile.pointers import one_block
         from nonsmooth.kernels.tangent.legs import Steps
 
         n, columns, width = self.n_moving, self.n + self.n_active, order + 1

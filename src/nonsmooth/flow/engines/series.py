@@ -211,7 +211,7 @@ def work_of(
     n: int, n_indicators: int, rows: int, n_modes: int, n_rows: int, n_p: int, n_m: int, order: int, n_scratch: int
 ) -> Any:
     """Working memory of one running kernel (``kernels.records.SeriesWork``)."""
-    from nonsmooth.kernels.compile.block import one_block
+    from nonsmooth.kernels.compile.pointers import one_block
     from nonsmooth.kernels.hybrid.records import SeriesWork
     from nonsmooth.kernels.series.places import N_SERIES_MEMO, N_SERIES_TALLY
     from nonsmooth.kernels.series.polynomial import stack_size

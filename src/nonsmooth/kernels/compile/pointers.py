@@ -1,17 +1,4 @@
-"""Compiled functions and records of arrays passed to a kernel as integers.
-
-An argument of function type costs 30 microseconds per call from Python, because Numba asks Python for its address each
-time. That is nothing beside a sweep, and far too much where a kernel runs for ten microseconds. Here the addresses are
-asked for once and passed as an array; ``function_at`` makes them functions again inside the kernel. Whoever passes
-addresses keeps the functions alive.
-
-The same holds for records: an array takes 150 ns on its way into a kernel, seven words of it in each call between two
-kernels, and a system has some sixty. A record is written to a block of memory once (:func:`stored`), and a kernel that
-is given its address reads from it what it needs.
-
-Leans on the layout of Numba's function values, as ``numba.core.types.FunctionType`` lowers a call; checked with 0.62
-and 0.68.
-"""
+"""Compiled functions and records of arrays passed to a kernel as integers; its working memory in one block."""
 
 from __future__ import annotations
 
@@ -124,3 +111,32 @@ class Block:
             self._put(self.address, record)
             self.record = record
         return self.address
+
+
+LINE = 64  # bytes of a cache line
+PAGE = 4096
+
+
+def one_block(*arrays: Any) -> tuple[Any, ...]:
+    """Copies of arrays (and of tuples of arrays), behind each other in one block of memory that begins on a page."""
+    block = np.zeros(_room(arrays) + PAGE, dtype=np.uint8)
+    return _put(arrays, block, -block.ctypes.data % PAGE)
+
+
+def _room(array: Any) -> int:
+    """Bytes that an array takes up to the next cache line."""
+    if isinstance(array, tuple):
+        return sum(_room(part) for part in array)
+    return -(-int(array.nbytes) // LINE) * LINE
+
+
+def _put(array: Any, block: Any, first: int) -> Any:
+    if isinstance(array, tuple):
+        found = []
+        for part in array:
+            found.append(_put(part, block, first))
+            first += _room(part)
+        return tuple(found)
+    view = block[first : first + array.nbytes].view(array.dtype).reshape(array.shape)
+    view[...] = array
+    return view
