@@ -1,4 +1,9 @@
-"""Ends of many starts, one array per quantity, one row per job; the place of one, from which it can go on."""
+"""Ends of many starts, one array per quantity, one row per job; the place of one, from which it can go on.
+
+A *place* is a start with everything that the run needs besides its mode: the states, then the memory, then, where a
+forced system is looked at on a Poincare section, the time since the forcing period began (:attr:`Settler.width` numbers
+in all). A plain start has the states only.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Many starts brought to their attractors, judged, to a tolerance, with exponents: the work of charts and basins."""
+"""Many starts brought to their attractors, judged, to a tolerance, with exponents: the work of charts and basins.
+
+A *job* is a start at one parameter point. All jobs of a call run in one compiled loop (``mapper``), on a GPU in rounds.
+What is done is decided in one place (``kernels.judging.settle``): a period number is granted with a certificate only.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,19 @@
-"""A Zarr store for the chunks of one work: written chunk by chunk, whole or not at all, marked, gone on with later."""
+"""A Zarr store for the chunks of one work: written chunk by chunk, whole or not at all, marked, gone on with later.
+
+::
+
+    chart.zarr/              a Zarr group; the attribute ``nonsmooth_campaign`` says what the work is
+        results/             one array per column, one file per chunk, of zeros too (Zstandard, fixed level)
+        run/000017.json      chunk 17 is done: its key and the hash of its content, by whom, when, time worked
+        run/started.log      which chunks were begun: one begun twice was lost with its worker
+
+A chunk's key is a hash of the model, the parameters, the options, the source of kernels and rules, and the chunk's
+place. Its mark is written after its arrays, so that a chunk cut short counts as missing. Arrays hold results only:
+facts about the run (which machine, how long) stay in ``run``, so that equal work gives equal files.
+
+Processes write chunks without knowing of each other, so each chunk has its own hash, and they are compared whenever
+the store is read. The hash of a finished store is the hash of these: it says whether two stores hold the same.
+"""
 
 from __future__ import annotations
 

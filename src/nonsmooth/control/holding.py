@@ -1,4 +1,11 @@
-"""``Holding``: how a controller holds a motion to a reference, what one measurement gives, and how it is let go."""
+r"""``Holding``: how a controller holds a motion to a reference, what one measurement gives, and how it is let go.
+
+.. math::
+
+    F_k = K_p e_k + K_d d_k, \quad e_k = r(\varphi_k) - y_k, \quad
+    d_k = \alpha d_{k-1} + (1 - \alpha) \frac{e_k - e_{k-1}}{t_k - t_{k-1}}, \quad
+    \alpha = e^{-(t_k - t_{k-1}) / \tau}
+"""
 
 from __future__ import annotations
 

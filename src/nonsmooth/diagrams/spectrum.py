@@ -1,4 +1,15 @@
-"""Lyapunov exponents of one trajectory: growth of a frame in batches of time, their errors, the dimension they give."""
+r"""Lyapunov exponents of one trajectory: growth of a frame in batches of time, their errors, the dimension they give.
+
+The sums of the logarithms of what is divided out, over the elapsed time, are finite-time Lyapunov exponents. Their sum
+is :math:`\frac1t \log|\det\Phi(t)|`, which must equal
+:math:`\frac1t(\int \operatorname{div} f\,dt + \sum \log|\det S|)`. The frame is marched with the trajectory by the
+engine's own kernel: with the tables of an exact flow, or by Taylor series of its own.
+
+References
+----------
+G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9-30; P.C. Mueller, Chaos, Solitons &
+Fractals 5 (1995) 1671-1681.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""A sweep cut into pieces of independent work, and their buffers; histograms in place of its section points."""
+"""A sweep cut into pieces of independent work, and their buffers; histograms in place of its section points.
+
+The points of one parameter value at a time are run into a buffer, counted there and forgotten.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""The variational flow of systems whose modes are linear or made when visited: rows of numbers in place of formulas."""
+"""The variational flow of systems whose modes are linear or made when visited: rows of numbers in place of formulas.
+
+The rows of modes, conditions and transitions over w = (u, memory, 1, cos k_1 w t, sin k_1 w t, ...), with their
+derivatives in the active parameters, stand in one array, which the kernels read as the constants of a model
+(:mod:`nonsmooth.kernels.tangent.rows`): nothing is compiled for such a system.
+"""
 
 from __future__ import annotations
 

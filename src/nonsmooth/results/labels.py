@@ -1,4 +1,8 @@
-"""Words of results: the labels of a system (names, units, symbols), the meanings of status codes, flags."""
+"""Words of results: the labels of a system (names, units, symbols), the meanings of status codes, flags.
+
+Results lie below the system room, so they read a system through this one record. ``labels_of`` is the
+only place that knows which attributes a ``System`` has.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Memory is looked up before it is taken, by a call or for a file; what claims more than there is is refused."""
+"""Memory is looked up before it is taken, by a call or for a file; what claims more than there is is refused.
+
+A file may also point out of itself (an external link, data kept in another file): that is never followed.
+"""
 
 from __future__ import annotations
 

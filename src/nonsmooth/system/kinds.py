@@ -1,4 +1,19 @@
-"""Kinds of arguments, as signatures declare them or verbs ask, and the readers that refuse the rest in a sentence."""
+"""Kinds of arguments, as signatures declare them or verbs ask, and the readers that refuse the rest in a sentence.
+
+==============================================  =======================================================
+``keep: Annotated[int, at_least(2)] = 100``     a whole number; 3.0 passes for 3; 2.5, True, "3" and NaN do not
+``budget: Annotated[float, above(0)] = 60``     a finite number; ``at_least`` as well, both with a largest
+``judge: bool = True``                          yes or no, also 0 and 1 or of NumPy; no word
+``side: Literal["up", "down", None] = "up"``    one of these
+``rtol: float | None = None``                   that, or None
+``range: Range``                                two ends, (low, high)
+``box: Mapping[str, float]``                    by name; what it holds is read too
+``per_run: Sequence[str]``                      a list, likewise
+``orbit: Orbit``                                one of a class
+``name: Annotated[str, "its name in quotes"]``  with what to do, for the sentence
+``start: Any``                                  not read here
+==============================================  =======================================================
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""One traced form of a description, sharp or smoothed: what is derived from it and kept; values of its parameters."""
+"""One traced form of a description, sharp or smoothed: what is derived from it and kept; values of its parameters.
+
+Jacobians of the vector fields, resets and writes, gradients of indicators and outputs, in u, t, p and
+memory; Hessians of indicators; Lie derivatives
+:math:`L_f h = h_t + h_u f`, :math:`L_f^k h = L_f (L_f^{k-1} h)` along a mode's field.
+All are expanded, so that "is it constant?" is a question about free symbols.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The engine of the series methods: generated Taylor series and Runge-Kutta-Fehlberg 4(5), periods and scratch."""
+"""The engine of the series methods: generated Taylor series and Runge-Kutta-Fehlberg 4(5), periods and scratch.
+
+It packs a system into the records of ``kernels.series``; no numerics of its own.
+"""
 
 from __future__ import annotations
 

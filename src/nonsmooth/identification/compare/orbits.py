@@ -1,4 +1,28 @@
-"""Distances of motions: of two closed orbits, folded by the phase of the drive, and of two clouds of points."""
+r"""Distances of motions: of two closed orbits, folded by the phase of the drive, and of two clouds of points.
+
+Measured samples fall anywhere in a period. Folded, a motion stands on equal grids of phase, period after period;
+between samples each state is interpolated by the cubic through the four samples nearest by: of fourth order where the
+motion is smooth, and a kink that an impact leaves reaches no further than two samples.
+
+Two orbits are given on equal grids of phase, over the same whole number of forcing periods. With s_i the root mean
+square size of state i about its mean (of both orbits together),
+
+.. math:: d(\delta)^2 = \frac1n \sum_i \Big\langle \frac{(a_i(\varphi) - b_i(\varphi - \delta))^2}{s_i^2} \Big\rangle
+
+is 0 for equal orbits, about :math:`\sqrt 2` for unrelated ones of equal size, and :math:`2 |\sin(\delta / 2)|` for two
+harmonic ones that are :math:`\delta` apart. Where the drive's phase is known, only shifts by whole forcing periods are
+free (which of p alike points is called the first); modulo phase, all are.
+
+The energy distance of Székely and Rizzo (J. Stat. Plan. Inference 143 (2013) 1249-1272, Eq. 2.1) of the laws of
+X and Y,
+
+.. math:: E^2 = 2\,\mathrm E|X - Y| - \mathrm E|X - X'| - \mathrm E|Y - Y'|,
+
+is zero only where the laws are equal, in any number of dimensions; SciPy has it in one. A finite cloud is at a distance
+from the law it came from, so a distance says something only beside those of the cloud's own halves. The halves are
+made of whole blocks of successive points: points of a motion that follow each other are alike, and halves of
+single points would be closer than two records are.
+"""
 
 from __future__ import annotations
 

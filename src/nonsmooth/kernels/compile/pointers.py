@@ -1,4 +1,20 @@
-"""Compiled functions and records of arrays passed to a kernel as integers; its working memory in one block."""
+"""Compiled functions and records of arrays passed to a kernel as integers; its working memory in one block.
+
+An argument of function type costs 30 microseconds per call from Python, because Numba asks Python for its address each
+time. That is nothing beside a sweep, and far too much where a kernel runs for ten microseconds. Here the addresses are
+asked for once and passed as an array; ``function_at`` makes them functions again inside the kernel. Whoever passes
+addresses keeps the functions alive.
+
+The same holds for records: an array takes 150 ns on its way into a kernel, seven words of it in each call between two
+kernels, and a system has some sixty. A record is written to a block of memory once (:func:`stored`), and a kernel that
+is given its address reads from it what it needs.
+
+Leans on the layout of Numba's function values, as ``numba.core.types.FunctionType`` lowers a call; checked with 0.62
+and 0.68.
+
+Where Python happens to put small arrays changes from process to process, and a vector that straddles two cache lines
+costs twice: the same kernel took up to 20 % more time in one process than in another.
+"""
 
 from __future__ import annotations
 

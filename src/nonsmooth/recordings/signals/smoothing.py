@@ -1,4 +1,10 @@
-"""Position, velocity and acceleration from a quantised record, with standard errors; Savitzky-Golay beside it."""
+"""Position, velocity and acceleration from a quantised record, with standard errors; Savitzky-Golay beside it.
+
+The signal is taken as a polynomial that is shaken: its n-th derivative is white noise, whose intensity is found by
+maximum likelihood, so that nothing is to be tuned. An encoder's count is known to +- half a step, an error of variance
+delta^2 / 12. Times may be uneven, samples may be missing. At an impact the position is continuous and the velocity is
+free; nothing is carried across it.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Forces between bounds: the convex problem that tells them, and the sums in which they leave their bounds first."""
+"""Forces between bounds: the convex problem that tells them, and the sums in which they leave their bounds first.
+
+A force between two bounds moves a sum along a segment, a contact that pushes along a ray, one that sticks within its
+cone of friction along two. By how much a single one of several that hold the same rates pulls is not known, and not
+asked.
+"""
 
 from __future__ import annotations
 

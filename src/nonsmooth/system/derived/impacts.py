@@ -1,4 +1,14 @@
-"""Impacts at one instant of a motion: places and rates, what counts as zero there, contacts closed, friction."""
+"""Impacts at one instant of a motion: places and rates, what counts as zero there, contacts closed, friction.
+
+Newton's law over all of them at once, one after the other, or with friction.
+
+Along the normal impulse p the rates v of the contact (n), of its slip (t) and of other closed contacts (o) change by
+
+    dv / dp = G_n + k G_t + G_o y,      k = -mu sgn v_t,    or |k| <= mu with v_t = 0,    0 <= y complementary to v_o.
+
+Compression ends where v_n = 0, with the work W = int v_n dp; the impact ends where the work since then is e^2 |W|
+(Stronge 1990). k and y do not change along a piece, which ends where a rate becomes zero: all roots are closed forms.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""The ground of all elements: the place where one acts, its phases, what it says of itself and asks of others."""
+"""The ground of all elements: the place where one acts, its phases, what it says of itself and asks of others.
+
+An element is in one of a few phases (open or at rest, slipping or sticking, ...). In each its force is a law, or it is
+whatever keeps a rate at zero: the approach of a contact that rests, the speed of one that sticks. A system with
+elements has a mode for each combination of their phases. An element knows its own rules and no other element; what
+stands around it is a :class:`Place`.
+"""
 
 from __future__ import annotations
 
