@@ -129,15 +129,15 @@ class Mapper:
         """The record of the engine's march for the compiled loops (``kernels.judging.driver.Runs``)."""
         from nonsmooth.kernels.compile.cache import compiled
         from nonsmooth.kernels.compile.pointers import Block, addresses
-        from nonsmooth.kernels.hybrid import blocks, records
+        from nonsmooth.kernels.hybrid import records
         from nonsmooth.kernels.judging.driver import Runs
 
         march, plan, (one, other) = self.march, self.engine.placed(tables, self.settler.plan), self.states
         march.returns(0, 0, one, None, plan, 0, 0, self.kept)
         first, work = march.call.record, self._system(tables, row)[3]
         second = first._replace(motion=other.motion())
-        kept = [Block(records.KEPT, blocks.put_kept) for _ in self.rooms]
-        self.blocks = Block(records.CALL, blocks.put_call), *kept
+        kept = [Block(records.KEPT, records.put_kept) for _ in self.rooms]
+        self.blocks = Block(records.CALL, records.put_call), *kept
         found = [
             march.system.address,
             march.log.address,

@@ -98,12 +98,12 @@ class KernelMarch:
 
     def __init__(self, module: ModuleType, limit: FloatArray) -> None:
         from nonsmooth.kernels.compile.pointers import Block
-        from nonsmooth.kernels.hybrid import blocks, records
+        from nonsmooth.kernels.hybrid import records
 
         self.module, self.limit = module, limit
         self.system = Block(module.SYSTEM, module.put_system)
-        self.call, self.kept = Block(records.CALL, blocks.put_call), Block(records.KEPT, blocks.put_kept)
-        self.log, self.growth = Block(records.LOG, blocks.put_log), Block(records.GROWTH, blocks.put_growth)
+        self.call, self.kept = Block(records.CALL, records.put_call), Block(records.KEPT, records.put_kept)
+        self.log, self.growth = Block(records.LOG, records.put_log), Block(records.GROWTH, records.put_growth)
         self.orders, self.reals = np.zeros(records.N_ORDERS, dtype=np.int64), np.zeros(records.N_REALS)
 
     def returns(

@@ -1,4 +1,4 @@
-"""Arguments of the kernels by name: each concept's arrays in one named tuple, which costs nothing inside a kernel.
+"""Arguments of the kernels by name, each concept's arrays in one named tuple, and blocks of memory where they stand.
 
 ``type_of`` gives the Numba type of a record; the names of types are those of the records in capitals.
 """
@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 
 from numba import types
 
-from nonsmooth.kernels.compile.cache import device
+from nonsmooth.kernels.compile.cache import device, kernel
+from nonsmooth.kernels.compile.pointers import stored
 from nonsmooth.kernels.hybrid.kept import Kept
 
 _i, _f = types.int64, types.float64
@@ -289,3 +290,33 @@ CALL = type_of(Call, _i1, _f1, _f1, _f2, MOTION)
 KEPT = type_of(Kept, _f3, _f2, _f2, _i1, _i1, _f1, _f2, _i2, _i1)
 LOG = type_of(Log, _f1, _f2, _f2, _i1, _i1, _f1, _i1, _f2, _f2, _f2, _f1, _i1, _f2, _f1, _i, _f1, _f2, _i)
 GROWTH = type_of(Growth, _f1, _f2, _f2, _f1, _f1, *[_f2] * 4, _f1, _f1, _i1, _i1, _i, _f1, _f1)
+
+
+_put_call, call_at = stored(CALL)
+_put_kept, kept_at = stored(KEPT)
+_put_log, log_at = stored(LOG)
+_put_growth, growth_at = stored(GROWTH)
+
+
+@kernel(types.void(types.int64, CALL))
+def put_call(address, record):
+    """Write what is asked of a march to an address."""
+    _put_call(address, record)
+
+
+@kernel(types.void(types.int64, KEPT))
+def put_kept(address, record):
+    """Write the arrays of kept returns to an address."""
+    _put_kept(address, record)
+
+
+@kernel(types.void(types.int64, LOG))
+def put_log(address, record):
+    """Write the arrays of a log to an address."""
+    _put_log(address, record)
+
+
+@kernel(types.void(types.int64, GROWTH))
+def put_growth(address, record):
+    """Write the arrays of a frame and its growth to an address."""
+    _put_growth(address, record)

@@ -10,7 +10,6 @@ from numba import types
 
 from nonsmooth.kernels.compile.cache import kernel, once
 from nonsmooth.kernels.compile.pointers import stored
-from nonsmooth.kernels.hybrid.blocks import call_at, growth_at, kept_at, log_at
 from nonsmooth.kernels.hybrid.codes import LOG_FULL, NO_CONVERGENCE, NOT_GUARANTEED, OK, PAUSED
 from nonsmooth.kernels.hybrid.kept import Section
 from nonsmooth.kernels.hybrid.loop import leave, march
@@ -38,6 +37,10 @@ from nonsmooth.kernels.hybrid.records import (
     UNTIL,
     Goal,
     Seen,
+    call_at,
+    growth_at,
+    kept_at,
+    log_at,
 )
 from nonsmooth.kernels.hybrid.sections import keep_point, window_of
 from nonsmooth.kernels.linear.extremes import finish
