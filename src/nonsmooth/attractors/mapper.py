@@ -12,8 +12,8 @@ from nonsmooth.attractors.settled import Settled
 from nonsmooth.flow.engines.engine import FloatArray, IntArray, KernelMarch, State
 from nonsmooth.flow.engines.loop import end_if_not_wanted
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.codes import BEGUN, STARTS, WAITS
 from nonsmooth.kernels.hybrid.kept import Kept
-from nonsmooth.kernels.hybrid.places import BEGUN, STARTS, WAITS
 from nonsmooth.kernels.hybrid.stopping import flag
 
 if TYPE_CHECKING:

@@ -26,8 +26,8 @@ from nonsmooth.flow.equilibria import Equilibrium, equilibrium_at
 from nonsmooth.flow.loads import meter_of
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.codes import UNBROKEN
 from nonsmooth.kernels.hybrid.kept import Section
-from nonsmooth.kernels.hybrid.places import UNBROKEN
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

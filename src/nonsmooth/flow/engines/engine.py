@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.kernels.hybrid.codes import GROW, LOGGED, RETURNS_OF_SECTION
 from nonsmooth.kernels.hybrid.kept import Kept, Section
-from nonsmooth.kernels.hybrid.places import GROW, LOGGED, RETURNS_OF_SECTION
 
 IntArray = NDArray[np.int64]
 

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.flow.engines.engine import NO_CHANGES, Changes, FloatArray, KernelMarch, State, TrajectoryLog
-from nonsmooth.kernels.hybrid import codes, places
+from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.codes import BEGUN, CROSSINGS, DEAD_END, FIRED, MODE, RESET, STARTS, TIME, TOUCHES, WAITS
 from nonsmooth.kernels.hybrid.kept import Kept, Section
-from nonsmooth.kernels.hybrid.places import BEGUN, CROSSINGS, DEAD_END, FIRED, MODE, RESET, STARTS, TIME, TOUCHES, WAITS
 from nonsmooth.kernels.hybrid.stopping import flag
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.derived.deciding import begun, decide
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 DIVERGENCE = 1e9  # in units of a state's scale
 # Place 4 of ``Net.transitions``
-KINDS = {ALONE: places.ALONE, OWN: places.OWN, ASKS_BEHIND: places.ASKS_BEHIND, FOUND: places.ANSWER}
+KINDS = {ALONE: codes.ALONE, OWN: codes.OWN, ASKS_BEHIND: codes.ASKS_BEHIND, FOUND: codes.ANSWER}
 #: Called by the thread of a run whenever it pauses.
 at_pause: list[Callable[[], None]] = []
 SPARE = 64  # crossings that one leg may add to a log

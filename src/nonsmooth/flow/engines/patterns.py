@@ -18,8 +18,8 @@ from nonsmooth.flow.engines.engine import Changes, FloatArray, IntArray, KernelM
 from nonsmooth.flow.engines.linear import table_bytes
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.codes import DEAD_END, FIRED, MODE, RESET, STARTS, TIME, WAITS
 from nonsmooth.kernels.hybrid.kept import Kept, Section
-from nonsmooth.kernels.hybrid.places import DEAD_END, FIRED, MODE, RESET, STARTS, TIME, WAITS
 from nonsmooth.results.memory import free_memory, room_for
 from nonsmooth.system.codegen.linear import apart, put_together
 from nonsmooth.system.derived.deciding import Outcome, begun, decide

@@ -8,10 +8,9 @@ of the next launch, and a launch stays short.
 
 from nonsmooth.kernels.cuda.tables import tabled
 from nonsmooth.kernels.cuda.target import cuda, device, entry
-from nonsmooth.kernels.hybrid.codes import OK
+from nonsmooth.kernels.hybrid.codes import BEGUN, OK, RETURNS_OF_SECTION
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.hybrid.loop import leave, march
-from nonsmooth.kernels.hybrid.places import BEGUN, RETURNS_OF_SECTION
 from nonsmooth.kernels.hybrid.records import Goal, Motion, Net, Seen
 from nonsmooth.kernels.hybrid.sections import window_of
 from nonsmooth.kernels.linear.extremes import finish

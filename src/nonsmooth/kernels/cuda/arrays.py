@@ -8,7 +8,7 @@ local memory, which the GPU interleaves in the same way.
 from numba import float64, int64
 
 from nonsmooth.kernels.cuda.target import cuda, device, local
-from nonsmooth.kernels.hybrid.places import N_MEMO, N_TALLY
+from nonsmooth.kernels.hybrid.codes import N_MEMO, N_TALLY
 from nonsmooth.kernels.hybrid.records import Form, Tables, Work
 from nonsmooth.kernels.linear.search import WIDTH
 from nonsmooth.kernels.linear.tables import HARMONICS, NODES, TERMS

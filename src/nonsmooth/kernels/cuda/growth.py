@@ -8,9 +8,9 @@ from numba import float64
 
 from nonsmooth.kernels.cuda.tables import tabled
 from nonsmooth.kernels.cuda.target import cuda, entry
+from nonsmooth.kernels.hybrid.codes import GROW
 from nonsmooth.kernels.hybrid.kept import Section
 from nonsmooth.kernels.hybrid.loop import leave, march
-from nonsmooth.kernels.hybrid.places import GROW
 from nonsmooth.kernels.hybrid.records import Goal, Growth, Motion, Net, Seen
 from nonsmooth.kernels.linear.tables import STATES
 

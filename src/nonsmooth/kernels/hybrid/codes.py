@@ -1,4 +1,4 @@
-"""Integer codes shared by the kernels and the rooms above them (see results/labels.py for their sentences)."""
+"""Integers by name: codes that kernels share with the rooms above them, and places in ``work.tally``, ``work.memo``."""
 
 OK = 0
 SLOW = 1
@@ -16,3 +16,43 @@ NO_MOTION = 10
 LOG_FULL = -1  # a log buffer is full: grow it and call again with the same state
 PAUSED = -3  # as many steps as were asked for have been made: call again with the same state
 BEYOND_STOP = -2  # the start satisfies the condition of a transition with a reset
+
+
+# counts
+BEGUN, MODE, JUMPS, BURST = 0, 1, 2, 3  # transitions within one return, period or unit; and closely behind each other
+RETURNS, PASSES, TRIES = 4, 5, 6  # of the section; steps since the last pass
+SAMPLES, CROSSINGS, TOUCHES = 7, 8, 9  # logged
+FIRED = 10  # the functional (indicator) that has crossed, or -1
+# a transition (plus one) that waits for the tables of its mode, and of its instant: the transitions taken before it,
+# the mode before the first, the first; whether they are closely behind others, and what the observer saw on the leg
+WAITS, TAKEN, SOURCE, FIRST, CLOSELY, NOTED = 11, 12, 13, 14, 15, 16
+STARTS = 17  # 1 where what the elements of a system do at a start is asked; -1: motion is not unique, -2: there is none
+CHANGES = 18  # of inputs, so far
+# one more than the returns, where a run was last compared with the place noted, and where that was noted (0: none); its
+# mode, and the transitions and contacts in the kept window by then
+LOOKED, NOTED_AT, NOTED_MODE, NOTED_CROSSINGS, NOTED_CONTACTS = 19, 20, 21, 22, 23
+N_TALLY = 24
+
+# times
+TIME, PERIODS, SINCE, WAITED, DONE = 0, 1, 2, 3, 4  # in the period, since a crossing, since a pass, since the start
+LONGEST_STEP = 5  # of the modes visited so far
+NOTED_TIME = 6  # in the period, where a run was noted
+N_MEMO = 7
+
+MOST_CROSSINGS = 50_000  # within one return, period or unit of time: with e = 0.999 a mass rests after some 16 000
+REPEATS_WITHIN = 16  # returns from a place noted to the last one that is compared with it
+MOST_AT_ONCE = 60  # at one instant: a log has room for 64 more when a step begins
+MOST_STEPS = 2_000_000  # on the way to the next return
+BURST_LENGTH = 50  # crossings in a row at intervals below SHORT of the stepper's time scale end a run as chatter
+SHORT = 1e-11
+NO_END = 1e300  # a time that is never reached
+
+# What a run is for (``Goal.kind``), and what an observer says of a segment.
+RETURNS_OF_SECTION, LOGGED, GROW = 0, 1, 2
+UNBROKEN = 1  # ``Goal.transient`` of growth: nothing can happen to the motion, which the frame's own series moves
+OPEN_RUN, LATE, CLOSED = 0, 1, 2
+
+RESET = 1  # of ``Net.transitions``, place 1: the states change (2: memory alone)
+DEAD_END = 2  # of place 2: behind it motion is not unique (3: there is none), and the run ends (1: a contact begins)
+# of place 4, where elements are asked: one decides alone; the system's own, without and with a reset; an answer
+ALONE, OWN, ASKS_BEHIND, ANSWER = 1, 2, 3, 4

@@ -7,7 +7,7 @@ after each, and what is divided out is multiplied up.
 from math import inf
 
 from nonsmooth.kernels.compile.cache import once
-from nonsmooth.kernels.hybrid.places import DONE, JUMPS, NO_END, PERIODS, RETURNS, TIME, WAITED
+from nonsmooth.kernels.hybrid.codes import DONE, JUMPS, NO_END, PERIODS, RETURNS, TIME, WAITED
 from nonsmooth.kernels.linear.growth import anchor_frame, frame_has_moved, shape_of
 from nonsmooth.kernels.tangent.frame import log_determinant, multiply, straighten
 

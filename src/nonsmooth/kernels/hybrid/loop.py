@@ -14,24 +14,17 @@ whoever calls says where it leads, and the next call goes on with it.
 
 from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.codes import (
-    BEYOND_STOP,
-    CHATTER,
-    DIVERGED,
-    NOT_GUARANTEED,
-    NOT_UNIQUE,
-    OK,
-    PAUSED,
-    TOO_MANY_CROSSINGS,
-)
-from nonsmooth.kernels.hybrid.places import (
     ALONE,
     ASKS_BEHIND,
     BEGUN,
+    BEYOND_STOP,
     BURST,
     BURST_LENGTH,
+    CHATTER,
     CLOSED,
     CLOSELY,
     DEAD_END,
+    DIVERGED,
     FIRED,
     FIRST,
     JUMPS,
@@ -39,9 +32,13 @@ from nonsmooth.kernels.hybrid.places import (
     MOST_AT_ONCE,
     MOST_CROSSINGS,
     NO_END,
+    NOT_GUARANTEED,
+    NOT_UNIQUE,
     NOTED,
+    OK,
     OPEN_RUN,
     OWN,
+    PAUSED,
     PERIODS,
     RESET,
     SHORT,
@@ -50,6 +47,7 @@ from nonsmooth.kernels.hybrid.places import (
     STARTS,
     TAKEN,
     TIME,
+    TOO_MANY_CROSSINGS,
     WAITS,
 )
 

@@ -4,9 +4,8 @@ The loop asks these functions; each hands on to ``sections``, ``record`` or ``gr
 """
 
 from nonsmooth.kernels.compile.cache import once
-from nonsmooth.kernels.hybrid.codes import OK
+from nonsmooth.kernels.hybrid.codes import DONE, GROW, LOGGED, NO_END, OK, OPEN_RUN, RETURNS, RETURNS_OF_SECTION, WAITED
 from nonsmooth.kernels.hybrid.growth import leave_transitions, mark_unit, open_frame
-from nonsmooth.kernels.hybrid.places import DONE, GROW, LOGGED, NO_END, OPEN_RUN, RETURNS, RETURNS_OF_SECTION, WAITED
 from nonsmooth.kernels.hybrid.record import (
     base_of,
     change_inputs,

@@ -1,14 +1,15 @@
 """Log of one trajectory: its samples, crossings and touches."""
 
 from nonsmooth.kernels.compile.cache import inline, once
-from nonsmooth.kernels.hybrid.codes import LOG_FULL, OK
-from nonsmooth.kernels.hybrid.places import (
+from nonsmooth.kernels.hybrid.codes import (
     CHANGES,
     CROSSINGS,
     DONE,
     JUMPS,
+    LOG_FULL,
     MODE,
     NO_END,
+    OK,
     PERIODS,
     SAMPLES,
     TIME,

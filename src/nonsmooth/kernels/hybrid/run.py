@@ -10,10 +10,22 @@ from numba import types
 
 from nonsmooth.kernels.compile.cache import kernel, once
 from nonsmooth.kernels.compile.pointers import stored
-from nonsmooth.kernels.hybrid.codes import LOG_FULL, NO_CONVERGENCE, NOT_GUARANTEED, OK, PAUSED
+from nonsmooth.kernels.hybrid.codes import (
+    BEGUN,
+    LOG_FULL,
+    LOGGED,
+    MODE,
+    NO_CONVERGENCE,
+    NO_END,
+    NOT_GUARANTEED,
+    OK,
+    PAUSED,
+    RETURNS_OF_SECTION,
+    STARTS,
+    TIME,
+)
 from nonsmooth.kernels.hybrid.kept import Section
 from nonsmooth.kernels.hybrid.loop import leave, march
-from nonsmooth.kernels.hybrid.places import BEGUN, LOGGED, MODE, NO_END, RETURNS_OF_SECTION, STARTS, TIME
 from nonsmooth.kernels.hybrid.record import last_samples
 from nonsmooth.kernels.hybrid.records import (
     AFTER,

@@ -7,21 +7,21 @@ start) to the last kept one; its end is where a carried state goes on.
 from math import floor, inf
 
 from nonsmooth.kernels.compile.cache import inline, once
-from nonsmooth.kernels.hybrid.codes import NO_CONVERGENCE, OK
-from nonsmooth.kernels.hybrid.kept import Kept
-from nonsmooth.kernels.hybrid.places import (
+from nonsmooth.kernels.hybrid.codes import (
     CLOSED,
     JUMPS,
     LATE,
     LOOKED,
     MODE,
     MOST_STEPS,
+    NO_CONVERGENCE,
     NO_END,
     NOTED_AT,
     NOTED_CONTACTS,
     NOTED_CROSSINGS,
     NOTED_MODE,
     NOTED_TIME,
+    OK,
     OPEN_RUN,
     PASSES,
     PERIODS,
@@ -32,6 +32,7 @@ from nonsmooth.kernels.hybrid.places import (
     TRIES,
     WAITED,
 )
+from nonsmooth.kernels.hybrid.kept import Kept
 from nonsmooth.kernels.linear.extremes import include, widen
 from nonsmooth.kernels.linear.stepper import at_rest, memory_at, note_side, state_at, stride
 

@@ -12,8 +12,7 @@ from numba import types
 
 from nonsmooth.kernels.compile.cache import device, kernel
 from nonsmooth.kernels.compile.pointers import function_at
-from nonsmooth.kernels.hybrid.codes import NO_CONVERGENCE, NOT_GUARANTEED, OK, PAUSED
-from nonsmooth.kernels.hybrid.places import BEGUN, NO_END
+from nonsmooth.kernels.hybrid.codes import BEGUN, NO_CONVERGENCE, NO_END, NOT_GUARANTEED, OK, PAUSED
 from nonsmooth.kernels.hybrid.records import (
     BEGIN,
     END,

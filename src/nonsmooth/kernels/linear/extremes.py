@@ -5,7 +5,7 @@ is halved down to two node spacings, where the polynomial's critical points deci
 """
 
 from nonsmooth.kernels.compile.cache import inline, once
-from nonsmooth.kernels.hybrid.places import MODE
+from nonsmooth.kernels.hybrid.codes import MODE
 from nonsmooth.kernels.linear.polynomial import NEVER, THIRD, classify, critical_points, horner
 from nonsmooth.kernels.linear.tables import NODES, states_of
 from nonsmooth.kernels.linear.values import at_ends, bound_at, compose, to_node, value_of

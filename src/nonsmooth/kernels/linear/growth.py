@@ -4,7 +4,7 @@ segment itself, a transition by its saltation (``tangent.frame``)."""
 from math import fabs, inf, sqrt
 
 from nonsmooth.kernels.compile.cache import inline, once
-from nonsmooth.kernels.hybrid.places import MODE
+from nonsmooth.kernels.hybrid.codes import MODE
 from nonsmooth.kernels.linear.bands import by_series, carry
 from nonsmooth.kernels.linear.tables import DEGREE, NODES, STATES, states_of, width_of
 from nonsmooth.kernels.linear.values import slope_of, value_of

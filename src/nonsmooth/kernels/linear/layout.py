@@ -8,7 +8,7 @@ import numpy as np
 
 from nonsmooth.kernels.compile.assembly import is_planar
 from nonsmooth.kernels.compile.pointers import one_block
-from nonsmooth.kernels.hybrid.places import N_MEMO, N_TALLY
+from nonsmooth.kernels.hybrid.codes import N_MEMO, N_TALLY
 from nonsmooth.kernels.hybrid.records import Tables, Work
 from nonsmooth.kernels.linear.bands import BANDED
 from nonsmooth.kernels.linear.search import WIDTH

@@ -3,7 +3,7 @@
 from math import fabs
 
 from nonsmooth.kernels.compile.cache import device, inline, once
-from nonsmooth.kernels.hybrid.places import LONGEST_STEP, MODE, TIME
+from nonsmooth.kernels.hybrid.codes import LONGEST_STEP, MODE, TIME
 from nonsmooth.kernels.linear.sums import at, dot
 from nonsmooth.kernels.linear.tables import STATES, sizes_at, states_of, width_of
 from nonsmooth.kernels.linear.values import EPS, noise, rounding, slope_of, value_of

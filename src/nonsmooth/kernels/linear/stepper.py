@@ -7,7 +7,7 @@ A segment is one step of the mode, or its part up to the first crossing, section
 from math import cos, fabs, sin
 
 from nonsmooth.kernels.compile.cache import inline, once
-from nonsmooth.kernels.hybrid.places import FIRED, MODE, NO_END, TIME, TRIES
+from nonsmooth.kernels.hybrid.codes import FIRED, MODE, NO_END, TIME, TRIES
 from nonsmooth.kernels.hybrid.records import FORM, TABLES, WORK
 from nonsmooth.kernels.linear.build import build
 from nonsmooth.kernels.linear.limits import sign_after

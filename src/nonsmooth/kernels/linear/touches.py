@@ -1,7 +1,7 @@
 """Touches on a segment of the exact flow."""
 
 from nonsmooth.kernels.compile.cache import once
-from nonsmooth.kernels.hybrid.places import DONE, MODE, TOUCHES
+from nonsmooth.kernels.hybrid.codes import DONE, MODE, TOUCHES
 from nonsmooth.kernels.hybrid.records import asked_before
 from nonsmooth.kernels.linear.limits import flat
 from nonsmooth.kernels.linear.polynomial import critical_points, curvature_at, horner, monotone

@@ -10,7 +10,7 @@ from numba import types
 import nonsmooth.kernels.series.places as place
 from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.compile.pointers import function_at
-from nonsmooth.kernels.hybrid.places import MODE, RETURNS, TIME, UNBROKEN
+from nonsmooth.kernels.hybrid.codes import MODE, RETURNS, TIME, UNBROKEN
 from nonsmooth.kernels.series.taylor import copied
 
 _i, _f = types.int64, types.float64

@@ -4,7 +4,7 @@ from math import fabs, inf
 
 import nonsmooth.kernels.series.places as place
 from nonsmooth.kernels.compile.cache import device, inline, once
-from nonsmooth.kernels.hybrid.places import ANSWER, MODE, TIME
+from nonsmooth.kernels.hybrid.codes import ANSWER, MODE, TIME
 from nonsmooth.kernels.series.crossing import NOISE, OFF, rows_hold, snap
 from nonsmooth.kernels.series.generated import jet_of, jump_of, values_of
 from nonsmooth.kernels.series.rkf45 import first_step

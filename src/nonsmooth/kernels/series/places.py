@@ -1,7 +1,7 @@
 """Methods of the series stepper, its places in ``work.tally`` and ``work.memo`` behind those of ``hybrid.places``."""
 
-from nonsmooth.kernels.hybrid.places import N_MEMO as FIRST_TIME
-from nonsmooth.kernels.hybrid.places import N_TALLY as FIRST_COUNT
+from nonsmooth.kernels.hybrid.codes import N_MEMO as FIRST_TIME
+from nonsmooth.kernels.hybrid.codes import N_TALLY as FIRST_COUNT
 
 TAYLOR, RKF45 = 0, 1
 METHODS = {"taylor": TAYLOR, "rkf45": RKF45}

@@ -7,7 +7,7 @@ from numpy import float32
 
 import nonsmooth.kernels.series.places as place
 from nonsmooth.kernels.compile.cache import device, inline, local, once
-from nonsmooth.kernels.hybrid.places import MODE, NO_END, TIME, WAITED
+from nonsmooth.kernels.hybrid.codes import MODE, NO_END, TIME, WAITED
 from nonsmooth.kernels.series.crossing import earliest, rows_hold
 from nonsmooth.kernels.series.generated import field_of, jet_of, values_of
 from nonsmooth.kernels.series.polynomial import NONE

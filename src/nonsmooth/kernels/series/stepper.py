@@ -13,7 +13,7 @@ from numba import types
 
 import nonsmooth.kernels.series.places as place
 from nonsmooth.kernels.compile.cache import once
-from nonsmooth.kernels.hybrid.places import FIRED, GROW, MODE, NO_END, RETURNS, TIME, TRIES, UNBROKEN
+from nonsmooth.kernels.hybrid.codes import FIRED, GROW, MODE, NO_END, RETURNS, TIME, TRIES, UNBROKEN
 from nonsmooth.kernels.hybrid.records import GENERATED, SERIES_WORK
 from nonsmooth.kernels.series.crossing import section_crossing, sides_at
 from nonsmooth.kernels.series.generated import jet_of, values_of

@@ -11,7 +11,7 @@ from math import fabs, inf
 import numpy as np
 
 from nonsmooth.kernels.compile.cache import device, once
-from nonsmooth.kernels.hybrid.places import MODE, TIME
+from nonsmooth.kernels.hybrid.codes import MODE, TIME
 from nonsmooth.kernels.series.crossing import NOISE
 from nonsmooth.kernels.series.generated import field_of, values_of
 from nonsmooth.kernels.series.polynomial import NONE, first_crossing, load, row_bounds, shift, strip

@@ -2,7 +2,7 @@
 
 import nonsmooth.kernels.series.places as place
 from nonsmooth.kernels.compile.cache import once
-from nonsmooth.kernels.hybrid.places import DONE, MODE, TOUCHES
+from nonsmooth.kernels.hybrid.codes import DONE, MODE, TOUCHES
 from nonsmooth.kernels.hybrid.records import asked_before
 from nonsmooth.kernels.series.crossing import NOISE
 from nonsmooth.kernels.series.generated import values_of
