@@ -21,7 +21,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.flow.saltation import Jump, Touch, chained, of_one_instant
-from nonsmooth.kernels.tangent.segments import Segments
+from nonsmooth.kernels.hybrid.kept import Segments
 from nonsmooth.system.transition import phase_slopes, varying_phases
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""A section, and the kept points of some runs there: records of the kernels and of Python alike."""
+"""Records of the kernels and of Python alike: a section, kept points of some runs there; ends of segments."""
 
 from __future__ import annotations
 
@@ -52,3 +52,25 @@ class Kept(NamedTuple):
             np.zeros((points, keep), whole),
             np.zeros(points, whole),
         )
+
+
+class Segments(NamedTuple):
+    """Ends and derivatives of m segments."""
+
+    z: Any  # (m, n)
+    Phi: Any  # (m, n, n)
+    P: Any  # (m, n, n_active), at fixed t0 and tau
+    f_begin: Any  # (m, n)
+    f_end: Any  # (m, n) = dz/dtau
+    divergence: Any  # (m,) integral of div f = log det Phi
+    status: Any  # (m,) 0, DIVERGED or NO_CONVERGENCE
+
+    @classmethod
+    def room(cls, m: int, n: int, n_active: int) -> Segments:
+        """Room for so many."""
+        sizes = (m, n), (m, n, n), (m, n, n_active), (m, n), (m, n), m
+        return cls._make([*(np.empty(size) for size in sizes), np.empty(m, dtype=np.int64)])
+
+    def start_time(self) -> Any:
+        """dz/dt0 at fixed tau (m, n): f_end - Phi f_begin."""
+        return self.f_end - np.einsum("mij,mj->mi", self.Phi, self.f_begin)

@@ -19,11 +19,11 @@ from nonsmooth.kernels.compile.cache import device, kernel
 from nonsmooth.kernels.compile.lanes import FOUR, load, plus, store
 from nonsmooth.kernels.compile.pointers import function_at
 from nonsmooth.kernels.hybrid.codes import DIVERGED, NO_CONVERGENCE, OK
+from nonsmooth.kernels.hybrid.kept import Segments
 from nonsmooth.kernels.hybrid.records import type_of
 from nonsmooth.kernels.series.taylor import fill_powers
 from nonsmooth.kernels.tangent.agreement import fits
 from nonsmooth.kernels.tangent.frame import NEAR, ON_SURFACE, add_product, saltation
-from nonsmooth.kernels.tangent.segments import Segments
 
 ORDER = 24  # of the series of an orbit's legs
 ACCURACY = 1e-17  # of the last two terms of a series against its largest one, there
