@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.attractors.settled import Settled
-from nonsmooth.flow.engines.engine import FloatArray, IntArray, KernelMarch, State
+from nonsmooth.flow.engines.engine import FloatArray, IntArray, KernelMarch, State, flag
 from nonsmooth.flow.engines.loop import end_if_not_wanted
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.codes import BEGUN, STARTS, WAITS
 from nonsmooth.kernels.hybrid.kept import Kept
-from nonsmooth.kernels.hybrid.stopping import flag
 
 if TYPE_CHECKING:
     from nonsmooth.attractors.settler import Settler

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.campaign.identity import clock
 from nonsmooth.campaign.work import ChunkedWork, check_room, empty_columns
-from nonsmooth.kernels.hybrid.stopping import obey
+from nonsmooth.flow.engines.engine import obey
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 

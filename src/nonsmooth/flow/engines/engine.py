@@ -1,7 +1,11 @@
-"""Records in which an engine is asked for runs and answers; one thread's calls of its compiled march."""
+"""Records in which an engine is asked for runs and answers; a thread's calls of its march, and whether it is wanted.
+
+Ctrl-C reaches the main thread only, and a kernel that runs in another one hears nothing of it.
+"""
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -165,3 +169,18 @@ class KernelMarch:
         from nonsmooth.kernels.hybrid.records import Call
 
         self.call.put(Call(self.orders, self.reals, self.limit, starts, state.motion()))
+
+
+_of_thread = threading.local()
+
+
+def obey(array: Any) -> None:
+    """From here on kernels of this thread end soon after ``array[0]`` has become 1."""
+    _of_thread.flag = array
+
+
+def flag() -> Any:
+    """The flag of this thread, an array of one integer: 1 where its work is not wanted any more."""
+    if not hasattr(_of_thread, "flag"):
+        _of_thread.flag = np.zeros(1, dtype=np.int64)
+    return _of_thread.flag

@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.flow.engines.engine import NO_CHANGES, Changes, FloatArray, KernelMarch, State, TrajectoryLog
+from nonsmooth.flow.engines.engine import NO_CHANGES, Changes, FloatArray, KernelMarch, State, TrajectoryLog, flag
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.codes import BEGUN, CROSSINGS, DEAD_END, FIRED, MODE, RESET, STARTS, TIME, TOUCHES, WAITS
 from nonsmooth.kernels.hybrid.kept import Kept, Section
-from nonsmooth.kernels.hybrid.stopping import flag
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.derived.deciding import begun, decide
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, FOUND, OWN, TOGETHER
