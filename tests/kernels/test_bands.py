@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from nonsmooth.flow.engines.linear import scratch
 from nonsmooth.kernels.compile.assembly import linear_module
 from nonsmooth.kernels.compile.cache import load_module
 from nonsmooth.kernels.hybrid.records import Form
-from nonsmooth.kernels.linear.layout import scratch
 
 MASSES, RATE = 20, 1.3
 STATES = 2 * MASSES

@@ -1,4 +1,4 @@
-"""The engine of the exact flow: linear modes with harmonic forcing, affine indicators and resets, any number of states.
+"""The engine of the exact flow: linear modes with harmonic forcing, affine indicators and resets; its memory.
 
 It only packs a system into the arrays of ``kernels.linear`` and unpacks what comes back. Memory travels there as
 states behind the others, that nothing but transitions changes.
@@ -15,10 +15,18 @@ import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.loop import Engine, pack_net
+from nonsmooth.kernels.compile.assembly import is_planar
+from nonsmooth.kernels.compile.pointers import one_block
+from nonsmooth.kernels.hybrid.codes import N_MEMO, N_TALLY
+from nonsmooth.kernels.hybrid.records import Tables, Work
+from nonsmooth.kernels.linear.bands import BANDED
+from nonsmooth.kernels.linear.search import WIDTH
+from nonsmooth.kernels.linear.tables import DEGREE, NODES, TERMS
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.linear import LinearForm
     from nonsmooth.system.symbolic.traced import Traced
+
 
 LARGEST = 64e6  # bytes of the tables of all modes
 
@@ -121,8 +129,6 @@ class LinearEngine(Engine):
             tables.form = self.prepare(tables.points).form
         local = self._local
         if not hasattr(local, "work"):
-            from nonsmooth.kernels.linear.layout import scratch
-
             n, harmonics = tables.form.A.shape[-1], len(tables.form.multiples)
             local.work, local.last = scratch(n, harmonics, *tables.sizes), tables
         if local.last is not tables:  # the same place among other points
@@ -145,3 +151,45 @@ def _with_harmonic(form: Any) -> Any:
 
 class PlanarEngine(LinearEngine):
     """That of two states: its spectrum, its judging of many jobs and its GPU kernels are compiled as well."""
+
+
+LANES = 4  # numbers of a vector: columns of propagators are filled up to whole ones
+
+
+def scratch(
+    states: int, harmonics: int, n_modes: int, n_indicators: int, n_outputs: int, n_rows: int, apart: bool = False
+) -> tuple[Tables, Work]:
+    """Tables and working memory for one thread, in one block.
+
+    ``apart``: each table by itself, which takes memory only where it is written."""
+    n, m, n_f = states, states + 1 + 2 * harmonics, n_indicators + states + n_outputs
+    planar = is_planar(states, harmonics) and not apart  # modes that are made on the way have the other module's
+    filled = n if planar else -(-n // LANES) * LANES
+
+    def whole(*shape: int) -> Any:
+        return np.zeros(shape, dtype=np.int64)
+
+    tables = (
+        np.zeros((n_modes, NODES + 1, m, filled)),
+        np.zeros((n_modes, NODES + 1, 2 * harmonics + 1)),
+        np.zeros((n_modes, n_f, 2 * (m + n + 1))),
+        np.zeros((n_modes, n_f, m, DEGREE + 1)),
+        np.zeros((n_modes, n, m)),
+        np.zeros((n_modes, 2 + n)),
+        whole(1, 1, 1, 1) if planar else whole(n_modes, n_f, 2, m + 1),
+        np.zeros((n_modes, n + m, n) if n >= BANDED else (n_modes, 1, 1)),
+        whole(n_modes, n + m if n >= BANDED else 1, 3),
+    )
+    work = (
+        *(np.zeros(m + LANES) for _ in range(8)),
+        np.zeros((max(TERMS, n) + 1, m)),
+        np.zeros((n_rows + n + 1, WIDTH)),
+        np.zeros(4),
+        np.zeros(harmonics),
+        *map(whole, (n_indicators, 4, n_modes, n_indicators, 2, N_TALLY)),
+        np.zeros(N_MEMO),
+    )
+    if apart:
+        return Tables(*tables), Work(*one_block(*work))
+    block = one_block(*tables, *work)
+    return Tables(*block[: len(tables)]), Work(*block[len(tables) :])

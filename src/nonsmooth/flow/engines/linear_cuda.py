@@ -31,9 +31,9 @@ class PlanarOnGpu(OnGpu):
     n, n_memory = 2, 0
 
     def __init__(self, engine: PlanarEngine, points: FloatArray, plan: Section) -> None:
+        from nonsmooth.flow.engines.linear import scratch
         from nonsmooth.kernels.cuda.module import cuda_linear_module
         from nonsmooth.kernels.cuda.target import THREADS, cuda
-        from nonsmooth.kernels.linear.layout import scratch
 
         tables = engine.prepare(points)
         n_modes, n_indicators, n_outputs, n_rows = tables.sizes

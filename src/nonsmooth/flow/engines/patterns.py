@@ -339,7 +339,7 @@ class PatternTables:
 
     def _widen(self, conditions: int, outputs: int) -> None:
         """Make room; a table takes memory only where it is written, so that much may be asked for."""
-        from nonsmooth.kernels.linear.layout import scratch
+        from nonsmooth.flow.engines.linear import scratch
 
         n, width = self.rows.field.shape
         of_one = table_bytes(n, self.harmonics, 1) + 8 * (conditions + n + outputs) * 13 * width
