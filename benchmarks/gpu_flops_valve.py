@@ -15,7 +15,8 @@ import nonsmooth as ns
 from gpu_flops import operations
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.sections import section_plan
-from nonsmooth.kernels.series import crossing, places, polynomial, taylor, trust
+from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.series import crossing, polynomial, taylor, trust
 
 FILES = (crossing, polynomial, taylor, trust)
 TRANSIENT, RETURNS, TOLERANCE = 40, 20, 1e-10
@@ -33,7 +34,7 @@ def main() -> None:
             engine: Any = engine_for(system, "taylor", TOLERANCE, None)
             engine.point = system.parameter_vector()[None, :]
             counts = operations(engine, plan, START, returns, (*map(vars, FILES), engine.model.jet.__globals__))
-            totals.append((counts, int(engine._threads.work.tally[places.STEPS])))
+            totals.append((counts, int(engine._threads.work.tally[codes.STEPS])))
         done.append((totals[1][0] - totals[0][0]) / RETURNS)
         steps.append((totals[1][1] - totals[0][1]) / RETURNS)
     print(json.dumps({"per_return": float(np.mean(done)), "steps_per_return": float(np.mean(steps))}))

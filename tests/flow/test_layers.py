@@ -16,7 +16,7 @@ import nonsmooth as ns
 from nonsmooth.flow.engines.engine import State
 from nonsmooth.flow.engines.layers import layers
 from nonsmooth.flow.engines.series import SeriesEngine
-from nonsmooth.kernels.series import places as at
+from nonsmooth.kernels.hybrid import codes as at
 
 WIDTHS = (1e-2, 1e-3, 1e-4, 1e-5)
 TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)

@@ -16,7 +16,7 @@ import numpy as np
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.layers import Layers, layers
 from nonsmooth.flow.engines.loop import DIVERGENCE, Engine, pack_net
-from nonsmooth.kernels.series.places import LENGTH, METHODS
+from nonsmooth.kernels.hybrid.codes import LENGTH, METHODS
 
 if TYPE_CHECKING:
     from nonsmooth.system.codegen.generate import CompiledModel
@@ -215,8 +215,8 @@ def work_of(
 ) -> Any:
     """Working memory of one running kernel (``kernels.records.SeriesWork``)."""
     from nonsmooth.kernels.compile.pointers import one_block
+    from nonsmooth.kernels.hybrid.codes import N_SERIES_MEMO, N_SERIES_TALLY
     from nonsmooth.kernels.hybrid.records import SeriesWork
-    from nonsmooth.kernels.series.places import N_SERIES_MEMO, N_SERIES_TALLY
     from nonsmooth.kernels.series.polynomial import stack_size
 
     width = max(order, 6) + 1

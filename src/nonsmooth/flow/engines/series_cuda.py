@@ -10,8 +10,8 @@ from nonsmooth.flow.engines.devices import OnGpu, StatesOnGpu
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.flow.engines.series import SeriesEngine, SeriesPoints
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.hybrid.codes import METHODS
 from nonsmooth.kernels.hybrid.kept import Kept, Section
-from nonsmooth.kernels.series.places import METHODS
 
 STEPS = 1024  # of one launch, at most: below a second also on a small GPU
 PART = 0.75  # of ``devices.batch_size`` in one launch: what the registers hold by the compiler's choice (168 of each)

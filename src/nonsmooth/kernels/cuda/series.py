@@ -13,12 +13,21 @@ import numpy as np
 from numba import float64, int64
 
 from nonsmooth.kernels.cuda.target import cuda, entry, local, once
-from nonsmooth.kernels.hybrid.codes import BEGUN, NOTED_AT, PAUSED, RETURNS_OF_SECTION
+from nonsmooth.kernels.hybrid.codes import (
+    BEGUN,
+    N_SERIES_MEMO,
+    N_SERIES_TALLY,
+    NOTED_AT,
+    OPEN_STEP,
+    PAUSED,
+    READY,
+    RETURNS_OF_SECTION,
+    ZERO_ROW,
+)
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.kernels.hybrid.loop import leave, march
 from nonsmooth.kernels.hybrid.records import Generated, Goal, Motion, Net, Seen, SeriesWork
 from nonsmooth.kernels.hybrid.sections import window_of
-from nonsmooth.kernels.series.places import N_SERIES_MEMO, N_SERIES_TALLY, OPEN_STEP, READY, ZERO_ROW
 from nonsmooth.kernels.series.polynomial import stack_size
 
 # Set for each system and method.

@@ -1,5 +1,6 @@
 """Integers by name: codes that kernels share with the rooms above them, and places in ``work.tally``, ``work.memo``."""
 
+# Outcomes of a run; ``results/labels.py`` has their sentences.
 OK = 0
 SLOW = 1
 NOT_PERIODIC = 2
@@ -17,8 +18,7 @@ LOG_FULL = -1  # a log buffer is full: grow it and call again with the same stat
 PAUSED = -3  # as many steps as were asked for have been made: call again with the same state
 BEYOND_STOP = -2  # the start satisfies the condition of a transition with a reset
 
-
-# counts
+# Places in ``work.tally``: counts
 BEGUN, MODE, JUMPS, BURST = 0, 1, 2, 3  # transitions within one return, period or unit; and closely behind each other
 RETURNS, PASSES, TRIES = 4, 5, 6  # of the section; steps since the last pass
 SAMPLES, CROSSINGS, TOUCHES = 7, 8, 9  # logged
@@ -33,7 +33,7 @@ CHANGES = 18  # of inputs, so far
 LOOKED, NOTED_AT, NOTED_MODE, NOTED_CROSSINGS, NOTED_CONTACTS = 19, 20, 21, 22, 23
 N_TALLY = 24
 
-# times
+# and in ``work.memo``: times
 TIME, PERIODS, SINCE, WAITED, DONE = 0, 1, 2, 3, 4  # in the period, since a crossing, since a pass, since the start
 LONGEST_STEP = 5  # of the modes visited so far
 NOTED_TIME = 6  # in the period, where a run was noted
@@ -56,3 +56,35 @@ RESET = 1  # of ``Net.transitions``, place 1: the states change (2: memory alone
 DEAD_END = 2  # of place 2: behind it motion is not unique (3: there is none), and the run ends (1: a contact begins)
 # of place 4, where elements are asked: one decides alone; the system's own, without and with a reset; an answer
 ALONE, OWN, ASKS_BEHIND, ANSWER = 1, 2, 3, 4
+
+# Methods of the series stepper, and its places behind those of every march.
+TAYLOR, RKF45 = 0, 1
+METHODS = {"taylor": TAYLOR, "rkf45": RKF45}
+
+# The jets at the present instant stand in their place; a polynomial of which only a part has been gone; the transition
+# on it, and its row that crosses; it ends at a stop; nothing happens on it; the indicator that vanishes where the next
+# one begins; a graze was left undecided; the motion stays on the section's surface; steps near one place; steps in all
+READY, OPEN_STEP, PENDING, HIT, LANDING, CALM, ZERO_ROW, DOUBTFUL, STAYS, RESTING, STEPS = range(N_TALLY, N_TALLY + 11)
+N_SERIES_TALLY = N_TALLY + 11
+
+# Time at which the polynomial begins; its length, and that of its part that is used; the part of it that is gone, and
+# will be at the end of the leg; the length that was planned; value and slope of the section's indicator at its end; the
+# longest time between two crossings; where a frame was carried to, the time since, and how far its series reach
+(
+    BASE,
+    LENGTH,
+    PART,
+    CURSOR,
+    AHEAD,
+    PLANNED,
+    VALUE_BEFORE,
+    SLOPE_BEFORE,
+    LONGEST,
+    ANCHOR,
+    GONE,
+    REACH,
+) = range(N_MEMO, N_MEMO + 12)
+N_SERIES_MEMO = N_MEMO + 12
+
+AT_REST = 1000  # steps in a row near one place, before a state without forcing counts as an equilibrium
+HALVINGS = 8  # of a step whose polynomial leaves a graze undecided

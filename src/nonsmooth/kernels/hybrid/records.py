@@ -109,7 +109,7 @@ class Work(NamedTuple):
     visited: Any  # (modes,) by the start rule
     twin: Any  # (indicators,) the state that an indicator is but for a constant, or -1
     built: Any  # (2,) the point for which the tables stand there already, plus one; the modes that stand before them
-    tally: Any  # counts of the run, at the places of ``hybrid.places``
+    tally: Any  # counts of the run, at the places of ``hybrid.codes``
     memo: Any  # and times
 
 
@@ -125,7 +125,7 @@ class Generated(NamedTuple):
     absolute: Any  # (n,) atol
     rtol: Any
     step: Any  # a fixed one, or 0
-    method: Any  # of ``series.places``
+    method: Any  # of ``hybrid.codes``
     order: Any
     locate: Any  # 0: transitions are judged at the ends of steps
     checked: Any  # 1: polynomials are held against the equations

@@ -7,7 +7,7 @@ from math import nan
 
 from numba import types
 
-import nonsmooth.kernels.series.places as place
+import nonsmooth.kernels.hybrid.codes as place
 from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.compile.pointers import function_at
 from nonsmooth.kernels.hybrid.codes import MODE, RETURNS, TIME, UNBROKEN

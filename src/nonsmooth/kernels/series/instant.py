@@ -2,7 +2,7 @@
 
 from math import fabs, inf
 
-import nonsmooth.kernels.series.places as place
+import nonsmooth.kernels.hybrid.codes as place
 from nonsmooth.kernels.compile.cache import device, inline, once
 from nonsmooth.kernels.hybrid.codes import ANSWER, MODE, TIME
 from nonsmooth.kernels.series.crossing import NOISE, OFF, rows_hold, snap

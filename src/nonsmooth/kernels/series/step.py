@@ -5,7 +5,7 @@ from math import log as ln
 
 from numpy import float32
 
-import nonsmooth.kernels.series.places as place
+import nonsmooth.kernels.hybrid.codes as place
 from nonsmooth.kernels.compile.cache import device, inline, local, once
 from nonsmooth.kernels.hybrid.codes import MODE, NO_END, TIME, WAITED
 from nonsmooth.kernels.series.crossing import earliest, rows_hold

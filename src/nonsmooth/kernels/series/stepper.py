@@ -11,7 +11,7 @@ from math import fabs
 
 from numba import types
 
-import nonsmooth.kernels.series.places as place
+import nonsmooth.kernels.hybrid.codes as place
 from nonsmooth.kernels.compile.cache import once
 from nonsmooth.kernels.hybrid.codes import FIRED, GROW, MODE, NO_END, RETURNS, TIME, TRIES, UNBROKEN
 from nonsmooth.kernels.hybrid.records import GENERATED, SERIES_WORK

@@ -1,6 +1,6 @@
 """Observations made while a step's polynomials are at hand: extremes and touches."""
 
-import nonsmooth.kernels.series.places as place
+import nonsmooth.kernels.hybrid.codes as place
 from nonsmooth.kernels.compile.cache import once
 from nonsmooth.kernels.hybrid.codes import DONE, MODE, TOUCHES
 from nonsmooth.kernels.hybrid.records import asked_before
