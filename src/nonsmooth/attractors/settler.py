@@ -258,7 +258,7 @@ class Settler:
         Two neighbours over ``n_returns`` returns, put back to a small distance after each, in units of the motion's
         size by its extremes (J, n); NaN where one failed.
         """
-        from nonsmooth.kernels.judging.exponent import BATCHES, DISTANCE, RATE_SUMS
+        from nonsmooth.kernels.judging.judge import BATCHES, DISTANCE, RATE_SUMS
 
         points = np.ascontiguousarray(points, dtype=float)
         rows = np.ascontiguousarray(rows, dtype=np.int64)
@@ -340,7 +340,7 @@ def separation_sizes(maximum: FloatArray, minimum: FloatArray, scale: FloatArray
 
 def rates(sums: FloatArray, status: IntArray) -> tuple[FloatArray, FloatArray]:
     """Exponents per unit time and their standard errors (J,) from the sums of J jobs; NaN where a run failed."""
-    from nonsmooth.kernels.judging.exponent import BATCHES, MEAN_RATE, SQUARED_RATES
+    from nonsmooth.kernels.judging.judge import BATCHES, MEAN_RATE, SQUARED_RATES
 
     good = np.isin(status, (codes.OK, codes.NOT_GUARANTEED))
     error = np.sqrt(sums[:, SQUARED_RATES] / (BATCHES * (BATCHES - 1)))

@@ -13,7 +13,7 @@ from nonsmooth.kernels.cuda.target import cuda, entry, local
 from nonsmooth.kernels.hybrid.codes import OK
 from nonsmooth.kernels.hybrid.kept import Kept
 from nonsmooth.kernels.hybrid.records import Motion, Net
-from nonsmooth.kernels.judging.exponent import separate
+from nonsmooth.kernels.judging.judge import separate
 
 
 @local

@@ -10,8 +10,7 @@ from numba import float64
 
 from nonsmooth.kernels.cuda.target import cuda, entry
 from nonsmooth.kernels.hybrid.codes import NOT_GUARANTEED, OK
-from nonsmooth.kernels.judging.exponent import separate
-from nonsmooth.kernels.judging.judge import contraction, multiplier
+from nonsmooth.kernels.judging.judge import contraction, multiplier, separate
 from nonsmooth.kernels.judging.settle import Jobs, Rules, next_run
 
 N_STATES = 2  # set for each system

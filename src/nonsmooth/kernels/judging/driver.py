@@ -26,8 +26,7 @@ from nonsmooth.kernels.hybrid.records import (
     TRANSIENT,
     type_of,
 )
-from nonsmooth.kernels.judging.exponent import separate
-from nonsmooth.kernels.judging.judge import ROUNDS, contraction, multiplier
+from nonsmooth.kernels.judging.judge import ROUNDS, contraction, multiplier, separate
 from nonsmooth.kernels.judging.settle import END as SETTLED
 from nonsmooth.kernels.judging.settle import FRESH, JOBS, PROBE, RULES, begin_job, next_run
 
