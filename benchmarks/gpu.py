@@ -67,7 +67,7 @@ def compiled() -> list[str]:
         "| kernel | registers | stack, bytes | spills (store, load), bytes | object, kB | seconds to PTX |",
         "|---|---|---|---|---|---|",
     ]
-    code = "import json, sys; from nonsmooth.kernels.cuda.ptx import ptx_of; print(ptx_of(*json.load(sys.stdin)))"
+    code = "import json, sys; from nonsmooth.kernels.cuda.module import ptx_of; print(ptx_of(*json.load(sys.stdin)))"
     for name, signature in launched.items():
         began = perf_counter()
         ptx = printed("-c", code, given=json.dumps([name, signature, SHAPE]))

@@ -59,7 +59,7 @@ def launched() -> str:
 def ptx(signature: str) -> str:
     """The kernel of the valve as PTX."""
     from nonsmooth.flow.engines.series_cuda import module_of
-    from nonsmooth.kernels.cuda.ptx import ptx_of_module
+    from nonsmooth.kernels.cuda.module import ptx_of_module
 
     engine, points = engine_and_points(np.array([5.0]))
     return ptx_of_module(module_of(engine, engine.prepare(points)), "advance", signature)

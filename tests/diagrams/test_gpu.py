@@ -23,7 +23,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.kernels.compile.assembly import LINEAR_STEPPER
 from nonsmooth.kernels.compile.cache import reached
-from nonsmooth.kernels.cuda import ptx
+from nonsmooth.kernels.cuda import module
 from nonsmooth.kernels.cuda.module import OBSERVERS, joined, stamp
 
 COMPILER = [importlib.util.find_spec(name) is not None for name in ("numba_cuda", "nvidia")]
@@ -34,7 +34,7 @@ SIMULATED = os.environ.get("NUMBA_ENABLE_CUDASIM", "1")  # 0: a real GPU (CONTRI
 COMPILE = """
 import functools, gc, json, sys
 import numba.cuda
-from nonsmooth.kernels.cuda.ptx import ptx_of
+from nonsmooth.kernels.cuda.module import ptx_of
 
 gc.disable()  # a compile makes millions of objects and hardly a cycle
 found, opt, kernels = {}, *json.load(sys.stdin)
@@ -134,7 +134,7 @@ def test_every_kernel_compiles_for_the_types_it_is_launched_with(
     given = json.dumps([optimised, {name: simulated["launched"][name] for name in sorted(entries)}])
     compiler = [version(name) for name in ("numba-cuda", "nvidia-nvvm", "llvmlite")]
     texts = [joined((*LINEAR_STEPPER, *parts)) for parts in OBSERVERS.values()]
-    texts += [stamp(), Path(ptx.__file__).read_text(), *(reached(text) for text in texts)]
+    texts += [stamp(), Path(module.__file__).read_text(), *(reached(text) for text in texts)]
     key = hashlib.sha256(repr([given, compiler, texts]).encode()).hexdigest()
     cache = getattr(request.config, "cache", None)  # there is none where pytest was told so
     if cache and cache.get(f"gpu/{optimised}", "") == key:

@@ -1,7 +1,10 @@
-"""The linear kernels for CUDA: the text of the CPU's files under another header.
+"""The linear kernels for CUDA: the text of the CPU's files under another header; as PTX, with or without a GPU.
 
 One module for each shape of a system (modes, indicators, outputs, transitions, rows, harmonics), because a thread's
 arrays have constant shapes.
+
+Compiling a kernel asks the present GPU for its type where there is one; here it is told. That leans on a private part
+of numba-cuda (``dispatcher.get_current_device``), checked with 0.30.
 """
 
 from __future__ import annotations
@@ -11,7 +14,7 @@ import re
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 from nonsmooth.kernels.compile import assembly
 from nonsmooth.kernels.compile.assembly import LINEAR_STEPPER, with_numbers
@@ -83,3 +86,37 @@ def stamp() -> str:
     it is compiled."""
     header = Path(__file__).with_name("target.py").read_text(encoding="utf-8")
     return f"\nHEADER = {hashlib.sha256(header.encode()).hexdigest()!r}\n"
+
+
+CAPABILITY = (9, 0)
+
+
+def ptx_of(entry: str, signature: str, shape: tuple[int, ...]) -> str:
+    """One entry of the module for a shape of system, compiled for ``CAPABILITY``.
+
+    Parameters
+    ----------
+    signature : str
+        Types of its arguments, as Numba writes them.
+    shape : tuple of int
+        Arguments of :func:`nonsmooth.kernels.cuda.module.cuda_linear_module`.
+    """
+
+    observer = "growth" if entry == "frames" else "sections"
+    return ptx_of_module(cuda_linear_module(*shape, observer), entry, signature)
+
+
+def ptx_of_module(module: ModuleType, entry: str, signature: str) -> str:
+    """The same for an entry of any module with the GPU's header."""
+    from numba.cuda import compile, dispatcher
+
+    from nonsmooth.kernels.cuda.target import THREADS
+
+    before = dispatcher.get_current_device
+    dispatcher.get_current_device = lambda: SimpleNamespace(compute_capability=CAPABILITY)
+    try:
+        function = getattr(module, entry).py_func
+        text, _ = compile(function, signature, device=False, abi="numba", cc=CAPABILITY, launch_bounds=THREADS)
+    finally:
+        dispatcher.get_current_device = before
+    return str(text)
