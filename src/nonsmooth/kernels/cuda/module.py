@@ -27,7 +27,6 @@ OBSERVERS = {
         "hybrid.observers",
         "judging.judge",
         "judging.settle",
-        "judging.exponent",
         "cuda.arrays",
         "cuda.tables",
         "cuda.advance",

@@ -32,7 +32,6 @@ PARTS = (
     "hybrid.observers",
     "judging.judge",
     "judging.settle",
-    "judging.exponent",
     "cuda.settle",
     "cuda.series",
 )
