@@ -12,7 +12,7 @@ import pytest
 from nonsmooth.kernels.compile import assembly
 from nonsmooth.kernels.compile.assembly import PLACES
 from nonsmooth.kernels.cuda import module as cuda_module
-from nonsmooth.kernels.cuda.series_module import PARTS
+from nonsmooth.kernels.cuda.module import PARTS
 
 ROOM = "nonsmooth.kernels."
 FOLDER = Path(cuda_module.__file__).parents[1]

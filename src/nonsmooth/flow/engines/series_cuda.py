@@ -19,7 +19,7 @@ PART = 0.75  # of ``devices.batch_size`` in one launch: what the registers hold 
 
 def module_of(engine: SeriesEngine, tables: SeriesPoints) -> Any:
     """The kernels for an engine's system, method and order."""
-    from nonsmooth.kernels.cuda.series_module import cuda_series_module, cuda_series_source
+    from nonsmooth.kernels.cuda.module import cuda_series_module, cuda_series_source
     from nonsmooth.system.codegen.generate import model_source
 
     net, form = engine.net, engine.generated(tables)
