@@ -16,10 +16,9 @@ from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.flow.engines.devices import StatesOnGpu, batch_size, batches
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.flow.engines.linear import PlanarEngine
-from nonsmooth.flow.engines.linear_cuda import SLICE, PlanarOnGpu
+from nonsmooth.flow.engines.linear_cuda import PART, SLICE, PlanarOnGpu, SeriesOnGpu
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.series import SeriesEngine
-from nonsmooth.flow.engines.series_cuda import PART, SeriesOnGpu
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 
