@@ -135,7 +135,7 @@ def compared(plane: str, side: int) -> list[str]:
 def one_launch(plane: str, side: int, returns: int = 256) -> float:
     """Forcing periods per second while all trajectories of a chart are marched, tables included."""
     from nonsmooth.flow.engines.devices import StatesOnGpu
-    from nonsmooth.flow.engines.linear_cuda import PlanarOnGpu
+    from nonsmooth.flow.engines.gpu import PlanarOnGpu
 
     _, settler, points, starts = settlers(side, plane)
     gpu = PlanarOnGpu(settler.engine, points, settler.plan)

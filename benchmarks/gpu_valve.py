@@ -17,7 +17,7 @@ import numpy as np
 import nonsmooth as ns
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.flow.engines.devices import batch_size
-from nonsmooth.flow.engines.linear_cuda import PART
+from nonsmooth.flow.engines.gpu import PART
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.sections import section_plan
 from nonsmooth.kernels.hybrid import codes
@@ -48,7 +48,7 @@ def launched() -> str:
     """Types with which the kernel is launched, by a run of one trajectory under Numba's simulator."""
     code = (
         "import json, numpy as np, gpu_both, gpu_valve\n"
-        "from nonsmooth.flow.engines.linear_cuda import SeriesOnGpu\n"
+        "from nonsmooth.flow.engines.gpu import SeriesOnGpu\n"
         "types = gpu_both.launches_of(SeriesOnGpu)\n"
         "gpu_valve.march(np.array([5.0]), 2, 1)\n"
         "print(types['advance'])"
@@ -58,7 +58,7 @@ def launched() -> str:
 
 def ptx(signature: str) -> str:
     """The kernel of the valve as PTX."""
-    from nonsmooth.flow.engines.linear_cuda import module_of
+    from nonsmooth.flow.engines.gpu import module_of
     from nonsmooth.kernels.cuda.module import ptx_of_module
 
     engine, points = engine_and_points(np.array([5.0]))
@@ -145,7 +145,7 @@ def compared(n: int = 400) -> list[str]:
 def march(inflows: np.ndarray, transient: int, keep: int) -> tuple[np.ndarray, np.ndarray]:
     """March the valve at each inflow: codes, and the seconds of each of three runs."""
     from nonsmooth.flow.engines.devices import StatesOnGpu
-    from nonsmooth.flow.engines.linear_cuda import SeriesOnGpu
+    from nonsmooth.flow.engines.gpu import SeriesOnGpu
 
     engine, points = engine_and_points(inflows)
     gpu = SeriesOnGpu(engine, points, section_plan(ns.models.relief_valve(), TOP)[1])

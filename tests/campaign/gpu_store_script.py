@@ -18,7 +18,7 @@ import nonsmooth as ns
 from nonsmooth.campaign import identity
 from nonsmooth.cli.main import main
 from nonsmooth.diagrams import chart as chart_module
-from nonsmooth.flow.engines import linear_cuda as planar_cuda
+from nonsmooth.flow.engines import gpu as planar_cuda
 
 STUDY = """
 [system]

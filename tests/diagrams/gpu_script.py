@@ -11,7 +11,7 @@ from typing import Any
 from gpu_both import JOBS, both, launches_of
 
 import nonsmooth as ns
-from nonsmooth.flow.engines import linear_cuda as planar_cuda
+from nonsmooth.flow.engines import gpu as planar_cuda
 
 LAUNCHED = launches_of(planar_cuda.PlanarOnGpu)
 

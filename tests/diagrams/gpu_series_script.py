@@ -12,12 +12,12 @@ from gpu_both import both, launches_of
 from gpu_series_systems import START, TOP, filtered, grows_to_a_stop, two_wells
 
 import nonsmooth as ns
-from nonsmooth.flow.engines import linear_cuda
+from nonsmooth.flow.engines import gpu
 
-LAUNCHED = launches_of(linear_cuda.SeriesOnGpu)
+LAUNCHED = launches_of(gpu.SeriesOnGpu)
 SHORT: dict[str, Any] = {"transient": 24, "keep": 10, "max_period": 4, "method": "taylor"}
 
-linear_cuda.STEPS = 50  # so that a run takes several launches
+gpu.STEPS = 50  # so that a run takes several launches
 valve = ns.models.relief_valve()
 results = {
     "sweep": both(ns.sweep, valve, "q", [6.5, 8.0], direction=None, start=START, section=TOP, rtol=1e-10, **SHORT),

@@ -31,7 +31,7 @@ import nonsmooth as ns
 from gpu_series_systems import filtered, two_wells
 from nonsmooth.flow.engines.devices import engine_on_gpu
 from nonsmooth.flow.engines.methods import engine_for
-from nonsmooth.flow.engines.linear_cuda import module_of
+from nonsmooth.flow.engines.gpu import module_of
 from nonsmooth.kernels.cuda.module import ptx_of_module
 
 gc.disable()  # a compile makes millions of objects and hardly a cycle

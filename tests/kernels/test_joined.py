@@ -12,7 +12,6 @@ import pytest
 from nonsmooth.kernels.compile import assembly
 from nonsmooth.kernels.compile.assembly import PLACES
 from nonsmooth.kernels.cuda import module as cuda_module
-from nonsmooth.kernels.cuda.module import PARTS
 
 ROOM = "nonsmooth.kernels."
 FOLDER = Path(cuda_module.__file__).parents[1]
@@ -20,7 +19,7 @@ TEXTS = {
     "linear": (*assembly.LINEAR_STEPPER, *assembly.LINEAR_OBSERVERS),
     **{f"cuda {name}": (*assembly.LINEAR_STEPPER, *parts) for name, parts in cuda_module.OBSERVERS.items()},
     "series": (*assembly.SERIES_STEPPER, *assembly.SERIES_OBSERVERS),
-    "cuda series": PARTS,
+    "cuda series": cuda_module.SERIES,
 }
 MARKERS = {"device", "inline", "kernel", "callback", "local", "once"}  # another compiler's on a GPU
 ON_PURPOSE = MARKERS | {"build", "may_pause"}  # replaced on a GPU

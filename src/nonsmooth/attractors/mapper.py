@@ -83,7 +83,7 @@ class Mapper:
         return self.found.judged(self.jobs)
 
     def separate(self, returns: int, batch: int, sizes: FloatArray, offsets: FloatArray, sums: FloatArray) -> IntArray:
-        """Take the growth of neighbours of the jobs into their sums (``kernels.judging.exponent``); their statuses."""
+        """Take the growth of neighbours of the jobs into their sums (``kernels.judging.judge``); their statuses."""
         from nonsmooth.kernels.judging.driver import separate_many
 
         status = np.zeros(len(self.rows), dtype=np.int64)

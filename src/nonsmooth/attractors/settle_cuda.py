@@ -15,8 +15,8 @@ import numpy as np
 from nonsmooth.attractors.settled import Settled, usable
 from nonsmooth.flow.engines.devices import StatesOnGpu, batch_size, batches
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
+from nonsmooth.flow.engines.gpu import PART, SLICE, PlanarOnGpu, SeriesOnGpu
 from nonsmooth.flow.engines.linear import PlanarEngine
-from nonsmooth.flow.engines.linear_cuda import PART, SLICE, PlanarOnGpu, SeriesOnGpu
 from nonsmooth.flow.engines.loop import Engine
 from nonsmooth.flow.engines.series import SeriesEngine
 from nonsmooth.kernels.hybrid import codes
@@ -275,7 +275,7 @@ def separate_on_gpu(
     offsets: FloatArray,
     sums: FloatArray,
 ) -> IntArray:
-    """Growth of neighbours of jobs, taken into their sums (``kernels.judging.exponent``); their statuses."""
+    """Growth of neighbours of jobs, taken into their sums (``kernels.judging.judge``); their statuses."""
     plan, status = settler.plan, np.zeros(len(rows), dtype=np.int64)
     separate = _separate_in_threads if isinstance(settler.engine, PlanarEngine) else _separate_in_rounds
     for some, own, own_rows in batches(points, rows, _batch(settler.engine)):

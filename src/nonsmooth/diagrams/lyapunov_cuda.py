@@ -8,8 +8,8 @@ import numpy as np
 
 from nonsmooth.flow.engines.devices import StatesOnGpu, batch_size
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
+from nonsmooth.flow.engines.gpu import PlanarOnGpu
 from nonsmooth.flow.engines.linear import PlanarEngine
-from nonsmooth.flow.engines.linear_cuda import PlanarOnGpu
 from nonsmooth.kernels.hybrid.kept import Section
 
 

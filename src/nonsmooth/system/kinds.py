@@ -28,8 +28,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_
 
 import numpy as np
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened
-from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.system.parameter import finite_number as real_number
 
 if TYPE_CHECKING:

@@ -1,13 +1,11 @@
 """The kernels for CUDA, of both steppers: the text of the CPU's files under another header; PTX without a GPU.
 
-One module for each shape of a system (modes, indicators, outputs, transitions, rows, harmonics), because a thread's
-arrays have constant shapes.
+One module for each shape of a linear system (modes, indicators, outputs, transitions, rows, harmonics), because a
+thread's arrays have constant shapes; for the series one for each system, method and order, because the model is part of
+it too. Tolerances, sections and parameters are arguments.
 
-Compiling a kernel asks the present GPU for its type where there is one; here it is told. That leans on a private part
-of numba-cuda (``dispatcher.get_current_device``), checked with 0.30.
-
-One module for each system, method and order, because the model is part of it and a thread's arrays have constant
-shapes; tolerances, sections and parameters are arguments.
+Compiling a kernel asks the present GPU for its type where there is one; for its PTX it is told. That leans on a private
+part of numba-cuda (``dispatcher.get_current_device``), checked with 0.30.
 """
 
 from __future__ import annotations
@@ -125,7 +123,7 @@ def ptx_of_module(module: ModuleType, entry: str, signature: str) -> str:
     return str(text)
 
 
-PARTS = (
+SERIES = (
     "circular",
     "series.polynomial",
     "series.crossing",
@@ -158,7 +156,7 @@ def cuda_series_source(model: str, sizes: Mapping[str, int], tables: Mapping[str
     tables : mapping
         The arrays there.
     """
-    text = joined(PARTS, model)
+    text = joined(SERIES, model)
     for names in (
         ("METHOD", "ORDER", "CHECKED", "CORNERS", "N_GUARDS"),
         ("N_PARAMETERS", "N_MEMORY", "N_INDICATORS", "N_OUTPUTS", "N_SCRATCH_ROWS"),
