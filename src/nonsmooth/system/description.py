@@ -26,8 +26,7 @@ from nonsmooth.system.inputs import input_states, read_inputs, with_inputs
 from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.names import check_names
 from nonsmooth.system.parameter import Parameter, finite_number
-from nonsmooth.system.symbolic.domain import Domain
-from nonsmooth.system.symbolic.period import check_period, forcing_period, timed_expressions
+from nonsmooth.system.symbolic.domain import Domain, check_period, forcing_period, timed_expressions
 from nonsmooth.system.symbolic.scalar import to_expression
 from nonsmooth.system.symbolic.traced import Traced
 from nonsmooth.system.symbolic.tracing import Symbols, call_scalar

@@ -21,7 +21,7 @@ from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.system.derived.assembly import Pattern
 from nonsmooth.system.derived.elements.element import THROWN
 from nonsmooth.system.derived.rows import Row, Rows
-from nonsmooth.system.symbolic.period import forcing_period
+from nonsmooth.system.symbolic.domain import forcing_period
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ENDS, TOGETHER, Traced, TracedCondition, TracedTransition
 from nonsmooth.system.symbolic.tracing import call_scalar
 

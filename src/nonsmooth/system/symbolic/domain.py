@@ -1,13 +1,17 @@
-"""Values of the parameters that the equations allow: no division by zero, no root of a negative number.
+"""What the traced equations say of the parameters: the forcing period, and values without division by zero or such.
 
 Parts of the expressions that depend on parameters alone are collected once. A single parameter in a
 denominator, by far the most common, is then a look-up; others are evaluated.
+
+Time may enter in sin, cos, tan of arguments linear in t; their frequencies must be rational multiples
+of one another. Anything else needs ``period=``, which is checked against the equations.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -15,8 +19,110 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.symbolic.period import timed_expressions
 from nonsmooth.system.symbolic.traced import Traced
+
+
+def timed_expressions(traced: Traced) -> dict[str, sp.Expr]:
+    """All expressions in which the time may occur, each with what it is."""
+    found: dict[str, sp.Expr] = {}
+    for mode, part in zip(traced.mode_names, traced.fields, strict=True):
+        found |= {
+            f"the vector field of mode {mode!r} ({state})": e for state, e in zip(traced.state_names, part, strict=True)
+        }
+    found |= {f"indicator {name!r}": e for name, e in zip(traced.indicator_names, traced.indicators, strict=True)}
+    for jump in traced.transitions:
+        if jump.reset is not None:
+            named = zip(traced.state_names, jump.reset, strict=True)
+            found |= {f"the reset of {jump.label} ({state})": e for state, e in named}
+        found |= {f"what {jump.label} writes to {traced.memory_names[i]!r}": e for i, e in jump.writes}
+    for name, row in zip(traced.output_names, traced.outputs, strict=True):
+        found |= {f"output {name!r} in mode {mode!r}": e for mode, e in zip(traced.mode_names, row, strict=True)}
+    return found
+
+
+def forcing_period(expressions: Sequence[sp.Expr], t: sp.Symbol, parameters: set[sp.Symbol]) -> sp.Expr | None:
+    """Return the common period in the parameters, or None where there is none to be read off.
+
+    Parameters
+    ----------
+    expressions : sequence of Expr
+        All that may depend on time.
+    t : Symbol
+    parameters : set of Symbol
+        What a frequency may depend on.
+    """
+    frequencies: list[sp.Expr] = []
+    for expression in expressions:
+        if not _collect(expression, t, parameters, frequencies):
+            return None
+    if not frequencies:
+        return None
+    ratios = [sp.cancel(frequency / frequencies[0]) for frequency in frequencies]
+    ratios = [_simple(ratio) for ratio in ratios]
+    if not all(ratio.is_Rational for ratio in ratios):
+        return None
+    # gcd of fractions: gcd of the numerators over lcm of the denominators
+    base = sp.Rational(sp.igcd(*(r.p for r in ratios), 0), sp.ilcm(*(r.q for r in ratios), 1))
+    return 2 * sp.pi / (base * frequencies[0])
+
+
+def _simple(ratio: sp.Expr) -> sp.Expr:
+    """Return the small fraction a float stands for (3.3/1.1 is 3), or what was given."""
+    if not ratio.is_Float:
+        return ratio
+    fraction = Fraction(float(ratio)).limit_denominator(1000)
+    close = abs(float(ratio) - float(fraction)) <= 1e-13 * abs(float(ratio))
+    return sp.Rational(fraction.numerator, fraction.denominator) if close else ratio
+
+
+def _collect(e: sp.Expr, t: sp.Symbol, parameters: set[sp.Symbol], found: list[sp.Expr]) -> bool:
+    """Add the frequencies in ``e`` to ``found``; False where t occurs in another way."""
+    if t not in e.free_symbols:
+        return True
+    if isinstance(e, (sp.sin, sp.cos, sp.tan)):
+        argument = sp.expand(e.args[0])
+        slope = argument.diff(t)
+        if t not in slope.free_symbols and slope.free_symbols <= parameters:
+            size = -slope if slope.could_extract_minus_sign() else slope  # SymPy writes cos(w t - c) as cos(c - w t)
+            if size not in found:
+                found.append(size)
+            return True
+    return bool(e.args) and all(_collect(part, t, parameters, found) for part in e.args)
+
+
+def check_period(
+    expressions: Mapping[str, sp.Expr], t: sp.Symbol, others: Mapping[sp.Symbol, float], period: float, given: str
+) -> None:
+    """Raise unless every expression repeats after ``period`` (numerically, at fixed pseudo-random points).
+
+    Parameters
+    ----------
+    expressions : mapping of str to Expr
+        What each is, and its expression.
+    t : Symbol
+    others : mapping of Symbol to float
+        Values of the parameters; states and memory are drawn at random.
+    period : float
+    given : str
+        What the user gave, for the message.
+    """
+    random = np.random.default_rng(5)
+    for what, expression in expressions.items():
+        if t not in expression.free_symbols:
+            continue
+        free = sorted(expression.free_symbols - {t} - others.keys(), key=str)
+        order = [t, *free, *others]
+        function = sp.lambdify(order, expression, modules="numpy")
+        for instant in random.uniform(0, 3 * period, 7):
+            # NumPy's numbers: a power that is too large for Python's floats is an exception
+            values = np.array([*random.uniform(0.1, 0.9, len(free)), *others.values()])
+            with np.errstate(all="ignore"):
+                now, later = (complex(function(time, *values)) for time in (instant, instant + period))
+            if np.isfinite(now) and abs(later - now) > 1e-7 * (1 + abs(now)):
+                raise SystemDefinitionError(
+                    f"{what} does not repeat after the period {given} = {period:.12g}: "
+                    f"{now.real:.9g} at t = {instant:.6g}, {later.real:.9g} one period later"
+                )
 
 
 class _Rule:
