@@ -15,7 +15,7 @@ import xarray as xr
 from nonsmooth import Recording, System
 from nonsmooth.errors import unknown
 from nonsmooth.recordings import PROCEDURES
-from nonsmooth_savi2007.rig import decays, figures, hand, motor, sensors, steps
+from nonsmooth_savi2007.rig import figures, hand, motor, sensors, steps
 from nonsmooth_savi2007.rig.live import LiveRig
 from nonsmooth_savi2007.rig.notebook import write_session
 from nonsmooth_savi2007.rig.physics import OF_THE_CAR, WANDERING, Wander, car
@@ -203,8 +203,8 @@ class VirtualRig:
 
     springs = hand.springs
     support = hand.support
-    impulse = decays.impulse
-    drop = decays.drop
+    impulse = hand.impulse
+    drop = hand.drop
     voltage = motor.voltage
     crank = motor.crank
     response = steps.response
