@@ -15,7 +15,7 @@ import xarray as xr
 from nonsmooth import Recording, System
 from nonsmooth.errors import unknown
 from nonsmooth.recordings import PROCEDURES
-from nonsmooth_savi2007.rig import figures, hand, motor, sensors, steps
+from nonsmooth_savi2007.rig import driven, figures, hand, motor, sensors
 from nonsmooth_savi2007.rig.live import LiveRig
 from nonsmooth_savi2007.rig.notebook import write_session
 from nonsmooth_savi2007.rig.physics import OF_THE_CAR, WANDERING, Wander, car
@@ -207,9 +207,9 @@ class VirtualRig:
     drop = hand.drop
     voltage = motor.voltage
     crank = motor.crank
-    response = steps.response
-    grazing = steps.grazing
-    contact = steps.contact
+    response = driven.response
+    grazing = driven.grazing
+    contact = driven.contact
     rise = figures.rise
     section = figures.section
     figure = figures.figure
