@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nonsmooth_savi2007.identification.consistency import CHANCE, birge_ratio, consistent
+from nonsmooth_savi2007.identification.cross_checks import CHANCE, birge_ratio, consistent
 
 
 def test_the_weighted_mean_and_birge_ratio_in_closed_form():

@@ -29,7 +29,7 @@ import numpy as np
 
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
 from nonsmooth_savi2007.arrays import FloatArray
-from nonsmooth_savi2007.identification.consistency import Consistent, consistent
+from nonsmooth_savi2007.identification.cross_checks import Consistent, consistent
 from nonsmooth_savi2007.identification.evidence import Run
 
 #: Speed (m/s) of the slowest half swing that is used.

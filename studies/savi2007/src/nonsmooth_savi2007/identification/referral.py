@@ -23,7 +23,7 @@ import numpy as np
 from nonsmooth.identification import Estimate, Finding, uniform
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.adjustment import Adjusted
-from nonsmooth_savi2007.identification.consistency import consistent
+from nonsmooth_savi2007.identification.cross_checks import consistent
 from nonsmooth_savi2007.identification.evidence import Evidence
 from nonsmooth_savi2007.identification.free_decay import DecayFit
 from nonsmooth_savi2007.identification.multiple_shooting import ContactFit

@@ -11,7 +11,7 @@ from nonsmooth import ParameterSet
 from nonsmooth.errors import unknown
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth_savi2007.identification.adjustment import Adjusted
-from nonsmooth_savi2007.identification.consistency import birge_ratio
+from nonsmooth_savi2007.identification.cross_checks import birge_ratio
 from nonsmooth_savi2007.identification.evidence import Evidence
 from nonsmooth_savi2007.identification.multiple_shooting import ContactFit
 from nonsmooth_savi2007.identification.referral import Referred
