@@ -20,8 +20,8 @@ from hypothesis.extra import numpy as hnp
 import nonsmooth as ns
 from nonsmooth.errors import DataFileError
 from nonsmooth.results import memory
-from nonsmooth.results.content import content, digest, seal, sealed, stamp, unstamp
 from nonsmooth.results.store import load, save
+from nonsmooth.results.whole import content, digest, seal, sealed, stamp, unstamp
 
 FORMATS = ["nc", "zarr"]
 RECORD = '{"version": "0.1.0", "verb": "test"}'

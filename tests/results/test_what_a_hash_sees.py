@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from nonsmooth.results.content import content, digest
+from nonsmooth.results.whole import content, digest
 
 
 def hashed(whole: dict[str, Any] | None = None, coordinate: bool = False, name: str = "x", **variable: Any) -> str:

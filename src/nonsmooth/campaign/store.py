@@ -34,9 +34,8 @@ from numpy.typing import NDArray
 from nonsmooth.campaign.identity import described, difference, processor_type
 from nonsmooth.campaign.work import ChunkedWork
 from nonsmooth.errors import DataFileError
-from nonsmooth.results.content import digest, seal, sealed
 from nonsmooth.results.store import needs_zarr
-from nonsmooth.results.whole import beside, told, write_whole
+from nonsmooth.results.whole import beside, digest, seal, sealed, told, write_whole
 
 ATTRIBUTE = "nonsmooth_campaign"
 ANEW = "give another name, and compute it anew there"

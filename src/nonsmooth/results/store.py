@@ -24,10 +24,9 @@ import xarray as xr
 
 from nonsmooth.errors import DataFileError, not_installed
 from nonsmooth.results import memory
-from nonsmooth.results.content import bytes_as_written, content, digest, stamp, trailer, unstamp
 from nonsmooth.results.memory import room_for
 from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
-from nonsmooth.results.whole import beside, replace, told
+from nonsmooth.results.whole import beside, bytes_as_written, content, digest, replace, stamp, told, trailer, unstamp
 
 _EXPECTED = "expected a result written by nonsmooth.save (.nc or .zarr)"
 _ALTERED = (
