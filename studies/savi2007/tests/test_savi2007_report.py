@@ -16,8 +16,8 @@ from nonsmooth_savi2007 import Reproduction, reproduce, study
 from nonsmooth_savi2007.bench import Measurement
 from nonsmooth_savi2007.claims.claims import CLAIMS
 from nonsmooth_savi2007.claims.verdicts import Verdict
+from nonsmooth_savi2007.figures.figure import finish, finished, just_made
 from nonsmooth_savi2007.findings import estimates_of
-from nonsmooth_savi2007.finished import finish, finished, just_made
 from nonsmooth_savi2007.flows import Settings
 from nonsmooth_savi2007.laboratory import Laboratory
 from nonsmooth_savi2007.printed import TABLE_1

@@ -19,8 +19,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from nonsmooth_savi2007.figures.figure import Figure
-from nonsmooth_savi2007.finished import finish
+from nonsmooth_savi2007.figures.figure import Figure, finish
 from nonsmooth_savi2007.flows import Settings
 from nonsmooth_savi2007.laboratory import Laboratory
 

@@ -25,8 +25,7 @@ from nonsmooth_savi2007.figures import (
     regions,
     resonance,
 )
-from nonsmooth_savi2007.figures.figure import Figure
-from nonsmooth_savi2007.finished import finish, finished, just_made, refuse_strange
+from nonsmooth_savi2007.figures.figure import Figure, finish, finished, just_made, refuse_strange
 from nonsmooth_savi2007.flows import Settings
 from nonsmooth_savi2007.report.report import REPORTS, write_report
 
