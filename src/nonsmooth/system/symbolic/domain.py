@@ -1,4 +1,4 @@
-"""What the traced equations say of the parameters: the forcing period, and values without division by zero or such.
+"""Facts of the traced equations about parameters: the forcing period, and values that divide nothing by zero.
 
 Parts of the expressions that depend on parameters alone are collected once. A single parameter in a
 denominator, by far the most common, is then a look-up; others are evaluated.
