@@ -64,7 +64,7 @@ def run(
     if keeper is None:
         columns |= empty_columns(work)
     size = work.bounds(work.n_chunks() - 1)[1]
-    before = size - sum(_places(work, chunk) for chunk in missing)
+    before = size - sum(last - first for first, last in map(work.bounds, missing))
     with progress_bar(size, label, progress, before) as advance:
 
         def keep(chunk: int, arrays: Mapping[str, NDArray[Any]] | None) -> None:
@@ -81,13 +81,8 @@ def run(
         else:
             if missing:
                 work.load()
-            on_threads(_Kept(work, keeper) if keeper else work, missing, keep, threads)
+            over_items(missing, (_Kept(work, keeper) if keeper else work).compute, keep, threads)
     return columns if keeper is None else keeper.read(work)
-
-
-def _places(work: ChunkedWork, chunk: int) -> int:
-    first, last = work.bounds(chunk)
-    return last - first
 
 
 class _Kept:
@@ -114,16 +109,6 @@ R = TypeVar("R")
 def cores() -> int:
     """Cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def on_threads(
-    work: ChunkedWork,
-    chunks: Iterable[int],
-    done: Callable[[int, Mapping[str, NDArray[Any]]], None],
-    threads: int | None = None,
-) -> None:
-    """Compute chunks and hand each to ``done(chunk, arrays)``: see :func:`over_items`."""
-    over_items(chunks, work.compute, done, threads)
 
 
 def over_items(

@@ -171,7 +171,7 @@ class _Refinement:
             split |= low == codes.NOT_PERIODIC
         if not split.any():
             return np.zeros(self.shape, dtype=bool)
-        middle_rows, middle_columns = (_middles(lines) for lines in (rows, columns))
+        middle_rows, middle_columns = (lines[:-1] + np.diff(lines) // 2 for lines in (rows, columns))
         wanted = np.zeros(self.shape, dtype=bool)
         wanted[np.ix_(middle_rows, middle_columns)] = split
         # the middle of an edge only where its ends differ, or where the cell is still large
@@ -239,11 +239,6 @@ class _Refinement:
 def _lines(n: int, step: int) -> IntArray:
     """Places of the grid lines of one size, the last point always among them."""
     return np.unique(np.append(np.arange(0, n, step), n - 1))
-
-
-def _middles(lines: IntArray) -> IntArray:
-    """The place that halves each gap between neighbouring lines (its beginning, where the gap has no inner place)."""
-    return np.asarray(lines[:-1] + np.diff(lines) // 2)
 
 
 def _over_cells(table: IntArray, rows: IntArray, columns: IntArray, least: Any) -> IntArray:

@@ -141,7 +141,12 @@ def sweep(
     carried = direction is not None
     settler = settler_for(system, "sweep", options, carried=carried, stop_early=False, device="cpu")
     gpu = options["device"] == "cuda"
-    _refuse_together(judge, extremes, density is not False, gpu)
+    if judge and not extremes:
+        raise ValueError("a period number rests on the size of the motion: give judge=False with extremes=False")
+    if not judge and (gpu or density is not False):
+        raise ValueError('judge=False records section points on the processor: leave out density and device="cuda"')
+    if gpu and density is not False:
+        raise ValueError('section points are counted on the processor: leave out density, or device="cuda"')
     threads, starts = workers_of(options), start_states(system, start)
     settler = replace(
         settler, plan=settler.plan._replace(extremes=extremes), max_period=settler.max_period if judge else 0
@@ -186,16 +191,6 @@ def sweep(
     warn_if_coarse(system, settler.engine, largest)
     warn_if_small(system, largest)
     return work.dataset(asked, squeeze)
-
-
-def _refuse_together(judge: bool, extremes: bool, counted: bool, gpu: bool) -> None:
-    """ValueError for options that exclude each other."""
-    if judge and not extremes:
-        raise ValueError("a period number rests on the size of the motion: give judge=False with extremes=False")
-    if not judge and (gpu or counted):
-        raise ValueError('judge=False records section points on the processor: leave out density and device="cuda"')
-    if gpu and counted:
-        raise ValueError('section points are counted on the processor: leave out density, or device="cuda"')
 
 
 @dataclass

@@ -72,7 +72,8 @@ def save(result: xr.Dataset, path: str | os.PathLike[str]) -> Path:
                 f"{target}: this Dataset has no attribute {ATTRIBUTE!r}, so load would refuse it; where a calculation "
                 f"lost it, copy it from the result: new.attrs[{ATTRIBUTE!r}] = result.attrs[{ATTRIBUTE!r}]"
             )
-        held = content(result.attrs, _variables(result))
+        variables = ((str(name), name in result.coords, one) for name, one in result.variables.items())
+        held = content(result.attrs, variables)
         encoded = _encode(result).assign_attrs({ATTRIBUTE: stamp(record, digest(held)), **_plain(result)})
         with told(target, _KEPT), beside(target) as folder:
             fresh = folder / f"new{target.suffix}"
@@ -237,12 +238,6 @@ def _compare(target: Path, fresh: Path, held: Mapping[str, Any]) -> None:
             f"{target}: was not written, because this format would not give back as it is: {', '.join(names)}; "
             "use names without spaces, numbers and text"
         )
-
-
-def _variables(result: xr.Dataset) -> Iterator[tuple[str, bool, xr.Variable]]:
-    """Name, coordinate or not, and variable."""
-    for name, variable in result.variables.items():
-        yield str(name), name in result.coords, variable
 
 
 def _own(attributes: Mapping[Any, Any]) -> dict[Any, Any]:

@@ -20,8 +20,7 @@ from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.derived.smoothing import BANDS
-from nonsmooth.system.kinds import at_least
-from nonsmooth.system.parameter import finite_number
+from nonsmooth.system.kinds import at_least, real_number
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -275,7 +274,7 @@ def _sharp(
 
 def _widths(etas: Any) -> FloatArray:
     """The half widths, rising."""
-    given = [finite_number(eta, "etas") for eta in np.atleast_1d(np.asarray(etas, dtype=object)).tolist()]
+    given = [real_number(eta, "etas") for eta in np.atleast_1d(np.asarray(etas, dtype=object)).tolist()]
     if not given or min(given) <= 0 or len(set(given)) != len(given):
         raise ValueError(f"etas are half widths of bands: positive numbers, each there once; not {given}")
     return np.sort(np.array(given))

@@ -23,9 +23,10 @@ from nonsmooth.system.equations import (
     trace_system,
 )
 from nonsmooth.system.inputs import input_states, read_inputs, with_inputs
+from nonsmooth.system.kinds import real_number
 from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.names import check_names
-from nonsmooth.system.parameter import Parameter, finite_number
+from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.symbolic.domain import Domain, check_period, forcing_period, timed_expressions
 from nonsmooth.system.symbolic.scalar import to_expression
 from nonsmooth.system.symbolic.traced import Traced
@@ -326,7 +327,7 @@ def _scale(given: Mapping[str, float] | None, states: Mapping[str, str], system:
     for key, value in (given or {}).items():
         if key not in states:
             raise SystemDefinitionError(f"scale: {unknown(key, 'a state', repr(system), states)}")
-        scale[key] = finite_number(value, f"the scale of {key!r}")
+        scale[key] = real_number(value, f"the scale of {key!r}")
         if scale[key] <= 0:
             raise SystemDefinitionError(f"the scale of {key!r} is its typical size and must be positive, not {value}")
     return scale
@@ -346,7 +347,7 @@ def _with_period(
         if not period.free_symbols <= set(symbols.p.values()):
             raise SystemDefinitionError(f"`period` may depend on the parameters only, not {period}")
     else:
-        number = finite_number(given, "`period`")
+        number = real_number(given, "`period`")
         if number <= 0:
             raise SystemDefinitionError(f"`period` must be positive, not {number}")
         period = to_expression(number)
@@ -358,7 +359,8 @@ def _with_period(
     traced = replace(traced, period=period)
     if period is not None and timed and period != found:
         Domain(traced).check({name: values[symbol] for name, symbol in symbols.p.items()})
-        check_period(expressions, traced.t, values, float(period.subs(values)), _plain(period, symbols))
+        plain = str(period.subs({symbol: sp.Symbol(name) for name, symbol in symbols.p.items()}))
+        check_period(expressions, traced.t, values, float(period.subs(values)), plain)
     return traced, timed and period is None
 
 
@@ -376,7 +378,3 @@ def _check_phases(traced: Traced) -> None:
                 "give them different phases"
             )
         met[place] = jump.label
-
-
-def _plain(expression: sp.Expr, symbols: Symbols) -> str:
-    return str(expression.subs({symbol: sp.Symbol(name) for name, symbol in symbols.p.items()}))

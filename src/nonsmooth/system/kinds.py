@@ -22,6 +22,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from numbers import Real
 from os import PathLike
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
@@ -30,7 +31,6 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened
-from nonsmooth.system.parameter import finite_number as real_number
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System
@@ -80,6 +80,20 @@ def at_least(low: float, most: float = math.inf) -> Limit:
 def above(low: float, most: float = math.inf) -> Limit:
     """More than ``low``."""
     return Limit(low, most, without_low=True)
+
+
+def real_number(value: Any, what: str, kind: str = "a real number") -> float:
+    """Return ``value`` as a float, or raise: TypeError for what is no real number, ValueError for NaN and inf."""
+    one = getattr(value, "ndim", 0) == 0 and not isinstance(value, str | bytes | complex)  # 0-d arrays are
+    if isinstance(value, bool) or not (isinstance(value, Real) or (hasattr(value, "__float__") and one)):
+        raise TypeError(f"{what} must be {kind}, not {shortened(value)}")
+    try:
+        number = float(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        number = math.inf
+    if not math.isfinite(number):
+        raise ValueError(f"{what} must be finite, not {number}")
+    return number
 
 
 def whole_number(value: Any, name: str, least: int) -> int:

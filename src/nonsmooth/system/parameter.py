@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any
 
 from nonsmooth.errors import SystemDefinitionError, shortened
+from nonsmooth.system.kinds import real_number
 
 _GREEK = frozenset(
     [
@@ -67,24 +66,6 @@ def latex_name(name: str) -> str:
     return f"{stem}_{{{below}}}" if below else stem
 
 
-def finite_number(value: Any, what: str, kind: str = "a real number") -> float:
-    """Return ``value`` as a float, or raise: TypeError for what is no real number, ValueError for NaN and inf."""
-    if isinstance(value, bool) or not (isinstance(value, Real) or (hasattr(value, "__float__") and _scalar(value))):
-        raise TypeError(f"{what} must be {kind}, not {shortened(value)}")
-    try:
-        number = float(value)
-    except OverflowError:  # a whole number of hundreds of digits
-        number = math.inf
-    if not math.isfinite(number):
-        raise ValueError(f"{what} must be finite, not {number}")
-    return number
-
-
-def _scalar(value: Any) -> bool:
-    """Return whether something with ``__float__`` is one number (0-d arrays are; longer arrays and strings are not)."""
-    return getattr(value, "ndim", 0) == 0 and not isinstance(value, (str, bytes, complex))
-
-
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """A parameter's value, unit and LaTeX symbol.
@@ -121,7 +102,7 @@ class Parameter:
                 f"parameter {name!r} must be a real number, not {shortened(parts[0])}; its unit stands beside it: "
                 f'{{"{name}": (8.47, "N/m")}}'
             )
-        value = finite_number(parts[0], f"parameter {name!r}")
+        value = real_number(parts[0], f"parameter {name!r}")
         unit = parts[1] if len(parts) > 1 else ""
         symbol = parts[2] if len(parts) > 2 and parts[2] else latex_name(name)
         return cls(value, unit, symbol)

@@ -9,9 +9,10 @@ import sympy as sp
 from nonsmooth.results.representation import html_table, text_table
 from nonsmooth.system.parameter import latex_name
 from nonsmooth.system.symbolic.expressions import write_expression
+from nonsmooth.system.transition import condition_text
 
 if TYPE_CHECKING:
-    from nonsmooth.system.symbolic.traced import Traced, TracedCondition, TracedTransition
+    from nonsmooth.system.symbolic.traced import Traced, TracedTransition
     from nonsmooth.system.system import System
 
 
@@ -26,17 +27,13 @@ def _plain(traced: Traced) -> dict[sp.Symbol, str]:
     return names
 
 
-def _row(row: TracedCondition, traced: Traced) -> str:
-    relation = (">" if row.sign > 0 else "<") + ("" if row.strict else "=")
-    return f"{traced.indicator_names[row.indicator]} {relation} 0"
-
-
 def _jump(jump: TracedTransition, traced: Traced, names: dict[sp.Symbol, str]) -> str:
     text = jump.label
     if jump.at is not None:
         text += f"  at phase {traced.phase_text(jump)}"
     else:
-        text += "  when " + " and ".join(_row(row, traced) for row in jump.rows)
+        indicators = traced.indicator_names
+        text += "  when " + condition_text([(indicators[row.indicator], row.sign, row.strict) for row in jump.rows])
     if jump.reset is not None:
         changed = [
             f"{name} := {write_expression(e, names)}"

@@ -11,7 +11,7 @@ import numpy as np
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, unknown
-from nonsmooth.system.parameter import finite_number
+from nonsmooth.system.kinds import real_number
 from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.traced import Traced
 from nonsmooth.system.symbolic.tracing import call_vector
@@ -49,7 +49,7 @@ def trace_symmetry(given: Any, traced: Traced, symbols: Symbols, values: Mapping
         short = False
     arguments = (symbols.states(),) if short else (Scalar(symbols.t), symbols.states(), symbols.parameters())
     image = call_vector(given[0], arguments, traced.state_names, "the map of `symmetry`")
-    shift = finite_number(given[1], "the shift of `symmetry`")
+    shift = real_number(given[1], "the shift of `symmetry`")
     if shift and traced.period is None:
         raise SystemDefinitionError("`symmetry` shifts the phase of the forcing, but the system has no forcing period")
     names, swap = traced.mode_names, dict(given[2]) if len(given) == 3 else {}

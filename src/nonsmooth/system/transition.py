@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.errors import SystemDefinitionError, shortened, unknown
-from nonsmooth.system.parameter import finite_number
+from nonsmooth.system.kinds import real_number
 
 if TYPE_CHECKING:
     from nonsmooth.system.symbolic.traced import Traced
@@ -123,7 +123,7 @@ class Surface:
         if self.field is not None and not callable(self.field):
             raise SystemDefinitionError(f"{self.label}: `field` must be a function field(t, u, p), not {self.field!r}")
         if not (self.static is None or callable(self.static)):
-            ratio = finite_number(self.static, f"{self.label}: `static`")
+            ratio = real_number(self.static, f"{self.label}: `static`")
             if ratio < 1:
                 raise SystemDefinitionError(
                     f"{self.label}: `static` is the static value over the kinetic one, 1 or more; not {self.static!r}"

@@ -17,7 +17,7 @@ import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened, unknown
 from nonsmooth.system.description import Description
-from nonsmooth.system.parameter import finite_number
+from nonsmooth.system.kinds import real_number
 from nonsmooth.system.symbolic.domain import Domain
 from nonsmooth.system.symbolic.traced import Traced
 
@@ -221,7 +221,7 @@ def changed_values(
         if key not in new:
             raise ValueError(_unknown_parameter(key, variant, name))
         if type(value) is not float or value - value != 0:
-            value = finite_number(value, f"parameter {key!r}")
+            value = real_number(value, f"parameter {key!r}")
         new[key] = value
     for key, _ in variant.etas:
         if key in changes:
@@ -275,7 +275,7 @@ def smoothed_values(
     else:
         variant = variant_of(description, ONE_ETA, band)
         widths = {"eta": eta}
-    new = plain | {key: _positive(finite_number(width, key), key) for key, width in widths.items()}
+    new = plain | {key: _positive(real_number(width, key), key) for key, width in widths.items()}
     variant.domain.check(new)
     return new, variant
 

@@ -160,10 +160,6 @@ class Engine(ABC):
         return np.array(self.traced.lacking, dtype=np.int64).reshape(len(self.traced.mode_names), -1)
 
     @cached_property
-    def _some_lacking(self) -> bool:
-        return bool((self.lacking == 1).any())
-
-    @cached_property
     def _none(self) -> Any:
         """No samples, no crossings, no touches: of most runs from one sample of a controller to the next."""
         n_u, n_m = len(self.scale), len(self.traced.m)
@@ -180,7 +176,9 @@ class Engine(ABC):
         if indicator >= 0:
             known = getattr(local, "section", None)
             if known is None or known[0] is not net or known[1] != indicator:
-                local.section = net, indicator, with_section(net, indicator)
+                rows = net.rows.copy()
+                rows[-2:, 0] = indicator  # the last two are the section's (rising, falling)
+                local.section = net, indicator, net._replace(rows=rows)
             net = local.section[2]
         return model, net, own, work
 
@@ -278,8 +276,8 @@ class Engine(ABC):
         by_time = np.argsort(touches[0][:n_t], kind="stable")  # those of a segment come by condition
         touch_times, indicators, touch_u, clearances = [part[by_time] for part in touches] if n_t else self._none[2]
         _, sample_u, sample_memory, sample_mode, sample_segment = sampled
-        if self._some_lacking:
-            lacking, jumps = self.lacking == 1, self.traced.transitions
+        lacking, jumps = self.lacking == 1, self.traced.transitions
+        if lacking.any():
             sample_u[lacking[sample_mode] & (sample_mode >= 0)[:, None]] = np.nan
             before[lacking[[t.source for t in jumps]][transitions]] = np.nan
             after[lacking[[t.target for t in jumps]][transitions]] = np.nan
@@ -339,13 +337,6 @@ def _longer(old: list[Any], new: list[Any]) -> list[Any]:
     for one, other in zip(old, new, strict=True):
         other[: len(one)] = one
     return new
-
-
-def with_section(net: Any, indicator: int) -> Any:
-    """The transition table, its last two rows being the section's (rising, falling)."""
-    rows = net.rows.copy()
-    rows[-2:, 0] = indicator
-    return net._replace(rows=rows)
 
 
 def _change(traced: Traced, jump: TracedTransition) -> int:

@@ -142,7 +142,7 @@ class _Rule:
         return sp.lambdify(self._symbols, self.expression, modules="math")
 
     @cached_property
-    def _array(self) -> Any:
+    def of_rows(self) -> Any:
         return sp.lambdify(self._symbols, self.expression, modules="numpy")
 
     def check(self, values: Mapping[str, float]) -> None:
@@ -162,12 +162,6 @@ class _Rule:
         if self.kind in ("nonnegative", "apart"):
             return finite & (number >= 0)
         return finite & (number > 0)
-
-    def first_refused(self, points: np.ndarray) -> int | None:
-        """Index of the first row of ``points`` that is not allowed."""
-        with np.errstate(all="ignore"):
-            refused = ~np.broadcast_to(self.allows(self._array(*points.T)), len(points))
-        return int(np.argmax(refused)) if refused.any() else None
 
     def _sentence(self, values: Mapping[str, float], number: float) -> str:
         given = ", ".join(f"{name} = {values[name]!r}" for name in self._names if name in self.used)
@@ -247,9 +241,10 @@ class Domain:
             if (points[:, self._names.index(name)] == 0).any():
                 raise SystemDefinitionError(self._by_zero(name))
         for rule in self._rules:
-            refused = rule.first_refused(points)
-            if refused is not None:
-                rule.check(dict(zip(self._names, points[refused].tolist(), strict=True)))
+            with np.errstate(all="ignore"):
+                refused = ~np.broadcast_to(rule.allows(rule.of_rows(*points.T)), len(points))
+            if refused.any():
+                rule.check(dict(zip(self._names, points[refused][0].tolist(), strict=True)))
 
 
 def _restricted(expression: sp.Expr, parameters: set[sp.Symbol]) -> Iterator[tuple[sp.Expr, str]]:

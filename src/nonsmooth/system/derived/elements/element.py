@@ -17,7 +17,6 @@ from nonsmooth.errors import SystemDefinitionError, shortened
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.assembly import Assembler, Part, Pattern
-    from nonsmooth.system.derived.elements import Element
 
 
 SMALL = 1e-4  # of the states' scale: what a rate or a gap that is held at zero may be off where a run begins
