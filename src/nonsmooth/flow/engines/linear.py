@@ -15,7 +15,6 @@ import numpy as np
 
 from nonsmooth.flow.engines.engine import FloatArray
 from nonsmooth.flow.engines.loop import Engine, pack_net
-from nonsmooth.kernels.compile.assembly import is_planar
 from nonsmooth.kernels.compile.pointers import one_block
 from nonsmooth.kernels.hybrid.codes import N_MEMO, N_TALLY
 from nonsmooth.kernels.hybrid.records import Tables, Work
@@ -163,7 +162,7 @@ def scratch(
 
     ``apart``: each table by itself, which takes memory only where it is written."""
     n, m, n_f = states, states + 1 + 2 * harmonics, n_indicators + states + n_outputs
-    planar = is_planar(states, harmonics) and not apart  # modes that are made on the way have the other module's
+    planar = states == 2 and harmonics == 1 and not apart  # modes that are made on the way have the other module's
     filled = n if planar else -(-n // LANES) * LANES
 
     def whole(*shape: int) -> Any:

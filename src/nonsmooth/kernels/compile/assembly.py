@@ -61,11 +61,6 @@ LINEAR_OBSERVERS = (
 )
 
 
-def is_planar(states: int, harmonics: int) -> bool:
-    """Return whether numbers of states (memory counted) and harmonics are those of the module with constant bounds."""
-    return states == 2 and harmonics == 1
-
-
 @cache
 def linear_module(planar: bool = False) -> ModuleType:
     """The module with ``run`` for the exact flow: of two states, all in every mode, with one harmonic; else of any
