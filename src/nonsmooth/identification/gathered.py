@@ -10,7 +10,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.draws import drawn_variables
-from nonsmooth.identification.compare.jumps import nearest_alike
+from nonsmooth.identification.compare.response import nearest_alike
 from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 
 import nonsmooth as ns
-from nonsmooth.identification.compare.jumps import AmplitudeJump, match_jumps
 from nonsmooth.identification.compare.orbits import cloud_distance
+from nonsmooth.identification.compare.response import AmplitudeJump, match_jumps
 
 MODEL = ns.models.discontinuous_support()
 

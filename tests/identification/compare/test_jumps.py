@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from nonsmooth.identification.compare import measured_response, measured_sections
-from nonsmooth.identification.compare.jumps import AmplitudeJump, jumps_in_steps, match_jumps
+from nonsmooth.identification.compare.response import AmplitudeJump, jumps_in_steps, match_jumps
 
 ZERO = np.zeros
 

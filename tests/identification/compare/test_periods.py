@@ -8,8 +8,8 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth.identification.compare.draws import draw_systems, read_settings
-from nonsmooth.identification.compare.jumps import AmplitudeJump, match_jumps
 from nonsmooth.identification.compare.periods import flips, measured_period, period_numbers
+from nonsmooth.identification.compare.response import AmplitudeJump, match_jumps
 
 NOISE = np.array([1e-3, 1e-2])
 

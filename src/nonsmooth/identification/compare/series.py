@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.identification.compare.jumps import jumps_of_runs
 from nonsmooth.identification.compare.orbits import fold
 from nonsmooth.identification.compare.periods import measured_period
+from nonsmooth.identification.compare.response import jumps_of_runs
 from nonsmooth.results.labels import labelled
 
 if TYPE_CHECKING:
