@@ -7,15 +7,15 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.identification.arrow import Residuals, Unsettled, sandwich, settle
-from nonsmooth.identification.finding import Estimate
-from nonsmooth.identification.fit.likelihood import limits_of
-from nonsmooth.identification.uncertainty import (
+from nonsmooth.identification.finding import (
+    Estimate,
     correlated,
     coverage_factor,
     factor_interval,
     interval,
     uniform,
 )
+from nonsmooth.identification.fit.likelihood import limits_of
 from nonsmooth.recordings.signals.spectrum import correlation_times
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.uncertainty import newey_west, not_below
+from nonsmooth.identification.finding import newey_west, not_below
 
 _LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction counts as determined
 _SETTLED = 1e-3  # of a standard uncertainty

@@ -12,8 +12,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import Answering
-from nonsmooth.identification.finding import Estimate, Finding
-from nonsmooth.identification.uncertainty import normal_draws
+from nonsmooth.identification.finding import Estimate, Finding, normal_draws
 from nonsmooth.results.representation import cut, html_table, text_table
 
 if TYPE_CHECKING:

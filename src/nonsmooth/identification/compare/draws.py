@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from nonsmooth.errors import SystemDefinitionError, unknown
-from nonsmooth.identification.uncertainty import normal_draws
+from nonsmooth.identification.finding import normal_draws
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.kinds import ends, real_number
 

@@ -13,9 +13,8 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, not_installed
 from nonsmooth.identification.arrow import Unsettled, concerned, inverted, reduced, settle
-from nonsmooth.identification.finding import Estimate, Finding
+from nonsmooth.identification.finding import Estimate, Finding, normal_draws
 from nonsmooth.identification.fit.growth import Grown
-from nonsmooth.identification.uncertainty import normal_draws
 from nonsmooth.results.progress import Progress, progress
 
 
