@@ -33,7 +33,6 @@ OBSERVERS = {
         "cuda.tables",
         "cuda.advance",
         "cuda.settle",
-        "cuda.neighbours",
     ),
     "growth": (
         "tangent.frame",

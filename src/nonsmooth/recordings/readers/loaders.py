@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.recordings.readers.matlab_v5 import load_hdf5, load_v5
+from nonsmooth.recordings.readers.matlab import load_hdf5, load_v5
 from nonsmooth.recordings.readers.tdms import load_tdms
 from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Group, Remarks, Source, inflation_limit, needed, readable
 
