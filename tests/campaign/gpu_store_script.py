@@ -15,7 +15,7 @@ from unittest import mock
 from simple_work import hashes
 
 import nonsmooth as ns
-from nonsmooth.campaign import identity
+from nonsmooth.campaign import work
 from nonsmooth.cli.main import main
 from nonsmooth.diagrams import chart as chart_module
 from nonsmooth.flow.engines import gpu as planar_cuda
@@ -78,7 +78,7 @@ found["plan"] = command("plan", "study.toml", "--seconds", "0.01")
 found["processor"] = study("cpu", "cpu")
 found["gpu's store, processor"] = study("cpu", "cuda", any_cpu=True)
 found["processor's store, gpu"] = study("cuda", "cpu", any_cpu=True)
-mock.patch.object(identity, "gpu_type", return_value="another").start()  # as on a machine with another GPU
+mock.patch.object(work, "gpu_type", return_value="another").start()  # as on a machine with another GPU
 found["another gpu"] = study("cuda", "cuda")
 found["any"] = study("cuda", "cuda", any_cpu=True)
 cpu, cuda = ns.load("cpu.nc"), ns.load("cuda.nc")

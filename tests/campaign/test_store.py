@@ -14,8 +14,8 @@ from simple_work import Squares, Zeros, hashes, right
 
 import nonsmooth as ns
 from nonsmooth.attractors.basins import basins
-from nonsmooth.campaign import identity
 from nonsmooth.campaign import store as stores
+from nonsmooth.campaign import work
 from nonsmooth.campaign.plan import plan
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.store import describe_store, open_store
@@ -150,7 +150,7 @@ def test_the_store_of_another_work_is_refused(tmp_path: Path, monkeypatch: pytes
             run(Squares(), store=path, **QUIET)
         assert right(run(Squares(), store=path, any_cpu=True, **QUIET), Squares())
     with monkeypatch.context() as patched:
-        patched.setattr(identity, "_kernel_version", lambda: "older")
+        patched.setattr(work, "_kernel_version", lambda: "older")
         with pytest.raises(DataFileError, match="another version"):
             run(Squares(), store=path, **QUIET)
     assert hashes(path) == before
@@ -158,7 +158,7 @@ def test_the_store_of_another_work_is_refused(tmp_path: Path, monkeypatch: pytes
 
 def test_other_rules_of_judgement_are_another_version(monkeypatch: pytest.MonkeyPatch) -> None:
     """Labels are decided by analysis as much as by the kernels."""
-    version, read = identity._kernel_version.__wrapped__, Path.read_bytes
+    version, read = work._kernel_version.__wrapped__, Path.read_bytes
     now = version()
     for changed in ("kernels/judging/judge.py", "flow/engines/linear.py", "kernels/linear/stepper.py"):
         with monkeypatch.context() as patched:

@@ -13,8 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.campaign.identity import clock
-from nonsmooth.campaign.work import ChunkedWork, check_room, empty_columns
+from nonsmooth.campaign.work import ChunkedWork, check_room, clock, empty_columns
 from nonsmooth.flow.engines.engine import obey
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar

@@ -31,8 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.campaign.identity import described, difference, processor_type
-from nonsmooth.campaign.work import ChunkedWork
+from nonsmooth.campaign.work import ChunkedWork, described, difference, processor_type
 from nonsmooth.errors import DataFileError
 from nonsmooth.results.store import needs_zarr
 from nonsmooth.results.whole import beside, digest, seal, sealed, told, write_whole
