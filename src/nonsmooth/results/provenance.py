@@ -120,7 +120,12 @@ def read_provenance(result: xr.Dataset) -> dict[str, Any]:
     ValueError
         The Dataset carries no record, or one that cannot be read.
     """
-    record = _read(result)
+    text = result.attrs.get(ATTRIBUTE)
+    if not isinstance(text, str):
+        raise ValueError(
+            f"this Dataset has no attribute {ATTRIBUTE!r}: it was not made by nonsmooth, or lost it on the way"
+        )
+    record = _object(text, f"attribute {ATTRIBUTE!r}")
     if record.get("record") == COORDINATE:
         if COORDINATE not in result.coords:
             raise ValueError(
@@ -132,15 +137,6 @@ def read_provenance(result: xr.Dataset) -> dict[str, Any]:
     if isinstance(options := record.get("options"), dict):
         record["options"] = {name: _resolved(value, result) for name, value in options.items()}
     return record
-
-
-def _read(result: xr.Dataset) -> dict[str, Any]:
-    text = result.attrs.get(ATTRIBUTE)
-    if not isinstance(text, str):
-        raise ValueError(
-            f"this Dataset has no attribute {ATTRIBUTE!r}: it was not made by nonsmooth, or lost it on the way"
-        )
-    return _object(text, f"attribute {ATTRIBUTE!r}")
 
 
 def _object(text: str, where: str) -> dict[str, Any]:
