@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nonsmooth.recordings.sampling import examine, missing_runs
+from nonsmooth.recordings.recording import examine, missing_runs
 from nonsmooth.recordings.signals.displacement import found_resolution, resolution
 
 

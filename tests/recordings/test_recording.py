@@ -15,7 +15,7 @@ import nonsmooth as ns
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings import RecordingWarning
 from nonsmooth.recordings.load import parse_recording
-from nonsmooth.recordings.sampling import examine, missing_runs
+from nonsmooth.recordings.recording import examine, missing_runs
 from nonsmooth.results.provenance import read_provenance
 
 

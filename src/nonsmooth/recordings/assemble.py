@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth.recordings.reading import MAX_COLUMNS, Reading, Remarks, Source, Trace
-from nonsmooth.recordings.recording import Recording, mixed_units
-from nonsmooth.recordings.sampling import examine, missing_runs
+from nonsmooth.recordings.recording import Recording, examine, missing_runs, mixed_units
 
 if TYPE_CHECKING:
     import xarray as xr

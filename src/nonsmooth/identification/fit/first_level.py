@@ -26,7 +26,7 @@ from nonsmooth.errors import SolveError, shortened, unknown
 from nonsmooth.identification.arrow import Residuals, settle
 from nonsmooth.identification.fit.first_windows import first_length, first_windows, told_start
 from nonsmooth.identification.fit.windows import Window, Windows
-from nonsmooth.recordings.sampling import runs_of
+from nonsmooth.recordings.recording import runs_of
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.recordings.recording import Recording, RecordingWarning
-from nonsmooth.recordings.sampling import examine, missing_runs
+from nonsmooth.recordings.recording import Recording, RecordingWarning, examine, missing_runs
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.recordings.sampling import runs_of
+from nonsmooth.recordings.recording import runs_of
 from nonsmooth.recordings.signals.checks import even_rate, signal, whose
 from nonsmooth.results.labels import labelled
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.recordings.sampling import examine
+from nonsmooth.recordings.recording import examine
 from nonsmooth.recordings.signals.checks import signal, unit_of, whose
 from nonsmooth.recordings.signals.harmonics import fit
 from nonsmooth.recordings.signals.spectrum import largest_line, peak, spectrum
