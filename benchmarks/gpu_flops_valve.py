@@ -16,7 +16,7 @@ from gpu_flops import operations
 from nonsmooth.flow.engines.methods import engine_for
 from nonsmooth.flow.sections import section_plan
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.kernels.series import crossing, polynomial, taylor, trust
+from nonsmooth.kernels.series import crossing, polynomial, taylor
 
 FILES = (crossing, polynomial, taylor, trust)
 TRANSIENT, RETURNS, TOLERANCE = 40, 20, 1e-10

@@ -12,8 +12,7 @@ from nonsmooth.kernels.series.crossing import earliest, rows_hold
 from nonsmooth.kernels.series.generated import field_of, jet_of, values_of
 from nonsmooth.kernels.series.polynomial import NONE
 from nonsmooth.kernels.series.rkf45 import first_step, hermite, quiet, stages, time_to_transition
-from nonsmooth.kernels.series.taylor import dense_states, fill_powers, step_length
-from nonsmooth.kernels.series.trust import trusted
+from nonsmooth.kernels.series.taylor import dense_states, fill_powers, step_length, trusted
 
 
 @inline
