@@ -18,7 +18,7 @@ from nonsmooth.flow.sections import section_plan
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.series import crossing, polynomial, taylor
 
-FILES = (crossing, polynomial, taylor, trust)
+FILES = (crossing, polynomial, taylor)
 TRANSIENT, RETURNS, TOLERANCE = 40, 20, 1e-10
 START = [0.2, 0.0, 10.0]
 

@@ -128,7 +128,6 @@ SERIES = (
     "series.crossing",
     "series.rkf45",
     "series.taylor",
-    "series.trust",
     "series.step",
     "series.watch",
     "series.instant",
