@@ -13,8 +13,7 @@ from scipy.special import ellipe, jv
 import nonsmooth as ns
 from nonsmooth_savi2007.rig import VirtualRig
 from nonsmooth_savi2007.rig.motor import mean_position, passages
-from nonsmooth_savi2007.rig.physics import AT_REST, car, crank_angle, friction, support_force
-from nonsmooth_savi2007.rig.sampled import simulated
+from nonsmooth_savi2007.rig.physics import AT_REST, car, crank_angle, friction, simulated, support_force
 
 OFF = {
     "ripple": False,

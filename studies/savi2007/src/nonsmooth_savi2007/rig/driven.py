@@ -16,8 +16,7 @@ import xarray as xr
 from nonsmooth import Recording, SolveError
 from nonsmooth_savi2007.rig import sensors
 from nonsmooth_savi2007.rig.motor import frequency, mean_position, passages, voltage_for
-from nonsmooth_savi2007.rig.physics import NO_SUPPORT, Wander
-from nonsmooth_savi2007.rig.sampled import simulated
+from nonsmooth_savi2007.rig.physics import NO_SUPPORT, Wander, simulated
 from nonsmooth_savi2007.rig.truth import NOMINAL_GAP
 
 if TYPE_CHECKING:

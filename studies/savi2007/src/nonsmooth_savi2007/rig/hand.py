@@ -14,8 +14,7 @@ import numpy as np
 from nonsmooth import Recording, System
 from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.rig import sensors
-from nonsmooth_savi2007.rig.physics import NO_SUPPORT, friction, hanging_mass
-from nonsmooth_savi2007.rig.sampled import simulated
+from nonsmooth_savi2007.rig.physics import NO_SUPPORT, friction, hanging_mass, simulated
 
 if TYPE_CHECKING:
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig

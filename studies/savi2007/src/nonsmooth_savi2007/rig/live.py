@@ -8,7 +8,7 @@ from nonsmooth import SimulatedRig
 from nonsmooth_savi2007.rig.figures import screw_for
 from nonsmooth_savi2007.rig.motor import frequency as motor_frequency
 from nonsmooth_savi2007.rig.motor import voltage_for
-from nonsmooth_savi2007.rig.sampled import METHOD
+from nonsmooth_savi2007.rig.physics import METHOD
 from nonsmooth_savi2007.rig.sensors import COUNT, RATE
 
 if TYPE_CHECKING:
