@@ -107,11 +107,11 @@ class VariationalFlow:
         """The constants of the model of :meth:`path` at these parameters, for these modes."""
         return _floats(values)
 
-    def _ready(self, values: FloatArray, modes: Any) -> tuple[FloatArray, Any]:
-        """The parameters that the kernels put into their working memory, and that memory, for some modes."""
-        return _floats(values), self.scratch()
-
-    def _ready_to_jump(self, values: FloatArray, k: int, t: float, z: FloatArray) -> tuple[FloatArray, Any]:
+    def _ready(
+        self, values: FloatArray, modes: Any = (), jump: tuple[int, float, FloatArray] | None = None
+    ) -> tuple[FloatArray, Any]:
+        """The parameters that the kernels put into their working memory, and that memory, for some modes, or for a
+        transition with its time and the state before it."""
         return _floats(values), self.scratch()
 
     @classmethod
@@ -188,7 +188,7 @@ class VariationalFlow:
             Crossing(np.empty(square), np.empty(square), np.empty(square), np.empty((3, n + a)), np.empty(n + a)),
         )
         z = _floats(z)
-        values, work = self._ready_to_jump(values, int(k), t, z)
+        values, work = self._ready(values, jump=(int(k), t, z))
         row = cross(self.equations, k, row, t, z, values, timing, self.scale, seen, out, work)
         at = n + n * n + n + n * a + row * (2 + n + a)
         h = out[at : at + 2 + n + a] if row >= 0 else np.zeros(2 + n + a)

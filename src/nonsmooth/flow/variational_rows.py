@@ -206,10 +206,9 @@ class LinearFlow(RowsFlow):
         found: FloatArray = self.kept(values)
         return found
 
-    def _ready(self, values: FloatArray, modes: Any) -> tuple[FloatArray, Any]:
-        return NONE, self.scratch()._replace(q=self.kept(values))
-
-    def _ready_to_jump(self, values: FloatArray, k: int, t: float, z: FloatArray) -> tuple[FloatArray, Any]:
+    def _ready(
+        self, values: FloatArray, modes: Any = (), jump: tuple[int, float, FloatArray] | None = None
+    ) -> tuple[FloatArray, Any]:
         return NONE, self.scratch()._replace(q=self.kept(values))
 
     def _taken(self, at: FloatArray, i: int, mode: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -253,11 +252,11 @@ class PatternFlow(RowsFlow):
         found: FloatArray = self.kept(values).array(modes, watched=True)
         return found
 
-    def _ready(self, values: FloatArray, modes: Any) -> tuple[FloatArray, Any]:
-        return NONE, self.scratch()._replace(q=self.kept(values).array(modes))
-
-    def _ready_to_jump(self, values: FloatArray, k: int, t: float, z: FloatArray) -> tuple[FloatArray, Any]:
-        return NONE, self.scratch()._replace(q=self.kept(values).of_jump(k, t, z))
+    def _ready(
+        self, values: FloatArray, modes: Any = (), jump: tuple[int, float, FloatArray] | None = None
+    ) -> tuple[FloatArray, Any]:
+        kept = self.kept(values)
+        return NONE, self.scratch()._replace(q=kept.array(modes) if jump is None else kept.of_jump(*jump))
 
     def _taken(self, at: Packed, i: int, mode: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         rows = parts([at.row(one, mode, i) for one in at.every])
