@@ -183,7 +183,7 @@ def smoothing_report(
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.progress import progress as bar
     from nonsmooth.results.provenance import provenance
-    from nonsmooth.results.smoothing import report
+    from nonsmooth.results.variations import report
 
     if system.is_smoothed:
         raise ValueError("smoothing_report compares with the event-driven system: give it without smoothed(...)")
