@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
-from scipy.optimize import linear_sum_assignment
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.results.labels import Labels
@@ -152,6 +151,8 @@ def _differences(variables: Mapping[str, Any], scale: FloatArray, forced: bool) 
 
 def _of_multipliers(values: Any, reference: Any) -> FloatArray:
     """The largest distance of two sets of multipliers, each paired with one of the other so that the sum is least."""
+    from scipy.optimize import linear_sum_assignment
+
     found = np.full(values.shape[:-1], np.nan)
     for place in np.ndindex(found.shape):
         gaps = np.abs(values[place][:, None] - reference[None, :])

@@ -26,13 +26,15 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from glob import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from nonsmooth.errors import DataFileError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _OLD = "old"  # where a folder goes that is about to be replaced
 _WRITER = "writer.json"
