@@ -77,7 +77,10 @@ def _collect(e: sp.Expr, t: sp.Symbol, values: Mapping[sp.Symbol, float], found:
         argument = sp.expand(e.args[0])
         slope = argument.diff(t)
         if slope.free_symbols <= values.keys():
-            size = -slope if slope.subs(values).is_negative else slope  # SymPy writes cos(w t - c) as cos(c - w t)
+            # SymPy writes cos(w t - c) as cos(c - w t): what is negative of positive parameters is turned round. Of a
+            # difference their values say it.
+            sign = slope.subs({p: sp.Dummy(positive=True) for p in slope.free_symbols})
+            size = -slope if (slope.subs(values) if sign.is_positive is None else sign).is_negative else slope
             if size not in found:
                 found.append(size)
             return True
