@@ -72,6 +72,22 @@ def test_directions_and_starts_of_a_response() -> None:
     assert np.allclose(many["amplitude"].sel(omega=3.0, state="x"), a, rtol=1e-8)
 
 
+def test_the_parameter_is_the_one_that_sets_the_period() -> None:
+    """a = P / |k - w^2 + i c w| over the frequency, whatever its name; of two, or none, one says which."""
+
+    def driven(force, **parameters):
+        return ns.mechanical(1.0, 0.1, 1.0, parameters=parameters, forcing={"q": force})
+
+    w, options = np.array([0.5, 0.9, 1.4]), {"transient": 300, "keep": 4, "max_period": 3, "progress": False}
+    response = ns.frequency_response(driven(lambda t, p: p.P * np.sin(2 * p.w * t), P=0.3, w=1.0), w / 2, **options)
+    a = 0.3 / np.hypot(1 - w**2, 0.1 * w)
+    assert response["amplitude"].dims[0] == "w"
+    np.testing.assert_allclose(response["amplitude"].sel(state="q"), np.stack([a, a], axis=1), rtol=1e-9)
+    for two in (driven(lambda t, p: np.sin((p.w - p.b) * t), w=1.0, b=0.1), driven(lambda t, p: p.P, P=0.1)):
+        with pytest.raises(ValueError, match=r"`omega` is not a parameter of .*; choose one with parameter="):
+            ns.frequency_response(two, w, **options)
+
+
 def test_jumps_are_those_of_every_state_and_output_and_a_plot_draws_its_own() -> None:
     """Three bistable cells x_i' = x_i - x_i^3 + s_i a, of which the second and the third are met at other values of a.
 

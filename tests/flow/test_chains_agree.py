@@ -8,10 +8,12 @@ forms of single cases stand in ``test_inputs`` and ``system/test_elements_by_han
 from __future__ import annotations
 
 from itertools import pairwise
+from math import factorial
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline, PPoly
 
 import nonsmooth as ns
 
@@ -66,29 +68,36 @@ def apart_by_method(seed: int, method: str = "taylor") -> float:
     return float(np.abs(exact.u.values[-1] - series.u.values[-1]).max())
 
 
-def apart_by_restarts(seed: int) -> float:
+def apart_by_restarts(seed: int, smooth: bool = False) -> float:
     """The distance of a motion under sampled courses from that of runs that begin anew at each sample."""
     rng = np.random.default_rng(seed)
-    steps = bool(rng.random() < 0.5)
+    steps = bool(rng.random() < 0.5) and not smooth
     times = [np.append(0.0, np.cumsum(rng.uniform(0.3, 1.2, 6))) for _ in range(2)]
-    places, speeds = rng.uniform(-1.0, -0.4, 7), rng.uniform(-0.5, 0.5, 7)
+    values = rng.uniform(-1.0, -0.4, 7), rng.uniform(-0.5, 0.5, 7)
     seeds = np.random.default_rng([seed, 1]), np.random.default_rng([seed, 1])
-    driven = chain(seeds[0], lambda t, u, p: p.y, lambda t, u, p: p.b, 0.0, inputs={"y": "", "b": ""})
-    course = {"parameters": {"y": 0.0, "y_rate": 0.0, "b": 0.0, "b_rate": 0.0}}
-    line = chain(seeds[1], lambda t, u, p: p.y + p.y_rate * t, lambda t, u, p: p.b + p.b_rate * t, 0.0, **course)
+    declared = dict.fromkeys("yb", ("", "smooth") if smooth else "")
+    driven = chain(seeds[0], lambda t, u, p: p.y, lambda t, u, p: p.b, 0.0, inputs=declared)
+    known = {name + str(power): 0.0 for name in "yb" for power in range(4 if smooth else 2)}
+
+    def course(name: str) -> Any:
+        return lambda t, u, p: sum(p[one] * t ** int(one[1]) for one in known if one[0] == name)
+
+    alone = chain(seeds[1], course("y"), course("b"), 0.0, parameters=known)
     start, end = start_of(rng, driven), min(one[-1] for one in times)
-    inputs = {"y": (times[0], places), "b": ns.Input(times[1], speeds, between="steps" if steps else "linear")}
+    inputs = {"y": (times[0], values[0]), "b": ns.Input(times[1], values[1], between="steps" if steps else None)}
     run = ns.simulate(driven, duration=end, start=start, inputs=inputs)
-    cuts = np.unique([t for one in times for t in one if t <= end])
-    for begin, until in pairwise(cuts):
-        middle, at = (begin + until) / 2, {}
-        for name, t, y in (("y", times[0], places), ("b", times[1], speeds)):
-            i = int(np.searchsorted(t, middle)) - 1
-            rate = 0.0 if steps and name == "b" else (y[i + 1] - y[i]) / (t[i + 1] - t[i])
-            at |= {name: y[i] + rate * (begin - t[i]), f"{name}_rate": rate}
-        piece = ns.simulate(line.with_parameters(**at), duration=until - begin, start=start)
+    curves = {name: (CubicSpline if smooth else line)(*at) for name, *at in zip("yb", times, values, strict=True)}
+    if steps:
+        curves["b"] = PPoly(values[1][None, :-1], times[1])
+    for begin, until in pairwise(np.unique([t for one in times for t in one if t <= end])):
+        now = {one: float(curves[one[0]](begin, int(one[1])) / factorial(int(one[1]))) for one in known}
+        piece = ns.simulate(alone.with_parameters(**now), duration=until - begin, start=start)
         start = dict(zip(start, piece.u.values[-1].tolist(), strict=True))
     return float(np.abs(run.u.values[-1, : len(start)] - list(start.values())).max())
+
+
+def line(times: np.ndarray, values: np.ndarray) -> Any:
+    return PPoly(np.array([np.diff(values) / np.diff(times), values[:-1]]), times)
 
 
 @pytest.mark.parametrize("seed", BY_METHOD)
@@ -101,7 +110,13 @@ def test_sampled_courses_and_restarted_runs(seed: int) -> None:
     assert apart_by_restarts(seed) < 1e-9
 
 
+@pytest.mark.parametrize("seed", [3])
+def test_smooth_courses_and_restarted_runs(seed: int) -> None:
+    assert apart_by_restarts(seed, smooth=True) < 1e-9
+
+
 @pytest.mark.slow
 def test_two_hundred_of_each() -> None:
     far = [("method", seed) for seed in range(200) if not apart_by_method(seed) < 1e-8]
-    assert not far + [("restarts", seed) for seed in range(200) if not apart_by_restarts(seed) < 1e-9]
+    both = [(seed, smooth) for smooth in (False, True) for seed in range(200)]
+    assert not far + [one for one in both if not apart_by_restarts(*one) < 1e-9]

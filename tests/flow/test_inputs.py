@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -244,9 +245,8 @@ def test_derivatives_of_a_start_at_rest_on_a_plate_that_comes_up() -> None:
     np.testing.assert_allclose(found.P.sel(parameter="e")[:2], [0.5 * 0.2, 0.5], atol=1e-12)
 
 
-@pytest.mark.parametrize("method", ["exact", "taylor"])
-def test_a_mass_leaves_a_smooth_plate_where_that_falls_faster(method: str) -> None:
-    """y = -b (t - late)^3 of samples, as a cubic spline has it, falls with 6 b (t - late) = g where the mass lifts off.
+def test_a_mass_leaves_a_smooth_plate_where_that_falls_faster() -> None:
+    """The mass lifts off where y = -b (t - late)^3, of samples from t = late on, falls with 6 b (t - late) = g.
 
     Behind it q = -b T^3 - 3 b T^2 s - g s^2 / 2 with T = g / (6 b) and the time s since then."""
     b, g, late = 1.5, 9.0, 0.1
@@ -267,24 +267,37 @@ def test_a_mass_leaves_a_smooth_plate_where_that_falls_faster(method: str) -> No
         ("y_rate2", "m/s^2"),
         ("y_rate3", "m/s^3"),
     ]
-    times = np.array([-0.5, 0.31, 0.7, 1.2, 1.9, 2.0])
+    times = np.array([0.0, 0.31, 0.7, 1.2, 1.9, 2.0])
     inputs = {"y": ns.Input(times, -b * times**3, delay="late")}
-    found = ns.sensitivity(
-        system,
-        duration=1.7,
-        start={"q": b * late**3},
-        mode="plate_rest",
-        parameters=["g", "late"],
-        inputs=inputs,
-        method=method,
-    )
+    begin = {"duration": 1.7, "mode": "plate_rest", "inputs": inputs}
+    found = ns.sensitivity(system, parameters=["g", "late"], **begin)
     T, s = g / (6 * b), 0.6
-    np.testing.assert_allclose(found.crossing_time, [late + T], atol=1e-13)
-    np.testing.assert_allclose(
-        found.end[:2], [-b * T**3 - 3 * b * T**2 * s - g * s**2 / 2, -3 * b * T**2 - g * s], atol=1e-12
-    )
+    end = [-b * T**3 - 3 * b * T**2 * s - g * s**2 / 2, -3 * b * T**2 - g * s]
+    for method in ("exact", "taylor"):
+        run = ns.simulate(system, method=method, **begin)
+        np.testing.assert_allclose(run.crossing_time, [late + T], atol=1e-13)
+        np.testing.assert_allclose(run.u.values[-1, :2], end, atol=1e-12)
+    np.testing.assert_allclose(found.end[:2], end, atol=1e-12)
     np.testing.assert_allclose(found.P.sel(parameter="late")[:2], [3 * b * T**2 + g * s, g], atol=1e-11)
     np.testing.assert_allclose(found.P.sel(parameter="g")[:2], [-(s**2) / 2, -s], atol=1e-11)
+
+
+def test_the_noise_of_a_smooth_input() -> None:
+    """The spline passes readings of a slow swing by their noise, in few pieces, with its second derivative."""
+    t = np.arange(0.0, 5.0, 0.001)
+    noisy = ns.Input(t, np.sin(3 * t) + 1e-3 * np.random.default_rng(0).standard_normal(len(t)), noise=1e-3)
+    probe = ns.System(states=["x"], parameters={}, inputs={"f": ("", "smooth")}, modes={"one": lambda t, u, p: [p.f]})
+    run = ns.simulate(probe, duration=4.9, samples=np.linspace(0.2, 4.8, 99), inputs={"f": noisy})
+    at = run.time.values[1:-1]
+    for state, exact, off in (("f", np.sin(3 * at), 5e-4), ("f_rate2", -9 * np.sin(3 * at), 0.4)):
+        assert np.sqrt(np.mean((run.u.sel(state=state).values[1:-1] - exact) ** 2)) < off
+    given = json.loads(run.attrs["nonsmooth"])["options"]["inputs"]["f"]
+    assert given["noise"] == 1e-3
+    with pytest.raises(ValueError, match=r"noise = 0.1 is that of a smooth input; this one is 'steps'"):
+        ns.Input([0, 1], [0, 1], between="steps", noise=0.1)
+    plain = ns.mechanical(1.0, 0.0, 0.0, inputs={"f": "N"})
+    with pytest.raises(ValueError, match=r"declare it with ns.System"):
+        ns.simulate(plain, duration=1.0, inputs={"f": noisy})
 
 
 def test_inputs_declared_smooth_or_not() -> None:

@@ -31,6 +31,7 @@ def forced(force, period=None, **parameters):
         (lambda t, u, p: np.cos(p.w * t - p.b), 2 * np.pi / 3),  # SymPy has it as cos(b - w t)
         (lambda t, u, p: np.sin(p.b - p.w * t) + np.cos(2 * p.w * t - p.b), 2 * np.pi / 3),
         (lambda t, u, p: np.cos((p.w + p.b) * t) + np.cos(2 * (p.b + p.w) * t), 2 * np.pi / 3.7),
+        (lambda t, u, p: np.cos((p.b - p.w) * t) + np.sin(2 * (p.w - p.b) * t), 2 * np.pi / 2.3),
     ],
 )
 def test_the_period_is_read_off(force, period):

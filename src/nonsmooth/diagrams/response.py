@@ -25,7 +25,7 @@ def frequency_response(
     system: System,
     values: Any,
     *,
-    parameter: str = "omega",
+    parameter: str | None = None,
     direction: Literal["up", "down", "both", None] = "both",
     **options: Any,
 ) -> xr.Dataset:
@@ -38,8 +38,8 @@ def frequency_response(
     system : System
     values : array (P,)
         Values of the parameter.
-    parameter : str
-        ``"omega"`` where not given.
+    parameter : str, optional
+        Where not given the one that sets the forcing period; of several, or none, ``"omega"``.
 
     Returns
     -------
@@ -56,9 +56,14 @@ def frequency_response(
     that a jump may stand for some of them only; between points whose ``period_number`` is 0 it may be the scatter of
     chaos.
     """
+    if parameter is None:
+        t = system.traced
+        known = [name for name, p in zip(t.parameter_names, t.p, strict=True) if t.period and t.period.has(p)]
+        parameter = known[0] if len(known) == 1 else "omega"
     if parameter not in system.parameters:
-        known = {name: item.unit for name, item in system.parameters.items()}
-        raise ValueError(unknown(parameter, "a parameter", repr(system.name), known) + "; choose one with parameter=")
+        raise ValueError(
+            unknown(parameter, "a parameter", repr(system.name), system.parameters) + "; choose one with parameter="
+        )
     try:
         return _response(system, sweep(system, parameter, values, direction=direction, **options), parameter)
     except Interrupted as error:

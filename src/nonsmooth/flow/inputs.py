@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import factorial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from nonsmooth.errors import shortened, unknown
 from nonsmooth.flow.engines.engine import Changes
 from nonsmooth.flow.saltation import Jump
 from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import float_array
+from nonsmooth.system.kinds import above, float_array
 
 if TYPE_CHECKING:
     from nonsmooth.flow.variational import VariationalFlow
@@ -34,6 +35,9 @@ class Input:
     between : {"linear", "steps", "smooth"}, optional
         The course between samples; ``"smooth"`` is a cubic spline (of ends "not a knot"), for inputs that are declared
         as ``(unit, "smooth")`` and by default taken for such. Others are linear by default.
+    noise : float, optional
+        Standard deviation of the values of a smooth input: the spline passes them by so much (``splrep`` of SciPy with
+        ``s`` the number of values), with as few pieces as do, where it passes through all of them otherwise.
     delay : float or str
         The input acts so much later than its samples say; the name of a parameter of the system, so that it can be
         found by a fit.
@@ -52,8 +56,11 @@ class Input:
     values: Any = None
     between: Literal["linear", "steps", "smooth"] | None = None
     delay: float | str = 0.0
+    noise: Annotated[float, above(0)] | None = None
 
     def __post_init__(self) -> None:
+        if self.noise is not None and self.between in ("linear", "steps"):
+            raise ValueError(f"noise = {self.noise} is that of a smooth input; this one is {self.between!r}")
         if isinstance(self.time, str) and self.values is None:
             return
         t, y = float_array(self.time, "the time of an input"), float_array(self.values, "the values of an input")
@@ -77,21 +84,32 @@ class Input:
 
     def course(self, delay: float, width: int) -> tuple[FloatArray, FloatArray]:
         """Instants of change (K,), and the value and its derivatives behind them (K, ``width``)."""
-        t, y = self.time + delay, self.values
+        t, pieces = self._pieces
         found = np.zeros((len(t), width))
-        found[:, 0] = y
-        if self.between == "smooth" and len(t) > 1:
-            from scipy.interpolate import CubicSpline
+        found[:, : pieces.shape[1]] = pieces
+        return t + delay, found
 
-            found[:-1] = CubicSpline(t, y).c[::-1].T * [1.0, 1.0, 2.0, 6.0]
-        elif self.between == "linear":
-            found[:-1, 1] = np.diff(y) / np.diff(t)
-        return t, found
+    @functools.cached_property
+    def _pieces(self) -> tuple[FloatArray, FloatArray]:
+        """Instants (K,), without a delay, and the value and those derivatives behind them that are not zero."""
+        t, y = self.time, self.values
+        if self.between == "steps" or len(t) == 1:
+            return t, y[:, None]
+        if self.between == "linear":
+            return t, np.stack([y, np.append(np.diff(y) / np.diff(t), 0.0)], axis=1)
+        from scipy.interpolate import CubicSpline, PPoly, splrep
+
+        spline = CubicSpline(t, y)
+        if self.noise is not None and len(t) > 3:
+            spline = PPoly.from_spline(splrep(t, y, np.full(len(t), 1 / self.noise), s=len(t)))
+        real = np.append(np.diff(spline.x) > 0, True)  # its ends stand there four times
+        found = [np.append(spline.c[-1 - i] * factorial(i), 0.0 if i else spline(t[-1])) for i in range(4)]
+        return spline.x[real], np.stack(found, axis=1)[real]
 
     def data(self) -> dict[str, Any]:
         """The input as data that a result can record."""
         about = {"samples": len(self.time), "first": float(self.time[0]), "last": float(self.time[-1])}
-        return {**about, "between": self.between, "delay": self.delay}
+        return {**about, "between": self.between, "delay": self.delay} | ({"noise": self.noise} if self.noise else {})
 
 
 class Driven:
@@ -259,8 +277,8 @@ def driven(system: System, given: Any) -> Driven | None:
             one = Input(*one)
         smooth = len(system._description.driven[name]) > 2
         if one.between is None:
-            one = replace(one, between="smooth" if smooth else "linear")
-        elif one.between == "smooth" and not smooth:
+            one = replace(one, between="smooth" if smooth or one.noise is not None else "linear")
+        if one.between == "smooth" and not smooth:
             raise ValueError(
                 f"inputs[{name!r}] is smooth between its samples, which {system.name!r} has to know: declare it with "
                 f"ns.System(..., inputs={{{name!r}: ({system.inputs[name]!r}, 'smooth')}})"

@@ -339,7 +339,7 @@ def _with_period(
     """Return the system with its period, and whether it depends on the time without one."""
     expressions = timed_expressions(traced)
     timed = any(traced.t in expression.free_symbols for expression in expressions.values())
-    found = forcing_period(tuple(expressions.values()), traced.t, set(symbols.p.values()))
+    found = forcing_period(tuple(expressions.values()), traced.t, values)
     if given is None:
         period = found
     elif callable(given):

@@ -111,7 +111,7 @@ class Assembler(ABC):
 
     def held_exactly(self, vector: Any, rates: list[tuple[Any, Any]], states: bool = False) -> Any:
         """A field or states with several rates and their values (:meth:`holding`), as far as one leads to the next."""
-        known: set[int] = set()
+        known = set(self.inputs)  # their motion is given
         before = -1
         while before < len(known):
             before = len(known)

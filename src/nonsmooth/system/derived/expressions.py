@@ -128,7 +128,7 @@ class Expressions(Assembler):
         return replace(part, direction={i: part.direction.get(i, 0) + share * other.direction.get(i, 0) for i in both})
 
     def shifted_back(self, states: Sequence[sp.Expr], expression: sp.Expr) -> list[sp.Expr]:
-        slopes = [sp.diff(expression, symbol) for symbol in self.u]
+        slopes = [0 if i in self.inputs else sp.diff(expression, symbol) for i, symbol in enumerate(self.u)]
         length = sp.Add(*[slope**2 for slope in slopes])
         return self.tidy([x - expression * s / length for x, s in zip(states, slopes, strict=True)])
 

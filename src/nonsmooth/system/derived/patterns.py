@@ -212,9 +212,8 @@ class Patterns:
         from nonsmooth.system.codegen.linear import linear_form
 
         symbols, fields = self.make.symbols, (tuple(self.make.base(self.mode)),)
-        known = set(symbols.p.values())
         if period is None:
-            period = forcing_period((*fields[0], *self.expressions), symbols.t, known)
+            period = forcing_period((*fields[0], *self.expressions), symbols.t, self.make.values)
         elif callable(period):
             period = call_scalar(period, (symbols.parameters(),), "`period`")
         self.equations = Traced(

@@ -40,20 +40,20 @@ def timed_expressions(traced: Traced) -> dict[str, sp.Expr]:
     return found
 
 
-def forcing_period(expressions: Sequence[sp.Expr], t: sp.Symbol, parameters: set[sp.Symbol]) -> sp.Expr | None:
-    """Return the common period in the parameters, or None where there is none to be read off.
+def forcing_period(expressions: Sequence[sp.Expr], t: sp.Symbol, values: Mapping[sp.Symbol, float]) -> sp.Expr | None:
+    """Return the common period in the parameters, positive at their values, or None where there is none to be read off.
 
     Parameters
     ----------
     expressions : sequence of Expr
         All that may depend on time.
     t : Symbol
-    parameters : set of Symbol
-        What a frequency may depend on.
+    values : mapping of Symbol to float
+        Those of the parameters, on which a frequency may depend.
     """
     frequencies: list[sp.Expr] = []
     for expression in expressions:
-        if not _collect(expression, t, parameters, frequencies):
+        if not _collect(expression, t, values, frequencies):
             return None
     if not frequencies:
         return None
@@ -75,19 +75,22 @@ def _simple(ratio: sp.Expr) -> sp.Expr:
     return sp.Rational(fraction.numerator, fraction.denominator) if close else ratio
 
 
-def _collect(e: sp.Expr, t: sp.Symbol, parameters: set[sp.Symbol], found: list[sp.Expr]) -> bool:
+def _collect(e: sp.Expr, t: sp.Symbol, values: Mapping[sp.Symbol, float], found: list[sp.Expr]) -> bool:
     """Add the frequencies in ``e`` to ``found``; False where t occurs in another way."""
     if t not in e.free_symbols:
         return True
     if isinstance(e, (sp.sin, sp.cos, sp.tan)):
         argument = sp.expand(e.args[0])
         slope = argument.diff(t)
-        if t not in slope.free_symbols and slope.free_symbols <= parameters:
-            size = -slope if slope.could_extract_minus_sign() else slope  # SymPy writes cos(w t - c) as cos(c - w t)
+        if slope.free_symbols <= values.keys():
+            # SymPy writes cos(w t - c) as cos(c - w t): what is negative of positive parameters is turned round. Of a
+            # difference their values say it.
+            sign = slope.subs({p: sp.Dummy(positive=True) for p in slope.free_symbols})
+            size = -slope if (slope.subs(values) if sign.is_positive is None else sign).is_negative else slope
             if size not in found:
                 found.append(size)
             return True
-    return bool(e.args) and all(_collect(part, t, parameters, found) for part in e.args)
+    return bool(e.args) and all(_collect(part, t, values, found) for part in e.args)
 
 
 def check_period(

@@ -256,7 +256,7 @@ class Place:
         return self.make.behind(expression, states)
 
     def back_on(self, states: Any) -> Any:
-        """States moved onto the surface of the contact, the shortest way."""
+        """States moved onto the surface of the contact, the shortest way; inputs stay."""
         expressions: Any = self.make  # where nothing is asked: rows always are
         return expressions.shifted_back(states, self.where)
 
