@@ -64,11 +64,11 @@ if TYPE_CHECKING:
     from nonsmooth.system.derived.maps import Branch as Branch
     from nonsmooth.system.derived.maps import Map as Map
     from nonsmooth.system.derived.mechanical import mechanical as mechanical
-    from nonsmooth.system.mode import Band as Band
-    from nonsmooth.system.mode import Mode as Mode
     from nonsmooth.system.origin import system_of as system_of
     from nonsmooth.system.symbolic.scalar import where as where
     from nonsmooth.system.system import System as System
+    from nonsmooth.system.transition import Band as Band
+    from nonsmooth.system.transition import Mode as Mode
     from nonsmooth.system.transition import Surface as Surface
     from nonsmooth.system.transition import Transition as Transition
     from nonsmooth.tables.region import region as region

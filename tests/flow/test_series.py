@@ -12,9 +12,8 @@ from nonsmooth.flow.engines.engine import State, TrajectoryLog
 from nonsmooth.flow.engines.series import SeriesEngine, order_for
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept, Section
-from nonsmooth.system.mode import Mode
 from nonsmooth.system.system import System
-from nonsmooth.system.transition import Transition
+from nonsmooth.system.transition import Mode, Transition
 
 TIGHT: dict[str, dict[str, Any]] = {"taylor": {"rtol": 1e-14}, "rkf45": {"rtol": 1e-13}}
 

@@ -8,9 +8,8 @@ import pytest
 
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.models import discontinuous_support
-from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.system import System
-from nonsmooth.system.transition import Surface, Transition
+from nonsmooth.system.transition import Band, Mode, Surface, Transition
 
 
 def free(t, u, p):

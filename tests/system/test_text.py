@@ -10,11 +10,10 @@ import sympy as sp
 
 from nonsmooth import models
 from nonsmooth.errors import SystemDefinitionError
-from nonsmooth.system.mode import Mode
 from nonsmooth.system.symbolic.expressions import read_expression, write_expression
 from nonsmooth.system.symbolic.scalar import where
 from nonsmooth.system.system import System
-from nonsmooth.system.transition import Surface, Transition
+from nonsmooth.system.transition import Mode, Surface, Transition
 
 
 def everything():

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.system.mode import Band
-from nonsmooth.system.transition import Transition
+from nonsmooth.system.transition import Band, Transition
 
 if TYPE_CHECKING:
     from nonsmooth.system.system import System

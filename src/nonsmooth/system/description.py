@@ -24,7 +24,6 @@ from nonsmooth.system.equations import (
 )
 from nonsmooth.system.inputs import input_states, read_inputs, with_inputs
 from nonsmooth.system.kinds import real_number
-from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.names import check_names
 from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.symbolic.domain import Domain, check_period, forcing_period, timed_expressions
@@ -32,7 +31,7 @@ from nonsmooth.system.symbolic.scalar import to_expression
 from nonsmooth.system.symbolic.traced import Traced
 from nonsmooth.system.symbolic.tracing import Symbols, call_scalar
 from nonsmooth.system.symmetry import Symmetry, trace_symmetry
-from nonsmooth.system.transition import Surface, Transition
+from nonsmooth.system.transition import Band, Mode, Surface, Transition
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.loads import Loads

@@ -9,12 +9,11 @@ from typing import Any
 import sympy as sp
 
 from nonsmooth.errors import SystemDefinitionError, shortened, unknown
-from nonsmooth.system.mode import Band
 from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.symbolic.scalar import Scalar, as_written, to_expression
 from nonsmooth.system.symbolic.traced import Traced, TracedCondition, TracedTransition
 from nonsmooth.system.symbolic.tracing import KnownFunction, Symbols, call_scalar, call_vector, refuse_corners
-from nonsmooth.system.transition import Surface, Transition, read_condition
+from nonsmooth.system.transition import Band, Surface, Transition, read_condition
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 from nonsmooth.errors import SystemDefinitionError, shortened
-from nonsmooth.system.mode import Mode
-from nonsmooth.system.transition import Surface, Transition
+from nonsmooth.system.transition import Mode, Surface, Transition
 
 RATES = ("", "_rate", "_rate2", "_rate3")
 TIMES = ("", "/s", "/s^2", "/s^3")

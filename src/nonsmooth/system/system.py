@@ -13,13 +13,12 @@ from nonsmooth.errors import Answering
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.description import Description, describe
 from nonsmooth.system.equations import TracedSurface
-from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.parameter import Parameter
 from nonsmooth.system.show import latex, page, table
 from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 from nonsmooth.system.symmetry import Symmetry
 from nonsmooth.system.text import read_system, write_system
-from nonsmooth.system.transition import Surface, Transition
+from nonsmooth.system.transition import Band, Mode, Surface, Transition
 from nonsmooth.system.variant import (
     SHARP,
     Derivatives,

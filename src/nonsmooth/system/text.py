@@ -17,12 +17,11 @@ from nonsmooth.errors import SystemDefinitionError, shortened
 from nonsmooth.system.description import Description
 from nonsmooth.system.equations import TracedSurface
 from nonsmooth.system.inputs import input_states
-from nonsmooth.system.mode import Band, Mode
 from nonsmooth.system.symbolic.expressions import read_expression, write_expression
 from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.traced import Traced, TracedCondition
 from nonsmooth.system.symbolic.tracing import KnownFunction, Symbols
-from nonsmooth.system.transition import Surface, Transition, condition_text
+from nonsmooth.system.transition import Band, Mode, Surface, Transition, condition_text
 from nonsmooth.system.variant import variant_of
 
 if TYPE_CHECKING:

@@ -19,11 +19,10 @@ from nonsmooth.system.derived.assembly import Pattern, VaryingError
 from nonsmooth.system.derived.decider import Decider
 from nonsmooth.system.derived.elements import Element
 from nonsmooth.system.derived.expressions import Expressions
-from nonsmooth.system.mode import Mode
 from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.traced import ALONE, ASKED, ASKS_BEHIND, OWN, TOGETHER
 from nonsmooth.system.symbolic.tracing import KnownFunction, Symbols, call_vector
-from nonsmooth.system.transition import Surface, Transition
+from nonsmooth.system.transition import Mode, Surface, Transition
 
 if TYPE_CHECKING:
     from nonsmooth.system.derived.patterns import Patterns

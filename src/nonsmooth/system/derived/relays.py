@@ -21,10 +21,9 @@ import sympy as sp
 
 from nonsmooth.system.derived.elements import Coulomb, Element, PreloadedSpring
 from nonsmooth.system.derived.elements.element import CREEP
-from nonsmooth.system.mode import Mode
 from nonsmooth.system.symbolic.scalar import Scalar
 from nonsmooth.system.symbolic.tracing import Symbols, call_scalar, call_vector
-from nonsmooth.system.transition import Surface
+from nonsmooth.system.transition import Mode, Surface
 
 Field = tuple[sp.Expr, ...]
 Signs = tuple[int, ...]
