@@ -17,7 +17,7 @@ import pytest
 from simple_work import Squares, hashes, right
 
 import nonsmooth as ns
-from nonsmooth.campaign import cluster
+from nonsmooth.campaign import run
 from nonsmooth.campaign.run import run
 from nonsmooth.campaign.store import describe_store
 
@@ -37,11 +37,11 @@ with Client({address!r}) as client:
 def test_without_dask_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ImportError, match="cluster"):
-        cluster.on_cluster(Squares(), [0], print, None, None)
+        run.on_cluster(Squares(), [0], print, None, None)
 
 
 class Crew:
-    """Three worker processes of a cluster, each put back when it is gone, as a batch system would."""
+    """Three worker processes of a run, each put back when it is gone, as a batch system would."""
 
     def __init__(self, address: str) -> None:
         self.command = [
@@ -112,8 +112,8 @@ def test_one_process_and_eight_workers_write_the_same_chart(tmp_path: Path) -> N
     with (
         distributed.LocalCluster(
             n_workers=8, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
-        ) as cluster,
-        distributed.Client(cluster) as client,
+        ) as run,
+        distributed.Client(run) as client,
     ):
         client.wait_for_workers(8, timeout=120)
         eight = ns.chart(system, grid, store=tmp_path / "eight.zarr", client=client, **QUIET)

@@ -70,7 +70,7 @@ def _connected(address: str | None) -> Any:
     """A client of the scheduler at an address, for a ``with`` block; None without an address."""
     if address is None:
         return nullcontext()
-    from nonsmooth.campaign.cluster import connect
+    from nonsmooth.campaign.run import connect
 
     try:
         return connect(address)
