@@ -17,8 +17,7 @@ import pytest
 from simple_work import Squares, hashes, right
 
 import nonsmooth as ns
-from nonsmooth.campaign import run
-from nonsmooth.campaign.run import run
+from nonsmooth.campaign.run import on_cluster, run
 from nonsmooth.campaign.store import describe_store
 
 QUIET = {"progress": False}
@@ -28,7 +27,7 @@ import sys
 sys.path.insert(0, {here!r})
 from distributed import Client
 from simple_work import Squares
-from nonsmooth.campaign.run import run
+from nonsmooth.campaign.run import on_cluster, run
 with Client({address!r}) as client:
     run(Squares(size={size}, step=7, seconds={seconds}), store={store!r}, client=client, progress=False)
 """
@@ -37,7 +36,7 @@ with Client({address!r}) as client:
 def test_without_dask_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ImportError, match="cluster"):
-        run.on_cluster(Squares(), [0], print, None, None)
+        on_cluster(Squares(), [0], print, None, None)
 
 
 class Crew:

@@ -12,17 +12,19 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.campaign.store import ChunkStore
 from nonsmooth.campaign.work import ChunkedWork, check_room, clock, empty_columns
 from nonsmooth.errors import not_installed, shortened
 from nonsmooth.flow.engines.engine import obey
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
+
+if TYPE_CHECKING:
+    from nonsmooth.campaign.store import ChunkStore
 
 
 def run(
@@ -196,6 +198,8 @@ def compute_chunk(work: ChunkedWork, chunk: int, path: str | None, key: str) -> 
     """Compute one chunk on a worker, into the store where there is one."""
     if path is None:
         return work.compute(chunk)
+    from nonsmooth.campaign.store import ChunkStore
+
     store = ChunkStore(Path(path), key)
     if store.has(chunk):  # computed meanwhile for a client that is gone
         return None
