@@ -1,6 +1,6 @@
 """Trajectories by the series methods on a GPU, one per thread: text of a generated module.
 
-This file stands behind the model's own functions and the series files of the CPU (``cuda.series_module``). ``advance``
+This file stands behind the model's own functions and the series files of the CPU (``cuda.module``). ``advance``
 runs ``march`` for every job until it has counted its section returns, or has made as many steps as a launch may; then
 it is launched again for those that are under way, and goes on where it stopped, so that the cut changes no number.
 
