@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
-from nonsmooth.plot.labels import name_and_unit, name_axes, name_plane, only_states, variable_along
+from nonsmooth.plot.labels import Name, name_and_unit, name_axes, name_plane, only_states, variable_along
 from nonsmooth.results.statuses import words_of_flags
+from nonsmooth.system.kinds import above
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,10 +45,10 @@ def branch(
     ax: Axes,
     result: xr.Dataset,
     *,
-    y: str | None = None,
-    quantity: str = "section",
+    y: Name | None = None,
+    quantity: Literal["section", "maximum", "minimum", "amplitude"] = "section",
     special: bool = True,
-    color: str | None = None,
+    color: Any = None,
 ) -> None:
     """Draw a branch over its parameter: stable parts solid, unstable ones dashed, virtual ones dotted.
 
@@ -77,7 +78,7 @@ def draw_branch(
     ax: Axes,
     result: xr.Dataset,
     *,
-    y: str | None = None,
+    y: Name | None = None,
     quantity: str = "section",
     special: bool = True,
     color: str | None = None,
@@ -91,8 +92,6 @@ def draw_branch(
     from nonsmooth.results.branches import with_marks_in_place
 
     variable_along(result, "stable", "continue_orbit")
-    if quantity not in _WORDS:
-        raise ValueError(f"quantity = {quantity!r}; allowed: {', '.join(map(repr, _WORDS))}")
     (name,) = only_states(result, y)
     result = with_marks_in_place(result)
     values = result[result.attrs["parameter"]].values
@@ -193,7 +192,7 @@ POINTS = {
 
 
 @figure("continue_curve", "kind", "special_point")
-def curve(ax: Axes, result: xr.Dataset, *, special: bool = True, color: str | None = None) -> None:
+def curve(ax: Axes, result: xr.Dataset, *, special: bool = True, color: Any = None) -> None:
     """Draw a curve of special points over its two parameters; call it again on the same axes for another curve.
 
     Parameters
@@ -228,7 +227,7 @@ def curve(ax: Axes, result: xr.Dataset, *, special: bool = True, color: str | No
 
 
 @figure(ratio=0.9)
-def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: float | None = None) -> None:
+def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: Annotated[float, above(0)] | None = None) -> None:
     """Draw the Floquet multipliers of an orbit, or those along a branch coloured by its parameter.
 
     Parameters
@@ -241,6 +240,8 @@ def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: float | None = Non
         Half width of the picture; by default what holds the unit circle and the multipliers, but no more than 4: near
         a rigid graze one multiplier goes to infinity. Those outside are counted in the title.
     """
+    from matplotlib.patches import Circle
+
     data = result.to_dataset() if hasattr(result, "to_dataset") and not hasattr(result, "data_vars") else result
     variable_along(data, "floquet_multipliers", "find_orbit or continue_orbit")
     values = data["floquet_multipliers"]
@@ -250,10 +251,10 @@ def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: float | None = Non
     parts = np.abs([x, y])
     half = min(1.12 * max(1.0, parts[:, np.isfinite(mu)].max(initial=0.0)), 4.0) if limit is None else float(limit)
     outside = int((~(parts <= half)).any(axis=(0, 2)).sum())
-    angle, muted = np.linspace(0, 2 * np.pi, 361), style.COLORS["muted"]
-    ax.plot(np.cos(angle), np.sin(angle), color=muted, linewidth=0.6, zorder=1)
-    for line in (ax.axhline, ax.axvline):
-        line(0.0, color=muted, linewidth=0.3, zorder=0)
+    muted = style.COLORS["muted"]
+    ax.add_patch(Circle((0.0, 0.0), 1.0, fill=False, color=muted, linewidth=0.6, zorder=1))
+    for line in (ax.axhspan, ax.axvspan):
+        line(0.0, 0.0, color=muted, linewidth=0.3, zorder=0)
     if along:
         name = str(data.attrs["parameter"])
         shade = np.broadcast_to(data[name].values[:, None], mu.shape)
@@ -267,9 +268,7 @@ def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: float | None = Non
 
 
 @figure("manifolds", "arc_length", ratio=0.85)
-def manifolds(
-    ax: Axes, result: xr.Dataset, *, x: str | None = None, y: str | None = None, linewidth: float = 0.6
-) -> None:
+def manifolds(ax: Axes, result: xr.Dataset, *, x: Name | None = None, y: Name | None = None) -> None:
     """Draw the manifolds of a saddle in the plane of two states, with the saddle's own section points.
 
     Parameters
@@ -280,8 +279,6 @@ def manifolds(
         Where to draw; a new one-column figure if None.
     x, y
         The states of the two axes; by default the first two.
-    linewidth
-        In typographic points.
     """
     names = only_states(result, x, y)
     kinds = words_of_flags(result["manifold"])
@@ -300,7 +297,7 @@ def manifolds(
         )
         kind = kinds[int(code)]
         color, above = ("second", 3) if kind == "unstable" else ("first", 2)
-        looks: dict[str, Any] = {"color": style.COLORS[color], "zorder": above, "linewidth": linewidth}
+        looks: dict[str, Any] = {"color": style.COLORS[color], "zorder": above, "linewidth": 0.6}
         ax.plot(xs, ys, label=style.once(ax, f"{kind} manifold"), **looks)
     style.mark(ax, saddle, "o", "saddle", zorder=5)
     name_plane(ax, result, *names)
@@ -321,7 +318,13 @@ _EFFORTS = (
 
 
 @figure("control_based_continuation", "control_effort")
-def controlled_branch(ax: Axes, result: xr.Dataset, *, y: str = "amplitude", theory: xr.Dataset | None = None) -> None:
+def controlled_branch(
+    ax: Axes,
+    result: xr.Dataset,
+    *,
+    y: Literal["amplitude", "control_effort"] = "amplitude",
+    theory: xr.Dataset | None = None,
+) -> None:
     """Draw the result of ``control_based_continuation``.
 
     Parameters
@@ -341,11 +344,13 @@ def controlled_branch(ax: Axes, result: xr.Dataset, *, y: str = "amplitude", the
     ValueError, TypeError
         A result of another verb, another quantity, a branch in another parameter.
     """
-    if y not in ("amplitude", "control_effort"):
-        raise ValueError(f"y = {y!r}; allowed: 'amplitude', 'control_effort'")
     parameter, state = str(result.attrs["parameter"]), str(result["state"].values[0])
-    if theory is not None and theory.attrs.get("parameter") != parameter:
-        raise ValueError(f"the branch is in {theory.attrs.get('parameter')!r}, the result in {parameter!r}")
+    if theory is not None:
+        variable_along(theory, "stable", "continue_orbit")
+        if theory.attrs["parameter"] != parameter:
+            raise ValueError(f"the branch is in {theory.attrs['parameter']!r}, the result in {parameter!r}")
+        if y == "control_effort":
+            raise ValueError(f"theory = a branch in {parameter!r} is drawn beside y='amplitude' alone; leave it out")
     if y == "control_effort":
         for name, mark, color, words in _EFFORTS:
             ax.semilogy(result[name].values, mark, color=style.COLORS[color], markersize=3.5, label=words)

@@ -10,6 +10,7 @@ import numpy as np
 from nonsmooth.plot import style
 from nonsmooth.plot.parts import GROUND, Link, Scheme
 from nonsmooth.plot.pen import GREY, PALE, Part, Pen, put
+from nonsmooth.system.arguments import checked
 from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ _ORDER = ("spring", "preload", "damper", "backlash", "friction", "stop", "elasti
 _FORCE = style.COLORS["first"]
 
 
+@checked
 def mechanism(system: System, ax: Axes | None = None, *, labels: bool = True) -> Axes:
     """Draw a mechanical system as masses on a line with what joins them.
 
@@ -62,9 +64,6 @@ def mechanism(system: System, ax: Axes | None = None, *, labels: bool = True) ->
     """
     from nonsmooth.plot.scheme import scheme_of
 
-    if not hasattr(system, "modes"):
-        made = ", which ns.system_of(result) gives" if hasattr(system, "data_vars") else ""
-        raise TypeError(f"mechanism draws a system{made}; not {type(system).__name__}")
     sketch = Sketch(scheme_of(system))
     with style.axes(ax, width=min(0.56 * sketch.width, style.PAGE), ratio=sketch.height / sketch.width) as drawn:
         sketch.frame(drawn)

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
-from nonsmooth.plot.labels import name_axes, symbol_of
+from nonsmooth.plot.labels import Name, name_axes, symbol_of
+from nonsmooth.system.kinds import Range
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,10 +34,10 @@ def regions(
     ax: Axes,
     system: System,
     *,
-    xlim: tuple[float, float],
-    ylim: tuple[float, float],
-    x: str | None = None,
-    y: str | None = None,
+    xlim: Range,
+    ylim: Range,
+    x: Name | None = None,
+    y: Name | None = None,
     t: float = 0.0,
 ) -> None:
     """Draw the regions of a system's first mode (G-), of the mode it changes to (G+), and the borders between them.

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from textwrap import fill as in_lines
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.plot import style
+from nonsmooth.plot import palette, style
 from nonsmooth.plot.branches import draw_branch
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import (
+    Name,
     column,
     first_states,
     name_and_unit,
@@ -20,6 +21,7 @@ from nonsmooth.plot.labels import (
     only_states,
 )
 from nonsmooth.plot.planes import edges_of, held
+from nonsmooth.system.kinds import above, at_least
 from nonsmooth.tables.quantities import quantities_of
 from nonsmooth.tables.quantities import quantity as quantity_of
 
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-_LINES = ("section", "third", "fourth")
+_LINES = tuple(style.COLORS[name] for name in ("section", "third", "fourth"))
 _COLORS = {"up": "first", "down": "second", "none": "section"}
 _LONGEST = 30  # characters of a line of a condition in a legend
 _SEAM = 2.0  # a rising point over a falling one, which lies on it: both show
@@ -38,9 +40,9 @@ def bifurcation(
     ax: Axes,
     result: xr.Dataset,
     *over: xr.Dataset,
-    y: str | None = None,
-    size: float = 0.8,
-    color: str | None = None,
+    y: Name | None = None,
+    size: Annotated[float, above(0)] = 0.8,
+    color: Any = None,
 ) -> None:
     """Draw the section points of a ``sweep`` over its parameter, up and down in two colours, and branches over them.
 
@@ -87,7 +89,7 @@ def bifurcation(
         words = direction if len(directions) > 1 else None
         style.cloud(ax, (values, cloud), size * (_SEAM if under else 1.0), shade, words)
     for k, one in enumerate(over):
-        draw_branch(ax, one, y=name, color=style.COLORS[_LINES[k % len(_LINES)]], behind=True)
+        draw_branch(ax, one, y=name, color=palette.nth(k, _LINES), behind=True)
     _whole(ax, result[parameter].values)
     _name(ax, result, parameter, name, points)
     if len(directions) > 1 or over:
@@ -117,7 +119,7 @@ def _share_an_axis(over: tuple[xr.Dataset, ...], parameter: str) -> None:
 
 @figure("bifurcation_diagram", "swept_section")
 def bifurcation_diagram(
-    ax: Axes, result: xr.Dataset, *, y: str | None = None, special: bool = True, size: float = 0.8
+    ax: Axes, result: xr.Dataset, *, y: Name | None = None, special: bool = True, size: Annotated[float, above(0)] = 0.8
 ) -> None:
     """Draw all section points of every branch, stable parts solid and unstable ones dashed, over those of the sweeps.
 
@@ -168,10 +170,10 @@ def frequency_response(
     ax: Axes,
     result: xr.Dataset,
     *over: xr.Dataset,
-    y: str | None = None,
-    quantity: str = "amplitude",
+    y: Name | None = None,
+    quantity: Literal["amplitude", "maximum", "minimum"] = "amplitude",
     jumps: bool = True,
-    digits: int = 4,
+    digits: Annotated[int, at_least(1, 17)] = 4,
     region: str | xr.DataArray | None = None,
 ) -> None:
     """Draw a ``frequency_response`` result.
@@ -197,8 +199,6 @@ def frequency_response(
         A condition, or what :func:`nonsmooth.region` gave: the values of the parameter at which it holds, in every
         direction and from every start, are shaded.
     """
-    if quantity not in ("amplitude", "maximum", "minimum"):
-        raise ValueError(f"quantity is {quantity!r}; allowed: 'amplitude', 'maximum', 'minimum'")
     (name,) = first_states(result, y)
     parameter = str(result["status"].dims[0])
     values = result[parameter].values
@@ -295,7 +295,7 @@ def _mark(
 
 
 @figure("sweep(..., density=True)", "density")
-def density(ax: Axes, result: xr.Dataset, *, y: str | None = None, cmap: str = "magma_r") -> None:
+def density(ax: Axes, result: xr.Dataset, *, y: Name | None = None, cmap: str = "magma_r") -> None:
     """Draw the histograms of a ``sweep(..., density=True)`` over its parameter, in a logarithmic scale of colour.
 
     Parameters
@@ -347,7 +347,9 @@ _LOST = 0.04  # height of the mark where there is no such orbit, in the axes
 
 
 @figure("smoothing_report", "state_difference")
-def smoothing_report(ax: Axes, result: xr.Dataset, *, y: str = "state") -> None:
+def smoothing_report(
+    ax: Axes, result: xr.Dataset, *, y: Literal["state", "multiplier", "exponent", "period"] = "state"
+) -> None:
     """Draw the result of ``smoothing_report``: one line for each band, with its order at the smallest widths.
 
     Parameters
@@ -366,8 +368,6 @@ def smoothing_report(ax: Axes, result: xr.Dataset, *, y: str = "state") -> None:
     ValueError
         A result of another verb, or another quantity.
     """
-    if y not in _QUANTITIES:
-        raise ValueError(f"y = {y!r} is one of {', '.join(_QUANTITIES)}")
     eta = result["eta"].values
     lost: set[float] = set()
     for band in result["band"].values:

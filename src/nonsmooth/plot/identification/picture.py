@@ -143,7 +143,7 @@ class Picture:
     def line(self, x: Any, y: Any, label: str = "", color: str = "first", line: str = "-", **looks: Any) -> None:
         """A curve; its words stand in the legend once."""
         words = style.once(self.ax, label) if label else None
-        self.ax.plot(x, y, line, color=style.COLORS[color], label=words, **looks)
+        self.ax.plot(x, y, line, color=style.COLORS.get(color, color), label=words, **looks)
 
     def span(self, low: float, high: float, label: str, **looks: Any) -> None:
         """An interval of the abscissa; nothing where it is not known."""
