@@ -1,4 +1,4 @@
-"""What figures are given is drawn, or refused in a sentence that says what is allowed."""
+"""Arguments of figures: each is drawn, or refused in a sentence that says what is allowed."""
 
 from __future__ import annotations
 
