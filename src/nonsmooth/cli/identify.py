@@ -9,7 +9,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from nonsmooth.cli.files import LENGTH, NAMES, QUANTITIES, TEXT, keep, read_tables, with_folder, without_screen
+from nonsmooth.cli.files import (
+    LENGTH,
+    NAMES,
+    QUANTITIES,
+    TEXT,
+    keep,
+    put_text,
+    read_tables,
+    with_folder,
+    without_screen,
+)
 from nonsmooth.errors import check_keys, unknown
 
 _TABLES = {
@@ -136,8 +146,7 @@ def _write(found: Any, study: _Study, data: Path | None) -> list[Path]:
     if study.table is not None:
         from nonsmooth.identification.report import report
 
-        with_folder(study.table).write_text(report(found), encoding="utf-8")
-        written.append(study.table)
+        written.append(put_text(study.table, report(found)))
     if study.figures is not None:
         plot = without_screen()
         from matplotlib import pyplot as plt

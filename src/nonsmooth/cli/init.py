@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from nonsmooth.cli.files import with_folder
+from nonsmooth.cli.files import put_text
 from nonsmooth.cli.verb_options import VERBS, Option, options_of
 
 _WIDTH = 100
@@ -43,7 +43,7 @@ def _run(options: argparse.Namespace) -> int:
     if out.exists():
         raise ValueError(f"{out}: is there already and was left alone; give another name with --out")
     model = name if not colon else f"{Path(os.path.relpath(file, out.parent or Path())).as_posix()}:{name}"
-    with_folder(out).write_text(study_text(system, model, options.verb, out.stem), encoding="utf-8")
+    put_text(out, study_text(system, model, options.verb, out.stem))
     print(f"written to {out}; run it with: nonsmooth run {out}")
     return 0
 

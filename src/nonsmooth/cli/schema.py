@@ -12,7 +12,7 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from nonsmooth.cli.files import with_folder
+from nonsmooth.cli.files import put_text
 from nonsmooth.cli.verb_options import VERBS, Option, options_of
 
 _TYPES: dict[str, dict[str, Any]] = {
@@ -59,7 +59,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.out is None:
         print(text)
     else:
-        with_folder(options.out).write_text(text + "\n", encoding="utf-8")
+        put_text(options.out, text + "\n")
         print(f"written to {options.out}; in a study file beside it the first line is  #:schema ./{options.out.name}")
     return 0
 

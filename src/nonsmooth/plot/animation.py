@@ -8,21 +8,22 @@ import os
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
+from subprocess import CalledProcessError
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from nonsmooth.errors import Answering
+from nonsmooth.errors import Answering, DataFileError
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import column, first_states, name_plane, variable_along
 from nonsmooth.plot.mechanism import sketch_of_run
 from nonsmooth.plot.pen import put
 from nonsmooth.plot.trajectories import with_gaps
+from nonsmooth.results.whole import REMEDY, placed
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import above, at_least
 from nonsmooth.system.origin import system_of
 from nonsmooth.tables.sampled import sampled
-from nonsmooth.tables.table import placed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -242,7 +243,12 @@ class Animation(Answering):
             settings = {"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()}
         with mpl.rc_context(settings):
             film = FuncAnimation(self.figure, self.draw, frames=len(self), repeat=False)
-            film.save(target, writer=FFMpegWriter(fps=self.rate, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]))
+            writer = FFMpegWriter(fps=self.rate, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"])
+            try:
+                film.save(target, writer=writer)
+            except CalledProcessError as error:
+                why = " ".join(str(error.stderr or "").splitlines()[-1:])
+                raise DataFileError(f"{target.name}: ffmpeg has written no film ({why}); {REMEDY}") from error
 
     def _repr_html_(self) -> str:
         """The pictures with a player of its own; nothing is loaded from elsewhere."""

@@ -333,7 +333,7 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
     so equal input gives equal files. The path is returned, with the ending ``.png`` where it has none. A file that
     cannot be written is a DataFileError, and what stood there before stays.
     """
-    from nonsmooth.tables.table import placed
+    from nonsmooth.results.whole import placed
 
     owner: Any = getattr(figure, "figure", figure)
     if not hasattr(owner, "savefig"):

@@ -153,7 +153,8 @@ class _Door:
         """The reader of each argument; made in the first call."""
         found = {name: reader_of(kind) for name, kind in self.kinds.items()}
         if "system" in found:
-            found["system"] = lambda value, _: check_system(value, self.verb, not {"inputs", "ax"}.isdisjoint(self.items))
+            driven = "inputs" in self.items or "ax" in self.items  # figures draw them too
+            found["system"] = lambda value, _: check_system(value, self.verb, driven)
         return found
 
     def misfit(self, given: tuple[Any, ...], named: Mapping[str, Any], error: str) -> str:
