@@ -174,7 +174,9 @@ def responded(labels: Labels) -> xr.Dataset:
         starts=np.zeros((1, 2)),
         squeeze=("start",),
     )
-    return schema.response(base, amplitude=x, jumps={"value": [JUMP_UP, JUMP_DOWN], "direction": ["up", "down"]})
+    return schema.response(
+        base, amplitude=x, jumps={"value": [JUMP_UP, JUMP_DOWN], "direction": ["up", "down"], "variable": ["x"] * 2}
+    )
 
 
 @pytest.fixture

@@ -66,7 +66,7 @@ def test_the_bands_are_those_of_the_paper(support: System) -> None:
 
 
 def test_what_cannot_be_drawn_is_explained(support: System) -> None:
-    with pytest.raises(ValueError, match="'w' is not a state of 'discontinuous support'"):
+    with pytest.raises(ValueError, match="'w' is not a state; states:"):
         plot.regions(support, y="w", **WINDOW)
 
 

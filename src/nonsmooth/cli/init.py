@@ -16,7 +16,7 @@ from nonsmooth.cli.verb_options import VERBS, Option, options_of
 _WIDTH = 100
 
 
-def add(commands: Any) -> None:
+def add(commands: Any) -> Any:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "init",
@@ -31,10 +31,10 @@ def add(commands: Any) -> None:
     parser.add_argument("model", metavar="MODEL", help='a name of `nonsmooth models`, or "file.py:object"')
     parser.add_argument("--verb", choices=VERBS, default="simulate", help="what to compute (default: simulate)")
     parser.add_argument("--out", type=Path, metavar="STUDY.toml", help="the file (default: MODEL_VERB.toml)")
-    parser.set_defaults(run=_run)
+    return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     from nonsmooth.cli.study import load_model
 
     system = load_model(options.model, Path())

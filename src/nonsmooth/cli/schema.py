@@ -40,7 +40,7 @@ _STATE_BY_NAME = {"type": "object", "additionalProperties": {"type": "number"}}
 _STATE = {"anyOf": [_NUMBERS, _STATE_BY_NAME]}
 
 
-def add(commands: Any) -> None:
+def add(commands: Any) -> Any:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "schema",
@@ -51,10 +51,10 @@ def add(commands: Any) -> None:
         epilog="examples:\n  nonsmooth schema --out study.schema.json",
     )
     parser.add_argument("--out", type=Path, metavar="FILE", help="where to write it (else it is printed)")
-    parser.set_defaults(run=_run)
+    return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     text = json.dumps(study_schema(), indent=2, ensure_ascii=False)
     if options.out is None:
         print(text)

@@ -136,6 +136,13 @@ class Panel:
                 one.update(start=ends[0], end=ends[1], reset_start=ends[0], reset_end=ends[1])
 
 
+def cells_of(x: Any, y: Any) -> dict[str, list[float]]:
+    """Place and size of an image whose cells are about these values."""
+    steps = [(one[-1] - one[0]) / max(len(one) - 1, 1) or 1.0 for one in (x, y)]
+    places = {name: [one[0] - step / 2] for name, one, step in zip("xy", (x, y), steps, strict=True)}
+    return places | {f"d{name}": [step * len(one)] for name, one, step in zip("wh", (x, y), steps, strict=True)}
+
+
 def extent(values: Any, margin: float = 0.06) -> tuple[float, float]:
     """Ends of an axis that shows all values."""
     finite = np.asarray(values, dtype=float)

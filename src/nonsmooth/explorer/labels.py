@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from sympy.printing.pretty.pretty_symbology import greek_unicode, sub
 
-from nonsmooth.plot.prefixes import PREFIXES, power_for
+from nonsmooth.plot.labels import with_unit
+from nonsmooth.plot.prefixes import PREFIXES, power_for, prefixed
 from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
@@ -50,12 +51,10 @@ def power_of(unit: str, *values: float) -> int:
 
 def axis_label(latex: str, unit: str, power: int = 0) -> str:
     """``ρ (N)``; the symbol alone of what has no unit."""
-    text = plain_of(latex)
-    return text if unit in ("", "1") else f"{text} ({PREFIXES[power]}{unit})"
+    return with_unit(plain_of(latex), PREFIXES[power] + unit)
 
 
 def number(value: float, unit: str = "", digits: int = 4) -> str:
     """A value with its unit, in the prefix that suits it: ``−4.5 mm``."""
-    power = power_of(unit, value)
-    text = f"{value / 10.0**power:.{digits}g}".replace("-", "\N{MINUS SIGN}")
-    return text if unit in ("", "1") else f"{text} {PREFIXES[power]}{unit}"
+    text, unit = prefixed(value, unit, digits)
+    return text if unit in ("", "1") else f"{text} {unit}"

@@ -12,6 +12,7 @@ from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import Name, name_and_unit, name_axes, name_plane, only_states, variable_along
 from nonsmooth.results.statuses import words_of_flags
 from nonsmooth.system.kinds import above
+from nonsmooth.tables.quantities import dataset_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -68,8 +69,7 @@ def branch(
     color
         Colour of the lines.
     """
-    draw_branch(ax, result, y=y, quantity=quantity, special=special, color=color)
-    (name,) = only_states(result, y)
+    name = draw_branch(ax, result, y=y, quantity=quantity, special=special, color=color)
     name_plane(ax, result, result.attrs["parameter"], name, _WORDS[quantity])
     style.clear_legend(ax)
 
@@ -84,8 +84,9 @@ def draw_branch(
     color: str | None = None,
     width: float = 0.9,
     behind: bool = False,
-) -> None:
-    """Draw the lines (``width`` in typographic points) and marks of a branch on axes that the caller labels.
+) -> str:
+    """Draw the lines (``width`` in typographic points) and marks of a branch on axes that the caller labels; return the
+    state.
 
     ``behind``: over points of a sweep, which lie on the stable parts: those become a pale, wide seam under them.
     """
@@ -106,6 +107,14 @@ def draw_branch(
             ax.plot(with_breaks(values, at), with_breaks(row, at), line, color=shade, label=label, **looks)
     if special and result.sizes.get("special", 0):
         _mark_special(ax, result, values, ordinates, MARKS)
+    return name
+
+
+def check_axis(branch: xr.Dataset, parameter: str) -> None:
+    """Check that a branch is over the parameter of what it is drawn over."""
+    variable_along(branch, "stable", "continue_orbit")
+    if (of := branch.attrs["parameter"]) != parameter:
+        raise ValueError(f"the result is over {parameter!r}, this branch over {of!r}: they share no axis")
 
 
 def ordinates_of(result: xr.Dataset, name: str, quantity: str) -> NDArray[np.float64]:
@@ -242,7 +251,7 @@ def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: Annotated[float, a
     """
     from matplotlib.patches import Circle
 
-    data = result.to_dataset() if hasattr(result, "to_dataset") and not hasattr(result, "data_vars") else result
+    data = dataset_of(result)
     variable_along(data, "floquet_multipliers", "find_orbit or continue_orbit")
     values = data["floquet_multipliers"]
     along = "point" in values.dims
@@ -297,8 +306,9 @@ def manifolds(ax: Axes, result: xr.Dataset, *, x: Name | None = None, y: Name | 
         )
         kind = kinds[int(code)]
         color, above = ("second", 3) if kind == "unstable" else ("first", 2)
-        looks: dict[str, Any] = {"color": style.COLORS[color], "zorder": above, "linewidth": 0.6}
-        ax.plot(xs, ys, label=style.once(ax, f"{kind} manifold"), **looks)
+        ax.plot(
+            xs, ys, label=style.once(ax, f"{kind} manifold"), color=style.COLORS[color], zorder=above, linewidth=0.6
+        )
     style.mark(ax, saddle, "o", "saddle", zorder=5)
     name_plane(ax, result, *names)
     style.clear_legend(ax)
@@ -346,9 +356,7 @@ def controlled_branch(
     """
     parameter, state = str(result.attrs["parameter"]), str(result["state"].values[0])
     if theory is not None:
-        variable_along(theory, "stable", "continue_orbit")
-        if theory.attrs["parameter"] != parameter:
-            raise ValueError(f"the branch is in {theory.attrs['parameter']!r}, the result in {parameter!r}")
+        check_axis(theory, parameter)
         if y == "control_effort":
             raise ValueError(f"theory = a branch in {parameter!r} is drawn beside y='amplitude' alone; leave it out")
     if y == "control_effort":

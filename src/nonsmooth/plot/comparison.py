@@ -28,12 +28,12 @@ def measured_label(result: xr.Dataset | Any) -> str:
     return "virtual rig (synthetic)" if str(attrs.get("synthetic", "no")) in ("yes", "True", "1") else "measured"
 
 
-def check_kind(result: xr.Dataset, *kinds: str) -> None:
-    """ValueError where ``result`` is no comparison of one of these kinds."""
+def check_kind(result: xr.Dataset, wanted: str) -> None:
+    """ValueError where ``result`` is no comparison of this kind."""
     kind = getattr(result, "attrs", {}).get("comparison", "")
-    if kind not in kinds:
+    if kind != wanted:
         what = f"a comparison of a {kind}" if kind else "no result of compare"
-        raise ValueError(f"this picture needs a comparison of a {' or '.join(kinds)}; this is {what}")
+        raise ValueError(f"this picture needs a comparison of a {wanted}; this is {what}")
 
 
 def shade_reach(ax: Axes, result: xr.Dataset, x: Any, **looks: Any) -> None:
@@ -294,8 +294,7 @@ def comparison_response(ax: Axes, result: xr.Dataset, *, digits: Annotated[int, 
         ax.plot(values, result["theory_amplitude"].values[:, i], line, color=color, label=f"theory, {name}")
         keys = (f"measured_{parameter}", "measured_amplitude", "measured_amplitude_error")
         at, heights, error = (result[key].values[runs == direction] for key in keys)
-        looks: dict[str, Any] = {"color": color, "face": "white", "mark": marker, "label": f"{word}, {name}"}
-        style.points(ax, at, heights, yerr=error, **looks)
+        style.points(ax, at, heights, yerr=error, color=color, face="white", mark=marker, label=f"{word}, {name}")
     written = _jumps(ax, result, digits)
     ax.set_ylim(bottom=0)
     ax.margins(x=0.02)

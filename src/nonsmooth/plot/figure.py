@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
-from nonsmooth.errors import shortened
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import variable_along
 from nonsmooth.system.arguments import checked
@@ -67,8 +66,6 @@ def figure(verb: str = "", *variables: str, **size: float) -> Callable[[Callable
 
         @wraps(draw)
         def drawn(*given: Any, **options: Any) -> Axes:
-            lines = {key: options[key] for key in _LINE if options.get(key) is not None}
-            _check_lines(lines)
             look = {key: options.pop(key) for key in Look.__annotations__ if key in options and key not in known}
             if many:
                 for one in given[1:]:
@@ -82,7 +79,7 @@ def figure(verb: str = "", *variables: str, **size: float) -> Callable[[Callable
             there = {*getattr(ax, "lines", ()), *getattr(ax, "collections", ())}
             with style.axes(ax, **size) as paper:
                 draw(paper, *bound.args, **bound.kwargs)
-                _finish(paper, there, {key: value for key, value in lines.items() if key in look}, draw.__name__)
+                _finish(paper, there, {key: look[key] for key in _LINE if look.get(key) is not None}, draw.__name__)
                 _name(paper, look)
             return paper
 
@@ -91,17 +88,6 @@ def figure(verb: str = "", *variables: str, **size: float) -> Callable[[Callable
         return checked(drawn)
 
     return made
-
-
-def _check_lines(looks: Mapping[str, Any]) -> None:
-    """Check properties of lines by Matplotlib's own rules, before anything is drawn."""
-    from matplotlib.lines import Line2D
-
-    for key, value in looks.items():
-        try:
-            Line2D([], [], **{key: value})
-        except (TypeError, ValueError) as error:
-            raise type(error)(f"{key} = {shortened(value)}: {error}; a property of Matplotlib's lines") from None
 
 
 def _finish(ax: Axes, there: set[Any], looks: Mapping[str, Any], name: str) -> None:

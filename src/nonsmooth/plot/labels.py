@@ -112,7 +112,7 @@ def one_of(array: Any, dim: str, at: int, name: str) -> Any:
     return array.isel({dim: at}) if dim in array.dims else array
 
 
-def first_states(result: xr.Dataset, *names: str | None) -> list[str]:
+def first_states(result: Any, *names: str | None) -> list[str]:
     """The names given, and for those left None the states in their order.
 
     Raises
@@ -120,23 +120,27 @@ def first_states(result: xr.Dataset, *names: str | None) -> list[str]:
     ValueError
         If the system has fewer states than needed.
     """
-    states = [str(name) for name in result["state"].values]
+    states = _states(result)
     if len(states) < len(names):
         raise ValueError(f"this plot needs {len(names)} states; the system has {states}")
     return [name if name is not None else states[i] for i, name in enumerate(names)]
 
 
-def only_states(result: xr.Dataset, *names: str | None) -> list[str]:
-    """The same for a result that holds nothing but states.
+def only_states(result: Any, *names: str | None) -> list[str]:
+    """The same for a result that holds nothing but states, or for a system.
 
     Raises
     ------
     ValueError
         If the system has fewer states than needed, or none of that name.
     """
-    states = [str(name) for name in result["state"].values]
-    found = first_states(result, *names)
+    found, states = first_states(result, *names), _states(result)
     for name in found:
         if name not in states:
-            raise ValueError(f"{name!r} is not a state of this result; states: {states}")
+            raise ValueError(f"{name!r} is not a state; states: {states}")
     return found
+
+
+def _states(result: Any) -> list[str]:
+    """The states of a result, or of a system."""
+    return [str(name) for name in (result["state"].values if hasattr(result, "data_vars") else result.states)]

@@ -80,7 +80,7 @@ def sketch_of_run(system: System, run: xr.Dataset) -> tuple[Sketch, Callable[[in
         sketch = Sketch(scheme_of(system), moving=True)
     except ValueError:
         return None
-    q = np.stack([run["u"].sel(state=name).values for name in sketch.scheme.coordinates], axis=1)
+    q = np.stack([run["u"].sel(state=name).values for name, _ in sketch.scheme.pairs], axis=1)
     scale, q, time = sketch.scale_for(q), np.nan_to_num(q), run["time"].values
     return sketch, lambda k: sketch.parts(scale * q[k], scale, float(time[k]))
 
@@ -206,7 +206,7 @@ class Sketch:
         if not self.moving:
             pen.path(top, middle, 0.06, middle, 0.26, color=GREY)
             pen.arrow(middle, middle + 0.38, top + 0.16, color=GREY)
-            pen.text(middle + 0.43, top + 0.16, latex_name(self.scheme.coordinates[i]), ha="left")
+            pen.text(middle + 0.43, top + 0.16, latex_name(self.scheme.pairs[i][0]), ha="left")
             if force := self.scheme.forces.get(i):
                 pen.arrow(middle - 0.2, middle + 0.34, top + 0.46, color=_FORCE, heavy=True)
                 pen.text(middle + 0.42, top + 0.46, force, ha="left", color=_FORCE)

@@ -193,8 +193,7 @@ def line(ax: Axes, x: Any, y: Any, *form: str, **looks: Any) -> None:
 
 def cloud(ax: Axes, points: Iterable[Any], size: float, color: str, label: str | None = None) -> None:
     """Draw many points (x, y) as dots without edges; they are pixels in a vector figure."""
-    looks: dict[str, Any] = {"markersize": size, "markeredgewidth": 0, "rasterized": True}
-    ax.plot(*map(np.ravel, points), ".", color=color, label=label, **looks)
+    ax.plot(*map(np.ravel, points), ".", color=color, label=label, markersize=size, markeredgewidth=0, rasterized=True)
 
 
 def mark(ax: Axes, points: Iterable[Any], marker: str, words: str, size: float = 4.0, **looks: Any) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.plot import palette, style
-from nonsmooth.plot.branches import draw_branch
+from nonsmooth.plot.branches import check_axis, draw_branch
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import (
     Name,
@@ -72,7 +72,8 @@ def bifurcation(
         raise ValueError("this sweep counted its section points (density=...): draw it with plot.density")
     (name,) = first_states(result, y)
     parameter = str(result["status"].dims[0])
-    _share_an_axis(over, parameter)
+    for branch in over:
+        check_axis(branch, parameter)
     of_state = name in result["state"].values
     if of_state:
         points = column(result, "section", name)
@@ -108,13 +109,6 @@ def _name(ax: Axes, result: xr.Dataset, parameter: str, name: str, values: xr.Da
         return name_plane(ax, result, parameter, name, before)
     own = before + name_and_unit(result, name)[0]
     return name_axes(ax, name_and_unit(result, parameter), (own, str(values.attrs.get("units", "1"))))
-
-
-def _share_an_axis(over: tuple[xr.Dataset, ...], parameter: str) -> None:
-    """Check that branches are over the parameter of the diagram."""
-    for one in over:
-        if (of := one.attrs.get("parameter")) != parameter:
-            raise ValueError(f"the diagram is over {parameter!r}, this branch over {of!r}: they share no axis")
 
 
 @figure("bifurcation_diagram", "swept_section")
@@ -207,7 +201,8 @@ def frequency_response(
     ranges = [one.removesuffix("_amplitude") for one in known if one.endswith("_amplitude")]
     heights = quantity_of(result, name if alone else f"{name}_{quantity}", known, also=ranges)
     inside = held(result, region)
-    _share_an_axis(over, parameter)
+    for branch in over:
+        check_axis(branch, parameter)
     marks: list[Any] = []
     for i, direction in enumerate(np.atleast_1d(result["direction"].values).astype(str)):
         one = heights.isel(direction=i) if "direction" in heights.dims else heights
@@ -242,12 +237,9 @@ def _shade(ax: Axes, inside: xr.DataArray, parameter: str) -> None:
 
 def _jumps(result: xr.Dataset, name: str, direction: str, start: int) -> list[float]:
     """The jumps of one curve: those of its state, its direction and, where there are several starts, of its start."""
-    first = str(result["state"].values[0])  # older results hold no others
-    if "jump_value" not in result or ("jump_variable" not in result and name != first):
+    if "jump_value" not in result:
         return []
-    mine = result["jump_direction"].values == direction
-    if "jump_variable" in result:
-        mine = mine & (result["jump_variable"].values == name)
+    mine = (result["jump_direction"].values == direction) & (result["jump_variable"].values == name)
     if "jump_start" in result:
         mine = mine & (result["jump_start"].values == start)
     return [float(value) for value in result["jump_value"].values[mine]]
@@ -330,8 +322,7 @@ def density(ax: Axes, result: xr.Dataset, *, y: Name | None = None, cmap: str = 
     there = share[np.isfinite(share)]
     lowest, highest = (float(there.min()), float(there.max())) if len(there) else (1.0, 100.0)
     edges = edges_of(one[parameter].values), one["bin_edge"].values
-    colors: dict[str, Any] = {"cmap": cmap, "norm": LogNorm(lowest, max(highest, 1.01 * lowest))}
-    mesh = ax.pcolormesh(*edges, share, rasterized=True, **colors)
+    mesh = ax.pcolormesh(*edges, share, rasterized=True, cmap=cmap, norm=LogNorm(lowest, max(highest, 1.01 * lowest)))
     ax.figure.colorbar(mesh, ax=ax, label="share of the points (%)")
     name_plane(ax, result, parameter, name)
 
@@ -378,12 +369,10 @@ def smoothing_report(
         orders = one[f"{y}_order"].values
         known = orders[np.isfinite(orders)]
         ax.plot(eta[shown], values[shown], "-", color=color, linewidth=0.8)
-        ax.plot(
-            [], [], mark, color=color, markersize=3.5, label=band + (f", order {known[0]:.2f}" if len(known) else "")
-        )
+        words = band + (f", order {known[0]:.2f}" if len(known) else "")
         changed = one["stable"].values != bool(one["reference_stable"])
-        for which, fill in ((shown & ~changed, color), (shown & changed, "none")):
-            ax.plot(eta[which], values[which], mark, color=color, markerfacecolor=fill, markersize=3.5)
+        for which, fill, label in ((shown & ~changed, color, words), (shown & changed, "none", None)):
+            ax.plot(eta[which], values[which], mark, color=color, markerfacecolor=fill, markersize=3.5, label=label)
         lost |= set(eta[one["status"].values != 0].tolist())
     if lost:
         looks: dict[str, Any] = {"color": style.COLORS["section"], "markersize": 4, "label": "no such orbit"}

@@ -198,8 +198,7 @@ def orbit(ax: Axes, result: Any, *, x: Name | None = None, y: Name | None = None
         near = int(np.nanargmin(clearance))
         words = f"least clearance {clearance[near]:.2g}"
         place = [run["touch_u"].sel(state=name).values[near] for name in names]
-        cross: dict[str, Any] = {"color": style.COLORS["fourth"], "markersize": 5, "markeredgewidth": 1.1}
-        ax.plot(*place, "x", zorder=6, label=words, **cross)
+        ax.plot(*place, "x", zorder=6, label=words, color=style.COLORS["fourth"], markersize=5, markeredgewidth=1.1)
     style.clear_legend(ax)
 
 

@@ -76,8 +76,9 @@ def calibration(one: Picture, finding: Any) -> None:
         band = None
         if "fitted_low" in one.data:
             band = [at[there], *((one.data[f"fitted_{end}"].values - fitted)[there] for end in ("low", "high"))]
-            looks: dict[str, Any] = {"color": style.COLORS["first"], "alpha": 0.25, "linewidth": 0}
-            one.ax.fill_between([], [], label="its 95 % band (below)", **looks)
+            one.ax.fill_between(
+                [], [], label="its 95 % band (below)", color=style.COLORS["first"], alpha=0.25, linewidth=0
+            )
         error = one.data["reading_error"].values if "reading_error" in one.data else None
         one.residual(setting, reading - np.interp(setting, at, fitted), error=error, band=band, marker="o")
     one.points("setting", "reading")
@@ -201,8 +202,7 @@ def _by_place(ax: Axes, data: Any) -> None:
         r = residual[place == i]
         size = float(np.sqrt(np.mean(r**2)))
         color = style.COLORS["first" if i < n_modes else "second"]
-        bars = {"xerr": size / np.sqrt(2.0 * len(r)), "error_kw": {"elinewidth": 0.8}}
-        ax.barh(row, size, color=color, height=0.6, **bars)
+        ax.barh(row, size, color=color, height=0.6, xerr=size / np.sqrt(2.0 * len(r)), error_kw={"elinewidth": 0.8})
         ax.text(0.0, row, f" {len(r)}", va="center", fontsize=style.small(ax), color="white")
     ax.axvline(1.0, color=style.COLORS["muted"], linewidth=0.7)
     words = [names[i].replace("->", " \N{RIGHTWARDS ARROW} ").replace("_", " ") for i in held]
@@ -233,8 +233,7 @@ def profile(one: Picture, finding: Any) -> None:
     value, cost = one.values("value", "cost")
     one.span(number(data, "low"), number(data, "high"), "95 % interval", ymax=0.74)
     one.line(value, cost, f"profile, {one.word}", marker="o", markersize=1.5)
-    bound: dict[str, Any] = {"color": style.COLORS["muted"], "linestyle": "--", "linewidth": 0.7}
-    one.ax.axhline(CHI_SQUARE_95, label="95 % bound, 3.84", **bound)
+    one.ax.axhline(CHI_SQUARE_95, label="95 % bound, 3.84", color=style.COLORS["muted"], linestyle="--", linewidth=0.7)
     if np.isfinite(best := number(data, "best")):
         one.ax.axvline(best, ymax=0.74, color=style.COLORS["second"], linewidth=0.9, label="best fit")
     one.ax.set_ylim(0, max(1.1 * CHI_SQUARE_95, min(float(np.nanmax(cost)), 5 * CHI_SQUARE_95)) * 1.35)
@@ -276,8 +275,7 @@ def coverage(ax: Axes, finding: Any) -> None:
             ax.plot(k + spread[mine], off[mine, k], ".", color=style.COLORS[color], markersize=3)
         rms = float(np.sqrt(np.nanmean(off[:, k] ** 2)))
         words = f"{np.count_nonzero(held[:, k])}/{rigs}\nrms {rms:.2f}"
-        above: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "ha": "center", "va": "bottom"}
-        ax.text(k, 1.02, words, fontsize=style.small(ax), **above)
+        ax.text(k, 1.02, words, fontsize=style.small(ax), transform=ax.get_xaxis_transform(), ha="center", va="bottom")
     reach = max(3.0, 1.08 * float(np.nanmax(np.abs(off[np.isfinite(off)]), initial=0.0)))
     ax.set_ylim(-reach, reach)
     ax.set_xticks(range(len(names)), [symbol_of(name) for name in names])

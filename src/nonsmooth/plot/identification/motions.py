@@ -53,8 +53,9 @@ def impulse_response(one: Picture, finding: Any) -> None:
     one.span(largest - step / 2, largest + step / 2, words)
     for name, word, color, line in _PEAKS:
         if np.isfinite(value := number(one.data, name)):
-            looks: dict[str, Any] = {"color": style.COLORS[color], "linestyle": line, "linewidth": 1.0}
-            one.ax.axvline(value, label=f"{word} {value:.4f} Hz", **looks)
+            one.ax.axvline(
+                value, label=f"{word} {value:.4f} Hz", color=style.COLORS[color], linestyle=line, linewidth=1.0
+            )
     one.ax.set_ylim(0, 1.06 * heights.max())
 
 

@@ -137,8 +137,7 @@ class Picture:
 
     def cloud(self, x: Any, y: Any, label: str = "", color: str = MEASURED) -> None:
         """Small dots of many samples."""
-        looks: dict[str, Any] = {"markersize": 3.0, "markeredgewidth": 0, "rasterized": True}
-        self.ax.plot(x, y, ".", color=color, label=label or self.word, **looks)
+        style.cloud(self.ax, (x, y), 3.0, color, label or self.word)
 
     def line(self, x: Any, y: Any, label: str = "", color: str = "first", line: str = "-", **looks: Any) -> None:
         """A curve; its words stand in the legend once."""
