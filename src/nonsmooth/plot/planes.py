@@ -13,7 +13,6 @@ from nonsmooth.plot import palette, style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import Name, name_and_unit, name_axes, name_plane, one_of, only_states
 from nonsmooth.plot.prefixes import PREFIXES, power_for
-from nonsmooth.results.labels import kind_of
 from nonsmooth.results.statuses import in_words
 from nonsmooth.system.kinds import above, at_least
 from nonsmooth.tables.quantities import quantities_of, quantity
@@ -254,17 +253,9 @@ def basins(ax: Axes, result: xr.Dataset, *, size: Annotated[float, above(0)] = 3
     name_plane(ax, result, first, second)
 
 
-def _kinds(result: xr.Dataset) -> Any:
-    """Each attractor by its kind, ``period 3`` or ``chaos``."""
-    if "name" in result:
-        return result["name"].values
-    kinds = np.vectorize(kind_of, otypes=[object])
-    return kinds(result["period_number"].values.astype(int), result["chaotic"].values.astype(bool))
-
-
 def names_of(result: xr.Dataset) -> list[str]:
     """Each attractor by its kind; of several of one kind (a), (b), ..."""
-    return told_apart([str(name) for name in _kinds(result)])
+    return told_apart([str(name) for name in result["name"].values])
 
 
 def told_apart(names: list[str]) -> list[str]:
@@ -336,7 +327,7 @@ def basin_fractions(ax: Axes, result: xr.Dataset, *, y: Name | None = None) -> N
 
 def _along(result: xr.Dataset, k: int) -> str:
     """Kinds of an attractor along the parameter, each once, in the order met."""
-    kinds = _kinds(result)[result["period_number"].values[:, k] >= 0, k]
+    kinds = result["name"].values[result["period_number"].values[:, k] >= 0, k]
     distinct = list(dict.fromkeys(map(str, kinds)))
     numbers = [kind.removeprefix("period ") for kind in distinct if kind.startswith("period")]
     words = [f"period {', '.join(numbers)}"] if numbers else []
