@@ -134,7 +134,7 @@ class Bench:
         self._count += 1
         self._job = self._count, what, self.page.state.model
         self.doing, self._fraction = what, 0.0
-        self._worker = Worker(lambda answer: self.page.later(self._hear, answer))
+        self._worker = Worker.idle(lambda answer: self.page.later(self._hear, answer))
         self._worker.ask(self._count, job)
 
     def _stop(self) -> None:
