@@ -22,6 +22,11 @@ def symbols_of(system: System) -> dict[str, str]:
     }
 
 
+def rows_of(system: System) -> list[dict[str, str]]:
+    """The states as the page lists them: name, symbol and unit."""
+    return [{"name": name, "html": html_of(latex_name(name)), "unit": unit} for name, unit in system.states.items()]
+
+
 def plain_of(latex: str) -> str:
     """``k_{s}`` as ``kₛ``: Unicode has a few letters as subscripts; with others the underscore stays."""
     stem, below = _parts(latex)

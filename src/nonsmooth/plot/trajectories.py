@@ -202,7 +202,14 @@ def orbit(ax: Axes, result: Any, *, x: Name | None = None, y: Name | None = None
     style.clear_legend(ax)
 
 
-FLOOR = 1e-7  # of the largest line: below it rounding and the tolerance rule
+_FLOOR = 1e-7  # of the largest line: below it rounding and the tolerance rule
+
+
+def lines_of(result: xr.Dataset, name: str, highest: float) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Multiples of the base frequency up to the highest, the amplitudes there, and the least that means something."""
+    order, values = result["order"].values, column(result, "amplitude", name).values
+    some = (order > 1e-9) & (order <= highest)
+    return order[some], values[some], _FLOOR * (float(values[some].max(initial=0.0)) or 1.0)
 
 
 @figure("amplitude_spectrum", "amplitude")
@@ -214,10 +221,7 @@ def amplitude_spectrum(
     ``highest``: the largest multiple drawn. Lines below 1e-7 of the largest are left out, and so is the mean.
     """
     (name,) = first_states(result, y)
-    order, values = result["order"].values, column(result, "amplitude", name).values
-    some = (order > 1e-9) & (order <= highest)
-    order, values = order[some], values[some]
-    floor = FLOOR * (float(values.max(initial=0.0)) or 1.0)
+    order, values, floor = lines_of(result, name, highest)
     some = values > floor
     bottom = max(floor, 0.3 * float(values[some].min(initial=np.inf))) if some.any() else floor
     color = style.COLORS["first"]
