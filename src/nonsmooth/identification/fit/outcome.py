@@ -290,7 +290,7 @@ def _ends(grown: Grown, data: xr.Dataset) -> list[str]:
 
 
 def _aliases(grown: Grown) -> list[str]:
-    """Sentences on quantities whose fitted motion swings faster than readings show, at the records' beginnings."""
+    """A sentence on a fitted motion that swings faster than its readings show, at the records' beginnings."""
     problem, rng = grown.problem, np.random.default_rng(0)
     counts = np.zeros((2, len(problem.sensors)))  # readings, swings
     firsts = {
@@ -305,11 +305,14 @@ def _aliases(grown: Grown) -> list[str]:
         if (motion := problem.motion(grown.theta, fine, start)) is not None:
             predicted = problem.readings(grown.theta, fine, motion, False)[0].reshape(fine.values.shape)
             counts += np.isfinite(window.values[:k]).sum(axis=0), [0.5 * turns_of(y) for y in predicted.T]
+    read, swings = counts
+    best = int(np.argmax(read / np.maximum(swings, 1e-300)))  # the quantity that shows most of the motion
+    if swings[best] <= _SWINGS or read[best] >= _PER_SWING * swings[best]:
+        return []
+    name, each = list(problem.sensors)[best], read[best] / swings[best]
     return [
-        f"the fitted motion of {name} has {read / swings:.2g} readings for each of its swings: so few are those of "
-        "slower or faster motions too; see whether the record's times are in the unit of the model"
-        for name, read, swings in zip(problem.sensors, *counts, strict=True)
-        if swings > _SWINGS and 0 < read < _PER_SWING * swings
+        f"the fitted motion of {name} has {each:.2g} readings for each of its swings: so few are those of slower or faster "
+        "motions too; see whether the record's times are in the unit of the model"
     ]
 
 
