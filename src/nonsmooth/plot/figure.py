@@ -79,8 +79,7 @@ def figure(verb: str = "", *variables: str, **size: float) -> Callable[[Callable
             there = {*getattr(ax, "lines", ()), *getattr(ax, "collections", ())}
             with style.axes(ax, **size) as paper:
                 draw(paper, *bound.args, **bound.kwargs)
-                _finish(paper, there, {key: look[key] for key in _LINE if look.get(key) is not None}, draw.__name__)
-                _name(paper, look)
+                _finish(paper, there, look, draw.__name__)
             return paper
 
         rest = inspect.Parameter("look", inspect.Parameter.VAR_KEYWORD, annotation=Unpack[Look])
@@ -90,35 +89,29 @@ def figure(verb: str = "", *variables: str, **size: float) -> Callable[[Callable
     return made
 
 
-def _finish(ax: Axes, there: set[Any], looks: Mapping[str, Any], name: str) -> None:
-    """Apply the properties of lines to those that were drawn, bars of errors and entries of the legend among them."""
+def _finish(ax: Axes, there: set[Any], look: Mapping[str, Any], name: str) -> None:
+    """Apply what all figures take; properties of lines to those drawn, bars and entries of the legend among them."""
     from matplotlib.collections import LineCollection
 
-    if not looks:
-        return
+    shown, looks = ax.get_legend(), {key: look[key] for key in _LINE if look.get(key) is not None}
     bars = [one for one in ax.collections if isinstance(one, LineCollection)]
     new: list[Any] = [one for one in (*ax.lines, *bars) if one not in there]
-    if not new:
+    if looks and not new:
         raise TypeError(f"{', '.join(looks)}: no property of this picture, in which {name} has drawn no line or point")
-    shown = ax.get_legend()
     signs: list[Any] = [] if shown is None else [one for one in shown.legend_handles if hasattr(one, "get_markersize")]
-    for line in (*new, *signs):
+    for line in (*new, *signs) if looks else ():
         line.set(**{key: value for key, value in looks.items() if hasattr(line, f"set_{key}")})
         if "marker" in looks and hasattr(line, "set_marker"):  # at all points; a cross is nothing but an edge
             line.set(markevery=None, markeredgewidth=0.7)
-
-
-def _name(ax: Axes, look: Mapping[str, Any]) -> None:
-    """Apply the title, the legend and the units."""
     if (unit := look.get("unit")) is not None:
         from nonsmooth.plot.units import in_unit
 
-        for name, wanted in ({"y": unit} if isinstance(unit, str) else unit).items():
-            if name not in ("x", "y"):
+        for axis, wanted in ({"y": unit} if isinstance(unit, str) else unit).items():
+            if axis not in ("x", "y"):
                 raise ValueError(f"unit = {unit!r}: a unit of the ordinate, or {{'x': 'mm', 'y': 'mm/s'}}")
-            in_unit(ax.xaxis if name == "x" else ax.yaxis, wanted)
+            in_unit(ax.xaxis if axis == "x" else ax.yaxis, wanted)
     if (title := look.get("title")) is not None:
         said = ax.get_title(loc="left")  # of contours and regions: the title stands above it
         ax.set_title(title + "\n" * len(said.splitlines()))
-    if not look.get("legend", True) and (shown := ax.get_legend()) is not None:
+    if not look.get("legend", True) and shown is not None:
         shown.remove()

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _LINES = tuple(style.COLORS[name] for name in ("section", "third", "fourth"))
-_COLORS = {"up": "first", "down": "second", "none": "section"}
 _LONGEST = 30  # characters of a line of a condition in a legend
 _SEAM = 2.0  # a rising point over a falling one, which lies on it: both show
 
@@ -86,7 +85,7 @@ def bifurcation(
         cloud = mine.transpose(..., parameter).values
         values = np.broadcast_to(result[parameter].values, cloud.shape)
         under = direction == "up" and "down" in directions
-        shade = color or style.COLORS["pale" if under else _COLORS[direction]]
+        shade = color or (style.COLORS["pale"] if under else _LOOKS[direction]["color"])
         words = direction if len(directions) > 1 else None
         style.cloud(ax, (values, cloud), size * (_SEAM if under else 1.0), shade, words)
     for k, one in enumerate(over):
@@ -240,9 +239,7 @@ def _jumps(result: xr.Dataset, name: str, direction: str, start: int) -> list[fl
     if "jump_value" not in result:
         return []
     mine = (result["jump_direction"].values == direction) & (result["jump_variable"].values == name)
-    if "jump_start" in result:
-        mine = mine & (result["jump_start"].values == start)
-    return [float(value) for value in result["jump_value"].values[mine]]
+    return result["jump_value"].values[mine & (result["jump_start"].values == start)].tolist()
 
 
 def _intervals(values: NDArray[np.float64], curve: NDArray[np.float64], places: list[float]) -> list[tuple[float, int]]:

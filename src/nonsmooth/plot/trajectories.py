@@ -76,9 +76,6 @@ def _away(result: xr.Dataset, shade: bool | str) -> NDArray[np.bool_]:
     return np.array([bool(now & wanted) for now in of])[mode.values]
 
 
-ZONE = "contact zone"  # in legends
-
-
 @figure("simulate", "u", ratio=0.85)
 def phase_portrait(
     ax: Axes,
@@ -137,7 +134,9 @@ def shade_zone(ax: Axes, edge: float) -> None:
     low, high = ax.get_xlim()
     ax.axvline(edge, color=style.COLORS["muted"], linewidth=0.6, linestyle="--", zorder=1)
     if edge < high:
-        ax.axvspan(max(edge, low), high, color=style.COLORS["zone"], alpha=0.18, linewidth=0, zorder=0, label=ZONE)
+        ax.axvspan(
+            max(edge, low), high, color=style.COLORS["zone"], alpha=0.18, linewidth=0, zorder=0, label="contact zone"
+        )
     ax.set_xlim(low, high)
 
 

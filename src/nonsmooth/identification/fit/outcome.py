@@ -311,8 +311,8 @@ def _aliases(grown: Grown) -> list[str]:
         return []
     name, each = list(problem.sensors)[best], read[best] / swings[best]
     return [
-        f"the fitted motion of {name} has {each:.2g} readings for each of its swings: so few are those of slower or faster "
-        "motions too; see whether the record's times are in the unit of the model"
+        f"the fitted motion of {name} has {each:.2g} readings for each of its swings: so few are those of slower or "
+        "faster motions too; see whether the record's times are in the unit of the model"
     ]
 
 
