@@ -173,7 +173,8 @@ def responded(labels: Labels) -> xr.Dataset:
         starts=np.zeros((1, 2)),
         squeeze=("start",),
     )
-    return schema.response(base, amplitude=x, jumps={"value": [JUMP_UP, JUMP_DOWN], "direction": ["up", "down"]})
+    jumps = {"value": [JUMP_UP, JUMP_DOWN], "direction": ["up", "down"], "variable": ["x"] * 2, "start": [0] * 2}
+    return schema.response(base, amplitude=x, jumps=jumps)
 
 
 @pytest.fixture

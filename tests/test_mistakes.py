@@ -550,14 +550,14 @@ MISTAKES = {
     # figures and files
     "a sketch of a run": (
         "ns.plot.mechanism(xr.Dataset({'u': ('time', [0.0])}))",
-        "not Dataset",
-        "draws a system",
+        "not <xarray.Dataset>",
+        "takes an ns.System",
         "ns.system_of(result)",
     ),
     "a run's figure of a system": ("ns.plot.phase_portrait(osc)", "not System", "the result of simulate", "first"),
     "two states in one figure": (
         "ns.plot.time_history(RUN, y=['x', 'v'])",
-        "['x', 'v'] is not one name",
+        "not ['x', 'v']; it is one name",
         "a call of its own",
         "the same axes with ax=",
     ),

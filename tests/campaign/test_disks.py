@@ -63,6 +63,22 @@ def test_a_disk_too_small_for_an_empty_store(disk: Path) -> None:
     assert [file.name for file in disk.iterdir()] == ["filling"]
 
 
+def test_tables_figures_and_films_on_a_full_disk(disk: Path) -> None:
+    run = ns.simulate(ns.models.impact_oscillator(), periods=1)
+    film, ax = ns.animate(run, seconds=0.5, rate=10, pixels=150), ns.plot.time_history(run)
+    for filled in (196_000, 204_800):  # a little of a file fits, or none
+        (disk / "filling").write_bytes(bytes(filled))
+        for write in (
+            lambda: ns.table(run, samples=4000, file=disk / "run.csv"),
+            lambda: ns.plot.save_figure(ax, disk / "run.png"),
+            lambda: film.save(disk / "run.gif"),
+            lambda: film.save(disk / "run.html"),
+        ):
+            with pytest.raises(DataFileError, match="the disk is full .*make room"):
+                write()
+            assert [file.name for file in disk.iterdir()] == ["filling"]
+
+
 def test_a_read_only_disk(disk: Path) -> None:
     work, path = Squares(), disk / "squares.zarr"
     with pytest.raises(RuntimeError):

@@ -171,7 +171,7 @@ def test_no_value_of_any_key_ends_in_a_traceback(
         (("show", b"\xff.nc"), r"no such file"),
         (("init", "wrong.py:system"), r"wrong\.py, line 1: BaseException: x"),
         (("init", "nothing.py:system"), "no such file"),
-        (("schema", "--out", "."), r"\.: Is a directory"),
+        (("schema", "--out", "."), r"\.: a folder stands there .*; close it where it is open, make room"),
         (("compare", "odd.toml"), r"\[measured\]: session = 3 must be a text"),
         (("run", "a" * 5000), "File name too long"),
         (("run", "odd.nc"), r"odd\.nc: is a saved result and no study file; `nonsmooth show odd\.nc`"),

@@ -55,7 +55,9 @@ def test_a_frequency_response() -> None:
 
 
 @pytest.mark.parametrize(
-    "options", [{}, {"carry": {"rho": "up"}}, {"start": [[0.0, 0.0], [0.01, 0.0]]}], ids=["plain", "carried", "starts"]
+    "options",
+    [{}, {"carry": {"rho": "up"}}, {"start": [[0.0, 0.0], [0.01, 0.0]]}, {"refine": 0.9}],
+    ids=["plain", "carried", "starts", "refined"],
 )
 def test_a_chart(options: dict[str, Any]) -> None:
     grid = {"rho": np.linspace(0.3, 0.5, 24), "g": np.linspace(-0.005, -0.004, 44)}

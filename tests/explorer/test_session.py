@@ -22,7 +22,7 @@ from nonsmooth.explorer import session as sessions
 from nonsmooth.explorer.catalogue import Catalogue
 from nonsmooth.explorer.figures import BLUE
 from nonsmooth.explorer.session import Page
-from nonsmooth.explorer.worker import _Process
+from nonsmooth.explorer.worker import Worker
 from nonsmooth.plot.style import COLORS
 
 FEW = "columns=10&transient=20&keep=8&low=0.2&high=0.3"
@@ -85,7 +85,7 @@ def tabs() -> Iterator[list[Page]]:
 @pytest.fixture
 def new_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     """No page takes over the process of another one, which has its environment."""
-    monkeypatch.setattr(_Process, "idle", _Process)
+    monkeypatch.setattr(Worker, "idle", Worker)
 
 
 def test_nothing_of_a_model_stands_under_the_name_of_the_next(tabs: list[Page]) -> None:

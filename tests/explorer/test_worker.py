@@ -16,7 +16,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.explorer.catalogue import first_state
-from nonsmooth.explorer.worker import Answer, Worker, _Cancelled, _Process, end_spare, prepare
+from nonsmooth.explorer.worker import Answer, Worker, _Cancelled, end_spare, prepare
 
 SYSTEM = ns.models.discontinuous_support()
 
@@ -42,7 +42,7 @@ def cancelled(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Cancelled]:
 
 @pytest.fixture(scope="module")
 def worker(answers: queue.Queue[Answer]) -> Iterator[Worker]:
-    one = Worker(answers.put)
+    one = Worker.idle(answers.put)
     yield one
     one.close()
 
@@ -103,7 +103,6 @@ def test_work_that_is_not_wanted_ends(worker: Worker, answers: queue.Queue[Answe
 def test_work_that_does_not_ask_is_interrupted_and_the_process_stays(
     worker: Worker, answers: queue.Queue[Answer]
 ) -> None:
-    process = worker._process
     chaotic = {**job("branches")["values"], "rho": 0.2}  # half a minute that reports nothing
     worker.ask(5, job("branches", values=chaotic, low=0.199, high=0.201, transient=10_000_000))
     time.sleep(0.5)
@@ -111,7 +110,7 @@ def test_work_that_does_not_ask_is_interrupted_and_the_process_stays(
     assert last_of(answers, 5)[0] == "cancelled"
     worker.ask(6, job("orbit"))
     assert last_of(answers, 6)[0] == "done"
-    assert worker._process is process
+    assert worker._popen.poll() is None
 
 
 def test_a_package_is_loaded_whole_before_its_work_is_interrupted(
@@ -148,12 +147,15 @@ def test_an_error_is_a_sentence(worker: Worker, answers: queue.Queue[Answer]) ->
     assert "`gap` is not a parameter" in said
 
 
-def test_one_that_ends_says_so_and_can_be_started_again(worker: Worker, answers: queue.Queue[Answer]) -> None:
-    worker.end()
-    assert answers.get(timeout=60)[0] == "ended"
-    worker.start()
-    worker.ask(4, job("orbit"))
+def test_one_that_ends_says_so_and_another_begins() -> None:
+    answers = queue.Queue[Answer]()
+    Worker.idle(answers.put).end()
+    while answers.get(timeout=60)[0] != "ended":
+        pass
+    other = Worker.idle(answers.put)
+    other.ask(4, job("orbit"))
     assert last_of(answers, 4)[0] == "done"
+    other.close()
 
 
 def test_work_that_is_cancelled_while_it_waits_is_answered(worker: Worker, answers: queue.Queue[Answer]) -> None:
@@ -167,26 +169,23 @@ def test_work_that_is_cancelled_while_it_waits_is_answered(worker: Worker, answe
 def test_a_page_takes_over_the_process_of_one_that_was_closed() -> None:
     """Cancelled is what the other one had asked, and its answers reach nobody."""
     first, second = queue.Queue[Answer](), queue.Queue[Answer]()
-    one = Worker(first.put)
-    process = one._process
-    assert process is not None
+    one = Worker.idle(first.put)
     one.ask(1, job("diagram", columns=200_000))  # an hour
     while first.get(timeout=120)[:2] != ("progress", 1):
         pass
     one.close()
-    one.ask(2, job("orbit"))  # of a page that is not there any more
     end = time.monotonic() + 60
-    while _Process.spare is not process:
+    while Worker.spare is not one:
         assert time.monotonic() < end
         time.sleep(0.02)
-    other = Worker(second.put)
-    assert other._process is process
+    other = Worker.idle(second.put)
+    assert other is one
     other.ask(1, job("orbit"))
     assert last_of(second, 1)[0] == "done"
     assert {kind for kind, *_ in first.queue} <= {"progress"}
     prepare()  # one more waits
-    waiting = _Process.spare
+    waiting = Worker.spare
     other.close()
-    process._popen.wait(30)  # of two that nobody hears one ends
-    assert _Process.spare is waiting
+    one._popen.wait(30)  # of two that nobody hears one ends
+    assert Worker.spare is waiting
     end_spare()

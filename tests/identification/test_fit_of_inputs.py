@@ -85,3 +85,20 @@ def test_a_run_that_begins_at_rest_in_a_mode_that_slips() -> None:
     ]
     slope = (ends[0].u.values[-1] - ends[1].u.values[-1]) / (2 * h)
     np.testing.assert_allclose(found.P.sel(parameter="mu"), slope, atol=1e-6)
+
+
+def test_models_with_an_input_are_ranked_by_what_they_predict() -> None:
+    """The channel has the input's name; the damping that is there predicts better than none."""
+    t = np.arange(0.0, 12.0, 0.02)
+    force = np.sin(2.0 * t) + np.sin(5.3 * t)
+    free = ns.System(
+        states={"x": "m", "v": "m/s"},
+        parameters={"k": 40.0, "c": 0.6},
+        inputs={"f": "N"},
+        modes={"one": lambda t, u, p: [u.v, -p.k * u.x - p.c * u.v + p.f]},
+    )
+    run = ns.simulate(free, duration=11.9, samples=t[:-6], start={"x": 0.05}, inputs={"f": (t, force)})
+    noise = 1e-4 * np.random.default_rng(0).standard_normal(run.sizes["time"])
+    record = {"x": (run["time"].values, run["u"].sel(state="x").values + noise), "f": (t, force)}
+    models = {"damped": (free, ["k", "c"]), "free": (free.with_parameters(c=0.0), ["k"])}
+    assert ns.select_model(models, record, measured=["x"], folds=2, progress=False).attrs["best"] == "damped"

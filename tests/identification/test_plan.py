@@ -114,6 +114,16 @@ def test_a_run_that_does_not_move_tells_nothing_and_priors_stand() -> None:
     np.testing.assert_allclose(known["uncertainty"].values[0], [0.01, 0.3], rtol=1e-9)
 
 
+def test_a_parameter_that_a_run_sets_is_known_there_alone() -> None:
+    """The bound of the other is that with k given: the inverse of one entry of F, not an entry of the inverse of F."""
+    t = np.linspace(0.0, 30.0, 601)
+    run = {"duration": 30.0, "samples": t, "start": {"q": 1.0}}
+    found = plan({"free": run, "set": {**run, "settings": {"k": K}}}, free_start=False)["uncertainty"]
+    information = np.linalg.inv(covariance(t, False))
+    assert float(found.sel(run="set", parameter="c")) == pytest.approx(information[0, 0] ** -0.5, rel=1e-6)
+    assert np.isinf(found.sel(run="set", parameter="k")) and np.isfinite(found.sel(run="free")).all()
+
+
 def test_through_a_stop_information_comes_with_the_impacts() -> None:
     """Before the first impact nothing is told of the restitution; behind each one more."""
     s = ns.mechanical(

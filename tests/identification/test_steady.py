@@ -298,6 +298,17 @@ def test_what_cannot_be_read_is_refused(system: Any, data: Any, parameters: Any,
         ns.fit(system, data, parameters, progress=False, **options)
 
 
+def test_a_channel_called_amplitude_is_no_response() -> None:
+    t = np.linspace(0.0, 20.0, 200)
+    run = ns.simulate(linear(), duration=20.0, samples=t)
+    record = {"q": (run["time"].values, run["u"].sel(state="q").values)}
+    alone, beside = (
+        ns.fit(linear(), {**record, **more}, "c", measured=["q"], progress=False)
+        for more in ({}, {"amplitude": record["q"]})
+    )
+    assert beside["c"] == alone["c"]
+
+
 def test_models_are_chosen_by_records() -> None:
     with pytest.raises(ValueError, match="holds out parts of records over time"):
         ns.select_model({"a": (linear(), "c"), "b": (linear(), "k")}, response(amplitude()), progress=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import os
 import re
 
 import numpy as np
@@ -75,6 +76,23 @@ def test_a_film_needs_ffmpeg_and_says_how_to_get_it(moving, tmp_path, monkeypatc
     monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
     with pytest.raises(ImportError, match=r"python -m pip install imageio-ffmpeg"):
         moving.save(tmp_path / "other.mp4")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a script in place of a program")
+def test_a_film_that_ffmpeg_gives_up_leaves_nothing(moving, tmp_path, monkeypatch) -> None:
+    import matplotlib.animation
+
+    program, film = tmp_path / "bin" / "ffmpeg", tmp_path / "run.mp4"
+    program.parent.mkdir()
+    words = ["#!/bin/sh", "for last; do :; done", 'echo half > "$last"', 'echo "No space left" >&2', "exit 1"]
+    program.write_text("\n".join(words))
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{program.parent}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setattr(matplotlib.animation.FFMpegWriter, "isAvailable", classmethod(lambda cls: True))
+    film.write_bytes(b"old")
+    with pytest.raises(DataFileError, match=r"run\.mp4: ffmpeg has written no film \(No space left\); .*make room"):
+        moving.save(film)
+    assert film.read_bytes() == b"old" and {one.name for one in tmp_path.iterdir()} == {"bin", "run.mp4"}
 
 
 def test_a_system_without_masses_has_plane_and_history() -> None:

@@ -181,7 +181,7 @@ def test_labels_have_symbols_units_or_words(trajectory: xr.Dataset, swept: xr.Da
 def test_an_unknown_state_is_answered_with_all_states(swept: xr.Dataset) -> None:
     with pytest.raises(ValueError, match=r"'w' is neither a state nor an output .*\['x', 'v'\]"):
         column(swept, "section", "w")
-    with pytest.raises(ValueError, match="quantity is 'height'"):
+    with pytest.raises(ValueError, match="quantity = 'height'; allowed: 'amplitude'"):
         plot.frequency_response(xr.Dataset({"amplitude": 1.0}), quantity="height")
 
 

@@ -68,7 +68,7 @@ def test_what_stands_between_two_masses_or_at_a_wall_is_drawn_there(chain) -> No
 
 def test_a_chain_is_read_as_it_was_built(chain) -> None:
     scheme = scheme_of(chain)
-    assert scheme.coordinates == ["q1", "q2", "q3"]
+    assert scheme.pairs == [("q1", "v_q1"), ("q2", "v_q2"), ("q3", "v_q3")]
     assert scheme.masses == ["m_{1}", "m_{2}", "m_{3}"]
     joined = {(one.kind, one.left, one.right, one.label) for one in scheme.links if one.kind in ("spring", "damper")}
     assert joined == {
@@ -203,7 +203,7 @@ def test_what_has_no_sketch_says_why(system, words: str) -> None:
 def test_a_measured_input_is_a_force_and_no_mass() -> None:
     cart = ns.mechanical(2.0, 0.0, 8.0, forcing={"q": lambda t, p: p.force}, inputs={"force": "N"})
     scheme = scheme_of(cart)
-    assert scheme.coordinates == ["q"]
+    assert [name for name, _ in scheme.pairs] == ["q"]
     assert scheme.forces == {0: r"\mathrm{force}"}
     run = ns.simulate(cart, duration=3.0, inputs={"force": ns.Input([0, 1, 2], [4, 0, -4], between="steps")})
     with pytest.warns(UserWarning, match="interpolated by cubic splines"):  # the record does not hold the samples

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 import nonsmooth as ns
 
@@ -217,7 +218,15 @@ WRITERS = {
     ".xlsx": lambda run, file: ns.table(run, file=file),
     ".pdf": lambda run, file: ns.plot.save_figure(ns.plot.time_history(run), file),
     ".gif": lambda run, file: ns.animate(run, seconds=0.2, rate=10, pixels=150).save(file),
+    ".html": lambda run, file: ns.animate(run, seconds=0.2, rate=10, pixels=150).save(file),
+    ".cap": lambda run, file: ns.recordings.write_cap(recorded(), file),
 }
+
+
+def recorded() -> ns.recordings.Recording:
+    t = np.arange(20.0)
+    sensor = xr.Dataset({"x": ("time", np.sin(t), {"units": "m"})}, {"time": ("time", t, {"units": "s"})})
+    return ns.recordings.Recording.from_runs({"r": {"x": sensor}}, synthetic=True)
 
 
 @pytest.mark.parametrize("suffix", WRITERS)
@@ -237,7 +246,7 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(suffix: str, tmp_path:
         def full(*_: object) -> None:
             raise OSError(errno.ENOSPC, "No space left on device")
 
-        patched.setattr("nonsmooth.tables.table.replace", full)
+        patched.setattr("nonsmooth.results.whole.replace", full)
         with pytest.raises(ns.DataFileError, match="the disk is full .*make room"):
             write(run, old)
     assert old.read_bytes() == b"old"

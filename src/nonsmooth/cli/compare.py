@@ -37,7 +37,7 @@ _PICTURES = {
 }
 
 
-def add(commands: Any) -> None:
+def add(commands: Any) -> Any:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "compare",
@@ -61,10 +61,10 @@ def add(commands: Any) -> None:
         help="the session that they were identified from: its screw readings tell the screw's zero",
     )
     parser.add_argument("--quiet", action="store_true", help="no summary")
-    parser.set_defaults(run=_run)
+    return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     if options.study.is_dir():
         return _run_folder(options)
     if options.identified is not None or options.identified_from is not None:

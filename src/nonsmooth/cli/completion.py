@@ -38,7 +38,7 @@ class _Command:
         return " ".join(word for item in self.arguments if not item.flags for word in item.values or ())
 
 
-def add(commands: Any) -> None:
+def add(commands: Any) -> Any:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "completion",
@@ -50,10 +50,10 @@ def add(commands: Any) -> None:
         "  nonsmooth completion fish > ~/.config/fish/completions/nonsmooth.fish",
     )
     parser.add_argument("shell", choices=sorted(_SCRIPTS), help="the shell")
-    parser.set_defaults(run=_run)
+    return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     from nonsmooth.cli.main import parser
 
     print(completion(parser(), options.shell))

@@ -8,7 +8,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 
-def add(commands: Any) -> None:
+def add(commands: Any) -> Any:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "explore",
@@ -32,10 +32,10 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--port", type=int, help="port on 127.0.0.1 (default: 5180, or any that is free)")
     parser.add_argument("--no-browser", action="store_true", help="print the address, open no browser")
-    parser.set_defaults(run=_run)
+    return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     from nonsmooth.cli.study import load_model, named_model, read_study
     from nonsmooth.explorer.opening import opened_result, opened_study
     from nonsmooth.explorer.serve import explore

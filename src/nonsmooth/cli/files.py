@@ -80,7 +80,19 @@ def read_tables(
 
 def with_folder(path: Path) -> Path:
     """The path, its folder made if need be."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    from nonsmooth.results.whole import REMEDY, WRITTEN, told
+
+    with told(path, REMEDY, WRITTEN):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    return path
+
+
+def put_text(path: Path, text: str) -> Path:
+    """Write a text file, or leave what stands there."""
+    from nonsmooth.results.whole import placed
+
+    with placed(with_folder(path)) as fresh:
+        fresh.write_text(text, encoding="utf-8")
     return path
 
 

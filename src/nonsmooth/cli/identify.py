@@ -5,11 +5,20 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from nonsmooth.cli.files import LENGTH, NAMES, QUANTITIES, TEXT, keep, read_tables, with_folder, without_screen
+from nonsmooth.cli.files import (
+    LENGTH,
+    NAMES,
+    QUANTITIES,
+    TEXT,
+    keep,
+    put_text,
+    read_tables,
+    with_folder,
+    without_screen,
+)
 from nonsmooth.errors import check_keys, unknown
 
 _TABLES = {
@@ -25,22 +34,7 @@ _TABLES = {
 _FORMATS = ("pdf", "png", "svg")
 
 
-@dataclass(frozen=True)
-class _Study:
-    """Contents of a study file, paths already relative to where the command runs."""
-
-    session: Path
-    model: Any = None
-    parameters: tuple[str, ...] = ()
-    crank_length: float | None = None
-    apparatus: Mapping[str, Any] = field(default_factory=dict)
-    data: Path | None = None
-    table: Path | None = None
-    figures: Path | None = None
-    format: str = "pdf"
-
-
-def add(commands: Any) -> None:
+def add(commands: Any) -> Any:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "identify",
@@ -56,21 +50,18 @@ def add(commands: Any) -> None:
     parser.add_argument("--out", type=Path, help="write the parameters with their covariance (.nc or .zarr)")
     parser.add_argument("--crank", type=float, help="crank length (m) to whose mean position the gap is referred")
     parser.add_argument("--quiet", action="store_true", help="parameters only, no findings")
-    parser.set_defaults(run=_run)
+    return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     from nonsmooth.studies import study as package
 
     rig = package("savi2007", "identification")
     study = _read(options.study)
-    found = rig.identify(
-        study.session,
-        study.model,
-        apparatus=study.apparatus,
-        crank_length=study.crank_length if options.crank is None else options.crank,
-    )
-    rig.require(found, study.parameters)
+    crank = study.get("crank_length") if options.crank is None else options.crank
+    how = {"apparatus": study.get("apparatus", {}), "crank_length": crank}
+    found = rig.identify(study["session"], study.get("model"), **how)
+    rig.require(found, study.get("parameters", []))
     print(found)
     if not options.quiet:
         for finding in found.findings:
@@ -78,7 +69,7 @@ def _run(options: argparse.Namespace) -> int:
         print()
         for name, sentence in found.identifiability.items():
             print(f"{name}: {sentence}")
-    for path in _write(found, study, study.data if options.out is None else options.out):
+    for path in _write(found, study if options.out is None else {**study, "data": options.out}):
         print(f"written to {path}")
     return said(found)
 
@@ -90,20 +81,21 @@ def said(found: Any) -> int:
     return 3 if found.anomalies else 0
 
 
-def _read(path: Path) -> _Study:
+def _read(path: Path) -> dict[str, Any]:
+    """Contents of a study file, paths already relative to where the command runs."""
     from nonsmooth.recordings.session import NOTEBOOK
 
     if path.is_dir():
         if not (path / NOTEBOOK).is_file():
             raise ValueError(f"{path}: this folder has no {NOTEBOOK}; a session has one, beside its recordings")
-        return _Study(path)
+        return {"session": path}
     if path.name == NOTEBOOK:
-        return _Study(path.parent)
+        return {"session": path.parent}
     document = read_tables(path, _TABLES, "study file or session folder", {"identify": ("session",)})
     return _study(path, document["identify"], document.get("output", {}))
 
 
-def _study(path: Path, asked: Mapping[str, Any], output: Mapping[str, Any]) -> _Study:
+def _study(path: Path, asked: Mapping[str, Any], output: Mapping[str, Any]) -> dict[str, Any]:
     from nonsmooth.cli.study import load_model
     from nonsmooth.recordings.session import APPARATUS
 
@@ -111,40 +103,34 @@ def _study(path: Path, asked: Mapping[str, Any], output: Mapping[str, Any]) -> _
     session = folder / asked["session"]
     if not session.is_dir():
         raise ValueError(f"{where}: session = {asked['session']!r}: no such folder beside the study file ({session})")
-    apparatus, crank, style = asked.get("apparatus", {}), asked.get("crank_length"), output.get("format", "pdf")
+    apparatus, style = asked.get("apparatus", {}), output.get("format", "pdf")
     check_keys(apparatus, APPARATUS, f"{where}, apparatus", "a key")
     if style not in _FORMATS:
         raise ValueError(f"{path}, table [output]: {unknown(style, 'a format', 'figures', _FORMATS)}")
-    return _Study(
-        session,
-        load_model(asked["model"], folder) if "model" in asked else None,
-        tuple(asked.get("parameters", [])),
-        None if crank is None else float(crank),
-        {
-            name: (value.get("value"), value.get("uncertainty", 0.0)) if isinstance(value, dict) else value
-            for name, value in apparatus.items()
-        },
-        **{key: folder / output[key] if key in output else None for key in ("data", "table", "figures")},
-        format=style,
-    )
+    known = {
+        name: (value.get("value"), value.get("uncertainty", 0.0)) if isinstance(value, dict) else value
+        for name, value in apparatus.items()
+    }
+    places = {key: folder / name for key, name in output.items() if key != "format"}
+    model = {"model": load_model(asked["model"], folder)} if "model" in asked else {}
+    return {**asked, **places, **model, "session": session, "apparatus": known, "format": style}
 
 
-def _write(found: Any, study: _Study, data: Path | None) -> list[Path]:
+def _write(found: Any, study: Mapping[str, Any]) -> list[Path]:
     written = []
-    if data is not None:
-        written.append(keep(found.to_dataset(), data))
-    if study.table is not None:
+    if "data" in study:
+        written.append(keep(found.to_dataset(), study["data"]))
+    if "table" in study:
         from nonsmooth.identification.report import report
 
-        with_folder(study.table).write_text(report(found), encoding="utf-8")
-        written.append(study.table)
-    if study.figures is not None:
+        written.append(put_text(study["table"], report(found)))
+    if "figures" in study:
         plot = without_screen()
         from matplotlib import pyplot as plt
 
         from nonsmooth.plot.identification.picture import pictures
 
         for name, ax in pictures(found):
-            written.append(plot.save_figure(ax, with_folder(study.figures / f"{name}.{study.format}")))
+            written.append(plot.save_figure(ax, with_folder(study["figures"] / f"{name}.{study['format']}")))
             plt.close("all")
     return written

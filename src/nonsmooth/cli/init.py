@@ -10,13 +10,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from nonsmooth.cli.files import with_folder
+from nonsmooth.cli.files import put_text
 from nonsmooth.cli.verb_options import VERBS, Option, options_of
 
 _WIDTH = 100
 
 
-def add(commands: Any) -> None:
+def add(commands: Any) -> Any:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "init",
@@ -31,10 +31,10 @@ def add(commands: Any) -> None:
     parser.add_argument("model", metavar="MODEL", help='a name of `nonsmooth models`, or "file.py:object"')
     parser.add_argument("--verb", choices=VERBS, default="simulate", help="what to compute (default: simulate)")
     parser.add_argument("--out", type=Path, metavar="STUDY.toml", help="the file (default: MODEL_VERB.toml)")
-    parser.set_defaults(run=_run)
+    return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     from nonsmooth.cli.study import load_model
 
     system = load_model(options.model, Path())
@@ -43,7 +43,7 @@ def _run(options: argparse.Namespace) -> int:
     if out.exists():
         raise ValueError(f"{out}: is there already and was left alone; give another name with --out")
     model = name if not colon else f"{Path(os.path.relpath(file, out.parent or Path())).as_posix()}:{name}"
-    with_folder(out).write_text(study_text(system, model, options.verb, out.stem), encoding="utf-8")
+    put_text(out, study_text(system, model, options.verb, out.stem))
     print(f"written to {out}; run it with: nonsmooth run {out}")
     return 0
 

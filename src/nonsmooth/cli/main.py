@@ -152,7 +152,7 @@ def parser() -> argparse.ArgumentParser:
     known.set_defaults(run=None)
     commands = known.add_subparsers(title="commands", metavar="COMMAND")
     for command in _COMMANDS:
-        command.add(commands)
+        command.add(commands).set_defaults(run=command.run)
     return known
 
 

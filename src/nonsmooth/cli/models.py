@@ -7,7 +7,7 @@ import re
 from typing import Any
 
 
-def add(commands: Any) -> None:
+def add(commands: Any) -> Any:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "models",
@@ -16,10 +16,10 @@ def add(commands: Any) -> None:
         epilog="examples:\n  nonsmooth models\n  nonsmooth models discontinuous_support",
     )
     parser.add_argument("name", nargs="?", metavar="MODEL", help="show this model's equations and parameters")
-    parser.set_defaults(run=_run)
+    return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     from nonsmooth import models
     from nonsmooth.cli.study import named_model
 

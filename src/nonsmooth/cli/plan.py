@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 
-def add(commands: Any) -> None:
+def add(commands: Any) -> Any:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "plan",
@@ -21,10 +21,10 @@ def add(commands: Any) -> None:
     parser.add_argument("study", type=Path, metavar="STUDY.toml", help="a study file with a table [chart]")
     parser.add_argument("--workers", type=int, help="cores of a cluster to reckon with")
     parser.add_argument("--seconds", type=float, default=5.0, help="time to spend on the sample (default: 5)")
-    parser.set_defaults(run=_run)
+    return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     for library in ("h5netcdf", "xarray"):  # what the run itself loads counts in its memory
         import_module(library)
 

@@ -10,7 +10,7 @@ from typing import Any
 from nonsmooth.cli.files import without_screen
 
 
-def add(commands: Any) -> None:
+def add(commands: Any) -> Any:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "reproduce",
@@ -41,10 +41,10 @@ def add(commands: Any) -> None:
         "--full", action="store_true", help="large charts over two parameters too; an interrupted run goes on"
     )
     parser.add_argument("--quiet", action="store_true", help="no progress bars")
-    parser.set_defaults(run=_run)
+    return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     from nonsmooth.studies import installed, study
 
     out = options.out or Path("out") / (options.study + "_quick" * options.quick)

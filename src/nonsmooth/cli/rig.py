@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 
-def add(commands: Any) -> None:
+def add(commands: Any) -> Any:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "rig",
@@ -37,10 +37,10 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--truth", type=Path, metavar="FILE", help="where the truth goes (default: DIR.truth.toml)")
     parser.add_argument("--quiet", action="store_true", help="no summary")
-    parser.set_defaults(run=_run)
+    return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     from nonsmooth.studies import study
 
     rig = study("savi2007", "rig")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 
-def add(commands: Any) -> None:
+def add(commands: Any) -> Any:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "run",
@@ -33,10 +33,10 @@ def add(commands: Any) -> None:
         "--scheduler", metavar="ADDRESS", help="compute the chunks on the workers of this Dask scheduler (tcp://...)"
     )
     parser.add_argument("--quiet", action="store_true", help="no progress bars, no summary")
-    parser.set_defaults(run=_run)
+    return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     from nonsmooth.cli.show import summary
     from nonsmooth.cli.study import read_study
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from nonsmooth.cli.files import with_folder
+from nonsmooth.cli.files import put_text
 from nonsmooth.cli.verb_options import VERBS, Option, options_of
 
 _TYPES: dict[str, dict[str, Any]] = {
@@ -40,7 +40,7 @@ _STATE_BY_NAME = {"type": "object", "additionalProperties": {"type": "number"}}
 _STATE = {"anyOf": [_NUMBERS, _STATE_BY_NAME]}
 
 
-def add(commands: Any) -> None:
+def add(commands: Any) -> Any:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "schema",
@@ -51,15 +51,15 @@ def add(commands: Any) -> None:
         epilog="examples:\n  nonsmooth schema --out study.schema.json",
     )
     parser.add_argument("--out", type=Path, metavar="FILE", help="where to write it (else it is printed)")
-    parser.set_defaults(run=_run)
+    return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     text = json.dumps(study_schema(), indent=2, ensure_ascii=False)
     if options.out is None:
         print(text)
     else:
-        with_folder(options.out).write_text(text + "\n", encoding="utf-8")
+        put_text(options.out, text + "\n")
         print(f"written to {options.out}; in a study file beside it the first line is  #:schema ./{options.out.name}")
     return 0
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def add(commands: Any) -> None:
+def add(commands: Any) -> Any:
     """Declare the sub-command."""
     parser = commands.add_parser(
         "show",
@@ -26,10 +26,10 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("file", type=Path, help="a result saved by this package, or a recording")
     parser.add_argument("--text", action="store_true", help="show the whole text of the system too")
-    parser.set_defaults(run=_run)
+    return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     from nonsmooth.results.provenance import read_provenance
     from nonsmooth.results.store import load
 

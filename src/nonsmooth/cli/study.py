@@ -28,8 +28,6 @@ SYSTEM = {"model": TEXT, "text": TEXT, "parameters": ANY, "smoothed": ANY}
 _FORMATS = (".pdf", ".png", ".svg", ".eps", ".ps", ".pgf", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 #: Keys of the table [output], with the endings that a name may have.
 OUTPUT = {"data": (".nc", ".zarr"), "figure": _FORMATS, "store": (".zarr",), "x": (), "y": ()}
-#: Verbs whose work is cut into chunks.
-_IN_CHUNKS = ("chart", "basins", "basin_fractions")
 _FIGURES = {
     "simulate": "phase_portrait",
     "sweep": "bifurcation",
@@ -76,7 +74,7 @@ class Study:
                 what = "store" if name == "store" else "scheduler"
                 raise ValueError(
                     f"{self.path}: {self.verb} is not cut into chunks and takes no {what}; "
-                    f"those that do: {', '.join(_IN_CHUNKS)}"
+                    "those that do: chart, basins, basin_fractions"
                 )
         extra = {name: value for name, value in given.items() if name in known}
         result: xr.Dataset = verb(self.system, **self.options, **extra)

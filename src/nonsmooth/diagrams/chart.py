@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack, cast
 
 import numpy as np
@@ -108,19 +109,20 @@ def chart(
 
         if chunked:
             raise ValueError("refine decides from its results what to compute next: it takes no store and no client")
-        arrays = refined(work, refine, threads=workers_of(options), progress=options["progress"], label=label)
+        fill = partial(refined, part=refine, threads=workers_of(options), progress=options["progress"])
     else:
         if chunked and work.device == "cpu":
             work = replace(work, chunk=STORED)
-        flat: dict[str, Any] = {}
-        try:
-            arrays = planned.over_grid(run(work, label=label, columns=flat, **kept_of(options)))
-        except KeyboardInterrupt as error:
-            known = int((flat["status"] != codes.INTERRUPTED).sum()) if flat else 0
-            if not known:
-                raise
-            part = planned.dataset(asked, planned.over_grid(flat))
-            raise Interrupted.with_points(error, known, flat["status"].size, label, part) from error
+        fill = partial(run, **kept_of(options))
+    flat: dict[str, Any] = {}
+    try:
+        arrays = planned.over_grid(fill(work, label=label, columns=flat))
+    except KeyboardInterrupt as error:
+        known = int((flat["status"] != codes.INTERRUPTED).sum()) if flat else 0
+        if not known:
+            raise
+        part = planned.dataset(asked, planned.over_grid(flat))
+        raise Interrupted.with_points(error, known, flat["status"].size, label, part) from error
     if "maximum" in arrays:
         warn_if_small(system, work.starts, arrays["maximum"], arrays["minimum"])
     return planned.dataset(asked, arrays)

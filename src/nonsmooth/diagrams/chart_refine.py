@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.campaign.run import run
-from nonsmooth.campaign.work import check_room
+from nonsmooth.campaign.work import check_room, empty_columns
 from nonsmooth.diagrams.chart_work import ChartWork
 from nonsmooth.flow.engines.engine import IntArray
 from nonsmooth.kernels.hybrid import codes
@@ -47,9 +47,15 @@ def labels_of_points(arrays: Mapping[str, NDArray[Any]]) -> IntArray:
 
 
 def refined(
-    work: ChartWork, part: bool | float, *, threads: int | None = None, progress: Progress = True, label: str = ""
+    work: ChartWork,
+    part: bool | float,
+    *,
+    threads: int | None,
+    progress: Progress,
+    label: str,
+    columns: dict[str, NDArray[Any]],
 ) -> dict[str, NDArray[Any]]:
-    """Columns over the plane, with ``confidence`` and ``computed``.
+    """Columns over all points, with ``confidence`` and ``computed``; ``columns`` hold what was computed by then.
 
     Parameters
     ----------
@@ -70,7 +76,8 @@ def refined(
     if work.carried or len(work.starts) > 1:
         raise ValueError("refine needs points that stand alone: leave carry out and give one start")
     check_room(work, label)
-    return _Refinement(work, share, threads, progress, label).result()
+    columns |= empty_columns(work)
+    return _Refinement(work, share, threads, progress, label, columns).result()
 
 
 def confidence_of(
@@ -91,16 +98,20 @@ def confidence_of(
 class _Refinement:
     """The plane as far as it is known."""
 
-    def __init__(self, work: ChartWork, share: float, threads: int | None, progress: Progress, label: str) -> None:
-        self.work, self.threads, self.progress, self.text = work, threads, progress, label
+    def __init__(
+        self,
+        work: ChartWork,
+        share: float,
+        threads: int | None,
+        progress: Progress,
+        label: str,
+        columns: dict[str, NDArray[Any]],
+    ) -> None:
+        self.work, self.threads, self.progress, self.text, self.columns = work, threads, progress, label, columns
         self.shape = (len(next(iter(work.grid.values()))), len(list(work.grid.values())[1]))
         size = self.shape[0] * self.shape[1]
         self.budget = max(int(share * size), min(size, LEAST_POINTS))
         self.label = np.full(self.shape, UNKNOWN, dtype=np.int64)
-        self.columns = {
-            name: np.full((*self.shape, *item.shape), np.nan if item.dtype == "f8" else 0, item.dtype)
-            for name, item in work.columns().items()
-        }
         self.spent = 0
         self.rng = np.random.default_rng(0)
 
@@ -115,11 +126,11 @@ class _Refinement:
                 break
         self._halve(step)
         nearest, classes = self._inferred()
-        computed = self.label != UNKNOWN
+        computed, places = self.label != UNKNOWN, np.ravel_multi_index(tuple(nearest), self.shape).ravel()
         confidence = confidence_of(classes, computed, rates)
         for name in ("period_number", "status", "crossings_per_period", "contacts_per_period"):
-            self.columns[name] = self.columns[name][tuple(nearest)]
-        return {**self.columns, "confidence": confidence, "computed": computed.astype(np.int8)}
+            self.columns[name] = self.columns[name][places]
+        return {**self.columns, "confidence": confidence.ravel(), "computed": computed.ravel().astype(np.int8)}
 
     def _coarse_step(self) -> int:
         step = 1
@@ -139,9 +150,13 @@ class _Refinement:
             places = np.sort(self.rng.choice(places, max(left, 0), replace=False))
         if not len(places):
             return
-        found = run(replace(self.work, where=places), threads=self.threads, progress=self.progress, label=self.text)
-        for name, values in found.items():
-            self.columns[name].reshape(-1, *values.shape[1:])[places] = values
+        found: dict[str, NDArray[Any]] = {}
+        work = replace(self.work, where=places)
+        try:
+            run(work, threads=self.threads, progress=self.progress, label=self.text, columns=found)
+        finally:
+            for name, values in found.items():
+                self.columns[name][places] = values
         self.label.ravel()[places] = labels_of_points(found)
         self.spent += len(places)
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
-from nonsmooth.explorer.labels import html_of, number, plain_of, symbols_of
+from nonsmooth.explorer.labels import html_of, number, plain_of, rows_of, symbols_of
 from nonsmooth.explorer.recorded import (
     LARGEST,
     RecordedFile,
@@ -134,7 +134,7 @@ class Bench:
         self._count += 1
         self._job = self._count, what, self.page.state.model
         self.doing, self._fraction = what, 0.0
-        self._worker = Worker(lambda answer: self.page.later(self._hear, answer))
+        self._worker = Worker.idle(lambda answer: self.page.later(self._hear, answer))
         self._worker.ask(self._count, job)
 
     def _stop(self) -> None:
@@ -272,15 +272,15 @@ class Bench:
                 f"{far['periods']} forcing periods compared; "
                 f"the record's phase leads the model's by {round(far['shift'], 3) + 0.0:.3f} of a period"
             )
-        drive, html = laid.get("drive"), {name: html_of(symbol) for name, symbol in symbols.items()}
+        drive = laid.get("drive")
         return {
             **busy,
             "file": recorded.file + (" (synthetic)" if recorded.synthetic else ""),
             "runs": len(recorded.runs),
             "unit": "s" if recorded.axis == "time" else "Hz",
-            "rows": [{"name": name, "html": html[name], "unit": unit} for name, unit in system.states.items()],
+            "rows": rows_of(system),
             "shown": [*setup.channels],
-            "ticks": [{"name": name, "html": html[name]} for name in system.parameters],
+            "ticks": [{"name": name, "html": html_of(symbols[name])} for name in system.parameters],
             "drive": "" if drive is None else f"forcing period {number(drive, 's', 5)} recorded",
             "found": self._told,
             "remarks": remarks,

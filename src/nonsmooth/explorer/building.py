@@ -16,12 +16,14 @@ import numpy as np
 import nonsmooth as ns
 from nonsmooth.errors import SystemDefinitionError
 from nonsmooth.explorer.state import number_of
+from nonsmooth.system.kinds import Limit, above, at_least
 
 if TYPE_CHECKING:
     from nonsmooth.explorer.session import Page
     from nonsmooth.system.system import System
 
 _MOST = 4  # masses, and elements
+_ANY = at_least(-np.inf)
 _KEPT = 50  # models that a page may have made
 
 
@@ -33,8 +35,7 @@ class FormNumber:
     unit: str
     value: float
     letter: str
-    least: float = -np.inf
-    most: float = np.inf
+    limit: Limit = _ANY
 
 
 @dataclass(frozen=True)
@@ -49,19 +50,19 @@ class ElementKind:
 
 #: Of a mass: its own, and of the spring, the damper and the force at it.
 LINK: Mapping[str, FormNumber] = {
-    "m": FormNumber("mass", "kg", 1.0, "m", least=1e-12),
-    "k": FormNumber("stiffness", "N/m", 1.0, "k", least=0.0),
-    "c": FormNumber("damping", "N s/m", 0.1, "c", least=0.0),
+    "m": FormNumber("mass", "kg", 1.0, "m", above(0.0)),
+    "k": FormNumber("stiffness", "N/m", 1.0, "k", at_least(0.0)),
+    "c": FormNumber("damping", "N s/m", 0.1, "c", at_least(0.0)),
     "F": FormNumber("force", "N", 0.0, "F"),
 }
-_OMEGA = FormNumber("forcing frequency", "rad/s", 1.0, "omega", least=1e-9)
+_OMEGA = FormNumber("forcing frequency", "rad/s", 1.0, "omega", above(0.0))
 _POSITION = {"position": FormNumber("position", "m", 0.5, "d")}
-_STIFFNESS = {"stiffness": FormNumber("stiffness", "N/m", 20.0, "s", least=0.0)}
-_RESTITUTION = {"restitution": FormNumber("restitution", "1", 0.7, "e", least=0.0, most=1.0)}
-_DAMPING = {"damping": FormNumber("damping", "N s/m", 0.1, "b", least=0.0)}
-_FRICTION = {"friction": FormNumber("friction force", "N", 0.2, "f", least=0.0)}
+_STIFFNESS = {"stiffness": FormNumber("stiffness", "N/m", 20.0, "s", at_least(0.0))}
+_RESTITUTION = {"restitution": FormNumber("restitution", "1", 0.7, "e", at_least(0.0, 1.0))}
+_DAMPING = {"damping": FormNumber("damping", "N s/m", 0.1, "b", at_least(0.0))}
+_FRICTION = {"friction": FormNumber("friction force", "N", 0.2, "f", at_least(0.0))}
 _BELT = {"belt": FormNumber("speed of the ground", "m/s", 0.0, "w")}
-_PLAY = {"half_width": FormNumber("half width", "m", 0.2, "h", least=0.0)}
+_PLAY = {"half_width": FormNumber("half width", "m", 0.2, "h", at_least(0.0))}
 _PRELOAD = {"preload": FormNumber("preload", "N", 0.2, "P")}
 KINDS: Mapping[str, ElementKind] = {
     "stop": ElementKind("rigid stop", "Stop", _POSITION | _RESTITUTION, sided=True),
@@ -196,9 +197,8 @@ def _numbers(quantities: Mapping[str, FormNumber], row: Mapping[str, Any], where
 
 def _number(value: Any, quantity: FormNumber, where: str) -> float:
     number = number_of(value, f"{where}, {quantity.label}")
-    if not quantity.least <= number <= quantity.most:
-        limits = f"at least {quantity.least:g}" + (f" and at most {quantity.most:g}" if quantity.most < np.inf else "")
-        raise ValueError(f"{where}, {quantity.label} = {number:g}: give {limits}")
+    if not quantity.limit.holds(number):
+        raise ValueError(f"{where}, {quantity.label} = {number:g} must be {quantity.limit.words}")
     return number
 
 

@@ -27,30 +27,24 @@ def theme(dark: bool, large: bool) -> Theme:
         ("#171B20", "#E8E8E8", "#2C3239", "#8A929B") if dark else ("#FFFFFF", "#1B1F24", "#E4E7EB", "#6B7280")
     )
     size = 20 if large else 13
+
+    def letters(of: str, pixels: int) -> dict[str, str]:
+        looks = {"color": ink, "font": "system-ui, sans-serif", "font_style": "normal", "font_size": f"{pixels}px"}
+        return {f"{of}text_{key}": one for key, one in looks.items()}
+
     return Theme(
         json={
             "attrs": {
                 "Plot": {"background_fill_color": paper, "border_fill_color": None, "outline_line_color": line},
                 "Grid": {"grid_line_color": faint},
                 "BasicTicker": {"desired_num_ticks": 4 if large else 6},
-                "Title": {
-                    "text_color": ink,
-                    "text_font": "system-ui, sans-serif",
-                    "text_font_style": "normal",
-                    "text_font_size": f"{size + 2}px",
-                    "standoff": 4,
-                },
+                "Title": {**letters("", size + 2), "standoff": 4},
                 "Axis": {
                     "axis_line_color": line,
                     "major_tick_line_color": line,
                     "minor_tick_line_color": None,
-                    "axis_label_text_color": ink,
-                    "axis_label_text_font_style": "normal",
-                    "axis_label_text_font_size": f"{size + 2}px",
-                    "axis_label_text_font": "system-ui, sans-serif",
-                    "major_label_text_color": ink,
-                    "major_label_text_font_size": f"{size}px",
-                    "major_label_text_font": "system-ui, sans-serif",
+                    **letters("axis_label_", size + 2),
+                    **letters("major_label_", size),
                     "axis_label_standoff": 6,
                 },
             }
@@ -134,6 +128,13 @@ class Panel:
         for one, ends in ((self.plot.x_range, x), (self.plot.y_range, y)):
             if ends is not None:
                 one.update(start=ends[0], end=ends[1], reset_start=ends[0], reset_end=ends[1])
+
+
+def cells_of(x: Any, y: Any) -> dict[str, list[float]]:
+    """Place and size of an image whose cells are about these values."""
+    steps = [(one[-1] - one[0]) / max(len(one) - 1, 1) or 1.0 for one in (x, y)]
+    places = {name: [one[0] - step / 2] for name, one, step in zip("xy", (x, y), steps, strict=True)}
+    return places | {f"d{name}": [step * len(one)] for name, one, step in zip("wh", (x, y), steps, strict=True)}
 
 
 def extent(values: Any, margin: float = 0.06) -> tuple[float, float]:

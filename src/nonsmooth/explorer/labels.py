@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from sympy.printing.pretty.pretty_symbology import greek_unicode, sub
 
-from nonsmooth.plot.prefixes import PREFIXES, power_for
+from nonsmooth.plot.labels import with_unit
+from nonsmooth.plot.prefixes import PREFIXES, power_for, prefixed
 from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
@@ -19,6 +20,11 @@ def symbols_of(system: System) -> dict[str, str]:
     return {name: p.symbol or latex_name(name) for name, p in system.parameters.items()} | {
         name: latex_name(name) for name in system.states
     }
+
+
+def rows_of(system: System) -> list[dict[str, str]]:
+    """The states as the page lists them: name, symbol and unit."""
+    return [{"name": name, "html": html_of(latex_name(name)), "unit": unit} for name, unit in system.states.items()]
 
 
 def plain_of(latex: str) -> str:
@@ -50,12 +56,10 @@ def power_of(unit: str, *values: float) -> int:
 
 def axis_label(latex: str, unit: str, power: int = 0) -> str:
     """``ρ (N)``; the symbol alone of what has no unit."""
-    text = plain_of(latex)
-    return text if unit in ("", "1") else f"{text} ({PREFIXES[power]}{unit})"
+    return with_unit(plain_of(latex), PREFIXES[power] + unit)
 
 
 def number(value: float, unit: str = "", digits: int = 4) -> str:
     """A value with its unit, in the prefix that suits it: ``−4.5 mm``."""
-    power = power_of(unit, value)
-    text = f"{value / 10.0**power:.{digits}g}".replace("-", "\N{MINUS SIGN}")
-    return text if unit in ("", "1") else f"{text} {PREFIXES[power]}{unit}"
+    text, unit = prefixed(value, unit, digits)
+    return text if unit in ("", "1") else f"{text} {unit}"

@@ -158,17 +158,8 @@ def strand_distance(
     def squares(shift: float) -> FloatArray:
         """Mean squares over phase, (recorded periods, the motion's periods, states)."""
         b = fold(phase - phase[0] + shift, u, grid)[: whole if closed else None] / size
-        return np.stack(
-            [
-                (
-                    np.mean(a[:, :, i] ** 2, axis=1)[:, None]
-                    + np.mean(b[:, :, i] ** 2, axis=1)[None]
-                    - 2 * a[:, :, i] @ b[:, :, i].T / grid
-                ).clip(0)
-                for i in range(len(size))
-            ],
-            axis=-1,
-        )
+        mixed = np.einsum("kgs,jgs->kjs", a, b) / grid
+        return ((a**2).mean(axis=1)[:, None] + (b**2).mean(axis=1) - 2 * mixed).clip(0)
 
     def nearest(shift: float) -> FloatArray:
         each = squares(shift)
@@ -194,11 +185,7 @@ def fitted(job: Job) -> dict[str, Any]:
     samples: RecordedStates = job["samples"]
     step = -(-len(samples.time) // _FITTED)
     take = slice(None, None, step)
-    table = {
-        state: (samples.time[take][ok], column[take][ok])
-        for state, column in samples.columns.items()
-        for ok in [np.isfinite(column[take])]
-    }
+    table = {state: (samples.time[take], column[take]) for state, column in samples.columns.items()}
     unknown = [*job["parameters"], *(["phase"] if job.forced else [])]
     found = ns.fit(job.system, table, unknown, progress=job.heard)
     return {
@@ -208,7 +195,7 @@ def fitted(job: Job) -> dict[str, Any]:
             for name, one in found.estimates.items()
         },
         "anomalies": [*found.anomalies],
-        "samples": sum(len(t) for t, _ in table.values()),
+        "samples": sum(int(np.isfinite(column).sum()) for _, column in table.values()),
         "step": step,
     }
 

@@ -19,29 +19,6 @@ if TYPE_CHECKING:
 
 def opened_study(system: System, options: Mapping[str, Any], output: Mapping[str, str]) -> tuple[System | None, str]:
     """The system of a study and the query of its view; no system where it is one of ``nonsmooth.models``."""
-    return _opened(system, options, output)
-
-
-def opened_result(result: xr.Dataset) -> tuple[System | None, str]:
-    """The system of a result and the query of its view; no system where it is one of ``nonsmooth.models``.
-
-    Raises
-    ------
-    ValueError
-        A Dataset that was not made from a system.
-    """
-    from nonsmooth.results.provenance import read_provenance
-    from nonsmooth.system.origin import system_of
-
-    system, options = system_of(result), dict(read_provenance(result).get("options", {}))
-    for name in system.parameters:
-        if name in result.dims:
-            options |= {"parameter": name, "values": result[name].values}
-            break
-    return _opened(system, options, {})
-
-
-def _opened(system: System, options: Mapping[str, Any], output: Mapping[str, str]) -> tuple[System | None, str]:
     name, states = _name_of(system), list(system.states)
     state = first_state(name, system)
     for parameter, values in _ranges(options):
@@ -66,6 +43,25 @@ def _opened(system: System, options: Mapping[str, Any], output: Mapping[str, str
         with suppress(ValueError, TypeError):  # what no page shows stays as it is
             state = changed(state, field, value, states)
     return (None if name != GIVEN else system), to_query(state)
+
+
+def opened_result(result: xr.Dataset) -> tuple[System | None, str]:
+    """The system of a result and the query of its view; no system where it is one of ``nonsmooth.models``.
+
+    Raises
+    ------
+    ValueError
+        A Dataset that was not made from a system.
+    """
+    from nonsmooth.results.provenance import read_provenance
+    from nonsmooth.system.origin import system_of
+
+    system, options = system_of(result), dict(read_provenance(result).get("options", {}))
+    for name in system.parameters:
+        if name in result.dims:
+            options |= {"parameter": name, "values": result[name].values}
+            break
+    return opened_study(system, options, {})
 
 
 def _ranges(options: Mapping[str, Any]) -> list[tuple[str, Any]]:

@@ -25,7 +25,6 @@
   }
   /* A control bears the name of the field that it sets, and shows the value that the server has of it. A field is sent
      when its text is complete, until then the server's values leave it alone; a slider is followed while it moves. */
-  const named = name => all(`[data-set="${name}"]`);
   const put = (input, value) => { if (!input.dataset.open && input.value !== String(value)) input.value = value; };
   const commit = (name, value) => { act("set", name, value); act("end"); };
   on(document, "input", ({target: one}) => {
@@ -33,7 +32,7 @@
     if (!name) return;
     if (one.type === "range") {
       held = name;
-      for (const other of named(name)) put(other, short(Number(one.value)));
+      for (const other of all(`[data-set="${name}"]`)) put(other, short(Number(one.value)));
       act("set", name, Number(one.value));
     } else if (one.tagName === "INPUT") one.dataset.open = "yes";
   });

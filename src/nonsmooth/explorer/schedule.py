@@ -52,18 +52,20 @@ class Schedule:
         self._running: Asked | None = None
         self._count = 0
         self.worker: Worker | None = None  # a request that opens no page starts no process
+        self._hear: Callable[[Answer], None] | None = None
 
     def begin(self, hear: Callable[[Answer], None]) -> bool:
         """Start the worker; False where it has been started."""
-        if self.worker is not None:
+        if self._hear is not None:
             return False
-        self.worker = Worker(hear)
+        self._hear, self.worker = hear, Worker.idle(hear)
         return True
 
     def close(self) -> None:
-        """End the worker."""
+        """Leave the worker to another page."""
         if self.worker is not None:
             self.worker.close()
+        self.worker = None
 
     def go_on(self) -> None:
         """Ask for what is missing; say so where nothing is."""
@@ -159,10 +161,11 @@ class Schedule:
 
     def _restart(self, code: int) -> None:
         running, self._running = self._running, None
-        assert self.worker is not None
+        if self.worker is None or self._hear is None:  # the page has gone
+            return
         self._vain += 1
         if self._vain < _VAIN:
-            self.worker.start()
+            self.worker = Worker.idle(self._hear)
         if running is not None:
             known = self._crashed[running.key] = self._crashed.get(running.key, 0) + 1
             if known > 1 and running.cancelled is None:

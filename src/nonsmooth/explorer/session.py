@@ -150,8 +150,8 @@ class Page:
 
     def _begin(self) -> None:
         """The page is there: work begins, where not too many others are at it; once it has gone its session ends."""
-        with suppress(AttributeError):  # of a document that nobody serves
-            self.document.session_context.session.request_expiration()
+        if (served := self.document.session_context) is not None:
+            served.session.request_expiration()
         if self.work.worker is None and len(self.tabs) >= MOST_TABS:
             self.notes["page"] = (
                 f"{MOST_TABS} tabs of this explorer compute already, each in a process of some 300 MB. Close one of "

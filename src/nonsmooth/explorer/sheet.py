@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from nonsmooth.explorer.bench import Bench
 from nonsmooth.explorer.catalogue import GIVEN, presets_of, slider_range
 from nonsmooth.explorer.kinds import KINDS, ORDER, SETTINGS, setting
-from nonsmooth.explorer.labels import html_of, plain_of, symbols_of
+from nonsmooth.explorer.labels import html_of, plain_of, rows_of, symbols_of
 from nonsmooth.explorer.state import CHOICES, to_query
 from nonsmooth.explorer.views.motion import Mechanism, Portrait, Readout, SectionPoints, TimeHistory
 from nonsmooth.explorer.views.over_parameters import Branches, Diagram, Response
@@ -131,12 +131,11 @@ class Sheet:
             rows.append(
                 {"name": name, "html": html_of(symbols[name]), "unit": parameter.unit, "low": low, "high": high}
             )
-        states = [{"name": name, "html": html_of(symbols[name]), "unit": unit} for name, unit in system.states.items()]
         return {
             "models": {name: "your system" if name == GIVEN else name.replace("_", " ") for name in models},
             "presets": list(presets_of(state.model)),
             "parameters": rows,
-            "states": states,
+            "states": rows_of(system),
             "choices": {name: list(words.items()) for name, words in choices.items()},
             "state": values,
             "query": to_query(state),

@@ -55,6 +55,12 @@ class Job:
         """Values of the parameter that is varied."""
         return np.linspace(self["low"], self["high"], self["columns"])
 
+    def span(self, shown: int, duration: float, transient: float) -> dict[str, Any]:
+        """Forcing periods of a run, behind the page's transient; of a system without forcing its times."""
+        if self.forced:
+            return {"periods": shown, "transient": self["transient"]}
+        return {"duration": duration, "transient": transient}
+
     def section(self, phase: float = 0.0) -> Any:
         """Stroboscopic at a phase; where nothing forces the system, its first indicator rising."""
         return ns.Stroboscopic(phase) if self.forced else ns.Poincare(self.system.indicators[0])
@@ -146,10 +152,7 @@ def _sketch(job: Job) -> dict[str, Any]:
     """Pictures of the mechanism over one period of the motion, or some periods where it has none."""
     period, system = job["period"], _system(job["text"]).with_parameters(job["values"])
     shown = min(period, _MOST_MOVED) or 3
-    if job.forced:
-        span: dict[str, Any] = {"periods": shown, "transient": job["transient"]}
-    else:
-        span = {"duration": job["span"] * shown / periods_shown(period), "transient": 10 * job["span"]}
+    span = job.span(shown, job["span"] * shown / periods_shown(period), 10 * job["span"])
     pictures = _PICTURES * shown
     run = ns.simulate(job.system, start=job["start"], samples=pictures + 1, **span, **job.options)
     time = run["time"].values
@@ -169,11 +172,7 @@ def _stability(job: Job) -> dict[str, Any]:
             progress=job.heard,
         )
         return {"multipliers": np.asarray(orbit.floquet_multipliers)}
-    span: dict[str, Any] = (
-        {"transient": job["transient"], "periods": _MEASURED}
-        if job.forced
-        else {"transient": job["span"], "duration": _MEASURED / _CHAOTIC * job["span"]}
-    )
+    span = job.span(_MEASURED, _MEASURED / _CHAOTIC * job["span"], job["span"])
     return {"exponents": ns.lyapunov(job.system, start=job["start"], progress=job.heard, **span, **job.options)}
 
 

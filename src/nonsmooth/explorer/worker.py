@@ -35,48 +35,15 @@ Answer = tuple[str, int, Any]
 
 
 class Worker:
-    """The process that computes for one page: one that another page has left, or a new one.
+    """A process that computes, for the one that hears it; one that nobody hears any more waits for the next.
 
     Parameters
     ----------
-    hear : function
+    hear : function, optional
         Called with every answer, in a thread of its own.
     """
 
-    def __init__(self, hear: Callable[[Answer], None]) -> None:
-        self._hear = hear
-        self.start()
-
-    def start(self) -> None:
-        """Start the process, in place of one that has ended."""
-        self._process: _Process | None = _Process.idle(self._hear)
-
-    def ask(self, number: int, job: Mapping[str, Any]) -> None:
-        """Hand over a request; its answers bear this number."""
-        if self._process is not None:
-            self._process.ask(number, dict(job))
-
-    def cancel(self, number: int) -> None:
-        """Say that a request is not wanted any more."""
-        if self._process is not None:
-            self._process.cancel(number)
-
-    def end(self) -> None:
-        """End the process, whatever it does now; ``start`` begins another one."""
-        if self._process is not None:
-            self._process.kill()
-
-    def close(self) -> None:
-        """Leave the process to the next page; what it was asked is cancelled."""
-        if self._process is not None:
-            self._process.leave()
-        self._process = None
-
-
-class _Process:
-    """A process that computes, for the one that hears it; one that nobody hears any more waits for the next."""
-
-    spare: _Process | None = None
+    spare: Worker | None = None
     lock = threading.RLock()  # of the spare one, and of who hears whom
 
     def __init__(self, hear: Callable[[Answer], None] | None = None) -> None:
@@ -93,7 +60,7 @@ class _Process:
         threading.Thread(target=self._listen, daemon=True).start()
 
     @classmethod
-    def idle(cls, hear: Callable[[Answer], None]) -> _Process:
+    def idle(cls, hear: Callable[[Answer], None]) -> Worker:
         """The one that waits, or a new one, heard from now on."""
         with cls.lock:
             one, cls.spare = cls.spare, None
@@ -104,21 +71,24 @@ class _Process:
                 hear(("ready", 0, None))
             return one
 
-    def ask(self, number: int, job: dict[str, Any]) -> None:
+    def ask(self, number: int, job: Mapping[str, Any]) -> None:
+        """Hand over a request; its answers bear this number."""
         with self.lock:
             self._count += 1
             self._asked[self._count] = number
-        self._send(("ask", self._count, job))
+        self._send(("ask", self._count, dict(job)))
 
     def cancel(self, number: int) -> None:
+        """Say that a request is not wanted any more."""
         for own in [own for own, other in self._asked.copy().items() if other == number]:
             self._send(("cancel", own, None))
 
-    def kill(self) -> None:
+    def end(self) -> None:
+        """End the process, whatever it does now."""
         self._popen.kill()
 
-    def leave(self) -> None:
-        """Wait for the next page, once what was asked has been cancelled."""
+    def close(self) -> None:
+        """Wait for the next page, once what was asked has been cancelled; who has closed it asks no more."""
         with self.lock:
             self.hear, unwanted = None, [*self._asked]
             self._rest()
@@ -130,16 +100,16 @@ class _Process:
             late.start()
 
     def _rest(self) -> None:
-        if self.hear is None and not self._asked and _Process.spare is not self:
-            if _Process.spare is not None:
-                self.kill()
+        if self.hear is None and not self._asked and Worker.spare is not self:
+            if Worker.spare is not None:
+                self.end()
             else:
-                _Process.spare = self
+                Worker.spare = self
 
     def _end_if_at_work(self) -> None:
         with self.lock:
             if self.hear is None and self._asked:
-                self.kill()
+                self.end()
 
     def _send(self, message: Any) -> None:
         assert self._popen.stdin is not None
@@ -158,8 +128,8 @@ class _Process:
                 assert pipe is not None
                 pipe.close()
         with self.lock:
-            if _Process.spare is self:
-                _Process.spare = None
+            if Worker.spare is self:
+                Worker.spare = None
             if self.hear is not None:
                 self.hear(("ended", 0, code))
 
@@ -177,17 +147,17 @@ class _Process:
 
 def prepare() -> None:
     """Start the process of the first page, which takes a while."""
-    with _Process.lock:
-        if _Process.spare is None:
-            _Process.spare = _Process()
+    with Worker.lock:
+        if Worker.spare is None:
+            Worker.spare = Worker()
 
 
 def end_spare() -> None:
     """End the process that waits for a page."""
-    with _Process.lock:
-        if _Process.spare is not None:
-            _Process.spare.kill()
-        _Process.spare = None
+    with Worker.lock:
+        if Worker.spare is not None:
+            Worker.spare.end()
+        Worker.spare = None
 
 
 class _Cancelled:

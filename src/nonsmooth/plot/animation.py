@@ -8,21 +8,22 @@ import os
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
+from subprocess import CalledProcessError
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from nonsmooth.errors import Answering
+from nonsmooth.errors import Answering, DataFileError
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import column, first_states, name_plane, variable_along
 from nonsmooth.plot.mechanism import sketch_of_run
 from nonsmooth.plot.pen import put
 from nonsmooth.plot.trajectories import with_gaps
+from nonsmooth.results.whole import REMEDY, placed
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import above, at_least
 from nonsmooth.system.origin import system_of
 from nonsmooth.tables.sampled import sampled
-from nonsmooth.tables.table import placed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,17 +88,9 @@ def animate(
     time = run["time"].values
     at = sampled(run, None, np.linspace(time[0], time[-1], n, endpoint=False) if n > 1 else time[:1])
     sketch = sketch_of_run(system_of(run), at)
-    first = None if sketch is None else sketch[0].scheme.coordinates[0]
-    names = first_states(run, x or first, y or _speed(run, first))
+    own = (None, None) if sketch is None else sketch[0].scheme.pairs[0]
+    names = first_states(run, x or own[0], y or own[1])
     return Animation(run, at, sketch, [*names, history or names[0]], rate, pixels)
-
-
-def _speed(run: xr.Dataset, name: str | None) -> str | None:
-    """The speed of a coordinate: the state behind the coordinates at the same place; the second of two."""
-    states = [str(one) for one in run["state"].values]
-    if name is None or len(states) < 2:
-        return None
-    return next((one for one in (f"v_{name}", "v") if one in states), states[min(len(states) // 2, len(states) - 1)])
 
 
 class Animation(Answering):
@@ -118,7 +111,7 @@ class Animation(Answering):
         with style.journal():
             self.figure = Figure(figsize=(width, plots + high + 0.1), dpi=pixels / width)
             FigureCanvasAgg(self.figure)
-            rows: dict[str, Any] = {"nrows": 2, "height_ratios": [high, plots]} if high else {"nrows": 1}
+            rows: dict[str, Any] = {"nrows": 1 + bool(high), "height_ratios": [high, plots][not high :]}
             margins: dict[str, Any] = {"left": 0.1, "right": 0.98, "bottom": 0.42 / (plots + high), "top": 0.98}
             grid = self.figure.add_gridspec(
                 **rows, ncols=2, width_ratios=[1.0, 1.5], hspace=0.1, wspace=0.24, **margins
@@ -242,7 +235,12 @@ class Animation(Answering):
             settings = {"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()}
         with mpl.rc_context(settings):
             film = FuncAnimation(self.figure, self.draw, frames=len(self), repeat=False)
-            film.save(target, writer=FFMpegWriter(fps=self.rate, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]))
+            writer = FFMpegWriter(fps=self.rate, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"])
+            try:
+                film.save(target, writer=writer)
+            except CalledProcessError as error:
+                why = " ".join(str(error.stderr or "").splitlines()[-1:])
+                raise DataFileError(f"{target.name}: ffmpeg has written no film ({why}); {REMEDY}") from error
 
     def _repr_html_(self) -> str:
         """The pictures with a player of its own; nothing is loaded from elsewhere."""

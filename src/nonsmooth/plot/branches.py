@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
-from nonsmooth.plot.labels import name_and_unit, name_axes, name_plane, only_states, variable_along
+from nonsmooth.plot.labels import Name, name_and_unit, name_axes, name_plane, only_states, variable_along
 from nonsmooth.results.labels import words_of_flags
+from nonsmooth.system.kinds import above
+from nonsmooth.tables.quantities import dataset_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,10 +46,10 @@ def branch(
     ax: Axes,
     result: xr.Dataset,
     *,
-    y: str | None = None,
-    quantity: str = "section",
+    y: Name | None = None,
+    quantity: Literal["section", "maximum", "minimum", "amplitude"] = "section",
     special: bool = True,
-    color: str | None = None,
+    color: Any = None,
 ) -> None:
     """Draw a branch over its parameter: stable parts solid, unstable ones dashed, virtual ones dotted.
 
@@ -67,8 +69,7 @@ def branch(
     color
         Colour of the lines.
     """
-    draw_branch(ax, result, y=y, quantity=quantity, special=special, color=color)
-    (name,) = only_states(result, y)
+    name = draw_branch(ax, result, y=y, quantity=quantity, special=special, color=color)
     name_plane(ax, result, result.attrs["parameter"], name, _WORDS[quantity])
     style.clear_legend(ax)
 
@@ -77,22 +78,21 @@ def draw_branch(
     ax: Axes,
     result: xr.Dataset,
     *,
-    y: str | None = None,
+    y: Name | None = None,
     quantity: str = "section",
     special: bool = True,
     color: str | None = None,
     width: float = 0.9,
     behind: bool = False,
-) -> None:
-    """Draw the lines (``width`` in typographic points) and marks of a branch on axes that the caller labels.
+) -> str:
+    """Draw the lines (``width`` in typographic points) and marks of a branch on axes that the caller labels; return the
+    state.
 
     ``behind``: over points of a sweep, which lie on the stable parts: those become a pale, wide seam under them.
     """
     from nonsmooth.results.branches import with_marks_in_place
 
     variable_along(result, "stable", "continue_orbit")
-    if quantity not in _WORDS:
-        raise ValueError(f"quantity = {quantity!r}; allowed: {', '.join(map(repr, _WORDS))}")
     (name,) = only_states(result, y)
     result = with_marks_in_place(result)
     values = result[result.attrs["parameter"]].values
@@ -107,6 +107,14 @@ def draw_branch(
             ax.plot(with_breaks(values, at), with_breaks(row, at), line, color=shade, label=label, **looks)
     if special and result.sizes.get("special", 0):
         _mark_special(ax, result, values, ordinates, MARKS)
+    return name
+
+
+def check_axis(branch: xr.Dataset, parameter: str) -> None:
+    """Check that a branch is over the parameter of what it is drawn over."""
+    variable_along(branch, "stable", "continue_orbit")
+    if (of := branch.attrs["parameter"]) != parameter:
+        raise ValueError(f"the result is over {parameter!r}, this branch over {of!r}: they share no axis")
 
 
 def ordinates_of(result: xr.Dataset, name: str, quantity: str) -> NDArray[np.float64]:
@@ -193,7 +201,7 @@ POINTS = {
 
 
 @figure("continue_curve", "kind", "special_point")
-def curve(ax: Axes, result: xr.Dataset, *, special: bool = True, color: str | None = None) -> None:
+def curve(ax: Axes, result: xr.Dataset, *, special: bool = True, color: Any = None) -> None:
     """Draw a curve of special points over its two parameters; call it again on the same axes for another curve.
 
     Parameters
@@ -228,7 +236,7 @@ def curve(ax: Axes, result: xr.Dataset, *, special: bool = True, color: str | No
 
 
 @figure(ratio=0.9)
-def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: float | None = None) -> None:
+def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: Annotated[float, above(0)] | None = None) -> None:
     """Draw the Floquet multipliers of an orbit, or those along a branch coloured by its parameter.
 
     Parameters
@@ -241,7 +249,9 @@ def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: float | None = Non
         Half width of the picture; by default what holds the unit circle and the multipliers, but no more than 4: near
         a rigid graze one multiplier goes to infinity. Those outside are counted in the title.
     """
-    data = result.to_dataset() if hasattr(result, "to_dataset") and not hasattr(result, "data_vars") else result
+    from matplotlib.patches import Circle
+
+    data = dataset_of(result)
     variable_along(data, "floquet_multipliers", "find_orbit or continue_orbit")
     values = data["floquet_multipliers"]
     along = "point" in values.dims
@@ -250,10 +260,10 @@ def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: float | None = Non
     parts = np.abs([x, y])
     half = min(1.12 * max(1.0, parts[:, np.isfinite(mu)].max(initial=0.0)), 4.0) if limit is None else float(limit)
     outside = int((~(parts <= half)).any(axis=(0, 2)).sum())
-    angle, muted = np.linspace(0, 2 * np.pi, 361), style.COLORS["muted"]
-    ax.plot(np.cos(angle), np.sin(angle), color=muted, linewidth=0.6, zorder=1)
-    for line in (ax.axhline, ax.axvline):
-        line(0.0, color=muted, linewidth=0.3, zorder=0)
+    muted = style.COLORS["muted"]
+    ax.add_patch(Circle((0.0, 0.0), 1.0, fill=False, color=muted, linewidth=0.6, zorder=1))
+    for line in (ax.axhspan, ax.axvspan):
+        line(0.0, 0.0, color=muted, linewidth=0.3, zorder=0)
     if along:
         name = str(data.attrs["parameter"])
         shade = np.broadcast_to(data[name].values[:, None], mu.shape)
@@ -267,9 +277,7 @@ def multipliers(ax: Axes, result: xr.Dataset | Any, *, limit: float | None = Non
 
 
 @figure("manifolds", "arc_length", ratio=0.85)
-def manifolds(
-    ax: Axes, result: xr.Dataset, *, x: str | None = None, y: str | None = None, linewidth: float = 0.6
-) -> None:
+def manifolds(ax: Axes, result: xr.Dataset, *, x: Name | None = None, y: Name | None = None) -> None:
     """Draw the manifolds of a saddle in the plane of two states, with the saddle's own section points.
 
     Parameters
@@ -280,8 +288,6 @@ def manifolds(
         Where to draw; a new one-column figure if None.
     x, y
         The states of the two axes; by default the first two.
-    linewidth
-        In typographic points.
     """
     names = only_states(result, x, y)
     kinds = words_of_flags(result["manifold"])
@@ -300,8 +306,9 @@ def manifolds(
         )
         kind = kinds[int(code)]
         color, above = ("second", 3) if kind == "unstable" else ("first", 2)
-        looks: dict[str, Any] = {"color": style.COLORS[color], "zorder": above, "linewidth": linewidth}
-        ax.plot(xs, ys, label=style.once(ax, f"{kind} manifold"), **looks)
+        ax.plot(
+            xs, ys, label=style.once(ax, f"{kind} manifold"), color=style.COLORS[color], zorder=above, linewidth=0.6
+        )
     style.mark(ax, saddle, "o", "saddle", zorder=5)
     name_plane(ax, result, *names)
     style.clear_legend(ax)
@@ -321,7 +328,13 @@ _EFFORTS = (
 
 
 @figure("control_based_continuation", "control_effort")
-def controlled_branch(ax: Axes, result: xr.Dataset, *, y: str = "amplitude", theory: xr.Dataset | None = None) -> None:
+def controlled_branch(
+    ax: Axes,
+    result: xr.Dataset,
+    *,
+    y: Literal["amplitude", "control_effort"] = "amplitude",
+    theory: xr.Dataset | None = None,
+) -> None:
     """Draw the result of ``control_based_continuation``.
 
     Parameters
@@ -341,11 +354,11 @@ def controlled_branch(ax: Axes, result: xr.Dataset, *, y: str = "amplitude", the
     ValueError, TypeError
         A result of another verb, another quantity, a branch in another parameter.
     """
-    if y not in ("amplitude", "control_effort"):
-        raise ValueError(f"y = {y!r}; allowed: 'amplitude', 'control_effort'")
     parameter, state = str(result.attrs["parameter"]), str(result["state"].values[0])
-    if theory is not None and theory.attrs.get("parameter") != parameter:
-        raise ValueError(f"the branch is in {theory.attrs.get('parameter')!r}, the result in {parameter!r}")
+    if theory is not None:
+        check_axis(theory, parameter)
+        if y == "control_effort":
+            raise ValueError(f"theory = a branch in {parameter!r} is drawn beside y='amplitude' alone; leave it out")
     if y == "control_effort":
         for name, mark, color, words in _EFFORTS:
             ax.semilogy(result[name].values, mark, color=style.COLORS[color], markersize=3.5, label=words)

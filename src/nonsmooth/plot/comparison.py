@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
-from nonsmooth.plot.labels import first_states, name_and_unit, name_axes, name_plane, with_unit
+from nonsmooth.plot.labels import Name, name_and_unit, name_axes, name_plane, one_of, only_states, with_unit
 from nonsmooth.plot.style import ABOVE
-from nonsmooth.plot.trajectories import shade_zone
+from nonsmooth.plot.trajectories import edge_of, shade_zone
+from nonsmooth.system.kinds import above, at_least
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,12 +28,12 @@ def measured_label(result: xr.Dataset | Any) -> str:
     return "virtual rig (synthetic)" if str(attrs.get("synthetic", "no")) in ("yes", "True", "1") else "measured"
 
 
-def check_kind(result: xr.Dataset, *kinds: str) -> None:
-    """ValueError where ``result`` is no comparison of one of these kinds."""
+def check_kind(result: xr.Dataset, wanted: str) -> None:
+    """ValueError where ``result`` is no comparison of this kind."""
     kind = getattr(result, "attrs", {}).get("comparison", "")
-    if kind not in kinds:
+    if kind != wanted:
         what = f"a comparison of a {kind}" if kind else "no result of compare"
-        raise ValueError(f"this picture needs a comparison of a {' or '.join(kinds)}; this is {what}")
+        raise ValueError(f"this picture needs a comparison of a {wanted}; this is {what}")
 
 
 def shade_reach(ax: Axes, result: xr.Dataset, x: Any, **looks: Any) -> None:
@@ -43,12 +44,13 @@ def shade_reach(ax: Axes, result: xr.Dataset, x: Any, **looks: Any) -> None:
 
 def one_phase(result: xr.Dataset, name: str, phase: int = 0) -> xr.DataArray:
     """A variable at one of the sections that were compared."""
-    array = result[name]
-    return array.isel(section_phase=phase) if "section_phase" in array.dims else array
+    return one_of(result[name], "section_phase", phase, "phase")
 
 
 @figure()
-def comparison_time(ax: Axes, result: xr.Dataset, *, y: str | None = None, periods: float = 8) -> None:
+def comparison_time(
+    ax: Axes, result: xr.Dataset, *, y: Name | None = None, periods: Annotated[float, above(0)] = 8
+) -> None:
     """Draw a state over the phase of the drive: measured points, the predicted curve and its band.
 
     Parameters
@@ -64,7 +66,7 @@ def comparison_time(ax: Axes, result: xr.Dataset, *, y: str | None = None, perio
         and parts from it, as any two chaotic motions do.
     """
     _check_orbits(result)
-    (name,) = first_states(result, y)
+    (name,) = only_states(result, y)
     closed, here = "phase" in result.coords, result.sel(state=name)
     for side in ("theory", "measured"):
         phase = result["phase" if closed else f"{side}_phase"].values
@@ -90,8 +92,8 @@ def comparison_phase_portrait(
     ax: Axes,
     result: xr.Dataset,
     *,
-    x: str | None = None,
-    y: str | None = None,
+    x: Name | None = None,
+    y: Name | None = None,
     zone: float | str | None = None,
 ) -> None:
     """Draw both motions in the plane of two states, each with its section points.
@@ -108,7 +110,7 @@ def comparison_phase_portrait(
         The edge of the contact zone x > zone: a number, or the parameter that holds it (``"g"``).
     """
     _check_orbits(result)
-    names = first_states(result, x, y)
+    names = only_states(result, x, y)
     closed = "phase" in result.coords
     for side, color in (("theory", THEORY), ("measured", MEASURED)):
         curves = [result[f"{side}_orbit"].sel(state=name).values for name in names]
@@ -126,7 +128,7 @@ def comparison_phase_portrait(
         looks |= {"zorder": 4 if ours else 5, "rasterized": points[0].size > 500}
         ax.plot(*points, "o", label=f"section points, {word}", **looks)
     if zone is not None:
-        shade_zone(ax, float(result[zone]) if isinstance(zone, str) else zone)
+        shade_zone(ax, edge_of(result, zone))
     style.make_room(ax, 0.15)
     ax.legend(loc="upper center", ncols=2)
     name_plane(ax, result, *names)
@@ -134,14 +136,19 @@ def comparison_phase_portrait(
 
 @figure(ratio=0.85)
 def comparison_section(
-    ax: Axes, result: xr.Dataset, *, x: str | None = None, y: str | None = None, phase: int = 0
+    ax: Axes,
+    result: xr.Dataset,
+    *,
+    x: Name | None = None,
+    y: Name | None = None,
+    phase: Annotated[int, at_least(0)] = 0,
 ) -> None:
     """Draw both section clouds in the plane of two states, with their energy distance beside that of halves.
 
     ``phase`` is the index of the section where several were compared.
     """
     check_kind(result, "motion")
-    names = first_states(result, x, y)
+    names = only_states(result, x, y)
     few = int(result["theory_period_number"])
     measured, theory = (
         [one_phase(result, f"{side}_section", phase).sel(state=name).values for name in names]
@@ -202,7 +209,9 @@ def _check_orbits(result: xr.Dataset) -> None:
 
 
 @figure()
-def comparison_diagram(ax: Axes, result: xr.Dataset, *, y: str | None = None, size: float = 1.6) -> None:
+def comparison_diagram(
+    ax: Axes, result: xr.Dataset, *, y: Name | None = None, size: Annotated[float, above(0)] = 1.6
+) -> None:
     """Draw a comparison of a diagram: theory as a pale cloud, measured points in black, flips as marks at the top.
 
     Parameters
@@ -218,7 +227,7 @@ def comparison_diagram(ax: Axes, result: xr.Dataset, *, y: str | None = None, si
     """
     check_kind(result, "diagram")
     parameter = str(result["theory_section"].dims[0])
-    (name,) = first_states(result, y)
+    (name,) = only_states(result, y)
     points = result["theory_section"].sel(state=name).transpose(..., parameter)
     at = np.broadcast_to(result[parameter].values, points.shape)
     style.cloud(ax, (at, points.values), 0.9, THEORY, "theory")
@@ -258,13 +267,11 @@ def _flips(ax: Axes, result: xr.Dataset) -> None:
             style.points(ax, [still], [0.965], xerr=[error], label=label, **looks)
 
 
-#: Height in points of a jump's number above its marks: a rising and a falling one may lie at one place.
-_LIFT = {"up": 5, "down": 14}
 _LOOKS = {"up": ("first", "^", "-", "increasing"), "down": ("second", "v", "--", "decreasing")}
 
 
 @figure()
-def comparison_response(ax: Axes, result: xr.Dataset, *, digits: int = 3) -> None:
+def comparison_response(ax: Axes, result: xr.Dataset, *, digits: Annotated[int, at_least(0, 15)] = 3) -> None:
     """Draw a comparison of a response.
 
     Parameters
@@ -278,7 +285,7 @@ def comparison_response(ax: Axes, result: xr.Dataset, *, digits: int = 3) -> Non
     """
     check_kind(result, "response")
     parameter = str(result["theory_amplitude"].dims[0])
-    (state,) = first_states(result, None)
+    (state,) = only_states(result, None)
     values, runs, word = result[parameter].values, result["measured_direction"].values, measured_label(result)
     for i, direction in enumerate(result["direction"].values.astype(str)):
         shade, marker, line, name = _LOOKS[direction]
@@ -287,23 +294,23 @@ def comparison_response(ax: Axes, result: xr.Dataset, *, digits: int = 3) -> Non
         ax.plot(values, result["theory_amplitude"].values[:, i], line, color=color, label=f"theory, {name}")
         keys = (f"measured_{parameter}", "measured_amplitude", "measured_amplitude_error")
         at, heights, error = (result[key].values[runs == direction] for key in keys)
-        looks: dict[str, Any] = {"color": color, "face": "white", "mark": marker, "label": f"{word}, {name}"}
-        style.points(ax, at, heights, yerr=error, **looks)
-    _jumps(ax, result, digits)
+        style.points(ax, at, heights, yerr=error, color=color, face="white", mark=marker, label=f"{word}, {name}")
+    written = _jumps(ax, result, digits)
     ax.set_ylim(bottom=0)
     ax.margins(x=0.02)
     ax.legend(**ABOVE, ncols=2, handlelength=1.6, columnspacing=1.2)
     name_plane(ax, result, parameter, state, "amplitude of ")
+    style.apart(ax, written)
 
 
-def _jumps(ax: Axes, result: xr.Dataset, digits: int) -> None:
+def _jumps(ax: Axes, result: xr.Dataset, digits: int) -> list[Any]:
     """A mark at the foot for each jump: filled where measured, open where predicted, with the difference."""
     foot = ax.get_xaxis_transform()
     names: dict[str, Any] = {"color": style.COLORS["muted"], "markersize": 3.5, "linestyle": "none"}
     for key, word, face in (("measured_jump", measured_label(result), None), ("theory_jump", "theory", "white")):
         if np.isfinite(result[key].values if key in result else np.nan).any():
             ax.plot([], [], "D", markerfacecolor=face, label=f"jump, {word}", **names)
-    differences = False
+    written: list[Any] = []
     for row in range(result.sizes.get("jump", 0)):
         direction = str(result["jump_direction"].values[row])
         color = style.COLORS[_LOOKS[direction][0]]
@@ -314,9 +321,9 @@ def _jumps(ax: Axes, result: xr.Dataset, digits: int) -> None:
                 ax.plot([place], [0.03], "D", color=color, markerfacecolor=face, **looks)
         if np.isfinite(seen) and np.isfinite(expected):
             number = f"{expected - seen:+.{digits}f}".replace("-", "\N{MINUS SIGN}")
-            between, lift = ((seen + expected) / 2, 0.03), (0, _LIFT[direction])
-            style.annotate(ax, number, between, lift, xycoords=foot, ha="center", color=color)
-            differences = True
-    if differences:
+            between = (seen + expected) / 2, 0.03
+            written.append(style.annotate(ax, number, between, (0, 5), xycoords=foot, ha="center", color=color))
+    if written:
         unit = name_and_unit(result, str(result["theory_amplitude"].dims[0]))[1]
         ax.plot([], [], linestyle="none", label=with_unit("numbers: theory less measured", unit))
+    return written

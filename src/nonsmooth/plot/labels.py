@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from nonsmooth.errors import shortened
 from nonsmooth.plot.prefixes import together
 from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+
+
+#: The name of one state, output or quantity.
+Name = Annotated[str, "it is one name: draw each by a call of its own, into the same axes with ax="]
 
 
 def name_and_unit(result: xr.Dataset, name: str) -> tuple[str, str]:
@@ -75,10 +78,6 @@ def column(result: xr.Dataset, variable: str, name: str) -> xr.DataArray:
     ValueError
         If ``name`` is neither; the message lists what there is.
     """
-    if not isinstance(name, str):
-        raise TypeError(
-            f"{shortened(name)} is not one name: draw each by a call of its own, into the same axes with ax="
-        )
     states = result["state"].values.tolist() if "state" in result.coords else []
     if name in states:
         return result[variable].isel(state=states.index(name))
@@ -105,7 +104,15 @@ def variable_along(result: xr.Dataset, variable: str, verb: str) -> None:
         raise ValueError(f"this result has no {variable!r}: it is not the result of {verb}; it holds {held}")
 
 
-def first_states(result: xr.Dataset, *names: str | None) -> list[str]:
+def one_of(array: Any, dim: str, at: int, name: str) -> Any:
+    """An array, or a result, at one place of a dimension that it may have; ``name`` is that of the argument."""
+    size = array.sizes.get(dim, 1)
+    if at >= size:
+        raise ValueError(f"{name} = {at}: this result has {size}; allowed: {', '.join(map(str, range(size)))}")
+    return array.isel({dim: at}) if dim in array.dims else array
+
+
+def first_states(result: Any, *names: str | None) -> list[str]:
     """The names given, and for those left None the states in their order.
 
     Raises
@@ -113,23 +120,27 @@ def first_states(result: xr.Dataset, *names: str | None) -> list[str]:
     ValueError
         If the system has fewer states than needed.
     """
-    states = [str(name) for name in result["state"].values]
+    states = _states(result)
     if len(states) < len(names):
         raise ValueError(f"this plot needs {len(names)} states; the system has {states}")
     return [name if name is not None else states[i] for i, name in enumerate(names)]
 
 
-def only_states(result: xr.Dataset, *names: str | None) -> list[str]:
-    """The same for a result that holds nothing but states.
+def only_states(result: Any, *names: str | None) -> list[str]:
+    """The same for a result that holds nothing but states, or for a system.
 
     Raises
     ------
     ValueError
         If the system has fewer states than needed, or none of that name.
     """
-    states = [str(name) for name in result["state"].values]
-    found = first_states(result, *names)
+    found, states = first_states(result, *names), _states(result)
     for name in found:
         if name not in states:
-            raise ValueError(f"{name!r} is not a state of this result; states: {states}")
+            raise ValueError(f"{name!r} is not a state; states: {states}")
     return found
+
+
+def _states(result: Any) -> list[str]:
+    """The states of a result, or of a system."""
+    return [str(name) for name in (result["state"].values if hasattr(result, "data_vars") else result.states)]

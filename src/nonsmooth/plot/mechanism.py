@@ -10,6 +10,7 @@ import numpy as np
 from nonsmooth.plot import style
 from nonsmooth.plot.parts import GROUND, Link, Scheme
 from nonsmooth.plot.pen import GREY, PALE, Part, Pen, put
+from nonsmooth.system.arguments import checked
 from nonsmooth.system.parameter import latex_name
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ _ORDER = ("spring", "preload", "damper", "backlash", "friction", "stop", "elasti
 _FORCE = style.COLORS["first"]
 
 
+@checked
 def mechanism(system: System, ax: Axes | None = None, *, labels: bool = True) -> Axes:
     """Draw a mechanical system as masses on a line with what joins them.
 
@@ -62,9 +64,6 @@ def mechanism(system: System, ax: Axes | None = None, *, labels: bool = True) ->
     """
     from nonsmooth.plot.scheme import scheme_of
 
-    if not hasattr(system, "modes"):
-        made = ", which ns.system_of(result) gives" if hasattr(system, "data_vars") else ""
-        raise TypeError(f"mechanism draws a system{made}; not {type(system).__name__}")
     sketch = Sketch(scheme_of(system))
     with style.axes(ax, width=min(0.56 * sketch.width, style.PAGE), ratio=sketch.height / sketch.width) as drawn:
         sketch.frame(drawn)
@@ -81,7 +80,7 @@ def sketch_of_run(system: System, run: xr.Dataset) -> tuple[Sketch, Callable[[in
         sketch = Sketch(scheme_of(system), moving=True)
     except ValueError:
         return None
-    q = np.stack([run["u"].sel(state=name).values for name in sketch.scheme.coordinates], axis=1)
+    q = np.stack([run["u"].sel(state=name).values for name, _ in sketch.scheme.pairs], axis=1)
     scale, q, time = sketch.scale_for(q), np.nan_to_num(q), run["time"].values
     return sketch, lambda k: sketch.parts(scale * q[k], scale, float(time[k]))
 
@@ -207,7 +206,7 @@ class Sketch:
         if not self.moving:
             pen.path(top, middle, 0.06, middle, 0.26, color=GREY)
             pen.arrow(middle, middle + 0.38, top + 0.16, color=GREY)
-            pen.text(middle + 0.43, top + 0.16, latex_name(self.scheme.coordinates[i]), ha="left")
+            pen.text(middle + 0.43, top + 0.16, latex_name(self.scheme.pairs[i][0]), ha="left")
             if force := self.scheme.forces.get(i):
                 pen.arrow(middle - 0.2, middle + 0.34, top + 0.46, color=_FORCE, heavy=True)
                 pen.text(middle + 0.42, top + 0.46, force, ha="left", color=_FORCE)

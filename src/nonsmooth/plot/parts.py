@@ -30,9 +30,9 @@ class Link:
 
 @dataclass
 class Scheme:
-    """Masses in order along the line, with the names of their coordinates and their labels; links; loads by mass."""
+    """Masses in order along the line, by their coordinates and speeds, with their labels; links; loads by mass."""
 
-    coordinates: list[str]
+    pairs: list[tuple[str, str]]
     masses: list[str]
     links: list[Link] = field(default_factory=list)
     forces: dict[int, str] = field(default_factory=dict)

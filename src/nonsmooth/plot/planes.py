@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from textwrap import fill as in_lines
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
+from nonsmooth.errors import shortened
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.figure import figure
-from nonsmooth.plot.labels import name_and_unit, name_axes, name_plane, only_states
+from nonsmooth.plot.labels import Name, name_and_unit, name_axes, name_plane, one_of, only_states
 from nonsmooth.plot.prefixes import PREFIXES, power_for
-from nonsmooth.results.labels import in_words, kind_of
+from nonsmooth.results.labels import in_words
+from nonsmooth.system.kinds import above, at_least
 from nonsmooth.tables.quantities import quantities_of, quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     import xarray as xr
     from matplotlib.axes import Axes
 
@@ -59,9 +60,9 @@ def chart(
     result: xr.Dataset,
     *,
     show: str = "period_number",
-    y: str | None = None,
-    start: int = 0,
-    contours: Mapping[str, Any] | None = None,
+    y: Name | None = None,
+    start: Annotated[int, at_least(0)] = 0,
+    contours: Mapping[str, float | Sequence[float]] | None = None,
     region: str | xr.DataArray | None = None,
 ) -> None:
     """Draw a ``chart``: each point of the plane in the colour of its period number, or of another quantity.
@@ -95,12 +96,14 @@ def chart(
 
     def sorted_one(of: Any) -> Any:
         """From one start, over rising values: values may come in any order, cells cannot."""
-        return (of.isel(start=start) if "start" in of.dims else of).sortby([first, second])
+        return one_of(of, "start", start, "start").sortby([first, second])
 
     one = sorted_one(result)
     x, values_of_y = one[first].values, one[second].values
     if show in ("maximum", "minimum", "amplitude"):
         show = f"{only_states(result, y)[0]}_{show}"
+    elif y is not None:
+        raise ValueError(f"y = {y!r} goes with show='maximum', 'minimum' or 'amplitude'; show = {show!r} has no state")
     known = quantities_of(one)
     values = quantity(one, show, known)
     lines = {name: (quantity(one, name, known), np.sort(np.atleast_1d(at))) for name, at in (contours or {}).items()}
@@ -130,19 +133,23 @@ def chart(
 
 def held(result: xr.Dataset, region: Any) -> Any:
     """A region given as a condition or as what ``region`` gave."""
-    if not isinstance(region, str):
-        return region
     from nonsmooth.tables.region import region as region_of
 
-    return region_of(result, region)
+    inside = region_of(result, region) if isinstance(region, str) else region
+    if inside is not None and not {*map(str, result["status"].dims)} - {"start", "direction"} <= {
+        *getattr(inside, "dims", ())
+    }:
+        raise ValueError(f"region = {shortened(region)}: give a condition, or what ns.region found in this result")
+    return inside
 
 
 def _contours(ax: Axes, heights: xr.DataArray, levels: Any, name: str) -> None:
     """Lines of equal value, each with its value in the unit that suits it."""
     unit = str(heights.attrs.get("units", "1"))
     y, x = (heights[dim].values for dim in heights.dims)
-    looks: dict[str, Any] = {"colors": style.COLORS["section"], "linestyles": "--", "linewidths": 0.8}
-    found = ax.contour(x, y, heights.values.astype(float), levels, **looks)
+    found = ax.contour(
+        x, y, heights.values.astype(float), levels, colors=style.COLORS["section"], linestyles="--", linewidths=0.8
+    )
     found.set_path_effects(style.halo())
     power = power_for(unit, float(np.abs(levels).max()))
     words = {at: f"{at / 10.0**power:g} {PREFIXES[power]}{unit.removesuffix('1')}".strip() for at in found.levels}
@@ -196,11 +203,11 @@ def legend_of(classes: Any, entries: list[tuple[str, str]]) -> list[tuple[str, s
     ]
 
 
-_MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
+_MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p")  # one more than colours
 
 
 @figure("basins", "label", ratio=0.85)
-def basins(ax: Axes, result: xr.Dataset, *, size: float = 3.6) -> None:
+def basins(ax: Axes, result: xr.Dataset, *, size: Annotated[float, above(0)] = 3.6) -> None:
     """Draw the result of ``basins``.
 
     Parameters
@@ -246,17 +253,9 @@ def basins(ax: Axes, result: xr.Dataset, *, size: float = 3.6) -> None:
     name_plane(ax, result, first, second)
 
 
-def _kinds(result: xr.Dataset) -> Any:
-    """Each attractor by its kind, ``period 3`` or ``chaos``."""
-    if "name" in result:
-        return result["name"].values
-    kinds = np.vectorize(kind_of, otypes=[object])
-    return kinds(result["period_number"].values.astype(int), result["chaotic"].values.astype(bool))
-
-
 def names_of(result: xr.Dataset) -> list[str]:
     """Each attractor by its kind; of several of one kind (a), (b), ..."""
-    return told_apart([str(name) for name in _kinds(result)])
+    return told_apart([str(name) for name in result["name"].values])
 
 
 def told_apart(names: list[str]) -> list[str]:
@@ -278,7 +277,7 @@ _LARGEST = 7.0  # diameter in points of an attractor that all starts reach
 
 
 @figure("basin_fractions", "n_starts_99", ratio=0.85)
-def basin_fractions(ax: Axes, result: xr.Dataset, *, y: str | None = None) -> None:
+def basin_fractions(ax: Axes, result: xr.Dataset, *, y: Name | None = None) -> None:
     """Draw the result of ``basin_fractions``.
 
     Parameters
@@ -328,7 +327,7 @@ def basin_fractions(ax: Axes, result: xr.Dataset, *, y: str | None = None) -> No
 
 def _along(result: xr.Dataset, k: int) -> str:
     """Kinds of an attractor along the parameter, each once, in the order met."""
-    kinds = _kinds(result)[result["period_number"].values[:, k] >= 0, k]
+    kinds = result["name"].values[result["period_number"].values[:, k] >= 0, k]
     distinct = list(dict.fromkeys(map(str, kinds)))
     numbers = [kind.removeprefix("period ") for kind in distinct if kind.startswith("period")]
     words = [f"period {', '.join(numbers)}"] if numbers else []

@@ -40,7 +40,7 @@ def together(axes: Sequence[tuple[str, float]]) -> list[float]:
     return found
 
 
-def prefixed(value: float, unit: str) -> tuple[str, str]:
+def prefixed(value: float, unit: str, digits: int = 6) -> tuple[str, str]:
     """A value as an axis would write it, and its unit with the prefix: ``("−1.2", "mm")`` of -0.0012 and ``"m"``."""
     power = power_for(unit, abs(value))
-    return f"{value / 10.0**power:g}".replace("-", "\N{MINUS SIGN}"), PREFIXES[power] + unit
+    return f"{value / 10.0**power:.{digits}g}".replace("-", "\N{MINUS SIGN}"), PREFIXES[power] + unit

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from nonsmooth.plot import style
 from nonsmooth.plot.figure import figure
-from nonsmooth.plot.labels import name_axes, symbol_of
+from nonsmooth.plot.labels import Name, name_axes, only_states, symbol_of
+from nonsmooth.system.kinds import Range
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,10 +34,10 @@ def regions(
     ax: Axes,
     system: System,
     *,
-    xlim: tuple[float, float],
-    ylim: tuple[float, float],
-    x: str | None = None,
-    y: str | None = None,
+    xlim: Range,
+    ylim: Range,
+    x: Name | None = None,
+    y: Name | None = None,
     t: float = 0.0,
 ) -> None:
     """Draw the regions of a system's first mode (G-), of the mode it changes to (G+), and the borders between them.
@@ -59,23 +60,12 @@ def regions(
     ValueError
         A name that is no state, or a system whose first mode is never left by a condition.
     """
-    names = _states(system, x, y)
+    names = only_states(system, x, y)
     first, second = np.meshgrid(np.linspace(*xlim, _GRID), np.linspace(*ylim, _GRID))
     margins = _margins(system, names, first, second, t)
-    (_draw_bands if system.is_smoothed else _draw_surfaces)(ax, first, second, margins)
+    _draw(ax, first, second, margins, system.is_smoothed)
     ax.set(xlim=xlim, ylim=ylim)
     name_axes(ax, *((symbol_of(name), system.states[name]) for name in names))
-
-
-def _states(system: System, *given: str | None) -> list[str]:
-    known = list(system.states)
-    if len(known) < 2:
-        raise ValueError(f"regions are drawn in the plane of two states; {system.name!r} has {known}")
-    names = [known[i] if name is None else name for i, name in enumerate(given)]
-    for name in names:
-        if name not in known:
-            raise ValueError(f"{name!r} is not a state of {system.name!r}; states: {', '.join(known)}")
-    return names
 
 
 def _margins(system: System, names: list[str], first: Any, second: Any, t: float) -> NDArray[np.float64]:
@@ -99,28 +89,22 @@ def _margins(system: System, names: list[str], first: Any, second: Any, t: float
     return np.array(margins, dtype=float)
 
 
-def _draw_bands(ax: Axes, x: Any, y: Any, margins: NDArray[np.float64]) -> None:
-    least = margins.min(axis=0)
-    _fill(ax, x, y, least + 1, _OUTSIDE, "$G_-$")
-    _fill(ax, x, y, 1 - least, _INSIDE, "$G_+$")
+def _draw(ax: Axes, x: Any, y: Any, margins: NDArray[np.float64], band: bool) -> None:
+    least, tilde = margins.min(axis=0), "" if band else r"\tilde "
+    _fill(ax, x, y, least + band, _OUTSIDE, f"${tilde}G_-$")
+    _fill(ax, x, y, band - least, _INSIDE, f"${tilde}G_+$")
     for r, others in _others(margins):
-        inside = np.maximum(np.abs(margins[r]) - 1, margins[r] - others)
-        _fill(ax, x, y, inside, _BANDS[r % 3], _surface_name(r, len(margins)))
-        ax.contour(x, y, inside, levels=[0], colors=style.COLORS[_LINES[r % 3]], linewidths=0.8)
-
-
-def _draw_surfaces(ax: Axes, x: Any, y: Any, margins: NDArray[np.float64]) -> None:
-    least = margins.min(axis=0)
-    _fill(ax, x, y, least, _OUTSIDE, r"$\tilde G_-$")
-    _fill(ax, x, y, -least, _INSIDE, r"$\tilde G_+$")
-    for r, others in _others(margins):
-        here = np.where(margins[r] <= others, margins[r], np.nan)
         color = style.COLORS[_LINES[r % 3]]
+        name = f"${tilde}S{f'_{chr(97 + r)}' if len(margins) > 1 else ''}$"
+        if band:
+            inside = np.maximum(np.abs(margins[r]) - 1, margins[r] - others)
+            _fill(ax, x, y, inside, _BANDS[r % 3], name)
+            ax.contour(x, y, inside, levels=[0], colors=color, linewidths=0.8)
+            continue
+        here = np.where(margins[r] <= others, margins[r], np.nan)
         drawn = ax.contour(x, y, here, levels=[0], colors=color, linewidths=1.4)
-        lines = [np.asarray(path.vertices) for path in drawn.get_paths()]
-        longest = max(lines, key=len)
+        longest = max((np.asarray(path.vertices) for path in drawn.get_paths()), key=len)
         if len(longest):
-            name = _surface_name(r, len(margins)).replace("S", r"\tilde S")
             ax.annotate(name, longest[len(longest) // 2], (5, 2), textcoords="offset points", color=color)
 
 
@@ -128,10 +112,6 @@ def _others(margins: NDArray[np.float64]) -> list[tuple[int, NDArray[np.float64]
     """For each row, the least of the other rows (infinite where there is one row only)."""
     infinite = np.full((1, *margins.shape[1:]), np.inf)
     return [(r, np.concatenate([np.delete(margins, r, axis=0), infinite]).min(axis=0)) for r in range(len(margins))]
-
-
-def _surface_name(r: int, count: int) -> str:
-    return "$S$" if count == 1 else f"$S_{chr(ord('a') + r)}$"
 
 
 def _fill(ax: Axes, x: Any, y: Any, outside: NDArray[np.float64], color: str, name: str) -> None:

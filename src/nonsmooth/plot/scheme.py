@@ -44,7 +44,7 @@ class _SchemeReader:
             raise ValueError(
                 f"{system.name!r} has no mass to draw: no state whose derivative is another state, its speed"
             )
-        self.names = [names[i] for i, _ in pairs]
+        self.names = [(names[i], names[j]) for i, j in pairs]
         self.q, self.v = [self.u[i] for i, _ in pairs], [self.u[j] for _, j in pairs]
         self.acceleration = [first[j] for _, j in pairs]
         self.speeds = [j for _, j in pairs]
@@ -71,7 +71,7 @@ class _SchemeReader:
             [[-sp.diff(a, x).subs(self.still) for x in some] for a in self.acceleration] for some in (self.q, self.v)
         )
         masses = self._masses(stiffness, damping)
-        scheme = Scheme(list(self.names), [self.text(m) if m is not None else "" for m in masses])
+        scheme = Scheme(self.names, [self.text(m) if m is not None else "" for m in masses])
         for kind, table in (("spring", stiffness), ("damper", damping)):
             for i in range(size):
                 of = masses[i] if masses[i] is not None else sp.Integer(1)

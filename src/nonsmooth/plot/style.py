@@ -193,8 +193,7 @@ def line(ax: Axes, x: Any, y: Any, *form: str, **looks: Any) -> None:
 
 def cloud(ax: Axes, points: Iterable[Any], size: float, color: str, label: str | None = None) -> None:
     """Draw many points (x, y) as dots without edges; they are pixels in a vector figure."""
-    looks: dict[str, Any] = {"markersize": size, "markeredgewidth": 0, "rasterized": True}
-    ax.plot(*map(np.ravel, points), ".", color=color, label=label, **looks)
+    ax.plot(*map(np.ravel, points), ".", color=color, label=label, markersize=size, markeredgewidth=0, rasterized=True)
 
 
 def mark(ax: Axes, points: Iterable[Any], marker: str, words: str, size: float = 4.0, **looks: Any) -> None:
@@ -333,7 +332,7 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
     so equal input gives equal files. The path is returned, with the ending ``.png`` where it has none. A file that
     cannot be written is a DataFileError, and what stood there before stays.
     """
-    from nonsmooth.tables.table import placed
+    from nonsmooth.results.whole import placed
 
     owner: Any = getattr(figure, "figure", figure)
     if not hasattr(owner, "savefig"):

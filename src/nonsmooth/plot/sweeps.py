@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from textwrap import fill as in_lines
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.plot import style
-from nonsmooth.plot.branches import draw_branch
+from nonsmooth.plot import palette, style
+from nonsmooth.plot.branches import check_axis, draw_branch
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.labels import (
+    Name,
     column,
     first_states,
     name_and_unit,
@@ -20,6 +21,7 @@ from nonsmooth.plot.labels import (
     only_states,
 )
 from nonsmooth.plot.planes import edges_of, held
+from nonsmooth.system.kinds import above, at_least
 from nonsmooth.tables.quantities import quantities_of
 from nonsmooth.tables.quantities import quantity as quantity_of
 
@@ -27,8 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-_LINES = ("section", "third", "fourth")
-_COLORS = {"up": "first", "down": "second", "none": "section"}
+_LINES = tuple(style.COLORS[name] for name in ("section", "third", "fourth"))
 _LONGEST = 30  # characters of a line of a condition in a legend
 _SEAM = 2.0  # a rising point over a falling one, which lies on it: both show
 
@@ -38,9 +39,9 @@ def bifurcation(
     ax: Axes,
     result: xr.Dataset,
     *over: xr.Dataset,
-    y: str | None = None,
-    size: float = 0.8,
-    color: str | None = None,
+    y: Name | None = None,
+    size: Annotated[float, above(0)] = 0.8,
+    color: Any = None,
 ) -> None:
     """Draw the section points of a ``sweep`` over its parameter, up and down in two colours, and branches over them.
 
@@ -70,7 +71,8 @@ def bifurcation(
         raise ValueError("this sweep counted its section points (density=...): draw it with plot.density")
     (name,) = first_states(result, y)
     parameter = str(result["status"].dims[0])
-    _share_an_axis(over, parameter)
+    for branch in over:
+        check_axis(branch, parameter)
     of_state = name in result["state"].values
     if of_state:
         points = column(result, "section", name)
@@ -83,11 +85,11 @@ def bifurcation(
         cloud = mine.transpose(..., parameter).values
         values = np.broadcast_to(result[parameter].values, cloud.shape)
         under = direction == "up" and "down" in directions
-        shade = color or style.COLORS["pale" if under else _COLORS[direction]]
+        shade = color or (style.COLORS["pale"] if under else _LOOKS[direction]["color"])
         words = direction if len(directions) > 1 else None
         style.cloud(ax, (values, cloud), size * (_SEAM if under else 1.0), shade, words)
     for k, one in enumerate(over):
-        draw_branch(ax, one, y=name, color=style.COLORS[_LINES[k % len(_LINES)]], behind=True)
+        draw_branch(ax, one, y=name, color=palette.nth(k, _LINES), behind=True)
     _whole(ax, result[parameter].values)
     _name(ax, result, parameter, name, points)
     if len(directions) > 1 or over:
@@ -108,16 +110,9 @@ def _name(ax: Axes, result: xr.Dataset, parameter: str, name: str, values: xr.Da
     return name_axes(ax, name_and_unit(result, parameter), (own, str(values.attrs.get("units", "1"))))
 
 
-def _share_an_axis(over: tuple[xr.Dataset, ...], parameter: str) -> None:
-    """Check that branches are over the parameter of the diagram."""
-    for one in over:
-        if (of := one.attrs.get("parameter")) != parameter:
-            raise ValueError(f"the diagram is over {parameter!r}, this branch over {of!r}: they share no axis")
-
-
 @figure("bifurcation_diagram", "swept_section")
 def bifurcation_diagram(
-    ax: Axes, result: xr.Dataset, *, y: str | None = None, special: bool = True, size: float = 0.8
+    ax: Axes, result: xr.Dataset, *, y: Name | None = None, special: bool = True, size: Annotated[float, above(0)] = 0.8
 ) -> None:
     """Draw all section points of every branch, stable parts solid and unstable ones dashed, over those of the sweeps.
 
@@ -168,10 +163,10 @@ def frequency_response(
     ax: Axes,
     result: xr.Dataset,
     *over: xr.Dataset,
-    y: str | None = None,
-    quantity: str = "amplitude",
+    y: Name | None = None,
+    quantity: Literal["amplitude", "maximum", "minimum"] = "amplitude",
     jumps: bool = True,
-    digits: int = 4,
+    digits: Annotated[int, at_least(1, 17)] = 4,
     region: str | xr.DataArray | None = None,
 ) -> None:
     """Draw a ``frequency_response`` result.
@@ -197,8 +192,6 @@ def frequency_response(
         A condition, or what :func:`nonsmooth.region` gave: the values of the parameter at which it holds, in every
         direction and from every start, are shaded.
     """
-    if quantity not in ("amplitude", "maximum", "minimum"):
-        raise ValueError(f"quantity is {quantity!r}; allowed: 'amplitude', 'maximum', 'minimum'")
     (name,) = first_states(result, y)
     parameter = str(result["status"].dims[0])
     values = result[parameter].values
@@ -207,7 +200,8 @@ def frequency_response(
     ranges = [one.removesuffix("_amplitude") for one in known if one.endswith("_amplitude")]
     heights = quantity_of(result, name if alone else f"{name}_{quantity}", known, also=ranges)
     inside = held(result, region)
-    _share_an_axis(over, parameter)
+    for branch in over:
+        check_axis(branch, parameter)
     marks: list[Any] = []
     for i, direction in enumerate(np.atleast_1d(result["direction"].values).astype(str)):
         one = heights.isel(direction=i) if "direction" in heights.dims else heights
@@ -242,15 +236,10 @@ def _shade(ax: Axes, inside: xr.DataArray, parameter: str) -> None:
 
 def _jumps(result: xr.Dataset, name: str, direction: str, start: int) -> list[float]:
     """The jumps of one curve: those of its state, its direction and, where there are several starts, of its start."""
-    first = str(result["state"].values[0])  # older results hold no others
-    if "jump_value" not in result or ("jump_variable" not in result and name != first):
+    if "jump_value" not in result:
         return []
-    mine = result["jump_direction"].values == direction
-    if "jump_variable" in result:
-        mine = mine & (result["jump_variable"].values == name)
-    if "jump_start" in result:
-        mine = mine & (result["jump_start"].values == start)
-    return [float(value) for value in result["jump_value"].values[mine]]
+    mine = (result["jump_direction"].values == direction) & (result["jump_variable"].values == name)
+    return result["jump_value"].values[mine & (result["jump_start"].values == start)].tolist()
 
 
 def _intervals(values: NDArray[np.float64], curve: NDArray[np.float64], places: list[float]) -> list[tuple[float, int]]:
@@ -295,7 +284,7 @@ def _mark(
 
 
 @figure("sweep(..., density=True)", "density")
-def density(ax: Axes, result: xr.Dataset, *, y: str | None = None, cmap: str = "magma_r") -> None:
+def density(ax: Axes, result: xr.Dataset, *, y: Name | None = None, cmap: str = "magma_r") -> None:
     """Draw the histograms of a ``sweep(..., density=True)`` over its parameter, in a logarithmic scale of colour.
 
     Parameters
@@ -330,8 +319,7 @@ def density(ax: Axes, result: xr.Dataset, *, y: str | None = None, cmap: str = "
     there = share[np.isfinite(share)]
     lowest, highest = (float(there.min()), float(there.max())) if len(there) else (1.0, 100.0)
     edges = edges_of(one[parameter].values), one["bin_edge"].values
-    colors: dict[str, Any] = {"cmap": cmap, "norm": LogNorm(lowest, max(highest, 1.01 * lowest))}
-    mesh = ax.pcolormesh(*edges, share, rasterized=True, **colors)
+    mesh = ax.pcolormesh(*edges, share, rasterized=True, cmap=cmap, norm=LogNorm(lowest, max(highest, 1.01 * lowest)))
     ax.figure.colorbar(mesh, ax=ax, label="share of the points (%)")
     name_plane(ax, result, parameter, name)
 
@@ -347,7 +335,9 @@ _LOST = 0.04  # height of the mark where there is no such orbit, in the axes
 
 
 @figure("smoothing_report", "state_difference")
-def smoothing_report(ax: Axes, result: xr.Dataset, *, y: str = "state") -> None:
+def smoothing_report(
+    ax: Axes, result: xr.Dataset, *, y: Literal["state", "multiplier", "exponent", "period"] = "state"
+) -> None:
     """Draw the result of ``smoothing_report``: one line for each band, with its order at the smallest widths.
 
     Parameters
@@ -366,8 +356,6 @@ def smoothing_report(ax: Axes, result: xr.Dataset, *, y: str = "state") -> None:
     ValueError
         A result of another verb, or another quantity.
     """
-    if y not in _QUANTITIES:
-        raise ValueError(f"y = {y!r} is one of {', '.join(_QUANTITIES)}")
     eta = result["eta"].values
     lost: set[float] = set()
     for band in result["band"].values:
@@ -378,12 +366,10 @@ def smoothing_report(ax: Axes, result: xr.Dataset, *, y: str = "state") -> None:
         orders = one[f"{y}_order"].values
         known = orders[np.isfinite(orders)]
         ax.plot(eta[shown], values[shown], "-", color=color, linewidth=0.8)
-        ax.plot(
-            [], [], mark, color=color, markersize=3.5, label=band + (f", order {known[0]:.2f}" if len(known) else "")
-        )
+        words = band + (f", order {known[0]:.2f}" if len(known) else "")
         changed = one["stable"].values != bool(one["reference_stable"])
-        for which, fill in ((shown & ~changed, color), (shown & changed, "none")):
-            ax.plot(eta[which], values[which], mark, color=color, markerfacecolor=fill, markersize=3.5)
+        for which, fill, label in ((shown & ~changed, color, words), (shown & changed, "none", None)):
+            ax.plot(eta[which], values[which], mark, color=color, markerfacecolor=fill, markersize=3.5, label=label)
         lost |= set(eta[one["status"].values != 0].tolist())
     if lost:
         looks: dict[str, Any] = {"color": style.COLORS["section"], "markersize": 4, "label": "no such orbit"}

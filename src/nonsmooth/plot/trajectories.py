@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.plot import style
+from nonsmooth.errors import unknown
+from nonsmooth.plot import palette, style
 from nonsmooth.plot.figure import figure
-from nonsmooth.plot.labels import column, first_states, name_and_unit, name_axes, name_plane, variable_along
+from nonsmooth.plot.labels import Name, column, first_states, name_and_unit, name_axes, name_plane, variable_along
 from nonsmooth.results.labels import words_of_flags
+from nonsmooth.system.kinds import above
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,7 +34,7 @@ def pieces_by_mode(mode: NDArray[np.integer], *curves: NDArray[np.float64]) -> l
 
 
 @figure("simulate", "u")
-def time_history(ax: Axes, result: xr.Dataset, *, y: str | None = None, shade: bool | str = True) -> None:
+def time_history(ax: Axes, result: xr.Dataset, *, y: Name | None = None, shade: bool | str = True) -> None:
     """Draw ``y`` (a state, by default the first, or an output) of a ``simulate`` result over time.
 
     The curve is cut where a reset makes the state jump. ``shade`` marks the time spent in any mode but the first; of a
@@ -74,17 +76,13 @@ def _away(result: xr.Dataset, shade: bool | str) -> NDArray[np.bool_]:
     return np.array([bool(now & wanted) for now in of])[mode.values]
 
 
-ZONE = "contact zone"  # in legends
-_MODE_COLORS = ("first", "second", "third", "fourth")
-
-
 @figure("simulate", "u", ratio=0.85)
 def phase_portrait(
     ax: Axes,
     result: xr.Dataset,
     *,
-    x: str | None = None,
-    y: str | None = None,
+    x: Name | None = None,
+    y: Name | None = None,
     section: xr.Dataset | None = None,
     zone: float | str | None = None,
 ) -> None:
@@ -110,16 +108,25 @@ def phase_portrait(
     modes = words_of_flags(result["mode"])
     for k, (xs, ys) in enumerate(pieces_by_mode(np.nan_to_num(cut_mode, nan=-1).astype(int), *cut)):
         if np.isfinite(xs).any():
-            color = style.COLORS[_MODE_COLORS[k % len(_MODE_COLORS)]]
-            ax.plot(xs, ys, color=color, label=modes[k].replace("_", " "), zorder=2 + 0.1 * k)
+            ax.plot(xs, ys, color=palette.nth(k), label=modes[k].replace("_", " "), zorder=2 + 0.1 * k)
     if section is not None:
         variable_along(section, "section", "poincare or sweep")
         points = [column(section, "section", name).values.ravel() for name in names]
         looks: dict[str, Any] = {"markersize": 2.6, "color": style.COLORS["section"], "zorder": 4}
         ax.plot(*points, "o", label="section points", rasterized=points[0].size > 500, **looks)
     if zone is not None:
-        shade_zone(ax, float(result[zone]) if isinstance(zone, str) else zone)
+        shade_zone(ax, edge_of(result, zone))
     name_plane(ax, result, *names)
+
+
+def edge_of(result: xr.Dataset, zone: float | str) -> float:
+    """The edge of the contact zone, a number or the parameter that holds it."""
+    if not isinstance(zone, str):
+        return zone
+    known = [str(name) for name, one in result.coords.items() if not one.dims and one.dtype.kind == "f"]
+    if zone not in known:
+        raise ValueError(f"zone: {unknown(zone, 'a parameter', 'this result', known)}; or give a number")
+    return float(result[zone])
 
 
 def shade_zone(ax: Axes, edge: float) -> None:
@@ -127,7 +134,9 @@ def shade_zone(ax: Axes, edge: float) -> None:
     low, high = ax.get_xlim()
     ax.axvline(edge, color=style.COLORS["muted"], linewidth=0.6, linestyle="--", zorder=1)
     if edge < high:
-        ax.axvspan(max(edge, low), high, color=style.COLORS["zone"], alpha=0.18, linewidth=0, zorder=0, label=ZONE)
+        ax.axvspan(
+            max(edge, low), high, color=style.COLORS["zone"], alpha=0.18, linewidth=0, zorder=0, label="contact zone"
+        )
     ax.set_xlim(low, high)
 
 
@@ -136,10 +145,9 @@ def section(
     ax: Axes,
     result: xr.Dataset,
     *,
-    x: str | None = None,
-    y: str | None = None,
-    size: float = 0.8,
-    color: str | None = None,
+    x: Name | None = None,
+    y: Name | None = None,
+    size: Annotated[float, above(0)] = 0.8,
 ) -> None:
     """Draw the section points of a ``poincare`` result (or of a ``sweep``, all its points together).
 
@@ -147,12 +155,12 @@ def section(
     """
     names = first_states(result, x, y)
     points = (column(result, "section", name).values for name in names)
-    style.cloud(ax, points, size, color or style.COLORS["section"])
+    style.cloud(ax, points, size, style.COLORS["section"])
     name_plane(ax, result, *names)
 
 
 @figure(ratio=0.85)
-def orbit(ax: Axes, result: Any, *, x: str | None = None, y: str | None = None) -> None:
+def orbit(ax: Axes, result: Any, *, x: Name | None = None, y: Name | None = None) -> None:
     """Draw an orbit once round, each mode in its own colour.
 
     Open circles are the states just before and after each transition, black dots the section points, and a cross is the
@@ -189,25 +197,30 @@ def orbit(ax: Axes, result: Any, *, x: str | None = None, y: str | None = None) 
         near = int(np.nanargmin(clearance))
         words = f"least clearance {clearance[near]:.2g}"
         place = [run["touch_u"].sel(state=name).values[near] for name in names]
-        cross: dict[str, Any] = {"color": style.COLORS["fourth"], "markersize": 5, "markeredgewidth": 1.1}
-        ax.plot(*place, "x", zorder=6, label=words, **cross)
+        ax.plot(*place, "x", zorder=6, label=words, color=style.COLORS["fourth"], markersize=5, markeredgewidth=1.1)
     style.clear_legend(ax)
 
 
-FLOOR = 1e-7  # of the largest line: below it rounding and the tolerance rule
+_FLOOR = 1e-7  # of the largest line: below it rounding and the tolerance rule
+
+
+def lines_of(result: xr.Dataset, name: str, highest: float) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Multiples of the base frequency up to the highest, the amplitudes there, and the least that means something."""
+    order, values = result["order"].values, column(result, "amplitude", name).values
+    some = (order > 1e-9) & (order <= highest)
+    return order[some], values[some], _FLOOR * (float(values[some].max(initial=0.0)) or 1.0)
 
 
 @figure("amplitude_spectrum", "amplitude")
-def amplitude_spectrum(ax: Axes, result: xr.Dataset, *, y: str | None = None, highest: float = 20.0) -> None:
+def amplitude_spectrum(
+    ax: Axes, result: xr.Dataset, *, y: Name | None = None, highest: Annotated[float, above(0)] = 20.0
+) -> None:
     """Draw an ``amplitude_spectrum`` of the state ``y`` (by default the first) over multiples of the base frequency.
 
     ``highest``: the largest multiple drawn. Lines below 1e-7 of the largest are left out, and so is the mean.
     """
     (name,) = first_states(result, y)
-    order, values = result["order"].values, column(result, "amplitude", name).values
-    some = (order > 1e-9) & (order <= highest)
-    order, values = order[some], values[some]
-    floor = FLOOR * (float(values.max(initial=0.0)) or 1.0)
+    order, values, floor = lines_of(result, name, highest)
     some = values > floor
     bottom = max(floor, 0.3 * float(values[some].min(initial=np.inf))) if some.any() else floor
     color = style.COLORS["first"]

@@ -36,6 +36,8 @@ from nonsmooth.errors import DataFileError
 if TYPE_CHECKING:
     import xarray as xr
 
+REMEDY = "close it where it is open, make room, or give another name"
+WRITTEN = "it could not be written"
 _OLD = "old"  # where a folder goes that is about to be replaced
 _WRITER = "writer.json"
 _DAY = 86400.0  # seconds after which a folder is left behind whose writer cannot be asked (another machine, a restart)
@@ -87,8 +89,20 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 @contextmanager
-def told(path: Path, remedy: str) -> Iterator[None]:
-    """Trouble with the disk as one sentence that ends with what to do."""
+def placed(target: Path) -> Iterator[Path]:
+    """A place to write what goes to ``target`` when it is whole; DataFileError for what cannot be written."""
+    if not target.parent.is_dir():
+        raise DataFileError(f"{target}: the folder {target.parent} does not exist; create it first")
+    with told(target, REMEDY, WRITTEN), beside(target) as folder:
+        if target.exists():
+            target.open("r+b").close()  # not a folder, nor a file that is held or may not be changed
+        yield (fresh := folder / target.name)
+        replace(target, fresh)
+
+
+@contextmanager
+def told(path: Path, remedy: str, other: str = "") -> Iterator[None]:
+    """Trouble with the disk as one sentence that ends with what to do; ``other`` trouble too where it has words."""
     try:
         yield
     except OSError as error:
@@ -100,8 +114,8 @@ def told(path: Path, remedy: str) -> Iterator[None]:
             errno.EPERM: "it may not be written",
             errno.EISDIR: "a folder stands there",
             errno.EFBIG: "the file would be larger than the disk allows",
-        }.get(error.errno or 0)
-        if why is None:
+        }.get(error.errno or 0, other)
+        if not why:
             raise
         raise DataFileError(f"{path}: {why} ({error}); {remedy}") from error
 

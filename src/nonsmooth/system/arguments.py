@@ -38,7 +38,9 @@ def check_system(system: Any, verb: str, inputs: bool = False) -> Any:
         return system
     name = getattr(system, "__name__", None)
     hint = f"; call it: {name}()" if callable(system) and name else ""
-    if isinstance(system, str):
+    if hasattr(system, "data_vars"):
+        hint = "; ns.system_of(result) is that of a result"
+    elif isinstance(system, str):
         hint = f"; a ready model is called by its name: ns.models.{system}()"
     raise TypeError(f"{verb} takes an ns.System, not {shortened(system)}{hint}")
 
@@ -151,7 +153,8 @@ class _Door:
         """The reader of each argument; made in the first call."""
         found = {name: reader_of(kind) for name, kind in self.kinds.items()}
         if "system" in found:
-            found["system"] = lambda value, _: check_system(value, self.verb, "inputs" in self.items)
+            driven = "inputs" in self.items or "ax" in self.items  # figures draw them too
+            found["system"] = lambda value, _: check_system(value, self.verb, driven)
         return found
 
     def misfit(self, given: tuple[Any, ...], named: Mapping[str, Any], error: str) -> str:

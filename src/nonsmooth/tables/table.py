@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.errors import DataFileError
 from nonsmooth.results.labels import in_words
 from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
-from nonsmooth.results.whole import beside, replace, told
+from nonsmooth.results.whole import placed
 from nonsmooth.system.arguments import checked
 from nonsmooth.tables.quantities import coordinates_of, dataset_of, quantities_of, quantity, rows_of
 from nonsmooth.tables.sampled import once, sampled
@@ -160,18 +158,6 @@ def _target(file: str | os.PathLike[str]) -> Path:
             f"{package}; a .csv needs nothing"
         )
     return path
-
-
-@contextmanager
-def placed(target: Path) -> Iterator[Path]:
-    """A place to write what goes to ``target`` when it is whole; DataFileError for what cannot be written."""
-    if not target.parent.is_dir():
-        raise DataFileError(f"{target}: the folder {target.parent} does not exist; create it first")
-    with told(target, "close it where it is open, make room, or give another name"), beside(target) as folder:
-        if target.exists():
-            target.open("r+b").close()  # not a folder, nor a file that is held or may not be changed
-        yield (fresh := folder / target.name)
-        replace(target, fresh)
 
 
 def _write(frame: pd.DataFrame, path: Path) -> None:

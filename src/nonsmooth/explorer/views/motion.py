@@ -11,6 +11,7 @@ from bokeh.models import BoxAnnotation, LinearColorMapper
 from nonsmooth.explorer.figures import BLUE, MOST, Panel, extent
 from nonsmooth.explorer.labels import number, plain_of
 from nonsmooth.explorer.views.view import Request, Requests, View
+from nonsmooth.plot import palette
 from nonsmooth.plot.labels import column
 from nonsmooth.plot.style import COLORS
 from nonsmooth.plot.trajectories import pieces_by_mode, with_gaps
@@ -19,7 +20,7 @@ from nonsmooth.results.labels import in_words
 if TYPE_CHECKING:
     from nonsmooth.explorer.state import PageState
 
-_MODES = [BLUE, *((COLORS[name],) * 2 for name in ("second", "third", "fourth"))]
+_MODES = [BLUE, *((palette.nth(k),) * 2 for k in range(1, 60))]  # more than are seen
 
 
 class _Curves(View):
@@ -137,10 +138,10 @@ class TimeHistory(_Curves):
         """Modes that the motion visits, in the colours that they have in the phase plane too."""
         run = self.sheet.results.get("run")
         seen = [] if run is None else np.unique(run["mode"].values).tolist()
-        if run is None or not 1 < len(seen) <= len(_MODES) or max(seen) >= len(_MODES):
+        if run is None or not 1 < len(seen) <= len(_MODES):
             return []
         words = dict(zip(run["mode"].values.tolist(), in_words(run["mode"]).tolist(), strict=True))
-        return [(str(words[k]).replace("_", " "), _MODES[k][self.dark]) for k in seen if k >= 0]
+        return [(str(words[k]).replace("_", " "), _MODES[k % len(_MODES)][self.dark]) for k in seen if k >= 0]
 
 
 class SectionPoints(View):

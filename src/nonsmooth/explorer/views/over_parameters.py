@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.explorer.figures import BLUE, GREY, INK, Panel, extent
+from nonsmooth.explorer.figures import BLUE, GREY, INK, Panel, cells_of, extent
 from nonsmooth.explorer.labels import number
 from nonsmooth.explorer.raster import Layer, drawn
 from nonsmooth.explorer.schedule import key_of
@@ -38,11 +38,7 @@ _CLOUDS = {
 class Diagram(View):
     """A first look, then the diagram with period numbers."""
 
-    name = "diagram"
-
-    def depends(self, old: tuple[str, str], new: tuple[str, str]) -> bool:
-        """Return whether either changed."""
-        return old != new
+    name, over = "diagram", True
 
     def requests(self, base: Requests) -> Requests:
         """A sweep that nothing judges, and one with a direction."""
@@ -53,8 +49,9 @@ class Diagram(View):
         """The image, and bars that tell the period numbers of a column."""
         self.figure = Panel("diagram")
         plot, empty = self.figure.plot, np.zeros((1, 1), np.uint32)
-        ends: dict[str, Any] = {"x": [0.0], "y": [0.0], "dw": [1.0], "dh": [1.0]}
-        self._image = self.figure.source(name="diagram image", image=[empty], **ends, stage=[""], of=[""])
+        self._image = self.figure.source(
+            name="diagram image", image=[empty], x=[0.0], y=[0.0], dw=[1.0], dh=[1.0], stage=[""], of=[""]
+        )
         plot.image_rgba("image", "x", "y", "dw", "dh", source=self._image)
         self._columns = self.figure.source("value", "low", "high", "words", "period", "status", name="columns")
         bars = plot.segment(
@@ -129,12 +126,10 @@ class Diagram(View):
             self.figure.show(y=extent(np.quantile(finite, [0.001, 0.999]), 0.08))
             self._fitted = key
         low, high = self.figure.plot.y_range.start, self.figure.plot.y_range.end
-        step = (values[-1] - values[0]) / max(len(values) - 1, 1) or 1.0
         self._image.data = {
             "image": [drawn(self._layers(points), low, high, self._pixels)],
-            "x": [values[0] - step / 2],
+            **cells_of(values, values),
             "y": [low],
-            "dw": [step * len(values)],
             "dh": [high - low],
             "of": [key_of(self._shown)],
             "stage": ["judged" if self._shown["view"] == "diagram" else "first look"],
@@ -209,11 +204,7 @@ _WORDS = {"neimark_sacker": "Neimark-Sacker bifurcation", "flip": "flip (period 
 class Branches(View):
     """Lines over the diagram's points, from Newton's method and continuation."""
 
-    name = "branches"
-
-    def depends(self, old: tuple[str, str], new: tuple[str, str]) -> bool:
-        """Return whether either changed: branches lie over the diagram's parameter."""
-        return old != new
+    name, over = "branches", True
 
     @property
     def shown(self) -> bool:
@@ -323,7 +314,7 @@ _POINTS = {"first response": 81, "response": 401}
 class Response(View):
     """Half the peak-to-peak value of a state over a parameter, in most models the forcing frequency."""
 
-    name = "response"
+    name, ends = "response", ("low", "high")
 
     def requests(self, base: Requests) -> Requests:
         """Few frequencies, then many."""
@@ -401,7 +392,3 @@ class Response(View):
     def zoomed(self, x: Ends, y: Ends) -> PageState:
         """Compute the range that is seen."""
         return self.state.with_settings(response__low=x[0], response__high=x[1])
-
-    def unzoomed(self) -> PageState:
-        """Return to the first range."""
-        return self.state.with_settings(response__low=None, response__high=None)

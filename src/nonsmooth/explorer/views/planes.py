@@ -10,7 +10,7 @@ import numpy as np
 from bokeh.models import CustomJSHover, LinearColorMapper
 
 from nonsmooth.explorer.catalogue import first_state
-from nonsmooth.explorer.figures import Panel
+from nonsmooth.explorer.figures import Panel, cells_of
 from nonsmooth.explorer.labels import PREFIXES, power_of
 from nonsmooth.explorer.views.motion import Portrait
 from nonsmooth.explorer.views.view import Ends, Request, Requests, View
@@ -35,8 +35,10 @@ class CellImage(View):
         """The image, its words, marks, and the place of the page."""
         self.figure = Panel(self.name)
         plot, empty = self.figure.plot, np.full((1, 1), np.nan)
-        ends: dict[str, Any] = {"x": [0.0], "y": [0.0], "dw": [1.0], "dh": [1.0]}
-        self._image = self.figure.source(name=f"{self.name} cells", image=[empty], more=[empty], **ends, stage=[""])
+        self._image = self.figure.source(
+            name=f"{self.name} cells", image=[empty], more=[empty], x=[0.0], y=[0.0], dw=[1.0], dh=[1.0], stage=[""]
+        )
+        self._legend: list[tuple[str, ...]] = []
         self._mapper = LinearColorMapper(palette=["#FFFFFF"], low=-0.5, high=0.5, nan_color="rgba(0,0,0,0)")
         image = plot.image("image", "x", "y", "dw", "dh", source=self._image, color_mapper=self._mapper, level="image")
         self._places = {
@@ -72,16 +74,16 @@ class CellImage(View):
         self._mapper.update(palette=[color for _, color in entries], low=-0.5, high=len(entries) - 0.5)
         self._words.args = {"words": [words for words, _ in entries]}
         self._more.args = {"before": ", exponent near ", "after": "" if unit == "1" else f" {unit}"}
-        steps = [(one[-1] - one[0]) / max(len(one) - 1, 1) for one in (x, y)]
         self._image.data = {
             "image": [classes.astype(np.float64)],
             "more": [np.full(classes.shape, _NOTHING) if more is None else np.nan_to_num(more, nan=_NOTHING)],
-            "x": [x[0] - steps[0] / 2],
-            "y": [y[0] - steps[1] / 2],
-            "dw": [steps[0] * len(x)],
-            "dh": [steps[1] * len(y)],
+            **cells_of(x, y),
             "stage": [stage],
         }
+
+    def legend(self) -> list[tuple[str, ...]]:
+        """The classes that the picture has."""
+        return self._legend if self.name in self.results else []
 
     def name_axes(self, x: str, y: str, of: str = "") -> None:
         """Label the axes, in the prefixes that the words below the mouse have too."""
@@ -96,11 +98,7 @@ class CellImage(View):
 class Chart(CellImage):
     """Period numbers over the diagram's parameter and a second one, from the initial state at rest."""
 
-    name = "chart"
-
-    def depends(self, old: tuple[str, str], new: tuple[str, str]) -> bool:
-        """Return whether either changed: the chart's abscissa is the diagram's."""
-        return old != new
+    name, over, ends = "chart", True, ("low", "high")
 
     def requests(self, base: Requests) -> Requests:
         """Each finer than the one before it, and exponents on a grid of their own."""
@@ -139,7 +137,7 @@ class Chart(CellImage):
             more = known.sel({over: x, across: y}, method="nearest").transpose(across, over).values
             unit = str(known.attrs.get("units", "1"))
         self.put(x, y, classes, entries, self._stage, more, unit)
-        self._legend: list[tuple[str, ...]] = [*legend_of(classes, entries)]
+        self._legend = [*legend_of(classes, entries)]
         self.figure.show((self.state.low, self.state.high), (float(y[0]), float(y[-1])))
         self.name_axes(over, across)
         self.place()
@@ -149,10 +147,6 @@ class Chart(CellImage):
         values, across = self.state.values, self.setting("across")
         if "chart" in self.results and across in values:
             self.here.data = {"x": [values[self.state.over]], "y": [values[across]]}
-
-    def legend(self) -> list[tuple[str, ...]]:
-        """The classes that the chart has."""
-        return self._legend if "chart" in self.results else []
 
     def tapped(self, x: float, y: float) -> PageState:
         """Go to the nearest point of the chart, and start where its runs started."""
@@ -167,20 +161,15 @@ class Chart(CellImage):
         """Compute the range that is seen; the diagram's range is the same."""
         return replace(self.state, low=x[0], high=x[1]).with_settings(chart__low=y[0], chart__high=y[1])
 
-    def unzoomed(self) -> PageState:
-        """Return to the first range of the second parameter."""
-        return self.state.with_settings(chart__low=None, chart__high=None)
-
 
 _NEAR = 0.1  # of the window: attractors of two pictures that are this near are one
 _MARKS = ("circle", "square", "triangle", "diamond", "inverted_triangle", "hex", "star")
-_ENDS = ("left", "right", "bottom", "top")
 
 
 class Basins(CellImage):
     """Initial states in the colour of their attractor, with the attractors' section points; a click starts there."""
 
-    name = "basins"
+    name, ends = "basins", ("left", "right", "bottom", "top")
 
     def requests(self, base: Requests) -> Requests:
         """Each finer than the one before it; initial values of states outside the plane are the page's."""
@@ -193,7 +182,7 @@ class Basins(CellImage):
                 "y": state.y,
                 "begin": base["first look"]["begin"],
                 "fixed": {name: value for name, value in start if name not in (state.x, state.y)},
-                "window": [self.setting(end) for end in _ENDS],
+                "window": [self.setting(end) for end in self.ends],
             }
         )
 
@@ -231,12 +220,11 @@ class Basins(CellImage):
         ]
         classes = np.maximum(result["label"].transpose(second, first).values, -2) + 2
         self.put(x, y, classes, entries, self._stage)
-        self._legend: list[tuple[str, ...]] = [entries[k] for k in np.unique(classes)]
+        self._legend = [entries[k] for k in np.unique(classes)]
         marks = [_MARKS[numbers[k] % len(_MARKS)] if periods[k] else "dot" for k in of]
         self.points.data = {"x": points[:, 0], "y": points[:, 1], "marker": marks}
-        half = [0.5 * np.ptp(one) / max(len(one) - 1, 1) for one in (x, y)]
-        ends = ((float(one[0] - h), float(one[-1] + h)) for one, h in zip((x, y), half, strict=True))
-        self.figure.show(*ends)
+        drawn = self._image.data
+        self.figure.show(*((drawn[at][0], drawn[at][0] + drawn[size][0]) for at, size in (("x", "dw"), ("y", "dh"))))
         self.name_axes(first, second)
         self.place()
 
@@ -268,16 +256,10 @@ class Basins(CellImage):
         super().clear()
         self._known = []
 
-    def legend(self) -> list[tuple[str, ...]]:
-        """Attractors with their shares."""
-        return self._legend if "basins" in self.results else []
-
     tapped = Portrait.tapped
 
     def zoomed(self, x: Ends, y: Ends) -> PageState:
         """Compute the window that is seen."""
-        return self.state.with_settings(**{f"basins__{end}": value for end, value in zip(_ENDS, (*x, *y), strict=True)})
-
-    def unzoomed(self) -> PageState:
-        """Return to the first window."""
-        return self.state.with_settings(**{f"basins__{end}": None for end in _ENDS})
+        return self.state.with_settings(
+            **{f"basins__{end}": value for end, value in zip(self.ends, (*x, *y), strict=True)}
+        )

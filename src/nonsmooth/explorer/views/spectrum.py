@@ -7,7 +7,7 @@ import numpy as np
 from nonsmooth.explorer.figures import BLUE, Panel
 from nonsmooth.explorer.labels import axis_label, number
 from nonsmooth.explorer.views.view import Requests, View
-from nonsmooth.plot.trajectories import FLOOR
+from nonsmooth.plot.trajectories import lines_of
 
 _LINES = 20  # multiples of the base frequency that are drawn
 
@@ -39,20 +39,17 @@ class AmplitudeSpectrum(View):
             return
         system, (latex, unit) = self.system, self.quantity(self.state.x)
         base, discrete = float(result["base_frequency"]), bool(result["period_number"])
-        order, own = result["order"].values, result["amplitude"].sel(state=self.state.x).values
-        some = (order > 1e-9) & (order <= _LINES)
-        largest = float(own[some].max(initial=0.0)) or 1.0
-        some &= own > FLOOR * largest
-        x, y = order[some], own[some]
+        order, own, floor = lines_of(result, self.state.x, _LINES)
+        x, y = order[own > floor], own[own > floor]
         hertz = result["base_frequency"].attrs["units"]
         words = [
             f"{a:.4g}{'' if system.is_map else f' · {number(a * base, hertz)}'}: {number(b, unit)}"
             for a, b in zip(x, y, strict=True)
         ]
-        self._source.data = {"x": x, "y": y, "low": np.full(len(x), FLOOR * largest), "words": words}
+        self._source.data = {"x": x, "y": y, "low": np.full(len(x), floor), "words": words}
         self._stems.visible = self._dots.visible = discrete
         self._curve.glyph.line_alpha = 0.0 if discrete else 1.0
-        self.figure.show((0.0, float(x.max(initial=1.0)) * 1.02), (FLOOR * largest, 3 * largest))
+        self.figure.show((0.0, float(x.max(initial=1.0)) * 1.02), (floor, 3 * (float(own.max(initial=0.0)) or 1.0)))
         times = "frequency / forcing frequency" if system.period() is not None else "frequency / that of the returns"
         self.figure.x.say("frequency per iterate" if system.is_map else times)
         self.figure.y.say(f"amplitude of {axis_label(latex, unit)}")

@@ -27,9 +27,15 @@ class View:
         By name, as the worker gave them.
     figure : Panel, optional
         None where the view lies in another one's.
+    over : bool
+        Whether its results are of the diagram's parameter.
+    ends : tuple of str
+        Settings that hold the window which it shows.
     """
 
     name: ClassVar[str]
+    over: ClassVar[bool] = False
+    ends: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, sheet: Sheet) -> None:
         self.page, self.kind, self.results = sheet.page, KINDS[self.name], dict[str, Any]()
@@ -75,7 +81,7 @@ class View:
 
     def depends(self, old: tuple[str, str], new: tuple[str, str]) -> bool:
         """Return whether its results are of no use after a change of the model or of the diagram's parameter."""
-        return old[0] != new[0]
+        return old != new if self.over else old[0] != new[0]
 
     @property
     def shown(self) -> bool:
@@ -128,5 +134,5 @@ class View:
         return self.state
 
     def unzoomed(self) -> PageState:
-        """The state after the zoom was reset."""
-        return self.state
+        """The state after the zoom was reset: the first window."""
+        return self.state.with_settings(**{f"{self.name}__{end}": None for end in self.ends})

@@ -31,13 +31,13 @@ def first_length(problem: Windows) -> float:
     n = problem.marcher.flow.n
     for record in problem.records:
         columns = [y[np.isfinite(y)] for y in record.values.T]
-        swings = [_turns(y) for y in columns if len(y)]
+        swings = [turns_of(y) for y in columns if len(y)]
         longest = _OF_A_SWING * 2.0 * record.duration / max(min(swings), 4)
         found.append(max(longest, (3 * n + 6) * record.duration / (len(record.time) - 1)))
     return float(np.median(found))
 
 
-def _turns(y: FloatArray) -> int:
+def turns_of(y: FloatArray) -> int:
     """Number of turns of a quantity by more than a part of its range."""
     low, high = np.quantile(y, [0.05, 0.95])
     least, turns, rising, extreme = _SWING * (high - low), 0, True, y[0]

@@ -1,7 +1,8 @@
 r"""Noise of a fit: its size and its correlation from the residuals, and the structure that no such noise has.
 
 The noise of a quantity is taken for an autoregressive process of the first order: two readings a time :math:`\Delta t`
-apart correlate by :math:`\rho^{\Delta t / h}`, with h the median step. White noise has rho = 0.
+apart correlate by :math:`\rho^{\Delta t / h}` in all runs, whatever their rates; h is the shortest median step. White
+noise has rho = 0.
 """
 
 from __future__ import annotations
@@ -26,23 +27,35 @@ def robust_size(r: FloatArray) -> float:
     return float(1.4826 * np.median(np.abs(r))) if len(r) else 0.0
 
 
-def _as_irregular(rho: float) -> float:
-    """Standard deviation of such noise over that of white noise of the same third differences."""
-    return float(np.sqrt(20.0 / (20.0 - 30.0 * rho + 12.0 * rho**2 - 2.0 * rho**3)))
+def _as_irregular(rho: FloatArray) -> float:
+    """Standard deviation of such noise over that of white noise of the same third differences, over all runs."""
+    return float(np.sqrt(20.0 / np.mean(20.0 - 30.0 * rho + 12.0 * rho**2 - 2.0 * rho**3)))
 
 
 def colours(problem: Windows, state: Residuals) -> FloatArray:
-    """Correlation of neighbouring residuals of each quantity, 0 where it is none; ``state``: not whitened."""
-    found = np.zeros(len(problem.sensors))
-    for c in range(len(found)):
-        rows = parts(problem, state, c)
-        cut = 5.0 * robust_size(np.concatenate([np.zeros(0), *rows]))
-        rows = [np.clip(r, -cut, cut) for r in rows]
-        power, n = sum(float(r @ r) for r in rows), sum(map(len, rows))
-        if power > 0.0:
-            rho = sum(float(r[1:] @ r[:-1]) for r in rows) / power
-            found[c] = min(rho, _MOST) if rho > max(_LEAST, _SURE / np.sqrt(n)) else 0.0
-    return found
+    """Correlation of residuals of each quantity over its step, 0 where it is none; ``state``: not whitened."""
+    return np.array([_colour(problem, c, _timed(problem, state, c)) for c in range(len(problem.sensors))])
+
+
+def _colour(problem: Windows, c: int, rows: list[tuple[FloatArray, FloatArray]]) -> float:
+    """The most likely correlation, where it is large and sure enough; ``rows``: times and residuals."""
+    from scipy.optimize import minimize_scalar
+
+    every = np.concatenate([np.zeros(0), *(r for _, r in rows)])
+    cut = 5.0 * robust_size(every)
+    cuts = [(problem.gaps(c, t), np.clip(r, -cut, cut)) for t, r in rows if len(r) > 1]
+    if not cuts or not every.any():
+        return 0.0
+    gaps, before, here = (np.concatenate(one) for one in zip(*((gap, r[:-1], r[1:]) for gap, r in cuts), strict=True))
+    power = max(float(np.mean(np.clip(every, -cut, cut) ** 2)), 1e-300)
+
+    def unlikely(rho: float) -> float:
+        """Minus twice the logarithm of the likelihood."""
+        left = 1.0 - rho ** (2.0 * gaps)
+        return float(np.sum(np.log(left) + (here - rho**gaps * before) ** 2 / (power * left)))
+
+    best = minimize_scalar(unlikely, bounds=(0.0, _MOST), method="bounded")
+    return float(best.x) if best.x > _LEAST and unlikely(0.0) - best.fun > _SURE**2 else 0.0
 
 
 def strange(problem: Windows, plain: Residuals, white: Residuals, irregular: FloatArray) -> tuple[float, bool]:
@@ -59,14 +72,20 @@ def strange(problem: Windows, plain: Residuals, white: Residuals, irregular: Flo
             continue
         # outliers raise the one, readings that are rounded the other
         size = min(robust_size(r), float(np.sqrt(np.mean(r**2)))) / irregular[c]
-        worst = max(worst, size / _as_irregular(problem.colour[c]))
+        worst = max(worst, size / _as_irregular(problem.colour[c] ** (problem.steps[:, c] / problem.step[c])))
         missing = missing or (size > _LARGE and _has_structure(r, e))
     return worst, missing
 
 
 def parts(problem: Windows, state: Residuals, c: int) -> list[FloatArray]:
     """Residuals of a quantity, window by window, without the readings at a limit of the sensor."""
-    return [r[(w.readings[1] == c) & (problem.limits(w) == 0)] for w, r in problem.rows(state)]
+    return [r for _, r in _timed(problem, state, c)]
+
+
+def _timed(problem: Windows, state: Residuals, c: int) -> list[tuple[FloatArray, FloatArray]]:
+    """The same with their times."""
+    mine = [(w, r, (w.readings[1] == c) & (problem.limits(w) == 0)) for w, r in problem.rows(state)]
+    return [(w.time[w.readings[0][here]], r[here]) for w, r, here in mine]
 
 
 def _has_structure(r: FloatArray, e: FloatArray) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import Sandwich, concerned, sandwich
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.fit.first_level import BETTER
+from nonsmooth.identification.fit.first_windows import turns_of
 from nonsmooth.identification.fit.growth import SHORT, Grown
 from nonsmooth.identification.fit.likelihood import profiled
 from nonsmooth.identification.fit.noise import OUTLYING, robust_size
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
 _TOGETHER = 0.98  # correlation from which two parameters are said to be known only together
 _POOR = 2.0  # residuals over noise, from which the model is said not to be the motion
 _NOTHING = 0.5  # residuals over the readings' own variation, from which the model is said to explain nothing
+_SEEN, _BETWEEN = 200, 16  # readings at the beginning of a record, and instants that are looked at for each
+_PER_SWING, _SWINGS = 4, 3  # readings for each swing, below which other motions have them too; swings that tell it
 _SHARED = 8  # readings that share the record's extreme value
 _FEW, _NAMED = 0.05, 6  # part of the readings that outliers are at most; outliers of which the times are named
 METHOD_STEADY = "least squares over the steady states that sweeps up and down reach, derivatives of the periodic orbits"
@@ -252,7 +256,8 @@ def _of_readings(grown: Grown, c: int, data: xr.Dataset) -> list[str]:
     r, time = (data["measured"] - data["fitted"]).values[mine], data["time"].values[mine]
     if problem.colour[c]:
         notes.append(
-            f"the noise of {name} correlates by {problem.colour[c]:.2f} from reading to reading, and is weighed by that"
+            f"the noise of {name} correlates by {problem.colour[c]:.2f} from reading to reading ({problem.step[c]:.3g} "
+            "apart, the shortest where runs differ), and is weighed by that"
         )
     out = np.flatnonzero(np.abs(r) > OUTLYING * max(robust_size(r), problem.sensors[name].floor))
     if 0 < len(out) < _FEW * len(r):
@@ -284,8 +289,35 @@ def _ends(grown: Grown, data: xr.Dataset) -> list[str]:
     return found
 
 
+def _aliases(grown: Grown) -> list[str]:
+    """A sentence on a fitted motion that swings faster than its readings show, at the records' beginnings."""
+    problem, rng = grown.problem, np.random.default_rng(0)
+    counts = np.zeros((2, len(problem.sensors)))  # readings, swings
+    firsts = {
+        window.record: (window, start) for window, start in [*zip(problem.pieces, grown.starts, strict=True)][::-1]
+    }
+    for window, start in firsts.values():
+        k = min(_SEEN, len(window.time) - 1)
+        time = np.sort(
+            rng.uniform(window.time[0], window.time[k], _BETWEEN * k)
+        )  # at no rate, which could have aliases too
+        fine = replace(window, time=time, values=np.zeros((len(time), counts.shape[1])))
+        if (motion := problem.motion(grown.theta, fine, start)) is not None:
+            predicted = problem.readings(grown.theta, fine, motion, False)[0].reshape(fine.values.shape)
+            counts += np.isfinite(window.values[:k]).sum(axis=0), [0.5 * turns_of(y) for y in predicted.T]
+    read, swings = counts
+    best = int(np.argmax(read / np.maximum(swings, 1e-300)))  # the quantity that shows most of the motion
+    if swings[best] <= _SWINGS or read[best] >= _PER_SWING * swings[best]:
+        return []
+    name, each = list(problem.sensors)[best], read[best] / swings[best]
+    return [
+        f"the fitted motion of {name} has {each:.2g} readings for each of its swings: so few are those of slower or "
+        "faster motions too; see whether the record's times are in the unit of the model"
+    ]
+
+
 def _anomalies(grown: Grown, data: xr.Dataset | None) -> list[str]:
-    found = [] if data is None else _ends(grown, data)
+    found = [] if data is None else [*_aliases(grown), *_ends(grown, data)]
     if data is not None and (grown.rms > _POOR or grown.missing):
         name, rms, _ = next(row for row in by_place(data) if row[2] >= min(5, data.sizes["sample"]))
         found.append(

@@ -163,10 +163,11 @@ def _information(
     from nonsmooth.identification.fit.fit import problem_of
 
     settings = dict(run.get("settings", {}))
-    motion = simulate(system.with_parameters(settings), **{key: run[key] for key in run if key != "settings"})
+    there = system.with_parameters(settings)
+    motion = simulate(there, **{key: run[key] for key in run if key != "settings"})
     mode = list(system.modes)[int(motion["mode"].values[0])] if motion["mode"].dtype.kind in "iu" else None
-    given = {"measured": sensors, "settings": settings, "priors": known_before["priors"]}
-    problem = problem_of(system, motion, parameters, given, run.get("mode") or mode)
+    given = {"measured": sensors, "priors": known_before["priors"]}
+    problem = problem_of(there, motion, parameters, given, run.get("mode") or mode)
     problem = replace(problem, noise=noise)
     theta = problem.unknowns.guess
     begin = motion["u"].values[:1]
@@ -184,8 +185,11 @@ def _information(
     shared = len(theta) - problem.unknowns.phases
     own = np.linalg.pinv(normal[shared:, shared:], hermitian=True)
     eliminated = normal[:shared, :shared] - normal[:shared, shared:] @ own @ normal[shared:, :shared]
-    known = problem.unknowns.precision[:shared, :shared]
-    return list(problem.unknowns.names[:shared]), eliminated, known, theta[:shared]
+    names, known = list(problem.unknowns.names[:shared]), problem.unknowns.precision[:shared, :shared]
+    for i in (names.index(name) for name in settings if name in names):  # known in this run, which tells nothing of it
+        eliminated[i] = eliminated[:, i] = 0.0
+        theta[i] = system.values[names[i]]
+    return names, eliminated, known, theta[:shared]
 
 
 def _ordered(found: list[FloatArray], known: FloatArray, size: FloatArray) -> tuple[list[int], list[FloatArray]]:

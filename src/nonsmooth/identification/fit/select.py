@@ -85,7 +85,7 @@ def select_model(
     for name, pair in models.items():
         if not isinstance(pair, list | tuple) or len(pair) != 2:
             raise TypeError(f"models[{name!r}] must be a pair (system, parameters), not {type(pair).__name__}")
-        check_system(pair[0], "select_model")
+        check_system(pair[0], "select_model", inputs=True)
         problems[str(name)] = problem_of(pair[0], recording, pair[1], options)
     held = _held_out(next(iter(problems.values())), folds)
     found = np.empty((len(problems), folds))

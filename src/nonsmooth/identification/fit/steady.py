@@ -93,8 +93,10 @@ class SteadyReadings:
 
 def is_steady(one: Any) -> bool:
     """Return whether this is a response or sections, not a record over time."""
-    held = [str(name) for name in getattr(one, "variables", one)] if hasattr(one, "keys") else []
-    return "time" not in held and ("amplitude" in held or "section" in held)
+    held = {str(name): name for name in getattr(one, "variables", one)} if hasattr(one, "keys") else {}
+    kinds = [] if "time" in held else [one[held[kind]] for kind in ("amplitude", "section") if kind in held]
+    pairs = [isinstance(kind, list | tuple) and len(kind) == 2 and np.ndim(kind[0]) > 0 for kind in kinds]
+    return bool(kinds) and not any(pairs)  # a pair (t, y) is a channel of this name
 
 
 def of_table(system: System, one: Any, name: str) -> xr.Dataset:

@@ -99,9 +99,9 @@ class Windows:
     """Windows of all records with the system, its sensors and the unknowns.
 
     ``noise``: standard deviation of a reading of each quantity, rounding included. ``modes``: in which each record
-    may begin, the first guess first. ``colour``: correlation of neighbouring readings of each quantity. ``loss``: noise
-    deviations from which on a residual counts linearly (Huber). ``steady``: readings of steady states, which are runs
-    behind the records.
+    may begin, the first guess first. ``colour``: correlation of readings of each quantity over its ``step``. ``loss``:
+    noise deviations from which on a residual counts linearly (Huber). ``steady``: readings of steady states, which are
+    runs behind the records.
     """
 
     system: System
@@ -124,6 +124,21 @@ class Windows:
     def plain(self) -> Windows:
         """The problem of the records alone, with readings taken for independent."""
         return replace(self, colour=np.zeros(len(self.sensors)), steady=())
+
+    @cached_property
+    def steps(self) -> FloatArray:
+        """Median time from reading to reading (records, quantities); infinite where there are not two."""
+        times = [[record.time[np.isfinite(y)] for y in record.values.T] for record in self.records]
+        return np.array([[np.median(np.diff(t)) if len(t) > 1 else np.inf for t in each] for each in times])
+
+    @cached_property
+    def step(self) -> FloatArray:
+        """The shortest of these of each quantity."""
+        return np.asarray(self.steps.min(axis=0, initial=np.inf))
+
+    def gaps(self, c: int, time: FloatArray) -> FloatArray:
+        """Times between readings of a quantity, in its steps."""
+        return np.maximum(np.diff(time) / self.step[c], 0.2)
 
     @cached_property
     def readouts(self) -> list[Observable]:
@@ -295,12 +310,11 @@ class Windows:
         if not self.colour.any():
             return rows
         (k, c), plain, out = window.readings, self.limits(window) == 0, rows.copy()
-        for j in np.flatnonzero(self.colour):
+        for j in np.flatnonzero(self.colour).tolist():
             at = np.flatnonzero((c == j) & plain)
             if len(at) < 2:
                 continue
-            apart = np.diff(window.time[k[at]])
-            told = (self.colour[j] ** np.maximum(apart / np.median(apart), 0.2))[:, None]
+            told = self.colour[j] ** self.gaps(j, window.time[k[at]])[:, None]
             out[at[1:]] = (rows[at[1:]] - told * rows[at[:-1]]) / np.sqrt(1.0 - told**2)
         return out
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.plot import style
+from nonsmooth.plot import palette, style
 from nonsmooth.plot.comparison import MEASURED
 from nonsmooth.plot.identification.picture import Picture, number, picture
 
@@ -16,7 +16,7 @@ _OMEGA, _AMPLITUDE = (r"$\omega$", "rad/s"), ("amplitude of $x$", "m")
 _MARKERS = {"up": "^", "down": "v"}
 _FITS = (("joint", "$c$ beside dry friction", "first", "-", "s"), ("viscous", "$c$ alone", "second", "--", "D"))
 _ENVELOPES = (("both", "viscous and dry", "first", "-"), ("viscous", "viscous alone", "second", "--"))
-_CRANKS = (("first", "o"), ("second", "s"), ("third", "^"), ("fourth", "D"))
+_CRANKS = ("o", "s", "^", "D")
 
 
 @picture("amplitude omega omega_fine", _OMEGA, _AMPLITUDE, ratio=0.85)
@@ -87,8 +87,8 @@ def nyquist(one: Picture, finding: Any) -> None:
     """
     lengths, crank, real, imaginary = one.values("crank_length", "crank", "fitted_real", "fitted_imaginary")
     for k, length in enumerate(lengths):
-        color, mark = _CRANKS[k % len(_CRANKS)]
-        one.line(real[k], imaginary[k], f"fitted, crank {1e3 * length:.4g} mm", color, linewidth=0.9)
+        mark = _CRANKS[k % len(_CRANKS)]
+        one.line(real[k], imaginary[k], f"fitted, crank {1e3 * length:.4g} mm", palette.nth(k), linewidth=0.9)
         here, label = np.isclose(crank, length), f"{one.word}, {1e3 * length:.4g} mm"
         one.points("real", "imaginary", label, where=here, mark=mark, face="white")
     for axis in (one.ax.axhline, one.ax.axvline):

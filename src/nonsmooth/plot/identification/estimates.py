@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from nonsmooth.errors import unknown
-from nonsmooth.plot import style
+from nonsmooth.plot import palette, style
 from nonsmooth.plot.figure import figure
 from nonsmooth.plot.identification.picture import Picture, data_of, number, picture
 from nonsmooth.plot.labels import symbol_of
@@ -76,8 +76,9 @@ def calibration(one: Picture, finding: Any) -> None:
         band = None
         if "fitted_low" in one.data:
             band = [at[there], *((one.data[f"fitted_{end}"].values - fitted)[there] for end in ("low", "high"))]
-            looks: dict[str, Any] = {"color": style.COLORS["first"], "alpha": 0.25, "linewidth": 0}
-            one.ax.fill_between([], [], label="its 95 % band (below)", **looks)
+            one.ax.fill_between(
+                [], [], label="its 95 % band (below)", color=style.COLORS["first"], alpha=0.25, linewidth=0
+            )
         error = one.data["reading_error"].values if "reading_error" in one.data else None
         one.residual(setting, reading - np.interp(setting, at, fitted), error=error, band=band, marker="o")
     one.points("setting", "reading")
@@ -93,19 +94,18 @@ def _law(one: Picture) -> str:
     return f"{text},\nfrom {-intercept / slope:.4g} {units[1]} on" if away and text else text
 
 
-_COLORS = ("first", "second", "third", "fourth", "zone", "pale")
 _FEW = 3  # readings of a place, below which it has no bar
 
 
+@picture("", ("time", ""), columns=3, margin=0.05, strip=r"$\sigma$", ratio=0.9)
 def fit_residuals(
+    one: Picture,
     fitted: Any,
-    ax: Axes | None = None,
     *,
-    show: str = "time",
+    show: Literal["time", "places"] = "time",
     quantity: str | None = None,
     run: str | None = None,
-    **common: Any,
-) -> Axes:
+) -> None:
     """Draw readings, fit and residuals over time, or the residuals' size at each place of the motion.
 
     Parameters
@@ -118,22 +118,30 @@ def fit_residuals(
         ``"time"``: readings with the fit, coloured by mode, and residuals over their standard deviation below;
         ``"places"``: their root mean square in each mode, at each transition and at grazes.
     quantity, run
-        Of which measured quantity, and of which run; the first ones where not given.
+        Of which measured quantity, and of which run; where not given the first ones, of places all.
     """
     data = data_of(getattr(fitted, "residuals", fitted), "measured", "fitted", "residual", "place")
-    if show not in ("time", "places"):
-        raise ValueError(f"show = {show!r}; allowed: 'time', 'places'")
-    if show == "time":
-        return _over_time(data, ax, quantity=quantity, run=run, **common)
-    return _by_place(data, ax, **common)
+    if show == "places":
+        _by_place(one.ax, _chosen(data, quantity=quantity, run=run))
+    else:
+        _over_time(one, _chosen(data, True, quantity=quantity, run=run))
 
 
-def _chosen(data: Any, name: str, given: str | None) -> int:
-    words = words_of_flags(data[name])
-    asked = words[0] if given is None else given.replace(" ", "_")
-    if asked not in words:
-        raise ValueError(unknown(given, f"a {name}", "this fit", words))
-    return words.index(asked)
+def _chosen(data: Any, one: bool = False, **asked: str | None) -> Any:
+    """The samples of what is asked for by name; of ``one`` the first where no name is given."""
+    for name, given in asked.items():
+        if given is None and not one:
+            continue
+        words = words_of_flags(data[name])
+        word = words[0] if given is None else given.replace(" ", "_")
+        if word not in words:
+            raise ValueError(unknown(given, f"a {name}", "this fit", words))
+        data = data.isel(sample=data[name].values == words.index(word))
+    return data
+
+
+def _quantity(part: Any) -> str:
+    return words_of_flags(part["quantity"])[int(part["quantity"].values[0])]
 
 
 @picture("", columns=3, margin=0.03, strip=r"$\sigma$", ratio=0.9)
@@ -154,14 +162,13 @@ def steady_readings(
         Of which measured state, and of which run; the first ones where not given.
     """
     data = data_of(getattr(fitted, "steady", fitted), "measured", "fitted", "used", "iterate")
-    q, r = _chosen(data, "quantity", quantity), _chosen(data, "run", run)
-    one.data = part = data.isel(sample=np.flatnonzero((data["quantity"].values == q) & (data["run"].values == r)))
+    one.data = part = _chosen(data, True, quantity=quantity, run=run)
     known = ("run", "quantity", "iterate", "measured", "fitted", "measured_error", "used", "residual")
     set_ = [str(name) for name in part.data_vars if name not in known and np.isfinite(part[name].values).any()]
     if over is not None and over not in set_:
         raise ValueError(unknown(over, "a parameter that was set", "these runs", set_))
     name = over or max(set_, key=lambda each: len(np.unique(part[each].values)))
-    attrs, of = part["measured"].attrs, symbol_of(words_of_flags(data["quantity"])[q])
+    attrs, of = part["measured"].attrs, symbol_of(_quantity(part))
     one.x = symbol_of(name), str(part[name].attrs.get("units", ""))
     one.y = f"{attrs.get('long_name', 'reading')} of {of}", str(attrs.get("units", ""))
     used, residual = one.values("used", "residual")
@@ -170,18 +177,16 @@ def steady_readings(
     one.residual(part[name].values[used], residual[used])
 
 
-@picture("", ("time", ""), columns=3, margin=0.05, strip=r"$\sigma$", ratio=0.9)
-def _over_time(one: Picture, data: Any, *, quantity: str | None, run: str | None) -> None:
-    q, r = _chosen(data, "quantity", quantity), _chosen(data, "run", run)
-    one.data = part = data.isel(sample=np.flatnonzero((data["quantity"].values == q) & (data["run"].values == r)))
-    one.y = words_of_flags(data["quantity"])[q], str(part["measured"].attrs.get("units", ""))
-    modes = words_of_flags(data["mode"])
+def _over_time(one: Picture, part: Any) -> None:
+    one.data = part
+    one.y = _quantity(part), str(part["measured"].attrs.get("units", ""))
+    modes = words_of_flags(part["mode"])
     time, mode, window, residual, fitted = one.values("time", "mode", "window", "residual", "fitted")
     one.cloud(time, part["measured"].values)
     for k, m in enumerate(np.unique(mode)):
         inside = (mode == m) & np.append(np.diff(window) == 0, False)
         line = np.where(inside | np.roll(inside, 1), fitted, np.nan)
-        one.line(time, line, f"fit: {modes[int(m)]}", _COLORS[k % len(_COLORS)], linewidth=0.9)
+        one.line(time, line, f"fit: {modes[int(m)]}", palette.nth(k), linewidth=0.9)
     one.residual(time, residual)
     near = part["place"].values >= len(modes)
     if near.any():
@@ -189,7 +194,6 @@ def _over_time(one: Picture, data: Any, *, quantity: str | None, run: str | None
         one.residual(time[near], residual[near], "residual at a transition or graze", color=color, markersize=3.5)
 
 
-@figure()
 def _by_place(ax: Axes, data: Any) -> None:
     names, place, residual = words_of_flags(data["place"]), data["place"].values, data["residual"].values
     held = [i for i in np.unique(place) if np.count_nonzero(place == i) >= _FEW]
@@ -198,8 +202,7 @@ def _by_place(ax: Axes, data: Any) -> None:
         r = residual[place == i]
         size = float(np.sqrt(np.mean(r**2)))
         color = style.COLORS["first" if i < n_modes else "second"]
-        bars = {"xerr": size / np.sqrt(2.0 * len(r)), "error_kw": {"elinewidth": 0.8}}
-        ax.barh(row, size, color=color, height=0.6, **bars)
+        ax.barh(row, size, color=color, height=0.6, xerr=size / np.sqrt(2.0 * len(r)), error_kw={"elinewidth": 0.8})
         ax.text(0.0, row, f" {len(r)}", va="center", fontsize=style.small(ax), color="white")
     ax.axvline(1.0, color=style.COLORS["muted"], linewidth=0.7)
     words = [names[i].replace("->", " \N{RIGHTWARDS ARROW} ").replace("_", " ") for i in held]
@@ -230,8 +233,7 @@ def profile(one: Picture, finding: Any) -> None:
     value, cost = one.values("value", "cost")
     one.span(number(data, "low"), number(data, "high"), "95 % interval", ymax=0.74)
     one.line(value, cost, f"profile, {one.word}", marker="o", markersize=1.5)
-    bound: dict[str, Any] = {"color": style.COLORS["muted"], "linestyle": "--", "linewidth": 0.7}
-    one.ax.axhline(CHI_SQUARE_95, label="95 % bound, 3.84", **bound)
+    one.ax.axhline(CHI_SQUARE_95, label="95 % bound, 3.84", color=style.COLORS["muted"], linestyle="--", linewidth=0.7)
     if np.isfinite(best := number(data, "best")):
         one.ax.axvline(best, ymax=0.74, color=style.COLORS["second"], linewidth=0.9, label="best fit")
     one.ax.set_ylim(0, max(1.1 * CHI_SQUARE_95, min(float(np.nanmax(cost)), 5 * CHI_SQUARE_95)) * 1.35)
@@ -273,8 +275,7 @@ def coverage(ax: Axes, finding: Any) -> None:
             ax.plot(k + spread[mine], off[mine, k], ".", color=style.COLORS[color], markersize=3)
         rms = float(np.sqrt(np.nanmean(off[:, k] ** 2)))
         words = f"{np.count_nonzero(held[:, k])}/{rigs}\nrms {rms:.2f}"
-        above: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "ha": "center", "va": "bottom"}
-        ax.text(k, 1.02, words, fontsize=style.small(ax), **above)
+        ax.text(k, 1.02, words, fontsize=style.small(ax), transform=ax.get_xaxis_transform(), ha="center", va="bottom")
     reach = max(3.0, 1.08 * float(np.nanmax(np.abs(off[np.isfinite(off)]), initial=0.0)))
     ax.set_ylim(-reach, reach)
     ax.set_xticks(range(len(names)), [symbol_of(name) for name in names])

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from nonsmooth.plot import style
 from nonsmooth.plot.comparison import MEASURED
 from nonsmooth.plot.identification.picture import Picture, data_of, number, picture
+from nonsmooth.system.kinds import above
 
 _TIME, _DISPLACEMENT = ("time", "s"), ("displacement", "m")
 _BINS = 9  # shown on either side of the peak
@@ -52,8 +53,9 @@ def impulse_response(one: Picture, finding: Any) -> None:
     one.span(largest - step / 2, largest + step / 2, words)
     for name, word, color, line in _PEAKS:
         if np.isfinite(value := number(one.data, name)):
-            looks: dict[str, Any] = {"color": style.COLORS[color], "linestyle": line, "linewidth": 1.0}
-            one.ax.axvline(value, label=f"{word} {value:.4f} Hz", **looks)
+            one.ax.axvline(
+                value, label=f"{word} {value:.4f} Hz", color=style.COLORS[color], linestyle=line, linewidth=1.0
+            )
     one.ax.set_ylim(0, 1.06 * heights.max())
 
 
@@ -88,7 +90,7 @@ def grazing(one: Picture, finding: Any) -> None:
 
 
 @picture("x fitted time", _TIME, _DISPLACEMENT, margin=0, ratio=0.9)
-def multiple_shooting(one: Picture, finding: Any, *, seconds: float = 6.0) -> None:
+def multiple_shooting(one: Picture, finding: Any, *, seconds: Annotated[float, above(0)] = 6.0) -> None:
     """Draw a record with contact, the segments fitted to it, and their residuals.
 
     Parameters

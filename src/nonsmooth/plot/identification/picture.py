@@ -137,13 +137,12 @@ class Picture:
 
     def cloud(self, x: Any, y: Any, label: str = "", color: str = MEASURED) -> None:
         """Small dots of many samples."""
-        looks: dict[str, Any] = {"markersize": 3.0, "markeredgewidth": 0, "rasterized": True}
-        self.ax.plot(x, y, ".", color=color, label=label or self.word, **looks)
+        style.cloud(self.ax, (x, y), 3.0, color, label or self.word)
 
     def line(self, x: Any, y: Any, label: str = "", color: str = "first", line: str = "-", **looks: Any) -> None:
         """A curve; its words stand in the legend once."""
         words = style.once(self.ax, label) if label else None
-        self.ax.plot(x, y, line, color=style.COLORS[color], label=words, **looks)
+        self.ax.plot(x, y, line, color=style.COLORS.get(color, color), label=words, **looks)
 
     def span(self, low: float, high: float, label: str, **looks: Any) -> None:
         """An interval of the abscissa; nothing where it is not known."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import os
-import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -18,9 +17,9 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
-from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.readers import capstone_cap, capstone_csv
 from nonsmooth.recordings.recording import Recording
+from nonsmooth.results.whole import placed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -189,11 +188,6 @@ def _even(time: FloatArray) -> tuple[float, float] | None:
 
 
 def _put(target: Path, content: bytes) -> Path:
-    """Write beside the place and move there when whole."""
-    if not target.parent.is_dir():
-        raise DataFileError(f"{target}: the folder {target.parent} does not exist; create it first")
-    with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
-        fresh = Path(folder) / "new"
+    with placed(target) as fresh:
         fresh.write_bytes(content)
-        os.replace(fresh, target)
     return target
