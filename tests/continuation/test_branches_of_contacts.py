@@ -99,6 +99,7 @@ def test_frictions_of_one_coordinate_are_their_sum() -> None:
             np.testing.assert_allclose(several[name].values, one[name].values, rtol=0, atol=1e-8, err_msg=name)
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_a_speed_that_was_held_is_zero_where_the_block_leaves_its_belt() -> None:
     """Its rounding, as large as the slow slip that follows, once ended the branch at A = 0.5648."""
 

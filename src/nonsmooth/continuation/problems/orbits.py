@@ -151,7 +151,9 @@ class Orbits(Curve[OrbitPoint]):
     def described(self, point: Point) -> OrbitPoint | None:
         """The orbit with its multipliers and its path."""
         solved, states = point.solved, self.shooting.split(point.X)[1]
-        M = solved.monodromy @ within_held(self.shooting.system, self.shooting.modes[0], solved.values, states[0])
+        held = within_held(self.shooting.system, self.shooting.modes[0], solved.values, states[0])
+        with np.errstate(over="ignore", invalid="ignore"):  # at a touch they may have no bound
+            M = solved.monodromy @ held
         path = self.walk.along(solved, states)
         if path is None or not np.isfinite(M).all():
             return None
