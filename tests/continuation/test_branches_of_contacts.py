@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -94,3 +97,36 @@ def test_frictions_of_one_coordinate_are_their_sum() -> None:
         np.testing.assert_allclose(several["w"], one["w"], rtol=0, atol=1e-9)
         for name in ("section", "maximum", "minimum", "floquet_multipliers"):
             np.testing.assert_allclose(several[name].values, one[name].values, rtol=0, atol=1e-8, err_msg=name)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_speed_that_was_held_is_zero_where_the_block_leaves_its_belt() -> None:
+    """Its rounding, as large as the slow slip that follows, once ended the branch at A = 0.5648."""
+
+    def force(mean: float, *terms: tuple[float, float]) -> Callable[..., Any]:
+        waves = [(0.798 * k, a, b) for k, (a, b) in enumerate(terms, 1)]
+        return lambda t, p: mean + p.A * sum(a * np.cos(w * t) + b * np.sin(w * t) for w, a, b in waves)
+
+    shake, belt = force(0.0, (-0.296, 0.153), (0.152, -0.281)), force(0.121, (-0.081, 0.511))
+    one = {"A": 1.0}
+    still = SimpleNamespace(**one)
+    system = ns.mechanical(
+        np.diag([0.798, 0.92, 0.912]),
+        [[0.088, 0.003, 0.008], [0.003, 0.118, -0.02], [0.008, -0.02, 0.172]],
+        [[1.493, 0.056, 0.153], [0.056, 2.107, -0.397], [0.153, -0.397, 2.628]],
+        coordinates=["x", "y", "z"],
+        parameters=one,
+        forcing={
+            "x": force(0.3, (-0.589, 0.549), (0.516, 0.325)),
+            "y": 0.227,
+            "z": force(0.387, (0.382, 0.635), (-0.38, -0.723)),
+        },
+        base=lambda t, p: shake(t, still),
+        elements={
+            "belt": Coulomb(at="x", friction=0.65, belt=lambda t, u, p: belt(t, still)),
+            "one": ns.elements.Backlash(at={"x": -1.0, "z": 1.0}, half_width=0.078, stiffness=2.237),
+            "two": ns.elements.Backlash(at="x", half_width=0.113, stiffness=6.988, damping=0.291),
+        },
+    )
+    branch = ns.continue_orbit(ns.find_orbit(system, progress=False), "A", (0.5, 1.05))
+    assert branch["ended"].values.tolist() == [0, 0]

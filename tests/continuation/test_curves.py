@@ -84,6 +84,50 @@ def test_two_folds_meet_in_a_cusp(figure_9: xr.Dataset) -> None:
         assert int((ns.special_points(branch)["kind"] == "fold").sum()) == folds
 
 
+@pytest.mark.parametrize("damping", [0.2, 0.15])
+def test_grazing_curve_while_its_touch_and_a_crossing_pass_the_section(damping: float) -> None:
+    """x touches a wall, on which it may rest, for A = sqrt((1 - w^2)^2 + (0.2 w)^2), whatever a second mass does.
+
+    The phases of the touch and of the second mass's crossings pass the section, and are no ends; with equal dampings
+    all multipliers have one modulus."""
+    stops = ns.elements
+    system = ns.mechanical(
+        np.eye(2),
+        np.diag([0.2, damping]),
+        np.eye(2),
+        coordinates=["x", "y"],
+        forcing={"x": lambda t, p: p.A * np.cos(p.w * t + 1.0), "y": lambda t, p: np.cos(p.w * t + 2.2)},
+        parameters={"A": 0.3, "w": 0.6},
+        elements={
+            "wall": stops.Stop(at="x", position=1.0, restitution=0.5),
+            "pad": stops.ElasticStop(at="y", position=0.3, stiffness=0.5),
+        },
+    )
+    branch = ns.continue_orbit(ns.find_orbit(system), "A", (0.1, 0.68))
+    curve = ns.continue_curve(row(branch, "grazing"), {"w": (0.55, 1.15), "A": (0.1, 2.0)}, points=400)
+    A, w = curve["A"].values, curve["w"].values
+    assert np.abs(A - np.hypot(1 - w**2, 0.2 * w)).max() < 1e-10
+    assert list(curve["ended"].values) == [0, 0] and [w.min(), w.max()] == pytest.approx([0.55, 1.15])
+
+
+def test_fold_curve_while_an_impact_passes_the_section() -> None:
+    """With cos(w t + phase) the fold lies at the same w for all phases, and its impacts at any."""
+    system = ns.mechanical(
+        1.0,
+        0.05,
+        1.0,
+        coordinates="x",
+        forcing={"x": lambda t, p: p.A * np.cos(p.w * t + p.phase)},
+        parameters={"A": 0.5, "w": 0.7, "phase": 0.0},
+        elements={"pad": ns.elements.ElasticStop(at="x", position=0.7, stiffness=4.0)},
+    )
+    branch = ns.continue_orbit(ns.find_orbit(system), "w", (0.6, 2.0))
+    fold = row(branch, "fold")
+    curve = ns.continue_curve(fold, {"phase": (0.0, 6.5), "w": (0.6, 2.0)})
+    assert curve["w"].values == pytest.approx(float(fold["w"]), abs=1e-9)
+    assert sorted(curve["phase"].values[[0, -1]]) == pytest.approx([0.0, 6.5])
+
+
 def test_curve_saves_and_loads(impact: xr.Dataset, tmp_path: Any) -> None:
     curve = ns.continue_curve(row(impact, "grazing"), {"omega": (0.8, 1.2), "A": (0.01, 1.0)}, points=10)
     path = ns.save(curve, tmp_path / "curve.nc")

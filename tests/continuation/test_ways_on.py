@@ -294,6 +294,7 @@ def ripple(c: float) -> ns.System:
     )
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_touches_between_two_samples_of_a_step() -> None:
     """The four extremes of g are grazes, each at the c that takes it to zero; sampled slopes show none of them."""
 

@@ -80,7 +80,7 @@ def continue_curve(
     shooting.prepare(X, size)
     widths = (box[0][1] - box[0][0], box[1][1] - box[1][0])
     locus = Locus(shooting, kind, size, point.period, widths)
-    first = locus.first(X)
+    first = locus.nearest(X / locus.scale, point.value)
     if first is None:
         raise SolveError(f"the curve of the {kind} could not be begun at this point", status="no_convergence")
     allowed = tuple((i - 2, *allowed_range(start, names[i], *ends)) for i, ends in enumerate(box))

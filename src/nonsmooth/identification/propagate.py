@@ -271,7 +271,7 @@ def _slope(row: xr.Dataset, name: str) -> float:
     shooting.prepare(X, size)
     widths = (abs(system.values[name]) or 1.0, abs(span[1] - span[0]))
     locus = Locus(shooting, kind, size, point.period, widths)
-    first = locus.first(X)
+    first = locus.nearest(X / locus.scale, point.value)
     if first is None or first.tangent[-2] == 0.0:
         return np.nan
     return float(first.tangent[-1] * locus.scale[-1] / (first.tangent[-2] * locus.scale[-2]))

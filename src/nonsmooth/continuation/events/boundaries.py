@@ -7,8 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.continuation.events.change import Change, by_others, gained, inserted, is_tolerance, rest_after, without
-from nonsmooth.continuation.march.event import Event, Step, first_beyond
+from nonsmooth.continuation.events.change import (
+    Change,
+    by_others,
+    gained,
+    inserted,
+    is_tolerance,
+    past_the_section,
+    rest_after,
+    without,
+)
+from nonsmooth.continuation.march.event import Event, Met, Step, first_beyond
+from nonsmooth.continuation.problems.orbits import OrbitPoint
 
 ENDS = 1e-4  # of the period: a maximum as near to a crossing belongs to it
 NO_SPEED = 1e-3  # of the steepest crossing: slower than this is a touch
@@ -207,6 +217,20 @@ class Unseen(Boundary):
     def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator of the first transition that the signature beyond has more often."""
         return -1 if beyond is None else gained(point, beyond)
+
+
+def section_passed(met: list[Met]) -> OrbitPoint | None:
+    """The same orbit where a crossing has passed the section, if nothing else is met."""
+    first = met[0]
+    if len(met) > 1 or not first.kind.at_section(first.point):
+        return None
+    after = past_the_section(first.point)
+    return after if after is not None and (after.curve.margins(after)[1:] >= 0.0).all() else None
+
+
+def contacts_of(met: list[Met]) -> list[Change]:
+    """The contacts that may begin or end with what is met."""
+    return [change for one in met for change in one.kind.contacts(one.point)]
 
 
 #: In the order of ``Path.margins``: what explains the others first.

@@ -164,13 +164,13 @@ def past_the_section(point: OrbitPoint) -> OrbitPoint | None:
         i = max(k for k in range(len(times)) if not at_once[k])
         z = led(shooting.flow, values, visits[i].mode, times[i], end - times[i], point.solved.segments.z[i])
         moved = once.begun(i, end, z)
-    fresh, X = point.curve.around(moved, point.X[-1:])
+    fresh, X = point.curve.around(moved, point.X[shooting.size :])
     first = fresh.nearest(X / fresh.scale, point.value)
     if first is None:
         return None
-    # The tangents of both live in different unknowns; the parameter and the later instants are common to them.
-    new, old, n = first.tangent, point.tangent, shooting.n
-    along = new[-1] * old[-1] if abs(old[-1]) > 1e-3 else float(new[:n] @ old[:n])
+    # The tangents of both live in different unknowns; the parameters and the later instants are common to them.
+    new, old, n, own = first.tangent, point.tangent, shooting.n, shooting.size
+    along = float(new[own:] @ old[own:] if np.abs(old[own:]).max() > 1e-3 else new[:n] @ old[:n])
     return first.turned() if along < 0.0 else first
 
 

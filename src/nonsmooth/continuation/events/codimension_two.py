@@ -22,7 +22,7 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from nonsmooth.continuation.events.boundaries import BOUNDARIES
+from nonsmooth.continuation.events.boundaries import BOUNDARIES, contacts_of, section_passed
 from nonsmooth.continuation.events.change import inserted
 from nonsmooth.continuation.events.grazing import both_sides
 from nonsmooth.continuation.march.event import Event, Met, Name, Step, locate
@@ -119,10 +119,14 @@ class AlongCurve(Policy):
         self._graze, every, of_forced = KINDS[kind]
         self.kinds = (*every, *of_forced) if forced else every
 
-    def behind(self, found: March, met: list[Met]) -> None:
-        """Record the point at which the curve meets a graze or a corner; it ends there."""
-        found.ending = met[0].name
-        found.mark(self._graze if met[0].name == "grazing" else met[0].name, met[0].point)
+    def behind(self, found: March, met: list[Met]) -> OrbitPoint | None:
+        """Go on behind the section; at a graze or a corner, which is recorded, the curve ends."""
+        if (after := section_passed(met)) is not None:
+            return after
+        grazes = any(one.name == "grazing" for one in met) or contacts_of(met)
+        found.ending = "grazing" if grazes else "corner"
+        found.mark(self._graze if grazes else found.ending, met[0].point)
+        return None
 
 
 def _coefficient(place: OrbitPoint, which: int = 0) -> float:

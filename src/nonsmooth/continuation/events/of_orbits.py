@@ -20,14 +20,19 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.continuation.events.boundaries import BOUNDARIES, Boundary, Crossed, Unseen
+from nonsmooth.continuation.events.boundaries import (
+    BOUNDARIES,
+    Boundary,
+    Crossed,
+    Unseen,
+    contacts_of,
+    section_passed,
+)
 from nonsmooth.continuation.events.change import (
     BEFORE_REST,
-    Change,
     common_orbit,
     completes,
     is_tolerance,
-    past_the_section,
     rest_after,
 )
 from nonsmooth.continuation.events.grazing import graze
@@ -209,10 +214,8 @@ class AlongOrbits(Policy):
     def behind(self, found: March, met: list[Met]) -> OrbitPoint | None:
         """Record a change of signature and begin anew behind it; None where the branch ends."""
         first = met[0]
-        if len(met) == 1 and first.kind.at_section(first.point):
-            after = past_the_section(first.point)
-            if after is not None and (after.path.margins[1:] >= 0.0).all():
-                return after  # else another boundary is met with the section
+        if (after := section_passed(met)) is not None:
+            return after
         beyond = beside(first.point, contacts_of(met), [row.point for row in found.rows])
         special, end = ([], None) if beyond is None else self._between(first.point, beyond)
         if beyond is None or not (_completes(met, beyond) or (end is not None and _completes([end], first.point))):
@@ -315,11 +318,6 @@ def _is_centre(met: Met) -> bool:
     system, name, width = point.shooting.system, point.shooting.active[0], point.curve.width
     free = [change.new.signature for change in met.kind.contacts(point) if not change.gained]
     return any(not one.crossings and Equilibria(system, one.visits[0].mode, name, width).linear for one in free)
-
-
-def contacts_of(met: list[Met]) -> list[Change]:
-    """The contacts that may begin or end with what is met."""
-    return [change for one in met for change in one.kind.contacts(one.point)]
 
 
 def mark(found: March, met: list[Met], beyond: OrbitPoint | None, end: Met | None = None, name: str = "") -> str:

@@ -190,12 +190,12 @@ class Curve(ABC, Generic[P]):
         for i in range(most or self.most):
             with np.errstate(over="ignore", invalid="ignore"):  # of a guess that leads nowhere
                 solved = self.evaluate(Y)
-            right[:-1] = self.residual(solved)
-            right[-1] = border @ Y - level
-            try:
-                step = (shortest if singular else solve)(self.bordered(solved, border), right)
-            except np.linalg.LinAlgError:
-                return None
+                right[:-1] = self.residual(solved)
+                right[-1] = border @ Y - level
+                try:
+                    step = (shortest if singular else solve)(self.bordered(solved, border), right)
+                except np.linalg.LinAlgError:
+                    return None
             length = float(np.abs(step).max())
             if not length < self.longest or (i > 1 and length > self.grows * last and length > 1e-10):
                 return None

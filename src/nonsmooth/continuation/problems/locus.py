@@ -14,7 +14,9 @@ psi is differentiated by central differences, in the unknowns and in both parame
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
+from nonsmooth.continuation.problems.path import Path
 from nonsmooth.continuation.problems.shooting import Shooting, Solved
 from nonsmooth.continuation.problems.solve import determinant
 
@@ -45,15 +48,13 @@ class Locus(Orbits):
 
     tolerance = 1e-11  # the gradient of psi is not exact: no step is followed by one of its square
 
-    def __init__(
-        self, shooting: Shooting, kind: str, size: FloatArray, period: float, widths: tuple[float, float]
-    ) -> None:
+    def __init__(self, shooting: Shooting, kind: str, size: FloatArray, period: float, widths: Sequence[float]) -> None:
         super().__init__(shooting, size, period, widths)
         self.kind = kind
         self._eye = np.eye(shooting.n)
         self._unit = 1.0  # of psi
         self._gradient: tuple[FloatArray, FloatArray] | None = None  # the last one, and its place
-        self.touched: tuple[int, int] | None = None  # (visit, transition) of a grazing curve
+        self.touched: tuple[list[int], list[int]] | None = None  # visits and transitions of a grazing curve's touch
 
     def psi(self, solved: Solved) -> float:
         """The number that vanishes on the locus."""
@@ -66,10 +67,15 @@ class Locus(Orbits):
             if path is None:
                 return np.nan
             if self.touched is None:
-                self.touched = path.touched
-            if path.which[self.touched] >= 0 and np.isneginf(path.inner[self.touched]):
+                self.touched = self._touch(path)
+            visits, conditions = self.touched
+            margins = path.inner[np.ix_(visits, conditions)]
+            if len(visits) > 1:  # at the section itself no maximum shows within them
+                margins = np.vstack([margins, path.section[conditions]])
+            largest = float(margins.max())
+            if np.isneginf(largest) and (path.which[np.ix_(visits, conditions)] >= 0).any():
                 return 0.0  # a maximum so near to zero that it has no sign
-            return float(path.inner[self.touched]) / self._unit
+            return largest / self._unit
         M = solved.monodromy
         if self.kind == "flip":
             return float(np.linalg.det(M + self._eye))
@@ -108,15 +114,26 @@ class Locus(Orbits):
         self._gradient = None
         return super().point(solved, Y, border, iterations)
 
-    def first(self, X: FloatArray) -> OrbitPoint | None:
+    def nearest(self, Y: FloatArray, value: float) -> OrbitPoint | None:
         """The locus at a special point: the shortest correction, and a tangent of either sense."""
-        Y = X / self.scale
         self.calibrate(Y)
         found = self.correct(Y, np.zeros(self.n), 0.0, tolerance=CLOSE, most=3 * self.most, singular=True)
         if found is None:
             return None
         null = self.null_vectors(found[0], 1e-9)
         return self.point(found[0], found[1], null[-1]) if len(null) == 1 else None
+
+    def _like(self, shooting: Shooting, size: FloatArray) -> Locus:
+        """The locus of orbits that are read from another section."""
+        return Locus(shooting, self.kind, size, self.period, self.widths)
+
+    def _touch(self, path: Path) -> tuple[list[int], list[int]]:
+        """The visits in which the touch of a grazing curve lies, as the section parts one, and the transitions whose
+        conditions need what is touched."""
+        (visit, _), last, net = path.touched, self.shooting.m, self.walk.net
+        needed = (net.rows[:, :2] == net.rows[path.which[path.touched], :2]).all(axis=1)
+        conditions = [k for k, (a, b) in enumerate(pairwise(net.row_start)) if needed[a:b].any()]
+        return ([0, last] if self.shooting.forced and 0 < last and visit in (0, last) else [visit]), conditions
 
     def renewed(self, point: OrbitPoint) -> OrbitPoint | None:
         """The phase condition put through the last point; the units stay, psi was calibrated in them."""
@@ -127,10 +144,10 @@ class Locus(Orbits):
         return self.kind
 
     def margins(self, point: OrbitPoint) -> FloatArray:
-        """Margins of the path to its boundaries; on a grazing curve by another touch than its own."""
+        """Margins of the path to its boundaries; on a grazing curve by touches of other surfaces than its own."""
         path = point.path
         if self.kind == "grazing":
             inner = path.inner.copy()
-            inner[self.touched or path.touched] = -np.inf
+            inner[np.ix_(*(self.touched or self._touch(path)))] = -np.inf
             path = replace(path, touch=float(inner.max(initial=-np.inf)))
         return path.margins

@@ -151,7 +151,9 @@ class Orbits(Curve[OrbitPoint]):
     def described(self, point: Point) -> OrbitPoint | None:
         """The orbit with its multipliers and its path."""
         solved, states = point.solved, self.shooting.split(point.X)[1]
-        M = solved.monodromy @ within_held(self.shooting.system, self.shooting.modes[0], solved.values, states[0])
+        held = within_held(self.shooting.system, self.shooting.modes[0], solved.values, states[0])
+        with np.errstate(over="ignore", invalid="ignore"):  # at a touch they may have no bound
+            M = solved.monodromy @ held
         path = self.walk.along(solved, states)
         if path is None or not np.isfinite(M).all():
             return None
@@ -177,9 +179,10 @@ class Orbits(Curve[OrbitPoint]):
         return point.path.margins
 
     def spread(self, a: OrbitPoint, b: OrbitPoint) -> float:
-        """Largest distance of multipliers on the Riemann sphere, matched in order of modulus."""
-        mu, nu = a.multipliers, b.multipliers
-        return float((np.abs(mu - nu) / np.sqrt((1 + np.abs(mu) ** 2) * (1 + np.abs(nu) ** 2))).max())
+        """Largest distance, on the Riemann sphere, of a multiplier of one from the nearest of the other."""
+        mu, nu = a.multipliers[:, None], b.multipliers
+        apart = np.abs(mu - nu) / np.sqrt((1 + np.abs(mu) ** 2) * (1 + np.abs(nu) ** 2))
+        return float(max(apart.min(axis=0).max(), apart.min(axis=1).max()))
 
     def shows(self, point: OrbitPoint) -> bool:
         """Return whether a simulated round of an orbit takes the transitions of the signature."""

@@ -47,6 +47,7 @@ class Path:
     tau: FloatArray  # (m + 1,) lengths of the visits; inf where it is fixed by the forcing
     landed: FloatArray  # (m + 1,) where each visit begins, the largest margin of its transitions: 0 on a boundary
     landing: NDArray[np.int64]  # (m + 1,) which transition
+    section: FloatArray  # (n_transitions,) the margins at the section
 
     @cached_property
     def margins(self) -> FloatArray:
@@ -93,7 +94,9 @@ class Walk:
         rows = n + len(traced.indicators) + len(traced.outputs)
         self.scratch = (
             np.zeros((rows, ORDER + 1)),
+            np.zeros((rows, ORDER + 1)),
             np.zeros((n_scratch, ORDER + 1)),
+            np.zeros(n),
             np.zeros(n),
             np.zeros(len(traced.indicators)),
         )
@@ -211,6 +214,7 @@ class Walk:
             np.where(self.fixed, np.inf, tau),
             held[self.every, landing],
             landing,
+            begin[0],
         )
 
     def _held(self, begin: FloatArray, zero: NDArray[np.bool_]) -> FloatArray:

@@ -16,6 +16,7 @@ from nonsmooth.kernels.compile.cache import device, inline, kernel
 from nonsmooth.kernels.compile.pointers import function_at
 from nonsmooth.kernels.hybrid.codes import DIVERGED, NO_CONVERGENCE, OK
 from nonsmooth.kernels.hybrid.records import NET, type_of
+from nonsmooth.kernels.series.crossing import OFF
 from nonsmooth.kernels.series.taylor import dense_states, step_length
 
 PARTS = 8  # of a step of the series: an extremum shows as a change of the slope's sign over one part
@@ -100,27 +101,27 @@ class Margins(NamedTuple):
     which: Any  # and the row it stands in
     begin: Any  # the margin at the beginning of the visit
     begin_row: Any  # the row it stands in
-    begin_size: Any  # and the size of that row's terms
+    begin_size: Any  # and the size of that row's terms, and of what they are computed from
     end: Any  # the margin at the end; for the transition that fires there, without the row that is zero
     slope: Any  # (m, 2) of the signed indicator that is zero at the end: time derivative just before it, and value
 
 
 VISITS = type_of(Visits, _i1, _f1, _f1, _f2, _i1, _i1)
 MARGINS = type_of(Margins, _f2, _f2, _i2, _f2, _i2, _f2, _f2, _f2)
-SCRATCH = types.Tuple((_f2, _f2, _f1, _f1, _f1))
+SCRATCH = types.Tuple((_f2, _f2, _f2, _f1, _f1, _f1, _f1))
 
 
 @kernel(types.int64(_i1, _i, _f, _f1, _i2, NET, _f1, VISITS, SCRATCH, _f2, MARGINS))
 def follow(functions, order, rtol, weight, lacking, net, values, visits, work, extremes, margins):
     """Follow all visits of an orbit.
 
-    ``functions`` holds the address of the model's jet (``pointers.addresses``), ``work`` room for a jet, its scratch,
-    states, parameters with memory, and sizes of indicators. ``extremes`` (2, n) become the largest and smallest value
-    of each state; ``margins`` are written."""
+    ``functions`` holds the address of the model's jet (``pointers.addresses``), ``work`` room for two jets, scratch,
+    two lots of states, parameters with memory, sizes of indicators. ``extremes`` (2, n) become the largest and smallest
+    value of each state; ``margins`` are written."""
     jet, rows = jet_at(functions[0]), net.rows
     modes, t0, tau, z, fired, fired_row = visits
     inner, place, which, begin, begin_row, begin_size, end, slope = margins
-    C, W, u, q, scale = work
+    C, near, W, u, beside, q, scale = work
     n, n_p = weight.shape[0], values.shape[0]
     log_rtol = ln(rtol)
     for i in range(n_p):
@@ -150,6 +151,10 @@ def follow(functions, order, rtol, weight, lacking, net, values, visits, work, e
             steps += 1
             if steps > MOST_STEPS:
                 return NO_CONVERGENCE
+            if steps == 1:  # a speed that was held is a difference of zero: what it is computed from shows its rounding
+                for i in range(n):  # no two by the same, so that no terms stay equal
+                    beside[i] = u[i] * (1.0 + OFF * (1 + i))
+                jet(mode, 2, t * (1.0 + 0.5 * OFF), beside, q, near, W)
             width = h / PARTS
             # Extremes of the states
             for i in range(n):
@@ -174,7 +179,8 @@ def follow(functions, order, rtol, weight, lacking, net, values, visits, work, e
                 begun, rising, row = margin(C, order, n, net, k, 0.0, -1)
                 if steps == 1:
                     begin[leg, k], begin_row[leg, k] = begun, row
-                    begin_size[leg, k] = size_of(C, order, n + rows[row, 0], reach)
+                    r = n + rows[row, 0]
+                    begin_size[leg, k] = max(size_of(C, order, r, reach), fabs(near[r, 0] - C[r, 0]) / OFF)
                 for part in range(1, PARTS + 1):
                     b = h if part == PARTS else part * width
                     _, s, _ = margin(C, order, n, net, k, b, -1)
