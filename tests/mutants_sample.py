@@ -41,6 +41,7 @@ SWAPS: dict[type, type] = {
 }
 DROPPED = (ast.Assign, ast.AugAssign, ast.Expr, ast.Continue, ast.Break)
 SILENT = (ast.Raise, ast.JoinedStr, ast.Assert, ast.AnnAssign, ast.arguments, ast.Import, ast.ImportFrom)
+FOR_PAGES = ["tests/explorer/test_views.py", "tests/explorer/test_page.py"]
 FOR_CUDA = ["tests/diagrams/test_gpu.py", "tests/diagrams/test_gpu_series.py"]
 FOR_KERNELS = ["tests/kernels", "tests/flow"]
 FOR_KERNELS += [f"tests/diagrams/test_{one}.py" for one in ("sweep", "lyapunov", "chart_known_answers")]
@@ -146,16 +147,17 @@ def sample(number: int, rooms: list[str], seed: str) -> list[Mutant]:
 
 def tests_of(one: Mutant, called: dict, longest: float) -> list[str]:
     """The tests to run, the quickest first; as many as take no longer than ``longest`` seconds together."""
-    file = str(one.path.relative_to(PACKAGE))
+    file, room = str(one.path.relative_to(PACKAGE)), room_of(one.path)
+    if file.startswith("kernels/cuda") or file.endswith("_cuda.py"):
+        return FOR_CUDA  # a simulator runs them in a process of its own
     known = called.get("called", {})
     if one.function:
         seen = set(known.get(f"{file}:{one.function}", []))
     else:
         seen = {test for place, tests in known.items() if place.startswith(f"{file}:") for test in tests}
     if not seen:
-        room = room_of(one.path)
         if room == "kernels":
-            return FOR_CUDA if file.startswith("kernels/cuda") else FOR_KERNELS
+            return FOR_KERNELS
         return [f"tests/{room}"] if (ROOT / "tests" / room).is_dir() else []
     chosen, left = [], longest
     for test in sorted(seen, key=lambda name: called["took"][name]):
@@ -163,7 +165,7 @@ def tests_of(one: Mutant, called: dict, longest: float) -> list[str]:
         chosen.append(test)
         if left < 0:
             break
-    return chosen
+    return chosen + (FOR_PAGES if room == "explorer" else [])  # a browser looks at a server of its own
 
 
 def caught(one: Mutant, tests: list[str], sources: Path, limit: float) -> bool:
