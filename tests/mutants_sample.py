@@ -1,10 +1,11 @@
 """A sample of generated mutants, spread over the rooms: ``python tests/mutants_sample.py [NUMBER] [--rooms ...]``.
 
-A mutant is one operator, condition or constant changed, or one statement dropped; messages and annotations are left
-out. Each room has a share by its lines. The seed is the hash of the commit, so that a sample is fresh after each change
-and the same for who repeats it. The tests that run a mutant's function are those that ``python -m pytest -p tests.costs
---called out/called.json -n 0`` has seen, the quickest first; without that file, or for kernels, which no profile sees,
-the tests of the room. Survivors are printed with their lines; the score by room is the table of the documentation.
+A mutant is one operator, condition or constant changed, or one statement dropped; messages, annotations and assertions
+are left out. Each room has a share by its lines. The seed is the hash of the commit, so that a sample is fresh after
+each change and the same for who repeats it. The tests that run a mutant's function are those that ``python -m pytest -p
+tests.costs --called out/called.json -n 0`` has seen, the quickest first; without that file the tests of the room. No
+profile sees kernels, what a GPU's simulator runs, and a page's server: their tests are listed here. Survivors are
+printed with their lines; the score by room is the table of the documentation.
 """
 
 from __future__ import annotations
@@ -72,6 +73,8 @@ def places(node: ast.AST, around: ast.stmt | None = None, function: str = "", in
             continue
         for i, child in enumerate(value) if isinstance(value, list) else [(-1, value)]:
             if not isinstance(child, ast.AST) or isinstance(child, SILENT) or _is_text(child):
+                continue
+            if isinstance(child, ast.keyword) and child.arg == "strict":  # an assertion on lengths
                 continue
             where = name if i < 0 else f"{name}.{i}"
             if type(child) in SWAPS:
