@@ -1,10 +1,11 @@
 """A sample of generated mutants, spread over the rooms: ``python tests/mutants_sample.py [NUMBER] [--rooms ...]``.
 
-A mutant is one operator, condition or constant changed, or one statement dropped; messages and annotations are left
-out. Each room has a share by its lines. The seed is the hash of the commit, so that a sample is fresh after each change
-and the same for who repeats it. The tests that run a mutant's function are those that ``python -m pytest -p tests.costs
---called out/called.json -n 0`` has seen, the quickest first; without that file, or for kernels, which no profile sees,
-the tests of the room. Survivors are printed with their lines; the score by room is the table of the documentation.
+A mutant is one operator, condition or constant changed, or one statement dropped; messages, annotations and assertions
+are left out. Each room has a share by its lines. The seed is the hash of the commit, so that a sample is fresh after
+each change and the same for who repeats it. The tests that run a mutant's function are those that ``python -m pytest -p
+tests.costs --called out/called.json -n 0`` has seen, the quickest first; without that file the tests of the room. No
+profile sees kernels, what a GPU's simulator runs, and a page's server: their tests are listed here. Survivors are
+printed with their lines; the score by room is the table of the documentation.
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ SWAPS: dict[type, type] = {
 }
 DROPPED = (ast.Assign, ast.AugAssign, ast.Expr, ast.Continue, ast.Break)
 SILENT = (ast.Raise, ast.JoinedStr, ast.Assert, ast.AnnAssign, ast.arguments, ast.Import, ast.ImportFrom)
+FOR_PAGES = ["tests/explorer/test_views.py", "tests/explorer/test_page.py"]
 FOR_CUDA = ["tests/diagrams/test_gpu.py", "tests/diagrams/test_gpu_series.py"]
 FOR_KERNELS = ["tests/kernels", "tests/flow"]
 FOR_KERNELS += [f"tests/diagrams/test_{one}.py" for one in ("sweep", "lyapunov", "chart_known_answers")]
@@ -71,6 +73,8 @@ def places(node: ast.AST, around: ast.stmt | None = None, function: str = "", in
             continue
         for i, child in enumerate(value) if isinstance(value, list) else [(-1, value)]:
             if not isinstance(child, ast.AST) or isinstance(child, SILENT) or _is_text(child):
+                continue
+            if isinstance(child, ast.keyword) and child.arg == "strict":  # an assertion on lengths
                 continue
             where = name if i < 0 else f"{name}.{i}"
             if type(child) in SWAPS:
@@ -146,16 +150,17 @@ def sample(number: int, rooms: list[str], seed: str) -> list[Mutant]:
 
 def tests_of(one: Mutant, called: dict, longest: float) -> list[str]:
     """The tests to run, the quickest first; as many as take no longer than ``longest`` seconds together."""
-    file = str(one.path.relative_to(PACKAGE))
+    file, room = str(one.path.relative_to(PACKAGE)), room_of(one.path)
+    if file.startswith("kernels/cuda") or file.endswith("_cuda.py"):
+        return FOR_CUDA  # a simulator runs them in a process of its own
     known = called.get("called", {})
     if one.function:
         seen = set(known.get(f"{file}:{one.function}", []))
     else:
         seen = {test for place, tests in known.items() if place.startswith(f"{file}:") for test in tests}
     if not seen:
-        room = room_of(one.path)
         if room == "kernels":
-            return FOR_CUDA if file.startswith("kernels/cuda") else FOR_KERNELS
+            return FOR_KERNELS
         return [f"tests/{room}"] if (ROOT / "tests" / room).is_dir() else []
     chosen, left = [], longest
     for test in sorted(seen, key=lambda name: called["took"][name]):
@@ -163,7 +168,7 @@ def tests_of(one: Mutant, called: dict, longest: float) -> list[str]:
         chosen.append(test)
         if left < 0:
             break
-    return chosen
+    return chosen + (FOR_PAGES if room == "explorer" else [])  # a browser looks at a server of its own
 
 
 def caught(one: Mutant, tests: list[str], sources: Path, limit: float) -> bool:

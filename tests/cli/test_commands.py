@@ -96,13 +96,16 @@ def test_a_study_says_what_it_does_before_anything_is_loaded(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def load(name: str) -> None:
-        assert capsys.readouterr().err == f"reproducing savi2007 into {Path('out') / 'savi2007_quick'}\n"
+        told.append(capsys.readouterr().err)
         raise ValueError("loaded")
 
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    told: list[str] = []
     monkeypatch.setattr("nonsmooth.studies.import_module", load)
-    assert run("reproduce", "savi2007", "--quick") == 2
-    assert "loaded" in capsys.readouterr().err
+    for screen, *words in (True,), (True, "--quiet"), (False,):
+        monkeypatch.setattr(sys.stderr, "isatty", lambda screen=screen: screen)
+        assert run("reproduce", "savi2007", "--quick", *words) == 2
+        assert "loaded" in capsys.readouterr().err
+    assert told == [f"reproducing savi2007 into {Path('out') / 'savi2007_quick'}\n", "", ""]
 
 
 def test_ctrl_c_ends_with_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -66,6 +66,20 @@ def test_every_command_shows_examples_that_it_understands(command: str, capsys: 
         assert cli.parser().parse_args(words[1].split()).run is not None
 
 
+def test_a_command_without_what_it_needs_says_what(capsys: pytest.CaptureFixture[str]) -> None:
+    file = "STUDY.toml"
+    needed = {"init": "MODEL", "run": file, "plan": file, "show": "file", "identify": file, "compare": file}
+    needed |= {"reproduce": "STUDY", "rig": "--out", "completion": "shell"}
+    for command in COMMANDS:
+        if command not in needed:
+            assert cli.parser().parse_args([command]).run is not None
+            continue
+        with pytest.raises(SystemExit) as ended:
+            run(command)
+        assert ended.value.code == 2
+        assert capsys.readouterr().err.endswith(f"the following arguments are required: {needed[command]}\n")
+
+
 def test_it_runs_as_a_module() -> None:
     done = process("models")
     assert done.returncode == 0

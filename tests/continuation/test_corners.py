@@ -72,6 +72,42 @@ def test_two_surfaces_change_their_order(start: float) -> None:
     assert {str(w) for w in ns.special_points(branch)["touched"].values} <= {"right", "above"}
 
 
+@pytest.mark.parametrize("start", [-0.4, 0.4])
+def test_surfaces_that_move_are_named_at_the_instant_at_which_they_are_reached(start: float) -> None:
+    """The same in coordinates less cos(t) / 2; ``within`` always holds, and half a period off it is the nearest."""
+    modes, transitions = {}, []
+    for i in (0, 1):
+        for j in (0, 1):
+
+            def field(t: Any, u: Any, p: Any) -> Any:
+                x, y = (one + 0.5 * np.cos(t) for one in u)
+                return np.cos(t - 1.0) - x + 0.5 * np.sin(t), np.cos(t - 1.0 - p.phi) - y + 0.5 * np.sin(t)
+
+            modes[f"m{i}{j}"] = field
+            for to, when in (
+                (f"m{1 - i}{j}", f"right {'<' if i else '>'} 0"),
+                (f"m{i}{1 - j}", f"above {'<' if j else '>'} 0"),
+            ):
+                transitions.append(ns.Transition(f"m{i}{j}", to, when=f"{when} and within > 0"))
+    system = ns.System(
+        name="moving quadrants",
+        states=["x", "y"],
+        parameters={"phi": start},
+        modes=modes,
+        transitions=transitions,
+        period=2 * np.pi,
+        indicators={
+            "right": lambda t, u, p: u.x + 0.5 * np.cos(t),
+            "above": lambda t, u, p: u.y + 0.5 * np.cos(t) - 0.1,
+            "within": lambda t, u, p: 1.02 + np.cos(t - 0.2) + 0.01 * u.x,
+        },
+    )
+    branch = ns.continue_orbit(ns.find_orbit(system), "phi", (-0.6, 0.6))
+    at = np.pi / 2 - np.arccos(0.1 * np.sqrt(2))
+    assert corners(branch) == pytest.approx([-at, at], abs=1e-9)
+    assert {str(w) for w in ns.special_points(branch)["touched"].values} <= {"right", "above"}
+
+
 @pytest.mark.parametrize("start", [1.2, 0.6])
 def test_a_crossing_reaches_another_surface(start: float) -> None:
     """y follows a square wave and turns at the crossing of x = 0, at +-tanh(T / 4); there it meets y = c."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from nonsmooth.control.holding import (
     Samples,
     release,
 )
-from nonsmooth.control.outcome import Names
+from nonsmooth.control.outcome import Names, _beside_folds, _folds
 from nonsmooth.control.rig import Guard
 
 PER_TURN = 16  # so that phases are exact
@@ -177,3 +178,35 @@ def test_a_motion_is_let_go_a_hundredth_away() -> None:
         found, factor = release(rig, held, 6)  # type: ignore[arg-type]
         assert rig.asked is not None and rig.asked == pytest.approx([0.0, 1.0 + push, 0.0, 0.0], abs=1e-12)
         assert found == STABLE and factor == pytest.approx(0.5, abs=1e-9)
+
+
+def folds_of(places: Any, across: float) -> list[tuple[float, float, int]]:
+    """Those of points in a plane of the frequency, in units of 2 rad/s, and two more coordinates."""
+    march: Any = SimpleNamespace(plane=np.eye(3), scale=2.0)
+    points: Any = [SimpleNamespace(y=one) for one in places]
+    return _folds(march, points, 2.0 * np.asarray(places)[:, 0], np.full(len(places), across))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_branch_turns_at_its_corner_or_at_the_vertex_of_its_parabola(sign: float) -> None:
+    """Both lie between points. The corner is as uncertain as it is far from the outermost point, with half of how far
+    the next one lies from that."""
+    corner, before, after = np.array([0.7, 0.3, 0.2]), np.array([0.8, 0.5, 0.0]), np.array([-0.9, 0.7, 0.1])
+    lines = [*(corner - k * before for k in (2.5, 1.5, 0.5)), *(corner + k * after for k in (0.3, 1.3, 2.3))]
+    for places in lines, lines[::-1]:
+        ((value, error, i),) = folds_of(sign * np.array(places), 1e-9)
+        assert value == pytest.approx(sign * 1.4, abs=1e-12)
+        assert error == pytest.approx(np.hypot(0.54, 0.13)) and np.allclose(places[i], corner + 0.3 * after)
+    s = np.array([-2.0, -1.2, -0.3, 0.4, 1.4, 2.1])
+    ((value, error, i),) = folds_of(sign * np.column_stack([0.7 - 1e-3 * s**2, s, 0.0 * s]), 1e-5)
+    assert value == pytest.approx(sign * 1.4, abs=1e-6)
+    assert 1e-6 < error < 1e-5 and i == 2
+    assert not folds_of(np.column_stack([0.7 - 1e-3 * s**2, s, 0.0 * s]), 0.01)  # what goes back may be noise
+
+
+def test_the_amplitude_beside_a_fold_is_uncertain_by_its_slope_and_at_it_by_its_curvature() -> None:
+    """On omega = 1 - (A - 2)^2 an error d of omega is one of d / (2 |A - 2|) in A, and of sqrt(d) at A = 2."""
+    size = np.array([1.5, 1.8, 2.0, 2.3])
+    found = _beside_folds(size, 1.0 - (size - 2.0) ** 2, np.full(4, 0.01))
+    np.testing.assert_allclose(found, [0.01, 0.025, 0.1, 0.01 / 0.6], rtol=1e-12)
+    assert not _beside_folds(size[:2], size[:2], np.full(2, 0.01)).any()

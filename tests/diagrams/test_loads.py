@@ -357,14 +357,11 @@ def test_three_balls_and_two_stops_at_one_place_share_impulses() -> None:
 
 
 def test_loads_are_refused_where_there_are_none() -> None:
-    plain = (
-        ns.models.duffing()
-        if hasattr(ns.models, "duffing")
-        else ns.System(states=["x"], parameters={"a": 1.0}, modes={"all": lambda t, u, p: -p.a * u.x + np.cos(t)})
-    )
+    plain = ns.System(states=["x"], parameters={"a": 1.0}, modes={"all": lambda t, u, p: -p.a * u.x + np.cos(t)})
     for verb in (
-        lambda: ns.sweep(plain, next(iter(plain.values)), [1.0], loads=True),
+        lambda: ns.sweep(plain, "a", [1.0], loads=True),
         lambda: ns.find_orbit(plain, loads=True),
+        lambda: ns.find_orbit(plain).with_loads(),
     ):
         with pytest.raises(ValueError, match="loads are those of elements"):
             verb()
@@ -399,6 +396,24 @@ def test_a_load_that_two_elements_share_stays_within_their_bounds(friction: floa
         assert ends == pytest.approx([0.75, 0.25, -0.25, -0.75], abs=1e-9)
     else:
         assert np.isnan(ends).all()
+
+
+def test_two_frictions_that_slide_are_at_their_bounds_and_share_what_holds() -> None:
+    """At rest each has half of the force; in motion each has its own friction, which is within its bound."""
+    rubs = {"a": ns.elements.Coulomb(at="q", friction=0.3), "b": ns.elements.Coulomb(at="q", friction=0.2)}
+    rig = ns.mechanical(
+        1.0,
+        0.1,
+        1.0,
+        coordinates=["q"],
+        parameters={"F": 1.5, "w": 1.0},
+        forcing={"q": lambda t, p: p.F * np.cos(p.w * t)},
+        elements=rubs,
+    )
+    line = ns.sweep(rig, "F", [0.3, 1.5], transient=50, keep=20, progress=False)
+    for name, most in (("a", 0.3), ("b", 0.2)):
+        np.testing.assert_allclose(line[f"{name}_force_maximum"], [0.15, most], rtol=1e-12)
+        np.testing.assert_allclose(line[f"{name}_force_minimum"], [-0.15, -most], rtol=1e-12)
 
 
 @pytest.mark.parametrize("lift", [0.0, 0.05])

@@ -117,6 +117,7 @@ def test_one_impact_per_period() -> None:
     found = spectrum(system, periods=5000)
     assert abs(float(found.exponents.sum()) - 2 * wanted) < 1e-12
     assert np.abs(found.exponents.values - wanted).max() < 2e-3
+    assert float(found.elapsed) == pytest.approx(5000 * period, rel=1e-12)
     assert float(found.kaplan_yorke) == 0.0
 
 

@@ -12,7 +12,7 @@ import nonsmooth as ns
 QUIET = {"progress": False}
 
 
-def cubic(unit: float) -> ns.System:
+def cubic(unit: float, **more: object) -> ns.System:
     """x -> a x - x^3 / unit^2 once per period: x / unit follows one map, whatever the unit."""
     return ns.System(
         states=["x"],
@@ -20,6 +20,7 @@ def cubic(unit: float) -> ns.System:
         modes={"rest": lambda t, u, p: 0 * u.x},
         transitions=[ns.Transition("rest", "rest", at=0.5, reset=lambda t, u, p: p.a * u.x - u.x**3 / p.unit**2)],
         period=1.0,
+        **more,
     )
 
 
@@ -34,6 +35,14 @@ def test_exponents_do_not_depend_on_the_units(unit: float) -> None:
     plane = ns.chart(cubic(unit), {"a": a, "unit": [unit]}, start={"x": 0.3 * unit}, lyapunov=200, **QUIET)
     assert plane["period_number"].values.ravel().tolist() == [1, 2]
     np.testing.assert_allclose(plane["lyapunov"].values.ravel(), expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_an_unstable_fixed_point_is_left_for_the_attractor_beside_it_in_any_units(unit: float) -> None:
+    """x = 0 has the multiplier a = 1.7; fixed points beside it have x^2 = a - 1, and beyond x^2 = a + 1 all diverge."""
+    line = ns.sweep(cubic(unit, scale={"x": unit}), "a", [1.7], start={"x": 0.0}, **QUIET)
+    assert line["period_number"].item() == 1
+    np.testing.assert_allclose(np.abs(line["section"]) / unit, np.sqrt(0.7), rtol=1e-9)
 
 
 def test_states_far_below_their_scale_are_named() -> None:

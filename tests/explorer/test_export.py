@@ -90,13 +90,18 @@ def same(path: Path, shown: Any) -> None:
 def test_the_script_and_the_study_file_make_what_was_shown(
     view: str, key: str, results: dict[str, Any], tmp_path: Path
 ) -> None:
+    """Equidistant values are told by their ends and their number."""
     script = write(tmp_path, view, "py", results)
     run(script)
     data = script.with_suffix(".nc")
     same(data, results[key])
+    told = {"diagram": (0.25, 0.3, 7), "response": (3.0, 5.0, 5), "chart": (0.2, 0.5, 6), "basins": (-0.1, 0.1, 4)}
+    ends = told.get(view)
+    assert ends is None or f"np.linspace{ends}" in script.read_text()
     data.unlink()
     script.with_suffix(".pdf").unlink()
     study = write(tmp_path, view, "toml", results)
+    assert ends is None or "{{ from = {}, to = {}, n = {} }}".format(*ends) in study.read_text()
     assert cli.main(["run", str(study), "--quiet"]) == 0
     same(data, results[key])
     assert script.with_suffix(".pdf").read_bytes().startswith(b"%PDF")

@@ -101,6 +101,14 @@ def test_a_dropped_recording_lies_over_the_model_and_its_parameters_are_found(pa
         ' Bokeh.documents[0].get_model_by_name("recorded " + key).data.x.length)'
     )
     assert min(drawn) >= 13
+    beyond = page.tab.evaluate("""["portrait", "section", "history"].filter(name => {
+        const plot = Bokeh.documents[0].get_model_by_name(name);
+        const of = name === "history" ? "recorded history" : "recorded curve";
+        const {x, y} = Bokeh.documents[0].get_model_by_name(of).data;
+        const leaves = (values, {start, end}) => values.some(one => one < start || one > end);
+        return leaves(y, plot.y_range) || (name !== "history" && leaves(x, plot.x_range));
+    })""")
+    assert beyond == []
     page.tab.click("#recording-fit")
     page.until('document.getElementById("recording-found").textContent.includes("fitted to")')
     page.until_done()

@@ -51,6 +51,13 @@ def test_eigenvalues_of_the_lorenz_system() -> None:
     assert at(lorenz(1.0), 0.0, 0.0, 0.0).kind == "undecided"  # a pitchfork: an eigenvalue 0
 
 
+def test_a_tank_that_runs_empty_has_no_linearisation_there() -> None:
+    """Torricelli's x' = -a sqrt(x): at x = 0 it stands, with an infinite slope."""
+    tank = ns.System(states=["x"], parameters={"a": 1.0}, modes={"all": lambda t, u, p: -p.a * np.sqrt(u.x)})
+    with np.errstate(all="ignore"):
+        assert at(tank, 0.0) is None
+
+
 @pytest.mark.parametrize("frequency", [1e-4, 1.0, 1e4])
 def test_stability_is_the_same_in_every_unit_of_time(frequency: float) -> None:
     """x'' = -w^2 x - 2 D w x': the eigenvalues' real parts are -D w."""

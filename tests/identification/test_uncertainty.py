@@ -37,6 +37,9 @@ def test_a_factor():
     low, high, factor = factor_interval(2.0, np.log(2) / 1.959964)
     assert (low, high, factor) == pytest.approx((1.0, 4.0, 2.0), rel=1e-6)
     assert Estimate(2.0, 0.4, logarithmic=True).factor == pytest.approx(np.exp(1.959964 * 0.2))
+    for value in (0.0, -2.0):  # no factor holds it
+        own, plain = Estimate(value, 0.4, logarithmic=True), Estimate(value, 0.4)
+        assert own.interval() == plain.interval() and str(own) == str(plain)
 
 
 def test_correlation_of_an_autoregressive_series():

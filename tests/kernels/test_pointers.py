@@ -35,7 +35,7 @@ flow = VariationalFlow.of(system, ("rho",))
 values = system.parameter_vector()
 legs = flow.segments(values, [0, 1], [0.1, 0.4], [0.3, 0.02], [[-0.006, 0.03], [-0.0045, 0.04]])
 jump = flow.jump(values, 0, 0.3, [-0.0045, 0.04])
-numbers = [*legs.z.ravel(), *legs.Phi.ravel(), *legs.P.ravel(), *jump.saltation.ravel(), *jump.f_after]
+numbers = [*legs.z.ravel(), *legs.Phi.ravel(), *legs.P.ravel(), *jump.saltation.ravel(), *jump.fields[1]]
 print(json.dumps([numbers, len(compiled)]))
 """
 

@@ -236,6 +236,10 @@ def test_loads_are_drawn_with_their_units() -> None:
     assert ax.get_ylabel() == "wall energy (J)"
     (line,) = ax.get_lines()
     assert np.array_equal(np.asarray(line.get_ydata(), dtype=float), curve["wall_energy"].values)
+    # one point of each value in place of as many as were kept: three times as large
+    dots = plot.bifurcation(curve, plt.figure().add_subplot(), y="wall_energy", size=2.0).lines[0]
+    states = plot.bifurcation(curve, plt.figure().add_subplot(), y="q", size=2.0).lines[0]
+    assert (dots.get_markersize(), states.get_markersize()) == (6.0, 2.0)
 
 
 def test_a_point_between_two_that_failed_is_a_dot(responded: xr.Dataset) -> None:

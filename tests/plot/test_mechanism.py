@@ -153,6 +153,10 @@ def test_gaps_and_displacements_are_to_one_scale() -> None:
     put(ax, sketch.parts([0.5 * scale], scale, labels=False))
     mass, *_, pad = (one.get_xy()[:, 0] for one in ax.patches if len(one.get_xy()) == 5)
     assert mass.max() == pytest.approx(pad.min(), abs=1e-12)
+    for room in (0.0, 0.5):  # as large as the figure is made for it, and about its middle
+        sketch.frame(ax, room)
+        assert ax.get_xlim() == pytest.approx((sketch.left - 0.2 - room, sketch.left - 0.2 + sketch.width + room))
+        assert np.diff(ax.get_ylim()) == pytest.approx([sketch.height])
     plt.close("all")
 
 

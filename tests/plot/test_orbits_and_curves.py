@@ -193,3 +193,74 @@ def test_a_part_of_a_branch_has_the_special_points_that_are_in_it(branch: xr.Dat
     with pytest.raises(ValueError, match="only some of its points are there"):
         ns.continue_orbit(part, range=(3.0, 8.0))
     assert ns.special_points(part.isel(point=slice(0, 20))).sizes["special"] == 0
+
+
+def held_branch() -> xr.Dataset:
+    """Four held motions round a fold, one of each stability and two unstable ones."""
+    n = 4
+    columns = {
+        "amplitude": [1.0, 2.0, 3.0, 4.0],
+        "amplitude_uncertainty": [0.01, 0.02, 0.03, 0.04],
+        "stability": [1, -1, 0, 0],
+        "control_effort": [0.1, 0.2, 0.3, 0.4],
+        "control_effort_first": [1.0, 2.0, 3.0, 4.0],
+        "control_effort_noise": [0.01] * n,
+    }
+    result = xr.Dataset(
+        {name: ("point", np.array(values)) for name, values in columns.items()}
+        | {
+            "special_point": ("special", [1]),
+            "special_value": ("special", [5.95]),
+            "special_value_uncertainty": ("special", [0.05]),
+        },
+        {
+            "omega": ("point", [5.0, 5.9, 5.5, 5.2], {"units": "rad/s"}),
+            "state": ["x", "v"],
+            "state_unit": ("state", ["m", "m/s"]),
+        },
+        {"parameter": "omega"},
+    )
+    result["control_effort"].attrs["units"] = "N"
+    return result
+
+
+def test_held_motions_have_bars_of_two_uncertainties_and_their_stability() -> None:
+    result = held_branch()
+    ax = plot.controlled_branch(result)
+    kinds = ["came back when let go: stable", "left when let go: unstable", "held; stability not known"]
+    assert words(ax) == [*kinds, "fold"]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (r"$\omega$ (rad/s)", "amplitude of $x$ (m)")
+    bars = {str(one.get_label()): one for one in ax.containers}
+    for kind, code in zip(kinds, (1, 0, -1), strict=True):
+        here = result["stability"].values == code
+        (segments,) = bars[kind].lines[2]
+        reach = np.diff([one[:, 1] for one in segments.get_segments()])[:, 0]
+        np.testing.assert_allclose(reach, 4 * result["amplitude_uncertainty"].values[here])
+        np.testing.assert_array_equal(bars[kind].lines[0].get_ydata(), result["amplitude"].values[here])
+    (across,) = bars["fold"].lines[2]
+    ((begin, end),) = across.get_segments()
+    assert (begin.tolist(), end.tolist()) == (pytest.approx([5.85, 2.0]), pytest.approx([6.05, 2.0]))
+    none = result.isel(special=slice(0), point=slice(1))
+    assert words(plot.controlled_branch(none, plt.subplots()[1])) == kinds[:1]
+
+
+def test_theory_behind_held_motions_leaves_the_axes_to_them(branch: xr.Dataset) -> None:
+    result = held_branch()
+    ax = plot.controlled_branch(result, theory=branch)
+    assert ax.get_xlim() == pytest.approx((5.0 - 0.05 * 0.9, 5.9 + 0.08 * 0.9))
+    assert ax.get_ylim() == pytest.approx((1.0 - 0.05 * 3.0, 4.0 + 0.08 * 3.0))
+    half = 0.5 * (branch["maximum"] - branch["minimum"]).sel(state="x").values
+    assert any(set(half[:5]) <= set(line.get_ydata()) for line in ax.lines)
+    with pytest.raises(ValueError, match="the branch is in 'rho', the result in 'omega'"):
+        plot.controlled_branch(result, theory=branch.assign_attrs(parameter="rho"))
+
+
+def test_the_control_force_falls_from_its_first_to_that_of_noise() -> None:
+    result = held_branch()
+    ax = plot.controlled_branch(result, y="control_effort")
+    drawn = {str(line.get_label()): line.get_ydata() for line in ax.lines}
+    for words_of, name in (("before the first correction", "_first"), ("converged", ""), ("noise alone", "_noise")):
+        np.testing.assert_array_equal(drawn[words_of], result[f"control_effort{name}"].values)
+    assert (ax.get_yscale(), ax.get_ylabel()) == ("log", "rms of the control force (N)")
+    with pytest.raises(ValueError, match="allowed: 'amplitude', 'control_effort'"):
+        plot.controlled_branch(result, y="effort")

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
+import hashlib
+import zlib
+
 import pytest
 
 from nonsmooth.errors import DataFileError
@@ -19,6 +23,25 @@ def test_header_with_units_and_comments() -> None:
     assert recording.channel("force")["time"].values.tolist() == [0, 1]
     assert recording.source["header"]["comments"] == ["# a comment", "# another"]
     assert any("'force': 1 blank fields dropped" in w for w in recording.warnings)
+
+
+def test_a_packed_file_is_read_whole_or_not_at_all() -> None:
+    """Files joined after they were packed are one, as gzip has it; no part of one that is cut short is read."""
+    lines = [b"t (s), x (m)\n", *(b"%d, %d\n" % (i, i * i) for i in range(200))]
+    plain, halves = b"".join(lines), [b"".join(lines[:90]), b"".join(lines[90:])]
+    whole = gzip.compress(plain)
+    for packed in whole, gzip.compress(halves[0]) + gzip.compress(halves[1]):
+        recording = parse_recording(packed, "x.csv.gz")
+        assert recording.channel("x").equals(parse_recording(plain, "x.csv").channel("x"))
+        assert recording.channel("x").size == 200
+        assert recording.source["sha256"] == hashlib.sha256(packed).hexdigest()
+    flush = zlib.compressobj(wbits=31)
+    begun = flush.compress(halves[0]) + flush.flush(zlib.Z_FULL_FLUSH)  # cut at the end of a line
+    for damaged in (begun, whole[:-4], whole[:-8] + bytes(4) + whole[-4:], whole[:20] + bytes(20) + whole[40:]):
+        with pytest.raises(DataFileError, match=r"x.csv.gz: cannot be unpacked, it is damaged or cut short"):
+            parse_recording(damaged, "x.csv.gz")
+    with pytest.raises(DataFileError, match=r"unpacks to more than 16777216 bytes"):
+        parse_recording(gzip.compress(bytes(2**24 + 1)), "x.csv.gz")
 
 
 def test_column_mapping_with_runs() -> None:

@@ -66,7 +66,9 @@ def test_with_friction_a_linear_band_converges_like_eta_and_an_arctan_slower(rep
 def test_where_forces_are_continuous_a_band_costs_eta_squared_and_tails_eta() -> None:
     """The paper's support: eta^2 on transversal orbits; an arctan's tail is a force of order eta far from the gap."""
     system = ns.models.discontinuous_support(rho=0.45, g=-0.0045, omega=3.69)
-    report = ns.smoothing_report(system, [1e-5, 1e-4], band=["linear", "arctan"], progress=False).sel(eta=1e-4)
+    heard: list[float] = []
+    report = ns.smoothing_report(system, [1e-5, 1e-4], band=["linear", "arctan"], progress=heard.append).sel(eta=1e-4)
+    assert heard == [0.0, 0.25, 0.5, 0.75, 1.0]
     for key in ("state_order", "multiplier_order"):
         assert report[key].values == pytest.approx([2, 1], abs=0.06)
 

@@ -214,18 +214,19 @@ def _folds(
 def _corner(place: FloatArray, i: int) -> tuple[float, float]:
     """Parameter (scaled) where the lines through the points before and after a turn are nearest; its uncertainty.
 
-    The outermost point itself lies on one of the lines: the nearer of both ways to say so counts, and by how far they
-    differ is the uncertainty.
+    The outermost point itself lies on one of the lines: on the one whose next point is nearer to it; by how far both
+    ways to say so differ is the uncertainty.
     """
-    found = []
-    for before, after in (((i - 1, i), (i + 1, i + 2)), ((i - 2, i - 1), (i, i + 1))):
-        if min(before) < 0 or max(after) >= len(place):
+    found, last = [], len(place) - 1
+    for before, after, beyond in (((i - 1, i), (i + 1, i + 2), i - 2), ((i - 2, i - 1), (i, i + 1), i + 2)):
+        if before[0] < 0 or after[1] > last:
             continue
         a, b = place[before[1]] - place[before[0]], place[after[0]] - place[after[1]]
         along, *_ = np.linalg.lstsq(np.column_stack([a, -b]), place[after[0]] - place[before[1]], rcond=None)
         meeting = (place[before[1]] + along[0] * a, place[after[0]] + along[1] * b)
-        apart = float(np.linalg.norm(meeting[0] - meeting[1]))
-        found.append((apart, 0.5 * float(meeting[0][0] + meeting[1][0])))
+        line, third = a if beyond < i else b, place[min(max(beyond, 0), last)] - place[i]
+        off = float(np.linalg.norm(third - (third @ line) / (line @ line) * line))
+        found.append((off, 0.5 * float(meeting[0][0] + meeting[1][0])))
     if not found:
         return float(place[i][0]), float(np.ptp(place[i - 1 : i + 2, 0]))
     values = [value for _, value in sorted(found)]

@@ -78,11 +78,6 @@ class Jump:
         return self.fields[0, : self.n]
 
     @property
-    def f_after(self) -> FloatArray:
-        """(n,)"""
-        return self.fields[1, : self.n]
-
-    @property
     def saltation(self) -> FloatArray:
         """(n, n)"""
         return self.S[: self.n, : self.n]
@@ -93,13 +88,8 @@ class Jump:
         return self.S[: self.n, self.n :]
 
     @property
-    def t_z(self) -> FloatArray:
-        """(n,) derivative of the instant"""
-        return self.instant[: self.n]
-
-    @property
     def t_p(self) -> FloatArray:
-        """(n_active,)"""
+        """(n_active,) derivative of the instant"""
         return self.instant[self.n :]
 
     @property

@@ -59,7 +59,8 @@ def bifurcation(
         The state of the ordinate; by default the first. Or a quantity of each point, such as ``"x_amplitude"`` or a
         load (``"stop_impact_speed_maximum"``), which :func:`nonsmooth.table` lists.
     size
-        Diameter of a point in typographic points; of a rising sweep under a falling one, half of it.
+        Diameter of a point in typographic points; of a rising sweep under a falling one it is twice that, and three
+        times of a quantity, which has one point where a state has as many as were kept.
     color
         One colour for all points instead of one per direction.
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
 import hashlib
+import io
 import os
 import re
 import stat
@@ -168,8 +170,9 @@ def _unpacked(data: bytes, source: Source) -> bytes:
     """The content of a file that gzip has packed."""
     limit = inflation_limit(len(data))
     try:
-        content = zlib.decompressobj(wbits=31).decompress(data, limit + 1)
-    except zlib.error as error:
+        with gzip.open(io.BytesIO(data)) as packed:
+            content = packed.read(limit + 1)
+    except (OSError, EOFError, zlib.error) as error:
         raise source.error("", f"cannot be unpacked, it is damaged or cut short ({error})") from error
     if len(content) > limit:
         raise source.error("", f"unpacks to more than {limit} bytes, more than its size warrants: unpack it yourself")

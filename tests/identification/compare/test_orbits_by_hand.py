@@ -12,11 +12,13 @@ ANGLE = 2 * np.pi * np.arange(64) / 64
 
 
 def test_a_constant_difference_counts_once() -> None:
-    """cos and cos + b: the distance is b over the root mean square of cos about its mean, 1 / sqrt 2."""
+    """cos and cos + b: the distance is b over the root mean square of cos about its mean, 1 / sqrt 2; between states
+    that stand still it is in their own unit."""
     a = np.cos(ANGLE)[:, None]
     found = orbit_distance(a, a + 0.3, 1)
     assert found.distance == pytest.approx(0.3 * np.sqrt(2), rel=1e-12)
     assert found.any_phase == pytest.approx(0.3 * np.sqrt(2), rel=1e-6)
+    assert orbit_distance(0 * a + 1.0, 0 * a + 1.3, 1).distance == pytest.approx(0.3, rel=1e-12)
 
 
 def test_a_difference_at_half_the_sample_rate_counts_once() -> None:

@@ -26,6 +26,10 @@ def test_frequency_and_rate_lie_within_their_errors() -> None:
         z.append([(found.frequency - 20.123) / found.frequency_error, found.rate / found.rate_error])
     rms = np.sqrt(np.mean(np.square(z), axis=0))
     assert np.all((0.4 < rms) & (rms < 1.6)), rms
+    first, *methods, statement = str(found).splitlines()
+    assert first.endswith(f": {found.frequency:.5f} ± {found.frequency_error:.5f} Hz") and found.statement in statement
+    told = [f"  by {name}: {value:.5f} ± {error:.5f} Hz" for name, (value, error) in found.by_method.items()]
+    assert methods == told and len(told) > 1
 
 
 def test_a_slow_decay_is_seen_and_a_growth_is_no_steady_response() -> None:

@@ -80,21 +80,25 @@ class Crossed(Boundary):
     def visit(self, point: Any) -> int:
         """The visit whose crossing it is."""
 
-    def crossing(self, point: Any, visit: int) -> tuple[int, Any, int]:
-        """Transition, state, and the row that fires (-1: whichever): those at the end of the visit."""
-        return point.signature.visits[visit].transition, point.solved.segments.z[visit], -1
+    def crossing(self, point: Any, visit: int) -> tuple[int, float, Any, int]:
+        """Transition, instant, state, and the row that fires (-1: whichever): those at the end of the visit."""
+        return point.signature.visits[visit].transition, *_end(point, visit), -1
 
     def surface(self, point: Any, beyond: Any = None) -> int:
         """The indicator of the row that is nearest to zero (-1: of none)."""
         visit, shooting = self.visit(point), point.shooting
-        k, z, fires = self.crossing(point, visit)
-        t = float(point.solved.times[min(visit + 1, shooting.m)])
+        k, t, z, fires = self.crossing(point, visit)
         near = [
             (abs(shooting.flow.jump(point.values, k, t, z, r).h), row.indicator)
             for r, row in enumerate(shooting.system.traced.transitions[k].rows)
             if r != fires
         ]
         return min(near)[1] if near else -1
+
+
+def _end(point: Any, visit: int) -> tuple[float, Any]:
+    """Instant and state at the end of a visit."""
+    return float(point.solved.times[visit + 1]), point.solved.segments.z[visit]
 
 
 class Short(Crossed):
@@ -147,9 +151,9 @@ class Own(Crossed):
         """The visit before the crossing with the least other row."""
         return int(point.curve.walk.conditional[int(point.path.own.argmin())])
 
-    def crossing(self, point: Any, visit: int) -> tuple[int, Any, int]:
+    def crossing(self, point: Any, visit: int) -> tuple[int, float, Any, int]:
         """The row that fires is known."""
-        return (*super().crossing(point, visit)[:2], point.signature.visits[visit].row)
+        return (*super().crossing(point, visit)[:3], point.signature.visits[visit].row)
 
 
 class Grazing(Boundary):
@@ -179,9 +183,9 @@ class Others(Crossed):
         """The visit at whose end it does."""
         return int(point.path.others.argmax())
 
-    def crossing(self, point: Any, visit: int) -> tuple[int, Any, int]:
+    def crossing(self, point: Any, visit: int) -> tuple[int, float, Any, int]:
         """The other transition."""
-        return int(point.path.other[visit]), point.solved.segments.z[visit], -1
+        return int(point.path.other[visit]), *_end(point, visit), -1
 
 
 class Landed(Crossed):
@@ -197,9 +201,14 @@ class Landed(Crossed):
         """The visit that begins there."""
         return int(point.path.landed.argmax())
 
-    def crossing(self, point: Any, visit: int) -> tuple[int, Any, int]:
+    def crossing(self, point: Any, visit: int) -> tuple[int, float, Any, int]:
         """The transition that is reached, where the visit begins."""
-        return int(point.path.landing[visit]), point.shooting.split(point.X)[1][visit], -1
+        return (
+            int(point.path.landing[visit]),
+            float(point.solved.times[visit]),
+            point.shooting.split(point.X)[1][visit],
+            -1,
+        )
 
 
 class Unseen(Boundary):

@@ -237,9 +237,9 @@ def _inverse(mass: sp.Matrix, system: str) -> sp.Matrix:
     """The inverse of a mass matrix; one of numbers must be symmetric and positive definite."""
     if not mass.free_symbols:
         numbers = np.array(mass.tolist(), dtype=float)
-        least = np.linalg.eigvalsh(0.5 * (numbers + numbers.T)).min()
         if not np.allclose(numbers, numbers.T, rtol=1e-12, atol=0.0):
             raise SystemDefinitionError(f"{system!r}: the mass matrix is not symmetric; write M so that M = M^T")
+        least = np.linalg.eigvalsh(numbers).min()
         if not least > 1e-14 * np.abs(numbers).max():
             raise SystemDefinitionError(
                 f"{system!r}: the mass matrix is not positive definite, its least eigenvalue is {least:.3g}: a motion "
