@@ -55,7 +55,7 @@ def section(
     But every period is run: the verbs leave out those in which a motion repeats itself bit for bit."""
     engine, kept = engine_for(system, **method), keep or n_periods
     begun = np.zeros(len(system.states)) if u is None else np.asarray(u, dtype=float)
-    state, out = State(begun, system.memory_vector()), engine.kept(1, kept)
+    state, out = State(begun.copy(), system.memory_vector()), engine.kept(1, kept)
     tables = engine.prepare(system.parameter_vector()[None, :])
     every = Section(extremes=0, repeats=0)
     engine.chain(tables, 0, 1, state, begun[None, :], every, n_periods - kept, kept, out)
