@@ -251,7 +251,7 @@ def test_theory_behind_held_motions_leaves_the_axes_to_them(branch: xr.Dataset) 
     assert ax.get_ylim() == pytest.approx((1.0 - 0.05 * 3.0, 4.0 + 0.08 * 3.0))
     half = 0.5 * (branch["maximum"] - branch["minimum"]).sel(state="x").values
     assert any(set(half[:5]) <= set(line.get_ydata()) for line in ax.lines)
-    with pytest.raises(ValueError, match="the branch is in 'rho', the result in 'omega'"):
+    with pytest.raises(ValueError, match="the result is over 'omega', this branch over 'rho'"):
         plot.controlled_branch(result, theory=branch.assign_attrs(parameter="rho"))
 
 
