@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import factorial
@@ -77,6 +78,8 @@ class Input:
             raise ValueError(
                 f"the time of an input must increase; sample {where + 1} is at {t[where + 1]:.9g} after {t[where]:.9g}"
             )
+        if self.noise is not None and len(t) < 4:
+            raise ValueError(f"noise = {self.noise} of an input of {len(t)} values: at least 4 tell a curve from it")
         for name, array in (("time", t), ("values", y)):
             array = array.copy()
             array.flags.writeable = False
@@ -100,8 +103,17 @@ class Input:
         from scipy.interpolate import CubicSpline, PPoly, splrep
 
         spline = CubicSpline(t, y)
-        if self.noise is not None and len(t) > 3:
-            spline = PPoly.from_spline(splrep(t, y, np.full(len(t), 1 / self.noise), s=len(t)))
+        if self.noise is not None:
+            found, over, code, _ = splrep(t, y, np.full(len(t), 1 / self.noise), s=len(t), full_output=True)
+            spline = PPoly.from_spline(found)
+            if code > 0:
+                warnings.warn(
+                    f"noise = {self.noise:.6g} of a smooth input: no spline was found that passes its {len(t)} values "
+                    f"by so much; this one passes them by {self.noise * np.sqrt(over / len(t)):.3g}. Give the noise "
+                    "that they have",
+                    RuntimeWarning,
+                    stacklevel=2,
+                )
         real = np.append(np.diff(spline.x) > 0, True)  # its ends stand there four times
         found = [np.append(spline.c[-1 - i] * factorial(i), 0.0 if i else spline(t[-1])) for i in range(4)]
         return spline.x[real], np.stack(found, axis=1)[real]

@@ -49,37 +49,20 @@ LINEAR_STEPPER = (
     "linear.stepper",
     "hybrid.loop",
 )
-LINEAR_OBSERVERS = (
-    "linear.extremes",
-    "linear.touches",
-    "linear.growth",
-    "hybrid.sections",
-    "hybrid.record",
-    "hybrid.growth",
-    "hybrid.observers",
-    "hybrid.run",
-)
+OBSERVERS = ("hybrid.sections", "hybrid.record", "hybrid.growth", "hybrid.observers", "hybrid.run")
+LINEAR_OBSERVERS = ("linear.extremes", "linear.touches", "linear.growth", *OBSERVERS)
 
 
 @cache
 def linear_module(planar: bool = False) -> ModuleType:
     """The module with ``run`` for the exact flow: of two states, all in every mode, with one harmonic; else of any
     number of them, and with ``stand``, which adds modes to tables."""
-    text = joined(
-        (*LINEAR_STEPPER, *LINEAR_OBSERVERS) if planar else (*LINEAR_STEPPER, *LINEAR_OBSERVERS, "linear.modes")
-    )
+    text = joined((*LINEAR_STEPPER, *LINEAR_OBSERVERS, *(() if planar else ("linear.modes",))))
     return load_module(with_numbers(text, {"STATES": 2 if planar else 0}), "linear_planar" if planar else "linear")
 
 
 SERIES_STEPPER = ("series.step", "series.watch", "series.instant", "series.stepper", "hybrid.loop")
-SERIES_OBSERVERS = (
-    "series.growth",
-    "hybrid.sections",
-    "hybrid.record",
-    "hybrid.growth",
-    "hybrid.observers",
-    "hybrid.run",
-)
+SERIES_OBSERVERS = ("series.growth", *OBSERVERS)
 
 
 @cache
