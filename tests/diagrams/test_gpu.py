@@ -22,7 +22,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.kernels.compile.assembly import LINEAR_STEPPER
-from nonsmooth.kernels.compile.cache import reached
+from nonsmooth.kernels.compile.sources import reached
 from nonsmooth.kernels.cuda import module
 from nonsmooth.kernels.cuda.module import OBSERVERS, joined, stamp
 

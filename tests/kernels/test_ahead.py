@@ -12,7 +12,7 @@ import numba
 import pytest
 
 import nonsmooth
-from nonsmooth.kernels.compile import cache, target
+from nonsmooth.kernels.compile import cache, sources, target
 
 KERNEL = """
 from nonsmooth.kernels.compile.cache import kernel
@@ -44,7 +44,7 @@ class Package:
 
     def imported(self, cache_name):
         self._patch.setenv("NONSMOOTH_CACHE_DIR", str(self.folder / cache_name))
-        cache._file_stamp.cache_clear()
+        sources.file_stamp.cache_clear()
         target.level.cache_clear()
         spec = importlib.util.spec_from_file_location("one", self.folder / "one.py")
         module = importlib.util.module_from_spec(spec)

@@ -1,5 +1,6 @@
 """The compile cache: a second process compiles nothing, an edit anywhere it matters compiles again."""
 
+import ast
 import json
 import os
 import shutil
@@ -188,7 +189,7 @@ def test_without_jit(tmp_path):
 
 
 def test_stamp_follows_imports_through_kernel_files(monkeypatch):
-    from nonsmooth.kernels.compile import cache
+    from nonsmooth.kernels.compile import sources as stamps
 
     sources = {
         "low": "x = 1",
@@ -199,16 +200,16 @@ def test_stamp_follows_imports_through_kernel_files(monkeypatch):
     }
 
     def stamp(text):
-        monkeypatch.setattr(cache, "_kernel_sources", lambda: dict(sources))
-        cache._source_stamp.cache_clear()
-        return cache._source_stamp(text)
+        monkeypatch.setattr(stamps, "_kernel_sources", lambda: dict(sources))
+        stamps._source_stamp.cache_clear()
+        return stamps._source_stamp(text)
 
     before = {name: stamp(text) for name, text in sources.items()}
     sources["low"] = "x = 3"
     after = {name: stamp(text) for name, text in sources.items()}
     assert before["apart"] == after["apart"]
     assert all(before[name] != after[name] for name in ("low", "mid", "top", "other"))
-    cache._source_stamp.cache_clear()
+    stamps._source_stamp.cache_clear()
 
 
 def grow_old(path, days=200):
@@ -387,6 +388,57 @@ def test_a_compile_copies_no_names_of_what_it_inlines(tmp_path, monkeypatch):
     monkeypatch.setattr(ir.VarMap, "__deepcopy__", copied, raising=False)
     assert cache.load_module(LAYERS, "layers").layered(2.0) == 2.0 * 2.0 + 2.0 * 3.0
     assert not hasattr(ir.Scope, "__deepcopy__")  # Numba is left as it was
+
+
+BELOW = """
+from nonsmooth.kernels.compile.cache import device, kernel
+from nonsmooth.kernels.compile.lanes import apart
+
+
+@device
+def below(a):
+    apart()
+    return 2.0 * a
+
+
+@kernel("float64(float64)")
+def above(a):
+    return below(a) + below(a + 1.0)
+"""
+
+
+def test_a_kernel_runs_the_code_that_was_made_with_it(tmp_path, monkeypatch):
+    from nonsmooth.kernels.compile import cache
+
+    monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path))
+    module = cache.load_module(BELOW, "below")
+    assert module.above(2.0) == 2.0 * 2.0 + 2.0 * 3.0
+    (below,), (above,) = module.below.overloads.values(), module.above.overloads.values()
+    (inside,) = (f for f in above.library._final_module.functions if f.name == below.fndesc.llvm_func_name)
+    assert inside.linkage.name == "internal"  # an engine takes code of another name's first comer otherwise
+    assert below.library._compiled_object is None and above.library._compiled_object
+
+
+def test_imports_are_found_as_python_finds_them():
+    from nonsmooth.kernels.compile import sources
+
+    room = "nonsmooth.kernels"
+    texts = sources._kernel_sources()
+    for text in [
+        *texts.values(),
+        "from .low import (\n    x,\n    y as z,\n)",
+        "if 1:\n    from . import low, \\\n mid",
+    ]:
+        names = set()
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.Import):
+                names.update(alias.name for alias in node.names)
+            elif isinstance(node, ast.ImportFrom):
+                package = ".".join(filter(None, [room if node.level else "", node.module]))
+                names.update([package, *(f"{package}.{alias.name}" for alias in node.names)])
+        ours = {name.removeprefix(f"{room}.") for name in names if name.startswith(f"{room}.")}
+        found = sources._imported(text)
+        assert ours <= found and not (found - ours) & set(texts)
 
 
 def test_a_function_of_many_branches_is_compiled(tmp_path, monkeypatch):

@@ -14,7 +14,6 @@ it. Checked with Numba 0.62 and 0.68, calls that compile with 0.68.
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import gc
 import hashlib
@@ -24,7 +23,6 @@ import pickle
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -47,7 +45,8 @@ from nonsmooth.kernels.compile.folder import (
     read_private,
     write_atomically,
 )
-from nonsmooth.kernels.compile.target import Function, made_ahead
+from nonsmooth.kernels.compile.sources import GENERATED, file_stamp
+from nonsmooth.kernels.compile.target import FORM, Function, made_ahead
 
 # Kernels allocate nothing (scratch is an argument), so they need no reference counts: "_nrt" off saves a third.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
@@ -56,79 +55,9 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {
 _INNER: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": False}
 DEEP = 20_000  # Numba looks for a name's value by recursion, twice for each block of a function
 _DIGEST = hashlib.sha256().digest_size
-_GENERATED = "nonsmooth_generated_"
-_MACHINERY = {f"compile.{name}" for name in ("ahead", "assembly", "cache", "folder", "target")}
 _lock = threading.Lock()
 _passing: WeakValueDictionary[str, ModuleType] = WeakValueDictionary()  # modules of models, while somebody has them
 _most_passing = 16
-
-
-# --------------------------------------------------------------------------------------------------------------
-# What a compiled function depends on
-
-
-@cache
-def _kernel_sources() -> dict[str, str]:
-    """Name -> text of every file of this room, as they stand when the process first compiles something."""
-    room = Path(__file__).parents[1]
-    return {
-        ".".join(path.relative_to(room).with_suffix("").parts): path.read_text(encoding="utf-8")
-        for path in sorted(room.rglob("*.py"))
-    }
-
-
-def _imported(text: str) -> Iterator[str]:
-    """Names of the modules that a text imports: within this room, full names of generated ones."""
-    room = __name__.rsplit(".", 2)[0]
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            package = room + (f".{node.module}" if node.module else "") if node.level else node.module or ""
-            names = [package, *(f"{package}.{alias.name}" for alias in node.names)]
-        else:
-            continue
-        for name in names:
-            if name.startswith(room + "."):
-                yield name.removeprefix(room + ".")
-            elif name.startswith(_GENERATED):
-                yield name.partition(".")[0]
-
-
-@cache
-def _source_stamp(text: str) -> str:
-    """Hash of a source text and of all that it reaches."""
-    digest = hashlib.sha256(text.encode())
-    for name, found in sorted(reached(text).items()):
-        digest.update(f"\0{name}\0{found}".encode())
-    return digest.hexdigest()
-
-
-def reached(text: str) -> dict[str, str]:
-    """Name -> text of every kernel file and generated module that a source imports, through any number of files.
-
-    The files of the cache itself are left out: what they decide about a function's code stands in its key."""
-    sources = _kernel_sources()
-    texts: dict[str, str] = {}
-    pending = [text]
-    while pending:
-        for name in _imported(pending.pop()):
-            if name in texts or name in _MACHINERY:
-                continue
-            if name.startswith(_GENERATED):
-                found = Path(str(sys.modules[name].__file__)).read_text(encoding="utf-8")
-            elif name in sources:
-                found = sources[name]
-            else:
-                continue  # not a module: a function of the package, say
-            texts[name] = found
-            pending.append(found)
-    return texts
-
-
-@cache
-def _file_stamp(path: str) -> str:
-    return _source_stamp(Path(path).read_text(encoding="utf-8"))
 
 
 class _ContentCache(_Cache):
@@ -138,11 +67,12 @@ class _ContentCache(_Cache):
         self._name = function.__qualname__
         config = numba.config
         self._origin = (
-            _file_stamp(inspect.getfile(function)),
+            file_stamp(inspect.getfile(function)),
             f"{function.__module__}.{self._name}",
             sys.version_info[:2],
             numba.__version__,
             llvmlite.__version__,
+            FORM,
             (config.OPT, config.BOUNDSCHECK, config.DEBUGINFO_DEFAULT, config.USING_SVML),
             sorted(options.items(), key=str),
             sorted(_INNER.items(), key=str),
@@ -158,7 +88,6 @@ class _ContentCache(_Cache):
         return f"{self._name}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.nbc"
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
-        cpu_target.target_context.refresh()  # of Numba's own: what all engines share is not to live in this one
         name = self.entry(sig, target_context.codegen())
         payload = _checked(made_ahead(name))
         if not payload:
@@ -166,6 +95,7 @@ class _ContentCache(_Cache):
             payload = _checked(read_private(path))
             mark_used(path)
         if not payload:  # none yet, or a damaged one: compiled anew
+            cpu_target.target_context.refresh()  # of Numba's own: what all engines share is not to live in this one
             for call in tuple(before_compiling):
                 call(self._name)
             return None
@@ -266,14 +196,14 @@ def compiled(function: Any) -> Any:
 
 
 def _cached(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    dispatcher = _jitted(function, {**_OPTIONS, **options})
+    dispatcher = _jitted(function, {**_OPTIONS, **options}, called=True)
     if dispatcher is not function:
         dispatcher._cache = _ContentCache(function, options)
     return dispatcher
 
 
-def _jitted(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    return function if numba.config.DISABLE_JIT else Function(function, options)
+def _jitted(function: Callable[..., Any], options: dict[str, Any], called: bool = False) -> Any:
+    return function if numba.config.DISABLE_JIT else Function(function, options, called)
 
 
 def _compile_once(dispatcher: Any, signature: Any) -> None:
@@ -360,7 +290,7 @@ def load_module(source: str, stem: str, *, lasting: bool = True) -> ModuleType:
     """
     name = f"{stem}_{hashlib.sha256(source.encode()).hexdigest()[:20]}"
     with _lock:
-        full_name = f"{_GENERATED}{name}"
+        full_name = f"{GENERATED}{name}"
         there = sys.modules.get(full_name) or _passing.get(full_name)
         if there is not None:
             return there

@@ -4,8 +4,8 @@ Numba makes code for one processor. Ours is made for a level of the architecture
 travel with the package and run on another; what the level costs stands in ``docs/decisions.md``. And Numba keeps all
 code in one engine until the process ends; here each file has its own, which goes with the file's last function.
 
-Leans on private parts of Numba: ``JITCPUCodegen``, a target context's ``_internal_codegen``, a dispatcher's
-``add_overload``, ``_make_finalizer`` and ``targetdescr``. Checked with 0.68.
+Leans on private parts of Numba: ``JITCPUCodegen`` and ``JITCodeLibrary``, a target context's ``_internal_codegen``, a
+dispatcher's ``add_overload``, ``_make_finalizer`` and ``targetdescr``. Checked with 0.68.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from llvmlite.binding import create_new_function_pass_manager
-from numba.core.codegen import JITCPUCodegen, get_host_cpu_features
+from llvmlite.binding import Linkage, create_new_function_pass_manager, parse_bitcode
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen, get_host_cpu_features
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager
 from numba.core.registry import CPUDispatcher, CPUTarget, cpu_target
@@ -35,6 +35,7 @@ LEVELS: dict[str, dict[str, str]] = {
     "x86_64": {"x86-64-v3": _V3},
     "aarch64": {"generic": "neon"},
 }
+FORM = "what is called below is internal"  # part of the names of entries: another one where code is made otherwise
 _SAME = {"amd64": "x86_64", "arm64": "aarch64"}
 
 
@@ -76,10 +77,63 @@ def made_ahead(entry: str) -> bytes:
         return b""
 
 
+class _Library(JITCodeLibrary):
+    """A function with all that it calls; machine code is made of it only where Python or an address calls it.
+
+    What it calls is then its own, and arguments that nobody reads, of sixty arrays, are passed no longer. Numba makes
+    code of each function below as well, by a name that the engine takes from whoever comes first: the process that
+    compiled ran another code than those that load it."""
+
+    called = False
+    _shared_module: Any
+    _text = b""  # of code that was loaded: read where another function is made of it
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: Any) -> _Library:
+        name, _, (code, text) = state
+        library: _Library = codegen.create_library(name)
+        library.enable_object_caching()
+        library._set_compiled_object(code)
+        library.called, library._text = True, text
+        library._finalize_final_module()
+        return library
+
+    def _get_module_for_linking(self) -> Any:
+        if self._text and self._shared_module is None:
+            self._shared_module = parse_bitcode(self._text)
+        return super()._get_module_for_linking()
+
+    def get_pointer_to_function(self, name: str) -> int:
+        self._ensure_finalized()
+        return self._codegen._engine.get_function_address(name)
+
+    def _optimize_final_module(self) -> None:
+        for function in self._with(Linkage.linkonce_odr) if self.called else ():
+            function.linkage = "internal"
+        super()._optimize_final_module()
+
+    def _finalize_final_module(self) -> None:
+        if self.called:
+            super()._finalize_final_module()
+            return
+        for function in self._with(Linkage.external):
+            function.linkage = "linkonce_odr"
+        self._finalized, self._shared_module = True, self._final_module
+
+    def _with(self, linkage: Linkage) -> list[Any]:
+        return [f for f in self._final_module.functions if not f.is_declaration and f.linkage == linkage]
+
+
 class _Codegen(JITCPUCodegen):
     """An engine of its own.
 
     ``vectors``: loops over arrays become loops over vectors, each in four versions behind each other."""
+
+    _library_class = _Library
+
+    def set_env(self, name: str, env: Any) -> None:
+        if self._engine.get_global_value_address(name):  # else there is no code that reads it
+            super().set_env(name, env)
 
     def __init__(self, name: str, vectors: bool = True) -> None:
         self._level, self._vectors = level(), vectors
@@ -130,26 +184,40 @@ class _Compiler(CompilerBase):
     """Numba's passes but for the rewriting of expressions over whole arrays, which no kernel has: a tenth of the time
     that a march takes before LLVM."""
 
+    called = True
+
     def define_pipelines(self) -> list[Any]:
+        state = self.state
+        state.library = state.targetctx.codegen().create_library(state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        state.library.called = self.called
         passes = PassManager("kernel")
-        passes.passes.extend(DefaultPassBuilder.define_untyped_pipeline(self.state).passes)
+        passes.passes.extend(DefaultPassBuilder.define_untyped_pipeline(state).passes)
         for step in (NopythonTypeInference, PreLowerStripPhis, InlineOverloads):
             passes.add_pass(step, step.__name__)
-        passes.passes.extend(DefaultPassBuilder.define_nopython_lowering_pipeline(self.state).passes)
+        passes.passes.extend(DefaultPassBuilder.define_nopython_lowering_pipeline(state).passes)
         passes.finalize()
         return [passes]
 
 
-class Function(CPUDispatcher):
-    """A function as ``numba.njit`` compiles it, but in the engine of the file it stands in."""
+class _Inner(_Compiler):
+    """The same for what only compiled functions call."""
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+    called = False
+
+
+class Function(CPUDispatcher):
+    """A function as ``numba.njit`` compiles it, but in the engine of the file it stands in.
+
+    ``called``: it is called by Python or by its address, and not only by functions that are compiled with it."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any], called: bool) -> None:
         names = function.__globals__
         if "_target" not in names:
             names["_target"] = _Target(bool(names.get("VECTORS", 1)))
         self.targetdescr = names["_target"]
         given = {"nopython": True, "boundscheck": None, **options}
-        super().__init__(function, targetoptions=given, pipeline_class=_Compiler)
+        super().__init__(function, targetoptions=given, pipeline_class=_Compiler if called else _Inner)
 
     def get_call_template(self, arguments: Any, named: Any) -> Any:
         """For numbers of a type, whatever they are: Numba would compile the function anew for each constant."""
