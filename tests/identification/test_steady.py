@@ -320,7 +320,7 @@ def test_models_are_chosen_by_settings_that_were_held_out() -> None:
         found = ns.fit(linear(), response(y[~out], at=OMEGA[~out]), ["c", "k"], progress=False)
         left = (y - amplitude(found["c"], found["k"]))[out] / ERROR
         assert float(ranked["squared_error"][0, fold]) == pytest.approx(np.mean(left**2), rel=1e-4)
-    with pytest.raises(ValueError, match="0 blocks of 0 and 21 settings of steady states"):
+    with pytest.raises(ValueError, match="too short for folds = 22: .* settings of steady states"):
         ns.select_model(models, response(y), folds=22, progress=False)
 
 

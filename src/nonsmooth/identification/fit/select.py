@@ -121,10 +121,9 @@ def _held_out(problem: Windows, folds: int) -> list[IntArray]:
         block += int(number[-1])
     found += [one.setting[one.run] % folds for one in problem.steady]
     if not {*range(folds)} <= {*np.concatenate(found).tolist()}:
-        settings = "".join(f" and {len(one.values)} settings of steady states" for one in problem.steady)
         raise ValueError(
-            f"the recording is too short for folds = {folds}: it holds {block} blocks of {length:.3g}{settings}; ask "
-            "for fewer folds"
+            f"the recording is too short for folds = {folds}: each holds out blocks of {length:.3g}, and settings of "
+            "steady states; ask for fewer folds"
         )
     return found
 
@@ -137,7 +136,7 @@ def _error(problem: Windows, held: list[BoolArray], tries: int, seed: int) -> fl
         replace(record, values=np.where(part[:, None], np.nan, record.values))
         for record, part in zip(problem.records, held, strict=False)
     ]
-    steady = (*(one.only(~part) for one, part in zip(problem.steady, held[len(records) :], strict=True)),)
+    steady = tuple(one.only(~part) for one, part in zip(problem.steady, held[len(records) :], strict=True))
     # where there is no prediction
     far = [(record.values - np.nanmean(record.values, axis=0)) / problem.noise for record in problem.records]
     far += [(one.measured - np.mean(one.measured)) / one.noise for one in problem.steady]
@@ -162,7 +161,6 @@ def _predict(problem: Windows, grown: Grown, far: list[FloatArray]) -> None:
             k, c = whole.readings
             left = whole.values[k, c] - fitted.shown(whole, predicted)
             far[window.record][window.first + k, c] = left / problem.noise[c]
-    for i, one in enumerate(problem.steady):
-        there, _, _ = replace(fitted, steady=problem.steady).of_steady(grown.theta, i)
-        left = (one.measured - there) / one.noise
-        far[len(problem.records) + i] = np.where(np.isfinite(left), left, far[len(problem.records) + i])
+    for i, (one, left) in enumerate(zip(problem.steady, far[len(problem.records) :], strict=True)):
+        there = replace(fitted, steady=problem.steady).of_steady(grown.theta, i)[0]
+        np.copyto(left, (one.measured - there) / one.noise, where=np.isfinite(there))
