@@ -309,9 +309,22 @@ def test_a_channel_called_amplitude_is_no_response() -> None:
     assert beside["c"] == alone["c"]
 
 
-def test_models_are_chosen_by_records() -> None:
-    with pytest.raises(ValueError, match="holds out parts of records over time"):
-        ns.select_model({"a": (linear(), "c"), "b": (linear(), "k")}, response(amplitude()), progress=False)
+def test_models_are_chosen_by_settings_that_were_held_out() -> None:
+    """Every third setting is held out in turn: the error there is that of a fit to the others, by the formula."""
+    y = amplitude() + ERROR * np.random.default_rng(3).standard_normal(len(OMEGA))
+    models = {"damped": (linear(), ["c", "k"]), "too soft": (linear(k=3.8), "c")}
+    ranked = ns.select_model(models, response(y), folds=3, tries=2, progress=False)
+    assert ranked.attrs["best"] == "damped" and float(ranked["rms"].sel(model="too soft")) > 3.0
+    for fold in range(3):
+        out = np.arange(len(OMEGA)) % 3 == fold
+        found = ns.fit(linear(), response(y[~out], at=OMEGA[~out]), ["c", "k"], progress=False)
+        left = (y - amplitude(found["c"], found["k"]))[out] / ERROR
+        assert float(ranked["squared_error"][0, fold]) == pytest.approx(np.mean(left**2), rel=1e-4)
+    with pytest.raises(ValueError, match="too short for folds = 22: .* settings of steady states"):
+        ns.select_model(models, response(y), folds=22, progress=False)
+
+
+def test_a_fit_to_steady_states_alone_has_no_residuals_over_time() -> None:
     with pytest.raises(ValueError, match=r"steady states are in \.steady"):
         _ = ns.fit(linear(), response(amplitude()), "k", progress=False).residuals
 

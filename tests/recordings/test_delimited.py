@@ -102,10 +102,10 @@ def test_bad_files_say_where(data: bytes, options: Options, message: str) -> Non
     ("given", "message"),
     [
         ({"format": "xls"}, "format must be one of capstone-csv"),
-        ({"rate": -1}, "rate must be a positive number"),
+        ({"rate": -1}, "rate = -1 must be positive"),
         ({"rate": 1.0, "columns": {"time": 0}}, "rate makes a time axis"),
-        ({"decimal": ";"}, "decimal must be"),
-        ({"decimal": ",", "delimiter": ","}, "cannot both"),
+        ({"decimal": ";"}, "decimal = ';'; allowed: '.', ','"),
+        ({"decimal": ",", "delimiter": ","}, "cannot be the delimiter"),
         ({"delimiter": "ab"}, "delimiter must be one character"),
         ({"axis": "two words"}, "axis must be a name"),
     ],
@@ -116,7 +116,7 @@ def test_wrong_arguments_at_the_door(given: dict[str, object], message: str) -> 
 
 
 def test_wrong_columns_at_the_door() -> None:
-    with pytest.raises(TypeError, match="columns must map our names"):
+    with pytest.raises(TypeError, match="columns must be a mapping, .* maps our names"):
         load_recording("absent.csv", columns=["t"])
     with pytest.raises(TypeError, match=r"columns\['x'\] must be a header"):
         load_recording("absent.csv", columns={"x": 1.5})

@@ -345,12 +345,12 @@ def test_a_mdf_group_of_another_rate_is_a_sensor_of_the_same_run(tmp_path: Path)
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"thousands": "x"}, "thousands must be one of"),
-        ({"thousands": ",", "decimal": ","}, "not the decimal mark"),
-        ({"header": 0}, "header, the number of a line, = 0 must be a whole number, at least 1"),
-        ({"units_row": True}, "units_row, the number of a line, must be a real number"),
-        ({"skip": -1}, "skip, the number of a line, = -1 must be a whole number"),
-        ({"wraps": {"x": 0}}, "at which it begins anew"),
+        ({"thousands": "x"}, "thousands = 'x'; allowed: '.', ','"),
+        ({"thousands": ",", "decimal": ","}, "cannot be the delimiter or the mark between thousands"),
+        ({"header": 0}, "header = 0 must be a whole number, at least 1"),
+        ({"units_row": True}, "units_row must be a whole number, not True"),
+        ({"skip": -1}, "skip = -1 must be a whole number"),
+        ({"wraps": {"x": 0}}, r"wraps\['x'\] = 0 must be positive; counts at which"),
         ({"skips": 2}, "`skips` is not an option"),
     ],
 )

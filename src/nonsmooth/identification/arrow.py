@@ -163,10 +163,36 @@ def settle(
         said = f"the fit over {len(problem.pieces)} pieces did not settle{why}"
         return Unsettled(said, distance, rest, theta, starts)
 
+    def step_of(damping: float = 0.0) -> tuple[FloatArray, FloatArray, list[Any]]:
+        """A step of the parameters, those at a bound against which the data push them being held; their covariance, and
+        what gives the starts' steps."""
+        normal, right, back = reduced(problem, state, weights, len(theta), used, damping)
+        full, pull = normal + prior, right - prior @ (theta - u.centre)
+        if not np.isfinite(full).all():
+            raise SolveError(
+                f"the motion of this fit over {len(problem.pieces)} pieces grows without bound: its records are not of "
+                "the motion that they are taken for"
+            )
+        free = ~(((theta <= u.low) & (pull < 0)) | ((theta >= u.high) & (pull > 0)))
+        covariance, places = np.zeros_like(full), np.ix_(free, free)
+        covariance[places] = inverted(full[places], damping)[0]
+        return covariance @ pull, covariance, back
+
+    def undamped() -> tuple[FloatArray, FloatArray]:
+        """Undamped steps in standard uncertainties: the largest of the parameters, then of each start; the
+        parameters'."""
+        step, covariance, back = step_of()
+        far = [float(np.max(np.abs(step) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))))]
+        for i, (piece, (inverse, cross, part)) in enumerate(zip(problem.pieces, back, strict=True)):
+            error = np.linalg.norm(inverse, axis=1)
+            own = np.abs(inverse @ (part - cross @ step[piece.which])) / np.maximum(error, 1e-150)
+            far.append(float(np.max(own)) if used is None or used[i] else 0.0)
+        return np.array(far), step
+
     best = cost(state, theta)
     for _ in range(iterations):
         while True:
-            step, _, back = _step(problem, state, weights, used, theta, prior, damping)
+            step, _, back = step_of(damping)
             step = np.clip(theta + step, u.low, u.high) - theta
             moved = starts.copy()
             for i, (inverse, cross, part) in enumerate(back):
@@ -177,7 +203,7 @@ def settle(
             damping *= 8
             # no smaller sum of squares: the derivatives' own accuracy is reached, or nothing fits
             if damping > (1e4 if rough else 1e8):
-                distance, rest = _distance(problem, state, weights, used, theta, prior)
+                distance, rest = undamped()
                 if (far := float(np.max(distance))) < _ACCURACY or rough:
                     return theta, starts, state
                 raise unsettled(
@@ -187,7 +213,7 @@ def settle(
         theta, starts, gain, best = theta + step, moved, best - found, found
         state = problem.derivatives(theta, starts)
         # by the undamped step: a damped one is short wherever it is taken
-        distance, rest = _distance(problem, state, weights, used, theta, prior)
+        distance, rest = undamped()
         far = float(np.max(distance))
         if far < _SETTLED or (far < _ACCURACY and gain < 1e-7 * best) or (rough and gain < _LITTLE * best):
             return theta, starts, state
@@ -195,43 +221,6 @@ def settle(
     if rough:
         return theta, starts, state
     raise unsettled(f" in {iterations} iterations")
-
-
-def _distance(
-    problem: Problem, state: Residuals, weights: list[FloatArray], used: Any, theta: FloatArray, prior: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Undamped steps in standard uncertainties: the largest of the parameters, then of each start; the parameters'."""
-    step, covariance, back = _step(problem, state, weights, used, theta, prior)
-    far = [float(np.max(np.abs(step) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))))]
-    for i, (piece, (inverse, cross, part)) in enumerate(zip(problem.pieces, back, strict=True)):
-        error = np.linalg.norm(inverse, axis=1)
-        own = np.abs(inverse @ (part - cross @ step[piece.which])) / np.maximum(error, 1e-150)
-        far.append(float(np.max(own)) if used is None or used[i] else 0.0)
-    return np.array(far), np.asarray(step)
-
-
-def _step(
-    problem: Problem,
-    state: Residuals,
-    weights: list[FloatArray],
-    used: Any,
-    theta: FloatArray,
-    prior: FloatArray,
-    damping: float = 0.0,
-) -> tuple[FloatArray, FloatArray, list[Any]]:
-    """A step of the parameters, those at a bound against which the data push them being held; their covariance, and
-    what gives the starts' steps."""
-    normal, right, back = reduced(problem, state, weights, len(theta), used, damping)
-    u, full, pull = problem.unknowns, normal + prior, right - prior @ (theta - problem.unknowns.centre)
-    if not np.isfinite(full).all():
-        raise SolveError(
-            f"the motion of this fit over {len(problem.pieces)} pieces grows without bound: its records are not of the "
-            "motion that they are taken for"
-        )
-    free = ~(((theta <= u.low) & (pull < 0)) | ((theta >= u.high) & (pull > 0)))
-    covariance, places = np.zeros_like(full), np.ix_(free, free)
-    covariance[places] = inverted(full[places], damping)[0]
-    return covariance @ pull, covariance, back
 
 
 class Sandwich(NamedTuple):

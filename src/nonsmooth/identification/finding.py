@@ -218,6 +218,12 @@ class Estimate:
         return self.uncertainty / abs(self.value) if self.value else float("inf")
 
     @property
+    def expanded(self) -> float:
+        """The expanded uncertainty: half the 95 % interval, or its wider side."""
+        low, high = self.interval()
+        return max(high - self.value, self.value - low)
+
+    @property
     def factor(self) -> float:
         """The factor by which the value is uncertain at 95 %."""
         return factor_interval(self.value, self.relative)[2]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nonsmooth.recordings.reading import MAX_COLUMNS, Reading, Remarks, Source, Trace
+from nonsmooth.recordings.reading import MAX_COLUMNS, Reading, Trace
 from nonsmooth.recordings.recording import Recording, examine, missing_runs, mixed_units
 
 if TYPE_CHECKING:
@@ -19,20 +19,19 @@ SHORT = 32
 EVENTS = "Turn"
 
 
-def assemble(reading: Reading, source: Source, options: Mapping[str, Any], axis: str = "time") -> Recording:
+def assemble(reading: Reading) -> Recording:
     """Check the traces, group them by run and clock, and label them."""
-    remarks = reading.remarks
     traces = []
     for trace in reading.traces:
         if len(trace.values) == 0:
-            remarks.of(trace.run, trace.name, "holds no value; left out")
+            reading.of(trace.run, trace.name, "holds no value; left out")
         else:
             traces.append(trace)
     if not traces:
-        raise source.error("", "holds no samples; expected at least one channel with values")
+        raise reading.error("", "holds no samples; expected at least one channel with values")
     if len(traces) > MAX_COLUMNS:
-        raise source.error("", f"holds {len(traces)} channels; at most {MAX_COLUMNS} are read")
-    _compare_units(traces, remarks)
+        raise reading.error("", f"holds {len(traces)} channels; at most {MAX_COLUMNS} are read")
+    _compare_units(traces, reading)
 
     runs: dict[str, dict[str, xr.Dataset]] = {}
     run_attrs: dict[str, dict[str, str]] = {}
@@ -45,18 +44,18 @@ def assemble(reading: Reading, source: Source, options: Mapping[str, Any], axis:
         sensors: dict[str, xr.Dataset] = {}
         for group in _by_clock([trace for trace in traces if trace.run == run]):
             label = _fit(group[0].name or "sensor", sensors)
-            sensors[label] = _sensor(group, source, axis, remarks)
+            sensors[label] = _sensor(group, reading)
         runs[node] = sensors
     record = {
-        "file": source.name,
-        "format": source.format,
-        "bytes": source.size,
-        "sha256": source.sha256,
-        "options": dict(options),
-        "header": reading.header,
+        "file": reading.name,
+        "format": reading.format,
+        "bytes": reading.size,
+        "sha256": reading.sha256,
+        "options": reading.asked,
+        "header": reading.told,
     }
     return Recording.from_runs(
-        runs, synthetic=reading.synthetic, source=record, warnings=remarks.sentences(), run_attrs=run_attrs
+        runs, synthetic=reading.synthetic, source=record, warnings=reading.sentences(), run_attrs=run_attrs
     )
 
 
@@ -79,22 +78,22 @@ def _by_clock(traces: list[Trace]) -> list[list[Trace]]:
     return ordered
 
 
-def _sensor(group: list[Trace], source: Source, axis: str, remarks: Remarks) -> xr.Dataset:
+def _sensor(group: list[Trace], reading: Reading) -> xr.Dataset:
     import xarray as xr
 
-    first = group[0]
+    first, axis = group[0], reading.axis
     where = f"run {first.run!r}, channel {first.name!r}"
     if len(group) > 1:
         where += f" (and {len(group) - 1} sampled with it)"
     bad = np.flatnonzero(~np.isfinite(first.axis))
     if len(bad):
-        raise source.error(first.place(int(bad[0])), f"{where}: the {axis} is not a finite number")
+        raise reading.error(first.place(int(bad[0])), f"{where}: the {axis} is not a finite number")
 
     def note(sentence: str) -> None:
         for trace in group:
-            remarks.of(trace.run, trace.name, sentence)
+            reading.of(trace.run, trace.name, sentence)
 
-    attrs: dict[str, Any] = _clock(first, where, source, note) if axis == "time" else {}
+    attrs: dict[str, Any] = _clock(first, where, reading, note) if axis == "time" else {}
     if axis == "time" and len(first.values) < SHORT and any(trace.name != EVENTS for trace in group):
         note(f"only {len(first.values)} samples; too short to identify anything from")
     variables: dict[str, Any] = {}
@@ -102,7 +101,7 @@ def _sensor(group: list[Trace], source: Source, axis: str, remarks: Remarks) -> 
         total, start, longest = missing_runs(trace.values)
         if total:
             at = f"{axis} = {trace.axis[start]:.9g} {trace.axis_unit}".rstrip()
-            remarks.of(
+            reading.of(
                 trace.run,
                 trace.name,
                 f"{total} of {len(trace.values)} values are not finite numbers, "
@@ -111,7 +110,7 @@ def _sensor(group: list[Trace], source: Source, axis: str, remarks: Remarks) -> 
         name = _fit(trace.name or "channel", [*variables, axis])
         if name != trace.name and name != _clean(trace.name):
             sentence = f"the name stands there twice, or is the axis; this one is called {name!r}"
-            remarks.of(trace.run, trace.name, sentence)
+            reading.of(trace.run, trace.name, sentence)
         variables[name] = (
             axis,
             trace.values,
@@ -121,13 +120,13 @@ def _sensor(group: list[Trace], source: Source, axis: str, remarks: Remarks) -> 
     return xr.Dataset(variables, {axis: coordinate}, attrs)
 
 
-def _clock(trace: Trace, where: str, source: Source, note: Callable[[str], None]) -> dict[str, Any]:
+def _clock(trace: Trace, where: str, reading: Reading, note: Callable[[str], None]) -> dict[str, Any]:
     """Attributes of a sensor's clock; remarks on gaps, changes and rounded times."""
     time = trace.axis
     back = np.flatnonzero(np.diff(time) < 0)
     if len(back):
         i = int(back[0])
-        raise source.error(
+        raise reading.error(
             trace.place(i + 1),
             f"{where}: time goes back from {time[i]:.9g} s to {time[i + 1]:.9g} s; if a new run begins here, "
             "name the column that numbers the runs, columns={'run': ...}; if a counter begins anew there, say at which "
@@ -153,7 +152,7 @@ def _clock(trace: Trace, where: str, source: Source, note: Callable[[str], None]
     return {"rate": clock.rate, "sampling": kind}
 
 
-def _compare_units(traces: list[Trace], remarks: Remarks) -> None:
+def _compare_units(traces: list[Trace], reading: Reading) -> None:
     units: dict[str, dict[str, str]] = {}
     runs: dict[str, set[str]] = {}
     for trace in traces:
@@ -162,9 +161,9 @@ def _compare_units(traces: list[Trace], remarks: Remarks) -> None:
     for name, found in units.items():
         if set(found) == {""}:
             (run,) = runs[name] if len(runs[name]) == 1 else ("",)
-            remarks.of(run, name, f"the file gives no unit; say it with units={{{name!r}: ...}}")
+            reading.of(run, name, f"the file gives no unit; say it with units={{{name!r}: ...}}")
         if len(found) > 1:
-            remarks.of(
+            reading.of(
                 "",
                 name,
                 f"has units {mixed_units(found)}; nothing was converted: take each run's own unit, or read the runs "

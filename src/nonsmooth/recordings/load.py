@@ -10,11 +10,11 @@ import re
 import stat
 import warnings
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 
@@ -22,16 +22,14 @@ from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.assemble import assemble
 from nonsmooth.recordings.reading import (
     MAX_FILE_BYTES,
-    Column,
     Options,
     Reading,
-    Source,
-    TableOptions,
     Trace,
     inflation_limit,
     names_of,
 )
 from nonsmooth.recordings.recording import Recording, RecordingWarning
+from nonsmooth.system.arguments import checked
 
 #: Each format, and the module whose ``read`` reads it.
 FORMATS = {
@@ -65,16 +63,8 @@ _MEMBERS = {b"xl/workbook.xml": "xlsx", b".npy": "npy"}
 _SPOKEN = 20  # warnings shown one by one; the rest is counted, and all are in Recording.warnings
 
 
-def load_recording(
-    path: str | os.PathLike[str],
-    *,
-    format: str | None = None,
-    columns: Mapping[str, Column] | None = None,
-    axis: str = "time",
-    rate: float | None = None,
-    units: Mapping[str, str] | None = None,
-    **table: Unpack[TableOptions],
-) -> Recording:
+@checked(of=Options, read=False)
+def load_recording(path: str | os.PathLike[str], *, format: str | None = None, **options: Any) -> Recording:
     """Read what an instrument recorded: runs, channels, units, sample rates, and where each came from.
 
     PASCO Capstone (``.csv`` exports in both locales, ``.cap``), any table (CSV, TSV, ``.xlsx``), LabVIEW (``.lvm``,
@@ -138,44 +128,42 @@ def load_recording(
     """
     if format is not None and format not in FORMATS:
         raise ValueError(f"format must be one of {', '.join(FORMATS)}, got {format!r}")
-    options = Options.of({"columns": columns, "axis": axis, "rate": rate, "units": units, **table})
-    file = Path(path)
-    recording = parse_recording(content_of(file), file.name, options, format=format)
+    file, asked = Path(path), Options(**options)
+    recording = parse_recording(content_of(file), file.name, asked, format=format)
     for remark in recording.warnings[:_SPOKEN]:
-        warnings.warn(f"{file.name}: {remark}", RecordingWarning, stacklevel=2)
+        warnings.warn(f"{file.name}: {remark}", RecordingWarning, stacklevel=3)
     if len(recording.warnings) > _SPOKEN:
         more = len(recording.warnings) - _SPOKEN
-        warnings.warn(f"{file.name}: {more} more; see Recording.warnings", RecordingWarning, stacklevel=2)
+        warnings.warn(f"{file.name}: {more} more; see Recording.warnings", RecordingWarning, stacklevel=3)
     return recording
 
 
 def parse_recording(data: bytes, name: str, options: Options | None = None, *, format: str | None = None) -> Recording:
     """The recording in ``data``; ``name`` is what errors call it."""
-    options = options or Options()
-    unread, digest = Source(name, len(data), "", ""), hashlib.sha256(data).hexdigest()
+    digest = hashlib.sha256(data).hexdigest()
+    reading = Reading(name=name, size=len(data), sha256=digest, **vars(options or Options()))
     if data.startswith(b"\x1f\x8b"):
-        data = _unpacked(data, unread)
-    kind = format if format is not None else _detect(data, unread, options)
-    source = Source(name, unread.size, digest, kind)
-    reader = import_module(f"nonsmooth.recordings.readers.{FORMATS[kind]}")
-    read: Callable[[bytes, Source, Options], Reading] = reader.read
+        data = _unpacked(data, reading)
+    reading.format = format if format is not None else _detect(data, reading)
+    reader = import_module(f"nonsmooth.recordings.readers.{FORMATS[reading.format]}")
+    read: Callable[[bytes, Reading], None] = reader.read
     # Numbers from elsewhere may lie at both ends of the range of doubles; what is not finite is judged by assemble.
     with np.errstate(all="ignore"):
-        reading = read(data, source, options)
-        _replace_units(reading, source, options)
-        return assemble(reading, source, _given(options), options.axis)
+        read(data, reading)
+        _replace_units(reading)
+        return assemble(reading)
 
 
-def _unpacked(data: bytes, source: Source) -> bytes:
+def _unpacked(data: bytes, reading: Reading) -> bytes:
     """The content of a file that gzip has packed."""
     limit = inflation_limit(len(data))
     try:
         with gzip.open(io.BytesIO(data)) as packed:
             content = packed.read(limit + 1)
     except (OSError, EOFError, zlib.error) as error:
-        raise source.error("", f"cannot be unpacked, it is damaged or cut short ({error})") from error
+        raise reading.error("", f"cannot be unpacked, it is damaged or cut short ({error})") from error
     if len(content) > limit:
-        raise source.error("", f"unpacks to more than {limit} bytes, more than its size warrants: unpack it yourself")
+        raise reading.error("", f"unpacks to more than {limit} bytes, more than its size warrants: unpack it yourself")
     return content
 
 
@@ -207,48 +195,42 @@ def _without_waiting(path: str, flags: int) -> int:
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
-def _detect(data: bytes, source: Source, options: Options) -> str:
+def _detect(data: bytes, reading: Reading) -> str:
     """The format, by the first bytes."""
     for begin, kind in _BEGINS.items():
         if data.startswith(begin):
             if kind == "zip":
                 return next((k for part, k in _MEMBERS.items() if part in data), "capstone-cap")
-            return "mat" if kind == "hdf5" and source.name.endswith(".mat") else kind
+            return "mat" if kind == "hdf5" and reading.name.endswith(".mat") else kind
     if data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"LabVIEW Measurement"):
         return "lvm"
     if re.match(rb"\s*-1\s*\n\s+\d+", data[:200]):
         return "uff"
     if b"\0" in data[:4096] and not data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        hint = "a .mat file of version 4 is not read: save it again with -v7" if source.name.endswith(".mat") else ""
+        hint = "a .mat file of version 4 is not read: save it again with -v7" if reading.name.endswith(".mat") else ""
         known = (
             "is none of the formats known: Capstone .csv and .cap, tables, .xlsx, LabVIEW .lvm and .tdms, MATLAB .mat, "
             "HDF5, .npy and .npz, Parquet and Feather, .wav, universal files, .mf4; give format= if it is one of them"
         )
-        raise source.error("", known + (f" ({hint})" if hint else ""))
+        raise reading.error("", known + (f" ({hint})" if hint else ""))
     from nonsmooth.recordings.readers.capstone_csv import looks_like_capstone
 
-    plain = options.columns is not None or options.rate is not None or options.axis != "time"
-    return "csv" if plain or not looks_like_capstone(data, options) else "capstone-csv"
+    plain = reading.columns is not None or reading.rate is not None or reading.axis != "time"
+    return "csv" if plain or not looks_like_capstone(data, replace(reading)) else "capstone-csv"
 
 
-def _replace_units(reading: Reading, source: Source, options: Options) -> None:
-    names = {trace.name for trace in reading.traces}
-    for name in set(options.wraps) - names - {options.axis}:
-        raise source.error("", f"wraps names {name!r}, which is no channel; there are: {names_of(sorted(names))}")
+def _replace_units(reading: Reading) -> None:
+    names, units = {trace.name for trace in reading.traces}, reading.units or {}
+    for name in set(reading.wraps or {}) - names - {reading.axis}:
+        raise reading.error("", f"wraps names {name!r}, which is no channel; there are: {names_of(sorted(names))}")
     quantities = {trace.attrs.get("measurement", trace.name) for trace in reading.traces}
-    for name in options.units:
-        if name not in names | quantities | {options.axis}:
-            raise source.error("", f"units names {name!r}, which is no channel; there are: {names_of(sorted(names))}")
+    for name in units:
+        if name not in names | quantities | {reading.axis}:
+            raise reading.error("", f"units names {name!r}, which is no channel; there are: {names_of(sorted(names))}")
 
     def unit(trace: Trace) -> str:
-        given = options.units.get(trace.name, options.units.get(trace.attrs.get("measurement", "")))
+        given = units.get(trace.name, units.get(trace.attrs.get("measurement", "")))
         return trace.unit if given is None else given
 
-    if options.units:
+    if units:
         reading.traces = [replace(trace, unit=unit(trace)) for trace in reading.traces]
-
-
-def _given(options: Options) -> dict[str, Any]:
-    """The arguments that differ from their defaults, for the provenance."""
-    default = Options()
-    return {name: value for name, value in vars(options).items() if value != getattr(default, name)}

@@ -1,7 +1,7 @@
-"""Matter of every reader: its options, and its result: traces, remarks, and the file they came from.
+"""Matter of every reader: the file, what is asked of it, and what is found: traces and remarks.
 
-A reader is a function ``read(data: bytes, source: Source, options: Options) -> Reading``. It takes the whole file as
-bytes, touches no disk, raises only ``DataFileError``, and leaves rates, grouping and labels to ``assemble``. Recordings
+A reader is a function ``read(data: bytes, reading: Reading)``. It takes the whole file as bytes, touches no disk,
+raises only ``DataFileError``, adds to the reading, and leaves rates, grouping and labels to ``assemble``. Recordings
 come from elsewhere: what a file claims is checked against its size.
 """
 
@@ -16,11 +16,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from importlib import import_module
 from types import ModuleType
-from typing import Any, TypedDict
+from typing import Annotated, Any, Literal
 
 from nonsmooth.arrays import FloatArray, IntArray
-from nonsmooth.errors import DataFileError, check_keys, not_installed
-from nonsmooth.system.kinds import real_number, whole_number
+from nonsmooth.errors import DataFileError, not_installed
+from nonsmooth.system.arguments import checked
+from nonsmooth.system.kinds import above, at_least
 
 MAX_FILE_BYTES = 1 << 30  # read whole into memory, so that the hash is that of what was read
 MAX_COLUMNS = 4096  # over all runs of one file; each becomes a labelled array
@@ -39,11 +40,11 @@ _NAMED = 4  # channels named in one remark
 _ALIKE = 3  # more runs than this of which the same is to be said, but for numbers, share one sentence
 
 
+@dataclass(kw_only=True)
 class Remarks:
     """Sentences on a file, a run, or a channel of a run."""
 
-    def __init__(self) -> None:
-        self._channels: dict[tuple[str, str], list[str]] = {}
+    _channels: dict[tuple[str, str], list[str]] = field(default_factory=dict, init=False)
 
     def say(self, sentence: str) -> None:
         """Something about the file as a whole."""
@@ -117,102 +118,43 @@ TIME_SCALES = {
     "d": 86400.0,
 }
 
-#: A column of a file: its name there or its place (from 0), and its unit where the file does not say it.
-Column = str | int | tuple[str | int, str]
 
-
-@dataclass(frozen=True)
-class Source:
-    """The file being read; errors and provenance speak of it."""
-
-    name: str
-    size: int
-    sha256: str
-    format: str
-
-    def error(self, place: str, message: str) -> DataFileError:
-        """The exception for something wrong at ``place`` (a line, a record, a member; may be empty)."""
-        return DataFileError(": ".join(part for part in (self.name, place, message) if part))
-
-
-class TableOptions(TypedDict, total=False):
-    """Options of ``load_recording`` for tables and counters; see there."""
-
-    delimiter: str | None
-    decimal: str | None
-    thousands: str | None
-    header: int | None
-    units_row: int | None
-    skip: int | str | Sequence[str]
-    na: str | Sequence[str]
-    wraps: Mapping[str, float] | None
-
-
-@dataclass(frozen=True)
+@checked
+@dataclass
 class Options:
-    """The options of ``load_recording`` that concern readers; lines are 0 and texts () where none are given."""
+    """Options of ``load_recording``, which says what each is."""
 
-    columns: Mapping[str, Column] | None = None
+    columns: (
+        Annotated[Mapping[str, Any], "it maps our names to the file's, {'time': 't', 'x': ('pos', 'mm')}"] | None
+    ) = None
     axis: str = "time"
-    rate: float | None = None
-    units: Mapping[str, str] = field(default_factory=dict)
+    rate: Annotated[float, above(0)] | None = None
+    units: Mapping[str, str] | None = None
     delimiter: str | None = None
-    decimal: str | None = None
-    thousands: str | None = None
-    header: int = 0
-    units_row: int = 0
-    skip: int | tuple[str, ...] = 0
-    na: tuple[str, ...] = ()
-    wraps: Mapping[str, float] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, given: Mapping[str, Any]) -> Options:
-        """The options of a call, checked.
-
-        Raises
-        ------
-        ValueError, TypeError
-            An option that is not known, or a value that it cannot have.
-        """
-        check_keys(given, [one.name for one in fields(cls)], "load_recording", "an option")
-        read = {name: value for name, value in given.items() if value is not None}
-        for name in {"header", "units_row", "skip"} & set(read):
-            if name != "skip" or isinstance(read[name], int):
-                read[name] = whole_number(read[name], f"{name}, the number of a line,", int(name != "skip"))
-        for name in {"skip", "na"} & set(read):
-            if not isinstance(texts := read[name], int):
-                read[name] = (texts,) if isinstance(texts, str) else tuple(texts)
-                if not all(isinstance(text, str) and text.strip() for text in read[name]):
-                    raise TypeError(f"{name} must be a text or several, {name}='#N/A', got {texts!r}")
-        return cls(**read)
+    decimal: Literal[".", ",", None] = None
+    thousands: Literal[".", ",", " ", "'", "\u00a0", "\u202f", None] = None
+    header: Annotated[int, at_least(1)] | None = None
+    units_row: Annotated[int, at_least(1)] | None = None
+    skip: Annotated[int, at_least(0)] | Sequence[str] = 0
+    na: Sequence[str] | None = None
+    wraps: Annotated[Mapping[str, Annotated[float, above(0)]], "counts at which channels begin anew"] | None = None
 
     def __post_init__(self) -> None:
-        columns, axis, rate, decimal, marks = self.columns or {}, self.axis, self.rate, self.decimal, self.thousands
-        if self.columns is not None and (not isinstance(columns, Mapping) or not columns):
-            raise TypeError("columns must map our names to the file's, as {'time': 't', 'x': ('pos', 'mm')}")
+        columns, cut = self.columns or {}, self.delimiter
         for ours, theirs in columns.items():
             given = theirs[0] if isinstance(theirs, tuple) and len(theirs) == 2 else theirs
             if isinstance(given, bool) or not isinstance(given, str | int) or not isinstance(ours, str):
                 raise TypeError(
                     f"columns[{ours!r}] must be a header, a place from 0, or (one of these, unit): {theirs!r}"
                 )
-        if not isinstance(axis, str) or not axis.isidentifier() or axis == "run":
-            raise ValueError(f"axis must be a name such as 'time' or 'frequency', got {axis!r}")
-        if rate is not None and not real_number(rate, "rate") > 0:
-            raise ValueError(f"rate must be a positive number of samples per second, got {rate!r}")
-        if rate is not None and (axis != "time" or axis in columns):
+        if not self.axis.isidentifier() or self.axis == "run":
+            raise ValueError(f"axis must be a name such as 'time' or 'frequency', got {self.axis!r}")
+        if self.rate is not None and (self.axis != "time" or self.axis in columns):
             raise ValueError("rate makes a time axis where the file has none; give it without columns['time'] and axis")
-        if (cut := self.delimiter) is not None and (not isinstance(cut, str) or len(cut) != 1 or cut in '"\r\n'):
+        if cut is not None and (len(cut) != 1 or cut in '"\r\n'):
             raise ValueError(f"delimiter must be one character such as ',', ';' or a tab, got {cut!r}")
-        if decimal not in (None, ".", ","):
-            raise ValueError(f"decimal must be '.' or ',', got {decimal!r}")
-        if decimal == "," == cut:
-            raise ValueError("delimiter and decimal cannot both be ','")
-        if marks is not None and (marks not in (".", ",", " ", "'", "\u00a0", "\u202f") or marks == decimal):
-            raise ValueError(f"thousands must be one of . , ' or a space, and not the decimal mark, got {marks!r}")
-        for name, period in self.wraps.items():
-            if not real_number(period, f"wraps[{name!r}]") > 0:
-                raise ValueError(f"wraps[{name!r}] must be the count at which it begins anew, as 65536, got {period!r}")
+        if self.decimal is not None and self.decimal in (cut, self.thousands):
+            raise ValueError(f"decimal = {self.decimal!r} cannot be the delimiter or the mark between thousands too")
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,15 +181,28 @@ class Trace:
         return f"{self.origin}, sample {index + 1}"
 
 
-@dataclass
-class Reading:
-    """All that a reader found."""
+@dataclass(kw_only=True)
+class Reading(Options, Remarks):
+    """A file as it is read: its name and size, what is asked of it, and all that was found; errors speak of it."""
 
+    name: str
+    size: int
+    sha256: str = ""
+    format: str = ""
     traces: list[Trace] = field(default_factory=list)
-    remarks: Remarks = field(default_factory=Remarks)
-    header: dict[str, Any] = field(default_factory=dict)
+    told: dict[str, Any] = field(default_factory=dict)  # by the file, of itself
     run_attrs: dict[str, dict[str, str]] = field(default_factory=dict)
     synthetic: bool = False
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """The options that differ from their defaults."""
+        given = {one.name: (getattr(self, one.name), one.default) for one in fields(Options)}
+        return {name: value for name, (value, default) in given.items() if value != default}
+
+    def error(self, place: str, message: str) -> DataFileError:
+        """The exception for something wrong at ``place`` (a line, a record, a member; may be empty)."""
+        return DataFileError(": ".join(part for part in (self.name, place, message) if part))
 
 
 def is_axis_name(name: str, axis: str) -> bool:
@@ -273,16 +228,16 @@ def names_of(candidates: Sequence[str], most: int = 12) -> str:
     return shown + (f", and {len(candidates) - most} more" if len(candidates) > most else "")
 
 
-def needed(module: str, package: str, source: Source, extra: str = "experiment") -> ModuleType:
+def needed(module: str, package: str, reading: Reading, extra: str = "experiment") -> ModuleType:
     """Import ``module``; where it is missing, a DataFileError that says how to get it."""
     try:
         return import_module(module)
     except ImportError as error:
-        raise source.error("", f"reading it needs {not_installed(package, extra)}") from error
+        raise reading.error("", f"reading it needs {not_installed(package, extra)}") from error
 
 
 @contextmanager
-def readable(what: str, source: Source, place: str = "") -> Iterator[None]:
+def readable(what: str, reading: Reading, place: str = "") -> Iterator[None]:
     """Turn what a damaged file makes a library raise, almost anything, into a DataFileError."""
     try:
         yield
@@ -290,7 +245,7 @@ def readable(what: str, source: Source, place: str = "") -> Iterator[None]:
         raise
     except Exception as error:
         message = f"cannot be read as {what}, it is damaged or cut short ({type(error).__name__}: {error})"
-        raise source.error(place, message[:300]) from error
+        raise reading.error(place, message[:300]) from error
 
 
 class Group(dict[str, Any]):
@@ -318,17 +273,17 @@ class Archive:
     What its directory says of sizes is not believed: bytes are counted as they come out.
     """
 
-    def __init__(self, data: bytes, source: Source) -> None:
-        self._source = source
+    def __init__(self, data: bytes, reading: Reading) -> None:
+        self._reading = reading
         self._left = self._limit = inflation_limit(len(data))
         try:
             self._zip = zipfile.ZipFile(io.BytesIO(data))
             infos = self._zip.infolist()
         # A damaged directory surfaces as almost any exception of zipfile.
         except Exception as error:
-            raise source.error("", f"is not a whole ZIP archive ({error})") from error
+            raise reading.error("", f"is not a whole ZIP archive ({error})") from error
         if len(infos) > _MAX_MEMBERS:
-            raise source.error("", f"holds {len(infos)} members; at most {_MAX_MEMBERS} are read")
+            raise reading.error("", f"holds {len(infos)} members; at most {_MAX_MEMBERS} are read")
         self._infos = {info.filename.replace("\\", "/"): info for info in infos}
 
     @property
@@ -340,19 +295,19 @@ class Archive:
         """The bytes of a member, piece by piece."""
         info = self._infos.get(name)
         if info is None:
-            raise self._source.error(name, "is not in the archive, though main.xml names it")
+            raise self._reading.error(name, "is not in the archive, though main.xml names it")
         if info.flag_bits & 1:
-            raise self._source.error(name, "is encrypted; save the experiment without a password")
+            raise self._reading.error(name, "is encrypted; save the experiment without a password")
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise self._source.error(name, f"is packed by method {info.compress_type}; expected stored or deflated")
+            raise self._reading.error(name, f"is packed by method {info.compress_type}; expected stored or deflated")
         try:
             with self._zip.open(info) as opened:
                 while piece := opened.read(_PIECE):
                     self._left -= len(piece)
                     if self._left < 0:
-                        raise self._source.error(
+                        raise self._reading.error(
                             name,
-                            f"unpacks to more than {self._limit} bytes, more than a file of {self._source.size} bytes "
+                            f"unpacks to more than {self._limit} bytes, more than a file of {self._reading.size} bytes "
                             "warrants; it may be made to exhaust memory",
                         )
                     yield piece
@@ -360,4 +315,4 @@ class Archive:
             raise
         # zipfile raises NotImplementedError for a compression or a version of the format that it does not know.
         except (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, NotImplementedError) as error:
-            raise self._source.error(name, f"cannot be unpacked, it is damaged or cut short ({error})") from error
+            raise self._reading.error(name, f"cannot be unpacked, it is damaged or cut short ({error})") from error

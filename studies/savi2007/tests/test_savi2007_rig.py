@@ -16,7 +16,7 @@ from nonsmooth_savi2007.claims.portraits import at_gap
 from nonsmooth_savi2007.claims.response import between_cell, doubled_cell, grazing_cell, no_doubled_cell
 from nonsmooth_savi2007.claims.verdicts import Cell, Statement, Verdict, printed_cell
 from nonsmooth_savi2007.figures.motions import chosen, measured_periods_at, said
-from nonsmooth_savi2007.findings import Number, found_in, kept, the_finding
+from nonsmooth_savi2007.findings import found_in, kept, the_finding
 from nonsmooth_savi2007.flows import Settings
 from nonsmooth_savi2007.measure import Interval, jumps, main_jump, measured_periods
 from nonsmooth_savi2007.printed import FIGURE_9, FIGURE_14, NUMBERS, TABLE_1
@@ -129,12 +129,14 @@ def test_a_finding_is_kept_with_its_numbers(tmp_path) -> None:
     back = ns.load(ns.save(kept(finding), tmp_path / "finding.nc"))
     found = found_in(back)
     assert back["x"].identical(picture["x"])
-    assert (found.name, found.samples, found.runs, found.notes) == ("slope", 200, 2, ("a note",))
-    assert (found.number.low, found.number.high) == pytest.approx((16.94 - 1.959964 * 0.04, 16.94 + 1.959964 * 0.04))
+    assert (found.name, found.samples_used, len(found.runs), *found.notes) == ("slope", 200, 2, "a note")
+    assert found.interval() == pytest.approx((16.94 - 1.959964 * 0.04, 16.94 + 1.959964 * 0.04))
     assert found.others["slope_a"].uncertainty == 0.01
-    half = found.number.times(0.5)
+    half = found.estimate.times(0.5)
     assert (half.value, half.uncertainty) == (8.47, 0.02)
-    assert Number(2.0, 1.0, 1.5, 3.0, "m").expanded == 1.0  # the wider side
+    assert Estimate(2.0, 0.5, "m", logarithmic=True).expanded == pytest.approx(
+        2 * (np.exp(0.49) - 1), rel=1e-4
+    )  # the wider side
 
 
 def test_what_is_not_there_is_said() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nonsmooth.identification import Estimate
 from nonsmooth_savi2007.claims.verdicts import (
     MEANING,
     RULE,
@@ -22,7 +23,6 @@ from nonsmooth_savi2007.claims.verdicts import (
     judge_step,
     printed_cell,
 )
-from nonsmooth_savi2007.findings import Number
 from nonsmooth_savi2007.flows import Settings
 from nonsmooth_savi2007.measure import Interval
 from nonsmooth_savi2007.printed import NATURAL_FREQUENCY, TABLE_1, Printed
@@ -77,7 +77,7 @@ def test_a_printed_number_is_taken_to_its_resolution() -> None:
 def test_an_input_that_comes_back_is_no_agreement() -> None:
     mass = TABLE_1["m"]
     back, lost, vague = (
-        printed_cell(mass, Number(value, u, value - 2 * u, value + 2 * u, "kg"), put_in=True).verdict
+        printed_cell(mass, Estimate(value, u, "kg"), put_in=True).verdict
         for value, u in ((0.8379, 0.0005), (0.90, 0.0005), (0.84, 0.05))
     )
     assert (back, lost, vague) == (Verdict.INPUT, Verdict.DIFFERS, Verdict.UNDECIDED)
@@ -94,7 +94,7 @@ def test_a_closed_form_lies_in_the_step_or_beside_it() -> None:
 
 def test_plus_minus_is_the_standard_uncertainty() -> None:
     assert str(Interval(5.1, 5.3)) == "5.200 ± 0.058"  # 0.2 / sqrt(12)
-    assert str(Number(8.47, 0.012, 8.446, 8.494, "N/m")) == "8.470 ± 0.012 N/m"
+    assert str(Estimate(8.47, 0.012, "N/m")) == "8.470 ± 0.012 N/m"
     assert str(Beside(0.28, 0.005, 0.2699, 0.0003)) == "-3.6 % (3.5 to 3.7)"
     assert str(Beside(4.6, 0.15, 4.6, 0.0)) == "+0.0 %"
 

@@ -38,8 +38,9 @@ def test_along_a_diagram_the_error_of_a_rule_stays() -> None:
     base = nominal(MODEL, None, rule).with_parameters(omega=9.0, rho=0.1)
     drawn = base.with_parameters(g=0.01 + 2e-3)
     grid = np.array([0.05, 0.1])
-    model = Model(MODEL, ["x", "v"], None, rule, transient=300, draws=0, level=0.95, seed=0, options={})
-    sections, _ = _marched(drawn, model, "rho", grid, ["up"], 4, 0.0)
+    options = {"grid": 128, "transient": 300, "max_period": 4, "draws": 0, "level": 0.95, "splits": 400, "seed": 0}
+    model = Model(MODEL, ["x", "v"], None, rule, np.zeros(2), {}, **options)
+    sections, _ = _marched(drawn, model, "rho", grid, ["up"], 0.0)
     for i, rho in enumerate(grid):
         alone = ns.poincare(base.with_parameters(rho=rho, g=rho / 10 + 2e-3), n=1, transient=600)["section"].values
         np.testing.assert_allclose(sections[0, i, -1], alone[0], atol=1e-9)

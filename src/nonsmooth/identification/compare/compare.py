@@ -136,7 +136,7 @@ def compare(
     from nonsmooth.system.system import System
 
     set_ = _settings(theory, parameters, settings)
-    draws = _draws(options["draws"], theory, parameters, set_)
+    options["draws"] = _draws(options["draws"], theory, parameters, set_)
     if not 0 < options["level"] < 1:
         raise ValueError(f"level = {options['level']!r} must lie between 0 and 1, as 0.95")
     if not isinstance(measured, xr.Dataset) or channels is not None:
@@ -148,24 +148,16 @@ def compare(
             here, told = nominal(theory, parameters, set_), getattr(parameters, "extra", {})
             measured = recorded_motion(measured, here, channels, run, told)
     kind, states = _kind(measured, parameter), _states(measured, theory)
-    model = Model(
-        theory,
-        states,
-        parameters,
-        set_,
-        options["transient"],
-        draws,
-        options["level"],
-        options["seed"],
-        solver_of(options),
-    )
+    spread = np.full(len(states), np.nan) if kind == "response" else _noise(measured, noise, states)
+    solver = solver_of(options)
+    rest: dict[str, Any] = {key: value for key, value in options.items() if key not in solver}
+    model = Model(theory, states, parameters, set_, spread, solver, **rest)
     given = {
         "settings": {key: ["follows" if one.follows else one.value, one.uncertainty] for key, one in set_.items()},
         "parameter": parameter,
         "direction": direction,
         "section_phase": section_phase,
         **options,
-        "draws": draws,
     }
     if kind != "motion":
         name = parameter or ("omega" if kind == "response" else _swept(measured))
@@ -178,32 +170,15 @@ def compare(
     elif kind == "diagram":
         from nonsmooth.identification.compare.diagram import compare_diagram
 
-        variables = compare_diagram(
-            measured,
-            model,
-            name=name,
-            noise=_noise(measured, noise, states),
-            direction=direction,
-            values=values,
-            phase=real_number(section_phase, "section_phase"),
-            max_period=options["max_period"],
-        )
+        phase = real_number(section_phase, "section_phase")
+        variables = compare_diagram(measured, model, name=name, direction=direction, values=values, phase=phase)
     else:
         from nonsmooth.identification.compare.motion import compare_motion
 
         phases = [real_number(phase, "section_phase") for phase in np.atleast_1d(section_phase)]
         if "u" not in measured and len(phases) > 1:
             raise ValueError("measured section points are of one phase: give section_phase as one number")
-        variables = compare_motion(
-            measured,
-            model,
-            noise=_noise(measured, noise, states),
-            start=start,
-            phases=phases,
-            grid=options["grid"],
-            max_period=options["max_period"],
-            splits=options["splits"],
-        )
+        variables = compare_motion(measured, model, start, phases)
     result = _dataset(variables, measured, model, kind, given)
     return result.squeeze("section_phase") if kind == "motion" and np.ndim(section_phase) == 0 else result
 

@@ -28,20 +28,18 @@ def compare_diagram(
     model: Model,
     *,
     name: str,
-    noise: FloatArray,
     direction: str,
     values: FloatArray | None,
     phase: float,
-    max_period: int,
 ) -> dict[str, Any]:
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
-    at, points, numbers = _measured(measured, name, noise, max_period)
+    at, points, numbers = _measured(measured, name, model)
     unit = measured[name].attrs.get("units", "1")
     grid = np.linspace(at.min(), at.max(), FINE) if values is None else np.asarray(values, dtype=float)
     words = ["up", "down"] if direction == "both" else [direction]
 
     def diagram(system: System) -> tuple[FloatArray, IntArray]:
-        return _marched(system, model, name, grid, words, max_period, phase)
+        return _marched(system, model, name, grid, words, phase)
 
     theory = model.theory
     if model.system is not None:
@@ -78,7 +76,7 @@ def compare_diagram(
     if name in measured["section"].dims:  # steady runs: a flip lies between two of them
         seen = {word: MeasuredFlip(place, np.nan, place) for word, place in flips(at, numbers).items()}
     else:
-        seen = delayed_flips(at, points, noise, numbers)
+        seen = delayed_flips(at, points, model.noise, numbers)
         variables["rise_per_return"] = labelled(
             (), float((at[-1] - at[0]) / (len(at) - 1)), f"rise of {name} per return", unit
         )
@@ -86,7 +84,7 @@ def compare_diagram(
 
 
 def _marched(
-    system: System, model: Model, name: str, grid: FloatArray, words: Sequence[str], max_period: int, phase: float
+    system: System, model: Model, name: str, grid: FloatArray, words: Sequence[str], phase: float
 ) -> tuple[FloatArray, IntArray]:
     """The diagram, the state carried along; settings that follow from the parameter change with it."""
     rules = {key: setting for key, setting in model.settings.items() if setting.follows and key != name}
@@ -96,20 +94,18 @@ def _marched(
     for value in grid:
         here = {**system.values, name: float(value)}
         systems.append(system.with_parameters(here | {k: rule.at(here) + beside[k] for k, rule in rules.items()}))
-    motions = Motions(systems, model, keep=KEEP, max_period=max_period, phase=phase)
+    motions = Motions(systems, model, keep=KEEP, phase=phase)
     rising = np.argsort(grid, kind="stable").tolist()
     found = [motions.carried(rising if word == "up" else rising[::-1]) for word in words]
     return np.stack([sections for sections, _ in found]), np.stack([periods for _, periods in found])
 
 
-def _measured(
-    measured: xr.Dataset, name: str, noise: FloatArray, max_period: int
-) -> tuple[FloatArray, FloatArray, IntArray]:
+def _measured(measured: xr.Dataset, name: str, model: Model) -> tuple[FloatArray, FloatArray, IntArray]:
     """Values, points and period numbers, one row for each point: steady runs, or one slow rise."""
     section = measured["section"]
     if name in section.dims:
         stacked = section.transpose(name, "iterate", "state").values
-        numbers = [measured_period(one, noise, max_period=max_period).number for one in stacked]
+        numbers = [measured_period(one, model.noise, max_period=model.max_period).number for one in stacked]
         at = np.repeat(measured[name].values.astype(float), stacked.shape[1])
         points, found = stacked.reshape(-1, stacked.shape[2]), np.repeat(numbers, stacked.shape[1])
     else:
@@ -118,7 +114,7 @@ def _measured(
         if at.shape != points.shape[:1]:
             raise ValueError(f"{name} must be given for each of the {len(points)} section points; got {at.shape}")
         good = np.isfinite(points).all(axis=1)
-        return at[good], points[good], period_numbers(points[good], noise, max_period=min(max_period, 8))
+        return at[good], points[good], period_numbers(points[good], model.noise, max_period=min(model.max_period, 8))
     good = np.isfinite(points).all(axis=1)
     return at[good], points[good], np.asarray(found, dtype=np.int64)[good]
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SystemDefinitionError, unknown
 from nonsmooth.identification.finding import normal_draws
 from nonsmooth.results.labels import labelled
@@ -198,20 +199,25 @@ def known_together(parameters: Any, allowed: Container[str]) -> tuple[list[str],
 
 @dataclass(frozen=True)
 class Model:
-    """A System with identified parameters and a run's settings, or a result at hand; draws, seed and band level.
+    """A System with identified parameters and a run's settings, or a result at hand, and how it is compared.
 
-    ``states``: those that were measured, in their order, in which the comparison is made.
+    ``states``: those that were measured, in their order, in which the comparison is made; ``noise``: of a section
+    point in each; ``solver``: options of trajectories; all others are options of :func:`compare`.
     """
 
     theory: Any
     states: list[str]
     parameters: Any
     settings: Settings
+    noise: FloatArray
+    solver: Mapping[str, Any]
+    grid: int
     transient: int
+    max_period: int
     draws: int
     level: float
+    splits: int
     seed: int
-    options: Mapping[str, Any]
 
     @cached_property
     def system(self) -> System | None:

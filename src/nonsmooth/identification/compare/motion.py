@@ -36,50 +36,35 @@ MEASURED_STARTS = 4
 def compare_motion(
     measured: xr.Dataset,
     model: Model,
-    *,
-    noise: FloatArray,
     start: Any,
     phases: list[float],
-    grid: int,
-    max_period: int,
-    splits: int,
 ) -> dict[str, Any]:
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
-    folded, returns = _measured(measured, phases, grid)
+    noise = model.noise
+    folded, returns = _measured(measured, phases, model.grid)
     sections = [points[np.isfinite(points).all(axis=1)] for points in returns]
     scale = np.maximum(np.concatenate(sections).std(axis=0), noise)
-    number = measured_period(returns[0], noise, max_period=max_period).number
+    number = measured_period(returns[0], noise, max_period=model.max_period).number
     rng = np.random.default_rng(model.seed)
     motions = None
     if model.system is not None:
         starts = _starts(sections[0] if phases[0] == 0 else None, folded, model, start)
-        motions = Motions([model.system], model, keep=KEEP, max_period=max_period)
-        predicted = predict(motions, sections, phases, scale, starts=starts, n=max(CLOUD, len(sections[0])), grid=grid)
+        motions = Motions([model.system], model, keep=KEEP)
+        predicted = predict(motions, sections, phases, scale, starts=starts, n=max(CLOUD, len(sections[0])))
     else:
-        predicted = from_result(model.theory, model.states, phases, grid, max_period)
+        predicted = from_result(model, phases)
     blurred = [points + noise * rng.standard_normal(points.shape) for points in predicted.sections]
-    variables = _clouds(sections, blurred, predicted.sections, scale, splits, model.seed)
+    variables = _clouds(sections, blurred, predicted.sections, scale, model)
     variables |= _periods(number, predicted, returns[0], scale, model.states)
     if motions is not None and sorted(model.places) == list(range(len(motions.system.states))):
-        predicted = _begun_with_the_measurement(motions, folded, number, predicted, grid)
-    variables |= _orbits(folded, number, predicted, grid)
+        predicted = _begun_with_the_measurement(motions, folded, number, predicted)
+    variables |= _orbits(folded, number, predicted, model.grid)
     if model.system is not None and model.draws:
         assert predicted.attractor is not None  # a System's prediction has one
         systems, drawn = model.drawn()
         both = ("measured_orbit", "theory_orbit")
         closed = tuple(variables[key][1] for key in both) if "phase" in variables else None
-        variables |= motion_band(
-            systems,
-            model,
-            predicted.attractor,
-            sections,
-            phases,
-            noise,
-            scale,
-            closed,
-            grid=grid,
-            max_period=max_period,
-        )
+        variables |= motion_band(systems, model, predicted.attractor, sections, phases, scale, closed)
         variables |= drawn
     named = {"long_name": "phase of the section", "units": "forcing periods"}
     return variables | {"section_phase": ("section_phase", np.array(phases), named)}
@@ -112,8 +97,7 @@ def _clouds(
     blurred: list[FloatArray],
     exact: list[FloatArray],
     scale: FloatArray,
-    splits: int,
-    seed: int,
+    model: Model,
 ) -> dict[str, Any]:
     from scipy.stats import wasserstein_distance
 
@@ -127,14 +111,16 @@ def _clouds(
         "section_scale": labelled("state", scale, "unit of each state in the distances of clouds"),
     }
     found = [
-        cloud_distance(a / scale, b / scale, splits=splits, seed=seed) if min(len(a), len(b)) >= 40 else None
+        cloud_distance(a / scale, b / scale, splits=model.splits, seed=model.seed)
+        if min(len(a), len(b)) >= 40
+        else None
         for a, b in zip(sections, blurred, strict=True)
     ]
     moved = [
         [wasserstein_distance(a[:, i], b[:, i]) for i in range(len(scale))]
         for a, b in zip(sections, blurred, strict=True)
     ]
-    both = [wasserstein(a / scale, b / scale, seed) for a, b in zip(sections, blurred, strict=True)]
+    both = [wasserstein(a / scale, b / scale, model.seed) for a, b in zip(sections, blurred, strict=True)]
     variables["wasserstein_distance"] = labelled(
         (at, "state"), np.array(moved), "Wasserstein distance of the section clouds, in the state's unit"
     )
@@ -202,7 +188,7 @@ def _doubled(single: FloatArray, doubled: FloatArray, scale: FloatArray, number:
 
 
 def _begun_with_the_measurement(
-    motions: Motions, folded: FloatArray | None, number: int, predicted: Prediction, grid: int
+    motions: Motions, folded: FloatArray | None, number: int, predicted: Prediction
 ) -> Prediction:
     """Begin the predicted motion at the first measured state that is shown, where neither has a period."""
     if folded is None or number or predicted.period_number:
@@ -213,7 +199,7 @@ def _begun_with_the_measurement(
     at = np.empty(len(motions.places))
     at[motions.places] = whole[0, 0]
     begun = SteadyState(0, at)
-    return replace(predicted, orbit=motions.orbit(0, begun, grid, len(whole)))
+    return replace(predicted, orbit=motions.orbit(0, begun, len(whole)))
 
 
 def _shown(folded: FloatArray) -> FloatArray:
@@ -265,12 +251,8 @@ def motion_band(
     nearest: SteadyState,
     sections: list[FloatArray],
     phases: list[float],
-    noise: FloatArray,
     scale: FloatArray,
     closed: tuple[FloatArray, FloatArray] | None,
-    *,
-    grid: int,
-    max_period: int,
 ) -> dict[str, Any]:
     """Carry the nearest motion on to each drawn system, and say how the prediction spreads.
 
@@ -297,18 +279,18 @@ def motion_band(
     distances = np.full((draws, len(phases)), np.nan)
     to_measured = np.full(draws, np.nan)
     orbits: list[FloatArray] = []
-    motions = Motions(systems, model, keep=64, max_period=max_period)
+    motions = Motions(systems, model, keep=64)
     for i in range(draws):
         (one,) = motions.attractors(i, nearest.point)
         numbers[i] = one.period_number
         for j, phase in enumerate(phases):
             points = motions.cloud(i, one, phase, POINTS)
-            points = points + noise * rng.standard_normal(points.shape)
+            points = points + model.noise * rng.standard_normal(points.shape)
             distances[i, j] = energy_distance(sections[j][-POINTS:] / scale, points / scale)
-        length = 0 if closed is None else len(closed[0]) // grid
+        length = 0 if closed is None else len(closed[0]) // model.grid
         if closed is not None and one.period_number and length % one.period_number == 0:
-            motion = common_length(motions.orbit(i, one, grid, one.period_number), one.period_number, length)
-            motion = np.roll(motion, orbit_distance(closed[1], motion, length).whole_shift * grid, axis=0)
+            motion = common_length(motions.orbit(i, one, one.period_number), one.period_number, length)
+            motion = np.roll(motion, orbit_distance(closed[1], motion, length).whole_shift * model.grid, axis=0)
             orbits.append(motion)
             to_measured[i] = orbit_distance(closed[0], motion, length).distance
     variables: dict[str, Any] = {

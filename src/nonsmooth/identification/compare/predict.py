@@ -48,8 +48,8 @@ class Motions:
     ----------
     systems : sequence of System
     model : Model
-        With the transient, the method and its tolerances, and the states that `cloud`, `orbit` and `carried` return.
-    keep, max_period : int
+        With transient, longest period, grid and solver, and the states that `cloud`, `orbit` and `carried` return.
+    keep : int
         See :func:`nonsmooth.sweep`.
     phase : float
         Of the stroboscopic section, in forcing periods.
@@ -60,24 +60,22 @@ class Motions:
         Systems that are not forced.
     """
 
-    def __init__(
-        self, systems: Sequence[System], model: Model, *, keep: int, max_period: int, phase: float = 0.0
-    ) -> None:
-        self.system = systems[0].as_solved_by(model.options)
+    def __init__(self, systems: Sequence[System], model: Model, *, keep: int, phase: float = 0.0) -> None:
+        self.system = systems[0].as_solved_by(model.solver)
         if self.system.period() is None:
             raise ValueError(f"{self.system.name!r} has no forcing period; compare takes forced systems")
-        self.places = model.places
+        self.places, self.grid = model.places, model.grid
         self.periods = [float(one.period() or np.nan) for one in systems]
-        self.engine = engine_for(self.system, **model.options)
+        self.engine = engine_for(self.system, **model.solver)
         self.points = np.array([one.parameter_vector() for one in systems])
-        keep = max(keep, max_period + 1)
+        keep = max(keep, model.max_period + 1)
         self.settler = Settler(
             self.system,
             self.engine,
             self._plan(phase),
             model.transient,
             keep,
-            longest_period(keep, max_period),
+            longest_period(keep, model.max_period),
             False,
         )
 
@@ -148,8 +146,9 @@ class Motions:
         points = out.section[0][:, self.places]
         return np.resize(points, (n, points.shape[1])) if count < n else points
 
-    def orbit(self, i: int, attractor: SteadyState, grid: int, periods: int) -> FloatArray:
+    def orbit(self, i: int, attractor: SteadyState, periods: int) -> FloatArray:
         """The motion from phase 0 over whole forcing periods: (periods * grid, states)."""
+        grid = self.grid
         end = periods * self.periods[i]
         instants = np.linspace(0.0, end, periods * grid + 1)
         state = self._state(attractor.point)
@@ -199,7 +198,6 @@ def predict(
     *,
     starts: Any,
     n: int,
-    grid: int,
 ) -> Prediction:
     """Of all motions that the starts lead to the one whose section clouds lie nearest to the measured ones."""
     found = motions.attractors(0, starts)
@@ -211,12 +209,12 @@ def predict(
             best = (away, one, sections)
     assert best is not None  # `attractors` raises where there is none
     _, one, sections = best
-    motion = motions.orbit(0, one, grid, one.period_number or SHOWN)
+    motion = motions.orbit(0, one, one.period_number or SHOWN)
     numbers = np.array([item.period_number for item in found], dtype=np.int64)
     return Prediction(one.period_number, sections, motion, numbers, one)
 
 
-def from_result(result: xr.Dataset, states: list[str], phases: list[float], grid: int, max_period: int) -> Prediction:
+def from_result(model: Model, phases: list[float]) -> Prediction:
     """Theory read from a result of ``simulate``, ``poincare`` or ``sweep`` at one setting.
 
     Raises
@@ -224,12 +222,12 @@ def from_result(result: xr.Dataset, states: list[str], phases: list[float], grid
     ValueError
         Neither a motion nor one section cloud.
     """
-    result = result.sel(state=states)
+    result = model.theory.sel(state=model.states)
     if "u" in result:
         turns = _phase(result)
-        whole = fold(turns, result["u"].values, grid)
+        whole = fold(turns, result["u"].values, model.grid)
         sections = [fold(turns - phase, result["u"].values, 8)[:, 0] for phase in phases]
-        number = _number(sections[0], max_period)
+        number = _number(sections[0], model.max_period)
         motion = mean_orbit(whole, number)[0] if number else whole[-SHOWN:].reshape(-1, whole.shape[2])
         return Prediction(number, sections, motion, np.array([number]))
     if "section" in result:
@@ -239,7 +237,9 @@ def from_result(result: xr.Dataset, states: list[str], phases: list[float], grid
         if points.dims != ("iterate", "state"):
             raise ValueError(f"the theory's section has dims {points.dims}; choose one setting, start and direction")
         number = (
-            int(result["period_number"].squeeze()) if "period_number" in result else _number(points.values, max_period)
+            int(result["period_number"].squeeze())
+            if "period_number" in result
+            else _number(points.values, model.max_period)
         )
         return Prediction(number, [points.values], None, np.array([number]))
     raise ValueError(

@@ -256,7 +256,7 @@ def _curves(
         mine = runs["direction"] == word
         every = np.union1d(values, runs["value"][mine])
         result = sweep(
-            system, name, every, direction=word, transient=model.transient, keep=32, progress=False, **model.options
+            system, name, every, direction=word, transient=model.transient, keep=32, progress=False, **model.solver
         )
         heights = 0.5 * (result["maximum"] - result["minimum"]).sel(state=state).values
         curves[:, d] = heights[np.searchsorted(every, values)]

@@ -13,7 +13,7 @@ import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
-from nonsmooth.identification.fit.first_level import misfits, settle_soft
+from nonsmooth.identification.fit.first_level import Stage, settle_soft
 from nonsmooth.identification.fit.first_windows import WIDE, first_windows, told_start
 from nonsmooth.identification.fit.growth import POOR
 from nonsmooth.identification.fit.windows import Window, Windows
@@ -65,12 +65,12 @@ def beginnings(
         for theta, starts in tried:
             try:
                 begun = now.of([replace(window, start=z) for window, z in zip(now.pieces, starts, strict=True)])
-                found, moved, state = settle_soft(begun, theta, starts)
+                found = settle_soft(Stage(begun, theta, starts))
             except SolveError:
                 continue
-            cost = float(np.mean(misfits(now, state)))
-            if all(np.max(np.abs(moved - others) / size) > _SAME for _, _, others in fitted):
-                fitted.append((cost, found, moved))
+            cost = float(np.mean(found.misfits))
+            if all(np.max(np.abs(found.starts - others) / size) > _SAME for _, _, others in fitted):
+                fitted.append((cost, found.theta, found.starts))
         least = min((cost for cost, _, _ in fitted), default=np.inf)
         tried = [(theta, z) for cost, theta, z in fitted if cost < _BEHIND * max(least, 1.0)]
         if times > _LAST or all(w.last == len(r.time) for w, r in zip(now.pieces, problem.records, strict=True)):
@@ -102,7 +102,7 @@ def _best_drawn(problem: Windows, rng: np.random.Generator) -> list[tuple[FloatA
             for j in range(_STARTS):
                 z = np.where(known, told, window.start) + (size * rng.standard_normal(len(size)) if k or j else 0.0)
                 one = problem.of([replace(window, start=z)])
-                cost = float(misfits(one, one.residuals(theta, z[None, :]))[0])
+                cost = float(Stage(one, theta, z[None, :]).misfits[0])
                 if not cost >= least:
                     least, starts[i] = cost, z
             total += least

@@ -16,7 +16,8 @@ Windows that disagree with the rest are found with parameters of the others, lef
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,19 +33,50 @@ if TYPE_CHECKING:
     from nonsmooth.system.system import System
 
 
-def level(
-    problem: Windows, theta: FloatArray, starts: FloatArray, used: Any = None
-) -> tuple[FloatArray, FloatArray, Residuals]:
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """A stage of a fit: windows, unknowns and starts.
+
+    ``given`` are the residuals there, where they are known.
+    """
+
+    problem: Windows
+    theta: FloatArray
+    starts: FloatArray
+    given: Residuals | None = None
+
+    @cached_property
+    def state(self) -> Residuals:
+        """The residuals there."""
+        return self.problem.residuals(self.theta, self.starts) if self.given is None else self.given
+
+    @cached_property
+    def misfits(self) -> FloatArray:
+        """Mean squared residual over the noise, of each window."""
+        noise = self.problem.noise
+        return np.array([float(np.mean((r / noise[w.readings[1]]) ** 2)) for w, r in self.problem.rows(self.state)])
+
+    def with_others(self, others: Mapping[int, tuple[Window, FloatArray]]) -> Stage:
+        """The same with other windows and starts in these places; itself where there are none."""
+        if not others:
+            return self
+        pieces, starts = list(self.problem.pieces), self.starts.copy()
+        for i, other in others.items():
+            pieces[i], starts[i] = other
+        return Stage(self.problem.of(pieces), self.theta, starts)
+
+
+def level(stage: Stage, used: Any = None) -> Stage:
     """A rough fit on the way, in which the parameters are known to about their own size.
 
     What windows so short do not tell then stays where it is: a coefficient of restitution of 1e8, tried where hardly an
     impact was seen, makes a motion of hours.
     """
-    state = problem.residuals(theta, starts)
-    if not np.isfinite(np.concatenate([*state.residuals, state.alone])).all():
+    problem = stage.problem
+    if not np.isfinite(np.concatenate([*stage.state.residuals, stage.state.alone])).all():
         raise SolveError("a motion over longer windows, or to a steady state, does not come to its end")
     known = problem.unknowns.precision + np.diag(own_size(problem) ** -2.0)
-    return settle(problem, theta, starts, used, known, rough=True)
+    return Stage(problem, *settle(problem, stage.theta, stage.starts, used, known, rough=True))
 
 
 def own_size(problem: Windows) -> FloatArray:
@@ -52,29 +84,19 @@ def own_size(problem: Windows) -> FloatArray:
     return np.where(guess != 0.0, np.abs(guess), np.inf)
 
 
-def misfits(problem: Windows, state: Residuals) -> FloatArray:
-    """Mean squared residual over the noise, of each window."""
-    return np.array([float(np.mean((r / problem.noise[w.readings[1]]) ** 2)) for w, r in problem.rows(state)])
-
-
-def alone(
-    problem: Windows, theta: FloatArray, trials: list[tuple[Window, FloatArray]], most: int
-) -> list[tuple[float, Window, FloatArray]]:
+def alone(stage: Stage, trials: list[tuple[Window, FloatArray]], most: int) -> list[tuple[float, Window, FloatArray]]:
     """Of these windows with starts, those that fit best before their starts are fitted, fitted; the best first."""
+    problem, theta = stage.problem, stage.theta
     fixed = replace(problem, unknowns=replace(problem.unknowns, low=theta, high=theta, centre=theta))
-    costs = []
-    for window, start in trials:
-        one = fixed.of([window])
-        costs.append(float(misfits(one, one.residuals(theta, start[None, :]))[0]))
+    begun = [Stage(fixed.of([window]), theta, start[None, :]) for window, start in trials]
     found = []
-    for k in np.argsort(costs, kind="stable")[:most]:
+    for k in np.argsort([one.misfits[0] for one in begun], kind="stable")[:most]:
         window, start = trials[k]
-        one = fixed.of([replace(window, start=start)])
         try:
-            _, moved, state = level(one, theta, start[None, :])
+            one = level(Stage(fixed.of([replace(window, start=start)]), theta, start[None, :]))
         except SolveError:
             continue
-        found.append((float(misfits(one, state)[0]), one.pieces[0], moved[0]))
+        found.append((float(one.misfits[0]), one.problem.pieces[0], one.starts[0]))
     return sorted(found, key=lambda row: row[0])
 
 
@@ -106,158 +128,146 @@ def read_modes(system: System, given: Any, runs: Sequence[str]) -> list[tuple[in
     return [(modes.index(given[run]),) if run in given else tuple(range(len(modes))) for run in runs]
 
 
-def rechosen(problem: Windows, theta: FloatArray, starts: FloatArray) -> bool:
-    """Begin each record in the mode that fits its first window best, in place; return whether one has changed."""
-    changed = False
-    for i, window in enumerate(problem.pieces):
-        others = other_beginnings(problem, theta, starts, i)
-        if others and (now := alone(problem, theta, [(window, starts[i])], 1)):
+def rechosen(stage: Stage) -> Stage:
+    """The stage with each record begun in the mode that fits its first window best."""
+    found = {}
+    for i, window in enumerate(stage.problem.pieces):
+        others = other_beginnings(stage, i)
+        if others and (now := alone(stage, [(window, stage.starts[i])], 1)):
             best = min(others, key=lambda row: row[0])
             if (now[0][0] - best[0]) * len(window.readings[0]) > BETTER:
-                problem.pieces[i], starts[i], changed = best[1], best[2], True
-    return changed
+                found[i] = best[1:]
+    return stage.with_others(found)
 
 
-def other_beginnings(
-    problem: Windows, theta: FloatArray, starts: FloatArray, i: int
-) -> list[tuple[float, Window, FloatArray]]:
+def other_beginnings(stage: Stage, i: int) -> list[tuple[float, Window, FloatArray]]:
     """A window at the beginning of its record in each other mode, its start fitted: mean squared residual, window,
     start."""
-    window = problem.pieces[i]
+    problem, window, start = stage.problem, stage.problem.pieces[i], stage.starts[i]
     if window.first or len(problem.modes[window.record]) == 1:
         return []
-    told = told_start(problem, theta, window)
+    told = told_start(problem, stage.theta, window)
     known = np.isfinite(told) & (window.spread > 0)
     rng, found = np.random.default_rng(0), []
     for mode in problem.modes[window.record]:
-        other, trials = replace(window, mode=mode), [starts[i], np.where(known, told, starts[i])]
-        if mode == window.mode or not _stays(problem, theta, other, trials):
+        other, trials = replace(window, mode=mode), [start, np.where(known, told, start)]
+        if mode == window.mode or not _stays(stage, other, trials):
             continue
         reach = np.where(known, 0.0, 0.2) * window.spread
         trials += [trials[k % 2] + reach * rng.standard_normal(len(reach)) for k in range(_TRIED if reach.any() else 0)]
-        found += alone(problem, theta, [(other, z) for z in trials], _FITTED)[:1]
+        found += alone(stage, [(other, z) for z in trials], _FITTED)[:1]
     return found
 
 
-def _stays(problem: Windows, theta: FloatArray, window: Window, starts: list[FloatArray]) -> bool:
+def _stays(stage: Stage, window: Window, starts: list[FloatArray]) -> bool:
     """Return whether a motion may begin in the mode of this window: no condition ends it at once."""
-    begun = (problem.motion(theta, window, start) for start in starts)
+    begun = (stage.problem.motion(stage.theta, window, start) for start in starts)
     return any(motion is not None and int(motion.log.sample_mode[0]) == window.mode for motion in begun)
 
 
 _ROUNDS = 10
-_PART = 1 / 3  # of the residuals: as how large the noise is taken
+_PART = 1 / 3  # of the residuals
 _REACH = 4.0  # factor within which parameters stay about their guess at first
 _FAR = 5.0  # mean squared residual of a window over that of most, from which its start is searched anew
 _DRAWN = 60  # starts drawn for such a window
 
 
-def settle_first(
-    problem: Windows, theta: FloatArray, length: float, start: FloatArray | None, free: bool
-) -> tuple[Windows, FloatArray, FloatArray, Residuals]:
-    """Windows, unknowns, starts and residuals of the fit over windows of this length.
+def settle_first(problem: Windows, theta: FloatArray, length: float, start: FloatArray | None, free: bool) -> Stage:
+    """The fit over windows of this length.
 
     Raises
     ------
     SolveError
         If no window of the record can be simulated.
     """
-    pieces = first_windows(problem, theta, length, start, free)
-    if not pieces:
+    now = problem.of(first_windows(problem, theta, length, start, free))
+    if not now.pieces:
         raise SolveError("the motion of the first guess ends before any window of the record does")
-    now, starts = problem.of(pieces), problem.of(pieces).starts
-    rng = np.random.default_rng(len(pieces))
-    state = now.residuals(theta, starts)
-    used = np.ones(len(pieces), dtype=bool)
+    rng = np.random.default_rng(len(now.pieces))
+    stage, used = Stage(now, theta, now.starts), np.ones(len(now.pieces), dtype=bool)
     for _ in range(_ROUNDS):
-        noise = np.maximum(problem.noise, _PART * _sizes(now, state))
-        theta, starts, state = level(_soft(now, noise), theta, starts, used)
-        each, bad = _judged(now, state)
+        noise = np.maximum(problem.noise, _sizes(stage))
+        fitted = _soft(stage, noise, used)
+        bad = _bad(fitted)
         changed = not np.array_equal(bad, ~used)
-        if rechosen(now, theta, starts):
-            state, changed = now.residuals(theta, starts), True
-            each = misfits(now, state)
-        if np.mean(bad) <= 0.5 and _mend(now, theta, starts, each, np.flatnonzero(bad), rng):
-            state, changed = now.residuals(theta, starts), True
-            each, bad = _judged(now, state)
+        begun = rechosen(fitted)
+        stage = _mended(begun, np.flatnonzero(bad).tolist(), rng) if np.mean(bad) <= 0.5 else begun
+        if stage is not begun:
+            bad = _bad(stage)
         used = ~bad
-        if not changed and not _smaller(now, state, noise):
+        if not changed and stage is fitted and not _smaller(stage, noise):
             break
-    theta, starts, state = level(now, theta, starts, used)
-    moves = [bool(np.isfinite(r).all()) for r in state.residuals]
+    stage = level(stage, used)
+    moves = [bool(np.isfinite(r).all()) for r in stage.state.residuals]
     if not any(moves):
         raise SolveError("no window of the record can be simulated at the parameters that fit it best")
     if not all(moves):
-        now, starts = now.of([w for w, whole in zip(now.pieces, moves, strict=True) if whole]), starts[moves]
-        state = now.derivatives(theta, starts)
-    return now, theta, starts, state
+        now = stage.problem.of([w for w, whole in zip(stage.problem.pieces, moves, strict=True) if whole])
+        stage = Stage(now, stage.theta, stage.starts[moves], now.derivatives(stage.theta, stage.starts[moves]))
+    return stage
 
 
-def _judged(problem: Windows, state: Residuals) -> tuple[FloatArray, BoolArray]:
-    """Mean squared residual over the noise of each window, and which fit much worse than most."""
-    each = misfits(problem, state)
-    return each, each > _FAR * max(float(np.median(each)), 1.0)
+def _bad(stage: Stage) -> BoolArray:
+    """Mark the windows that fit much worse than most."""
+    return np.asarray(stage.misfits > _FAR * max(float(np.median(stage.misfits)), 1.0))
 
 
-def settle_soft(problem: Windows, theta: FloatArray, starts: FloatArray) -> tuple[FloatArray, FloatArray, Residuals]:
-    """Unknowns, starts and residuals of a fit from far off, over the windows as they are."""
-    state = problem.residuals(theta, starts)
+def settle_soft(stage: Stage) -> Stage:
+    """A fit from far off, over the windows as they are."""
     for _ in range(_ROUNDS):
-        noise = np.maximum(problem.noise, _PART * _sizes(problem, state))
-        theta, starts, state = level(_soft(problem, noise), theta, starts)
-        if not _smaller(problem, state, noise):
+        noise = np.maximum(stage.problem.noise, _sizes(stage))
+        stage = _soft(stage, noise)
+        if not _smaller(stage, noise):
             break
-    return theta, starts, state
+    return stage
 
 
-def _smaller(problem: Windows, state: Residuals, noise: FloatArray) -> bool:
+def _sizes(stage: Stage) -> FloatArray:
+    """A part of the size of the residuals of each quantity, of most windows: as how large the noise is taken."""
+    found = np.zeros(len(stage.problem.sensors))
+    for c in range(len(found)):
+        rows = [r[w.readings[1] == c] for w, r in stage.problem.rows(stage.state)]
+        each = [float(np.mean(r**2)) for r in rows if len(r)]
+        found[c] = _PART * np.sqrt(np.median(each or [0.0]))
+    return found
+
+
+def _smaller(stage: Stage, noise: FloatArray) -> bool:
     """Return whether the residuals have fallen, so that the noise may be taken for less."""
-    return bool(((_PART * _sizes(problem, state) < 0.8 * noise) & (noise > problem.noise)).any())
+    return bool(((_sizes(stage) < 0.8 * noise) & (noise > stage.problem.noise)).any())
 
 
-def _soft(problem: Windows, noise: FloatArray) -> Windows:
-    """The problem with this noise; while that is not yet its own, the parameters stay about their guess."""
+def _soft(stage: Stage, noise: FloatArray, used: Any = None) -> Stage:
+    """The level at this noise; while that is not yet its own, the parameters stay about their guess."""
+    problem = stage.problem
     if (noise <= problem.noise).all():
-        return problem
+        return level(stage, used)
     u, size = problem.unknowns, own_size(problem)
     near, far = np.where(size < np.inf, size / _REACH, -np.inf), _REACH * size
     low = np.maximum(u.low, np.where(u.guess > 0, near, -far))
     high = np.minimum(u.high, np.where(u.guess < 0, -near, far))
-    return replace(problem, noise=noise, unknowns=replace(u, low=low, high=high))
+    soft = replace(problem, noise=noise, unknowns=replace(u, low=low, high=high))
+    return replace(level(replace(stage, problem=soft), used), problem=problem)
 
 
-def _sizes(problem: Windows, state: Residuals) -> FloatArray:
-    """Size of the residuals of each quantity, of most windows."""
-    found = np.zeros(len(problem.sensors))
-    for c in range(len(found)):
-        rows = [r[w.readings[1] == c] for w, r in problem.rows(state)]
-        each = [float(np.mean(r**2)) for r in rows if len(r)]
-        found[c] = np.sqrt(np.median(each or [0.0]))
-    return found
-
-
-def _mend(
-    problem: Windows, theta: FloatArray, starts: FloatArray, each: FloatArray, bad: Any, rng: np.random.Generator
-) -> bool:
-    """Look for other starts (and modes) of the bad windows, in place; returns whether one was found."""
-    found = False
+def _mended(stage: Stage, bad: list[int], rng: np.random.Generator) -> Stage:
+    """The stage with other starts (and modes) of the bad windows, where such were found."""
+    found: dict[int, tuple[Window, FloatArray]] = {}
     for i in bad:
-        best = alone(problem, theta, _others(problem, theta, starts, int(i), rng), 3)
-        if best and best[0][0] < 0.7 * each[i]:
-            problem.pieces[i], starts[i], found = best[0][1], best[0][2], True
-    return found
+        best = alone(stage, _others(stage.with_others(found), i, rng), 3)
+        if best and best[0][0] < 0.7 * stage.misfits[i]:
+            found[i] = best[0][1:]
+    return stage.with_others(found)
 
 
-def _others(
-    problem: Windows, theta: FloatArray, starts: FloatArray, i: int, rng: np.random.Generator
-) -> list[tuple[Window, FloatArray]]:
+def _others(stage: Stage, i: int, rng: np.random.Generator) -> list[tuple[Window, FloatArray]]:
     """Other starts of a window: as the window before it ends, as the samples tell, and drawn about these."""
-    window = problem.pieces[i]
+    problem, theta, window = stage.problem, stage.theta, stage.problem.pieces[i]
     told, run = told_start(problem, theta, window), window.record
-    found = [(window, starts[i])]
+    found = [(window, stage.starts[i])]
     if i and problem.pieces[i - 1].record == run:
         before, begin = problem.pieces[i - 1], np.array([problem.clock(theta, run) * window.begin])
-        motion = problem.march(theta, run, before.begin, begin, starts[i - 1], before.mode)
+        motion = problem.march(theta, run, before.begin, begin, stage.starts[i - 1], before.mode)
         if motion is not None:
             found.append((replace(window, mode=int(motion.mode[0])), motion.z[0]))
     known = np.isfinite(told) & (window.spread > 0)
@@ -280,8 +290,8 @@ def without_disagreeing(problem: Windows, theta: FloatArray) -> tuple[Windows, l
     Each part begins with a free start; unknowns of a run are those of all its parts. The sentences name what is left
     out.
     """
-    now, theta, _, state = settle_first(problem, theta, first_length(problem), None, True)
-    each = misfits(now, state)
+    stage = settle_first(problem, theta, first_length(problem), None, True)
+    now, each = stage.problem, stage.misfits
     usual = max(float(np.median(each)), 1.0)
     bad = each > _DISAGREES * usual
     if not bad.any() or np.mean(bad) > _TOO_MANY:
@@ -308,7 +318,7 @@ def without_disagreeing(problem: Windows, theta: FloatArray) -> tuple[Windows, l
             modes.append(problem.modes[i] if a == 0 else tuple(range(len(problem.system.modes))))
     u = problem.unknowns
     whose = [*origin, *range(len(problem.records), len(u.places))]
-    unknowns = replace(u, guess=np.clip(theta, u.low, u.high), places=u.places[whose])
+    unknowns = replace(u, guess=np.clip(stage.theta, u.low, u.high), places=u.places[whose])
     return replace(problem, records=records, modes=modes, unknowns=unknowns), said
 
 

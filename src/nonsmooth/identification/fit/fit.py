@@ -287,7 +287,7 @@ def best_of(
 def _of_steady(problem: Windows, tries: int, seed: int, watched: Progress) -> Grown:
     """The fit to readings of steady states alone: from the first guess that leads near, else from the best."""
     from nonsmooth.identification.fit.beginnings import drawn
-    from nonsmooth.identification.fit.first_level import level
+    from nonsmooth.identification.fit.first_level import Stage, level
     from nonsmooth.identification.fit.growth import with_steady
 
     now, rng, rough, why = problem.of([]), np.random.default_rng(seed), list[tuple[float, FloatArray]](), ""
@@ -304,7 +304,7 @@ def _of_steady(problem: Windows, tries: int, seed: int, watched: Progress) -> Gr
     with progress(tries, "fit", watched) as advance:
         for guess in islice(guesses(), tries):
             try:
-                theta = level(now, guess, now.starts)[0]
+                theta = level(Stage(now, guess, now.starts)).theta
             except SolveError as reason:
                 why = f"{reason}"
             else:

@@ -16,7 +16,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.arrow import Residuals, Unsettled, inverted, reduced, settle
-from nonsmooth.identification.fit.first_level import BETTER, level, other_beginnings, rechosen, settle_first
+from nonsmooth.identification.fit.first_level import BETTER, Stage, level, other_beginnings, rechosen, settle_first
 from nonsmooth.identification.fit.first_windows import first_windows
 from nonsmooth.identification.fit.noise import colours, parts, robust_size, strange
 from nonsmooth.identification.fit.steady import ROUNDING
@@ -32,17 +32,12 @@ SHORT = 0.05  # standard uncertainties from the minimum, beyond which a fit is s
 _ROUNDS = 12  # of noise from residuals and residuals from noise
 
 
-@dataclass(frozen=True, eq=False)
-class Grown:
-    """A finished fit.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Grown(Stage):
+    """A finished fit, its windows the last ones, with the noise as found.
 
     Attributes
     ----------
-    problem : Windows
-        The last windows, with the noise as found.
-    theta, starts : array
-    state : Residuals
-        Residuals there.
     short : float
         Distance to the minimum where no step leads on, in standard uncertainties; 0 at a minimum.
     left : array (p,)
@@ -57,10 +52,6 @@ class Grown:
         Records that may begin in several modes: the record, its mode, by how much the next best raises chi^2.
     """
 
-    problem: Windows
-    theta: FloatArray
-    starts: FloatArray
-    state: Residuals
     short: float
     left: FloatArray
     rms: float
@@ -143,21 +134,21 @@ def grow(
     if near is not None:
         told()
         return near
-    now, theta, starts, state = settle_first(problem, theta, length, start, free)
+    stage = settle_first(problem, theta, length, start, free)
     told()
-    wide, poor, stuck = length, _reduced(now, state) > POOR, False
-    while not poor and len(now.pieces) > len(problem.records) and wide < longest:
+    wide, poor, stuck = length, _reduced(stage) > POOR, False
+    while not poor and len(stage.problem.pieces) > len(problem.records) and wide < longest:
         for factor in (4.0, 2.0):
-            longer = _longer_windows(now, theta, starts, state, min(factor * wide, longest))
+            longer = _longer_windows(stage, min(factor * wide, longest))
             told()
             if longer is not None:
-                now, (theta, starts, state), wide = longer[0], longer[1], min(factor * wide, longest)
+                stage, wide = longer, min(factor * wide, longest)
                 break
         else:
-            stuck = _spreads(now, starts, state) < _REGULAR
+            stuck = _spreads(stage) < _REGULAR
             break
     rounds = 2 if poor else _ROUNDS
-    final = _begun(_final(now, theta, starts, problem.noise, rounds), problem.noise, rounds)
+    final = _begun(_final(stage, problem.noise, rounds), problem.noise, rounds)
     return replace(final, stuck=stuck)
 
 
@@ -166,44 +157,38 @@ def _at_once(problem: Windows, theta: FloatArray, start: FloatArray | None, free
     now = problem.of(first_windows(problem, theta, longest, start, free))
     if not now.pieces:
         return None
-    state = now.residuals(theta, now.starts)
+    stage = Stage(now, theta, now.starts)
     for c in range(len(problem.sensors)):
         size = np.nanstd(np.concatenate([record.values[:, c] for record in problem.records]))
-        if not np.sqrt(np.mean(np.concatenate(parts(now, state, c)) ** 2)) < _NEAR * size:
+        if not np.sqrt(np.mean(np.concatenate(parts(now, stage.state, c)) ** 2)) < _NEAR * size:
             return None
     try:
-        found = level(now, theta, now.starts)
-        if _reduced(now, found[2]) > 2.0 * _GOOD**2:
+        found = level(stage)
+        if _reduced(found) > 2.0 * _GOOD**2:
             return None
-        final = _begun(_final(now, *found[:2], problem.noise, _ROUNDS), problem.noise, _ROUNDS)
+        final = _begun(_final(found, problem.noise, _ROUNDS), problem.noise, _ROUNDS)
     except SolveError:
         return None
-    return final if final.good and _spreads(now, *found[1:]) < _CHAOS else None
+    return final if final.good and _spreads(found) < _CHAOS else None
 
 
-def _longer_windows(
-    problem: Windows, theta: FloatArray, starts: FloatArray, state: Residuals, length: float
-) -> tuple[Windows, tuple[FloatArray, FloatArray, Residuals]] | None:
+def _longer_windows(stage: Stage, length: float) -> Stage | None:
     """The fit over windows joined up to ``length``; None where it does not come to an end, or fits much worse."""
-    joined = _joined(problem, starts, length)
-    if len(joined) == len(problem.pieces):
+    joined = _joined(stage, length)
+    if len(joined) == len(stage.problem.pieces):
         return None
-    trial = problem.of(joined)
-    starts = trial.starts
-    rechosen(trial, theta, starts)
+    trial = stage.problem.of(joined)
     try:
-        found = level(trial, theta, starts)
+        found = level(rechosen(Stage(trial, stage.theta, trial.starts)))
     except SolveError:
         return None
-    if _reduced(trial, found[2]) > _WORSE * max(_reduced(problem, state), 1.0) or _spreads(trial, *found[1:]) > _CHAOS:
-        return None
-    return trial, found
+    return None if _reduced(found) > _WORSE * max(_reduced(stage), 1.0) or _spreads(found) > _CHAOS else found
 
 
-def _spreads(problem: Windows, starts: FloatArray, state: Residuals) -> float:
+def _spreads(stage: Stage) -> float:
     """By how much a motion answers to its start, at most, both in units of their own size."""
-    found, sizes = 0.0, np.abs(starts).max(axis=0)
-    for window, slopes in zip(problem.pieces, state.in_start, strict=True):
+    found, sizes = 0.0, np.abs(stage.starts).max(axis=0)
+    for window, slopes in zip(stage.problem.pieces, stage.state.in_start, strict=True):
         rows = np.abs(slopes[: len(window.readings[0])]) * sizes
         for c in np.unique(window.readings[1]):
             size = float(np.ptp(window.values[np.isfinite(window.values[:, c]), c])) or 1.0
@@ -211,10 +196,10 @@ def _spreads(problem: Windows, starts: FloatArray, state: Residuals) -> float:
     return found
 
 
-def _joined(problem: Windows, starts: FloatArray, length: float) -> list[Window]:
+def _joined(stage: Stage, length: float) -> list[Window]:
     """Windows joined up to ``length``, each with the start of its first."""
     groups: list[list[tuple[Window, FloatArray]]] = []
-    for window, start in zip(problem.pieces, starts, strict=True):
+    for window, start in zip(stage.problem.pieces, stage.starts, strict=True):
         here = groups[-1][0][0] if groups else None
         if here is not None and here.record == window.record and window.time[-1] - here.time[0] <= 1.3 * length:
             groups[-1].append((window, start))
@@ -223,7 +208,7 @@ def _joined(problem: Windows, starts: FloatArray, length: float) -> list[Window]
     found = []
     for k, group in enumerate(groups):
         head, start = group[0]
-        record = problem.records[head.record]
+        record = stage.problem.records[head.record]
         behind = groups[k + 1][0][0] if k + 1 < len(groups) else head
         # samples between, of windows that could not be simulated, come back here
         last = behind.first if behind.record == head.record and behind is not head else len(record.time)
@@ -231,10 +216,10 @@ def _joined(problem: Windows, starts: FloatArray, length: float) -> list[Window]
     return found
 
 
-def _reduced(problem: Windows, state: Residuals) -> float:
+def _reduced(stage: Stage) -> float:
     """Sum of squared residuals over the noise, per degree of freedom."""
-    rows = [r / problem.noise[w.readings[1]] for w, r in problem.rows(state)]
-    return sum(float(r @ r) for r in rows) / _freedom(problem)[0]
+    rows = [r / stage.problem.noise[w.readings[1]] for w, r in stage.problem.rows(stage.state)]
+    return sum(float(r @ r) for r in rows) / _freedom(stage.problem)[0]
 
 
 def _freedom(problem: Windows) -> tuple[float, int]:
@@ -244,8 +229,9 @@ def _freedom(problem: Windows) -> tuple[float, int]:
     return max(total - free, 0.1 * total), total
 
 
-def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: FloatArray, rounds: int) -> Grown:
+def _final(stage: Stage, irregular: FloatArray, rounds: int) -> Grown:
     """The fit at its minimum, with the noise of each quantity from its residuals."""
+    problem, theta, starts = stage.problem, stage.theta, stage.starts
     short, left = 0.0, np.zeros(len(theta))
     for _ in range(rounds):
         colour = colours(problem, problem.plain.residuals(theta, starts))
@@ -268,7 +254,7 @@ def _final(problem: Windows, theta: FloatArray, starts: FloatArray, irregular: F
             break
     state = problem.residuals(theta, starts)
     far, missing = strange(problem, problem.plain.residuals(theta, starts), state, irregular)
-    return Grown(problem, theta, starts, state, short, left, far, missing)
+    return Grown(problem, theta, starts, state, short=short, left=left, rms=far, missing=missing)
 
 
 def with_steady(problem: Windows, theta: FloatArray, grown: Grown | None = None) -> Grown:
@@ -276,8 +262,7 @@ def with_steady(problem: Windows, theta: FloatArray, grown: Grown | None = None)
     now, starts = problem.of([]), np.zeros((0, problem.marcher.flow.n))
     if grown is not None:
         now, starts = replace(grown.problem, steady=problem.steady), grown.starts
-    theta, starts, _ = level(now, theta, starts)
-    final = _final(now, theta, starts, problem.noise, _ROUNDS)
+    final = _final(level(Stage(now, theta, starts)), problem.noise, _ROUNDS)
     return final if grown is None else replace(final, stuck=grown.stuck, begins=grown.begins)
 
 
@@ -286,21 +271,19 @@ def _begun(final: Grown, irregular: FloatArray, rounds: int) -> Grown:
     begins = []
     for i in range(len(final.problem.pieces)):
         now, best = final.state.chi2(final.problem.weights(final.state)), None
-        others = other_beginnings(final.problem, final.theta, final.starts, i)
+        others = other_beginnings(final, i)
         if not others:
             continue
         least, mode = np.inf, final.problem.pieces[i].mode
         for _, window, start in others:
-            pieces, starts = list(final.problem.pieces), final.starts.copy()
-            pieces[i], starts[i] = window, start
             try:
-                theta, starts, state = level(final.problem.of(pieces), final.theta, starts)
+                found = level(final.with_others({i: (window, start)}))
             except SolveError:
                 continue
-            if (far := state.chi2(final.problem.weights(state))) < least:
-                least, best = far, (final.problem.of(pieces), theta, starts)
+            if (far := found.state.chi2(final.problem.weights(found.state))) < least:
+                least, best = far, found
         if best is not None and least < now - BETTER:
-            final, mode = _final(*best, irregular, rounds), best[0].pieces[i].mode
+            final, mode = _final(best, irregular, rounds), best.problem.pieces[i].mode
         begins.append((final.problem.pieces[i].record, mode, abs(least - now)))
     return replace(final, begins=tuple(begins))
 

@@ -36,7 +36,8 @@ def select_model(
 ) -> xr.Dataset:
     r"""Errors with which systems predict parts of a recording that they were not fitted to.
 
-    The recording is cut into short blocks, and every ``folds``-th of them is held out in turn. Each system is fitted to
+    The recording is cut into short blocks, and every ``folds``-th of them is held out in turn; of readings of steady
+    states every ``folds``-th setting. Each system is fitted to
     the rest (:func:`nonsmooth.fit`), and its motion is compared with the readings that were held out. So a model with
     more parameters is not better for that alone.
 
@@ -53,10 +54,11 @@ def select_model(
     -------
     xarray.Dataset
         ``squared_error(model, fold)``: mean squared error of the prediction, over the variance that the record's own
-        irregularity shows (1: as good as its noise allows). A reading of which a model has no motion counts as if its
-        mean were predicted. ``rms(model)``; ``difference(model)``: mean excess of ``squared_error`` over that of the
-        best model, with its standard error over the folds, ``difference_error``. The attribute ``best`` names the model
-        with the least error.
+        irregularity shows (1: as good as its noise allows), or over that given with a steady reading (a twentieth of
+        the largest, where none is). A reading of which a model has no motion counts as if its mean were predicted.
+        ``rms(model)``; ``difference(model)``: mean excess of ``squared_error`` over that of the best model, with its
+        standard error over the folds, ``difference_error``. The attribute ``best`` names the model with the least
+        error.
 
     Raises
     ------
@@ -109,20 +111,19 @@ def select_model(
 
 
 def _held_out(problem: Windows, folds: int) -> list[IntArray]:
-    """The fold in which each instant of each record is held out; -1: never, at the record's beginning."""
+    """The fold in which each instant of a record (-1: never, at its beginning), or each steady reading, is held out."""
     from nonsmooth.identification.fit.first_windows import first_length
 
-    if not problem.records:
-        raise ValueError("select_model holds out parts of records over time: give some beside the steady states")
-    length, block, found = _BLOCK * first_length(problem), 0, []
+    length, block, found = _BLOCK * first_length(problem) if problem.records else 0.0, 0, list[IntArray]()
     for record in problem.records:
         number = np.floor((record.time - record.time[0]) / length).astype(np.int64)
         found.append(np.where(number == 0, -1, (number - 1 + block) % folds))
         block += int(number[-1])
-    if any(not (part == fold).any() for fold in range(folds) for part in [np.concatenate(found)]):
+    found += [one.setting[one.run] % folds for one in problem.steady]
+    if not {*range(folds)} <= {*np.concatenate(found).tolist()}:
         raise ValueError(
-            f"the recording is too short for folds = {folds}: it holds {block} blocks of {length:.3g}; ask for "
-            "fewer folds"
+            f"the recording is too short for folds = {folds}: each holds out blocks of {length:.3g}, and settings of "
+            "steady states; ask for fewer folds"
         )
     return found
 
@@ -133,13 +134,14 @@ def _error(problem: Windows, held: list[BoolArray], tries: int, seed: int) -> fl
 
     records = [
         replace(record, values=np.where(part[:, None], np.nan, record.values))
-        for record, part in zip(problem.records, held, strict=True)
+        for record, part in zip(problem.records, held, strict=False)
     ]
-    far = [
-        (record.values - np.nanmean(record.values, axis=0)) / problem.noise for record in problem.records
-    ]  # where there is no prediction
+    steady = tuple(one.only(~part) for one, part in zip(problem.steady, held[len(records) :], strict=True))
+    # where there is no prediction
+    far = [(record.values - np.nanmean(record.values, axis=0)) / problem.noise for record in problem.records]
+    far += [(one.measured - np.mean(one.measured)) / one.noise for one in problem.steady]
     try:
-        grown = best_of(replace(problem, records=records), None, True, np.inf, tries, seed, False)
+        grown = best_of(replace(problem, records=records, steady=steady), None, True, np.inf, tries, seed, False)
     except SolveError:
         pass
     else:
@@ -159,3 +161,6 @@ def _predict(problem: Windows, grown: Grown, far: list[FloatArray]) -> None:
             k, c = whole.readings
             left = whole.values[k, c] - fitted.shown(whole, predicted)
             far[window.record][window.first + k, c] = left / problem.noise[c]
+    for i, (one, left) in enumerate(zip(problem.steady, far[len(problem.records) :], strict=True)):
+        there = replace(fitted, steady=problem.steady).of_steady(grown.theta, i)[0]
+        np.copyto(left, (one.measured - there) / one.noise, where=np.isfinite(there))

@@ -79,6 +79,11 @@ class SteadyReadings:
     used: BoolArray
     left: int
 
+    def only(self, some: BoolArray) -> SteadyReadings:
+        """The same with some of its readings, of a motion through all the settings."""
+        names = ("run", "iterate", "quantity", "measured", "error", "noise", "used")
+        return replace(self, **{name: getattr(self, name)[some] for name in names})
+
     def with_noise(self, fitted: FloatArray, periodic: BoolArray, unknowns: int) -> SteadyReadings:
         """The same, used where the motion is periodic, with the noise that residuals show where it is not known."""
         noise, residual = self.error.copy(), self.measured - fitted
@@ -216,6 +221,8 @@ def predicted(
     tables: dict[tuple[int, int, int], FloatArray] = {}
     for run, i in enumerate(one.setting):
         mine = np.flatnonzero(one.run == run)
+        if not len(mine):
+            continue
         shape = len(mine) // len(columns), len(columns)
         least, chosen = np.inf, None
         for job in (i, 2 * count - 1 - i):

@@ -21,10 +21,7 @@ from nonsmooth.recordings.reading import (
     MAX_COLUMNS,
     MAX_DEPTH,
     Group,
-    Options,
     Reading,
-    Remarks,
-    Source,
     is_axis_name,
     names_of,
 )
@@ -33,42 +30,40 @@ _PICK = re.compile(r"(?P<path>.*?)\((?:(?P<column>:,(?P<k>\d{1,6}))|(?P<row>(?P<
 _TOP = "Run #1"
 
 
-def read(data: bytes, source: Source, options: Options) -> Reading:
+def read(data: bytes, reading: Reading) -> None:
     """Read the arrays of a file."""
-    reading = Reading()
-    variables, reading.header = load(data, source, reading.remarks)
-    if options.columns is not None:
-        reading.traces = list(traces_of(_chosen(variables, options, source), options, source, reading))
-        return reading
+    variables, reading.told = load(data, reading)
+    if reading.columns is not None:
+        reading.traces = list(traces_of(_chosen(variables, reading), reading))
+        return
     containers = list(_containers("", variables, 0))
-    holds = _is_vector if options.rate is None else _is_series
+    holds = _is_vector if reading.rate is None else _is_series
     vectors = [(path, node) for path, node in containers if any(map(_is_series if node.rate else holds, node.values()))]
     found: list[tuple[str, Group, str | None]] = []
     for path, node in vectors:
-        key = _axis_of(node, options.axis)
-        if key is not None or options.rate or node.rate:
+        key = _axis_of(node, reading.axis)
+        if key is not None or reading.rate or node.rate:
             found.append((path, node, key))
     if not found:
         names = [f"{path}.{key}".lstrip(".") for path, node in vectors for key, v in node.items() if _is_vector(v)]
-        raise source.error(
+        raise reading.error(
             "",
-            f"no vector {options.axis!r} beside others; there are {names_of(names) or 'no vectors at all'}. Name "
-            f"them, columns={{{options.axis!r}: 'data.t', 'x': 'data.x'}}, or give axis= or rate=",
+            f"no vector {reading.axis!r} beside others; there are {names_of(names) or 'no vectors at all'}. Name "
+            f"them, columns={{{reading.axis!r}: 'data.t', 'x': 'data.x'}}, or give axis= or rate=",
         )
     used = {path for path, _, _ in found}
     for path, _ in vectors:
         if path not in used:
-            reading.remarks.say(f"{path or 'the file itself'}: holds vectors, but no {options.axis!r}; left out")
+            reading.say(f"{path or 'the file itself'}: holds vectors, but no {reading.axis!r}; left out")
     for path, node, key in found:
         run = node.run or path or _TOP
         notes = {name: _note(v) for name, v in node.items() if _note(v)}
         own = {**node.notes, **{f"note_{name}": text for name, text in notes.items()}}
         reading.run_attrs.setdefault(run, {}).update(own)
-        table = _table(run, path, node, key, options, reading.remarks)
-        reading.traces += traces_of(table, options, source, reading)
+        table = _table(run, path, node, key, reading)
+        reading.traces += traces_of(table, reading)
         if len(reading.traces) > MAX_COLUMNS:
-            raise source.error("", f"holds more than {MAX_COLUMNS} channels")
-    return reading
+            raise reading.error("", f"holds more than {MAX_COLUMNS} channels")
 
 
 def _containers(path: str, node: Any, depth: int) -> Iterator[tuple[str, Group]]:
@@ -110,9 +105,9 @@ def _note(value: Any) -> str:
     return str(value.ravel()[0]) if _is_array(value) and value.size == 1 else ""
 
 
-def _table(run: str, path: str, node: Group, key: str | None, options: Options, remarks: Remarks) -> FieldTable:
+def _table(run: str, path: str, node: Group, key: str | None, reading: Reading) -> FieldTable:
     arrays = {name: value for name, value in node.items() if _is_array(value) and value.size > 1}
-    units = _units(node, list(arrays), remarks, run)
+    units = _units(node, list(arrays), reading, run)
     lengths = [v.size for v in arrays.values() if _is_vector(v)] or [max(v.shape) for v in arrays.values()]
     n = max(set(lengths), key=lengths.count) if key is None else arrays[key].size
     fields = []
@@ -121,12 +116,12 @@ def _table(run: str, path: str, node: Group, key: str | None, options: Options, 
         said, unit = label(name)
         columns = _columns(value, n)
         if columns is None:
-            wanted = f"{n} of {options.axis}"
-            remarks.of(run, name, f"has the shape {value.shape}, which does not fit the {wanted}; left out")
+            wanted = f"{n} of {reading.axis}"
+            reading.of(run, name, f"has the shape {value.shape}, which does not fit the {wanted}; left out")
         elif value.dtype.kind not in "biufc" and name != key:
-            remarks.of(run, name, f"holds {value.dtype} values, no numbers; left out")
+            reading.of(run, name, f"holds {value.dtype} values, no numbers; left out")
         else:
-            ours = options.axis if name == key else said if unit else name
+            ours = reading.axis if name == key else said if unit else name
             for k, column in enumerate(columns, 1):
                 number = f"({k})" if len(columns) > 1 else ""
                 attrs = node.attrs.get(name, {})
@@ -144,7 +139,7 @@ def _columns(value: NDArray[Any], n: int) -> list[NDArray[Any]] | None:
     return None
 
 
-def _units(node: Group, names: list[str], remarks: Remarks, run: str) -> dict[str, str]:
+def _units(node: Group, names: list[str], reading: Reading, run: str) -> dict[str, str]:
     if node.units:
         return node.units
     text = next((v for name, v in node.items() if name.casefold() in ("units", "unit") and isinstance(v, str)), "")
@@ -152,12 +147,12 @@ def _units(node: Group, names: list[str], remarks: Remarks, run: str) -> dict[st
     if not text:
         return {}
     if len(words) != len(names):
-        remarks.say(f"run {run!r}: units are {text[:80]!r}, which is not one for each of {names_of(names)}; not used")
+        reading.say(f"run {run!r}: units are {text[:80]!r}, which is not one for each of {names_of(names)}; not used")
         return {}
     return dict(zip(names, words, strict=True))
 
 
-def _chosen(variables: Mapping[str, Any], options: Options, source: Source) -> FieldTable:
+def _chosen(variables: Mapping[str, Any], reading: Reading) -> FieldTable:
     """The channels that ``columns`` names by path: ``"data.x"``, ``"runs(2).x"``, ``"M(:,3)"``."""
     found = [
         (f"{path}.{name}".lstrip("."), value, node.units.get(name, ""), node.rate)
@@ -168,23 +163,23 @@ def _chosen(variables: Mapping[str, Any], options: Options, source: Source) -> F
     arrays = {path: value for path, value, _, _ in found}
     units = {path: unit for path, _, unit, _ in found}
     fields = []
-    for ours, theirs in (options.columns or {}).items():
+    for ours, theirs in (reading.columns or {}).items():
         wanted, unit = theirs if isinstance(theirs, tuple) else (theirs, None)
-        values = _pick(wanted, arrays, source)
+        values = _pick(wanted, arrays, reading)
         fields.append(Field(ours, units.get(str(wanted), "") if unit is None else unit, values, str(wanted)))
-    rate = options.rate or next((rate for *_, rate in found if rate), None)
-    axis = next((field for field in fields if field.name == options.axis), None)
+    rate = reading.rate or next((rate for *_, rate in found if rate), None)
+    axis = next((field for field in fields if field.name == reading.axis), None)
     if axis is None and rate is None:
-        wanted = f"columns names no {options.axis!r}; add it, or give the sample rate in Hz, rate=..."
-        raise source.error("", wanted)
+        wanted = f"columns names no {reading.axis!r}; add it, or give the sample rate in Hz, rate=..."
+        raise reading.error("", wanted)
     n = len((axis or fields[0]).values)
     for field in fields:
         if len(field.values) != n:
-            raise source.error(field.origin, f"has {len(field.values)} values, the {options.axis} has {n}")
+            raise reading.error(field.origin, f"has {len(field.values)} values, the {reading.axis} has {n}")
     return FieldTable(_TOP, fields, n, rate=rate)
 
 
-def _pick(wanted: str | int, arrays: Mapping[str, NDArray[Any]], source: Source) -> NDArray[Any]:
+def _pick(wanted: str | int, arrays: Mapping[str, NDArray[Any]], reading: Reading) -> NDArray[Any]:
     path = list(arrays)[wanted] if isinstance(wanted, int) and 0 <= wanted < len(arrays) else str(wanted)
     if path in arrays and _is_vector(arrays[path]):
         return arrays[path].ravel()
@@ -195,4 +190,4 @@ def _pick(wanted: str | int, arrays: Mapping[str, NDArray[Any]], source: Source)
         if 1 <= k <= table.shape[1]:
             return table[:, k - 1]
     shown = [f"{name} {value.shape}" for name, value in arrays.items()]
-    raise source.error("", f"no vector {path!r}; there are {names_of(shown)} (columns of a matrix as 'M(:,2)')")
+    raise reading.error("", f"no vector {path!r}; there are {names_of(shown)} (columns of a matrix as 'M(:,2)')")

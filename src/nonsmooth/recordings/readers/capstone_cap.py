@@ -22,7 +22,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.readers.text_table import number
-from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Options, Reading, Remarks, Source, Trace
+from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Reading, Trace
 
 RECORD = np.dtype([("valid", "<u4"), ("value", "<f8")])
 
@@ -32,29 +32,27 @@ SYNTHETIC = "synthetic"
 _TYPED_TEXT = 2
 
 
-def read(data: bytes, source: Source, options: Options) -> Reading:
+def read(data: bytes, reading: Reading) -> None:
     """Read a Capstone experiment."""
-    if options.columns is not None or options.rate is not None or options.axis != "time":
+    if reading.columns is not None or reading.rate is not None or reading.axis != "time":
         raise ValueError("columns, rate and axis do not concern a Capstone file, which says them itself")
-    archive = Archive(data, source)
+    archive = Archive(data, reading)
     if "main.xml" not in archive.names:
-        raise source.error("", "is a ZIP archive without main.xml; expected a PASCO Capstone experiment")
-    experiment = parse(archive.pieces("main.xml"), source)
-    reading = Reading()
-    reading.header = {**experiment.header, "sensors": experiment.sensors}
+        raise reading.error("", "is a ZIP archive without main.xml; expected a PASCO Capstone experiment")
+    experiment = parse(archive.pieces("main.xml"), reading)
+    reading.told = {**experiment.header, "sensors": experiment.sensors}
     reading.synthetic = experiment.header.get("Origin", "").startswith(SYNTHETIC)
     for run, name in experiment.empty:
-        reading.remarks.of(f"Run #{run}", name, "has no stored values (it may be calculated); left out")
+        reading.of(f"Run #{run}", name, "has no stored values (it may be calculated); left out")
     comma = experiment.header.get("DecimalSeparator", ".") == ","
     traces = []
     for group in _groups(experiment, reading):
-        trace = _trace(group, archive, comma, experiment.units, reading.remarks, source)
+        trace = _trace(group, archive, comma, experiment.units, reading)
         if trace is not None:
             traces.append(trace)
     runs = dict.fromkeys(trace.run for trace in traces)
     order = sorted(runs, key=lambda run: int(run.removeprefix("Run #")))
     reading.traces = [trace for run in order for trace in traces if trace.run == run]
-    return reading
 
 
 def _groups(experiment: Experiment, reading: Reading) -> Iterator[list[Segment]]:
@@ -62,7 +60,7 @@ def _groups(experiment: Experiment, reading: Reading) -> Iterator[list[Segment]]
     groups: dict[int, list[Segment]] = {}
     for segment in experiment.segments:
         if segment.deleted:
-            reading.remarks.of(_run(segment), segment.measurement, "deleted by the user in Capstone; left out")
+            reading.of(_run(segment), segment.measurement, "deleted by the user in Capstone; left out")
             continue
         groups.setdefault(segment.data_set, []).append(segment)
     return iter(groups.values())
@@ -73,23 +71,23 @@ def _run(segment: Segment) -> str:
 
 
 def _trace(
-    group: list[Segment], archive: Archive, comma: bool, units: Mapping[str, str], remarks: Remarks, source: Source
+    group: list[Segment], archive: Archive, comma: bool, units: Mapping[str, str], reading: Reading
 ) -> Trace | None:
     first = group[0]
     place = f"main.xml, line {first.line}"
     if not (first.run.isascii() and first.run.isdigit() and len(first.run) < 10):
-        raise source.error(place, f"DataGroupNumber is {first.run[:40]!r}, expected the number of a run")
+        raise reading.error(place, f"DataGroupNumber is {first.run[:40]!r}, expected the number of a run")
     run, name = _run(first), first.measurement
     times, values = [], []
     for segment in group:
-        stretch = _stretch(segment, archive, comma, source)
+        stretch = _stretch(segment, archive, comma, reading)
         if stretch is None:
-            remarks.of(run, name, f"{segment.values} holds text that a user typed, no measurement; left out")
+            reading.of(run, name, f"{segment.values} holds text that a user typed, no measurement; left out")
             continue
         times.append(stretch[0])
         values.append(stretch[1])
         if stretch[2]:
-            remarks.of(run, name, f"{stretch[2]} records between valid ones are marked invalid; they are NaN")
+            reading.of(run, name, f"{stretch[2]} records between valid ones are marked invalid; they are NaN")
     if not values:
         return None
     # As in the CSV export, so that a channel has one name in both.
@@ -103,31 +101,31 @@ def _trace(
         remedy = f"say it with units={{{name!r}: ...}}"
         unit = units.get(unit, "")
         if not unit:
-            remarks.of(run, name, f"its unit is number {first.unit} of a table that is not in the file; {remedy}")
+            reading.of(run, name, f"its unit is number {first.unit} of a table that is not in the file; {remedy}")
     return Trace(run, name, unit, axis, column, origin, attrs=attrs)
 
 
 def _stretch(
-    segment: Segment, archive: Archive, comma: bool, source: Source
+    segment: Segment, archive: Archive, comma: bool, reading: Reading
 ) -> tuple[FloatArray, FloatArray, int] | None:
     """Times and values of a block, and how many of its records are blank; None if it holds typed text."""
     place = f"main.xml, line {segment.line}"
     if not (segment.size.isascii() and segment.size.isdigit() and len(segment.size) < 16):
-        raise source.error(place, f"DataCacheDataSize is {segment.size[:40]!r}, expected a number of records")
+        raise reading.error(place, f"DataCacheDataSize is {segment.size[:40]!r}, expected a number of records")
     size = int(segment.size)
-    values = _records(segment.values, size, archive, source)
+    values = _records(segment.values, size, archive, reading)
     if values is None or size == 0:
         return None if values is None else (values, values, 0)
     if segment.times:
-        times = _records(segment.times, size, archive, source)
+        times = _records(segment.times, size, archive, reading)
         if times is None or len(times) != len(values):
-            raise source.error(segment.times, f"does not hold one time for each of the {len(values)} values")
+            raise reading.error(segment.times, f"does not hold one time for each of the {len(values)} values")
         return times, values, len(values) - size
     start, interval = (
         number(text.replace(",", ".") if comma else text, ".") for text in (segment.start, segment.interval)
     )
     if start is None or interval is None or not (math.isfinite(start) and 0 < interval < math.inf):
-        raise source.error(
+        raise reading.error(
             place,
             f"the clock of {segment.values} is IntervalCacheStartValue = {segment.start[:40]!r}, "
             f"IntervalCacheInterval = {segment.interval[:40]!r}; expected a time and a step > 0",
@@ -135,7 +133,7 @@ def _stretch(
     return start + interval * np.arange(len(values), dtype=np.float64), values, len(values) - size
 
 
-def _records(member: str, size: int, archive: Archive, source: Source) -> FloatArray | None:
+def _records(member: str, size: int, archive: Archive, reading: Reading) -> FloatArray | None:
     """The values up to the last valid one (an invalid one before it is NaN); None if the member holds typed text."""
     content = b"".join(archive.pieces(member))
     count, rest = divmod(len(content), RECORD.itemsize)
@@ -143,7 +141,7 @@ def _records(member: str, size: int, archive: Archive, source: Source) -> FloatA
     valid, marked = table["valid"], np.flatnonzero(table["valid"])
 
     def error(record: int, message: str) -> DataFileError:
-        return source.error(f"{member}, record {record}", message)
+        return reading.error(f"{member}, record {record}", message)
 
     if count and valid[0] == _TYPED_TEXT:
         return None
@@ -192,27 +190,27 @@ class Experiment:
     units: dict[str, str] = field(default_factory=dict)
 
 
-def parse(pieces: Iterable[bytes], source: Source) -> Experiment:
+def parse(pieces: Iterable[bytes], reading: Reading) -> Experiment:
     """Read the pieces of ``main.xml``; DataFileError with its line for anything that is not as it should be."""
-    handler = _Handler(source)
+    handler = _Handler(reading)
     parser = handler.parser
     try:
         for piece in pieces:
             parser.Parse(piece, False)
         parser.Parse(b"", True)
     except expat.ExpatError as error:
-        raise source.error(f"main.xml, line {error.lineno}", f"is not well-formed XML ({error})") from None
+        raise reading.error(f"main.xml, line {error.lineno}", f"is not well-formed XML ({error})") from None
     if not handler.rooted:
-        raise source.error("main.xml", "holds no element; expected the root DSProExperiment")
+        raise reading.error("main.xml", "holds no element; expected the root DSProExperiment")
     return handler.found
 
 
 class _Handler:
-    def __init__(self, source: Source) -> None:
+    def __init__(self, reading: Reading) -> None:
         self.found = Experiment()
         self.rooted = False
         self.parser = expat.ParserCreate()
-        self._source = source
+        self._reading = reading
         self._open: list[str] = []
         self._data_sources: list[dict[str, Any]] = []
         self._data_set: dict[str, str] | None = None
@@ -224,7 +222,7 @@ class _Handler:
         self.parser.EndElementHandler = self._end
 
     def _error(self, message: str) -> DataFileError:
-        return self._source.error(f"main.xml, line {self.parser.CurrentLineNumber}", message)
+        return self._reading.error(f"main.xml, line {self.parser.CurrentLineNumber}", message)
 
     def _refuse(self, *_: Any) -> None:
         raise self._error("declares a document type or entities, which no Capstone file does; refused")

@@ -14,7 +14,7 @@ from dataclasses import replace
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.readers.fields import Field, FieldTable, split_unit, traces_of
 from nonsmooth.recordings.readers.text_table import Cells, Numerals, checked_header, decoded, read_cells, rows, sniffed
-from nonsmooth.recordings.reading import MAX_COLUMNS, TIME_WORDS, Options, Reading, Remarks, Source, names_of
+from nonsmooth.recordings.reading import MAX_COLUMNS, TIME_WORDS, Reading, names_of
 
 #: What ``write_capstone_csv`` puts behind a run's name: the only free text of the format.
 SYNTHETIC = " [synthetic]"
@@ -27,16 +27,15 @@ _TIME = re.compile(
 _PORT = re.compile(r"(?P<measurement>.+), Ch (?P<port>[^,]+)", re.DOTALL)
 
 
-def looks_like_capstone(data: bytes, options: Options) -> bool:
+def looks_like_capstone(data: bytes, reading: Reading) -> bool:
     """Return whether the first line holds a ``Time`` column with a run's name, and another column of that run."""
-    source = Source("", len(data), "", "")
     begin = data[: 1 << 20]
     end = begin.find(b"\n") + 1 or len(begin)
     if begin.startswith((b"\xff\xfe", b"\xfe\xff")):
         begin, end = begin[: len(begin) // 2 * 2], len(begin) // 2 * 2
     try:
-        delimiter = options.delimiter or _delimiter(begin[:end], source)
-        header = next(rows(decoded(begin[:end], source, Remarks()), delimiter, source), (1, []))[1]
+        delimiter = reading.delimiter or _delimiter(begin[:end], reading)
+        header = next(rows(decoded(begin[:end], reading), delimiter, reading), (1, []))[1]
     except DataFileError:
         return False
     # Stripped first: on much white space at the end the expression would try every way to share it out.
@@ -45,20 +44,17 @@ def looks_like_capstone(data: bytes, options: Options) -> bool:
     return any(name.endswith(" " + run) and not _TIME.fullmatch(name) for run in runs for name in names)
 
 
-def read(data: bytes, source: Source, options: Options) -> Reading:
+def read(data: bytes, reading: Reading) -> None:
     """Read a Capstone CSV export."""
-    if options.columns is not None or options.rate is not None or options.axis != "time":
+    if reading.columns is not None or reading.rate is not None or reading.axis != "time":
         raise ValueError("columns, rate and axis do not concern a Capstone file; read it with format='csv' to use them")
-    reading = Reading()
-    delimiter = options.delimiter or _delimiter(data, source)
-    numerals = Numerals(options.decimal or ("." if delimiter == "," else None), options.thousands, options.na)
-    table = rows(decoded(data, source, reading.remarks), delimiter, source)
+    delimiter = reading.delimiter or _delimiter(data, reading)
+    numerals = Numerals(reading.decimal or ("." if delimiter == "," else None), reading.thousands, reading.na or ())
+    table = rows(decoded(data, reading), delimiter, reading)
     line, fields = next(table, (1, []))
-    header = checked_header(fields, line, source)
-    times, channels = _layout(header, source)
-    cells = read_cells(
-        table, header, range(len(header)), numerals, source, reading.remarks, ends_with_newline=data.endswith(b"\n")
-    )
+    header = checked_header(fields, line, reading)
+    times, channels = _layout(header, reading)
+    cells = read_cells(table, header, range(len(header)), numerals, reading, ends_with_newline=data.endswith(b"\n"))
     tables: dict[int, list[Field]] = {}
     for column, (run, label) in channels.items():
         own = [k for k, (r, _) in times.items() if r == run]
@@ -68,18 +64,17 @@ def read(data: bytes, source: Source, options: Options) -> Reading:
         if column in tables:
             time = Field("time", unit, cells.values[column], f"column {column + 1}", cells.rows[column])
             held = FieldTable(run, [time, *tables[column]], len(cells.lines), cells.lines)
-            reading.traces += traces_of(held, options, source, reading)
+            reading.traces += traces_of(held, reading)
         else:
-            reading.remarks.of(run, header[column], "is the time of no channel")
+            reading.of(run, header[column], "is the time of no channel")
     runs = {run for run, _ in times.values()}
     reading.synthetic = any(run.endswith(SYNTHETIC) for run in runs)
     if reading.synthetic:
         reading.traces = [replace(trace, run=trace.run.removesuffix(SYNTHETIC)) for trace in reading.traces]
-    reading.header = {"delimiter": delimiter, "columns": len(header), "rows": len(cells.lines)}
-    return reading
+    reading.told = {"delimiter": delimiter, "columns": len(header), "rows": len(cells.lines)}
 
 
-def _layout(header: list[str], source: Source) -> tuple[dict[int, tuple[str, str]], dict[int, tuple[str, str]]]:
+def _layout(header: list[str], reading: Reading) -> tuple[dict[int, tuple[str, str]], dict[int, tuple[str, str]]]:
     """Columns of time as (run, unit), and columns of values as (run, header without the run)."""
     times: dict[int, tuple[str, str]] = {}
     for column, text in enumerate(header):
@@ -87,7 +82,7 @@ def _layout(header: list[str], source: Source) -> tuple[dict[int, tuple[str, str
         if match and match["run"]:
             times[column] = (match["run"], (match["unit"] or "").strip())
     if not times:
-        raise source.error(
+        raise reading.error(
             "line 1",
             f"no time column with a run's name, as 'Time (s) Run #1'; the columns are {names_of(header)}. "
             "Export the time too, or read the file with format='csv' and columns= or rate=",
@@ -99,14 +94,14 @@ def _layout(header: list[str], source: Source) -> tuple[dict[int, tuple[str, str
             continue
         run = next((run for run in runs if text.strip().endswith(" " + run)), None)
         if run is None:
-            raise source.error(
+            raise reading.error(
                 "line 1",
                 f"column {column + 1} ({text!r}) belongs to no run that has a time column "
                 f"({names_of(sorted(runs, key=len))}); export the time of its run too",
             )
         channels[column] = (run, text.strip().removesuffix(run).strip())
     if not channels:
-        raise source.error("line 1", "holds time columns only; expected channels such as 'Position (m) Run #1'")
+        raise reading.error("line 1", "holds time columns only; expected channels such as 'Position (m) Run #1'")
     return times, channels
 
 
@@ -117,11 +112,11 @@ def _field(column: int, label: str, cells: Cells) -> Field:
     return Field(name, unit, cells.values[column], f"column {column + 1}", cells.rows[column], attrs)
 
 
-def _delimiter(data: bytes, source: Source) -> str:
+def _delimiter(data: bytes, reading: Reading) -> str:
     """``;`` if the first line holds one outside quotes, else ``,``."""
     wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
     text = data[: 1 << 20].decode("utf-16" if wide else "utf-8", errors="replace").split("\n", 1)[0]
     found = sniffed(text)
     if found == " " and "\t" not in text and text.strip('" \r\n'):
-        raise source.error("line 1", "holds one field only; expected fields separated by ',' or ';'")
+        raise reading.error("line 1", "holds one field only; expected fields separated by ',' or ';'")
     return found if found != " " else ","

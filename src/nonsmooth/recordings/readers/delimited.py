@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from nonsmooth.errors import DataFileError
 from nonsmooth.recordings.readers.fields import Field, FieldTable, chosen, traces_of
 from nonsmooth.recordings.readers.text_table import Numerals, Row, checked_header, decoded, read_cells, rows, sniffed
-from nonsmooth.recordings.reading import Options, Reading, Source, Trace, names_of
+from nonsmooth.recordings.reading import Reading, Trace, names_of
 
 _COMMENT = ("#", "%")
 _STAMP = re.compile(r"[\d:/.,+\-TZ ]*\d:\d[\d:/.,+\-TZ ]*")
@@ -22,19 +22,15 @@ _ARROW = re.compile(r"(\d\d:\d\d:\d\d\.\d+) -> ")  # the serial monitor's clock 
 _SEARCHED = 60  # lines searched for the first of numbers, where a table cannot be read
 
 
-def read(data: bytes, source: Source, options: Options) -> Reading:
+def read(data: bytes, reading: Reading) -> None:
     """Read a table."""
-    reading = Reading()
-    stream = decoded(data, source, reading.remarks)
-    read_lines(stream, "Run #1", source, options, reading, ends=data.endswith((b"\n", b"\r")))
-    return reading
+    stream = decoded(data, reading)
+    read_lines(stream, "Run #1", reading, ends=data.endswith((b"\n", b"\r")))
 
 
 def read_lines(
     stream: Iterable[str],
     run: str,
-    source: Source,
-    options: Options,
     reading: Reading,
     *,
     ends: bool = True,
@@ -44,7 +40,7 @@ def read_lines(
     stream = iter(stream)
     top: list[str] = []
     comments: list[str] = []
-    kept = _kept(stream, options, top, comments)
+    kept = _kept(stream, reading, top, comments)
     try:
         first = next((text for text in kept if text.strip()), "")
         at = len(top)
@@ -52,72 +48,68 @@ def read_lines(
             delimiter, first = match[1], next((text for text in kept if text.strip()), "")
             at = len(top)
         if not first:
-            raise source.error("", "holds no table, only blank lines or comments")
-        delimiter = options.delimiter or delimiter or sniffed(first)
+            raise reading.error("", "holds no table, only blank lines or comments")
+        delimiter = reading.delimiter or delimiter or sniffed(first)
         lines: Iterator[str] = itertools.chain([first], kept)
         if _ARROW.match(first):
             lines = (_ARROW.sub(rf"\1{delimiter}", text) for text in lines)
-        table = rows(lines, delimiter, source, at)
-        reading.traces += _table(table, run, delimiter, source, options, reading, ends)
+        table = rows(lines, delimiter, reading, at)
+        reading.traces += _table(table, run, delimiter, reading, ends)
     except DataFileError as error:
-        advice = "" if options.header else _advice([*top, *itertools.islice(stream, max(0, _SEARCHED - len(top)))])
+        advice = "" if reading.header else _advice([*top, *itertools.islice(stream, max(0, _SEARCHED - len(top)))])
         raise DataFileError(f"{error}{advice}") from error
-    reading.header.setdefault("comments", comments)
+    reading.told.setdefault("comments", comments)
 
 
-def _kept(stream: Iterable[str], options: Options, top: list[str], comments: list[str]) -> Iterator[str]:
+def _kept(stream: Iterable[str], reading: Reading, top: list[str], comments: list[str]) -> Iterator[str]:
     """The lines of the table; others are blank, so that lines keep their numbers."""
     begun = False
-    skip, leave = (options.skip, ()) if isinstance(options.skip, int) else (0, options.skip)
+    skip, leave = (reading.skip, ()) if isinstance(reading.skip, int) else (0, tuple(reading.skip))
     for line, text in enumerate(stream, 1):
         top += [text] if line <= _SEARCHED or not begun else []
         begin = text.lstrip()
-        above = line <= skip or line < options.header
+        above = line <= skip or line < (reading.header or 0)
         begun = begun or not (above or begin == "" or begin.startswith(_COMMENT))
         if not begun and line > skip and begin.startswith(_COMMENT):
             comments.append(text.strip())
-        left = not begun or (line != options.header and bool(leave) and begin.startswith(leave))
+        left = not begun or (line != reading.header and bool(leave) and begin.startswith(leave))
         yield "\n" if left else text
         if begun and not leave and line >= _SEARCHED:
             yield from stream
 
 
-def _table(
-    table: Iterator[Row], run: str, delimiter: str, source: Source, options: Options, reading: Reading, ends: bool
-) -> Iterator[Trace]:
-    decimal = options.decimal or ("." if delimiter == "," else None)
-    numerals = Numerals(decimal, options.thousands, options.na)
+def _table(table: Iterator[Row], run: str, delimiter: str, reading: Reading, ends: bool) -> Iterator[Trace]:
+    decimal = reading.decimal or ("." if delimiter == "," else None)
+    numerals = Numerals(decimal, reading.thousands, reading.na or ())
     line, fields = next(table)
-    header, table = _header(checked_header(fields, line, source), table, line, numerals, source, options)
-    if options.units_row:
-        units, table = _units(table, options.units_row, source)
+    header, table = _header(checked_header(fields, line, reading), table, line, numerals, reading)
+    if reading.units_row:
+        units, table = _units(table, reading.units_row, reading)
         units += [""] * (len(header) - len(units))
         header = [f"{name} ({unit})" if unit else name for name, unit in zip(header, units, strict=False)]
-    picked = chosen(header, options, source, options.rate)
-    if options.columns is not None and set(picked) <= {"time", "run"}:
+    picked = chosen(header, reading)
+    if reading.columns is not None and set(picked) <= {"time", "run"}:
         there = names_of([name for name in header if name.strip()])
-        raise source.error(
+        raise reading.error(
             "", f"columns= names no channel, and leaves out what it does not name; the columns are {there}"
         )
     wanted = list(dict.fromkeys(column for column, _ in picked.values()))
-    stamped = picked.get("time", (-1, ""))[0] if options.axis == "time" else -1
-    cells = read_cells(
-        table, header, wanted, numerals, source, reading.remarks, ends_with_newline=ends, stamped=stamped
-    )
+    stamped = picked.get("time", (-1, ""))[0] if reading.axis == "time" else -1
+    cells = read_cells(table, header, wanted, numerals, reading, ends_with_newline=ends, stamped=stamped)
     left = [text for k, text in enumerate(header) if k not in wanted and text.strip()]
     if left:
-        reading.remarks.say(f"columns not asked for are left out: {names_of(left)}")
+        reading.say(f"columns not asked for are left out: {names_of(left)}")
     place = {column: k for k, column in enumerate(wanted)}
     found = [
         Field(name, unit, cells.values[place[c]], f"column {c + 1} ({header[c]})", cells.rows[place[c]])
         for name, (c, unit) in picked.items()
     ]
-    reading.header.update(delimiter=delimiter, columns=len(header), rows=len(cells.lines))
-    yield from traces_of(FieldTable(run, found, len(cells.lines), cells.lines), options, source, reading)
+    reading.told.update(delimiter=delimiter, columns=len(header), rows=len(cells.lines))
+    yield from traces_of(FieldTable(run, found, len(cells.lines), cells.lines), reading)
 
 
 def _header(
-    top: list[str], table: Iterator[Row], line: int, numerals: Numerals, source: Source, options: Options
+    top: list[str], table: Iterator[Row], line: int, numerals: Numerals, reading: Reading
 ) -> tuple[list[str], Iterator[Row]]:
     """The header's fields and the rows below; a first row of numbers only is data, its columns have places."""
     labelled = [_LABELLED.fullmatch(text) for text in top]
@@ -126,24 +118,24 @@ def _header(
         whole = itertools.chain([(line, top)], table)
         return names, ((at, [re.sub(r"^[^\d]*[:=]", "", text) for text in fields]) for at, fields in whole)
     plain = all(text == "" or _STAMP.fullmatch(text) or numerals.some(text) for text in top)
-    if options.header or not plain or not any(map(numerals.some, top)):
+    if reading.header or not plain or not any(map(numerals.some, top)):
         return top, table
-    if options.columns is None and options.rate is None:
-        raise source.error(
+    if reading.columns is None and reading.rate is None:
+        raise reading.error(
             f"line {line}",
             "the table has no header, so its columns are not known; name them by place, columns={'time': 0, 'x': 1}",
         )
     return [f"column {k + 1}" for k in range(len(top))], itertools.chain([(line, top)], table)
 
 
-def _units(table: Iterator[Row], at: int, source: Source) -> tuple[list[str], Iterator[Row]]:
+def _units(table: Iterator[Row], at: int, reading: Reading) -> tuple[list[str], Iterator[Row]]:
     """The row of units, without brackets, and the rows below it."""
     for line, fields in table:
         if line >= at:
             if line == at:
                 return [text.strip().strip("[]()").strip() for text in fields], table
             break
-    raise source.error(f"line {at}", "is no row of units below the header, as units_row says")
+    raise reading.error(f"line {at}", "is no row of units below the header, as units_row says")
 
 
 def _advice(head: list[str]) -> str:

@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.recordings.reading import (
     MAX_COLUMNS,
-    Options,
     Reading,
-    Source,
     Trace,
     is_axis_name,
     names_of,
@@ -72,71 +70,71 @@ def label(text: str) -> tuple[str, str]:
     return (name, tail) if not unit and tail in ("s", "ms", "us") and is_axis_name(name, "time") else (name, unit)
 
 
-def chosen(header: Sequence[str], options: Options, source: Source, rate: float | None) -> dict[str, tuple[int, str]]:
+def chosen(header: Sequence[str], reading: Reading) -> dict[str, tuple[int, str]]:
     """Our name -> (column, unit): as ``columns`` says, else every column under its own name."""
     named = [label(text) for text in header]
     picked: dict[str, tuple[int, str]] = {}
-    if options.columns is not None:
-        for ours, theirs in options.columns.items():
+    if reading.columns is not None:
+        for ours, theirs in reading.columns.items():
             wanted, unit = theirs if isinstance(theirs, tuple) else (theirs, None)
-            column = _find(wanted, header, named, source)
+            column = _find(wanted, header, named, reading)
             picked[ours] = (column, named[column][1] if unit is None else unit)
     else:
         for column, (name, unit) in enumerate(named):
             if not header[column].strip():
                 continue
-            ours = options.axis if is_axis_name(name, options.axis) and options.axis not in picked else name
+            ours = reading.axis if is_axis_name(name, reading.axis) and reading.axis not in picked else name
             picked[ours if ours not in picked else f"{ours} (column {column + 1})"] = (column, unit)
-    if options.axis not in picked and rate is None:
-        hint = "or give its sample rate in Hz, rate=..." if options.axis == "time" else "or another axis="
-        raise source.error(
-            "", f"no {options.axis} column among {names_of(header)}; name it, columns={{{options.axis!r}: ...}}, {hint}"
+    if reading.axis not in picked and reading.rate is None:
+        hint = "or give its sample rate in Hz, rate=..." if reading.axis == "time" else "or another axis="
+        raise reading.error(
+            "", f"no {reading.axis} column among {names_of(header)}; name it, columns={{{reading.axis!r}: ...}}, {hint}"
         )
     return picked
 
 
-def _find(wanted: str | int, header: Sequence[str], named: list[tuple[str, str]], source: Source) -> int:
+def _find(wanted: str | int, header: Sequence[str], named: list[tuple[str, str]], reading: Reading) -> int:
     if isinstance(wanted, int):
         if not 0 <= wanted < len(header):
-            raise source.error("", f"has {len(header)} columns; there is no column {wanted} (counted from 0)")
+            raise reading.error("", f"has {len(header)} columns; there is no column {wanted} (counted from 0)")
         return wanted
     for exact in ([text.strip() for text in header], [name for name, _ in named]):
         fits = [k for k, text in enumerate(exact) if text == wanted.strip()]
         if len(fits) > 1:
-            raise source.error("", f"{len(fits)} columns are called {wanted!r}; give the place, from 0: {fits}")
+            raise reading.error("", f"{len(fits)} columns are called {wanted!r}; give the place, from 0: {fits}")
         if fits:
             return fits[0]
-    raise source.error("", f"no column {wanted!r}; the columns are {names_of(header)}")
+    raise reading.error("", f"no column {wanted!r}; the columns are {names_of(header)}")
 
 
-def traces_of(table: FieldTable, options: Options, source: Source, reading: Reading) -> Iterator[Trace]:
+def traces_of(table: FieldTable, reading: Reading) -> Iterator[Trace]:
     """The channels of a table by run, over its axis or at its rate."""
-    fields = [_unwrapped(one, options) for one in table.fields]
-    axis, rate = next((one for one in fields if one.name == options.axis), None), options.rate or table.rate
-    numbers = next((one for one in fields if one.name == "run" and "run" in (options.columns or {})), None)
+    fields = [_unwrapped(one, reading) for one in table.fields]
+    axis, rate = next((one for one in fields if one.name == reading.axis), None), reading.rate or table.rate
+    numbers = next((one for one in fields if one.name == "run" and "run" in (reading.columns or {})), None)
     fields = [one for one in fields if one is not axis and one is not numbers]
-    if axis is not None and options.rate is not None:
-        reading.remarks.say(f"{axis.origin} is not used as the time, since rate= is given")
+    if axis is not None and reading.rate is not None:
+        reading.say(f"{axis.origin} is not used as the time, since rate= is given")
         axis = None
     if axis is None:
         held, along, unit = np.arange(table.rows), np.empty(0), "s"
     else:
         held = np.arange(table.rows) if axis.rows is None else axis.rows
-        along, unit = _along(axis, table, options, source, reading)
-    runs = _runs(table, numbers, source)
+        along, unit = _along(axis, table, reading)
+    runs = _runs(table, numbers, reading)
     if len(runs) * (len(fields) + 1) > MAX_COLUMNS:
-        raise source.error("", f"holds {len(fields) + 1} columns in {len(runs)} runs; at most {MAX_COLUMNS} are read")
+        raise reading.error("", f"holds {len(fields) + 1} columns in {len(runs)} runs; at most {MAX_COLUMNS} are read")
     for one in fields:
         rows = np.arange(table.rows) if one.rows is None else one.rows
         if one.values.dtype.kind == "c":
-            raise source.error(one.origin, "holds complex numbers; save its parts as two real vectors")
+            raise reading.error(one.origin, "holds complex numbers; save its parts as two real vectors")
         for run, inside in runs:
             whole = inside is None and len(rows) == table.rows
             mine = slice(None) if inside is None else inside[rows]
             at, values = rows[mine], np.ascontiguousarray(one.values[mine], np.float64)
             blank = (len(held) if inside is None else int(np.count_nonzero(inside[held]))) - len(at)
             if blank and len(at):
-                reading.remarks.of(run, one.name, f"{blank} blank fields dropped")
+                reading.of(run, one.name, f"{blank} blank fields dropped")
             if axis is None:
                 first = 0 if inside is None else int(np.flatnonzero(inside)[0])
                 taken = (at - first) / float(rate or 1.0)
@@ -146,8 +144,8 @@ def traces_of(table: FieldTable, options: Options, source: Source, reading: Read
                 place = np.minimum(np.searchsorted(held, at), max(len(held) - 1, 0))
                 missing = at[held[place] != at] if len(held) else at
                 if len(missing):
-                    complaint = f"run {run!r}, channel {one.name!r} has a value where there is no {options.axis}"
-                    raise source.error(row_of(int(missing[0]), table.lines), complaint)
+                    complaint = f"run {run!r}, channel {one.name!r} has a value where there is no {reading.axis}"
+                    raise reading.error(row_of(int(missing[0]), table.lines), complaint)
                 taken = along[place]
             lines = None if table.lines is None else table.lines[at]
             yield Trace(run, one.name, one.unit, taken, values, one.origin, unit, lines=lines, attrs=one.attrs)
@@ -158,9 +156,9 @@ def row_of(row: int, lines: IntArray | None) -> str:
     return f"row {row + 1}" if lines is None else f"line {lines[row]}"
 
 
-def _unwrapped(field: Field, options: Options) -> Field:
+def _unwrapped(field: Field, reading: Reading) -> Field:
     """The field, with a counter that begins anew at its period put together."""
-    period = options.wraps.get(field.name)
+    period = (reading.wraps or {}).get(field.name)
     if period is None or field.values.dtype.kind not in "iuf":
         return field
     values = np.array(field.values, np.float64)
@@ -169,47 +167,45 @@ def _unwrapped(field: Field, options: Options) -> Field:
     return replace(field, values=values)
 
 
-def _along(
-    axis: Field, table: FieldTable, options: Options, source: Source, reading: Reading
-) -> tuple[FloatArray, str]:
+def _along(axis: Field, table: FieldTable, reading: Reading) -> tuple[FloatArray, str]:
     """The axis and its unit: times in seconds."""
-    axis = replace(axis, unit=options.units.get(options.axis, axis.unit))
-    if options.axis != "time":
+    axis = replace(axis, unit=(reading.units or {}).get(reading.axis, axis.unit))
+    if reading.axis != "time":
         return np.ascontiguousarray(axis.values, np.float64), axis.unit
     if axis.values.dtype.kind not in "iufb":
-        seconds, begun = seconds_of(axis, table.lines, source)
+        seconds, begun = seconds_of(axis, table.lines, reading)
         if begun:
             reading.run_attrs.setdefault(table.run, {})["started"] = begun
-        period = options.wraps.get("time")
+        period = (reading.wraps or {}).get("time")
         return (seconds if period is None else np.unwrap(seconds, period=period)), "s"
     values = np.asarray(axis.values, np.float64)
     scaled = scaled_time(values, axis.unit)
     if scaled is None:
-        raise source.error(
+        raise reading.error(
             "", f"the time column is in {axis.unit!r}, which is no unit of time; say its unit, units={{'time': 'ms'}}"
         )
     if not axis.unit:
-        reading.remarks.say("the time column has no unit; taken as seconds (else units={'time': 'ms'})")
+        reading.say("the time column has no unit; taken as seconds (else units={'time': 'ms'})")
     if len(scaled) and scaled[0] > EPOCH:
-        reading.remarks.say(f"times count from an epoch, {scaled[0]:.15g} s ago at the first; they begin at 0 here")
+        reading.say(f"times count from an epoch, {scaled[0]:.15g} s ago at the first; they begin at 0 here")
         scaled = np.asarray(scaled_time(values - values[0], axis.unit))
     return scaled, "s"
 
 
-def _runs(table: FieldTable, numbers: Field | None, source: Source) -> list[tuple[str, BoolArray | None]]:
+def _runs(table: FieldTable, numbers: Field | None, reading: Reading) -> list[tuple[str, BoolArray | None]]:
     """The runs, each with the mask of its rows; one run where no column numbers them."""
     if numbers is None:
         return [(table.run, None)]
     if numbers.rows is not None and len(numbers.rows) != table.rows:
         missing = int(np.setdiff1d(np.arange(table.rows), numbers.rows)[0])
-        raise source.error(row_of(missing, table.lines), "the column that numbers the runs is blank")
+        raise reading.error(row_of(missing, table.lines), "the column that numbers the runs is blank")
     values = np.asarray(numbers.values, np.float64)
     if not np.isfinite(values).all():
         bad = int(np.flatnonzero(~np.isfinite(values))[0])
-        raise source.error(row_of(bad, table.lines), f"the number of the run is {values[bad]}")
+        raise reading.error(row_of(bad, table.lines), f"the number of the run is {values[bad]}")
     found, first = np.unique(values, return_index=True)
     if len(found) > MAX_COLUMNS:
-        raise source.error("", f"holds {len(found)} runs; at most {MAX_COLUMNS} are read")
+        raise reading.error("", f"holds {len(found)} runs; at most {MAX_COLUMNS} are read")
     return [(f"Run #{value:.12g}", values == value) for value in found[np.argsort(first)]]
 
 
@@ -220,7 +216,7 @@ _ISO = re.compile(r"\d{4}-?\d\d-?\d\d[ T]\d\d.*")
 _CLOCK = re.compile(r"(?:(\d+):)?(\d{1,2}):(\d{1,2}(?:[.,]\d*)?)")
 
 
-def seconds_of(axis: Field, lines: IntArray | None, source: Source) -> tuple[FloatArray, str]:
+def seconds_of(axis: Field, lines: IntArray | None, reading: Reading) -> tuple[FloatArray, str]:
     """Seconds since the first stamp and, where stamps have dates, when that was."""
     import pandas
 
@@ -235,22 +231,22 @@ def seconds_of(axis: Field, lines: IntArray | None, source: Source) -> tuple[Flo
     if given is None and texts and _CLOCK.fullmatch(texts[0]):
         found = [_CLOCK.fullmatch(text) for text in texts]
         if None in found:
-            raise _unread(texts, found.index(None), axis, lines, source)
+            raise _unread(texts, found.index(None), axis, lines, reading)
         parts = [[float((part or "0").replace(",", ".")) for part in match.groups()] for match in found if match]
         return np.array(parts) @ np.array([3600.0, 60.0, 1.0]), ""
     if given is None and not (texts and _ISO.fullmatch(texts[0])):
-        raise _unread(texts, 0, axis, lines, source)
+        raise _unread(texts, 0, axis, lines, reading)
     plain = [text.replace(",", ".") for text in texts] if given is None else texts
     read = pandas.to_datetime(plain, format=given or "ISO8601", utc=True, errors="coerce")
     if read.hasnans:
-        raise _unread(texts, int(np.flatnonzero(read.isna())[0]), axis, lines, source)
+        raise _unread(texts, int(np.flatnonzero(read.isna())[0]), axis, lines, reading)
     if not len(read):
         return np.empty(0), ""
     return np.asarray((read - read[0]).total_seconds(), np.float64), str(read[0].isoformat())
 
 
-def _unread(texts: list[str], place: int, axis: Field, lines: IntArray | None, source: Source) -> Exception:
-    return source.error(
+def _unread(texts: list[str], place: int, axis: Field, lines: IntArray | None, reading: Reading) -> Exception:
+    return reading.error(
         row_of(place if lines is None or axis.rows is None else int(axis.rows[place]), lines),
         f"the time {texts[place][:40]!r} is neither a number nor a stamp as 2026-05-31T14:05:09.25 or 14:05:09.25"
         + (f" nor of the form {axis.unit!r}" if "%" in axis.unit else "")

@@ -17,54 +17,54 @@ import numpy as np
 
 from nonsmooth.recordings.readers.matlab import load_hdf5, load_v5
 from nonsmooth.recordings.readers.tdms import load_tdms
-from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Group, Remarks, Source, inflation_limit, needed, readable
+from nonsmooth.recordings.reading import MAX_COLUMNS, Archive, Group, Reading, inflation_limit, needed, readable
 
 Loaded = tuple[Mapping[str, Any], dict[str, Any]]
 
 
-def _matlab(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+def _matlab(data: bytes, reading: Reading) -> Loaded:
     is_hdf5 = data.startswith(b"\x89HDF") or data[512:516] == b"\x89HDF"
-    variables = load_hdf5(data, source, remarks, matlab=True) if is_hdf5 else load_v5(data, source, remarks)
+    variables = load_hdf5(data, reading, matlab=True) if is_hdf5 else load_v5(data, reading)
     # An HDF5 file that another program wrote has no text before its own mark.
     text = b"" if data.startswith(b"\x89HDF") else data[:116].split(b"\0")[0]
     return variables, {"version": "7.3" if is_hdf5 else "5", "text": text.decode("ascii", "replace")}
 
 
-def _hdf5(data: bytes, source: Source, remarks: Remarks) -> Loaded:
-    return load_hdf5(data, source, remarks, matlab=False), {}
+def _hdf5(data: bytes, reading: Reading) -> Loaded:
+    return load_hdf5(data, reading, matlab=False), {}
 
 
-def _numpy(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+def _numpy(data: bytes, reading: Reading) -> Loaded:
     if not data.startswith(b"PK"):
-        return Group({"values": _array(data, "values", source)}), {}
-    archive = Archive(data, source)
+        return Group({"values": _array(data, "values", reading)}), {}
+    archive = Archive(data, reading)
     found = {name.removesuffix(".npy"): b"".join(archive.pieces(name)) for name in archive.names}
-    return Group({name: _array(content, name, source) for name, content in found.items()}), {"arrays": len(found)}
+    return Group({name: _array(content, name, reading) for name, content in found.items()}), {"arrays": len(found)}
 
 
-def _array(data: bytes, name: str, source: Source) -> Any:
+def _array(data: bytes, name: str, reading: Reading) -> Any:
     """The array of one .npy file; a structured one as a group of its fields."""
     stream = io.BytesIO(data)
     form = np.lib.format
-    with readable("a .npy array", source, name):
+    with readable("a .npy array", reading, name):
         version = form.read_magic(stream)
         shape, _, kind = (form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0)(stream)
         if kind.hasobject or math.prod(shape) * kind.itemsize > len(data):
-            raise source.error(name, f"says it holds {kind} values of shape {shape}; expected numbers that fit it")
+            raise reading.error(name, f"says it holds {kind} values of shape {shape}; expected numbers that fit it")
         stream.seek(0)
         values = np.load(stream, allow_pickle=False)
     return Group({field: values[field] for field in values.dtype.names}) if values.dtype.names else values
 
 
-def _arrow(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+def _arrow(data: bytes, reading: Reading) -> Loaded:
     # In this thread and from its own memory: else threads may go on behind the error of a damaged file.
-    pyarrow = needed("pyarrow", "pyarrow", source)
+    pyarrow = needed("pyarrow", "pyarrow", reading)
     held = pyarrow.BufferReader(data)
     if data.startswith(b"PAR1"):
-        opened = needed("pyarrow.parquet", "pyarrow", source).ParquetFile(held)
+        opened = needed("pyarrow.parquet", "pyarrow", reading).ParquetFile(held)
         shape = (opened.metadata.num_rows, opened.metadata.num_columns)
         if math.prod(shape) * 8 > inflation_limit(len(data)) or shape[1] > MAX_COLUMNS:
-            raise source.error("", f"says it holds {shape[0]} rows of {shape[1]} columns, more than it warrants")
+            raise reading.error("", f"says it holds {shape[0]} rows of {shape[1]} columns, more than it warrants")
         table = opened.read(use_threads=False)
     else:
         table = pyarrow.ipc.open_file(held, options=pyarrow.ipc.IpcReadOptions(use_threads=False)).read_all()
@@ -76,28 +76,28 @@ def _arrow(data: bytes, source: Source, remarks: Remarks) -> Loaded:
     return Group(columns, units), {"columns": len(columns), "rows": table.num_rows}
 
 
-def _wave(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+def _wave(data: bytes, reading: Reading) -> Loaded:
     from scipy.io import wavfile
 
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         rate, samples = wavfile.read(io.BytesIO(data))
     for warning in said:
-        remarks.say(f"SciPy: {warning.message}"[:200])
+        reading.say(f"SciPy: {warning.message}"[:200])
     kind = samples.dtype
     if kind.kind in "iu":  # as parts of full scale, as audio programs show them
         half = 128.0 if kind.kind == "u" else float(-np.iinfo(kind).min)
         samples = (samples - (128.0 if kind.kind == "u" else 0.0)) / half
     columns = samples.reshape(len(samples), -1)
-    remarks.say("values are parts of full scale; multiply by what full scale stands for")
+    reading.say("values are parts of full scale; multiply by what full scale stands for")
     names = [f"channel {k + 1}" for k in range(columns.shape[1])]
     found = Group(dict(zip(names, columns.T, strict=True)), dict.fromkeys(names, "1"), float(rate))
     return found, {"rate": float(rate), "samples": str(kind)}
 
 
-def _universal(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+def _universal(data: bytes, reading: Reading) -> Loaded:
     """Data sets 58; those over the same abscissa are one group."""
-    pyuff = needed("pyuff", "pyuff", source)
+    pyuff = needed("pyuff", "pyuff", reading)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "data.uff"
         path.write_bytes(data)
@@ -127,14 +127,14 @@ def _direction(number: Any) -> str:
     return f"{'-' if number < 0 else '+'}{' XYZ'[abs(int(number))]}" if 1 <= abs(int(number)) <= 3 else ""
 
 
-def _measured(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+def _measured(data: bytes, reading: Reading) -> Loaded:
     """Channel groups of an MDF file: one run, each group with the clock of its master."""
-    asammdf = needed("asammdf", "asammdf", source, "mdf")
+    asammdf = needed("asammdf", "asammdf", reading, "mdf")
     groups: dict[str, Any] = {}
     with asammdf.MDF(io.BytesIO(data)) as opened:
         cycles = sum(group.channel_group.cycles_nr * len(group.channels) for group in opened.groups)
         if 8 * cycles > inflation_limit(len(data)):
-            raise source.error("", f"says it holds {cycles} samples, more than a file of {len(data)} bytes warrants")
+            raise reading.error("", f"says it holds {cycles} samples, more than a file of {len(data)} bytes warrants")
         for k, held in enumerate(opened.groups):
             group = Group()
             group.run = "Run #1"
@@ -147,15 +147,15 @@ def _measured(data: bytes, source: Source, remarks: Remarks) -> Loaded:
     return groups, {"version": str(opened.version)}
 
 
-def load(data: bytes, source: Source, remarks: Remarks) -> Loaded:
+def load(data: bytes, reading: Reading) -> Loaded:
     """The arrays of a file."""
-    loader, what = _LOADERS[source.format]
-    with readable(what, source):
-        return loader(data, source, remarks)
+    loader, what = _LOADERS[reading.format]
+    with readable(what, reading):
+        return loader(data, reading)
 
 
 #: What loads each format of arrays, and its name in messages.
-_LOADERS: dict[str, tuple[Callable[[bytes, Source, Remarks], Loaded], str]] = {
+_LOADERS: dict[str, tuple[Callable[[bytes, Reading], Loaded], str]] = {
     "mat": (_matlab, "a MATLAB file"),
     "hdf5": (_hdf5, "HDF5"),
     "tdms": (load_tdms, "TDMS"),

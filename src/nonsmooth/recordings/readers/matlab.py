@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.recordings.reading import MAX_COLUMNS, MAX_DEPTH, Group, Remarks, Source, inflation_limit
+from nonsmooth.recordings.reading import MAX_COLUMNS, MAX_DEPTH, Group, Reading, inflation_limit
 
 _HEADER = 128
 _INT8, _INT32, _MATRIX, _COMPRESSED = 1, 5, 14, 15
@@ -28,28 +28,28 @@ class _LeftOut(Exception):
     """The variable is of a class that holds no plain data."""
 
 
-def load_v5(data: bytes, source: Source, remarks: Remarks) -> dict[str, Any]:
+def load_v5(data: bytes, reading: Reading) -> dict[str, Any]:
     """The variables of a file, as dicts (structs), lists (cells, arrays of structs), text and arrays."""
     from scipy.io import loadmat
 
     if len(data) < _HEADER or data[126:128] not in (b"IM", b"MI"):
-        raise source.error("byte 126", "expected the byte order mark of a MATLAB file of version 5")
+        raise reading.error("byte 126", "expected the byte order mark of a MATLAB file of version 5")
     order = "<" if data[126:128] == b"IM" else ">"
     # The offset of a part that only objects use is cleared with them.
     plain = bytearray(data[:116] + b"\0" * 8 + data[124:_HEADER])
     left = inflation_limit(len(data))
-    for kind, body, position in _elements(memoryview(data), order, "variable at ", source, _HEADER):
+    for kind, body, position in _elements(memoryview(data), order, "variable at ", reading, _HEADER):
         place = f"variable at byte {position}"
         if kind == _COMPRESSED:
-            unpacked = _unpacked(body, left, place, source)
+            unpacked = _unpacked(body, left, place, reading)
             left -= len(unpacked)
-            kind, body, _ = next(_elements(memoryview(unpacked), order, f"{place}, ", source), (0, body, 0))
+            kind, body, _ = next(_elements(memoryview(unpacked), order, f"{place}, ", reading), (0, body, 0))
         if kind != _MATRIX:
-            raise source.error(place, f"is of type {kind}, expected a matrix (14) or a packed one (15)")
+            raise reading.error(place, f"is of type {kind}, expected a matrix (14) or a packed one (15)")
         try:
-            name = _name(body, order, place, source)
+            name = _name(body, order, place, reading)
         except _LeftOut as why:
-            remarks.say(f"{place}: holds {why}; left out")
+            reading.say(f"{place}: holds {why}; left out")
             continue
         if name:
             plain += struct.pack(order + "II", _MATRIX, len(body)) + body
@@ -57,27 +57,27 @@ def load_v5(data: bytes, source: Source, remarks: Remarks) -> dict[str, Any]:
     return {name: _plain(value) for name, value in found.items() if not name.startswith("__")}
 
 
-def _unpacked(packed: memoryview, limit: int, place: str, source: Source) -> bytes:
+def _unpacked(packed: memoryview, limit: int, place: str, reading: Reading) -> bytes:
     """The bytes of a packed variable, at most ``limit``."""
     unpacker = zlib.decompressobj()
     try:
         found = unpacker.decompress(packed, limit + 1)
     except zlib.error as error:
-        raise source.error(place, f"cannot be unpacked, it is damaged ({error})") from None
+        raise reading.error(place, f"cannot be unpacked, it is damaged ({error})") from None
     if len(found) > limit:
-        raise source.error(place, f"unpacks to more than {limit} bytes, more than the file's size warrants")
+        raise reading.error(place, f"unpacks to more than {limit} bytes, more than the file's size warrants")
     if not unpacker.eof:
-        raise source.error(place, "cannot be unpacked, it is cut short")
+        raise reading.error(place, "cannot be unpacked, it is cut short")
     return found
 
 
 def _elements(
-    body: memoryview, order: str, place: str, source: Source, position: int = 0
+    body: memoryview, order: str, place: str, reading: Reading, position: int = 0
 ) -> Iterator[tuple[int, memoryview, int]]:
     """Type, content and place of each data element."""
     while position < len(body):
         if len(body) - position < 8:
-            raise source.error(f"{place}byte {position}", "an element is cut short")
+            raise reading.error(f"{place}byte {position}", "an element is cut short")
         kind, size = struct.unpack_from(order + "II", body, position)
         begin, following = position + 8, position + 8 + size
         if kind >> 16:  # a small element: up to four bytes inside its own tag
@@ -87,20 +87,20 @@ def _elements(
         if begin + size > min(max(following, begin), len(body)):
             left = min(following, len(body)) - begin
             message = f"is {size} bytes long, only {left} follow: the file is cut short"
-            raise source.error(f"{place}byte {position}", message)
+            raise reading.error(f"{place}byte {position}", message)
         yield kind, body[begin : begin + size], position
         position = following
 
 
-def _name(body: memoryview, order: str, place: str, source: Source, depth: int = 0) -> bytes:
+def _name(body: memoryview, order: str, place: str, reading: Reading, depth: int = 0) -> bytes:
     """The name of a matrix, whose number of elements, and of those of its members, fits the bytes it has."""
     if depth > MAX_DEPTH:
-        raise source.error(place, f"is nested deeper than {MAX_DEPTH}")
-    parts = _elements(body, order, f"{place}, ", source)
+        raise reading.error(place, f"is nested deeper than {MAX_DEPTH}")
+    parts = _elements(body, order, f"{place}, ", reading)
     (_, flags, _), (kind, shape, _), (_, name, _) = (next(parts, (0, body[:0], 0)) for _ in range(3))
     dims = struct.unpack(f"{order}{len(shape) // 4}i", shape[: len(shape) // 4 * 4])
     if len(flags) != 8 or kind != _INT32 or not 2 <= len(dims) <= 32 or min(dims) < 0:
-        raise source.error(place, f"expected the flags and the dimensions of a matrix, got {dims[:4]}")
+        raise reading.error(place, f"expected the flags and the dimensions of a matrix, got {dims[:4]}")
     (word, _), n, rest = struct.unpack(order + "II", flags), math.prod(dims), [*parts]
     class_, held = word & 0xFF, [kind for kind, *_ in rest]
     if class_ not in (_CELL, _STRUCT, _CHAR, *_NUMBERS):
@@ -115,10 +115,10 @@ def _name(body: memoryview, order: str, place: str, source: Source, depth: int =
         parts_of, count = (_TEXT, 1) if class_ == _CHAR else (_NUMERIC, 2 if word & 0x0800 else 1)
         fits = n <= len(body) and len(held) == count and set(held) <= parts_of
     if not fits:
-        raise source.error(place, f"says it has {n} elements, which are not what its {len(body)} bytes hold")
+        raise reading.error(place, f"says it has {n} elements, which are not what its {len(body)} bytes hold")
     for kind, member, _ in rest:
         if kind == _MATRIX and len(member):
-            _name(member, order, place, source, depth + 1)
+            _name(member, order, place, reading, depth + 1)
     return bytes(name).split(b"\0")[0]
 
 
@@ -144,25 +144,25 @@ def _plain(value: Any) -> Any:
 _RATES = ("sample_rate", "sampling_rate", "sampling_frequency", "rate", "fs")
 
 
-def load_hdf5(data: bytes, source: Source, remarks: Remarks, *, matlab: bool) -> dict[str, Any]:
+def load_hdf5(data: bytes, reading: Reading, *, matlab: bool) -> dict[str, Any]:
     """The variables of a file, as dicts (structs), lists (cells, arrays of structs), text and arrays."""
     import h5py
 
     with h5py.File(io.BytesIO(data), "r") as opened:
-        return _GroupReader(h5py, opened, source, remarks, inflation_limit(len(data)), matlab).group(opened, 0)
+        return _GroupReader(h5py, opened, reading, inflation_limit(len(data)), matlab).group(opened, 0)
 
 
 class _GroupReader:
     """An open file, of whose groups so much is read as its limits allow."""
 
-    def __init__(self, h5py: Any, opened: Any, source: Source, remarks: Remarks, limit: int, matlab: bool) -> None:
-        self._h5py, self._file, self._source, self._remarks, self._matlab = h5py, opened, source, remarks, matlab
+    def __init__(self, h5py: Any, opened: Any, reading: Reading, limit: int, matlab: bool) -> None:
+        self._h5py, self._file, self._reading, self._matlab = h5py, opened, reading, matlab
         self._left = self._limit = limit
         self._members = 16 * MAX_COLUMNS
 
     def group(self, group: Any, depth: int) -> dict[str, Any]:
         if depth > MAX_DEPTH:
-            raise self._source.error(str(group.name), f"is nested deeper than {MAX_DEPTH}")
+            raise self._reading.error(str(group.name), f"is nested deeper than {MAX_DEPTH}")
         found = {} if self._matlab else Group(rate=_rate(group))
         for name in group:
             place = f"{group.name.rstrip('/')}/{name}"
@@ -170,7 +170,7 @@ class _GroupReader:
             if name.startswith("#"):
                 continue
             if not isinstance(group.get(name, getlink=True), self._h5py.HardLink):
-                self._remarks.say(f"{place}: is a link; left out")
+                self._reading.say(f"{place}: is a link; left out")
                 continue
             found[name] = self._value(group[name], place, depth)
             if isinstance(found, Group):
@@ -182,11 +182,11 @@ class _GroupReader:
     def _value(self, item: Any, place: str, depth: int) -> Any:
         self._members -= 1
         if self._members < 0:
-            raise self._source.error(place, f"the file holds more than {16 * MAX_COLUMNS} arrays")
+            raise self._reading.error(place, f"the file holds more than {16 * MAX_COLUMNS} arrays")
         if isinstance(item, self._h5py.Group):
             return _rows(self.group(item, depth + 1))
         if not isinstance(item, self._h5py.Dataset):
-            self._remarks.say(f"{place}: is neither a group nor an array; left out")
+            self._reading.say(f"{place}: is neither a group nor an array; left out")
             return None
         return self._array(item, place, depth)
 
@@ -196,19 +196,19 @@ class _GroupReader:
         if "MATLAB_empty" in item.attrs:
             return "" if kind == "char" else np.empty(0)
         if item.is_virtual or item.external:
-            self._remarks.say(f"{place}: its values are in other files; left out")
+            self._reading.say(f"{place}: its values are in other files; left out")
             return None
         refers = self._h5py.check_ref_dtype(item.dtype) is not None
         compound = item.dtype.names is not None
         if not refers and not compound and item.dtype.kind not in "fiub":
-            self._remarks.say(f"{place}: holds {item.dtype} values, no numbers; left out")
+            self._reading.say(f"{place}: holds {item.dtype} values, no numbers; left out")
             return None
         if item.shape is None:
             return np.empty(0)
         self._left -= item.size * max(1, item.dtype.itemsize)
         if self._left < 0 or item.size > max(4096, 1100 * item.id.get_storage_size()):
-            raise self._source.error(
-                place, f"says it holds {item.shape} values, more than a file of {self._source.size} bytes warrants"
+            raise self._reading.error(
+                place, f"says it holds {item.shape} values, more than a file of {self._reading.size} bytes warrants"
             )
         values = item[()]
         if refers:
@@ -218,14 +218,14 @@ class _GroupReader:
                 for k, ref in enumerate(flat, 1)
             ]
             if depth > MAX_DEPTH:
-                raise self._source.error(place, f"is nested deeper than {MAX_DEPTH}")
+                raise self._reading.error(place, f"is nested deeper than {MAX_DEPTH}")
             return members if kind == "cell" else _Column(members)
         values = np.asarray(values)
         if compound and not self._matlab:
             return Group({name: values[name] for name in values.dtype.names or ()}, rate=_rate(item))
         if compound:
             if values.dtype.names != ("real", "imag"):
-                self._remarks.say(f"{place}: holds compound values; left out")
+                self._reading.say(f"{place}: holds compound values; left out")
                 return None
             values = values["real"] + 1j * values["imag"]
         if kind == "char":

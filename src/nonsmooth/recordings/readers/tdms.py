@@ -15,31 +15,31 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.recordings.reading import MAX_COLUMNS, Group, Remarks, Source, is_axis_name, needed
+from nonsmooth.recordings.reading import MAX_COLUMNS, Group, Reading, is_axis_name, needed
 
 
-def load_tdms(data: bytes, source: Source, remarks: Remarks) -> tuple[dict[str, Any], dict[str, Any]]:
+def load_tdms(data: bytes, reading: Reading) -> tuple[dict[str, Any], dict[str, Any]]:
     """The groups of a file by clock, and its properties."""
-    nptdms = needed("nptdms", "npTDMS", source)
-    check_layout(data, source)
-    with _heard(remarks), nptdms.TdmsFile.open(io.BytesIO(data)) as opened:
+    nptdms = needed("nptdms", "npTDMS", reading)
+    check_layout(data, reading)
+    with _heard(reading), nptdms.TdmsFile.open(io.BytesIO(data)) as opened:
         if sum(len(group.channels()) for group in opened.groups()) > MAX_COLUMNS:
-            raise source.error("", f"holds more than {MAX_COLUMNS} channels")
+            raise reading.error("", f"holds more than {MAX_COLUMNS} channels")
         found = {}
         for group in opened.groups():
             notes = {f"property_{key}": value for key, value in _plain(group.properties).items()}
-            for k, clocked in enumerate(_by_clock(group, data, source, remarks)):
+            for k, clocked in enumerate(_by_clock(group, data, reading)):
                 clocked.run, clocked.notes = group.name, notes
                 found[f"{group.name} ({k + 1})" if k else group.name] = clocked
         return found, {"properties": _plain(opened.properties)}
 
 
 @contextlib.contextmanager
-def _heard(remarks: Remarks) -> Iterator[None]:
+def _heard(reading: Reading) -> Iterator[None]:
     """Make remarks of what the library would print."""
 
     def note(record: logging.LogRecord) -> bool:
-        remarks.say(f"npTDMS: {record.getMessage()[:200]}")
+        reading.say(f"npTDMS: {record.getMessage()[:200]}")
         return False
 
     names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] == "nptdms"]
@@ -53,14 +53,14 @@ def _heard(remarks: Remarks) -> Iterator[None]:
             logger.removeFilter(note)
 
 
-def _by_clock(group: Any, data: bytes, source: Source, remarks: Remarks) -> list[Group]:
+def _by_clock(group: Any, data: bytes, reading: Reading) -> list[Group]:
     """The channels of a group: those with a waveform by their clock, the others together."""
     groups: dict[Any, Group] = {}
     for channel in group.channels():
         kind, n, place = getattr(channel, "dtype", None), len(channel), f"{group.name}/{channel.name}"
         # What the file says it holds must be there: never more memory than it warrants.
         if kind is not None and n * max(1, np.dtype(kind).itemsize if kind != np.dtype("O") else 1) > 2 * len(data):
-            raise source.error(place, f"says it holds {n} values, more than {len(data)} bytes can")
+            raise reading.error(place, f"says it holds {n} values, more than {len(data)} bytes can")
         values, properties = np.asarray(channel[:]), _plain(channel.properties)
         step, begin = (_number(properties.get(key)) for key in ("wf_increment", "wf_start_offset"))
         clock = (step, begin or 0.0, n) if step is not None and step > 0 else None
@@ -69,7 +69,7 @@ def _by_clock(group: Any, data: bytes, source: Source, remarks: Remarks) -> list
             or values.dtype.kind not in "fiubM"
             or (values.dtype.kind == "M" and (clock or not is_axis_name(channel.name, "time")))
         ):
-            remarks.of(group.name, channel.name, f"holds {values.dtype.name} values, no real numbers; left out")
+            reading.of(group.name, channel.name, f"holds {values.dtype.name} values, no real numbers; left out")
             continue
         held = groups.setdefault(clock, Group())
         if clock is not None:
@@ -96,26 +96,26 @@ _UNFINISHED = 0xFFFF_FFFF_FFFF_FFFF  # the writer was stopped before it could sa
 _MAX_SEGMENTS = 100_000
 
 
-def check_layout(data: bytes, source: Source) -> None:
+def check_layout(data: bytes, reading: Reading) -> None:
     """DataFileError with the segment whose lead-in is damaged or points outside the file."""
     position = 0
     for segment in range(1, _MAX_SEGMENTS + 1):
         place = f"segment {segment}, byte {position}"
         if len(data) - position < _LEAD_IN:
-            raise source.error(place, f"its lead-in of {_LEAD_IN} bytes is cut short")
+            raise reading.error(place, f"its lead-in of {_LEAD_IN} bytes is cut short")
         tag, contents, _, end, raw = struct.unpack_from("<4sIIQQ", data, position)
         if tag != b"TDSm":
-            raise source.error(place, f"begins with {tag!r}, expected b'TDSm'")
+            raise reading.error(place, f"begins with {tag!r}, expected b'TDSm'")
         if contents & (1 << 6):
-            raise source.error(place, "is written in big-endian order, which is not read; save it again on a PC")
+            raise reading.error(place, "is written in big-endian order, which is not read; save it again on a PC")
         left = len(data) - position - _LEAD_IN
         if end == _UNFINISHED:
             end = left
         if end > left or raw > end:
-            raise source.error(
+            raise reading.error(
                 place, f"says it is {end} bytes long with data from {raw} on, but {left} bytes follow: it is cut short"
             )
         position += _LEAD_IN + end
         if position == len(data):
             return
-    raise source.error("", f"holds more than {_MAX_SEGMENTS} segments")
+    raise reading.error("", f"holds more than {_MAX_SEGMENTS} segments")

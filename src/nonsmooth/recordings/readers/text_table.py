@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import IntArray
-from nonsmooth.recordings.reading import MAX_COLUMNS, Remarks, Source
+from nonsmooth.recordings.reading import MAX_COLUMNS, Reading
 
 #: Line number and fields.
 Row = tuple[int, list[str]]
@@ -28,7 +28,7 @@ _CHUNK = 4096  # rows read at once
 _SNIFFED = 20  # rows looked at to tell the decimal mark
 
 
-def decoded(data: bytes, source: Source, remarks: Remarks) -> io.TextIOWrapper:
+def decoded(data: bytes, reading: Reading) -> io.TextIOWrapper:
     """The text of a file: UTF-8 or UTF-16 with or without mark, else Windows-1252 (with a remark)."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         encoding = "utf-16"
@@ -36,19 +36,19 @@ def decoded(data: bytes, source: Source, remarks: Remarks) -> io.TextIOWrapper:
         encoding = "utf-8-sig"
         nul = data.find(b"\0")
         if nul >= 0:
-            raise source.error(f"line {_line_of(data, nul)}", "holds a zero byte; this is not a text table")
+            raise reading.error(f"line {_line_of(data, nul)}", "holds a zero byte; this is not a text table")
     try:
         data.decode(encoding)
     except UnicodeDecodeError as error:
         where = f"line {_line_of(data, error.start)}"
         if encoding == "utf-16":
-            raise source.error(where, "is not valid UTF-16, as its mark says; the file may be cut short") from None
+            raise reading.error(where, "is not valid UTF-16, as its mark says; the file may be cut short") from None
         encoding = "cp1252"
         try:
             data.decode(encoding)
         except UnicodeDecodeError:
-            raise source.error(where, "is neither UTF-8 nor Windows-1252 text") from None
-        remarks.say(f"{where}: the text is not UTF-8; read as Windows-1252, so check names and units")
+            raise reading.error(where, "is neither UTF-8 nor Windows-1252 text") from None
+        reading.say(f"{where}: the text is not UTF-8; read as Windows-1252, so check names and units")
     return io.TextIOWrapper(io.BytesIO(data), encoding=encoding, newline="")
 
 
@@ -58,7 +58,7 @@ def sniffed(line: str) -> str:
     return next((d for d in ("\t", ";", ",") if d in outside), " ")
 
 
-def rows(lines: Iterable[str], delimiter: str, source: Source, first_line: int = 1) -> Iterator[Row]:
+def rows(lines: Iterable[str], delimiter: str, reading: Reading, first_line: int = 1) -> Iterator[Row]:
     """Line number and fields of each row that is not empty. A delimiter of " " stands for any white space."""
     if delimiter == " ":
         for line, text in enumerate(lines, first_line):
@@ -75,15 +75,15 @@ def rows(lines: Iterable[str], delimiter: str, source: Source, first_line: int =
             return
         except csv.Error as error:
             message = f"cannot be split into fields ({error}); a quote may be missing, or the file is cut short"
-            raise source.error(f"line {begin}", message) from None
+            raise reading.error(f"line {begin}", message) from None
         if fields:
             yield begin, fields
 
 
-def checked_header(fields: list[str], line: int, source: Source) -> list[str]:
+def checked_header(fields: list[str], line: int, reading: Reading) -> list[str]:
     """The names of the columns, stripped; DataFileError if there are absurdly many."""
     if len(fields) > MAX_COLUMNS:
-        raise source.error(f"line {line}", f"has {len(fields)} columns; at most {MAX_COLUMNS} are read")
+        raise reading.error(f"line {line}", f"has {len(fields)} columns; at most {MAX_COLUMNS} are read")
     return [field.strip() for field in fields]
 
 
@@ -111,7 +111,7 @@ class Numerals(NamedTuple):
 
     decimal: str | None = None
     thousands: str | None = None
-    na: tuple[str, ...] = ()
+    na: Sequence[str] = ()
 
     def some(self, field: str) -> bool:
         """Return whether it is a number, or the mark of a missing one."""
@@ -133,8 +133,7 @@ def read_cells(
     labels: Sequence[str],
     wanted: Sequence[int],
     numerals: Numerals,
-    source: Source,
-    remarks: Remarks,
+    reading: Reading,
     *,
     ends_with_newline: bool,
     stamped: int = -1,
@@ -170,7 +169,7 @@ def read_cells(
                     held[k].extend(range(begin, begin + len(chunk)))
         for row, (line, fields) in enumerate(chunk, begin) if slow else ():
             if len(fields) > n and any(field.strip() for field in fields[n:]):
-                raise source.error(f"line {line}", f"has {len(fields)} fields, the header has {n}")
+                raise reading.error(f"line {line}", f"has {len(fields)} fields, the header has {n}")
             last_short = len(fields) < n
             if last_short:
                 short, first_short = short + 1, first_short or line
@@ -186,13 +185,13 @@ def read_cells(
                 else:
                     value = number(field, decimal, thousands)
                     if value is None:
-                        raise source.error(f"line {line}", _no_number(column, fields, labels, decimal, line, row == 0))
+                        raise reading.error(f"line {line}", _no_number(column, fields, labels, decimal, line, row == 0))
                     values[k].append(value)
                 held[k].append(row)
     if last_short and not ends_with_newline:
-        raise source.error(f"line {lines[-1]}", f"ends after fewer than {n} fields: the file is cut short")
+        raise reading.error(f"line {lines[-1]}", f"ends after fewer than {n} fields: the file is cut short")
     if short:
-        remarks.say(f"{short} rows have fewer fields than the header, first line {first_short}; taken as blank")
+        reading.say(f"{short} rows have fewer fields than the header, first line {first_short}; taken as blank")
     columns = [
         np.array(stamps, dtype=object) if stamps is not None and column == stamped else np.asarray(v)
         for column, v in zip(wanted, values, strict=True)

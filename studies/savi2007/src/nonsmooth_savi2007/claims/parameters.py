@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from nonsmooth.identification import Estimate, Finding
 from nonsmooth_savi2007.claims.verdicts import (
     Cell,
     Data,
@@ -23,7 +24,7 @@ from nonsmooth_savi2007.claims.verdicts import (
     printed_cell,
 )
 from nonsmooth_savi2007.figures.parameters import table_rows
-from nonsmooth_savi2007.findings import Found, Number, found_in
+from nonsmooth_savi2007.findings import found_in
 from nonsmooth_savi2007.measure import Interval
 from nonsmooth_savi2007.printed import NATURAL_FREQUENCY, NUMBERS, TABLE_1, TEST_MASS, Printed
 
@@ -97,7 +98,7 @@ def p1(data: Data) -> Iterator[Statement]:
         "P1",
         TABLE_1["k"].place,
         f"slope of force over displacement: k = {TABLE_1['k']}",
-        _back(TABLE_1["k"], car.number.times(0.5)),
+        _back(TABLE_1["k"], car.estimate.times(0.5)),
         why,
         _GIVEN,
     )
@@ -105,7 +106,7 @@ def p1(data: Data) -> Iterator[Statement]:
         "P1",
         TABLE_1["k_s"].place,
         f"slope of force over displacement: k_s = {TABLE_1['k_s']}",
-        _back(TABLE_1["k_s"], support.number),
+        _back(TABLE_1["k_s"], support.estimate),
         "",
         _GIVEN,
     )
@@ -114,10 +115,10 @@ def p1(data: Data) -> Iterator[Statement]:
 def p2(data: Data) -> Iterator[Statement]:
     """Mass, and the natural frequency that follows."""
     mass = table_rows(data["table1"])["m"][1]
-    slope = found_in(data["fig04"]["oscillator"]).number
+    slope = found_in(data["fig04"]["oscillator"]).estimate
     value = math.sqrt(slope.value / mass.value)
     u = 0.5 * value * math.hypot(slope.uncertainty / slope.value, mass.uncertainty / mass.value)
-    natural = Number(value, u, value - 1.96 * u, value + 1.96 * u, "")
+    natural = Estimate(value, u)
     printed = NUMBERS["natural frequency"]
     yield _row("P2", TABLE_1["m"].place, f"m = {TABLE_1['m']} by weighing", _back(TABLE_1["m"], mass), "", _GIVEN)
     yield _closed(
@@ -153,7 +154,7 @@ def p3(data: Data) -> Iterator[Statement]:
         f"natural frequency from it: {TABLE_1['omega_0']}",
         TABLE_1["omega_0"],
         NATURAL_FREQUENCY,
-        _back(TABLE_1["omega_0"], found.number, ", fitted in the time domain"),
+        _back(TABLE_1["omega_0"], found.estimate, ", fitted in the time domain"),
         f"The paper's 4.60 is 2 pi times its line, known to half a step, {math.pi * step:.2f} rad/s: 4.50 is "
         "within that resolution.",
     )
@@ -169,7 +170,7 @@ def p4(data: Data) -> Iterator[Statement]:
         f"c = {printed} by fitting the amplitude over frequency (viscous damping alone)",
         printed,
         2 * ratio.value * TABLE_1["m"].value * NATURAL_FREQUENCY,
-        _back(printed, viscous.number),
+        _back(printed, viscous.estimate),
         "Closed form: 2 xi m omega_0 with the printed xi and omega_0 = 4.50 rad/s. "
         + viscous.notes[0][0].upper()
         + viscous.notes[0][1:]
@@ -180,7 +181,7 @@ def p4(data: Data) -> Iterator[Statement]:
         f"xi = {ratio}",
         ratio,
         printed.value * per,
-        _back(ratio, viscous.number.times(per, " ")),
+        _back(ratio, viscous.estimate.times(per, unit="")),
         "c / (2 m omega_0).",
     )
     yield _row(
@@ -188,16 +189,17 @@ def p4(data: Data) -> Iterator[Statement]:
         "Section 3.1",
         "in the considered range the dry friction may be neglected",
         Cell(
-            f"with it c = {both.number} ({100 * (both.number.value / printed.value - 1):+.1f} %), without "
-            f"{viscous.number}",
+            f"with it c = {both.estimate} ({100 * (both.value / printed.value - 1):+.1f} %), without "
+            f"{viscous.estimate}",
             agreed(not _apart(viscous, both)),
         ),
         "The rig's friction is 5 mN, 3.6 % of the forcing of Fig. 6; that of the paper's rig is not known.",
     )
 
 
-def _apart(one: Found, other: Found) -> bool:
-    return one.number.low > other.number.high or other.number.low > one.number.high
+def _apart(one: Finding, other: Finding) -> bool:
+    (low, high), (other_low, other_high) = one.interval(), other.interval()
+    return low > other_high or other_low > high
 
 
 def p5(data: Data) -> Iterator[Statement]:
@@ -218,7 +220,7 @@ def p5(data: Data) -> Iterator[Statement]:
         f"logarithmic decrement: c_s = {printed}",
         printed,
         ratio.value / per,
-        _back(printed, found.number),
+        _back(printed, found.estimate),
         "Closed form: from the printed xi_s.",
     )
 
@@ -228,7 +230,7 @@ def _line(data: Data, key: str) -> tuple[float, Cell]:
     picture, found = data["fig08"][key], found_in(data["fig08"][key])
     fitted = float(picture["slope"]) * picture["setting"].values + float(picture["intercept"])
     left = float(np.abs(picture["reading"].values - fitted).max() / np.ptp(fitted))
-    text = f"a line of slope {found.number}; its {found.runs} points lie within {100 * left:.2g} % of the range"
+    text = f"a line of slope {found.estimate}; its {len(found.runs)} points lie within {100 * left:.2g} % of the range"
     return left, Cell(text, _built(left < _LEAST_LINE))
 
 
@@ -262,7 +264,8 @@ def p8(data: Data) -> Iterator[Statement]:
         if name not in TABLE_1:
             continue
         printed = TABLE_1[name]
-        inside = "inside" if number.low <= truth <= number.high else "outside"
+        low, high = number.interval()
+        inside = "inside" if low <= truth <= high else "outside"
         why = f"The rig's truth, {truth:.6g}, lies {inside} the 95 % interval."
         says = f"{name} = {printed}"
         cell = _back(printed, number)

@@ -9,8 +9,8 @@ from typing import TypeAlias
 
 import xarray as xr
 
+from nonsmooth.identification import Estimate
 from nonsmooth_savi2007.figures.resonance import grazing_of
-from nonsmooth_savi2007.findings import Number
 from nonsmooth_savi2007.measure import Interval, with_uncertainty
 from nonsmooth_savi2007.printed import Printed
 
@@ -70,7 +70,7 @@ class Cause(StrEnum):
 
 
 #: A number with its standard and its expanded uncertainty: a step that holds a change, a quantity identified.
-Uncertain: TypeAlias = Interval | Number
+Uncertain: TypeAlias = Interval | Estimate
 
 
 def agreed(met: bool) -> Verdict:

@@ -11,11 +11,13 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from nonsmooth import plot
+from nonsmooth.identification import Estimate
 from nonsmooth.plot import identification as pictures
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
-from nonsmooth_savi2007.findings import Number, estimates_of, found_in, kept, the_finding
+from nonsmooth_savi2007.findings import estimates_of, found_in, kept, the_finding
 from nonsmooth_savi2007.flows import Settings
 from nonsmooth_savi2007.laboratory import TRUTH, as_result
+from nonsmooth_savi2007.measure import with_uncertainty
 from nonsmooth_savi2007.printed import NUMBERS, TABLE_1
 from nonsmooth_savi2007.rig import IDENTIFICATION, UNITS, load_truth
 
@@ -63,10 +65,10 @@ def _spectrum(data: xr.Dataset, ax: Axes) -> None:
 def _caption_4(data: Datasets) -> str:
     car, support = found_in(data["oscillator"]), found_in(data["support"])
     return (
-        f"Force against displacement, {car.runs} pulls of the car and {support.runs} pushes of the support's spring by "
-        f"hand. (a) Slope 2k = {car.number}, k = {car.number.times(0.5)} (most of it the force sensor's gain, "
-        f"within 1 %); below, what the mean line leaves, the two ways apart by twice the dry friction. (b) k_s = "
-        f"{support.number}. The paper: 8.47 and 1210 N/m."
+        f"Force against displacement, {len(car.runs)} pulls of the car and {len(support.runs)} pushes of the support's "
+        f"spring by hand. (a) Slope 2k = {car.estimate}, k = {car.estimate.times(0.5)} (most of it the force sensor's "
+        f"gain, within 1 %); below, what the mean line leaves, the two ways apart by twice the dry friction. (b) k_s = "
+        f"{support.estimate}. The paper: 8.47 and 1210 N/m."
     )
 
 
@@ -74,24 +76,25 @@ def _caption_5(data: Datasets) -> str:
     found = found_in(data["tap"])
     return (
         "Impulsive response of the car and the magnitude of its DFT. (a) Tap and free decay with the fitted motion. "
-        f"(b) {found.notes[0]}. The paper reads 0.732 Hz. In the time domain omega_0 = {found.number}."
+        f"(b) {found.notes[0]}. The paper reads 0.732 Hz. In the time domain omega_0 = {found.estimate}."
     )
 
 
 def _caption_6(data: Datasets) -> str:
     viscous, both = found_in(data["viscous"]), found_in(data["amplitudes"])
     return (
-        f"Amplitude over frequency without the support, {viscous.runs} runs, and the fitted model. Viscous damping "
-        f"alone, as in the paper: c = {viscous.number}; {viscous.notes[0]}. With dry friction beside it: c = "
-        f"{both.number}. The paper: 0.87 N s/m."
+        f"Amplitude over frequency without the support, {len(viscous.runs)} runs, and the fitted model. Viscous "
+        f"damping alone, as in the paper: c = {viscous.estimate}; {viscous.notes[0]}. With dry friction beside it: c = "
+        f"{both.estimate}. The paper: 0.87 N s/m."
     )
 
 
 def _caption_7(data: Datasets) -> str:
     found = found_in(data["drop"])
+    c_s = with_uncertainty(found.value, found.uncertainty)
     return (
-        f"Free decay of the support with 1.33 kg on it. (a) One of {found.runs} runs. (b) Logarithm of its turning "
-        f"points: damping ratio {found.others['damping_ratio']}, c_s = {found.number}, from all runs. "
+        f"Free decay of the support with 1.33 kg on it. (a) One of {len(found.runs)} runs. (b) Logarithm of its "
+        f"turning points: damping ratio {found.others['damping_ratio']}, c_s = {c_s} N s/m, from all runs. "
         "The paper: 0.0075 and 0.60 N s/m."
     )
 
@@ -100,8 +103,9 @@ def _caption_8(data: Datasets) -> str:
     motor, crank = found_in(data["voltage"]), found_in(data["crank"])
     return (
         f"Calibrations of the drive with fitted lines and what they leave. (a) Frequency over motor voltage, "
-        f"{motor.runs} runs: slope {motor.number}; the motor turns from {motor.others['offset']} on. (b) Forcing "
-        f"amplitude over crank length, {crank.runs} runs: slope {crank.number}, which is k. The paper has no numbers."
+        f"{len(motor.runs)} runs: slope {motor.estimate}; the motor turns from {motor.others['offset']} on. (b) "
+        f"Forcing amplitude over crank length, {len(crank.runs)} runs: slope {crank.estimate}, which is k. The paper "
+        "has no numbers."
     )
 
 
@@ -125,7 +129,7 @@ def _compute_table(settings: Settings) -> Datasets:
     }
 
 
-def table_rows(data: Datasets) -> dict[str, tuple[str, Number, float]]:
+def table_rows(data: Datasets) -> dict[str, tuple[str, Estimate, float]]:
     """Of each quantity of ``NAMES``: as the paper prints it ("" where it does not), as identified, and the truth."""
     found, truth = estimates_of(data["identified"]), data["truth"]
     rows = {}
@@ -175,7 +179,7 @@ def _draw_table(canvas: Canvas, data: Datasets) -> None:
 
 def _caption_table(data: Datasets) -> str:
     rows = table_rows(data)
-    inside = sum(number.low <= truth <= number.high for _, number, truth in rows.values())
+    inside = sum(low <= truth <= high for _, number, truth in rows.values() for low, high in [number.interval()])
     return (
         "Table 1 by identification: each parameter's 95 % interval beside the rig's truth (which identification does "
         f"not see) and the paper's printed value. The truth lies in {inside} of {len(rows)} intervals. The rig was "

@@ -227,8 +227,9 @@ def _parameters(data: Data) -> Written:
     rows = []
     for name, (printed, number, truth) in table_rows(data["table1"]).items():
         off = 100 * (number.value / truth - 1)
-        inside = "in it" if number.low <= truth <= number.high else "outside"
-        interval = f"{number.low:.6g} ... {number.high:.6g}"
+        low, high = number.interval()
+        inside = "in it" if low <= truth <= high else "outside"
+        interval = f"{low:.6g} ... {high:.6g}"
         rows.append(
             (
                 name,
