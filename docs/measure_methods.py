@@ -195,7 +195,7 @@ def draw(errors: Mapping[str, np.ndarray], paper: Mapping[str, float], found: np
         guide = min(values[-1] for values in errors.values()) / 3
         left.loglog(widths, guide * (ETAS / ETAS[-1]) ** 2, ":", color="0.4", label="slope 2")
         left.set_ylabel(r"error, $[(\Delta x / 1\,\mathrm{mm})^2 + (\Delta v / 10\,\mathrm{mm/s})^2]^{1/2}$")
-        right.loglog(widths, found - grazing(0.02), "o", label="smoothed model")
+        right.loglog(widths, found - grazing(0.02), "o", markersize=3, label="smoothed model")
         line = np.geomspace(ETAS.min(), ETAS.max(), 50)
         right.loglog(
             1e6 * line,
