@@ -1,4 +1,4 @@
-"""The recordings of the tutorial ``docs/tutorials/a_bench.md``, computed by SciPy alone, with noise.
+"""The recordings of ``docs/tutorials/a_bench.md`` and ``docs/guides/recordings.md``, computed without the package.
 
 A mass between a spring and a damper rubs on its guide and meets an elastic stop; a shaker drives it. Segments of slip
 and of stick, in contact and out of it, are integrated one after another between located events.
@@ -82,8 +82,28 @@ def motion(frequency: float, phase: float, times: np.ndarray, x: float = 0.0, v:
     return out
 
 
+def pulls() -> str:
+    """An export of PASCO Capstone: two decays by a rotary sensor of 1440 counts, and a slower force sensor."""
+    rng, time, slow, count = np.random.default_rng(1), 0.01 * np.arange(400), 0.04 * np.arange(60), 2 * np.pi / 1440
+    decay = np.exp(-0.4 * time) * np.cos(7.0 * time)
+    angle, other = (count * np.round(size / count * decay) for size in (1.5, 1.2))
+    force = 30.0 * np.exp(-0.4 * slow) * np.cos(7.0 * slow) + 0.05 * rng.standard_normal(60)
+    columns = [
+        ("Time (s) Run #1", ".3f", time),
+        ("Angle (rad) Run #1", ".4f", angle),
+        ("Velocity (rad/s) Run #1", ".3f", np.gradient(angle, time)),
+        ("Time (s) Run #1", ".3f", slow),
+        ("Force, Ch P2 (N) Run #1", ".2f", force),
+        ("Time (s) Run #2", ".3f", time[:200]),
+        ("Angle (rad) Run #2", ".4f", other[:200]),
+    ]
+    rows = [",".join(format(y[i], digits) if i < len(y) else "" for _, digits, y in columns) for i in range(400)]
+    return "\n".join([",".join(f'"{name}"' for name, _, _ in columns), *rows]) + "\n"
+
+
 def main() -> None:
-    """Write the record of one run, and the amplitudes of steady motions over rising frequency."""
+    """Write the record of one run, the amplitudes of steady motions over rising frequency, and the export."""
+    (FOLDER.parent / "guides" / "pulls.csv").write_text(pulls(), encoding="utf-8")
     rng = np.random.default_rng(20261126)
     time = np.arange(0.0, 6.0, 0.005)
     frequency = 3.1

@@ -58,8 +58,10 @@ def keep(drawn: Any, name: str) -> None:
 def small(drawn: Any, name: str) -> None:
     """Save what is left of a figure without words, its lines twice as wide: docs/pictures/small/NAME.png."""
     figure = getattr(drawn, "figure", drawn)
-    for words in figure.findobj(lambda one: isinstance(one, Text | Legend | Axis)):
+    for words in figure.findobj(lambda one: isinstance(one, Text | Axis)):
         words.set_visible(False)
+    for legend in figure.findobj(Legend):  # unseen, it would keep its room
+        legend.remove()
     for line in figure.findobj(Line2D):
         line.set(linewidth=2 * line.get_linewidth(), markersize=1.6 * line.get_markersize())
     for frame in figure.findobj(Spine):

@@ -7,6 +7,7 @@ Run it from anywhere: ``python docs/measure_methods.py``. It takes about a minut
 from __future__ import annotations
 
 import platform
+import re
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -19,6 +20,7 @@ import numpy as np
 from make_pictures import keep
 
 import nonsmooth as ns
+from nonsmooth.plot.labels import symbol_of
 
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS.parent / "benchmarks"))
@@ -189,13 +191,14 @@ def draw(errors: Mapping[str, np.ndarray], paper: Mapping[str, float], found: np
         figure, (left, right) = plt.subplots(1, 2, figsize=(6.85, 3.6))
         widths = 1e6 * ETAS  # in micrometres
         for (name, values), color, mark in zip(errors.items(), COLORS, "osD^vP", strict=True):
-            left.loglog(widths, values, f"{mark}-", color=color, label=name, markersize=3)
+            label = re.sub(r"(omega|rho|g) (?=[-\d])", lambda found: f"{symbol_of(found[1])} = ", name)
+            left.loglog(widths, values, f"{mark}-", color=color, label=label, markersize=3)
             left.loglog(10, paper[name], "x", color=color, markersize=5)
         left.plot([], [], "x", color="black", markersize=5, label="rtol $10^{-6}$, as in the paper's setting")
         guide = min(values[-1] for values in errors.values()) / 3
         left.loglog(widths, guide * (ETAS / ETAS[-1]) ** 2, ":", color="0.4", label="slope 2")
         left.set_ylabel(r"error, $[(\Delta x / 1\,\mathrm{mm})^2 + (\Delta v / 10\,\mathrm{mm/s})^2]^{1/2}$")
-        right.loglog(widths, found - grazing(0.02), "o", label="smoothed model")
+        right.loglog(widths, found - grazing(0.02), "o", markersize=3, label="smoothed model")
         line = np.geomspace(ETAS.min(), ETAS.max(), 50)
         right.loglog(
             1e6 * line,

@@ -126,13 +126,10 @@ def main() -> Figure:
                 run = ns.simulate(system, duration=60.0, start=start, samples=3000)
             else:
                 run = ns.simulate(system, periods=6, transient=200, start=start, samples=3000)
-            ax.plot(run.u[:, i], run.u[:, j], linewidth=0.7)
+            ns.plot.phase_portrait(run, ax, x=run.state.values[i], y=run.state.values[j], linewidth=0.7)
             computed, known, text = number(make())
             assert np.isclose(computed, known, rtol=1e-3 if name.startswith("drifting") else 1e-6), name
             ax.set_title(f"{system.name} ({source})\n{text}", fontsize=7)
-            ax.set_xlabel(run.state.values[i], fontsize=7)
-            ax.set_ylabel(run.state.values[j], fontsize=7)
-            ax.tick_params(labelsize=6)
     return figure
 
 

@@ -75,7 +75,7 @@ def main() -> Figure:
     with ns.plot.journal():
         figure, (above, below) = plt.subplots(2, 1, figsize=(ns.plot.COLUMN, ns.plot.COLUMN), sharex=True)
         above.plot(t[:TEST], 1e3 * V2[:TEST], lw=0.3, color="0.4")
-        below.plot(t[:TEST], 1e3 * error, lw=0.3, color="C3")
+        below.plot(t[:TEST], 1e3 * error, lw=0.3, color=ns.plot.COLORS["second"])
         above.set_ylabel("measured $V_2$ (mV)")
         below.set(xlabel="$t$ (s)", ylabel="predicted less measured (mV)")
 

@@ -21,10 +21,12 @@ def main() -> Axes:
     system = oscillator.with_parameters(omega=float(middle.omega))
     saddle = ns.find_orbit(system, start=middle.section.values, period_number=1, transient=0)
     arms = ns.manifolds(saddle, length=4.0, distance=0.05)
-    ax = ns.plot.manifolds(arms)
-
     first, last = (arms.section.values[arms.arc_number.values == arm][-1] for arm in (0, 1))
     stable = [ns.find_orbit(system, start=end) for end in (first, last)]
+    with ns.plot.journal():
+        ax = ns.plot.manifolds(arms)
+        ax.plot(*np.transpose([orbit.u for orbit in stable]), "s", color=ns.plot.COLORS["third"], label="stable orbits")
+        ax.legend()
     assert [orbit.contacts_per_period for orbit in stable] in ([1.0, 0.0], [0.0, 1.0])
     for end, orbit in zip((first, last), stable, strict=True):
         assert np.abs((end - orbit.u) / arms["size"].values).max() < 1e-3

@@ -54,9 +54,9 @@ def main(points: int = 61, forces: int = 25) -> Figure:
         grid = figure.add_gridspec(2, 2, height_ratios=[1.0, 2.1])
         ns.plot.mechanism(rig, figure.add_subplot(grid[0, :]))
         left, right = (figure.add_subplot(grid[1, k]) for k in (0, 1))
-        for color, name in zip(("C0", "C1", "C2"), rig.states, strict=False):
+        for name in [*rig.states][:3]:
             one = response.sel(direction="up")
-            left.plot(omega, 1e3 * one.amplitude.sel(state=name), label=f"${name[0]}_{name[1]}$", color=color)
+            left.plot(omega, 1e3 * one.amplitude.sel(state=name), label=f"${name[0]}_{name[1]}$")
         left.set(xlabel=r"$\omega$ (rad/s)", ylabel="amplitude (mm)")
         left.legend()
         ns.plot.chart(chart, right, show="stop_impact_speed_maximum", contours={"q1_amplitude": [0.002]}, region=safe)

@@ -150,6 +150,13 @@ MISTAKES = {
         "called as f(t, p): time, parameters",
         "write them so",
     ),
+    "a belt of time and parameters": (
+        "ns.mechanical(1.0, 0.1, 1.0, parameters={'w': 1.0}, elements={'rub': ns.elements.Coulomb(at='q', friction=1, "
+        "belt=lambda t, p: -p.w)})",
+        "speed of element 'rub'",
+        "its arguments are (t, p), but it is called as f(t, u, p)",
+        "write them so",
+    ),
     "a mass of time": (
         "ns.mechanical(M=lambda t, p: 1.0, C=0.1, K=1.0)",
         "M: its arguments are (t, p)",

@@ -99,3 +99,34 @@ def test_leaving_the_stick_is_no_return_to_it(
     """A slip begins with no speed and no acceleration: rounding of either must not stop it again."""
     run = ns.simulate(make(w, F), periods=40, transient=40, method=method)
     assert len(run["crossing_time"]) == each * 40
+
+
+def test_stick_slip_of_a_drill_string_ends_at_a_graze_and_steady_turning_where_friction_falls_too_fast():
+    """The bit seen from the table that turns with Omega: the rock is a belt that moves backwards. Steady turning is
+    stable where c exceeds the fall of the friction, 4000 / (1 + Omega)^2."""
+    bit = ns.mechanical(
+        "J",
+        "c",
+        "k",
+        coordinates={"theta": "rad"},
+        parameters={
+            "J": (370.0, "kg m^2"),
+            "c": (100.0, "N m s/rad"),
+            "k": (470.0, "N m/rad"),
+            "Omega": (4.0, "rad/s"),
+        },
+        elements={
+            "rock": ns.elements.Coulomb(
+                at="theta", friction=lambda v, p: 5000 + 4000 / (1 + v), belt=lambda t, u, p: -p.Omega
+            )
+        },
+    )
+    steady = ns.continue_equilibrium(bit, "Omega", (1.0, 30.0), start={"theta": -12.0}, mode="rock_forward")
+    special = ns.special_points(steady)
+    assert special.kind.values.tolist() == ["hopf"]
+    assert special.Omega.values == pytest.approx([np.sqrt(40.0) - 1.0], abs=1e-6)
+    cycle = ns.find_orbit(bit, start={"theta": -15.0})
+    assert cycle.stable and cycle.period > 2 * np.pi * np.sqrt(370.0 / 470.0)
+    branch = ns.special_points(ns.continue_orbit(cycle, "Omega", (1.0, 30.0)))
+    assert branch.kind.values.tolist() == ["grazing", "hopf"]
+    assert branch.Omega.values[1] == pytest.approx(np.sqrt(40.0) - 1.0, abs=1e-4)

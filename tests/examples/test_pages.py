@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import doctest
 import os
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from page_code import blocks, run_page
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(page for page in (ROOT / "docs").rglob("*.md") if "_build" not in page.parts)
-# The first two need a file of the reader's own; the third is run as a notebook.
+# The first two need files of the reader's own; the third is run as a notebook.
 ELSEWHERE = {"recordings", "your_rig", "from_a_paper"}
 PAGES = [page for page in PAGES if page.stem not in ELSEWHERE and blocks(page.read_text(encoding="utf-8"))]
 LONGEST = 60  # lines of an output: in a notebook the next cell stays in sight
@@ -44,11 +45,15 @@ def test_whole_code_of_page(page: Path, tmp_path: Path) -> None:
     judge(page, tmp_path)
 
 
-def judge(page: Path, folder: Path, shorter: tuple[str, str] | None = None) -> None:
+def test_first_file_of_the_page_on_recordings(tmp_path: Path) -> None:
+    judge(ROOT / "docs" / "guides" / "recordings.md", tmp_path, blocks=2)
+
+
+def judge(page: Path, folder: Path, shorter: tuple[str, str] | None = None, blocks: int | None = None) -> None:
     import matplotlib.pyplot as plt
 
     checker = doctest.OutputChecker()
-    for printed, shown, expected, line in run_page(page, folder, shorter):
+    for printed, shown, expected, line in islice(run_page(page, folder, shorter), blocks):
         assert printed.count("\n") + shown.count("\n") < LONGEST, f"{page.name}, block at line {line}: a long output"
         if expected is not None:
             assert checker.check_output(expected, printed, FLAGS), (

@@ -222,6 +222,13 @@ def test_equations_and_a_moving_sketch_stand_beside_the_sliders(page: Any) -> No
     assert "closed" in page.tab.inner_text("#equations")
 
 
+def test_subscripts_stand_in_the_equations_as_beside_the_sliders() -> None:
+    """A name with a subscript in one piece would be upright among letters in italics."""
+    contact = dict(equations_of(ns.models.discontinuous_support()))["contact"]
+    assert "<msub><mi>k</mi><mi>s</mi></msub>" in contact and "ₛ" not in contact
+    assert "<mover><msub><mi>v</mi><mi>q</mi></msub><mo>˙</mo></mover>" in equations_of(ns.models.gear_pair())[0][1]
+
+
 def test_an_element_stands_in_the_equations_in_its_own_words() -> None:
     heading, words = equations_of(ns.models.chua_circuit())[-1]
     assert heading == "diode"

@@ -117,6 +117,28 @@ def test_curves_have_the_colour_of_their_mode_on_a_light_and_on_a_dark_ground(ta
             assert palette[:2] == (BLUE[dark], COLORS["second"])
 
 
+def test_an_orbit_that_is_shown_again_has_its_exponents(tabs: list[Page]) -> None:
+    """Undone between the orbit of other values and its exponents: those of the first values were known."""
+    tab = Tab(tabs, f"{FEW}&p.rho=0.45")
+    tab.say("begin")
+    tab.until_done()
+    before, done = tab.told("readout"), tab.session.work.done
+    assert any(name.startswith("largest") for name, _ in before)
+    first = done["orbit"]
+    tab.say("set", "p.rho", 0.47)
+    tab.until(lambda: done["orbit"] != first)
+    tab.say("undo")
+    tab.until_done()
+    assert tab.told("readout") == before
+
+
+def test_attractors_have_colours_of_their_own_however_many_there_are(tabs: list[Page]) -> None:
+    basins = Tab(tabs).session.sheet.views["basins"]
+    found = [(3, np.full((3, 2), float(place))) for place in range(11)]
+    assert basins._numbers(found) == [*range(11)]
+    assert basins._numbers(found[::-1]) == [*range(11)][::-1]  # and keep them in the next picture
+
+
 @pytest.mark.usefixtures("new_processes")
 def test_a_compile_is_said(tabs: list[Page], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NONSMOOTH_CACHE_DIR", str(tmp_path))

@@ -72,8 +72,9 @@ def test_a_record_in_another_unit_of_time_is_no_fit_without_a_word():
     noise = 1e-3 * np.random.default_rng(0).standard_normal(len(t))
     w = np.sqrt(40 - 0.01)
     y = np.exp(-0.1 * t) * (np.cos(w * t) + 0.1 / w * np.sin(w * t)) + noise
-    found = [ns.fit(system, {"q": (scale * t, y)}, ["k", "c"], progress=False) for scale in (1, 1000)]
-    assert not found[0].anomalies
+    found = [ns.fit(system, {"q": (scale * t, y)}, ["k", "c"], progress=False) for scale in (1, 1000, 1 / 60)]
+    assert not found[0].anomalies and not any("first guess" in one for one in found[0].notes)
+    assert any(one.startswith("k is 3.4e+03 times its first guess") for one in found[2].notes)  # in minutes
     assert any("readings for each of its swings" in one and "unit of the model" in one for one in found[1].anomalies)
 
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.plot.labels import in_lines
+from nonsmooth.plot.palette import nth
 
 
 @pytest.fixture(scope="module")
@@ -85,17 +87,52 @@ def test_the_phases_of_one_element_are_shaded() -> None:
 
 
 def test_labels_of_jumps_do_not_stand_over_each_other() -> None:
-    """Three times the same jump: the labels would lie on each other."""
+    """Three jumps at nearly one place: the labels would lie on each other."""
     response = ns.frequency_response(
         ns.models.impact_oscillator(), np.arange(1.0, 2.2, 0.01), direction="both", progress=False
     )
     row = int(np.flatnonzero(response.jump_variable.values == "x")[0])
-    ax = ns.plot.frequency_response(response.isel(jump=[row, row, row]))
+    three = response.isel(jump=[row, row, row])
+    ax = ns.plot.frequency_response(three.assign(jump_value=three.jump_value + 1e-9 * np.arange(3)))
     ax.figure.draw_without_rendering()
     boxes = [text.get_window_extent() for text in ax.texts if text.get_text()]
     assert len(boxes) == 3
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
     plt.close("all")
+
+
+def test_a_load_is_broken_where_the_motion_jumps() -> None:
+    """Grazing ends the motion with impacts: no line leads from their speed to zero, and labels stay in the axes."""
+    response = ns.frequency_response(
+        ns.models.discontinuous_support(g=0.02, rho=0.14), np.linspace(3, 7, 101), progress=False
+    )
+    ax = ns.plot.frequency_response(response, y="penetration_clearance")
+    rising = ax.lines[0].get_ydata()
+    steps = np.abs(np.diff(rising))
+    assert np.isnan(rising).sum() == len(np.unique(response.jump_value.values[response.jump_direction.values == "up"]))
+    assert np.nanmax(steps) < 0.2 * np.nanmax(rising)
+    ax.figure.draw_without_rendering()
+    low, high = ax.get_window_extent().intervaly
+    boxes = [text.get_window_extent() for text in ax.texts if text.get_text()]
+    assert len(boxes) == 4
+    assert all(low - 1 < box.y0 and box.y1 < high + 1 for box in boxes)
+    plt.close("all")
+
+
+def test_lines_of_ones_own_have_the_colours_of_the_package() -> None:
+    for style in (ns.plot.journal, ns.plot.slides):
+        with style():
+            ax = plt.figure().add_subplot()
+            ax.plot(np.zeros((2, 6)))
+        assert [line.get_color().lstrip("#") for line in ax.lines] == [nth(k).lstrip("#") for k in range(6)]
+    plt.close("all")
+
+
+def test_a_condition_is_broken_between_its_comparisons() -> None:
+    both = in_lines("outlined: abs(q3) < 6e-3 and impact_speed < 0.1", 46)
+    assert both.splitlines() == ["outlined: abs(q3) < 6e-3", "and impact_speed < 0.1"]
+    assert in_lines("a < 1 or b < 2", 46) == "a < 1 or b < 2"
+    assert max(map(len, in_lines("words " * 30, 46).splitlines())) <= 46
 
 
 def test_slides_have_a_style_of_their_own(run, tmp_path) -> None:
@@ -112,6 +149,17 @@ def test_slides_have_a_style_of_their_own(run, tmp_path) -> None:
     journal = ns.plot.time_history(run)  # behind the block it is the journal's again
     assert journal.figure.get_size_inches()[0] == pytest.approx(84 / 25.4)
     assert journal.lines[0].get_linewidth() == 0.8
+    plt.close("all")
+
+
+def test_a_line_style_joins_no_points() -> None:
+    swept = ns.sweep(ns.models.impact_oscillator(), "A", [0.3, 0.31, 0.32], keep=3, progress=False)
+    with pytest.raises(TypeError, match="linestyle: no property of this picture, in which bifurcation has drawn no li"):
+        ns.plot.bifurcation(swept, linestyle="--")
+    orbit = ns.find_orbit(ns.models.impact_oscillator(), progress=False)
+    ax = ns.plot.orbit(orbit, linestyle=":")
+    assert {line.get_linestyle() for line in ax.lines if line.get_marker() == "None"} == {":"}
+    assert {line.get_linestyle() for line in ax.lines if line.get_marker() != "None"} == {"None"}
     plt.close("all")
 
 

@@ -243,14 +243,21 @@ def fitted_motion() -> xr.Dataset:
         {"time": ("sample", t)},
         SYNTHETIC,
     )
-    for name, flags in {"run": "run", "quantity": "x", "mode": "free contact", "place": "free contact hit"}.items():
+    for name, flags in {
+        "run": "run",
+        "quantity": "v_x",
+        "mode": "free in_contact",
+        "place": "free contact hit",
+    }.items():
         data[name].attrs["flag_meanings"] = flags
+    data["time"].attrs["units"] = "s"
     return data
 
 
 def test_a_fit_is_drawn_over_time_and_by_place() -> None:
-    over = words(identification.fit_residuals(fitted_motion()))
-    assert "fit: contact" in over and "at a transition or graze" in over
+    ax = identification.fit_residuals(fitted_motion())
+    assert "fit: in contact" in words(ax) and "at a transition or graze" in words(ax)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("time (s)", "$v_{x}$ (m)")
     bars = identification.fit_residuals(fitted_motion(), show="places")
     assert [label.get_text() for label in bars.get_yticklabels()] == ["free", "contact", "hit"]
     assert bars.patches[0].get_width() == pytest.approx(np.sqrt(0.5), rel=0.1)  # rms of a cosine

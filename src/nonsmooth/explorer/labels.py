@@ -29,7 +29,7 @@ def rows_of(system: System) -> list[dict[str, str]]:
 
 def plain_of(latex: str) -> str:
     """``k_{s}`` as ``kₛ``: Unicode has a few letters as subscripts; with others the underscore stays."""
-    stem, below = _parts(latex)
+    stem, below = parts_of(latex)
     if not below:
         return stem
     small = "".join(sub.get(letter, "") for letter in below)
@@ -38,11 +38,12 @@ def plain_of(latex: str) -> str:
 
 def html_of(latex: str) -> str:
     """``k_{s}`` as ``<i>k</i><sub>s</sub>``; the letters are those of an identifier or of our own table."""
-    stem, below = (re.sub(r"[<>&]", "", part) for part in _parts(latex))
+    stem, below = (re.sub(r"[<>&]", "", part) for part in parts_of(latex))
     return f"<i>{stem}</i>" + (f"<sub>{below}</sub>" if below else "")
 
 
-def _parts(latex: str) -> tuple[str, str]:
+def parts_of(latex: str) -> tuple[str, str]:
+    """Stem and subscript in plain text: ``k_{s}`` as ``("k", "s")``."""
     text = re.sub(r"\\mathrm\{([^{}]*)\}", r"\1", latex)
     text = re.sub(r"\\(?:var)?([A-Za-z]+)", lambda found: greek_unicode.get(found[1], found[1]), text).replace("\\", "")
     stem, _, below = text.partition("_")

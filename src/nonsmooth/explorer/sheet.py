@@ -79,10 +79,10 @@ class Sheet:
         if stage == "orbit":
             for name in ("portrait", "section", "readout"):
                 self.views[name].results.clear()
-            self._undo("portrait", "section", "readout", "recording")
+            self.undo("portrait", "section", "readout", "recording")
             self.page.tell("readout", [])
 
-    def _undo(self, *views: str) -> None:
+    def undo(self, *views: str) -> None:
         """Ask for the results of views again."""
         for name in views:
             for stage in (*KINDS[name].quick, *KINDS[name].slow):
@@ -95,7 +95,7 @@ class Sheet:
         for name, view in self.views.items():
             if view.depends(old, subject):
                 view.clear()
-                self._undo(name)
+                self.undo(name)
         axes = state.x, state.y, state.shown
         if (old, self._axes) != (subject, axes):
             self._axes = axes

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
-from nonsmooth.explorer.labels import plain_of, symbols_of
+from nonsmooth.explorer.labels import parts_of, plain_of, symbols_of
 from nonsmooth.plot.mechanism import sketch_of_run
 
 if TYPE_CHECKING:
@@ -62,12 +62,11 @@ def equations_of(system: System) -> list[tuple[str, str]]:
     patterns, loads = system.traced.patterns, system._description.loads
     traced = system.traced if patterns is None else patterns.plain
     latex = symbols_of(system)
-    names = {traced.t: "t"} | {
-        symbol: plain_of(latex[name])
+    written = {traced.t: sp.Symbol("t")} | {
+        symbol: sp.Symbol("_".join(parts_of(latex[name])).strip("_"))
         for symbols, known in ((traced.u, traced.state_names), (traced.p, traced.parameter_names))
         for symbol, name in zip(symbols, known, strict=True)
     }
-    written = {symbol: sp.Symbol(name) for symbol, name in names.items()}
 
     def mathml(e: Any) -> str:
         return str(sp.mathml(e, printer="presentation")).replace("<mo>-</mo>", "<mo>−</mo>")
@@ -88,8 +87,8 @@ def equations_of(system: System) -> list[tuple[str, str]]:
 
     def rate(symbol: Any) -> str:
         if system.is_map:
-            return f"<msup><mi>{names[symbol]}</mi><mo>′</mo></msup>"
-        return f"<mover><mi>{names[symbol]}</mi><mo>˙</mo></mover>"
+            return f"<msup>{mathml(written[symbol])}<mo>′</mo></msup>"
+        return f"<mover>{mathml(written[symbol])}<mo>˙</mo></mover>"
 
     fields = dict(zip(traced.mode_names, traced.fields, strict=True))
     if loads is not None and loads.elements:

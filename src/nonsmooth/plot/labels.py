@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -34,6 +36,12 @@ def name_and_unit(result: xr.Dataset, name: str) -> tuple[str, str]:
 def with_unit(text: str, unit: str) -> str:
     """``text (unit)``; of what has no unit the text alone."""
     return text if unit in ("", "1") else f"{text} ({unit})"
+
+
+def in_lines(words: str, longest: int) -> str:
+    """Words in lines of at most ``longest`` characters, a condition broken before each ``and`` and ``or``."""
+    parts = [words] if len(words) <= longest else re.split(r" (?=and |or )", words)
+    return "\n".join(fill(part, longest) for part in parts)
 
 
 def name_axes(ax: Axes, x: tuple[str, str] | None = None, y: tuple[str, str] | None = None) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from textwrap import fill as in_lines
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from nonsmooth.errors import shortened
 from nonsmooth.plot import palette, style
 from nonsmooth.plot.figure import figure
-from nonsmooth.plot.labels import Name, name_and_unit, name_axes, name_plane, one_of, only_states
+from nonsmooth.plot.labels import Name, in_lines, name_and_unit, name_axes, name_plane, one_of, only_states
 from nonsmooth.plot.prefixes import PREFIXES, power_for
 from nonsmooth.results.labels import in_words
 from nonsmooth.system.kinds import above, at_least
@@ -49,7 +48,7 @@ def _box(color: str, words: str = "") -> Any:
     return Patch(facecolor=color, edgecolor="black", linewidth=0.4, label=words)
 
 
-_LONGEST = 46  # characters of a line above the axes
+_LONGEST = 46  # characters of a line above the axes or beside them
 #: A legend above the axes, in the middle.
 _ABOVE: dict[str, Any] = {"loc": "lower center", "columnspacing": 1.0}
 
@@ -123,7 +122,8 @@ def chart(
             limit = float(np.percentile(finite, 98)) if len(finite) else 1.0
             looks, extend = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}, "both"
         bar = ax.figure.colorbar(cells(ax, x, values_of_y, table, **looks), ax=ax, extend=extend)
-        name_axes(bar.ax, y=(str(values.attrs.get("long_name", show)), str(values.attrs.get("units", "1"))))
+        words = in_lines(str(values.attrs.get("long_name", show)), _LONGEST)
+        name_axes(bar.ax, y=(words, str(values.attrs.get("units", "1"))))
     for name, (heights, levels) in lines.items():
         _contours(ax, heights.transpose(second, first), levels, name)
     if inside is not None:

@@ -307,12 +307,15 @@ def clear_legend(ax: Axes) -> Legend:
 
 
 def apart(ax: Axes, labels: Iterable[Any]) -> None:
-    """Move labels that stand over others up or down, towards the middle of the axes; call it when all is drawn."""
+    """Move labels into the axes, and those that stand over others up or down; call it when all is drawn."""
     whole: Any = ax.figure.canvas.figure
     whole.draw_without_rendering()
-    middle = 0.5 * sum(ax.get_window_extent().intervaly)
+    low, high = ax.get_window_extent().intervaly
+    middle = 0.5 * (low + high)
     placed: list[Any] = []
     for label in labels:
+        (bottom, top), (x, y) = label.get_window_extent().intervaly, label.xyann
+        label.xyann = x, y + (max(low - bottom, 0.0) - max(top - high, 0.0)) * 72.0 / whole.dpi
         rises = sum(label.get_window_extent().intervaly) < 2.0 * middle
         for _ in placed:
             box = label.get_window_extent()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from textwrap import fill as in_lines
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -15,6 +14,7 @@ from nonsmooth.plot.labels import (
     Name,
     column,
     first_states,
+    in_lines,
     name_and_unit,
     name_axes,
     name_plane,
@@ -188,7 +188,7 @@ def frequency_response(
         ``"amplitude"`` (half the peak-to-peak value), ``"maximum"`` or ``"minimum"`` of a state or an output.
     jumps
         Mark each jump of what is drawn by a dotted arrow and its value of the parameter with ``digits`` significant
-        digits.
+        digits. A load jumps where a state does.
     region
         A condition, or what :func:`nonsmooth.region` gave: the values of the parameter at which it holds, in every
         direction and from every start, are shaded.
@@ -201,6 +201,7 @@ def frequency_response(
     ranges = [one.removesuffix("_amplitude") for one in known if one.endswith("_amplitude")]
     heights = quantity_of(result, name if alone else f"{name}_{quantity}", known, also=ranges)
     inside = held(result, region)
+    jumping = result["state"].values.tolist() if alone else [name]
     for branch in over:
         check_axis(branch, parameter)
     marks: list[Any] = []
@@ -208,7 +209,7 @@ def frequency_response(
         one = heights.isel(direction=i) if "direction" in heights.dims else heights
         curves = one.transpose(parameter, ...).values.reshape(len(values), -1)
         for k, curve in enumerate(curves.T):
-            found = _intervals(values, curve, _jumps(result, name, direction, k))
+            found = _intervals(values, curve, _jumps(result, jumping, direction, k))
             at = [i for _, i in found]
             broken = np.insert(values, at, np.nan), np.insert(curve, at, np.nan)
             style.line(ax, *broken, label=_WORDS[direction] if k == 0 else None, **_LOOKS[direction])
@@ -235,12 +236,12 @@ def _shade(ax: Axes, inside: xr.DataArray, parameter: str) -> None:
     ax.set_xlim(*whole[parameter].values[[0, -1]])
 
 
-def _jumps(result: xr.Dataset, name: str, direction: str, start: int) -> list[float]:
-    """The jumps of one curve: those of its state, its direction and, where there are several starts, of its start."""
+def _jumps(result: xr.Dataset, names: list[str], direction: str, start: int) -> list[float]:
+    """The jumps of one curve: those of its states, its direction and, where there are several starts, of its start."""
     if "jump_value" not in result:
         return []
-    mine = (result["jump_direction"].values == direction) & (result["jump_variable"].values == name)
-    return result["jump_value"].values[mine & (result["jump_start"].values == start)].tolist()
+    mine = (result["jump_direction"].values == direction) & np.isin(result["jump_variable"].values, names)
+    return np.unique(result["jump_value"].values[mine & (result["jump_start"].values == start)]).tolist()
 
 
 def _intervals(values: NDArray[np.float64], curve: NDArray[np.float64], places: list[float]) -> list[tuple[float, int]]:

@@ -69,8 +69,9 @@ class Portrait(_Curves):
         )
 
     def show(self, job: Request, found: Mapping[str, Any]) -> None:
-        """Its exponents are not known yet."""
+        """Its exponents are not known yet, nor those that were asked for before another orbit was shown."""
         self.sheet.views["readout"].results.clear()
+        self.sheet.undo("readout")
         super().show(job, found)
         self.sheet.views["history"].redraw()
 

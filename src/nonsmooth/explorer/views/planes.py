@@ -242,8 +242,8 @@ class Basins(CellImage):
             best = int(np.argmin(away)) if away and min(away) < _NEAR else next(free)
             numbers.append(best)
         known = dict(enumerate(self._known)) | dict(zip(numbers, found, strict=True))
-        self._known = [known[k] for k in sorted(known)] if len(known) <= 9 else found
-        return numbers if len(known) <= 9 else list(range(len(found)))
+        self._known = [known[k] for k in sorted(known)]
+        return numbers
 
     def place(self) -> None:
         """Mark the initial state."""

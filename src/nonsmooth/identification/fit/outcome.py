@@ -28,6 +28,7 @@ _POOR = 2.0  # residuals over noise, from which the model is said not to be the 
 _NOTHING = 0.5  # residuals over the readings' own variation, from which the model is said to explain nothing
 _SEEN, _BETWEEN = 200, 16  # readings at the beginning of a record, and instants that are looked at for each
 _PER_SWING, _SWINGS = 4, 3  # readings for each swing, below which other motions have them too; swings that tell it
+_DECADES = 3.0  # from a first guess, by which a stiffness is off in a record of minutes or milliseconds
 _SHARED = 8  # readings that share the record's extreme value
 _FEW, _NAMED = 0.05, 6  # part of the readings that outliers are at most; outliers of which the times are named
 METHOD_STEADY = "least squares over the steady states that sweeps up and down reach, derivatives of the periodic orbits"
@@ -237,12 +238,28 @@ def _notes(grown: Grown, found: Sandwich, data: xr.Dataset) -> list[str]:
         if excess < BETTER:
             words = f"chi^2 is only {excess:.2g} higher in another: the readings do not tell which"
         notes.append(f"{label} in mode {modes[mode]!r}; {words}")
+    notes += _far_from_guess(grown)
     places = [row for row in by_place(data) if row[2] >= 5]
     if len(places) > 1:
         notes.append(
             "rms of the residuals, over all: 1; " + "; ".join(f"{name}: {rms:.2f}" for name, rms, _ in places[:4])
         )
     return notes
+
+
+def _far_from_guess(grown: Grown) -> list[str]:
+    """A sentence on the parameter that is decades away from its first guess."""
+    u = grown.problem.unknowns
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factors = np.abs(grown.theta / u.guess)
+        decades = np.abs(np.log10(factors))
+    k = int(np.argmax(np.where(np.isfinite(decades), decades, 0.0)))
+    if not _DECADES < decades[k] < np.inf:
+        return []
+    return [
+        f"{u.names[k]} is {factors[k]:.2g} times its first guess: if that was more than a guess, see whether the "
+        "record's times and readings are in the units of the model"
+    ]
 
 
 def _length(grown: Grown) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from nonsmooth.arrays import IntArray
 from nonsmooth.identification.fit.growth import Grown
 from nonsmooth.identification.fit.motion import SampledMotion
+from nonsmooth.results.labels import labels_of
 from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
         data[name].attrs["units"] = unit
     data["beyond"].attrs["long_name"] = "how far the motion goes beyond the limits of the sensor"
     data["residual"].attrs = {"long_name": "residual over its standard deviation", "units": "1"}
+    data["time"].attrs = {"long_name": "time", "units": labels_of(system).time_unit}
     return _told(data.set_coords("time"), grown, system, options, flags)
 
 
@@ -117,7 +119,6 @@ def _told(
     data: xr.Dataset, grown: Grown, system: System, options: Mapping[str, Any], flags: Mapping[str, list[str]]
 ) -> xr.Dataset:
     """The data with the words of its flags and the record of the fit."""
-    from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
 
     for name, words in flags.items():

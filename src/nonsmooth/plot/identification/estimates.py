@@ -97,7 +97,7 @@ def _law(one: Picture) -> str:
 _FEW = 3  # readings of a place, below which it has no bar
 
 
-@picture("", ("time", ""), columns=3, margin=0.05, strip=r"$\sigma$", ratio=0.9)
+@picture("", "time", columns=3, margin=0.05, strip=r"$\sigma$", ratio=0.9)
 def fit_residuals(
     one: Picture,
     fitted: Any,
@@ -179,14 +179,14 @@ def steady_readings(
 
 def _over_time(one: Picture, part: Any) -> None:
     one.data = part
-    one.y = _quantity(part), str(part["measured"].attrs.get("units", ""))
+    one.y = symbol_of(_quantity(part)), str(part["measured"].attrs.get("units", ""))
     modes = words_of_flags(part["mode"])
     time, mode, window, residual, fitted = one.values("time", "mode", "window", "residual", "fitted")
     one.cloud(time, part["measured"].values)
     for k, m in enumerate(np.unique(mode)):
         inside = (mode == m) & np.append(np.diff(window) == 0, False)
         line = np.where(inside | np.roll(inside, 1), fitted, np.nan)
-        one.line(time, line, f"fit: {modes[int(m)]}", palette.nth(k), linewidth=0.9)
+        one.line(time, line, f"fit: {modes[int(m)].replace('_', ' ')}", palette.nth(k), linewidth=0.9)
     one.residual(time, residual)
     near = part["place"].values >= len(modes)
     if near.any():
@@ -208,7 +208,7 @@ def _by_place(ax: Axes, data: Any) -> None:
     words = [names[i].replace("->", " \N{RIGHTWARDS ARROW} ").replace("_", " ") for i in held]
     ax.set_yticks(range(len(held)), words)
     ax.invert_yaxis()
-    ax.set_xlabel("rms of the residuals (standard deviations)")
+    ax.set_xlabel(r"rms of the residuals ($\sigma$)")
 
 
 CHI_SQUARE_95 = 3.841  # of one degree of freedom

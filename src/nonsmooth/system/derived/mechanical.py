@@ -230,7 +230,9 @@ def _placed(label: str, element: Any, names: list[str], inverse: Callable[[Any],
 
 
 def _law(given: Any, t: Any, u: Any, p: Any) -> Any:
-    return p[given] if isinstance(given, str) else given(t, u, p) if callable(given) else given
+    if callable(given):
+        return call(given, (t, u, p), "a function of its")
+    return p[given] if isinstance(given, str) else given
 
 
 def _inverse(mass: sp.Matrix, system: str) -> sp.Matrix:
