@@ -1,4 +1,4 @@
-"""Curves of special points of systems whose parts do not feel each other, against the closed forms of one part."""
+"""Special points of systems whose parts do not feel each other, and their curves, against closed forms of one part."""
 
 from __future__ import annotations
 
@@ -46,3 +46,19 @@ def test_a_point_of_two_numbers_is_listed_once() -> None:
     """At a fold of y alone det(I - M) vanishes with and without the contact of x: one grazing_fold."""
     curve = grazing_curve({"damping": 0.1, "phase": 1.0, "loss": 0.3}, 1.6, (0.45, 1.05))
     assert curve["special_kind"].values.tolist().count("grazing_fold") == 2
+
+
+def test_two_torus_points_within_a_step() -> None:
+    """Of two masses apart the multipliers of each have the product exp(-(D - a) T): 1 at D = a, whatever they hit."""
+    system = ns.mechanical(
+        np.eye(2),
+        lambda p: [[p.D - 0.1, 0.0], [0.0, p.D - 0.102]],
+        np.diag([1.0, 4.0]),
+        coordinates=["x", "y"],
+        parameters={"D": 0.3},
+        forcing={q: lambda t, p: 0.3 * np.cos(1.5 * t) for q in "xy"},
+        elements={"stop": ns.elements.ElasticStop(at="x", position=0.2, stiffness=0.5)},
+    )
+    special = ns.special_points(ns.continue_orbit(ns.find_orbit(system, progress=False), "D", (-0.4, 0.6)))
+    assert special["kind"].values.tolist() == ["neimark_sacker", "neimark_sacker"]
+    assert special["D"].values == pytest.approx([0.1, 0.102], abs=1e-9)
