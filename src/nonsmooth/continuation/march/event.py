@@ -278,4 +278,6 @@ def special_on(step: Step, kinds: Sequence[Event]) -> list[Met]:
     # A branch that crosses another one where the parameter turns is one event, not two.
     crossings = [met.s for met in found if isinstance(met.kind, BranchPoint)]
     found = [met for met in found if not isinstance(met.kind, Fold) or all(abs(met.s - s) > TURN for s in crossings)]
-    return sorted(found, key=lambda met: met.s)
+    found.sort(key=lambda met: met.s)
+    # Two numbers of one name may vanish together, of a part of the system that the other does not reach.
+    return [b for i, b in enumerate(found) if all(a.name != b.name or b.s - a.s > BESIDE for a in found[:i])]

@@ -125,6 +125,11 @@ class Equilibria(Curve[Rest]):
         """Return whether all eigenvalues have negative real parts."""
         return bool((rest.eigenvalues.real < 0).all())
 
+    def spread(self, a: Rest, b: Rest) -> float:
+        """1 where more than a pair of eigenvalues becomes stable or unstable: two events of a step hide each other."""
+        unstable = [int((one.eigenvalues.real > 0.0).sum()) for one in (a, b)]
+        return float(abs(unstable[1] - unstable[0]) > 2)
+
     def word(self) -> Any:
         """The mode."""
         return self.mode

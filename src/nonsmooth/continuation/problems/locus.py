@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.continuation.problems.curve import Point
 from nonsmooth.continuation.problems.multipliers import product_of_pairs, without_own
 from nonsmooth.continuation.problems.orbits import OrbitPoint, Orbits
 from nonsmooth.continuation.problems.path import Path
@@ -54,7 +55,7 @@ class Locus(Orbits):
         self._eye = np.eye(shooting.n)
         self._unit = 1.0  # of psi
         self._gradient: tuple[FloatArray, FloatArray] | None = None  # the last one, and its place
-        self.touched: tuple[list[int], list[int]] | None = None  # visits and transitions of a grazing curve's touch
+        self._touched: tuple[list[int], float] | None = None  # what a grazing curve's touch is of, and when, in periods
 
     def psi(self, solved: Solved) -> float:
         """The number that vanishes on the locus."""
@@ -66,9 +67,7 @@ class Locus(Orbits):
             path = self.walk.along(solved, self.shooting.split(solved.X)[1])
             if path is None:
                 return np.nan
-            if self.touched is None:
-                self.touched = self._touch(path)
-            visits, conditions = self.touched
+            visits, conditions, _ = self._touch(path, float(solved.times[-1]))
             margins = path.inner[np.ix_(visits, conditions)]
             if len(visits) > 1:  # at the section itself no maximum shows within them
                 margins = np.vstack([margins, path.section[conditions]])
@@ -125,15 +124,31 @@ class Locus(Orbits):
 
     def _like(self, shooting: Shooting, size: FloatArray) -> Locus:
         """The locus of orbits that are read from another section."""
-        return Locus(shooting, self.kind, size, self.period, self.widths)
+        locus = Locus(shooting, self.kind, size, self.period, self.widths)
+        locus._touched = self._touched
+        return locus
 
-    def _touch(self, path: Path) -> tuple[list[int], list[int]]:
-        """The visits in which the touch of a grazing curve lies, as the section parts one, and the transitions whose
-        conditions need what is touched."""
-        (visit, _), last, net = path.touched, self.shooting.m, self.walk.net
-        needed = (net.rows[:, :2] == net.rows[path.which[path.touched], :2]).all(axis=1)
-        conditions = [k for k, (a, b) in enumerate(pairwise(net.row_start)) if needed[a:b].any()]
-        return ([0, last] if self.shooting.forced and 0 < last and visit in (0, last) else [visit]), conditions
+    def described(self, point: Point) -> OrbitPoint | None:
+        """The orbit; on a grazing curve its touch is expected here from now on."""
+        found = super().described(point)
+        if found is not None and self.kind == "grazing":
+            self._touched = self._touch(found.path, found.period)[1:]
+        return found
+
+    def _touch(self, path: Path, period: float) -> tuple[list[int], list[int], float]:
+        """The visits in which the touch of a grazing curve lies, two where the section parts one; the transitions whose
+        conditions need what is touched; of these the maximum nearest in time to where it was, whatever visit has it."""
+        if not self._touched:
+            net = self.walk.net
+            needed = (net.rows[:, :2] == net.rows[path.which[path.touched], :2]).all(axis=1)
+            conditions = [k for k, (a, b) in enumerate(pairwise(net.row_start)) if needed[a:b].any()]
+            self._touched = conditions, float(path.place[path.touched]) / period
+        (conditions, was), last = self._touched, self.shooting.m
+        place = path.place[:, conditions] / period
+        apart = np.where(path.which[:, conditions] < 0, np.inf, np.abs((place - was + 0.5) % 1.0 - 0.5))
+        visit, k = divmod(int(apart.argmin()), len(conditions))
+        both = self.shooting.forced and 0 < last and visit in (0, last)
+        return [0, last] if both else [visit], conditions, float(place[visit, k])
 
     def renewed(self, point: OrbitPoint) -> OrbitPoint | None:
         """The phase condition put through the last point; the units stay, psi was calibrated in them."""
@@ -148,6 +163,6 @@ class Locus(Orbits):
         path = point.path
         if self.kind == "grazing":
             inner = path.inner.copy()
-            inner[np.ix_(*(self.touched or self._touch(path)))] = -np.inf
+            inner[np.ix_(*self._touch(path, point.period)[:2])] = -np.inf
             path = replace(path, touch=float(inner.max(initial=-np.inf)))
         return path.margins

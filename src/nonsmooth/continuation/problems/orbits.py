@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.continuation.problems.curve import Curve, Point
+from nonsmooth.continuation.problems.multipliers import without_own
 from nonsmooth.continuation.problems.path import Path, Walk
 from nonsmooth.continuation.problems.rounds import Rounds
 from nonsmooth.continuation.problems.shooting import Shooting, Solved, plane_across
@@ -179,7 +180,13 @@ class Orbits(Curve[OrbitPoint]):
         return point.path.margins
 
     def spread(self, a: OrbitPoint, b: OrbitPoint) -> float:
-        """Largest distance, on the Riemann sphere, of a multiplier of one from the nearest of the other."""
+        """Largest distance, on the Riemann sphere, of a multiplier of one from the nearest of the other.
+
+        1 where more than a pair enters or leaves the unit circle: two events of a step hide each other."""
+        others = (without_own(one.multipliers, self.shooting.forced) for one in (a, b))
+        inside = [int((np.abs(mu) < 1.0).sum()) for mu in others]
+        if abs(inside[1] - inside[0]) > 2:
+            return 1.0
         mu, nu = a.multipliers[:, None], b.multipliers
         apart = np.abs(mu - nu) / np.sqrt((1 + np.abs(mu) ** 2) * (1 + np.abs(nu) ** 2))
         return float(max(apart.min(axis=0).max(), apart.min(axis=1).max()))

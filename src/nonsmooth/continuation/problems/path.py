@@ -39,7 +39,7 @@ class Path:
     place: FloatArray
     which: NDArray[np.int64]
     touch: float  # largest of inner: below 0 the nearest approach to a transition that does not happen
-    touched: tuple[int, int]  # its (visit, transition)
+    touched: tuple[int, int]  # its (visit, transition), or that of a touch so near to zero that it has no sign
     own: FloatArray  # (m,) at each transition, the least of its other rows: 0 at a corner of its condition
     others: FloatArray  # (m,) at each transition, the largest margin of the other transitions: 0 at a corner
     other: NDArray[np.int64]  # (m,) which one
@@ -181,11 +181,12 @@ class Walk:
         # In a flight as short as those before rest an indicator does not rise above what it is solved for.
         flown = tau < SHORT * float(solved.times[-1])
         inner[flown[:, None] & (np.abs(inner) <= ROUNDING * size.max(axis=0))] = -np.inf
-        inner[np.abs(inner) < LEAST * np.where(np.isfinite(size), size, 0.0)] = -np.inf
+        without_sign = np.abs(inner) < LEAST * np.where(np.isfinite(size), size, 0.0)
+        inner[without_sign] = -np.inf
         if m == 1:  # the section is a place within the only visit
             higher = begin > inner
             inner[higher], place[higher], which[higher] = begin[higher], 0.0, begin_row[higher]
-        at = int(inner.argmax()) if n_t else 0
+        at = int(np.where(without_sign, 0.0, inner).argmax()) if n_t else 0
         touched = (at // n_t, at % n_t) if n_t else (0, 0)
         own = end[self.inside]
         own[self.alone] = np.inf
@@ -205,7 +206,7 @@ class Walk:
             inner,
             place,
             which,
-            float(inner[touched]) if n_t else -np.inf,
+            float(inner.max(initial=-np.inf)),
             touched,
             own,
             others,

@@ -25,7 +25,8 @@ class Section(NamedTuple):
 class Kept(NamedTuple):
     """The kept section points of P runs, with true extremes and counts of the kept window; or one run's row of it.
 
-    Extremes include both limits of a jump; with the wrong sign they are infinite where nothing was kept."""
+    Extremes include both limits of a jump, not what lies between at its instant; with the wrong sign they are infinite
+    where nothing was kept."""
 
     section: Any  # (P, keep, n)
     high: Any  # (P, rows): maxima of states, indicators, outputs

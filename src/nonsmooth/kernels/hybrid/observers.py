@@ -143,7 +143,7 @@ def cross(i, t, jumps, mode, form, net, section, goal, seen, tables, work):
     elif LOGS == 1 and goal.kind == LOGGED:
         log_transition(t, form, seen.log, work)
     else:
-        count_transition(t, mode, form, net, section, goal, seen.kept, tables, work)
+        count_transition(t, net, goal, seen.kept, work)
 
 
 @once

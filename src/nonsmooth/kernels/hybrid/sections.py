@@ -33,7 +33,7 @@ from nonsmooth.kernels.hybrid.codes import (
     WAITED,
 )
 from nonsmooth.kernels.hybrid.kept import Kept
-from nonsmooth.kernels.linear.extremes import include, widen
+from nonsmooth.kernels.linear.extremes import widen
 from nonsmooth.kernels.linear.stepper import at_rest, memory_at, note_side, state_at, stride
 
 
@@ -179,13 +179,11 @@ def mark_return(step, work):
 
 
 @once
-def count_transition(t, mode, form, net, section, goal, seen, tables, work):
+def count_transition(t, net, goal, seen, work):
     """Count a transition in the kept window."""
     if work.tally[RETURNS] >= goal.transient:
         seen.crossings[0] += 1
         seen.contacts[0] += net.transitions[t, 2]
-        if section.extremes != 0:
-            include(mode, form, tables, work, seen)
 
 
 @once

@@ -8,7 +8,7 @@ from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.codes import MODE
 from nonsmooth.kernels.linear.polynomial import NEVER, THIRD, classify, critical_points, horner
 from nonsmooth.kernels.linear.tables import NODES, states_of
-from nonsmooth.kernels.linear.values import at_ends, bound_at, compose, to_node, value_of
+from nonsmooth.kernels.linear.values import at_ends, bound_at, compose, to_node
 
 
 @once
@@ -72,7 +72,9 @@ def kept_row(f, n, n_i, own):
 
 @once
 def widen(a, b, form, tables, work, kept):
-    """Extend the extremes by the piece [a, b] of a segment."""
+    """Extend the extremes by the piece [a, b] of a segment; what is passed through at one instant has none."""
+    if not (b > a):
+        return
     n, high, low = states_of(tables.field), kept.high, kept.low
     n_i, mode = work.zero.shape[0], work.tally[MODE]
     for f in range(tables.fun.shape[1]):
@@ -100,15 +102,3 @@ def finish(form, tables, work, kept):
         if work.twin[f] >= 0:
             kept.high[own + f] = kept.high[work.twin[f]] + tables.fun[0, f, n]
             kept.low[own + f] = kept.low[work.twin[f]] + tables.fun[0, f, n]
-
-
-@once
-def include(mode, form, tables, work, kept):
-    """Extend the extremes by the present instant."""
-    n = states_of(tables.field)
-    for f in range(tables.fun.shape[1]):
-        k = kept_row(f, n, work.zero.shape[0], kept.section.shape[1])
-        if k >= 0:
-            value = value_of(tables, mode, f, work.w)
-            kept.high[k] = max(kept.high[k], value)
-            kept.low[k] = min(kept.low[k], value)

@@ -17,7 +17,7 @@ from nonsmooth.kernels.series.polynomial import (
     shift,
     strip,
 )
-from nonsmooth.kernels.series.step import degree_of, jets_of
+from nonsmooth.kernels.series.step import degree_of
 from nonsmooth.kernels.series.taylor import dense_states
 
 
@@ -42,31 +42,16 @@ def widen(a, b, form, tables, work, kept):
 
 @once
 def widen_corners(m, form, work, kept):
-    """Outputs with a corner have no polynomial: sampled four times on the step."""
+    """Outputs with a corner have no polynomial: sampled five times on the step."""
     n, h = work.w.shape[0], work.memo[place.PART]
     values = values_of(form)
-    for j in range(1, 5):
+    for j in range(5):
         dense_states(work.C, m, n, 0.25 * j * h, work.dense)
         values(work.tally[MODE], work.memo[place.BASE] + 0.25 * j * h, work.dense, work.q, work.vals)
         for row in range(n, form.kinds.shape[0]):
             if form.kinds[row] == 0:
                 kept.high[row] = max(kept.high[row], work.vals[row - n])
                 kept.low[row] = min(kept.low[row], work.vals[row - n])
-
-
-@once
-def include(mode, form, tables, work, kept):
-    """Extend the extremes by the present instant, just after a transition."""
-    n = work.w.shape[0]
-    jets = jets_of(form, work)
-    for row in range(form.kinds.shape[0]):
-        if row < n and form.lacking[mode, row] == 1:
-            continue
-        value = jets[row, 0]
-        if value > kept.high[row]:
-            kept.high[row] = value
-        if value < kept.low[row]:
-            kept.low[row] = value
 
 
 @once
