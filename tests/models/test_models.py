@@ -1,7 +1,9 @@
 """The ready models against what was published for them."""
 
+import re
 import subprocess
 import sys
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +34,15 @@ def test_every_model_is_listed_documented_and_takes_parameters():
         assert make(**{first: 2.0}).values[first] == 2.0
         with pytest.raises(ValueError, match="`nonsense` is not a parameter"):
             make(nonsense=1.0)
+
+
+@pytest.mark.parametrize("name", models.names())
+def test_values_are_those_of_the_documentation(name: str):
+    """``zeta`` 0.05 (damping ratio): a name and its number, which may be a fraction."""
+    make = getattr(models, name)
+    sentence = re.search(r"\*\*parameters : float\n(.*?)(\.\s|\n\n)", make.__doc__, re.DOTALL)[1]
+    said = {key: float(Fraction(number)) for key, number in re.findall(r"``(\w+)``\s+(-?\d[\d./e-]*(?<!\.))", sentence)}
+    assert dict(make().values) == said
 
 
 def test_the_paper_s_table_1_and_natural_frequency():
