@@ -20,6 +20,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -140,11 +141,10 @@ def room_of(path: Path) -> str:
 
 
 def sample(number: int, rooms: list[str], seed: str) -> list[Mutant]:
-    """Mutants of these rooms, each room's share by its lines, at least one."""
+    """Those in these rooms of a sample of mutants, of which each room has its share by its lines, at least one."""
     files: dict[str, list[Path]] = defaultdict(list)
     for path in sorted(PACKAGE.rglob("*.py")):
-        if not rooms or room_of(path) in rooms:
-            files[room_of(path)].append(path)
+        files[room_of(path)].append(path)
     sizes = {room: sum(path.read_text("utf-8").count("\n") for path in paths) for room, paths in files.items()}
     rng, found = random.Random(seed), []
     for room, paths in files.items():
@@ -153,7 +153,7 @@ def sample(number: int, rooms: list[str], seed: str) -> list[Mutant]:
             while not (every := list(mutants(rng.choices(paths, lengths)[0]))):
                 pass
             found.append(rng.choice(every))
-    return found
+    return [one for one in found if not rooms or room_of(one.path) in rooms]
 
 
 def tests_of(one: Mutant, called: dict, longest: float) -> list[str]:
@@ -207,7 +207,7 @@ def pytest_of(tests: list[str], sources: Path, *words: str) -> subprocess.Comple
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("number", type=int, nargs="?", default=300)
-    parser.add_argument("--rooms", nargs="*", default=[])
+    parser.add_argument("--rooms", nargs="*", default=[], help="of the sample, those in these rooms")
     parser.add_argument("--seed", default="", help="instead of the hash of the commit")
     parser.add_argument("--called", default="out/called.json")
     parser.add_argument("--longest", type=float, default=120.0, help="seconds of tests for one mutant")
@@ -226,10 +226,11 @@ def main() -> int:
         if found.returncode != 0:  # a test that is no longer there would fail with every mutant
             raise SystemExit(f"{options.called} is of other tests:\n{found.stdout[-2000:]}{found.stderr[-2000:]}")
         for one, tests in drawn:
+            begun = time.monotonic()
             end = outcome(one, tests, sources, options.patience) if tests else "SURVIVES"
             score[room_of(one.path)].append(end)
             place = f"{one.path.relative_to(PACKAGE)}:{one.line}"
-            print(f"{end:8}  {place}  {one.words}  ({len(tests)} tests)", flush=True)
+            print(f"{end:8}  {place}  {one.words}  ({len(tests)} tests, {time.monotonic() - begun:.0f} s)", flush=True)
     print(f"\nseed {seed}\n\n| room | mutants | caught | hang |\n|---|---|---|---|")
     score["all"] = [end for ends in score.values() for end in ends]
     for room, ends in sorted(score.items(), key=lambda row: (row[0] == "all", row[0])):
