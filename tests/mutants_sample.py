@@ -47,7 +47,7 @@ SILENT = (ast.Raise, ast.JoinedStr, ast.Assert, ast.AnnAssign, ast.arguments, as
 LOOKS = {  # of a mark: how thick, large, pale, far from its neighbour; and which line a warning names
     *("alpha", "elinewidth", "fontsize", "labelpad", "linewidth", "linewidths", "lw", "markersize", "markeredgewidth"),
     *("columnspacing", "fill_alpha", "handlelength", "handletextpad", "line_alpha", "line_width", "ms"),
-    *("mutation_scale", "pad", "stacklevel", "zorder"),
+    *("mutation_scale", "pad", "rasterized", "stacklevel", "zorder"),
 }
 NO_ANSWER = {"default_rng", "bar", "progress_bar"}  # a seed that stands there is one of many; bars of progress
 FOR_CUDA = ["tests/diagrams/test_gpu.py", "tests/diagrams/test_gpu_series.py"]
@@ -89,13 +89,17 @@ def places(node: ast.AST, around: ast.stmt | None = None, function: str = "", in
             if type(child) in SWAPS:
                 yield node, where, SWAPS[type(child)](), around, function
             elif isinstance(child, ast.Constant) and type(child.value) in (int, float, bool):
-                other = not child.value if isinstance(child.value, bool) else child.value + 1
-                yield node, where, ast.Constant(other), around, function
+                yield node, where, ast.Constant(_other(child.value)), around, function
             elif name == "test" and ast.unparse(child) != "TYPE_CHECKING":  # imports too early are no other program
                 yield node, where, ast.UnaryOp(ast.Not(), child), around, function
             elif function and isinstance(child, DROPPED):
                 yield node, where, ast.Pass(), around, function
             yield from places(child, around, function, inside)
+
+
+def _other(value: float) -> float:
+    """Another constant: one more, or twice a large one, because a limit of 1001 is that of 1000."""
+    return not value if isinstance(value, bool) else 2 * value if abs(value) >= 10 else value + 1
 
 
 def _is_text(node: ast.AST) -> bool:
