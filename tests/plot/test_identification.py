@@ -347,6 +347,14 @@ def test_a_calibration_says_where_its_line_begins() -> None:
     assert "from 0.75 V on" in written and "1.2000 ± 0.0040 rad/s per V" in written
 
 
+@pytest.mark.parametrize("top", [1.0, 10.0, 1000.0])
+def test_a_profile_is_shown_up_to_five_times_its_bound(top: float) -> None:
+    data = flat()
+    data["cost"] *= top / data["cost"].max()
+    high = identification.profile(data).get_ylim()[1]
+    assert max(3.84, min(top, 5 * 3.84)) < high < 10 * 3.84
+
+
 def test_lengths_are_drawn_in_millimetres() -> None:
     length = {"units": "m", "long_name": "crank length"}
     data = line().assign(setting=("run", np.arange(2.0, 12.0) / 1e3, length))
