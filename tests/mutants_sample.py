@@ -81,7 +81,8 @@ def places(node: ast.AST, around: ast.stmt | None = None, function: str = "", in
         for i, child in enumerate(value) if isinstance(value, list) else [(-1, value)]:
             if not isinstance(child, ast.AST) or isinstance(child, SILENT) or _is_text(child):
                 continue
-            if isinstance(child, ast.keyword) and child.arg in LOOKS | {"strict"}:  # strict= asserts lengths
+            # strict= asserts lengths, total= is for the checker of types.
+            if isinstance(child, ast.keyword) and child.arg in LOOKS | {"strict", "total"}:
                 continue
             if isinstance(child, ast.Call) and ast.unparse(child.func).rpartition(".")[2] in NO_ANSWER:
                 continue

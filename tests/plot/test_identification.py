@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import matplotlib as mpl
 
 mpl.use("Agg")
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
@@ -27,12 +25,6 @@ from nonsmooth.plot.comparison import (
 )
 
 SYNTHETIC = {"synthetic": "yes"}
-
-
-@pytest.fixture(autouse=True)
-def close() -> Iterator[None]:
-    yield
-    plt.close("all")
 
 
 def words(ax: Any) -> str:
@@ -347,6 +339,7 @@ def test_a_calibration_says_where_its_line_begins() -> None:
     assert "from 0.75 V on" in written and "1.2000 ± 0.0040 rad/s per V" in written
 
 
+@pytest.mark.usefixtures("window")
 @pytest.mark.parametrize("top", [1.0, 10.0, 1000.0])
 def test_a_profile_is_shown_up_to_five_times_its_bound(top: float) -> None:
     data = flat()

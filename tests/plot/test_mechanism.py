@@ -142,7 +142,6 @@ def test_the_parts_and_their_labels_are_drawn(chain) -> None:
     for line in own.lines:  # everything lies within the picture
         x = np.asarray(line.get_xdata(), dtype=float)
         assert low <= np.nanmin(x) <= np.nanmax(x) <= high
-    plt.close("all")
 
 
 def test_a_belt_lies_on_both_rollers() -> None:
@@ -168,7 +167,6 @@ def test_gaps_and_displacements_are_to_one_scale() -> None:
         sketch.frame(ax, room)
         assert ax.get_xlim() == pytest.approx((sketch.left - 0.2 - room, sketch.left - 0.2 + sketch.width + room))
         assert np.diff(ax.get_ylim()) == pytest.approx([sketch.height])
-    plt.close("all")
 
 
 @pytest.mark.parametrize(
