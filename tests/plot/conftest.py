@@ -1,4 +1,4 @@
-"""What every picture of a test is held to."""
+"""The rule that holds for every picture of a test: nothing drawn leaves its axes."""
 
 from __future__ import annotations
 
