@@ -24,25 +24,20 @@ def numbers(system, expressions, u, t=0.0):
 
 
 def test_every_model_is_listed_documented_and_takes_parameters():
+    """Its values are those of its documentation: ``zeta`` 0.05 (damping ratio), a name and a number or a fraction."""
     files = Path(models.__file__).parent.glob("*.py")
     assert models.names() == tuple(sorted(file.stem for file in files if file.stem != "__init__"))
     for name in models.names():
         make = getattr(models, name)
         assert "References" in make.__doc__
         system = make()
+        sentence = re.search(r"\*\*parameters : float\n(.*?)(\.\s|\n\n)", make.__doc__, re.DOTALL)[1]
+        said = re.findall(r"``(\w+)``\s+(-?\d[\d./e-]*(?<!\.))", sentence)
+        assert dict(system.values) == {key: float(Fraction(number)) for key, number in said}
         first = next(iter(system.values))
         assert make(**{first: 2.0}).values[first] == 2.0
         with pytest.raises(ValueError, match="`nonsense` is not a parameter"):
             make(nonsense=1.0)
-
-
-@pytest.mark.parametrize("name", models.names())
-def test_values_are_those_of_the_documentation(name: str):
-    """``zeta`` 0.05 (damping ratio): a name and its number, which may be a fraction."""
-    make = getattr(models, name)
-    sentence = re.search(r"\*\*parameters : float\n(.*?)(\.\s|\n\n)", make.__doc__, re.DOTALL)[1]
-    said = {key: float(Fraction(number)) for key, number in re.findall(r"``(\w+)``\s+(-?\d[\d./e-]*(?<!\.))", sentence)}
-    assert dict(make().values) == said
 
 
 def test_the_paper_s_table_1_and_natural_frequency():
