@@ -2,7 +2,7 @@
 
 Compiling is what Numba's dispatchers take, importing what import statements take (collecting is mostly that), children
 are processes that have ended, the browser those of tests that look at one; the rest is what is left. ``--called FILE``
-writes the tests that run each function of the package, for ``tests/mutants_sample.py``.
+writes the tests that run each function of the package, in child processes too, for ``tests/mutants_sample.py``.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import cProfile
 import json
 import os
 import sys
+import tempfile
 import threading
 import time
 from collections import defaultdict
@@ -24,6 +25,7 @@ import pytest
 CAUSES = ("compiling", "importing", "children", "browser", "rest")
 SOURCES = str(Path(__file__).parents[1] / "src" / "nonsmooth") + os.sep
 ROOT = Path(__file__).parents[1]
+CHILDREN = ROOT / "tests" / "children"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -45,6 +47,12 @@ class Costs:
         self.took: dict[str, float] = {}
         self.seen: set[Any] = set()
         self.into = called
+        if called:
+            descriptor, self.children = tempfile.mkstemp()  # tests/children/sitecustomize.py writes there
+            os.close(descriptor)
+            os.environ["NONSMOOTH_CALLED"] = self.children
+            sys.path.append(str(CHILDREN))
+            os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [os.environ.get("PYTHONPATH"), str(CHILDREN)]))
         builtins.__import__ = self._timed("importing", builtins.__import__)
 
     def _timed(self, cause: str, function: Callable[..., Any]) -> Callable[..., Any]:
@@ -118,6 +126,10 @@ class Costs:
         for code in self.seen:
             if code.co_filename.startswith(SOURCES):
                 self.called[f"{code.co_filename.removeprefix(SOURCES)}:{code.co_qualname}"].add(nodeid)
+        with open(self.children, "r+", encoding="utf-8") as file:
+            for place in file.read().splitlines():
+                self.called[place].add(nodeid)
+            file.truncate(0)
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
         write = terminalreporter.write_line
@@ -129,6 +141,7 @@ class Costs:
             write(f"{name:56}{sum(row.values()):8.1f}" + "".join(f"{row[cause]:11.1f}" for cause in CAUSES))
         if self.into:
             called = {place: sorted(tests) for place, tests in sorted(self.called.items())}
+            Path(self.children).unlink()
             Path(self.into).write_text(json.dumps({"took": self.took, "called": called}), encoding="utf-8")
 
 

@@ -1,11 +1,12 @@
 """A sample of generated mutants, spread over the rooms: ``python tests/mutants_sample.py [NUMBER] [--rooms ...]``.
 
-A mutant is one operator, condition or constant changed, or one statement dropped; messages, annotations and assertions
-are left out. Each room has a share by its lines. The seed is the hash of the commit, so that a sample is fresh after
-each change and the same for who repeats it. The tests that run a mutant's function are those that ``python -m pytest -p
-tests.costs --called out/called.json -n 0`` has seen, the quickest first; without that file the tests of the room. No
-profile sees kernels, what a GPU's simulator runs, and a page's server: their tests are listed here. Survivors are
-printed with their lines; the score by room is the table of the documentation.
+A mutant is one operator, condition or constant changed, or one statement dropped. Messages, annotations and assertions
+are left out, and what no answer depends on (``LOOKS``, ``NO_ANSWER``). Each room has a share by its lines. The seed is
+the hash of the commit, so that a sample is fresh after each change and the same for who repeats it. The tests that run
+a mutant's function are those that ``python -m pytest -p tests.costs --called out/called.json -n 0`` has seen, the
+quickest first; without that file the tests of the room. No profile sees kernels: their tests are listed here. A mutant
+is caught where a test fails, and hangs where one takes longer than ``--patience`` (unless given, the limit at which the
+suite ends a test). Survivors are printed with their lines; the score by room is the table of the documentation.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -42,7 +44,12 @@ SWAPS: dict[type, type] = {
 }
 DROPPED = (ast.Assign, ast.AugAssign, ast.Expr, ast.Continue, ast.Break)
 SILENT = (ast.Raise, ast.JoinedStr, ast.Assert, ast.AnnAssign, ast.arguments, ast.Import, ast.ImportFrom)
-FOR_PAGES = ["tests/explorer/test_views.py", "tests/explorer/test_page.py"]
+LOOKS = {  # of a mark: how thick, large, pale, far from its neighbour; and which line a warning names
+    *("alpha", "elinewidth", "fontsize", "labelpad", "linewidth", "linewidths", "lw", "markersize", "markeredgewidth"),
+    *("columnspacing", "fill_alpha", "handlelength", "handletextpad", "line_alpha", "line_width", "ms"),
+    *("mutation_scale", "pad", "rasterized", "stacklevel", "zorder"),
+}
+NO_ANSWER = {"default_rng", "bar", "progress_bar"}  # a seed that stands there is one of many; bars of progress
 FOR_CUDA = ["tests/diagrams/test_gpu.py", "tests/diagrams/test_gpu_series.py"]
 FOR_KERNELS = ["tests/kernels", "tests/flow"]
 FOR_KERNELS += [f"tests/diagrams/test_{one}.py" for one in ("sweep", "lyapunov", "chart_known_answers")]
@@ -74,19 +81,26 @@ def places(node: ast.AST, around: ast.stmt | None = None, function: str = "", in
         for i, child in enumerate(value) if isinstance(value, list) else [(-1, value)]:
             if not isinstance(child, ast.AST) or isinstance(child, SILENT) or _is_text(child):
                 continue
-            if isinstance(child, ast.keyword) and child.arg == "strict":  # an assertion on lengths
+            # strict= asserts lengths, total= is for the checker of types.
+            if isinstance(child, ast.keyword) and child.arg in LOOKS | {"strict", "total"}:
+                continue
+            if isinstance(child, ast.Call) and ast.unparse(child.func).rpartition(".")[2] in NO_ANSWER:
                 continue
             where = name if i < 0 else f"{name}.{i}"
             if type(child) in SWAPS:
                 yield node, where, SWAPS[type(child)](), around, function
             elif isinstance(child, ast.Constant) and type(child.value) in (int, float, bool):
-                other = not child.value if isinstance(child.value, bool) else child.value + 1
-                yield node, where, ast.Constant(other), around, function
+                yield node, where, ast.Constant(_other(child.value)), around, function
             elif name == "test" and ast.unparse(child) != "TYPE_CHECKING":  # imports too early are no other program
                 yield node, where, ast.UnaryOp(ast.Not(), child), around, function
             elif function and isinstance(child, DROPPED):
                 yield node, where, ast.Pass(), around, function
             yield from places(child, around, function, inside)
+
+
+def _other(value: float) -> float:
+    """Another constant: one more, or twice a large one, because a limit of 1001 is that of 1000."""
+    return not value if isinstance(value, bool) else 2 * value if abs(value) >= 10 else value + 1
 
 
 def _is_text(node: ast.AST) -> bool:
@@ -132,11 +146,10 @@ def room_of(path: Path) -> str:
 
 
 def sample(number: int, rooms: list[str], seed: str) -> list[Mutant]:
-    """Mutants of these rooms, each room's share by its lines, at least one."""
+    """Those in these rooms of a sample of mutants, of which each room has its share by its lines, at least one."""
     files: dict[str, list[Path]] = defaultdict(list)
     for path in sorted(PACKAGE.rglob("*.py")):
-        if not rooms or room_of(path) in rooms:
-            files[room_of(path)].append(path)
+        files[room_of(path)].append(path)
     sizes = {room: sum(path.read_text("utf-8").count("\n") for path in paths) for room, paths in files.items()}
     rng, found = random.Random(seed), []
     for room, paths in files.items():
@@ -145,14 +158,12 @@ def sample(number: int, rooms: list[str], seed: str) -> list[Mutant]:
             while not (every := list(mutants(rng.choices(paths, lengths)[0]))):
                 pass
             found.append(rng.choice(every))
-    return found
+    return [one for one in found if not rooms or room_of(one.path) in rooms]
 
 
 def tests_of(one: Mutant, called: dict, longest: float) -> list[str]:
     """The tests to run, the quickest first; as many as take no longer than ``longest`` seconds together."""
     file, room = str(one.path.relative_to(PACKAGE)), room_of(one.path)
-    if file.startswith("kernels/cuda") or file.endswith("_cuda.py"):
-        return FOR_CUDA  # a simulator runs them in a process of its own
     known = called.get("called", {})
     if one.function:
         seen = set(known.get(f"{file}:{one.function}", []))
@@ -160,7 +171,7 @@ def tests_of(one: Mutant, called: dict, longest: float) -> list[str]:
         seen = {test for place, tests in known.items() if place.startswith(f"{file}:") for test in tests}
     if not seen:
         if room == "kernels":
-            return FOR_KERNELS
+            return FOR_CUDA if "cuda" in one.path.parts else FOR_KERNELS
         return [f"tests/{room}"] if (ROOT / "tests" / room).is_dir() else []
     chosen, left = [], longest
     for test in sorted(seen, key=lambda name: called["took"][name]):
@@ -168,56 +179,67 @@ def tests_of(one: Mutant, called: dict, longest: float) -> list[str]:
         chosen.append(test)
         if left < 0:
             break
-    return chosen + (FOR_PAGES if room == "explorer" else [])  # a browser looks at a server of its own
+    return chosen
 
 
-def caught(one: Mutant, tests: list[str], sources: Path, limit: float) -> bool:
-    """Return whether a test fails, or hangs, with the mutant."""
+def outcome(one: Mutant, tests: list[str], sources: Path, patience: float) -> str:
+    """Return "caught" where a test fails with the mutant, "hangs" where one takes longer, else "SURVIVES"."""
     place = sources / "nonsmooth" / one.path.relative_to(PACKAGE)
     original = place.read_text(encoding="utf-8")
     place.write_text(one.text, encoding="utf-8")
+    done = pytest_of(tests, sources, "-x", "-o", f"faulthandler_timeout={patience}")
+    place.write_text(original, encoding="utf-8")
+    if done.returncode == 0:
+        return "SURVIVES"
+    return "hangs" if "Timeout (" in done.stderr else "caught"
+
+
+def pytest_of(tests: list[str], sources: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """Run pytest on these tests with the package of a copy."""
+    paths = os.pathsep.join(filter(None, [str(sources), os.environ.get("PYTHONPATH")]))
     with tempfile.NamedTemporaryFile("w", suffix=".txt") as names:
         names.write("\n".join(tests))
         names.flush()
-        words = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", f"@{names.name}"]
-        try:
-            done = subprocess.run(
-                words, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(sources)}, capture_output=True, timeout=limit
-            )
-            return done.returncode != 0
-        except subprocess.TimeoutExpired:
-            return True
-        finally:
-            place.write_text(original, encoding="utf-8")
+        return subprocess.run(
+            [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", *words, f"@{names.name}"],
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": paths},
+            capture_output=True,
+            text=True,
+        )
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("number", type=int, nargs="?", default=300)
-    parser.add_argument("--rooms", nargs="*", default=[])
+    parser.add_argument("--rooms", nargs="*", default=[], help="of the sample, those in these rooms")
     parser.add_argument("--seed", default="", help="instead of the hash of the commit")
     parser.add_argument("--called", default="out/called.json")
     parser.add_argument("--longest", type=float, default=120.0, help="seconds of tests for one mutant")
+    parser.add_argument("--patience", type=float, default=1800.0, help="seconds of one test, behind which it hangs")
     options = parser.parse_args()
     head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True).stdout.strip()
     seed = options.seed or head
     file = ROOT / options.called
     called = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
-    score: dict[str, list[bool]] = defaultdict(list)
+    score: dict[str, list[str]] = defaultdict(list)
     with tempfile.TemporaryDirectory() as folder:
         sources = Path(folder) / "src"
         shutil.copytree(ROOT / "src", sources, ignore=shutil.ignore_patterns("__pycache__"))
-        for one in sample(options.number, options.rooms, seed):
-            tests = tests_of(one, called, options.longest)
-            fine = bool(tests) and caught(one, tests, sources, 10 * options.longest + 60)
-            score[room_of(one.path)].append(fine)
+        drawn = [(one, tests_of(one, called, options.longest)) for one in sample(options.number, options.rooms, seed)]
+        found = pytest_of(sorted({test for _, tests in drawn for test in tests}), sources, "--collect-only")
+        if found.returncode != 0:  # a test that is no longer there would fail with every mutant
+            raise SystemExit(f"{options.called} is of other tests:\n{found.stdout[-2000:]}{found.stderr[-2000:]}")
+        for one, tests in drawn:
+            begun = time.monotonic()
+            end = outcome(one, tests, sources, options.patience) if tests else "SURVIVES"
+            score[room_of(one.path)].append(end)
             place = f"{one.path.relative_to(PACKAGE)}:{one.line}"
-            print(f"{'caught  ' if fine else 'SURVIVES'}  {place}  {one.words}  ({len(tests)} tests)", flush=True)
-    print(f"\nseed {seed}\n\n| room | mutants | caught |\n|---|---|---|")
-    for room, fine in sorted(score.items()):
-        print(f"| `{room}` | {len(fine)} | {sum(fine)} |")
-    every = [one for fine in score.values() for one in fine]
-    print(f"| all | {len(every)} | {sum(every)} |")
+            print(f"{end:8}  {place}  {one.words}  ({len(tests)} tests, {time.monotonic() - begun:.0f} s)", flush=True)
+    print(f"\nseed {seed}\n\n| room | mutants | caught | hang |\n|---|---|---|---|")
+    score["all"] = [end for ends in score.values() for end in ends]
+    for room, ends in sorted(score.items(), key=lambda row: (row[0] == "all", row[0])):
+        print(f"| `{room}` | {len(ends)} | {ends.count('caught')} | {ends.count('hangs')} |")
     return 0
 
 

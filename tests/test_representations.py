@@ -70,6 +70,16 @@ def identified(**more: object) -> ParameterSet:
     )
 
 
+def test_a_surface_shows_its_static_friction() -> None:
+    assert "crossed or slid on, static f_s" in str(ns.models.dry_friction_oscillator())
+
+
+def test_a_smoothed_system_shows_the_ways_into_and_out_of_its_bands() -> None:
+    system = ns.models.stick_slip_belt()
+    assert str(system).count(" -> ") == 0  # its surface is crossed or slid on
+    assert str(system.smoothed(0.01)).count(" -> ") == 4
+
+
 def many_modes(modes: int) -> ns.System:
     """A chain of modes, one behind the other."""
     names = [f"mode{i}" for i in range(modes)]

@@ -98,6 +98,7 @@ def test_cascade_down_to_period_eight(tmp_path: Path) -> None:
     assert time.process_time() - begun < 5.0
     assert diagram["period_number"].values.tolist() == [1, 2, 4, 8]
     assert diagram["parent"].values.tolist() == [-1, 0, 1, 2]
+    assert all(one.attrs["long_name"] for one in diagram.data_vars.values())
     table = ns.special_points(diagram)
     flips = np.unique(table["g"].values[table["kind"].values == "flip"].round(12))
     ratios = np.diff(flips)[:-1] / np.diff(flips)[1:]

@@ -9,6 +9,7 @@ import numpy as np
 import nonsmooth as ns
 
 TOP = ns.Poincare("lift_velocity", rising=False)
+UNIT = 0.1  # of time, in which nothing may depend on its size
 START = {"y1": 0.2, "y2": 0.0, "y3": 10.0}
 
 
@@ -16,7 +17,8 @@ def two_wells() -> ns.System:
     """Forced, with a steep layer (whose steps are checked), impacts that remember, an output with a corner."""
 
     def field(t: Any, u: Any, p: Any) -> Any:
-        return u.v, u.x - u.x**3 - p.c * u.v - p.mu * np.tanh(u.v / 0.05) + p.F * np.cos(p.w * t)
+        force = u.x - u.x**3 - p.c * u.v - p.mu * np.tanh(u.v / 0.05) + p.F * np.cos(p.w * t / UNIT)
+        return u.v / UNIT, force / UNIT
 
     return ns.System(
         name="two wells",

@@ -95,12 +95,15 @@ def test_nothing_of_a_model_stands_under_the_name_of_the_next(tabs: list[Page]) 
     tab.until_done()
     before = tab.drawn()
     assert {name.partition(":")[0] for name, n in before.items() if n} >= {"diagram", "portrait", "history", "section"}
+    plots = [tab.session.sheet.views[name].figure.plot for name in ("portrait", "section", "history")]
+    names = [("x (mm)", "v (mm/s)")] * 2 + [("t (s)", "x (mm)")]
+    assert [(plot.xaxis[0].axis_label, plot.title.text) for plot in plots] == names
     assert tab.told("readout")
     tab.say("model", "", "bilinear_oscillator")
     assert {name for name, n in tab.drawn().items() if n} == set()
     assert tab.told("readout") == []
     assert not tab.session.sheet.views["portrait"].zone.visible
-    for plot in [tab.session.sheet.views[name].figure.plot for name in ("portrait", "history", "section")]:
+    for plot in plots:
         assert (plot.xaxis[0].axis_label, plot.title.text) == (None, "")
 
 

@@ -44,6 +44,23 @@ def test_a_ramp_covers_the_recorded_time(relaxation: ns.System) -> None:
     assert np.max(np.abs(run["u"].values[:, 0] - (2 * (t - 1) - 5 + 7 * np.exp(-t)))) < 1e-11
 
 
+def test_an_impulse_is_that_of_the_mass_at_its_instant() -> None:
+    """A ball of mass m = t falls from 1 and meets the floor at t = sqrt 2 with the speed sqrt 2: restitution 0.8."""
+    ball = ns.mechanical(
+        lambda p: p.m,
+        0.0,
+        0.0,
+        coordinates=["q"],
+        parameters={"m": 1.0},
+        forcing={"q": lambda t, p: -p.m},
+        elements={"floor": ns.elements.Stop(at="q", side=-1, position=0.0, restitution=0.8)},
+    )
+    run = ns.simulate(ball, start={"q": 1.0}, transient=1.0, duration=2.0, ramps={"m": (1.0, 3.0)})
+    assert run["crossing_time"].values == pytest.approx([np.sqrt(2)])
+    assert run["floor_impulse"].values == pytest.approx([np.sqrt(2) * 1.8 * np.sqrt(2)])
+    assert run["floor_energy_lost"].values == pytest.approx([np.sqrt(2) * (1 - 0.8**2)])
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_the_support_under_a_slow_ramp_of_the_force(method: str) -> None:
     """Against DOP853 at rtol 1e-12 with the contacts as terminal events: a slow pass through Fig. 11."""

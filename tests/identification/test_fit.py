@@ -1,5 +1,6 @@
 """Fits of any system: data are closed forms or another program's; derivatives are checked against differences."""
 
+import re
 import time
 
 import numpy as np
@@ -360,8 +361,12 @@ def test_models_are_ranked_by_what_they_predict():
     assert ranked.rms.sel(model="true") < 1.1 and ranked.rms.sel(model="undamped") > 3.0
     with pytest.raises(ValueError, match="at least two systems"):
         ns.select_model({"one": (system, ["k"])}, {"x": (t, x)})
-    with pytest.raises(ValueError, match="too short for folds = 50"):
-        ns.select_model({"a": (system, ["k"]), "b": (system, ["c"])}, {"x": (t, x)}, folds=50)
+    held = []
+    for records in ({"x": (t, x)}, [{"x": (t, x)}] * 2):
+        with pytest.raises(ValueError, match="too short for folds = 500") as told:
+            ns.select_model({"a": (system, ["k"]), "b": (system, ["c"])}, records, folds=500)
+        held.append(int(re.search(r"holds (\d+) blocks", str(told.value))[1]))
+    assert held[1] == 2 * held[0] > 0
 
 
 def test_five_parameters_of_two_thousand_samples_take_seconds():

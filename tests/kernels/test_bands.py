@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from nonsmooth.flow.engines.linear import scratch
+from nonsmooth.flow.engines.linear import scratch, table_bytes
 from nonsmooth.kernels.compile.assembly import linear_module
 from nonsmooth.kernels.compile.cache import load_module
 from nonsmooth.kernels.hybrid.records import Form
@@ -141,3 +141,9 @@ def test_directions_are_carried_by_the_matrix_exponential(generators, made) -> N
     flow = expm(generators[0][:STATES, :STATES] * part * tables.info[0, 0])
     wanted = flow @ (scale[:, None] * X) / scale[:, None]
     assert np.abs(carried - wanted).max() < 4e-15 * np.abs(wanted).max()
+
+
+@pytest.mark.parametrize(("states", "harmonics", "modes"), [(4, 0, 3), (8, 2, 1)])
+def test_the_memory_of_tables_is_known_beforehand(states: int, harmonics: int, modes: int) -> None:
+    propagators = scratch(states, harmonics, modes, 1, 0, 1)[0][0]
+    assert propagators.nbytes == table_bytes(states, harmonics, modes)

@@ -1,7 +1,9 @@
 """The ready models against what was published for them."""
 
+import re
 import subprocess
 import sys
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -22,12 +24,16 @@ def numbers(system, expressions, u, t=0.0):
 
 
 def test_every_model_is_listed_documented_and_takes_parameters():
+    """Its values are those of its documentation: ``zeta`` 0.05 (damping ratio), a name and a number or a fraction."""
     files = Path(models.__file__).parent.glob("*.py")
     assert models.names() == tuple(sorted(file.stem for file in files if file.stem != "__init__"))
     for name in models.names():
         make = getattr(models, name)
         assert "References" in make.__doc__
         system = make()
+        sentence = re.search(r"\*\*parameters : float\n(.*?)(\.\s|\n\n)", make.__doc__, re.DOTALL)[1]
+        said = re.findall(r"``(\w+)``\s+(-?\d[\d./e-]*(?<!\.))", sentence)
+        assert dict(system.values) == {key: float(Fraction(number)) for key, number in said}
         first = next(iter(system.values))
         assert make(**{first: 2.0}).values[first] == 2.0
         with pytest.raises(ValueError, match="`nonsense` is not a parameter"):

@@ -19,12 +19,6 @@ FIGURES = {name: one for room in ROOMS for name, one in vars(room).items() if ha
 QUIET = {"progress": False}
 
 
-@pytest.fixture(autouse=True)
-def _close():
-    yield
-    plt.close("all")
-
-
 @pytest.fixture(scope="module")
 def drawn() -> dict[str, tuple[Any, ...]]:
     """Arguments of figures: results of one oscillator."""

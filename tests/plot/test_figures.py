@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import matplotlib as mpl
@@ -25,12 +24,6 @@ CASES = [
     ("frequency_response", "responded"),
     ("section", "points"),
 ]
-
-
-@pytest.fixture(autouse=True)
-def _close() -> Iterator[None]:
-    yield
-    plt.close("all")
 
 
 @pytest.mark.parametrize(("figure", "name"), CASES)

@@ -35,7 +35,6 @@ def test_title_unit_legend_and_lines(run) -> None:
     both = ns.sweep(ns.models.discontinuous_support(), "rho", [0.3, 0.4], direction="both", keep=3, progress=False)
     assert ns.plot.bifurcation(both).get_legend() is not None
     assert ns.plot.bifurcation(both, legend=False).get_legend() is None
-    plt.close("all")
 
 
 def test_lines_that_were_there_stay_as_they_were(run) -> None:
@@ -43,7 +42,6 @@ def test_lines_that_were_there_stay_as_they_were(run) -> None:
     ax.plot([0, 1], [0, 1], linewidth=7)
     ns.plot.time_history(run, ax, linewidth=3)
     assert [line.get_linewidth() for line in ax.lines] == [7, 3]
-    plt.close("all")
 
 
 @pytest.mark.parametrize(
@@ -58,7 +56,6 @@ def test_lines_that_were_there_stay_as_they_were(run) -> None:
 def test_what_does_not_fit_is_said(run, options, error, words) -> None:
     with pytest.raises(error, match=words):
         ns.plot.time_history(run, **options)
-    plt.close("all")
 
 
 def test_the_phases_of_one_element_are_shaded() -> None:
@@ -83,7 +80,6 @@ def test_the_phases_of_one_element_are_shaded() -> None:
         ends = [path.vertices[:, 0] for path in shaded.get_paths()]
         covered = np.any([(one.min() < middle) & (middle < one.max()) for one in ends], axis=0)
         assert (covered == (x > 0.5))[clear].all()
-    plt.close("all")
 
 
 def test_labels_of_jumps_do_not_stand_over_each_other() -> None:
@@ -98,7 +94,6 @@ def test_labels_of_jumps_do_not_stand_over_each_other() -> None:
     boxes = [text.get_window_extent() for text in ax.texts if text.get_text()]
     assert len(boxes) == 3
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
-    plt.close("all")
 
 
 def test_a_load_is_broken_where_the_motion_jumps() -> None:
@@ -149,7 +144,6 @@ def test_slides_have_a_style_of_their_own(run, tmp_path) -> None:
     journal = ns.plot.time_history(run)  # behind the block it is the journal's again
     assert journal.figure.get_size_inches()[0] == pytest.approx(84 / 25.4)
     assert journal.lines[0].get_linewidth() == 0.8
-    plt.close("all")
 
 
 def test_a_line_style_joins_no_points() -> None:
@@ -168,7 +162,6 @@ def test_a_mark_without_a_face_shows() -> None:
     points = ns.poincare(ns.models.impact_oscillator(), n=5)
     (line,) = ns.plot.section(points, marker="+", markersize=5).lines
     assert line.get_markeredgewidth() > 0
-    plt.close("all")
 
 
 def test_a_title_stands_above_what_a_figure_says_of_itself() -> None:
@@ -178,4 +171,3 @@ def test_a_title_stands_above_what_a_figure_says_of_itself() -> None:
     ax.figure.draw_without_rendering()
     own, said = (text.get_window_extent() for text in (ax.title, ax._left_title))
     assert ax.get_title().strip() == "a safe region" and own.y1 > said.y1 and "\n" in ax.get_title()
-    plt.close("all")

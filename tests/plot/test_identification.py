@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import matplotlib as mpl
 
 mpl.use("Agg")
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
@@ -27,12 +25,6 @@ from nonsmooth.plot.comparison import (
 )
 
 SYNTHETIC = {"synthetic": "yes"}
-
-
-@pytest.fixture(autouse=True)
-def close() -> Iterator[None]:
-    yield
-    plt.close("all")
 
 
 def words(ax: Any) -> str:
@@ -352,6 +344,15 @@ def test_the_grid_of_the_transform_is_shown() -> None:
 def test_a_calibration_says_where_its_line_begins() -> None:
     written = words(identification.calibration(line().assign(intercept=-0.9, intercept_error=0.01)))
     assert "from 0.75 V on" in written and "1.2000 ± 0.0040 rad/s per V" in written
+
+
+@pytest.mark.usefixtures("window")
+@pytest.mark.parametrize("top", [1.0, 10.0, 1000.0])
+def test_a_profile_is_shown_up_to_five_times_its_bound(top: float) -> None:
+    data = flat()
+    data["cost"] *= top / data["cost"].max()
+    high = identification.profile(data).get_ylim()[1]
+    assert max(3.84, min(top, 5 * 3.84)) < high < 10 * 3.84
 
 
 def test_lengths_are_drawn_in_millimetres() -> None:

@@ -9,7 +9,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.plot.mechanism import Sketch
 from nonsmooth.plot.parts import GROUND
-from nonsmooth.plot.pen import put
+from nonsmooth.plot.pen import Pen, put
 from nonsmooth.plot.scheme import scheme_of
 
 E = ns.elements
@@ -142,7 +142,17 @@ def test_the_parts_and_their_labels_are_drawn(chain) -> None:
     for line in own.lines:  # everything lies within the picture
         x = np.asarray(line.get_xdata(), dtype=float)
         assert low <= np.nanmin(x) <= np.nanmax(x) <= high
-    plt.close("all")
+
+
+def test_a_belt_lies_on_both_rollers() -> None:
+    pen = Pen(labels=False)
+    pen.belt(0.0, 2.0, "")
+    one, other, upper, lower = (np.array(part[1:3]) for part in pen.made[:4])
+    for roller, middle in ((one, 0.0), (other, 2.0)):
+        assert (roller[0].min() + roller[0].max()) / 2 == pytest.approx(middle)
+        assert [roller[1].max(), roller[1].min()] == pytest.approx([0.0, lower[1, 0]])
+    assert upper.tolist() == [[0.0, 2.0], [0.0, 0.0]]
+    assert lower[1, 0] == lower[1, 1] < 0.0
 
 
 def test_gaps_and_displacements_are_to_one_scale() -> None:
@@ -157,7 +167,6 @@ def test_gaps_and_displacements_are_to_one_scale() -> None:
         sketch.frame(ax, room)
         assert ax.get_xlim() == pytest.approx((sketch.left - 0.2 - room, sketch.left - 0.2 + sketch.width + room))
         assert np.diff(ax.get_ylim()) == pytest.approx([sketch.height])
-    plt.close("all")
 
 
 @pytest.mark.parametrize(

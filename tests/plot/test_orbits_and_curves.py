@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +13,6 @@ import xarray as xr
 
 import nonsmooth as ns
 from nonsmooth import plot
-
-
-@pytest.fixture(autouse=True)
-def _close() -> Iterator[None]:
-    yield
-    plt.close("all")
 
 
 @pytest.fixture(scope="module")
@@ -244,6 +237,7 @@ def test_held_motions_have_bars_of_two_uncertainties_and_their_stability() -> No
     assert words(plot.controlled_branch(none, plt.subplots()[1])) == kinds[:1]
 
 
+@pytest.mark.usefixtures("window")
 def test_theory_behind_held_motions_leaves_the_axes_to_them(branch: xr.Dataset) -> None:
     result = held_branch()
     ax = plot.controlled_branch(result, theory=branch)

@@ -6,7 +6,6 @@ import matplotlib as mpl
 
 mpl.use("Agg")
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
@@ -16,12 +15,6 @@ from nonsmooth.plot import identification as pictures
 from nonsmooth.recordings.signals.steady import steady_response
 
 W0, C, MASS = 2 * np.pi * 20.0, 2.0, 1.7  # a linear mode: rad/s, 1/s, kg
-
-
-@pytest.fixture(autouse=True)
-def close():
-    yield
-    plt.close("all")
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +41,7 @@ def test_backbone_and_damping_of_a_linear_mode_are_level(mode) -> None:
     np.testing.assert_allclose(damping, 100 * C / (2 * W0), rtol=1e-4)
 
 
+@pytest.mark.usefixtures("window")
 def test_a_computed_response_peaks_at_its_closed_form(mode) -> None:
     finding, found = mode
     ax = pictures.forced_responses(finding, responses=[found.response(0.5, low=1e-5)])

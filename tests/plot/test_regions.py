@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
@@ -17,9 +14,8 @@ WINDOW = {"xlim": (G - 6 * ETA, G + 6 * ETA), "ylim": (-0.15, 0.15)}
 
 
 @pytest.fixture
-def support() -> Iterator[System]:
-    yield models.discontinuous_support(g=G)
-    plt.close("all")
+def support() -> System:
+    return models.discontinuous_support(g=G)
 
 
 def colour_at(ax: Axes, x: float, v: float) -> str:

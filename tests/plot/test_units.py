@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -15,12 +14,6 @@ from nonsmooth.plot.prefixes import power_for, prefixed
 from nonsmooth.plot.units import name_axis
 
 PREFIXES = {"": 1.0, "m": 1e-3, "µ": 1e-6, "n": 1e-9}
-
-
-@pytest.fixture(autouse=True)
-def _close() -> Iterator[None]:
-    yield
-    plt.close("all")
 
 
 def drawn(high: float, **options: Any) -> Any:
@@ -89,6 +82,7 @@ def test_ticks_times_unit_are_where_they_stand(high: float) -> None:
     np.testing.assert_array_equal(ax.lines[0].get_ydata(), [-high, high])  # the artist keeps the result's values
 
 
+@pytest.mark.usefixtures("window")
 def test_whatever_the_caller_does_the_numbers_stay_true() -> None:
     ax = drawn(0.02)
     name_axis(ax.yaxis, "$x$", "m")
@@ -107,6 +101,7 @@ def test_whatever_the_caller_does_the_numbers_stay_true() -> None:
     assert log.get_ylabel() == "$x$ (m)"
 
 
+@pytest.mark.usefixtures("window")
 def test_a_callers_formatter_and_scale_are_left_alone() -> None:
     mine, log = drawn(0.02), drawn(0.02)
     mine.yaxis.set_major_formatter("{x:.3f}")
@@ -163,4 +158,3 @@ def test_positions_and_speeds_have_one_unit_of_length(axes, labels) -> None:
     ax.margins(0)
     name_axes(ax, ("a", x), ("b", y))
     assert (ax.get_xlabel(), ax.get_ylabel()) == tuple(f"{n} ({unit})" for n, unit in zip("ab", labels, strict=True))
-    plt.close("all")

@@ -38,7 +38,7 @@ def segment(objects: list[bytes], values: list[float]) -> bytes:
 
 WAVE = segment(
     [
-        numbers("/'pull'/'x'", 3, wf_increment=0.25, wf_start_offset=1.0, unit_string="mm"),
+        numbers("/'pull'/'x'", 3, wf_increment=0.25, wf_start_offset=1.0, unit_string="mm", sensor="laser"),
         numbers("/'pull'/'F'", 2, wf_increment=0.5),
     ],
     [1.0, 2.0, 3.0, 10.0, 20.0],
@@ -49,6 +49,7 @@ def test_waveforms() -> None:
     recording = parse_recording(WAVE, "x.tdms")
     assert recording.runs == ("pull",) and recording.units == {"x": "mm", "F": ""}
     assert recording.channel("x").values.tolist() == [1, 2, 3]
+    assert recording.channel("x").attrs["property_sensor"] == "laser"
     assert recording.channel("x")["time"].values.tolist() == [1.0, 1.25, 1.5]
     assert recording.channel("F")["time"].values.tolist() == [0, 0.5]
 

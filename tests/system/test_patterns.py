@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.elements import Coulomb, ElasticStop, Stop
+from nonsmooth.elements import Coulomb, ElasticStop, PreloadedSpring, Stop
 from nonsmooth.flow.engines.patterns import PatternTables
 from nonsmooth.system.derived import combinations
 
@@ -104,6 +104,17 @@ def test_its_text_is_read_back_whatever_it_has_visited(both: tuple[ns.System, ns
         with pytest.raises(ns.SystemDefinitionError, match="lies between 0 and 1"):
             again.with_parameters(e=-0.1)
     assert 'wall: Stop(at="q2"' in repr(made) and "visited so far" in repr(made)
+
+
+def test_a_slow_start_of_a_preloaded_spring_that_cannot_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The load 2 exceeds the preload 1: from rest, or 1e-9 beside it, q = (1 - cos 2 t) / 4."""
+    monkeypatch.setattr(combinations, "MOST", 0)
+    spring = PreloadedSpring(at="q", preload=1.0, stiffness=4.0)
+    load = {"q": lambda t, p: 2.0 + 0 * t}
+    system = ns.mechanical(1.0, 0.0, 0.0, parameters={}, coordinates=["q"], forcing=load, elements={"s": spring})
+    for speed in (1e-9, -1e-9):
+        run = ns.simulate(system, start={"v_q": speed}, duration=1.0)
+        np.testing.assert_allclose(run["u"].values[:, 0], (1 - np.cos(2 * run["time"])) / 4, atol=2e-9)
 
 
 def test_exponents_are_those_of_the_system_written_out(both: tuple[ns.System, ns.System]) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from nonsmooth.campaign.run import cores
-from nonsmooth.campaign.work import ChunkedWork
+from nonsmooth.campaign.work import ChunkedWork, places_of, width_of
 from nonsmooth.errors import not_installed
 
 SECONDS = 5.0  # of sampling
@@ -91,8 +91,7 @@ def plan(work: ChunkedWork, *, seconds: float = SECONDS, seed: int = 0, kept: in
         took = time.thread_time() - start
         per_place.append(took / (last - first))
         spent += took
-    places = work.bounds(n - 1)[1]
-    width = sum(np.dtype(item.dtype).itemsize * int(np.prod(item.shape)) for item in work.columns().values())
+    places = places_of(work)
     rest = 1.0 - len(per_place) / n
     error = places * float(np.std(per_place)) / max(len(per_place) - 1, 1) ** 0.5 * rest**0.5
     first, last = work.bounds(0)
@@ -103,7 +102,7 @@ def plan(work: ChunkedWork, *, seconds: float = SECONDS, seed: int = 0, kept: in
         len(per_place),
         places * float(np.mean(per_place)),
         error,
-        places * width,
+        places * width_of(work),
         stored_bytes(work, together, kept or last - first) if find_spec("zarr") else None,
         _resident(),
     )

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.campaign.work import ChunkedWork, check_room, clock, empty_columns
+from nonsmooth.campaign.work import ChunkedWork, check_room, clock, empty_columns, places_of
 from nonsmooth.errors import not_installed, shortened
 from nonsmooth.flow.engines.engine import obey
 from nonsmooth.results.progress import Progress
@@ -70,7 +70,7 @@ def run(
     columns = {} if columns is None else columns
     if keeper is None:
         columns |= empty_columns(work)
-    size = work.bounds(work.n_chunks() - 1)[1]
+    size = places_of(work)
     before = size - sum(last - first for first, last in map(work.bounds, missing))
     with progress_bar(size, label, progress, before) as advance:
 

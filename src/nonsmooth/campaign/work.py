@@ -59,18 +59,25 @@ class ChunkedWork(Protocol):
     def describe(self) -> Mapping[str, Any]: ...
 
 
+def places_of(work: ChunkedWork) -> int:
+    """The number of places of a work."""
+    return work.bounds(work.n_chunks() - 1)[1]
+
+
+def width_of(work: ChunkedWork) -> int:
+    """The bytes of a work's columns at one place."""
+    return sum(np.dtype(item.dtype).itemsize * int(np.prod(item.shape)) for item in work.columns().values())
+
+
 def check_room(work: ChunkedWork, label: str) -> None:
     """MemoryError where a work's columns over all places would not fit into memory."""
-    chunks = work.n_chunks()
-    width = sum(np.dtype(item.dtype).itemsize * int(np.prod(item.shape)) for item in work.columns().values())
-    size = work.bounds(chunks - 1)[1] if chunks else 0
-    room_for(width * size + LISTED * chunks, label or "the result", "ask for fewer points")
+    needed = width_of(work) * places_of(work) + LISTED * work.n_chunks()
+    room_for(needed, label or "the result", "ask for fewer points")
 
 
 def empty_columns(work: ChunkedWork) -> dict[str, NDArray[Any]]:
     """Arrays for all places of a work."""
-    chunks = work.n_chunks()
-    size = work.bounds(chunks - 1)[1] if chunks else 0
+    size = places_of(work)
     return {
         name: np.full((size, *one.shape), np.nan if one.dtype.startswith("f") else one.unknown, one.dtype)
         for name, one in work.columns().items()
@@ -114,7 +121,7 @@ def described(work: ChunkedWork) -> dict[str, Any]:
         **work.describe(),
         "columns": columns,
         "chunks": work.n_chunks(),
-        "places": work.bounds(work.n_chunks() - 1)[1],
+        "places": places_of(work),
         "kernels": _kernel_version(),
     }
 

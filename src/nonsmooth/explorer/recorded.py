@@ -222,8 +222,8 @@ def response_points(
         turns = channels[setup.turns].time if setup.turns in channels else ()
         if recorded.axis != "time":
             points += [(1 / f, factor * a) for f, a in zip(axis, readings, strict=True) if f > 0 and np.isfinite(a)]
-        elif len(readings) and (len(turns) >= 3 or run == setup.run):
-            period = float(np.diff(turns).mean()) if len(turns) >= 3 else now
+        elif len(readings) and ((counted := len(turns) >= 3) or run == setup.run):
+            period = float(np.diff(turns).mean()) if counted else now
             points.append((period, 0.5 * factor * float(np.nanmax(readings) - np.nanmin(readings))))
     found = [(frequency_of(system, values, period).get(over), height) for period, height in points]
     there = [(place, height) for place, height in found if place is not None]

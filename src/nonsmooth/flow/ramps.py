@@ -104,7 +104,6 @@ def values_along(
     """The parameters at some instants of a run with ramps, (N, n_parameters)."""
     values = np.tile(system.parameter_vector(), (len(time), 1))
     for name, ramp in ramps.items():
-        part = (time - t_begin) / (t_end - t_begin)
-        column = ramp(time) if callable(ramp) else ramp[0] + (ramp[1] - ramp[0]) * part
+        column = ramp(time) if callable(ramp) else np.interp(time, (t_begin, t_end), ramp)
         values[:, list(system.values).index(name)] = column
     return values

@@ -162,8 +162,7 @@ def _beside(a: Jump, b: Jump) -> Jump:
             RuntimeWarning,
             stacklevel=2,
         )
-    fields = np.array([a.fields[0], b.fields[1], b.R @ a.fields[2] + b.fields[2]])
-    return Jump(b.z_after, b.R @ a.R, fields, a.h, a.h_z, a.h_t, a.h_p, b.S @ a.S, a.instant, a.row, a.indicator)
+    return _joined(a, b, b.S @ a.S)
 
 
 def _then(a: Jump, b: Jump) -> Jump:
@@ -171,5 +170,10 @@ def _then(a: Jump, b: Jump) -> Jump:
 
     both = Crossing(a.S.copy(), b.R, np.empty_like(a.S), b.fields, a.instant)
     follow(both)
+    return _joined(a, b, both.step)
+
+
+def _joined(a: Jump, b: Jump, S: FloatArray) -> Jump:
+    """One and the other at one instant, that of the first."""
     fields = np.array([a.fields[0], b.fields[1], b.R @ a.fields[2] + b.fields[2]])
-    return Jump(b.z_after, b.R @ a.R, fields, a.h, a.h_z, a.h_t, a.h_p, both.step, a.instant, a.row, a.indicator)
+    return Jump(b.z_after, b.R @ a.R, fields, a.h, a.h_z, a.h_t, a.h_p, S, a.instant, a.row, a.indicator)

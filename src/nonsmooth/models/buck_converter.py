@@ -40,7 +40,7 @@ def buck_converter(**parameters: float) -> System:
     Parameters
     ----------
     **parameters : float
-        ``V_in`` 24 V, ``R`` 22 ohm, ``L`` 20 mH, ``C`` 47 uF, ``T`` 400 us, ``V_ref`` 11.3 V, ``gain`` 8.4,
+        ``V_in`` 24 V, ``R`` 22 ohm, ``L`` 20e-3 H, ``C`` 47e-6 F, ``T`` 400e-6 s, ``V_ref`` 11.3 V, ``gain`` 8.4,
         ``V_low`` 3.8 V, ``V_high`` 8.2 V.
 
     Returns

@@ -71,13 +71,14 @@ class Pen:
         self.made.append(("line", *((other, one) if upright else (one, other)), GREY, 0.6, ""))
 
     def belt(self, a: float, b: float, words: str) -> None:
+        """A belt over two rollers, with its upper side at the height 0."""
+        radius, middle = 0.12, 0.5 * (a + b)
         for x in (a, b):
-            self.circle(x, -0.12, 0.12)
-        for y in (0.0, -0.24):
+            self.circle(x, -radius, radius)
+        for y in (0.0, -2 * radius):
             self.path(y, a, 0, b, 0, width=1.4)
-        middle = 0.5 * (a + b)
-        self.arrow(middle - 0.3, middle + 0.3, -0.12, color=_RUB, heavy=True)
-        self.text(middle, -0.28, words, va="top")
+        self.arrow(middle - 0.3, middle + 0.3, -radius, color=_RUB, heavy=True)
+        self.text(middle, -2 * radius - 0.04, words, va="top")
 
     def spring(
         self, a: float, b: float, y: float, words: str = "", boxed: bool = False, color: str = _DARK, high: float = 0.1

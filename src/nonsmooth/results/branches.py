@@ -223,9 +223,6 @@ def diagram(
         ],
         compat="override",
     )
-    for name in result.variables:
-        if name in branches[0].variables:
-            result[name].attrs = dict(branches[0][name].attrs)
     result["signature"].attrs |= flag_attributes(list(known["signature"]), dtype=np.int32)
     of_sweeps = {name: swept[name].transpose("direction", parameter, ...) for name in ("section", "period_number")}
     given: dict[str, Any] = {

@@ -42,7 +42,7 @@ def is_linear(traced: Traced, form: LinearForm | None) -> bool:
 
 def table_bytes(states: int, harmonics: int, modes: int) -> int:
     """Memory of the propagators, which are most of the tables."""
-    return 8 * modes * 33 * states * (states + 1 + 2 * harmonics)
+    return 8 * modes * (NODES + 1) * states * (states + 1 + 2 * harmonics)
 
 
 @dataclass
