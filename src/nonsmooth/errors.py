@@ -183,7 +183,8 @@ class Interrupted(KeyboardInterrupt):
         """That of a result over many points, some of which were computed."""
         return cls(
             f"{str(why) or 'interrupted'}: {done} of {size} points of the {what} were computed; they are in `result` "
-            'of this exception (at a prompt: sys.last_value.result), the others have the status "interrupted"',
+            'of this exception (at a prompt: sys.last_value.result), where others have the status "interrupted" or are '
+            "left out",
             result,
         )
 

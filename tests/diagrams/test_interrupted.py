@@ -1,4 +1,4 @@
-"""Ctrl-C in a sweep or a chart: points that were run are those of a whole one, the others say that they were not."""
+"""Ctrl-C in a sweep, a chart or basins: points that were run are those of a whole one, the others say so."""
 
 from __future__ import annotations
 
@@ -73,6 +73,38 @@ def test_a_chart(options: dict[str, Any]) -> None:
         np.testing.assert_array_equal(part[name].values[run], whole[name].values[run], err_msg=name)
     for name in ("contacts_per_period", "maximum", "minimum"):
         assert np.isnan(part[name].values[~run]).all(), name
+
+
+#: x' = x - a x^3: a start ends at the one of +-1 / sqrt(a) on its side.
+WELLS = ns.System(
+    states=["x", "y"], parameters={"a": 1.0}, modes={"only": lambda t, u, p: (u.x - p.a * u.x**3, -u.y)}, period=1.0
+)
+
+
+def test_basins() -> None:
+    """Runs that were made have the attractors of their sides."""
+    x = np.linspace(-1.9, 2.1, 40)
+    with pytest.raises(ns.Interrupted, match="points of the basins over x and y were computed") as caught:
+        ns.basins(WELLS, {"x": x, "y": np.linspace(-1, 1, 15)}, progress=lambda done: done < 0.5, threads=1)
+    part = caught.value.result
+    run = was_run(part)
+    assert run.any() and not run.all()
+    assert (part["label"].values[~run] == -1).all()
+    sides = part["section"].sel(state="x").values[part["label"].values]
+    np.testing.assert_allclose(sides[run], np.broadcast_to(np.sign(x)[:, None], run.shape)[run], rtol=1e-9)
+
+
+def test_basin_fractions() -> None:
+    """The result has the values at which all runs were made."""
+    with pytest.raises(ns.Interrupted) as caught:
+        ns.basin_fractions(
+            WELLS, "a", [1.0, 4.0, 9.0], n_starts=200, box={"x": (-2, 2)}, progress=lambda done: done < 0.5, threads=1
+        )
+    part = caught.value.result
+    assert 1 <= part.sizes["a"] < 3
+    ends = np.sort(part["section"].sel(state="x").values, axis=-1)
+    np.testing.assert_allclose(ends, [[-1.0, 1.0] / np.sqrt(a) for a in part["a"].values], rtol=1e-9)
+    np.testing.assert_allclose(part["fraction"].sum("attractor"), 1.0)
 
 
 def test_where_nothing_was_run_there_is_no_part() -> None:

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 
 from nonsmooth.attractors.basins import failed, settler_of
-from nonsmooth.attractors.basins_attractors import Attractor, Patience, find_attractors
+from nonsmooth.attractors.basins_attractors import Attractor, find_attractors
+from nonsmooth.attractors.basins_found import NONE, Patience
 from nonsmooth.attractors.basins_matching import numbered
 from nonsmooth.attractors.basins_measures import share_errors, starts_needed
 from nonsmooth.attractors.basins_work import StartsWork, settled_from
-from nonsmooth.campaign.run import run
+from nonsmooth.attractors.settled import Settled
+from nonsmooth.attractors.settler import Settler
+from nonsmooth.campaign.run import run, whole_or_part
 from nonsmooth.campaign.work import inputs
 from nonsmooth.errors import shortened
 from nonsmooth.flow.failure import warn_if_small
 from nonsmooth.flow.options import Campaign, Varied, as_called, kept_of
 from nonsmooth.flow.starts import random_starts, start_states
+from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.memory import room_for
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import at_least, swept_values
@@ -26,7 +31,7 @@ from nonsmooth.system.kinds import at_least, swept_values
 if TYPE_CHECKING:
     import xarray as xr
 
-    from nonsmooth.flow.engines.engine import IntArray
+    from nonsmooth.flow.engines.engine import FloatArray, IntArray
     from nonsmooth.system.system import System
 
 
@@ -72,6 +77,9 @@ def basin_fractions(
     ------
     ValueError, TypeError
         Arguments that do not fit.
+    Interrupted
+        Ctrl-C; its ``result`` has the values at which all runs were made, with the cycles among them (with ``store``
+        they are there).
     ImportError, RuntimeError
         ``device="cuda"`` without the package numba-cuda, or without a GPU.
     """
@@ -83,25 +91,41 @@ def basin_fractions(
     settler, chunk = settler_of(system, "basin_fractions", options)
     asked["values"], points = numbers, system.parameter_points({parameter: numbers})
     work = StartsWork(settler, points, starts, chunk, inputs(system, "basin_fractions", asked))
-    runs = settled_from(run(work, label=f"basins over {parameter}", **kept_of(options)))
-    warn_if_small(system, starts, runs.maximum, runs.minimum)
+    fill = partial(run, work, **kept_of(options))
+
+    def result(columns: dict[str, Any], whole: bool) -> xr.Dataset | None:
+        runs = settled_from(columns)
+        if whole:
+            warn_if_small(system, starts, runs.maximum, runs.minimum)
+        done = (runs.status.reshape(len(numbers), n_starts) != codes.INTERRUPTED).all(axis=1)
+        return _followed(
+            settler, points[done], {**asked, "values": numbers[done]}, runs[np.repeat(done, n_starts)], whole
+        )
+
+    found: xr.Dataset = whole_or_part(fill, f"basins over {parameter}", result)
+    return found
+
+
+def _followed(settler: Settler, points: FloatArray, asked: Mapping[str, Any], runs: Settled, whole: bool) -> xr.Dataset:
+    """The attractors at each value, matched from one to the next."""
+    numbers, n_starts, patience = asked["values"], asked["n_starts"], Patience() if whole else NONE
     rising = [int(i) for i in np.argsort(numbers, kind="stable")]
     per_value: list[dict[int, Attractor]] = [{} for _ in numbers]
     labels = np.full((len(numbers), n_starts), -1, dtype=np.int64)
     seen: dict[int, Attractor] = {}
     last: dict[int, Attractor] = {}
     single = replace(settler, device="cpu")  # a few runs from one value to the next
-    status, before = np.zeros_like(labels), points[rising[0] : rising[0] + 1]
+    status, before = np.zeros_like(labels), points[rising[:1]]
     for i in rising:
         point = points[i : i + 1]
-        found, label, status[i] = find_attractors(settler, point, runs[i * n_starts : (i + 1) * n_starts], Patience())
+        found, label, status[i] = find_attractors(settler, point, runs[i * n_starts : (i + 1) * n_starts], patience)
         ids = numbered(single, point, found, before, last, seen)
         before = point
         last = dict(zip(ids, found, strict=True))
         seen |= {k: replace(item, tree=None) for k, item in last.items()}
         per_value[i] = last
         labels[i] = np.append(ids, [-2, -1])[label] if len(ids) else label
-    return _dataset(system, settler.engine.name, asked, per_value, labels, status, len(seen))
+    return _dataset(settler.system, settler.engine.name, asked, per_value, labels, status, len(seen))
 
 
 def _starts(system: System, box: Mapping[str, tuple[float, float]] | None, n_starts: int, seed: int) -> Any:

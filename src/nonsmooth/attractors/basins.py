@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 
-from nonsmooth.attractors.basins_attractors import Attractor, Patience, find_attractors
+from nonsmooth.attractors.basins_attractors import Attractor, find_attractors
+from nonsmooth.attractors.basins_found import NONE, Patience
 from nonsmooth.attractors.basins_measures import (
     basin_entropy,
     boundary_dimension,
@@ -19,7 +21,7 @@ from nonsmooth.attractors.basins_measures import (
 from nonsmooth.attractors.basins_work import StartsWork, settled_from
 from nonsmooth.attractors.settled import usable
 from nonsmooth.attractors.settler import Settler, settler_for
-from nonsmooth.campaign.run import run
+from nonsmooth.campaign.run import run, whole_or_part
 from nonsmooth.campaign.work import CHUNK, STORED, inputs
 from nonsmooth.errors import shortened
 from nonsmooth.flow.engines.devices import BATCH
@@ -84,6 +86,9 @@ def basins(
     ------
     ValueError, TypeError
         Arguments that do not fit. A run that fails keeps the label -1 or -2.
+    Interrupted
+        Ctrl-C; its ``result`` has the runs that came to their end until then and the cycles among them (with ``store``
+        they are there).
     ImportError, RuntimeError
         ``device="cuda"`` without the package numba-cuda, or without a GPU.
 
@@ -114,17 +119,39 @@ def basins(
     starts[:, names.index(y_name)] = np.tile(y, len(x))
     asked["grid"], point = values, system.parameter_vector()[None, :]
     work = StartsWork(settler, point, starts, chunk, inputs(system, "basins", asked))
-    runs = settled_from(run(work, label=f"basins over {x_name} and {y_name}", **kept_of(options)))
-    warn_if_small(system, starts, runs.maximum, runs.minimum)
-    found, labels, status = find_attractors(settler, point, runs, Patience())
-    found, labels = by_share(found, labels)
-    label = labels.reshape(len(x), len(y))
+    fill = partial(run, work, **kept_of(options))
+
+    def result(columns: dict[str, Any], whole: bool) -> xr.Dataset:
+        runs = settled_from(columns)
+        if whole:
+            warn_if_small(system, starts, runs.maximum, runs.minimum)
+        attractors = find_attractors(settler, point, runs, Patience() if whole else NONE)
+        return _dataset(settler, asked, values, rest, *attractors)
+
+    found: xr.Dataset = whole_or_part(fill, f"basins over {x_name} and {y_name}", result)
+    return found
+
+
+def _dataset(
+    settler: Settler,
+    asked: Mapping[str, Any],
+    values: Mapping[str, FloatArray],
+    rest: FloatArray,
+    attractors: list[Attractor],
+    labels: IntArray,
+    status: IntArray,
+) -> xr.Dataset:
+    """The plane with its attractors in the order of falling share, and measures of the picture."""
     from nonsmooth.results.global_schema import basins as build
     from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import provenance
 
+    system = settler.system
+    names, (x, y) = list(system.states), values.values()
+    found, labels = by_share(attractors, labels)
+    label = labels.reshape(len(x), len(y))
     fraction, error = share_errors([np.sum(labels == k) for k in range(len(found))], labels.size)
-    scale, at = system.scale_vector(), [names.index(x_name), names.index(y_name)]
+    scale, at = system.scale_vector(), [names.index(name) for name in values]
     others = [k for k in range(len(names)) if k not in at]
     shocks = [
         minimal_shock(

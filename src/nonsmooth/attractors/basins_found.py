@@ -23,6 +23,9 @@ class Patience:
     window: int = 60  # points compared with an attractor's
 
 
+NONE = Patience(rounds=0)  # cycles and places of rest alone
+
+
 @dataclass(frozen=True)
 class Attractor:
     """One attractor on the section.

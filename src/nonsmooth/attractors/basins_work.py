@@ -12,6 +12,7 @@ from nonsmooth.attractors.settled import Settled
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.campaign.work import CHUNK, ColumnType
 from nonsmooth.flow.engines.engine import FloatArray
+from nonsmooth.kernels.hybrid import codes
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,11 @@ class StartsWork:
         n = self.starts.shape[1]
         kinds = {"period_number": "i8", "status": "i8", "mode": "i8", "returns": "i8"}
         wide = {"maximum": (n,), "minimum": (n,), "last": (self.settler.width,)}
-        return {item.name: ColumnType(kinds.get(item.name, "f8"), wide.get(item.name, ())) for item in fields(Settled)}
+        unknown = {"status": codes.INTERRUPTED}
+        return {
+            item.name: ColumnType(kinds.get(item.name, "f8"), wide.get(item.name, ()), unknown.get(item.name, 0))
+            for item in fields(Settled)
+        }
 
     def n_chunks(self) -> int:
         return -(-len(self.points) * len(self.starts) // self.chunk)

@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nonsmooth.campaign.work import ChunkedWork, check_room, clock, empty_columns, places_of
-from nonsmooth.errors import not_installed, shortened
+from nonsmooth.errors import Interrupted, not_installed, shortened
 from nonsmooth.flow.engines.engine import obey
+from nonsmooth.kernels.hybrid import codes
 from nonsmooth.results.progress import Progress
 from nonsmooth.results.progress import progress as progress_bar
 
@@ -88,6 +89,23 @@ def run(
                 work.load()
             over_items(missing, (_Kept(work, keeper) if keeper else work).compute, keep, threads)
     return columns if keeper is None else keeper.read(work)
+
+
+def whole_or_part(
+    fill: Callable[..., dict[str, NDArray[Any]]], label: str, result: Callable[[dict[str, NDArray[Any]], bool], Any]
+) -> Any:
+    """``result(columns, True)`` of what ``fill`` computes; at Ctrl-C ``Interrupted`` with ``result(columns, False)``.
+
+    None of the second says that nothing is whole yet. What is in a store stays there, and is not read."""
+    columns: dict[str, NDArray[Any]] = {}
+    try:
+        return result(fill(label=label, columns=columns), True)
+    except KeyboardInterrupt as error:
+        done = columns.get("status", np.array([codes.INTERRUPTED])) != codes.INTERRUPTED
+        part = result(columns, False) if done.any() else None
+        if part is None:
+            raise
+        raise Interrupted.with_points(error, int(done.sum()), done.size, label, part) from error
 
 
 class _Kept:

@@ -10,17 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack, cast
 import numpy as np
 
 from nonsmooth.attractors.settler import settler_for
-from nonsmooth.campaign.run import run
+from nonsmooth.campaign.run import run, whole_or_part
 from nonsmooth.campaign.work import CHUNK, STORED, inputs
 from nonsmooth.diagrams.chart_work import ChartWork
-from nonsmooth.errors import Interrupted, shortened
+from nonsmooth.errors import shortened
 from nonsmooth.flow.engines.devices import BATCH
 from nonsmooth.flow.equilibria import refuse_resting
 from nonsmooth.flow.failure import warn_if_small
 from nonsmooth.flow.loads import Quantities, checked_loads
 from nonsmooth.flow.options import Campaign, as_called, kept_of, workers_of
 from nonsmooth.flow.starts import is_one_start, start_states
-from nonsmooth.kernels.hybrid import codes
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import at_least, swept_values
 
@@ -109,23 +108,19 @@ def chart(
 
         if chunked:
             raise ValueError("refine decides from its results what to compute next: it takes no store and no client")
-        fill = partial(refined, part=refine, threads=workers_of(options), progress=options["progress"])
+        fill = partial(refined, work, part=refine, threads=workers_of(options), progress=options["progress"])
     else:
         if chunked and work.device == "cpu":
             work = replace(work, chunk=STORED)
-        fill = partial(run, **kept_of(options))
-    flat: dict[str, Any] = {}
-    try:
-        arrays = planned.over_grid(fill(work, label=label, columns=flat))
-    except KeyboardInterrupt as error:
-        known = int((flat["status"] != codes.INTERRUPTED).sum()) if flat else 0
-        if not known:
-            raise
-        part = planned.dataset(asked, planned.over_grid(flat))
-        raise Interrupted.with_points(error, known, flat["status"].size, label, part) from error
-    if "maximum" in arrays:
-        warn_if_small(system, work.starts, arrays["maximum"], arrays["minimum"])
-    return planned.dataset(asked, arrays)
+        fill = partial(run, work, **kept_of(options))
+
+    def result(flat: Mapping[str, Any], whole: bool) -> xr.Dataset:
+        arrays = planned.over_grid(flat)
+        if whole and "maximum" in arrays:
+            warn_if_small(system, work.starts, arrays["maximum"], arrays["minimum"])
+        return planned.dataset(asked, arrays)
+
+    return whole_or_part(fill, label, result)
 
 
 @dataclass(frozen=True)
