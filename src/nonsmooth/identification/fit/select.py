@@ -122,8 +122,8 @@ def _held_out(problem: Windows, folds: int) -> list[IntArray]:
     found += [one.setting[one.run] % folds for one in problem.steady]
     if not {*range(folds)} <= {*np.concatenate(found).tolist()}:
         raise ValueError(
-            f"the recording is too short for folds = {folds}: each holds out blocks of {length:.3g}, and settings of "
-            "steady states; ask for fewer folds"
+            f"the recording is too short for folds = {folds}: it holds {block} blocks of {length:.3g}, beside settings "
+            "of steady states; ask for fewer folds"
         )
     return found
 
