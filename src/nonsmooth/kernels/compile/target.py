@@ -18,7 +18,12 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from llvmlite.binding import Linkage, create_new_function_pass_manager, parse_bitcode
+from llvmlite.binding import (
+    Linkage,
+    create_new_function_pass_manager,
+    create_new_module_pass_manager,
+    parse_bitcode,
+)
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen, get_host_cpu_features
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager
@@ -35,7 +40,7 @@ LEVELS: dict[str, dict[str, str]] = {
     "x86_64": {"x86-64-v3": _V3},
     "aarch64": {"generic": "neon"},
 }
-FORM = "what is called below is internal"  # part of the names of entries: another one where code is made otherwise
+FORM = "internal, without dead arguments"  # part of the names of entries: another one where code is made otherwise
 _SAME = {"amd64": "x86_64", "arm64": "aarch64"}
 
 
@@ -108,20 +113,29 @@ class _Library(JITCodeLibrary):
         return self._codegen._engine.get_function_address(name)
 
     def _optimize_final_module(self) -> None:
-        for function in self._with(Linkage.linkonce_odr) if self.called else ():
-            function.linkage = "internal"
+        if self.called:
+            self._relink(Linkage.linkonce_odr, "internal")
+            passes = create_new_module_pass_manager()
+            passes.add_dead_arg_elimination_pass()
+            passes.run(self._final_module, self._codegen._module_pass_manager()[1])
+            self._relink(
+                Linkage.internal, "linkonce_odr"
+            )  # else what has one caller becomes part of it, which is slower
         super()._optimize_final_module()
+        if self.called:
+            self._relink(Linkage.linkonce_odr, "internal")
 
     def _finalize_final_module(self) -> None:
         if self.called:
             super()._finalize_final_module()
-            return
-        for function in self._with(Linkage.external):
-            function.linkage = "linkonce_odr"
-        self._finalized, self._shared_module = True, self._final_module
+        else:
+            self._relink(Linkage.external, "linkonce_odr")
+            self._finalized, self._shared_module = True, self._final_module
 
-    def _with(self, linkage: Linkage) -> list[Any]:
-        return [f for f in self._final_module.functions if not f.is_declaration and f.linkage == linkage]
+    def _relink(self, before: Linkage, after: str) -> None:
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == before:
+                function.linkage = after
 
 
 class _Codegen(JITCPUCodegen):
