@@ -201,7 +201,7 @@ FACTS: dict[str, Callable[[Any, dict[str, Any]], bool]] = {
     "load_recording": lambda found, _: np.allclose(*(one.channel("q").values for one in found), atol=1e-6),
     "fit": lambda found, _: abs(found["k"] - 4.0) < 0.02,
     "select_model": lambda found, _: float(found["rms"].sel(model="true")) < float(found["rms"].sel(model="undamped")),
-    "propagate": lambda found, _: bool((np.ptp(found["maximum_quantiles"], axis=0) > 0).any()),
+    "propagate": lambda found, _: bool((np.ptp(found["maximum_quantiles"].values, axis=0) > 0).any()),
     "plan_experiment": lambda found, _: bool(np.isfinite(found["uncertainty"]).all()),
     "compare": lambda found, _: int(found["measured_period_number"]) == int(found["theory_period_number"]) == 1,
     "control_based_continuation": lambda found, _: found.sizes["point"] == 2,
