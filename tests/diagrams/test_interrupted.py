@@ -91,6 +91,7 @@ def test_basins() -> None:
     assert run.any() and not run.all()
     assert (part["label"].values[~run] == -1).all()
     sides = part["section"].sel(state="x").values[part["label"].values]
+    assert all(np.isnan(part[name].values).all() for name in ("fraction", "minimal_shock", "entropy", "uncertain"))
     np.testing.assert_allclose(sides[run], np.broadcast_to(np.sign(x)[:, None], run.shape)[run], rtol=1e-9)
 
 
@@ -113,6 +114,13 @@ def test_where_nothing_was_run_there_is_no_part() -> None:
     assert not isinstance(caught.value, ns.Interrupted)
     with pytest.raises(KeyboardInterrupt) as caught:
         ns.chart(SYSTEM, {"rho": VALUES, "g": [-0.005, -0.004]}, progress=lambda done: False)
+    assert not isinstance(caught.value, ns.Interrupted)
+
+
+def test_where_no_value_is_whole_there_is_no_part() -> None:
+    stopped: dict[str, Any] = {"box": {"x": (-2, 2)}, "progress": lambda done: done < 0.1, "threads": 1}
+    with pytest.raises(KeyboardInterrupt) as caught:
+        ns.basin_fractions(WELLS, "a", [1.0, 4.0], n_starts=600, **stopped)
     assert not isinstance(caught.value, ns.Interrupted)
 
 

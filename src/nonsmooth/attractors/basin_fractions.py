@@ -98,9 +98,8 @@ def basin_fractions(
         if whole:
             warn_if_small(system, starts, runs.maximum, runs.minimum)
         done = (runs.status.reshape(len(numbers), n_starts) != codes.INTERRUPTED).all(axis=1)
-        return _followed(
-            settler, points[done], {**asked, "values": numbers[done]}, runs[np.repeat(done, n_starts)], whole
-        )
+        known = {**asked, "values": numbers[done]}
+        return _followed(settler, points[done], known, runs[np.repeat(done, n_starts)], whole) if done.any() else None
 
     found: xr.Dataset = whole_or_part(fill, f"basins over {parameter}", result)
     return found

@@ -87,8 +87,8 @@ def basins(
     ValueError, TypeError
         Arguments that do not fit. A run that fails keeps the label -1 or -2.
     Interrupted
-        Ctrl-C; its ``result`` has the runs that came to their end until then and the cycles among them (with ``store``
-        they are there).
+        Ctrl-C; its ``result`` has the runs that came to their end until then and the cycles among them, and no shares
+        or measures of the picture (with ``store`` the runs are there).
     ImportError, RuntimeError
         ``device="cuda"`` without the package numba-cuda, or without a GPU.
 
@@ -150,7 +150,8 @@ def _dataset(
     names, (x, y) = list(system.states), values.values()
     found, labels = by_share(attractors, labels)
     label = labels.reshape(len(x), len(y))
-    fraction, error = share_errors([np.sum(labels == k) for k in range(len(found))], labels.size)
+    told = 1.0 if (status != codes.INTERRUPTED).all() else np.nan  # a picture with holes has no shares and no measures
+    fraction, error = share_errors([told * np.sum(labels == k) for k in range(len(found))], labels.size)
     scale, at = system.scale_vector(), [names.index(name) for name in values]
     others = [k for k in range(len(names)) if k not in at]
     shocks = [
@@ -175,14 +176,14 @@ def _dataset(
         found,
         status=status.reshape(label.shape),
         fixed={name: rest[names.index(name)] for name in names if name not in values},
-        per_attractor={"fraction": fraction, "fraction_error": error, "minimal_shock": np.array(shocks)},
+        per_attractor={"fraction": fraction, "fraction_error": error, "minimal_shock": told * np.array(shocks)},
         measures={
-            "entropy": entropy,
-            "boundary_entropy": boundary,
-            "boundary_dimension": boundary_dimension(label),
+            "entropy": told * entropy,
+            "boundary_entropy": told * boundary,
+            "boundary_dimension": told * boundary_dimension(label),
             "n_starts_99": starts_needed(fraction),
         },
-        uncertain=(steps, parts),
+        uncertain=(steps, told * parts),
     )
 
 
