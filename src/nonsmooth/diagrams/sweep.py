@@ -36,6 +36,7 @@ from nonsmooth.system.kinds import Range, at_least, swept_values
 if TYPE_CHECKING:
     import xarray as xr
 
+    from nonsmooth.system.symbolic.traced import Traced
     from nonsmooth.system.system import System
 
 DIRECTIONS: dict[str | None, tuple[str, ...]] = {
@@ -165,7 +166,6 @@ def sweep(
         0 if density is False else bins,
         checked_loads(system, loads, "sweep"),
     )
-    work.room()
     if density is not False:
         coarse = None
         if len(ranges) < len(system.states):
@@ -207,20 +207,16 @@ class _Sweep:
     measured: Quantities
     edges: FloatArray | None = None  # of bins in which they are counted
 
-    def room(self) -> None:
-        """Ask for the memory that is kept."""
-        n = len(self.settler.system.states)
-        width = n * (self.bins + 1) / 2 if self.bins else self.settler.keep * (n + 2)
-        room_for(
-            16.0 * width * len(self.points) * len(self.directions) * len(self.starts),
-            f"a sweep over {len(self.points)} values",
-            "take fewer values, starts or bins, keep fewer returns, or count them with density=True",
-        )
-
     @cached_property
     def slots(self) -> dict[tuple[int, int], Slot]:
         """Points, verdicts and loads of each direction and start."""
-        both = product(range(len(self.directions)), range(len(self.starts)))
+        both, n = [*product(range(len(self.directions)), range(len(self.starts)))], self.starts.shape[1]
+        width = n * (self.bins + 1) / 2 if self.bins else self.settler.keep * (n + 2)
+        room_for(
+            16.0 * width * len(self.points) * len(both),
+            f"a sweep over {len(self.points)} values",
+            "take fewer values, starts or bins, keep fewer returns, or count them with density=True",
+        )
         return {key: Slot(self.settler, self.points, self.edges, self.measured) for key in both}
 
     def run(self, threads: int | None, progress: Progress) -> None:
@@ -288,12 +284,13 @@ class _Sweep:
             arrays["period_number"] = gather("period_number")
             arrays["residual"] = gather("residual")
         if asked["extremes"]:
-            n, n_i = len(system.states), len(system.indicators)
-            high, low = (np.split(whole(gather(f"kept.{end}")), [n, n + n_i], axis=-1) for end in ("high", "low"))
+            traced, n = system.traced, len(system.states)
+            ends = [n, n + len(traced.indicators)]
+            high, low = (np.split(whole(gather(f"kept.{end}")), ends, axis=-1) for end in ("high", "low"))
             arrays["maximum"], arrays["minimum"] = high[0], low[0]
-            arrays["clearance"] = np.where(armed_signs(system) > 0, -high[1], low[1])
+            arrays["clearance"] = np.where(armed_signs(traced) > 0, -high[1], low[1])
             if system.outputs:
-                unknown = out_of_bounds(system.traced, self.points, high[2], low[2]) | np.isinf(high[2])
+                unknown = out_of_bounds(traced, self.points, high[2], low[2]) | np.isinf(high[2])
                 arrays["output_maximum"], arrays["output_minimum"] = (
                     np.where(unknown, np.nan, one[2]) for one in (high, low)
                 )
@@ -320,10 +317,10 @@ class _Sweep:
         )
 
 
-def armed_signs(system: System) -> np.ndarray:
+def armed_signs(traced: Traced) -> np.ndarray:
     """+1 or -1 for each indicator: the sign with which it first stands in a transition (+1 where in none)."""
-    signs = np.ones(len(system.indicators), dtype=np.int64)
-    for jump in reversed(system.transitions):
+    signs = np.ones(len(traced.indicators), dtype=np.int64)
+    for jump in reversed(traced.transitions):
         for row in reversed(jump.rows):
             signs[row.indicator] = row.sign
     return signs

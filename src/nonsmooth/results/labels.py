@@ -61,18 +61,19 @@ class Labels:
 def labels_of(system: Any) -> Labels:
     """The labels of a ``System`` with its present parameter values."""
     states = {name: QuantityLabel(unit or "1") for name, unit in system.states.items()}
+    traced = system.traced
     return Labels(
         name=system.name,
         states=states,
         parameters={name: QuantityLabel(p.unit or "1", p.symbol, p.value) for name, p in system.parameters.items()},
-        modes=tuple(system.modes),
-        transitions=tuple((item.source, item.target) for item in system.transitions),
-        indicators=tuple(system.indicators),
+        modes=tuple(traced.mode_names),
+        transitions=tuple((item.source, item.target) for item in traced.transitions),
+        indicators=tuple(traced.indicator_names),
         outputs={name: QuantityLabel(unit or "1") for name, unit in system.outputs.items()},
         memory={name: QuantityLabel(unit or "1") for name, unit in system.memory.items()},
         # A system whose states have no units is written in a scaled time; that of a map counts iterates.
-        time_unit="s" if any(quantity.unit != "1" for quantity in states.values()) and not system.is_map else "1",
-        is_map=system.is_map,
+        time_unit="s" if any(quantity.unit != "1" for quantity in states.values()) and not traced.is_map else "1",
+        is_map=traced.is_map,
         text=system.to_text(),
     )
 

@@ -81,9 +81,36 @@ class System(Answering):
     Systems do not change. `with_parameters` and `smoothed` return new ones that share the equations.
     """
 
-    __slots__ = ("__weakref__", "_description", "_values", "_variant")
+    __slots__ = {
+        "name": "Its name.",
+        "states": "Names and units of the states.",
+        "values": "Present values of the parameters.",
+        "memory": "Names and units of the memory.",
+        "outputs": "Names and units of the outputs.",
+        "inputs": "Names and units of the inputs.",
+        "scale": "Typical size of each state.",
+        "surfaces": "Surfaces on which motion may slide; empty for a smoothed system. Their modes are among the modes.",
+        "symmetry": "The declared symmetry, as expressions.",
+        "explicit_time": "True where it depends on time without a known period: runs then need a ``duration``.",
+        "is_smoothed": "True where the switches are smoothed.",
+        "eta": "Half width of the bands: None, a number, or a number for each indicator.",
+        "band": 'Shape of the bands: "linear", "tanh" or "arctan"; None where nothing is smoothed.',
+        **dict.fromkeys(("_description", "_variant", "__weakref__"), ""),
+    }
+    name: str
+    states: Mapping[str, str]
+    values: Mapping[str, float]
+    memory: Mapping[str, str]
+    outputs: Mapping[str, str]
+    inputs: Mapping[str, str]
+    scale: Mapping[str, float]
+    surfaces: tuple[TracedSurface, ...]
+    symmetry: Symmetry | None
+    explicit_time: bool
+    is_smoothed: bool
+    eta: float | dict[str, float] | None
+    band: str | None
     _description: Description
-    _values: dict[str, float]
     _variant: Variant
 
     @checked(read=False)
@@ -128,8 +155,14 @@ class System(Answering):
         self._variant.domain.check(values)
 
     def _set(self, description: Description, values: dict[str, float], variant: Variant) -> Self:
-        for name, what in (("_description", description), ("_values", values), ("_variant", variant)):
-            object.__setattr__(self, name, what)
+        facts = variant.facts | {
+            "values": MappingProxyType(values),
+            "eta": variant.eta(values),
+            "_description": description,
+            "_variant": variant,
+        }
+        for name, fact in facts.items():
+            object.__setattr__(self, name, fact)
         return self
 
     @classmethod
@@ -140,7 +173,7 @@ class System(Answering):
         raise AttributeError(f"a System does not change: use with_parameters(...) (tried to set {name!r})")
 
     def _elsewhere(self, name: str) -> str:
-        if name not in self._values:
+        if name in self.__slots__ or name not in self.values:  # an object that is not whole yet has no values
             return ""
         return f": the value of a parameter is system.values[{name!r}], set by with_parameters({name}=...)"
 
@@ -150,25 +183,10 @@ class System(Answering):
     # What it is
 
     @property
-    def name(self) -> str:
-        """Its name."""
-        return self._description.name
-
-    @property
-    def states(self) -> Mapping[str, str]:
-        """Names and units of the states."""
-        return MappingProxyType(dict(self._description.states))
-
-    @property
     def parameters(self) -> Mapping[str, Parameter]:
         """Parameters with present value, unit and symbol; a smoothed system has ``eta`` at the end."""
         units, symbols = self._variant.units, self._variant.symbols
-        return MappingProxyType({key: Parameter(now, units[key], symbols[key]) for key, now in self._values.items()})
-
-    @property
-    def values(self) -> Mapping[str, float]:
-        """Present values of the parameters."""
-        return MappingProxyType(self._values)
+        return MappingProxyType({key: Parameter(now, units[key], symbols[key]) for key, now in self.values.items()})
 
     @property
     def modes(self) -> tuple[str, ...]:
@@ -184,36 +202,6 @@ class System(Answering):
     def transitions(self) -> tuple[TracedTransition, ...]:
         """The allowed jumps, in declared order."""
         return self.traced.transitions
-
-    @property
-    def surfaces(self) -> tuple[TracedSurface, ...]:
-        """Surfaces on which motion may slide; empty for a smoothed system. Their sliding modes are among the modes."""
-        return () if self.is_smoothed else self._description.surfaces
-
-    @property
-    def memory(self) -> Mapping[str, str]:
-        """Names and units of the memory."""
-        return MappingProxyType({key: unit for key, (_, unit) in self._variant.memory.items()})
-
-    @property
-    def outputs(self) -> Mapping[str, str]:
-        """Names and units of the outputs."""
-        return MappingProxyType(dict(self._description.outputs))
-
-    @property
-    def inputs(self) -> Mapping[str, str]:
-        """Names and units of the inputs."""
-        return MappingProxyType({name: states[name] for name, states in self._description.driven.items()})
-
-    @property
-    def scale(self) -> Mapping[str, float]:
-        """Typical size of each state."""
-        return MappingProxyType(dict(self._description.scale))
-
-    @property
-    def symmetry(self) -> Symmetry | None:
-        """The declared symmetry, as expressions."""
-        return self._description.symmetry
 
     @property
     def traced(self) -> Traced:
@@ -235,29 +223,9 @@ class System(Answering):
         return whole._variant.derivatives
 
     @property
-    def is_smoothed(self) -> bool:
-        """Return whether the switches are smoothed."""
-        return self._variant.kind != SHARP
-
-    @property
-    def eta(self) -> float | dict[str, float] | None:
-        """Half width of the bands: None, a number, or a number for each indicator."""
-        return self._variant.eta(self._values)
-
-    @property
-    def band(self) -> str | None:
-        """Shape of the bands: "linear", "tanh" or "arctan"; None where nothing is smoothed."""
-        return self._variant.band
-
-    @property
     def depends_on_time(self) -> bool:
         """Return whether the time occurs in the equations, or transitions happen at phases of a period."""
-        return self.traced.period is not None or self._description.explicit_time
-
-    @property
-    def explicit_time(self) -> bool:
-        """Return whether the equations depend on time without a known period: runs then need a ``duration``."""
-        return self._description.explicit_time
+        return self.traced.period is not None or self.explicit_time
 
     @property
     def is_map(self) -> bool:
@@ -272,7 +240,7 @@ class System(Answering):
 
     def parameter_vector(self) -> np.ndarray:
         """Return the present values, float64, in declared order (``eta`` last)."""
-        return np.array(list(self._values.values()), dtype=np.float64)
+        return np.array(list(self.values.values()), dtype=np.float64)
 
     def memory_vector(self) -> np.ndarray:
         """Return the memory at a start, float64."""
@@ -284,11 +252,11 @@ class System(Answering):
 
     def period(self) -> float | None:
         """Return the forcing period at the present values of the parameters; None where there is none."""
-        return self._variant.period_at(self._values, self._values)
+        return self._variant.period_at(self.values, self.values)
 
     def period_at(self, values: Mapping[str, float] | Sequence[float] | np.ndarray) -> float | None:
         """Return the forcing period at other values: a mapping (others stay), or a vector in declared order."""
-        return self._variant.period_at(self._values, values)
+        return self._variant.period_at(self.values, values)
 
     def parameter_points(self, columns: Mapping[str, Any]) -> np.ndarray:
         """Return checked rows of parameter values, (P, n_parameters), for columns of equal length P.
@@ -298,7 +266,7 @@ class System(Answering):
         ValueError, SystemDefinitionError
             An unknown name, a value that is not finite, or one the equations do not allow.
         """
-        return parameter_rows(self._variant, self._values, self.name, columns)
+        return parameter_rows(self._variant, self.values, self.name, columns)
 
     # Copies
 
@@ -320,7 +288,7 @@ class System(Answering):
         SystemDefinitionError
             A value the equations do not allow, such as a mass of zero.
         """
-        new = changed_values(self._variant, self._values, self.name, given, values)
+        new = changed_values(self._variant, self.values, self.name, given, values)
         return self._make(self._description, new, self._variant)
 
     def written_out(self) -> Self:
@@ -333,7 +301,7 @@ class System(Answering):
         description = self._description.written_out()
         if description is self._description:
             return self
-        return self._make(description, dict(self._values), variant_of(description, SHARP))
+        return self._make(description, dict(self.values), variant_of(description, SHARP))
 
     def as_solved_by(self, options: Mapping[str, Any]) -> Self:
         """Return the system as the options of a verb need it: written out for a series, a step or a ramp."""
@@ -369,7 +337,7 @@ class System(Answering):
         """
         whole = self.written_out()
         whole.refuse_patterns("smoothed")
-        new, variant = smoothed_values(whole._description, self._values, eta, band)
+        new, variant = smoothed_values(whole._description, self.values, eta, band)
         return self._make(whole._description, new, variant)
 
     # Text
@@ -397,11 +365,11 @@ class System(Answering):
         if not isinstance(other, System):
             return NotImplemented
         if self._description is other._description:
-            return self._variant is other._variant and self._values == other._values
+            return self._variant is other._variant and self.values == other.values
         return self.to_text() == other.to_text()
 
     def __hash__(self) -> int:
-        return hash((self.name, tuple(self._values.items())))
+        return hash((self.name, tuple(self.values.items())))
 
     def __copy__(self) -> System:
         return self

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,6 +55,22 @@ class Variant:
             **{name: r"\eta" if of is None else rf"\eta_{{\mathrm{{{of}}}}}" for name, of in self.etas},
         }
         self.domain = Domain(self.traced, (*description.ranges, *extra))
+        tables = {
+            "states": description.states,
+            "memory": {name: unit for name, (_, unit) in self.memory.items()},
+            "outputs": description.outputs,
+            "inputs": {name: states[name] for name, states in description.driven.items()},
+            "scale": description.scale,
+        }
+        #: What a system is, whatever the values of its parameters.
+        self.facts: dict[str, Any] = {name: MappingProxyType(dict(one)) for name, one in tables.items()} | {
+            "name": description.name,
+            "surfaces": description.surfaces if kind == SHARP else (),
+            "symmetry": description.symmetry,
+            "explicit_time": description.explicit_time,
+            "is_smoothed": kind != SHARP,
+            "band": band,
+        }
 
     @property
     def visited(self) -> Traced:

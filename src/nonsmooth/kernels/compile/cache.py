@@ -23,6 +23,7 @@ import pickle
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -166,7 +167,7 @@ def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any
                 _compile_once(dispatcher, signature)
                 return plain_template(arguments, named)
 
-            dispatcher.compile_now = lambda: _compile_once(dispatcher, signature)
+            dispatcher.compile_now = partial(_compile_once, dispatcher, signature)
             dispatcher.entry = lambda: dispatcher._cache.entry(signature, dispatcher.targetctx.codegen())
             dispatcher._compile_for_args = compile_for_arguments
             dispatcher.get_call_template = get_call_template
