@@ -75,6 +75,10 @@ class Costs:
         if module is not None and not hasattr(module.Dispatcher.compile, "watched"):
             module.Dispatcher.compile = self._timed("compiling", module.Dispatcher.compile)
             module.Dispatcher.compile.watched = True
+        module = sys.modules.get("nonsmooth.kernels.compile.direct")
+        if module is not None and not hasattr(module.Callback.__init__, "watched"):
+            module.Callback.__init__ = self._timed("compiling", module.Callback.__init__)
+            module.Callback.__init__.watched = True
 
     def _count(self, file: str, browser: bool) -> Iterator[None]:
         before, children, begun = dict(self.inside), _children(), time.process_time()

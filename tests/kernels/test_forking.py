@@ -18,7 +18,7 @@ from nonsmooth.kernels.compile import cache
 warnings.simplefilter("ignore")  # later Pythons warn of any fork beside threads
 SOURCE = """
 from math import sin
-from nonsmooth.kernels.compile.cache import callback
+from nonsmooth.kernels.compile.direct import callback
 
 @callback("float64(float64)")
 def value(x):

@@ -10,7 +10,7 @@ import pytest
 
 MODEL = """
 from math import sin
-from nonsmooth.kernels.compile.cache import callback
+from nonsmooth.kernels.compile.direct import callback
 
 
 @callback("void(int64, float64, float64[::1], float64[::1], float64[::1])")
@@ -29,7 +29,7 @@ def test_machine_code_ends_with_the_last_function_of_its_file(tmp_path, monkeypa
         assert [found[2] for found in cache.cache_statistics(module)] == [misses]
         assert module is cache.load_module(MODEL.format(2.0), "ending", lasting=False)
         field, name = module.field, module.__name__
-        engine = weakref.ref(field.targetctx.codegen()._engine._ee)
+        engine = weakref.ref(field.codegen._engine._ee)
         del module
         gc.collect()
         du = np.empty(1)

@@ -24,7 +24,6 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 from weakref import WeakValueDictionary
@@ -65,19 +64,7 @@ class _ContentCache(_Cache):
     """Numba's cache protocol over one immutable file per function, signature, source, version and level."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
-        self._name = function.__qualname__
-        config = numba.config
-        self._origin = (
-            file_stamp(inspect.getfile(function)),
-            f"{function.__module__}.{self._name}",
-            sys.version_info[:2],
-            numba.__version__,
-            llvmlite.__version__,
-            FORM,
-            (config.OPT, config.BOUNDSCHECK, config.DEBUGINFO_DEFAULT, config.USING_SVML),
-            sorted(options.items(), key=str),
-            sorted(_INNER.items(), key=str),
-        )
+        self._function, self._options = function, options
 
     @property
     def cache_path(self) -> str:
@@ -85,34 +72,23 @@ class _ContentCache(_Cache):
 
     def entry(self, signature: Any, codegen: Any) -> str:
         """Name of the file that holds the function's code."""
-        key = repr((self._origin, str(signature), codegen.magic_tuple()))
-        return f"{self._name}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.nbc"
+        return entry_of(self._function, signature, codegen, self._options)
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
-        name = self.entry(sig, target_context.codegen())
-        payload = _checked(made_ahead(name))
-        if not payload:
-            path = Path(self.cache_path) / name
-            payload = _checked(read_private(path))
-            mark_used(path)
+        payload = read_entry(self.entry(sig, target_context.codegen()))
         if not payload:  # none yet, or a damaged one: compiled anew
             cpu_target.target_context.refresh()  # of Numba's own: what all engines share is not to live in this one
-            for call in tuple(before_compiling):
-                call(self._name)
             return None
         return CompileResult._rebuild(target_context, *pickle.loads(payload))
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:
         if data.library.has_dynamic_globals or any(not part.can_cache for part in data.lifted):
             raise RuntimeError(
-                f"kernel {self._name!r} cannot be cached: it refers to a large global array, a function pointer or "
-                "a Python object; pass it as an argument"
+                f"kernel {self._function.__qualname__!r} cannot be cached: it refers to a large global array, a "
+                "function pointer or a Python object; pass it as an argument"
             )
-        path = Path(self.cache_path) / self.entry(sig, data.codegen)
-        with contextlib.suppress(OSError):  # a full disk costs a compile in the next process, not this run
-            payload = numba.core.serialize.dumps(data._replace(type_annotation="")._reduce())
-            write_atomically(path, hashlib.sha256(payload).digest() + payload)
-            prune(path.parent)
+        payload = numba.core.serialize.dumps(data._replace(type_annotation="")._reduce())
+        write_entry(self.entry(sig, data.codegen), payload)
 
     def enable(self) -> None:
         """Always enabled."""
@@ -122,6 +98,45 @@ class _ContentCache(_Cache):
 
     def flush(self) -> None:
         """Entries never become stale."""
+
+
+def entry_of(function: Callable[..., Any], signature: Any, codegen: Any, options: dict[str, Any]) -> str:
+    """Name of the file that holds a function's code: all that decides about it."""
+    config, name = numba.config, function.__qualname__
+    origin = (
+        file_stamp(inspect.getfile(function)),
+        f"{function.__module__}.{name}",
+        sys.version_info[:2],
+        numba.__version__,
+        llvmlite.__version__,
+        FORM,
+        (config.OPT, config.BOUNDSCHECK, config.DEBUGINFO_DEFAULT, config.USING_SVML),
+        sorted(options.items(), key=str),
+        sorted(_INNER.items(), key=str),
+    )
+    key = repr((origin, str(signature), codegen.magic_tuple()))
+    return f"{name}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.nbc"
+
+
+def read_entry(name: str) -> bytes:
+    """The content of an entry; empty, and whoever listens is told of the compile, where there is none."""
+    payload = _checked(made_ahead(name))
+    if not payload:
+        path = cache_folder() / "compiled" / name
+        payload = _checked(read_private(path))
+        mark_used(path)
+    if not payload:
+        for call in tuple(before_compiling):
+            call(name.rpartition("-")[0])
+    return payload
+
+
+def write_entry(name: str, payload: bytes) -> None:
+    """Keep code; a full disk costs a compile in the next process, not this run."""
+    path = cache_folder() / "compiled" / name
+    with contextlib.suppress(OSError):
+        write_atomically(path, hashlib.sha256(payload).digest() + payload)
+        prune(path.parent)
 
 
 def _checked(stored: bytes) -> bytes:
@@ -171,19 +186,6 @@ def kernel(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any
             dispatcher.entry = lambda: dispatcher._cache.entry(signature, dispatcher.targetctx.codegen())
             dispatcher._compile_for_args = compile_for_arguments
             dispatcher.get_call_template = get_call_template
-        return dispatcher
-
-    return decorate
-
-
-def callback(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Like :func:`kernel`, but compiled at once: for functions that kernels are given as arguments, by address."""
-
-    def decorate(function: Callable[..., Any]) -> Any:
-        dispatcher = _cached(function, options)
-        if dispatcher is not function:
-            _compile_once(dispatcher, signature)
-            dispatcher.never_inlined()
         return dispatcher
 
     return decorate
@@ -278,11 +280,11 @@ def load_module(source: str, stem: str, *, lasting: bool = True) -> ModuleType:
     Parameters
     ----------
     source
-        Text of the module. Its functions are decorated with :func:`kernel` or :func:`callback`.
+        Text of the module. Its functions are decorated with :func:`kernel` or :func:`.direct.callback`.
     stem
         Beginning of the file's name: an identifier.
     lasting
-        False: its machine code ends with the last reference to its functions. Then all of them are :func:`callback`.
+        False: its machine code ends with the last reference to its functions. Then all of them are callbacks.
 
     Returns
     -------
@@ -333,3 +335,5 @@ def cache_statistics(module: ModuleType) -> Iterator[tuple[str, int, int]]:
     for name, value in vars(module).items():
         if isinstance(getattr(value, "_cache", None), _ContentCache):
             yield name, sum(value.stats.cache_hits.values()), sum(value.stats.cache_misses.values())
+        elif hasattr(value, "compiles"):  # a callback of a model (``direct``)
+            yield name, value.loads, value.compiles

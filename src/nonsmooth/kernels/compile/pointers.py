@@ -36,11 +36,7 @@ def addresses(*functions: Any) -> Any:
     With ``NUMBA_DISABLE_JIT=1`` the functions themselves."""
     if _DISABLED:
         return functions
-    found = []
-    for function in functions:
-        (compiled,) = function.overloads.values()
-        found.append(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
-    return np.array(found, dtype=np.int64)
+    return np.array([function.address for function in functions], dtype=np.int64)
 
 
 def function_at(function_type: Any) -> Any:

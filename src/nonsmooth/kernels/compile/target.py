@@ -22,6 +22,7 @@ from llvmlite.binding import (
     Linkage,
     create_new_function_pass_manager,
     create_new_module_pass_manager,
+    parse_assembly,
     parse_bitcode,
 )
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen, get_host_cpu_features
@@ -82,7 +83,7 @@ def made_ahead(entry: str) -> bytes:
         return b""
 
 
-class _Library(JITCodeLibrary):
+class Library(JITCodeLibrary):
     """A function with all that it calls; machine code is made of it only where Python or an address calls it.
 
     What it calls is then its own, and arguments that nobody reads, of sixty arrays, are passed no longer. Numba makes
@@ -94,13 +95,32 @@ class _Library(JITCodeLibrary):
     _text = b""  # of code that was loaded: read where another function is made of it
 
     @classmethod
-    def _unserialize(cls, codegen: Any, state: Any) -> _Library:
-        name, _, (code, text) = state
-        library: _Library = codegen.create_library(name)
+    def of_code(cls, codegen: Any, name: str, code: bytes) -> Library:
+        """A library of machine code."""
+        library: Library = codegen.create_library(name)
         library.enable_object_caching()
         library._set_compiled_object(code)
-        library.called, library._text = True, text
+        library.called = True
         library._finalize_final_module()
+        return library
+
+    @classmethod
+    def of_text(cls, codegen: Any, name: str, text: str) -> Library:
+        """A library of a text for LLVM."""
+        library: Library = codegen.create_library(name)
+        library.enable_object_caching()
+        library.called = True
+        module = parse_assembly(text)
+        module.data_layout = codegen._data_layout
+        library.add_llvm_module(module)
+        library.finalize()
+        return library
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: Any) -> Library:
+        name, _, (code, text) = state
+        library = cls.of_code(codegen, name, code)
+        library._text = text
         return library
 
     def _get_module_for_linking(self) -> Any:
@@ -138,12 +158,12 @@ class _Library(JITCodeLibrary):
                 function.linkage = after
 
 
-class _Codegen(JITCPUCodegen):
+class Codegen(JITCPUCodegen):
     """An engine of its own.
 
     ``vectors``: loops over arrays become loops over vectors, each in four versions behind each other."""
 
-    _library_class = _Library
+    _library_class = Library
 
     def set_env(self, name: str, env: Any) -> None:
         if self._engine.get_global_value_address(name):  # else there is no code that reads it
@@ -174,7 +194,7 @@ def _function_passes() -> tuple[Any, Any, Any]:
 
     None is made: what Numba makes here it makes again of the whole module, and of the march, in which records of sixty
     arrays are values, it took 14 of 39 s."""
-    engine = _Codegen("passes")
+    engine = Codegen("passes")
     return create_new_function_pass_manager(), engine._pass_builder(), engine
 
 
@@ -183,7 +203,7 @@ class _Target(CPUTarget):
 
     def __init__(self, vectors: bool) -> None:
         super().__init__("cpu")
-        self._context = cpu_target.target_context.subtarget(_internal_codegen=_Codegen("nonsmooth", vectors))
+        self._context = cpu_target.target_context.subtarget(_internal_codegen=Codegen("nonsmooth", vectors))
 
     @property
     def target_context(self) -> Any:
@@ -242,10 +262,11 @@ class Function(CPUDispatcher):
         """Without what Numba noted on every line, half of what a compile leaves in memory."""
         super().add_overload(found._replace(type_annotation=None))
 
-    def never_inlined(self) -> None:
-        """Forget the code where other kernels would look for it: it is called by address alone, and ends with this."""
-        for found in self.overloads.values():
-            self.targetctx.remove_user_function(found.entry_point)
+    @property
+    def address(self) -> int:
+        """The place of its code, by which kernels call it."""
+        (found,) = self.overloads.values()
+        return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
 
     def _make_finalizer(self) -> Callable[[], None]:
         """Numba's holds the code, which holds the names of its file, which hold this function: it would never end."""

@@ -78,7 +78,7 @@ def joined(parts: Iterable[str], model: str = "") -> str:
     """The text of a model and of some kernel files in one, with the GPU's markers; its functions are there by name."""
     text = f"{model}\n{assembly.joined(parts, absent=ELSEWHERE)}"
     text = re.sub(r"^ +(field|jet|values|jump) = \1_of\(form\)$", "", text, flags=re.MULTILINE)
-    return text.replace("from nonsmooth.kernels.compile.cache import", "from nonsmooth.kernels.cuda.target import")
+    return re.sub(r"\bnonsmooth\.kernels\.compile\.(cache|direct) import", "nonsmooth.kernels.cuda.target import", text)
 
 
 def stamp() -> str:

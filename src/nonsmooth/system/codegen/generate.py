@@ -121,7 +121,7 @@ def model_source(traced: Traced) -> str:
     smooth = tuple(all(mode[len(traced.indicators) + i] for mode in jet.smooth) for i in range(len(traced.outputs)))
     parts = [
         "from numpy import array",
-        "from nonsmooth.kernels.compile.cache import callback, device",
+        "from nonsmooth.kernels.compile.direct import callback, device",
         f"from math import {', '.join(sorted(functions))}" if functions else "",
         f"from nonsmooth.kernels.circular import {', '.join(inlined)}" if inlined else "",
         f"N_SCRATCH = {max(1, jet.n_scratch)}",

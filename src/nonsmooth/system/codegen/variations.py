@@ -34,8 +34,14 @@ from nonsmooth.system.symbolic.traced import Traced, TracedTransition
 
 ZERO, CONSTANT, VARYING = 0, 1, 2
 FOUR = 4  # columns in a vector (``kernels.lanes``)
-_JET = SIGNATURES["jet"][:-1] + ", f8[:,:,::1])"
-_SWITCH = "void(i8, f8, f8[::1], f8[::1], f8[::1])"
+_JET, _FIELD, _SWITCH = (
+    f'callback("{signature}")'
+    for signature in (
+        SIGNATURES["jet"][:-1] + ", f8[:,:,::1])",
+        SIGNATURES["field"],
+        "void(i8, f8, f8[::1], f8[::1], f8[::1])",
+    )
+)
 
 
 @dataclass(frozen=True)
@@ -93,14 +99,18 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
     functions = jet.functions | used | used_by_switch
     parts = [
         "from numpy import array",
-        "from nonsmooth.kernels.compile.cache import callback, device",
+        "from nonsmooth.kernels.compile.direct import callback, device",
         "from nonsmooth.kernels.compile.lanes import load, plus, store, times",
         f"from math import {', '.join(sorted(functions))}" if functions else "",
         *jet_functions(
-            jet, _kind(_JET), "mode, order, t, u, q, C, W, D", choice, change=list(map(different.index, small))
+            jet,
+            _JET,
+            "mode, order, t, u, q, C, W, D",
+            choice,
+            change=list(map(different.index, small)),
         ),
-        function_of("field", _kind(SIGNATURES["field"]), "mode, t, u, q, du", field, field_lines),
-        function_of("switch", _kind(_SWITCH), "transition, t, u, q, out", switch, switch_lines),
+        function_of("field", _FIELD, "mode, t, u, q, du", field, field_lines),
+        function_of("switch", _SWITCH, "transition, t, u, q, out", switch, switch_lines),
     ]
     module = load_module("\n".join(part for part in parts if part) + "\n", "variations", lasting=False)
     return VariationalModel(
@@ -111,11 +121,6 @@ def variational_model(traced: Traced, active: tuple[int, ...]) -> VariationalMod
         np.array(kinds, dtype=np.int64).reshape(len(kinds), len(entries)),
         max(1, jet.n_scratch),
     )
-
-
-def _kind(signature: str) -> str:
-    """A decorator for what only kernels call."""
-    return f'callback("{signature}", no_cpython_wrapper=True, no_cfunc_wrapper=True)'
 
 
 def _small_changes(entries: list[tuple[int, int]], kinds: list[int], n: int, columns: int) -> list[str]:
@@ -137,11 +142,11 @@ def _small_changes(entries: list[tuple[int, int]], kinds: list[int], n: int, col
             used |= {m} if m < n else set()
     body = [f"y{m} = {load(m)}" for m in sorted(used)]
     if sums:
-        body += [f"w{e} = times(0.0, {load(m, '0')})" for e, _, m in sums]
+        body += [f"s{e} = times(0.0, {load(m, '0')})" for e, _, m in sums]
         body += ["for j in range(k + 1):", *(f"    x{m} = {load(m, 'j')}" for m in sorted({m for _, _, m in sums}))]
-        body += [f"    w{e} = plus(w{e}, C[{n + e}, k - j], x{m})" for e, _, m in sums]
+        body += [f"    s{e} = plus(s{e}, C[{n + e}, k - j], x{m})" for e, _, m in sums]
     for i, terms in rows.items():
-        own = [f"w{e}" for e, row, _ in sums if row == i]
+        own = [f"s{e}" for e, row, _ in sums if row == i]
         first = own[0] if own else f"times({terms.pop(0)})" if terms else f"times(0.0, {load(i, '0')})"
         body.append(f"v{i} = {first}")
         body += [f"v{i} = plus(v{i}, 1.0, {more})" for more in own[1:]]
