@@ -188,6 +188,8 @@ SIMULATE = {
         r"one number or one for each of x, v, not of shape \(3,\)",
     ),
     "atol of one state": ({"periods": 1, "atol": {"x": 1e-9}}, ValueError, r"atol must name each state.*'v'"),
+    "atol of nothing": ({"periods": 1, "atol": 0.0}, ValueError, r"atol = 0\.0 must be positive and finite"),
+    "endless atol": ({"periods": 1, "atol": np.inf}, ValueError, r"atol = inf must be positive and finite"),
     "negative step": ({"periods": 1, "step": -1.0}, ValueError, r"step = -1\.0 must be positive"),
     "a step of nothing": ({"periods": 1, "step": 1e-320}, ValueError, r"step = 1e-320: .* more than 1e\+09 steps"),
     "unknown option": (

@@ -109,6 +109,20 @@ def test_what_a_saltation_matrix_adds_is_counted() -> None:
     assert np.abs(np.sort(found.exponents.values) - np.sort([wanted, -1.0])).max() < 1e-11
 
 
+def test_states_that_change_places_share_their_exponents() -> None:
+    """x and y shrink at rates a and b, and change places once in each period: M M = exp(-(a + b) T)."""
+    system = ns.System(
+        states=["x", "y"],
+        parameters={"a": 0.2, "b": 0.6, "A": 0.0},
+        period=1.0,
+        modes={"only": lambda t, u, p: (-p.a * u.x, p.A * np.cos(2 * np.pi * t) - p.b * u.y)},
+        transitions=[ns.Transition("only", "only", at=0.5, reset=lambda t, u, p: (u.y, u.x))],
+    )
+    found = spectrum(system, periods=64, transient=2, start={"x": 1.0, "y": 0.5}).exponents.values
+    assert found == pytest.approx([-0.4, -0.4], abs=5e-3)
+    assert found.sum() == pytest.approx(-0.8, abs=1e-12)
+
+
 def test_one_impact_per_period() -> None:
     """Test problem A: complex multipliers of modulus e exp(-c T / 2), so two equal exponents (1/t), and their sum."""
     system = ns.models.impact_oscillator().with_parameters(A=1.0)

@@ -34,6 +34,13 @@ def test_one_friction_leaves_an_interval() -> None:
     assert inside.tolist() == [True, False, False]
 
 
+def test_an_interval_of_a_micrometre() -> None:
+    scale = {"q": 1e-6, "v_q": 1e-6}
+    rubs = {"f": E.Coulomb(at="q", friction=1e-6 * MU)}
+    (found,) = sets(ns.mechanical(1.0, 0.1, K, coordinates=["q"], elements=rubs, scale=scale))
+    assert [found.lower[0], found.upper[0]] == pytest.approx([-1e-6 * MU / K, 1e-6 * MU / K], rel=1e-12)
+
+
 def test_two_frictions_leave_a_parallelogram() -> None:
     """K q = lambda_1 (1, 0) + lambda_2 (1, -1) with |lambda_1| <= m, |lambda_2| <= n: K^-1 of four corners."""
     stiffness, m, n = np.array([[3.0, -1.0], [-1.0, 2.0]]), 0.5, 0.3

@@ -72,9 +72,12 @@ def test_runs_and_sweeps_as_by_the_series_of_the_same_flow(template) -> None:
             state = State(start.copy(), system.memory_vector())
             logs.append(engine.record(tables, state, duration, samples))
             ends.append(np.concatenate([state.u, state.memory, state.clock[:1]]))
-            out = engine.kept(1, 3)
+            out, plain, again = engine.kept(1, 3), engine.kept(1, 3), state.copy()
             engine.chain(tables, 0, 1, state, None, Section(), 2, 3, out)
             chains.append((out, np.concatenate([state.u, state.memory])))
+            engine.chain(tables, 0, 1, again, None, Section(extremes=0), 2, 3, plain)
+            np.testing.assert_allclose([out.elapsed[0], plain.elapsed[0]], 3 * tables.period[0], rtol=1e-13)
+            np.testing.assert_allclose(plain.section, out.section, rtol=0, atol=1e-10)
         ours, theirs = logs
         assert ours.status == theirs.status == 0
         assert ours.crossing_transition.tolist() == theirs.crossing_transition.tolist()

@@ -178,6 +178,16 @@ def test_a_valve_that_comes_to_rest_stands_at_its_equilibrium() -> None:
         ns.poincare(ns.models.relief_valve(q=9.0), n=1056, **options)
 
 
+def test_a_linear_motion_at_rest_is_not_waited_for() -> None:
+    """x'' + x' + x = 5 is at x = 5 within rounding after a hundred units of time, of the million that there are."""
+    modes = {"only": lambda t, u, p: (u.v, 5.0 - u.v - u.x)}
+    level = {"level": lambda t, u, p: u.x - 100.0}
+    system = ns.System(states=["x", "v"], parameters={}, modes=modes, indicators=level)
+    points = ns.poincare(system, section=ns.Poincare("level"), n=1, start=[{"x": 0.0}, {"x": 5.5}])
+    assert points["section"].values[:, 0] == pytest.approx(np.array([[5.0, 0.0]] * 2), abs=1e-12)
+    assert (points["time"] < 1e4).all()
+
+
 def test_a_slow_drift_is_no_rest() -> None:
     """x' = 1e-9 reaches the section x = 1e-5 after 10^4 units of time, on steps as long as the waiting."""
 

@@ -72,3 +72,16 @@ def test_extremes_and_counts_of_the_kept_window() -> None:
         assert int(found["period_number"]) == 1
         assert (float(found["crossings_per_period"]), float(found["contacts_per_period"])) == (2.0, 1.0)
         assert 0.8 * size < float(found["maximum"][0]) < size
+
+
+def test_extremes_of_conditions_that_are_a_state_and_that_are_not() -> None:
+    """The room left to q = 2 and to q + v = 2, of which the sum swings by |1 + i w| |answer|."""
+
+    def field(t, u, p):
+        return u.v, np.cos(p.w * t) - K * u.q - C * u.v
+
+    conditions = {"place": lambda t, u, p: u.q - 2.0, "sum": lambda t, u, p: u.q + u.v - 2.0}
+    system = ns.System(states=["q", "v"], parameters={"w": W}, modes={"only": field}, indicators=conditions)
+    found = ns.sweep(system, "w", [W], start=state(0.0), transient=5, keep=4, progress=False).squeeze()
+    swings = abs(ANSWER), abs(ANSWER * (1 + 1j * W))
+    assert found["clearance"].values == pytest.approx([2.0 - swing for swing in swings], rel=1e-9)

@@ -289,11 +289,14 @@ def test_a_series_with_gaps_does_not_hide_its_end(method: str, power: int, rtol:
     assert abs(run["u"].values[-1, 0] - truth) < 100 * rtol
 
 
-def test_unstable_linear_motion_ends_as_diverged() -> None:
-    """x'' = k x from x = 1, v = sqrt(k): exp(sqrt(k) t) passes 1e9 at ln(1e9) / sqrt(k)."""
-    system = ns.System(states=["x", "v"], parameters={"k": 4.0}, modes={"only": lambda t, u, p: (u.v, p.k * u.x)})
+@pytest.mark.parametrize("states", [2, 3])
+def test_unstable_linear_motion_ends_as_diverged(states: int) -> None:
+    """x'' = k x from x = 1, v = sqrt(k): exp(sqrt(k) t) passes 1e9 at ln(1e9) / sqrt(k), beside a state at rest too."""
+    names = ["x", "v", "y"][:states]
+    modes = {"only": lambda t, u, p: (u.v, p.k * u.x, *(-u[name] for name in names[2:]))}
+    system = ns.System(states=names, parameters={"k": 4.0}, modes=modes)
     with pytest.raises(ns.SolveError) as caught:
-        ns.simulate(system, duration=30.0, start=[1.0, 2.0])
+        ns.simulate(system, duration=30.0, start={"x": 1.0, "v": 2.0})
     assert caught.value.status == "diverged"
     assert caught.value.time == pytest.approx(np.log(1e9) / 2, abs=1.0)
 

@@ -88,6 +88,26 @@ def test_crossings_near_grazes_are_those_of_the_closed_form(gate: ns.System) -> 
     assert not wrong, wrong[:5]
 
 
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("rising", [True, False])
+def test_returns_beside_an_extremum_one_way(side: int, rising: bool) -> None:
+    """x = -side cos(t + phi) passes side (1 - depth) at t + phi = pi -+ arccos(1 - depth) in each turn. From a return
+    on steps are quarters of a turn, so that one of them ends on the section."""
+
+    def swing(t, u, p):
+        return u.v, -u.x
+
+    for depth in (1e-9, 1e-6, 1e-3, 0.01, 0.1):
+        level = {"level": lambda t, u, p, depth=depth: u.x - side * (1.0 - depth)}
+        system = ns.System(states=["x", "v"], parameters={}, modes={"only": swing}, indicators=level)
+        section, before = ns.Poincare("level", rising=rising, t_max=20.0), rising == (side > 0)
+        for phi in np.linspace(0.0, 2.5, 6):
+            start = {"x": -side * np.cos(phi), "v": side * np.sin(phi)}
+            found = ns.poincare(system, n=3, start=start, section=section)["time"].values
+            first = np.pi + (-1 if before else 1) * np.arccos(1.0 - depth) - phi
+            np.testing.assert_allclose(found, first + 2 * np.pi * np.arange(3), rtol=0, atol=1e-7)
+
+
 def test_a_root_finder_that_has_not_converged_has_found_nothing(gate: ns.System) -> None:
     """The first guess stands on the indicator's maximum: ten steps of Halley's method do not converge from there."""
     phi, c = 4.824163895694583, 0.999425333961005

@@ -216,6 +216,23 @@ def test_stamp_follows_imports_through_kernel_files(monkeypatch):
     stamps._source_stamp.cache_clear()
 
 
+def test_a_kernel_file_reaches_the_files_that_its_imports_name():
+    """Those that Python's own parser finds, with their texts."""
+    from nonsmooth.kernels.compile import sources as stamps
+
+    room = Path(stamps.__file__).parents[1]
+    texts = {
+        ".".join(path.relative_to(room).with_suffix("").parts): path.read_text("utf-8") for path in room.rglob("*.py")
+    }
+    for text in texts.values():
+        imports = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import | ast.ImportFrom)]
+        names = {f"{getattr(node, 'module', '')}.{one.name}" for node in imports for one in node.names}
+        names |= {one.rpartition(".")[0] for one in names}
+        ours = {one.strip(".").removeprefix("nonsmooth.kernels.") for one in names} & texts.keys() - stamps._MACHINERY
+        assert {name: texts[name] for name in ours}.items() <= stamps.reached(text).items()
+    assert "series.polynomial" in stamps.reached(texts["series.step"])
+
+
 def grow_old(path, days=200):
     stat = path.lstat()
     os.utime(path, (stat.st_atime, stat.st_mtime - 86400 * days), follow_symlinks=False)

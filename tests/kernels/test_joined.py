@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import ast
+import json
+import os
 import re
+import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from nonsmooth.kernels.compile import assembly
@@ -24,6 +29,19 @@ TEXTS = {
 MARKERS = {"device", "inline", "kernel", "callback", "local", "once"}  # another compiler's on a GPU
 ON_PURPOSE = MARKERS | {"build", "may_pause"}  # replaced on a GPU
 SWAPPED = {*PLACES, "series.generated"}  # for the stepper that is joined
+PLAIN = """
+import json
+import numpy as np
+import nonsmooth as ns
+
+found = []
+for n, method in ((1, "auto"), (2, "auto"), (1, "taylor"), (1, "rkf45")):
+    wall = {"wall": ns.elements.Stop(at="q", position=0.0, restitution=0.5)}
+    system = ns.mechanical(np.eye(n), np.zeros((n, n)), np.eye(n), coordinates=["q", "r"][:n], elements=wall)
+    run = ns.simulate(system, start={"q": -1.0}, duration=4.0, samples=9, method=method)
+    found.append([run["time"].values.tolist(), run["u"].values[:, 0].tolist()])
+print(json.dumps(found))
+"""
 
 
 @cache
@@ -56,3 +74,12 @@ def test_a_name_means_one_thing_in_a_joined_text(text: str) -> None:
             if name not in ON_PURPOSE and not foreign and not re.fullmatch(r"_[if]\d?", name):
                 origins.setdefault(name, set()).add(origin)
     assert {name: sorted(files) for name, files in origins.items() if len(files) > 1} == {}
+
+
+def test_the_texts_run_as_plain_python() -> None:
+    """As a debugger wants them: from q = -1 a mass comes to its stop at pi / 2, and leaves it with half the speed."""
+    plain = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run([sys.executable, "-c", PLAIN], capture_output=True, text=True, check=True, env=plain)
+    for time, q in map(np.array, json.loads(done.stdout)):
+        fallen = np.where(time < np.pi / 2, -np.cos(time), 0.5 * np.cos(time))
+        np.testing.assert_allclose(q, fallen, atol=1e-8)

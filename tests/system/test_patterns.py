@@ -92,6 +92,30 @@ def test_a_run_goes_on_from_another_one(both: tuple[ns.System, ns.System]) -> No
     assert made.modes[int(rest["mode"][-1])] == made.modes[int(whole["mode"][-1])]
 
 
+def test_a_mass_that_holds_holds_whatever_was_visited_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A spring of 1/4 pulls at the first mass: its friction may be 0.3 as long as it sticks, but 0.1 once it slips. The
+    other one slips, q2 = 0.1 + 0.9 cos t, behind a run in which only the first has slipped."""
+    monkeypatch.setattr(combinations, "MOST", 0)
+    rubs = {f"rub_{q}": Coulomb(at=q, friction=0.1, static=0.3) for q in ("q1", "q2")}
+    system = ns.mechanical(np.eye(2), np.zeros((2, 2)), np.eye(2), elements=rubs)
+    ns.simulate(system, duration=1.0, start={"q1": 1.0})
+    run = ns.simulate(system, transient=0.5, duration=1.0, start={"q1": 0.25, "q2": 1.0})
+    slipped = np.stack([np.full(run.time.size, 0.25), 0.1 + 0.9 * np.cos(run["time"])], axis=1)
+    np.testing.assert_allclose(run["u"].values[:, :2], slipped, atol=1e-13)
+    assert {system.modes[k] for k in run["mode"].values} == {"rub_q1_stick_rub_q2_back"}
+
+
+def test_what_sticks_has_the_exponent_zero_whatever_was_visited_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two masses alone the first sticks, so that a change of its place stays; the second is driven, and damped."""
+    monkeypatch.setattr(combinations, "MOST", 0)
+    rubs = {f"rub_{q}": Coulomb(at=q, friction=0.1, static=0.3) for q in ("q1", "q2")}
+    force = {"q2": lambda t, p: np.cos(2.0 * t)}
+    system = ns.mechanical(np.eye(2), 0.5 * np.eye(2), np.eye(2), parameters={}, forcing=force, elements=rubs)
+    ns.simulate(system, duration=1.0, start={"q1": 1.0})
+    found = ns.lyapunov(system, periods=32, transient=4, start={"q1": 0.25}, progress=False).exponents.values
+    assert abs(found[0]) < 1e-12 and found[1] < -0.1
+
+
 def test_its_text_is_read_back_whatever_it_has_visited(both: tuple[ns.System, ns.System]) -> None:
     made = both[1]
     before = made.to_text()

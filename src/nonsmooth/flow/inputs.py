@@ -237,7 +237,6 @@ class DelayedInputs:
             late = lasting @ R[:n, :n].T + then.fields[2, :n] - after[:, None]
         S = np.repeat(R[None], len(times), axis=0)
         S[:, :n, n:] += self.moved(flow, times)[0][:, None, :] * late.transpose(0, 2, 1)
-        S[:, own] = 0.0
         S[:, own, n:] = self.by_delays(flow, after)[:, own]
         return S
 

@@ -108,6 +108,7 @@ class KernelMarch:
         self.system = Block(module.SYSTEM, module.put_system)
         self.call, self.kept = Block(records.CALL, records.put_call), Block(records.KEPT, records.put_kept)
         self.log, self.growth = Block(records.LOG, records.put_log), Block(records.GROWTH, records.put_growth)
+        self.kept.put(Kept.room(1, 0, 0, 0))  # a run that keeps nothing looks at its row as well
         self.orders, self.reals = np.zeros(records.N_ORDERS, dtype=np.int64), np.zeros(records.N_REALS)
 
     def returns(

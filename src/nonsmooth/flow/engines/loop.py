@@ -79,18 +79,7 @@ class Engine(ABC):
         """Room for ``keep`` section points of each of so many runs."""
         n = len(self.scale)
         room_for(8.0 * points * keep * (n + 2), f"{points:.6g} x {keep:.6g} section points", "ask for fewer of them")
-        rows, whole, real = n + len(self.traced.indicators) + len(self.traced.outputs), np.int64, np.nan
-        return Kept(
-            np.full((points, keep, n), real),
-            np.full((points, rows), real),
-            np.full((points, rows), real),
-            np.zeros(points, whole),
-            np.zeros(points, whole),
-            np.zeros(points),
-            np.full((points, keep), real),
-            np.zeros((points, keep), whole),
-            np.zeros(points, whole),
-        )
+        return Kept.room(points, keep, n, n + len(self.traced.indicators) + len(self.traced.outputs))
 
     @property
     def own_systems(self) -> bool:

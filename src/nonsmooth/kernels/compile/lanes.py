@@ -168,11 +168,11 @@ def _sum_columns(typing: Any, table: Any, filled: Any, w: Any, n: Any, m: Any, o
 
 
 def _number(address: int, place: int) -> float:
-    return c_double.from_address(address + 8 * place).value
+    return c_double.from_address(int(address + 8 * place)).value
 
 
 def _whole_number(address: int, place: int) -> int:
-    return c_int64.from_address(address + 8 * place).value
+    return c_int64.from_address(int(address + 8 * place)).value
 
 
 def _plain_four(address: int, place: int) -> Any:
@@ -181,11 +181,11 @@ def _plain_four(address: int, place: int) -> Any:
 
 def _plain_write(address: int, place: int, x: Any) -> None:
     for k in range(FOUR):
-        c_double.from_address(address + 8 * (place + k)).value = x[k]
+        c_double.from_address(int(address + 8 * (place + k))).value = x[k]
 
 
 def _plain_write_number(address: int, place: int, x: float) -> None:
-    c_double.from_address(address + 8 * place).value = x
+    c_double.from_address(int(address + 8 * place)).value = x
 
 
 def _plain_load(D: Any, place: Any) -> Any:

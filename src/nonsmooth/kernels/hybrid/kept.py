@@ -38,6 +38,22 @@ class Kept(NamedTuple):
     section_mode: Any
     status: Any  # (P,)
 
+    @classmethod
+    def room(cls, points: int, keep: int, n: int, rows: int) -> Kept:
+        """Room for ``keep`` section points of each of so many runs."""
+        whole, real = np.int64, np.nan
+        return cls(
+            np.full((points, keep, n), real),
+            np.full((points, rows), real),
+            np.full((points, rows), real),
+            np.zeros(points, whole),
+            np.zeros(points, whole),
+            np.zeros(points),
+            np.full((points, keep), real),
+            np.zeros((points, keep), whole),
+            np.zeros(points, whole),
+        )
+
 
 class Segments(NamedTuple):
     """Ends and derivatives of m segments."""

@@ -10,11 +10,11 @@ from nonsmooth.kernels.compile.cache import inline, once
 from nonsmooth.kernels.hybrid.codes import FIRED, MODE, NO_END, TIME, TRIES
 from nonsmooth.kernels.hybrid.records import FORM, TABLES, WORK
 from nonsmooth.kernels.linear.build import build
-from nonsmooth.kernels.linear.limits import sign_after
+from nonsmooth.kernels.linear.limits import flat, sign_after
 from nonsmooth.kernels.linear.polynomial import NEVER, classify
 from nonsmooth.kernels.linear.search import FUNCTIONAL, SIDE, search
 from nonsmooth.kernels.linear.tables import NODES, STATES, states_of, width_of
-from nonsmooth.kernels.linear.values import NODE, at_ends, bound_at, dense, turn, value_of, whole_step
+from nonsmooth.kernels.linear.values import NODE, at_ends, bound_at, dense, slope_of, turn, value_of, whole_step
 
 STEPPER = FORM, TABLES, WORK  # the types of this stepper's records: model, tables, work
 
@@ -302,6 +302,8 @@ def note_side(t, sense, section, tables, work):
         work.found[SIDE] = sense
     elif work.found[SIDE] != 0:
         value = value_of(tables, mode, section.indicator, work.w)
+        if value == 0.0 and not flat(tables, mode, section.indicator, work.w, work):
+            value = -slope_of(tables, mode, section.indicator, work.w)  # it comes from the other side
         if value != 0.0:
             work.found[SIDE] = 1 if value > 0.0 else -1
 
