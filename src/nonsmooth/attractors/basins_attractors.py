@@ -21,7 +21,7 @@ from nonsmooth.attractors.settler import Settler
 from nonsmooth.attractors.standing import label_standing
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.kernels.hybrid import codes
-from nonsmooth.kernels.judging.judge import HELD
+from nonsmooth.kernels.judging.judge import ALONG
 
 NOT_CONVERGED, DIVERGED = -1, -2  # labels of starts without an attractor
 SAME = 1e-5  # of the motion's size: runs that end this near to a cycle's point are on it
@@ -131,7 +131,7 @@ def _held(settler: Settler, point: FloatArray, place: FloatArray, mode: int, p: 
     for one in off:
         run = settler.trace(point, place + np.pad(one, (0, len(place) - n)), mode, 0, p)
         ends.append((run.points[-1] if len(run.points) else np.nan) - place[:n] - one)
-    return np.maximum(np.abs(ends[0]), np.abs(np.diag(ends[1:]))) <= HELD * STEP * size
+    return np.maximum(np.abs(ends[0]), np.abs(np.diag(ends[1:]))) <= ALONG * STEP * size
 
 
 def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:

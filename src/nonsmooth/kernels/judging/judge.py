@@ -30,7 +30,7 @@ MARGIN = 2e-3  # multipliers nearer to the unit circle than this settle nothing 
 APART = 10.0  # how much farther a shorter period must be than the orbit is uncertain
 ROUNDS = 8  # of a cycle, over which the contraction on a Poincare section is measured
 ULPS = 4e-16  # of a value: the rounding of a sum
-HELD = 1e-4  # of a difference: what is held on a moving belt repeats no better
+ALONG = 1e-4  # of a difference: what is held on a moving belt repeats no better
 SQUARINGS = 32  # of a matrix, which give the logarithm of its spectral radius to 2^-32 of that of its condition
 
 
@@ -175,7 +175,7 @@ def multiplier(images, start, size, difference, work):
     for j in range(n):
         nudge = difference * size[j]
         off = max(fabs(images[0, j] - start[j]), fabs(images[j + 1, j] - start[j] - nudge))
-        if off <= ULPS * fabs(start[j]) + HELD * nudge:
+        if off <= ULPS * fabs(start[j]) + ALONG * nudge:
             for k in range(n):
                 A[j, k] = 0.0
                 A[k, j] = 0.0
