@@ -84,7 +84,7 @@ def orthonormal(Q, n, columns, lengths, singular, scratch):
 def put_away(lengths, columns, growth):
     """Move the logarithms of the lengths to ``growth``: minus infinity for one that was lost."""
     for c in range(columns):
-        growth[c] += log(lengths[c]) if lengths[c] > 0.0 else -inf
+        growth[c] += -inf if lengths[c] == 0.0 else log(lengths[c])  # NaN of a transition that is met at no speed
         lengths[c] = 1.0
 
 
