@@ -74,6 +74,28 @@ def test_a_mass_that_stands_has_period_1(method: str) -> None:
     assert (swept["maximum"].values[:2] == 0.0).all() and swept["maximum"].values[2, 0] > 0.1
 
 
+@pytest.mark.parametrize("method", ["auto", "taylor"])
+def test_a_mass_that_rides_on_a_belt_has_period_1(method: Any) -> None:
+    """Wherever it is held, it goes to and fro by 2 / (10 w), and so does every neighbour: one attractor, not many."""
+    riding = ns.mechanical(
+        1.0,
+        0.1,
+        1.0,
+        parameters={"w": 1.3},
+        elements={
+            "f": E.Coulomb(at="q", friction=0.5, belt=lambda t, u, p: 0.1 * np.cos(p.w * t)),
+            "s": E.Stop(at="q", position=1.5),
+        },
+        coordinates=["q"],
+    )
+    swept = ns.sweep(riding, "w", [1.1, 1.3], method=method, progress=False)
+    assert (swept["period_number"] == 1).all() and (swept["status"] == 0).all()
+    assert (swept["maximum"] - swept["minimum"]).values[:, 0] == pytest.approx(0.2 / swept["w"].values, rel=1e-6)
+    grid = {"q": np.linspace(-0.2, 0.3, 4), "v_q": np.linspace(-0.5, 0.5, 3)}
+    found = ns.basins(riding, grid, method=method, progress=False)
+    assert (found["label"].values == 0).all() and found["name"].values.tolist() == ["period 1"]
+
+
 def test_a_sweep_without_forcing_ends_at_rest() -> None:
     """Undamped, from q0 within 3 mu / k it swings once about mu / k, to 2 mu / k - q0, and stays."""
     bare = ns.mechanical(

@@ -34,6 +34,21 @@ def whole(branch: xr.Dataset, low: float, high: float) -> None:
     assert all("edge of the range" in str(text) for text in branch["ended_because"].values)
 
 
+@pytest.mark.parametrize("start", [0.0, 1.0, 0.9])
+def test_newton_s_method_on_its_own_goes_round_in_a_circle(start: float) -> None:
+    """By x^3 - 2 x + 2 it goes from 0 to 1 and back; the one real zero is Cardano's."""
+    system = ns.System(
+        name="cubic",
+        states=["x", "v"],
+        parameters={"P": 2.0},
+        modes={"free": lambda t, u, p: [u.v, -u.v - u.x**3 + 2.0 * u.x - p.P]},
+    )
+    branch = ns.continue_equilibrium(system, "P", (1.9, 2.1), start={"x": start})
+    root = np.sqrt(1.0 - 8.0 / 27.0)
+    found = branch["u"].values[np.argmin(np.abs(branch["P"].values - 2.0)), 0]
+    assert found == pytest.approx(np.cbrt(root - 1.0) - np.cbrt(root + 1.0), abs=1e-12)
+
+
 @pytest.mark.parametrize("start", [{}, {"q": 3.0}])
 def test_a_mass_pressed_against_a_rigid_stop(start: dict[str, float]) -> None:
     """q = P / 2 up to the stop at .5, and there beyond: persistence at P = 1."""

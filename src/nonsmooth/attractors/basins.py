@@ -94,14 +94,15 @@ def basins(
 
     Notes
     -----
-    A cycle counts with a certificate only (``kernels.judging.judge``), and Newton's method on the section's
-    map then gives its points and multipliers to rounding. Motion without a period counts only where a run of 20 000
-    returns neither settles nor leaves the places it has visited, and where runs that begin beside it come back
+    A cycle counts with a certificate only (``kernels.judging.judge``), and Newton's method on the section's map then
+    gives its points and multipliers to rounding. Motion without a period counts only where a run of 20 000 returns
+    neither settles nor leaves the places it has visited, and where runs that begin beside it come back
     (:mod:`nonsmooth.attractors.basins_candidate`); so motion without damping, and a slow transient, keep the label -1.
     A start exactly on a boundary, as at a saddle, is pushed off it to one side. Cycles whose multipliers are nearer
     than 0.002 to the unit circle are not certified; their starts keep -1 with the status ``slow``. What friction holds,
-    so that it repeats exactly, beside it too, is no multiplier. A run that has stopped, or creeps towards the end of a
-    set of equilibria and is nearer than 1e-5 of the scales, belongs to it (:mod:`nonsmooth.attractors.standing`).
+    at rest or on a moving belt, so that it repeats beside it too, is no multiplier. A run that has stopped, or creeps
+    towards the end of a set of equilibria and is nearer than 1e-5 of the scales, belongs to it
+    (:mod:`nonsmooth.attractors.standing`).
 
     ``lyapunov`` of a cycle is minus infinity where its multipliers are zero, NaN where they are not zero but lost in
     rounding (below 1e-8). Where a Poincare section is used, ``lyapunov`` and ``multiplier`` are those of its map: the

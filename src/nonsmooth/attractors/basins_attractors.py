@@ -15,12 +15,13 @@ import numpy as np
 
 from nonsmooth.attractors.basins_candidate import CandidateSearch, among
 from nonsmooth.attractors.basins_found import Attractor, Patience
-from nonsmooth.attractors.basins_newton import Cycle, confirmed_cycle, exponent_on
+from nonsmooth.attractors.basins_newton import STEP, Cycle, confirmed_cycle, exponent_on
 from nonsmooth.attractors.settled import Settled
 from nonsmooth.attractors.settler import Settler
 from nonsmooth.attractors.standing import label_standing
 from nonsmooth.flow.engines.engine import FloatArray, IntArray
 from nonsmooth.kernels.hybrid import codes
+from nonsmooth.kernels.judging.judge import ALONG
 
 NOT_CONVERGED, DIVERGED = -1, -2  # labels of starts without an attractor
 SAME = 1e-5  # of the motion's size: runs that end this near to a cycle's point are on it
@@ -94,7 +95,7 @@ def _label_cycles(
         same[first] = True
         labels[which[same]] = len(found)
         open_ &= ~same
-        if np.any(attractor.held):  # the extent of all that were met
+        if np.isfinite(attractor.held).any():  # the extent of all that were met
             maximum, minimum = runs.maximum[same].max(axis=0), runs.minimum[same].min(axis=0)
             attractor = replace(attractor, maximum=maximum, minimum=minimum)
         found.append(attractor)
@@ -103,13 +104,15 @@ def _label_cycles(
 def _on_cycle(attractor: Attractor, runs: Settled) -> Any:
     """Marks of runs that ended on this cycle: on one of its points, in the mode that it has there.
 
-    Cycles on which friction holds the same states are one attractor, wherever it holds them. Extremes would not tell:
-    the cycle that is shifted by a part of its period has the same ones."""
+    Cycles on which friction holds the same states, at rest or on a belt, are one attractor, wherever it holds them.
+    Extremes would not tell: the cycle that is shifted by a part of its period has the same ones."""
     n = attractor.points.shape[1]
-    if np.any(attractor.held):
+    if np.isfinite(attractor.held).any():
+        moved, still = runs.maximum - runs.minimum, np.nan_to_num(attractor.held, nan=1.0) == 0.0
+        alike = np.isnan(attractor.held) | (np.abs(moved - attractor.held) <= SAME * attractor.size)
         return (
             (runs.period_number == attractor.period_number)
-            & (_held(runs) == attractor.held).all(axis=1)
+            & (alike & ((moved == 0.0) == still)).all(axis=1)
             & np.isin(runs.mode, attractor.modes)
         )
     gap = np.abs(np.nan_to_num(runs.last[:, None, :n] - attractor.points) / attractor.size).max(axis=2)
@@ -121,9 +124,14 @@ def _on_cycle(attractor: Attractor, runs: Settled) -> Any:
     )
 
 
-def _held(runs: Settled) -> Any:
-    """Marks of states that do not move at all (J, n)."""
-    return runs.maximum == runs.minimum
+def _held(settler: Settler, point: FloatArray, place: FloatArray, mode: int, p: int, size: FloatArray) -> Any:
+    """Marks of states (n,) that are as far beside the cycle after p returns as before: friction holds them there."""
+    n, ends = len(size), []
+    off = STEP * np.vstack([np.zeros(n), np.diag(size)])
+    for one in off:
+        run = settler.trace(point, place + np.pad(one, (0, len(place) - n)), mode, 0, p)
+        ends.append((run.points[-1] if len(run.points) else np.nan) - place[:n] - one)
+    return np.maximum(np.abs(ends[0]), np.abs(np.diag(ends[1:]))) <= ALONG * STEP * size
 
 
 def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:
@@ -133,9 +141,11 @@ def _cycle(settler: Settler, point: FloatArray, run: Settled) -> Attractor:
     least = settler.least_at(run.maximum[0], run.minimum[0])
     size = np.maximum(0.5 * (run.maximum[0] - run.minimum[0]), least)
     cycle = confirmed_cycle(settler, point, place, mode, p, size)
-    held = _held(run)[0] & (cycle is None)  # neighbours stand beside it
-    confirmed = cycle is not None
+    held, confirmed = np.full(n, np.nan), cycle is not None
     if cycle is None:
+        moved = run.maximum[0] - run.minimum[0]
+        beside = settler.plan.indicator < 0 and _held(settler, point, place, mode, p, size)
+        held = np.where((moved == 0.0) | beside, moved, np.nan)  # neighbours stand beside it
         once = settler.trace(point, place, mode, 0, p)
         if len(once.points):
             cycle = Cycle(once.points, once.modes, float(run.multiplier[0]), float(once.times[-1]), once.end, once.mode)

@@ -51,7 +51,7 @@ class Attractor:
     chaotic: bool = False  # its exponent is above zero beyond doubt
     near: float = 0.0  # of its size: section points nearer than this belong to it
     tree: Any = field(default=None, repr=False, compare=False)
-    held: Any = False  # (n,) states of a cycle that do not move at all, and may stand elsewhere on others beside it
+    held: Any = np.nan  # (n,) how far states move that friction holds, and may elsewhere on others beside it; else NaN
     name: str = ""
     standing: EquilibriumSet | None = field(default=None, repr=False, compare=False)
 

@@ -9,11 +9,11 @@ import numpy as np
 from nonsmooth.continuation.arguments import LargestStep, allowed_range, limits
 from nonsmooth.continuation.branches.following import both_ways, dataset
 from nonsmooth.continuation.branches.records import record_of
-from nonsmooth.continuation.events.of_equilibria import AlongEquilibria, beyond
+from nonsmooth.continuation.events.of_equilibria import AlongEquilibria, standing
 from nonsmooth.continuation.march.march import Limits, MarkedPoint
-from nonsmooth.continuation.problems.equilibrium import Rest, equilibria_near
+from nonsmooth.continuation.problems.equilibrium import equilibria_near
 from nonsmooth.errors import SolveError
-from nonsmooth.flow.mode_fields import MOST, every_mode
+from nonsmooth.flow.mode_fields import MOST, every_mode, mode_field
 from nonsmooth.flow.options import Varied
 from nonsmooth.flow.starts import first_state
 from nonsmooth.system.arguments import checked
@@ -22,6 +22,8 @@ from nonsmooth.system.system import System
 
 if TYPE_CHECKING:
     import xarray as xr
+
+STARTS, FARTHEST = 64, 2.0  # of Newton's method where modes are not affine, and how far off, in units of the scales
 
 
 @checked
@@ -73,24 +75,24 @@ def continue_equilibrium(
     """
     from nonsmooth.results.branches import EQUILIBRIUM, SPECIAL_EQUILIBRIUM
 
-    if every_mode(system.traced, system.parameter_vector()) is None:
+    if (every := every_mode(system.traced, system.parameter_vector())) is None:
         raise ValueError(f"{system.name!r} has more than {MOST} combinations of contact states: take fewer elements")
     if system.depends_on_time:
         raise ValueError(f"{system.name!r} depends on time: it has no equilibria; find_orbit finds its periodic orbits")
     low, high = limits(system, parameter, range, system.values.get(parameter), what="the system")
     here = system.values[parameter]
     state = first_state(system, start, mode)
-    modes = None if mode is None else [int(state.counters[0])]
-    first: Rest | None = None
-    for rest in equilibria_near(system, parameter, high - low, np.nan_to_num(state.u), here, modes):
-        inside = (rest.margins < 0.0).all()
-        first = rest if inside else beyond(rest) if (rest.margins <= 0.0).all() else None
-        if first is not None:
+    modes, rng = None if mode is None else [int(state.counters[0])], np.random.default_rng(0)
+    affine = all(mode_field(system.traced, one).affine for one in modes or every)
+    for away in np.linspace(0.0, FARTHEST, 1 if affine else STARTS):
+        guess = np.nan_to_num(state.u) + away * system.scale_vector() * rng.normal(size=len(state.u))
+        near = equilibria_near(system, parameter, high - low, guess, here, modes)
+        if (first := next(filter(None, map(standing, near)), None)) is not None:
             break
-    if first is None:
+    else:
         raise SolveError(
-            "no equilibrium was found from this start: Newton's method did not converge in any mode, or what it found "
-            "lies outside its mode or behind a contact. Give a nearer start",
+            "no equilibrium was found from this start, nor from others around it: Newton's method did not converge in "
+            "any mode, or what it found lies outside its mode or behind a contact. Give a nearer start",
             status="no_convergence",
         )
     box = ((-1, *allowed_range(system, parameter, low, high)),)

@@ -112,7 +112,8 @@ def lyapunov(
     time. So it is for each constraint that elements hold where the measurement begins (a mass that sticks, two for a
     contact that rests): the frame is laid into what they leave free, and rates at which the equations bring rounding
     errors back to a constraint are no exponents. One is NaN, and comes last, for memory that is never written or a
-    state of modes that are never visited: it is constant. The phase of the forcing is no state, so a forced limit cycle
+    state of modes that are never visited: it is constant. All are NaN where several elements decide at an instant that
+    is met at no speed, of which no derivative is known. The phase of the forcing is no state, so a forced limit cycle
     has negative exponents only; an autonomous motion that does not end in an equilibrium has one exponent zero.
 
     Of transitions at one instant each that the motion would have met there by itself has an instant of its own (two

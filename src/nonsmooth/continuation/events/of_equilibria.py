@@ -89,6 +89,11 @@ class AlongEquilibria(Policy):
         return after
 
 
+def standing(rest: Rest) -> Rest | None:
+    """The equilibrium itself inside its mode, the one behind where it stands on the mode's boundary, else None."""
+    return rest if (rest.margins < 0.0).all() else beyond(rest) if (rest.margins <= 0.0).all() else None
+
+
 def beyond(rest: Rest) -> Rest | None:
     """The equilibrium, or the set of them, behind a boundary, where the two meet; None where there is none."""
     curve = rest.curve

@@ -30,6 +30,7 @@ MARGIN = 2e-3  # multipliers nearer to the unit circle than this settle nothing 
 APART = 10.0  # how much farther a shorter period must be than the orbit is uncertain
 ROUNDS = 8  # of a cycle, over which the contraction on a Poincare section is measured
 ULPS = 4e-16  # of a value: the rounding of a sum
+ALONG = 1e-4  # of a difference: what is held on a moving belt repeats no better
 SQUARINGS = 32  # of a matrix, which give the logarithm of its spectral radius to 2^-32 of that of its condition
 
 
@@ -165,7 +166,7 @@ def multiplier(images, start, size, difference, work):
     """Largest modulus of the multipliers of the map whose images (n + 1, n) of a point and its neighbours these are.
 
     Neighbour j is ``difference`` * size[j] away in state j; ``work`` (2, n, n) is scratch. A state that repeats its
-    start exactly, beside it too, is held, as by friction: along it lie others of a set, and its 1 is no multiplier."""
+    start, beside it too, is held, as by friction: along it lie others of a set, and its 1 is no multiplier."""
     n = size.shape[0]
     A, B = work[0], work[1]
     for j in range(n):
@@ -173,8 +174,8 @@ def multiplier(images, start, size, difference, work):
             A[k, j] = (images[j + 1, k] - images[0, k]) / (difference * size[k])
     for j in range(n):
         nudge = difference * size[j]
-        moved = fabs(images[j + 1, j] - start[j] - nudge)
-        if images[0, j] == start[j] and moved <= ULPS * (fabs(start[j]) + nudge):
+        off = max(fabs(images[0, j] - start[j]), fabs(images[j + 1, j] - start[j] - nudge))
+        if off <= ULPS * fabs(start[j]) + ALONG * nudge:
             for k in range(n):
                 A[j, k] = 0.0
                 A[k, j] = 0.0

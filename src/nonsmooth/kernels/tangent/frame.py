@@ -11,7 +11,8 @@ from nonsmooth.kernels.compile.cache import inline
 ENOUGH = 0.25  # of the square of a length: where as much is left no part along others is
 NEAR = 1e-13  # of an indicator's size: it is zero
 ON_SURFACE = 1e-9  # of an indicator's size: nearer to a surface than this is on it
-SINGULAR = 1e-13  # a pivot below this part of its row's size is that of a matrix without full rank
+SINGULAR = 1e-13  # a row smaller than this, or a pivot below this part of its row's size: a matrix without full rank
+LOST = 1e-11  # behind it a column shorter than this part of what it was has vanished
 
 
 @inline
@@ -56,12 +57,12 @@ def upright(Q, n, c, dots):
 def orthonormal(Q, n, columns, lengths, singular, scratch):
     """Gram-Schmidt on the columns of Q; ``lengths`` are multiplied by what they had become.
 
-    ``singular``: a transition without full rank came before, so that a column may have vanished: its length is zero for
-    good, and any direction that is left goes on in its place."""
+    ``singular``: columns of length 1 have passed a transition without full rank, so that some may have vanished: the
+    length of such a one is zero for good, and any direction that is left goes on in its place."""
     for c in range(columns):
-        before = squared(Q, n, c)
+        before = max(squared(Q, n, c), 1.0)
         length = upright(Q, n, c, scratch)
-        if (singular and length <= 1e-11 * sqrt(before)) or length == 0.0:
+        if (singular and length <= LOST * sqrt(before)) or length == 0.0:
             lengths[c] = 0.0
             best, which = -1.0, 0
             for i in range(n):  # the unit vector farthest from the columns before
@@ -83,7 +84,7 @@ def orthonormal(Q, n, columns, lengths, singular, scratch):
 def put_away(lengths, columns, growth):
     """Move the logarithms of the lengths to ``growth``: minus infinity for one that was lost."""
     for c in range(columns):
-        growth[c] += log(lengths[c]) if lengths[c] > 0.0 else -inf
+        growth[c] += -inf if lengths[c] == 0.0 else log(lengths[c])  # NaN of a transition that is met at no speed
         lengths[c] = 1.0
 
 
@@ -123,13 +124,13 @@ def multiply(X, Q, n, columns, A):
 
 @inline
 def log_determinant(S, n, A):
-    """log|det S|, minus infinity where S has not full rank (A: scratch)."""
+    """log|det S|, minus infinity where S, in units of the scales, has not full rank (A: scratch)."""
     total = 0.0
     for i in range(n):
         size = 0.0
         for j in range(n):
             size = max(size, fabs(S[i, j]))
-        if size == 0.0:
+        if size <= SINGULAR:
             return -inf
         total += log(size)
         for j in range(n):

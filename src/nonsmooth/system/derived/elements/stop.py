@@ -132,19 +132,20 @@ class Stop(Contact):
         w, restitution = here.rate(), here.law("restitution")
         closed = Condition(here.where, -1, "gap")
         closing = [closed, Condition(w, -1, "closing")]
+        rests = here.back_on(still) if here.begins_alone() else still
         if here.vanishes(restitution):
             return [
-                Leaving("rest", [*closing, presses], still),
+                Leaving("rest", [*closing, presses], rests),
                 Leaving("open", [*closing, lifts], still),
-                Leaving("rest", closing, still),  # neither, to all orders: it holds
+                Leaving("rest", closing, rests),  # neither, to all orders: it holds
             ]
         speed, rebound = w + (self.creep if self.creep is not None else CREEP * here.size(w)), here.struck(restitution)
         slow = [*closing, Condition(speed, 1, "slow")]
         return [
             Leaving("open", [closed, Condition(speed, -1, "slow")], rebound),
-            Leaving("rest", [*slow, presses], still),
+            Leaving("rest", [*slow, presses], rests),
             Leaving("open", [*slow, lifts], rebound),
-            Leaving("rest", slow, still),
+            Leaving("rest", slow, rests),
         ]
 
 
