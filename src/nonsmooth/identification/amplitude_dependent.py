@@ -92,11 +92,11 @@ def response_curves(
         (axis,) = size.dims
         if axis != "frequency":
             raise ValueError(f"run {run!r}: stands over {axis!r}; read it with load_recording(..., axis='frequency')")
-        f = np.asarray(size["frequency"].values, dtype=np.float64)
+        f = np.asarray(size["frequency"].values, float)
         beside: list[FloatArray | None] = []
         for name, unit in ((force, "N"), (phase, "rad")):
             at = None if name is None else take(recording, name, run, units=(unit,), samples=3).values
-            beside.append(None if at is None else np.asarray(at, dtype=np.float64))
+            beside.append(None if at is None else np.asarray(at, float))
         power = _POWERS[size.attrs["units"]]
         curves.append(ResponseCurve(run, f, np.asarray(size.values) / (2 * np.pi * f) ** power, *beside))
     return tuple(curves)

@@ -178,7 +178,7 @@ def _finer(length: FloatArray) -> Callable[[FloatArray], FloatArray]:
             flat = values.reshape(len(values), -1)
             dense = np.stack([np.interp(fine, length, column) for column in flat.T], axis=-1)
             return dense.reshape(-1, *values.shape[1:])
-        return np.asarray(PchipInterpolator(length, values, axis=0)(fine))
+        return PchipInterpolator(length, values, axis=0)(fine)
 
     return finer
 

@@ -82,12 +82,12 @@ class NonlinearMode:
 
     def stiffness(self, amplitude: ArrayLike, omega: ArrayLike) -> ComplexArray:
         """Force by displacement, m (omega_n^2 - Omega^2 + i D Omega), N/m."""
-        w = np.asarray(omega, dtype=np.float64)
+        w = np.asarray(omega, float)
         return np.asarray(self.mass * (self.square(amplitude) - w**2 + 1j * self.damping(amplitude) * w))
 
     def slope(self, amplitude: ArrayLike, omega: ArrayLike) -> FloatArray:
         r"""d ln F / d ln a at a fixed frequency: 1 if linear, 0 at a fold, negative on the unstable middle part."""
-        a, w = np.asarray(amplitude, dtype=np.float64), np.asarray(omega, dtype=np.float64)
+        a, w = np.asarray(amplitude, float), np.asarray(omega, float)
         G, D, change = self.square(a), self.damping(a), interpolation(self.knots, a, 1)
         turn = change @ self.squares + 1j * w * D * (change @ self.log_damping)
         return np.asarray(1.0 + np.real(a * turn / (G - w**2 + 1j * w * D)))
@@ -155,11 +155,11 @@ def interpolation(knots: FloatArray, amplitude: ArrayLike, derivative: int = 0) 
     """
     from scipy.interpolate import CubicSpline
 
-    at = np.asarray(amplitude, dtype=np.float64)
+    at = np.asarray(amplitude, float)
     a: Any = np.clip(at, knots[0], knots[-1])
     if len(knots) == 1:
         return np.full((*at.shape, 1), float(derivative == 0))
-    found = np.asarray(CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")(a, derivative))
+    found = CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")(a, derivative)
     return np.where((a == at)[..., None], found, 0.0) if derivative else found
 
 
@@ -217,7 +217,7 @@ class ResponseFit:
 
     def _own(self, R: complex) -> ComplexArray:
         """Displacement of the mode alone at each point."""
-        return np.asarray(self.measured if self.force is None else self.measured - R * self.force)
+        return self.measured if self.force is None else self.measured - R * self.force
 
     def _left(self, p: FloatArray) -> FloatArray:
         """ln of force over what the mode needs (and its phase), for all points."""
@@ -229,7 +229,7 @@ class ResponseFit:
         loss = np.exp(damping + by_damping) * self.omega
         needed = (square * np.exp(by_square) - self.omega**2 + 1j * loss) * own
         size = load - np.log(np.abs(needed))
-        return np.concatenate([size, -np.angle(needed)]) if self.phased else np.asarray(size)
+        return np.concatenate([size, -np.angle(needed)]) if self.phased else size
 
     def _fit(self) -> None:
         from scipy.optimize import least_squares
@@ -327,7 +327,7 @@ class ResponseFit:
             a, w = self.amplitude[self.curve == c], self.omega[self.curve == c]
             place = a[int(np.argmin(np.abs(np.log(self.mode.square(a) / w**2))))]
             rows.append((mode.natural_frequency(place), mode.damping_ratio(place), place))
-        frequency, ratio, place = np.array(rows, dtype=np.float64).T
+        frequency, ratio, place = np.array(rows, float).T
         return frequency, ratio, place
 
 
@@ -344,7 +344,7 @@ def _knots(knots: int | ArrayLike, size: FloatArray) -> FloatArray:
         if knots < 1:
             raise ValueError(f"knots must be at least 1, got {knots}")
         return np.linspace(size.min(), size.max(), knots) if knots > 1 else np.array([float(np.median(size))])
-    given = np.asarray(knots, dtype=np.float64)
+    given = np.asarray(knots, float)
     if given.ndim != 1 or len(given) < 1 or not (given > 0).all() or not (np.diff(given) > 0).all():
         raise ValueError(f"knots must be positive, increasing amplitudes (m), got {given!r}")
     return given

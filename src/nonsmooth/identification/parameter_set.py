@@ -66,7 +66,7 @@ class ParameterSet(Answering, Mapping[str, float]):
         anomalies: Sequence[str] = (),
         synthetic: bool = False,
     ) -> None:
-        matrix, n = np.array(covariance, dtype=np.float64), len(estimates) + len(extra or {})
+        matrix, n = np.array(covariance, float), len(estimates) + len(extra or {})
         if matrix.shape != (n, n):
             raise ValueError(f"covariance must be ({n}, {n}): parameters, then extra; got {matrix.shape}")
         matrix.flags.writeable = False
@@ -236,7 +236,7 @@ class ParameterSet(Answering, Mapping[str, float]):
             "n_parameters": len(self.estimates),
             "identifiability": dict(self.identifiability),
             "units": [row.unit for row in rows.values()],
-            "findings": [_as_record(finding) for finding in self.findings],
+            "findings": [as_record(finding) for finding in self.findings],
         }
         found = xr.Dataset(
             {**data, "covariance": (("parameter", "other"), self._covariance.copy())},
@@ -269,7 +269,7 @@ class ParameterSet(Answering, Mapping[str, float]):
             {name: rows[name] for name in names[:n]},
             dataset["covariance"].values,
             extra={name: rows[name] for name in names[n:]},
-            findings=[_from_record(item) for item in record["findings"]],
+            findings=[from_record(item) for item in record["findings"]],
             identifiability=record["identifiability"],
             notes=record["notes"],
             anomalies=record.get("anomalies", ()),
@@ -297,33 +297,35 @@ class ParameterSet(Answering, Mapping[str, float]):
         >>> ns.ParameterSet({"k": Estimate(8.5, 0.1, "N/m")}, [[0.01]]).to_dataframe().loc["k", "unit"]
         'N/m'
         """
-        import xarray as xr
+        import pandas as pd
 
-        rows = self._rows
-        low, high = zip(*(row.interval(level) for row in rows.values()), strict=True) if rows else ((), ())
-        columns: dict[str, Any] = {
-            "value": [row.value for row in rows.values()],
-            "uncertainty": [row.uncertainty for row in rows.values()],
-            "low": list(low),
-            "high": list(high),
-            "unit": np.array([row.unit for row in rows.values()], dtype=object),
-            "parameter_of_the_model": [name in self.estimates for name in rows],
-            "identifiability": np.array([self.identifiability.get(name, "") for name in rows], dtype=object),
-        }
-        names = np.array(list(rows), dtype=object)
-        return xr.Dataset({key: ("name", values) for key, values in columns.items()}, {"name": names}).to_dataframe()
+        table = [
+            (
+                row.value,
+                row.uncertainty,
+                *row.interval(level),
+                row.unit,
+                name in self.estimates,
+                self.identifiability.get(name, ""),
+            )
+            for name, row in self._rows.items()
+        ]
+        names = ["value", "uncertainty", "low", "high", "unit", "parameter_of_the_model", "identifiability"]
+        return pd.DataFrame(table, pd.Index([*self._rows], name="name"), names)
+
+    @property
+    def _shown(self) -> list[tuple[str, str]]:
+        """Name and value of each row; those of ``extra`` in brackets."""
+        rows = [(name, f"= {estimate}") for name, estimate in self.estimates.items()]
+        return rows + [(f"({name}", f"= {estimate})") for name, estimate in self.extra.items()]
 
     def __str__(self) -> str:
-        lines = [self._title()]
-        lines += [f"  {name} = {estimate}" for name, estimate in self.estimates.items()]
-        lines += [f"  ({name} = {estimate})" for name, estimate in self.extra.items()]
+        lines = [self._title(), *(f"  {name} {value}" for name, value in self._shown)]
         lines += [f"  {note}" for note in self.notes]
         return "\n".join(lines + [f"  ANOMALY: {sentence}" for sentence in self.anomalies])
 
     def __repr__(self) -> str:
-        rows = [(name, f"= {estimate}") for name, estimate in self.estimates.items()]
-        rows += [(f"({name}", f"= {estimate})") for name, estimate in self.extra.items()]
-        lines = [text_table(self._title(), rows, whole=False)]
+        lines = [text_table(self._title(), self._shown, whole=False)]
         lines += [f"  ANOMALY: {cut(sentence)}" for sentence in self.anomalies]
         counts = {"findings": len(self.findings), "notes": len(self.notes)}
         if any(counts.values()):
@@ -343,13 +345,16 @@ class ParameterSet(Answering, Mapping[str, float]):
         return f"ParameterSet{' (synthetic recordings)' if self.synthetic else ''}"
 
 
-def _as_record(finding: Finding) -> dict[str, Any]:
+def as_record(finding: Finding) -> dict[str, Any]:
+    """Return a finding as plain lists and texts, without its picture's data."""
     plain = {name: getattr(finding, name) for name in ("name", "method", "samples_used", "runs", "notes", "plot")}
     others = {name: list(astuple(other)) for name, other in finding.others.items()}
     return {**plain, "estimate": list(astuple(finding.estimate)), "others": others}
 
 
-def _from_record(item: Mapping[str, Any]) -> Finding:
+def from_record(item: Mapping[str, Any]) -> Finding:
+    """Return the finding of such a record."""
+
     def estimate(row: Sequence[Any]) -> Estimate:
         value, uncertainty, unit, half_width, logarithmic = row
         return Estimate(float(value), float(uncertainty), unit, float(half_width), logarithmic)  # "inf" is a text there

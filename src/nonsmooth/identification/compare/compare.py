@@ -248,7 +248,7 @@ def _noise(measured: xr.Dataset, noise: Any, states: list[str]) -> np.ndarray:
         for name in ("section_error", "u_error"):
             if name in measured:
                 others = [dim for dim in measured[name].dims if dim != "state"]
-                return np.asarray(measured[name].median(others).values, dtype=float)
+                return np.asarray(measured[name].median(others).values, float)
         raise ValueError(
             f"the standard error of the measured states is not known: give "
             f"noise={{{', '.join(map(repr, states))}: ...}}, or `u_error` or `section_error` in the measured Dataset"

@@ -180,7 +180,7 @@ def _identified(parameters: Any, count: int, seed: int) -> dict[str, np.ndarray]
     if callable(own):
         drawn = own(count, seed)
         names = list(getattr(drawn, "data_vars", drawn))
-        return {str(name): np.asarray(drawn[name], dtype=float) for name in names if name in parameters}
+        return {str(name): np.asarray(drawn[name], float) for name in names if name in parameters}
     if not hasattr(parameters, "covariance"):
         return {name: np.full(count, float(parameters[name])) for name in parameters}
     names, matrix = known_together(parameters, parameters)

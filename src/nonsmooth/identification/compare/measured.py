@@ -64,7 +64,7 @@ def motion_of(
     from nonsmooth.recordings.signals.smoothing import smooth
 
     smoothed = smooth(time, x, resolution=resolution, **smoothing)
-    turns = np.asarray(phase, dtype=np.float64)
+    turns = np.asarray(phase, float)
     if turns.shape != (smoothed.sizes["time"],) or not np.isfinite(turns).all():
         raise ValueError(
             f"{whose(x)}: phase must be one finite number for each of {smoothed.sizes['time']} samples (omega t / 2 pi "

@@ -72,8 +72,8 @@ def compare_motion(
 
 def _measured(measured: xr.Dataset, phases: list[float], grid: int) -> tuple[FloatArray | None, list[FloatArray]]:
     if "u" not in measured:
-        return None, [np.asarray(measured["section"].values, dtype=float)]
-    turns, u = np.asarray(measured["phase"].values, dtype=float), np.asarray(measured["u"].values, dtype=float)
+        return None, [np.asarray(measured["section"].values, float)]
+    turns, u = np.asarray(measured["phase"].values, float), np.asarray(measured["u"].values, float)
     return fold(turns, u, grid), [fold(turns - phase, u, 8)[:, 0] for phase in phases]
 
 
@@ -83,7 +83,7 @@ def _starts(points: FloatArray | None, folded: FloatArray | None, model: Model, 
     States that were not measured begin at 0.
     """
     if start is not None:
-        return np.atleast_2d(np.asarray(start, dtype=float))
+        return np.atleast_2d(np.asarray(start, float))
     at_zero = points if folded is None else folded[np.isfinite(folded[:, 0]).all(axis=1), 0]
     count = 0 if at_zero is None else min(MEASURED_STARTS, len(at_zero))
     starts = np.zeros((1 + count, len(model.theory.states)))
@@ -156,7 +156,7 @@ def _periods(
     if low > 0 and high == 2 * low and (apart := _doubled(single, doubled, scale, low)) is not None:
         by = ", ".join(f"{far:.2g} in {name}" for far, name in zip(apart, states, strict=True))
         words = f"on either side of a flip: the {whose} motion is doubled, its section points part by {by}"
-    coexisting = np.asarray(predicted.coexisting, dtype=np.int64)
+    coexisting = np.asarray(predicted.coexisting, np.int64)
     return {
         "measured_period_number": labelled((), np.int64(number), "measured period number (0: none found)"),
         "theory_period_number": labelled(
@@ -275,7 +275,7 @@ def motion_band(
     """
     rng = np.random.default_rng(model.seed)
     draws = len(systems)
-    numbers = np.zeros(draws, dtype=np.int64)
+    numbers = np.zeros(draws, np.int64)
     distances = np.full((draws, len(phases)), np.nan)
     to_measured = np.full(draws, np.nan)
     orbits: list[FloatArray] = []

@@ -55,7 +55,7 @@ def fold(phase: ArrayLike, u: ArrayLike, grid: int) -> FloatArray:
     ValueError
         A phase that does not rise, no whole period, or fewer than eight samples in one.
     """
-    turns, values = np.asarray(phase, dtype=float), np.asarray(u, dtype=float)
+    turns, values = np.asarray(phase, float), np.asarray(u, float)
     rises = np.diff(turns)
     if (rises < 0).any():
         i = int(np.argmax(rises < 0))
@@ -107,7 +107,7 @@ def mean_orbit(folded: ArrayLike, period_number: int) -> tuple[FloatArray, Float
     orbit, scatter : array (period_number * grid, states)
         Mean, and standard deviation of one pass about it (NaN from a single pass).
     """
-    values = np.asarray(folded, dtype=float)
+    values = np.asarray(folded, float)
     passes = len(values) // period_number
     if not passes:
         raise ValueError(f"{len(values)} forcing periods do not hold an orbit of period {period_number}")
@@ -152,7 +152,7 @@ def orbit_distance(a: ArrayLike, b: ArrayLike, periods: int) -> OrbitDistance:
     """
     from scipy.optimize import minimize_scalar
 
-    x, y = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    x, y = np.asarray(a, float), np.asarray(b, float)
     if x.shape != y.shape or x.ndim != 2 or len(x) % periods:
         raise ValueError(
             f"two orbits over {periods} forcing periods must have equal shapes (samples, states), the samples a "
@@ -184,7 +184,7 @@ def orbit_distance(a: ArrayLike, b: ArrayLike, periods: int) -> OrbitDistance:
 
 def common_length(orbit: ArrayLike, periods: int, length: int) -> FloatArray:
     """An orbit over ``periods`` repeated to ``length`` forcing periods, a multiple of them."""
-    values = np.asarray(orbit, dtype=float)
+    values = np.asarray(orbit, float)
     return np.tile(values, (length // periods, 1))
 
 
@@ -315,7 +315,7 @@ def cloud_distance(
     pairs = [_halves(len(x), length, rng) for _ in range(splits)]
     size = int(pairs[0][0].sum())
     others = [_parts(len(y), length, size, rng) for _ in range(splits)]
-    (left, right), (first, second) = (np.array(rows, dtype=float).transpose(1, 2, 0) for rows in (pairs, others))
+    (left, right), (first, second) = (np.array(rows, float).transpose(1, 2, 0) for rows in (pairs, others))
     to_left, to_right, to_first, to_second = xx @ left, xx @ right, yy @ first, yy @ second
     within, beyond = _mean(left, to_left, left), _mean(first, to_first, first)
     halves = _root(2 * _mean(left, to_right, right) - within - _mean(right, to_right, right))
@@ -328,7 +328,7 @@ def cloud_distance(
 def _mean(part: FloatArray, product: FloatArray, other: FloatArray) -> FloatArray:
     """Mean distance between two parts, for many pairs at once: columns say which points are in, ``product`` is the
     matrix of distances times ``other``."""
-    return np.asarray(np.einsum("ij,ij->j", part, product) / (part.sum(axis=0) * other.sum(axis=0)))
+    return np.einsum("ij,ij->j", part, product) / (part.sum(axis=0) * other.sum(axis=0))
 
 
 def _halves(n: int, block: int, rng: np.random.Generator) -> tuple[BoolArray, BoolArray]:
@@ -336,7 +336,7 @@ def _halves(n: int, block: int, rng: np.random.Generator) -> tuple[BoolArray, Bo
     count = n // (2 * block)
     first = int(rng.integers(0, n - 2 * count * block + 1))
     owner = np.repeat(rng.permutation(np.arange(2 * count) % 2), block)
-    halves = np.zeros((2, n), dtype=bool)
+    halves = np.zeros((2, n), bool)
     halves[owner, np.arange(first, first + len(owner))] = True
     return halves[0], halves[1]
 
@@ -353,7 +353,7 @@ def _parts(n: int, block: int, size: int, rng: np.random.Generator) -> tuple[Boo
 
 
 def _cloud(points: ArrayLike, name: str) -> FloatArray:
-    cloud = np.asarray(points, dtype=float)
+    cloud = np.asarray(points, float)
     cloud = cloud[:, None] if cloud.ndim == 1 else cloud
     if cloud.ndim != 2 or not len(cloud) or not np.isfinite(cloud).all():
         raise ValueError(f"{name} must be a cloud (points, states) of finite numbers, got shape {cloud.shape}")

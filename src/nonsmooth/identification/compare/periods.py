@@ -67,7 +67,7 @@ def measured_period(
     ValueError
         Too few points for any period, or a noise that is not positive.
     """
-    cloud, sigma = np.asarray(points, dtype=float), np.asarray(noise, dtype=float)
+    cloud, sigma = np.asarray(points, float), np.asarray(noise, float)
     if not (np.isfinite(sigma).all() and (sigma > 0).all()):
         raise ValueError(f"noise must be a positive standard error for each state, got {sigma.tolist()}")
     order = 2 if drifting else 1
@@ -94,7 +94,7 @@ def period_numbers(points: ArrayLike, noise: ArrayLike, *, window: int = 24, max
     The points of an orbit drift with the parameter: an even drift within the window is no return's fault.
     Points within half a window of an end have that of the first and last whole window.
     """
-    cloud = np.asarray(points, dtype=float)
+    cloud = np.asarray(points, float)
     if len(cloud) < window:
         raise ValueError(f"{len(cloud)} section points are fewer than one window of {window}")
     count = len(cloud) - window + 1
@@ -123,8 +123,8 @@ def flips(values: ArrayLike, numbers: ArrayLike) -> dict[str, float]:
     it with a delay when the parameter moves); the value given is the one that separates the two numbers with the fewest
     points on the wrong side.
     """
-    order = np.argsort(np.asarray(values, dtype=float), kind="stable")
-    x, n = np.asarray(values, dtype=float)[order], np.asarray(numbers)[order]
+    order = np.argsort(np.asarray(values, float), kind="stable")
+    x, n = np.asarray(values, float)[order], np.asarray(numbers)[order]
     found = {}
     for p in (1, 2):
         is_single, is_double = n == p, n == 2 * p
@@ -317,4 +317,4 @@ def _amplitude(growth: FloatArray, gain: float, first: float) -> FloatArray:
     for i in range(len(growth)):
         found[i] = w
         w = min(max(w * decay[i] + fed[i], 1e-250), 1e250)
-    return np.asarray(found**-0.5)
+    return found**-0.5

@@ -90,7 +90,7 @@ class Motions:
 
     def carried(self, order: Iterable[int]) -> tuple[FloatArray, IntArray]:
         """Section points and period numbers of all systems, the state carried from one to the next, from rest."""
-        rows, periods = np.array([*order], dtype=np.int64), np.zeros(len(self.periods), dtype=np.int64)
+        rows, periods = np.array([*order], np.int64), np.zeros(len(self.periods), np.int64)
         sections = self.engine.kept(len(periods), self.settler.keep).section
         kept, found = self._settled(rows, np.zeros((len(rows), sections.shape[2])), 2)
         periods[rows], good = found.period_number, usable(found.status)
@@ -116,7 +116,7 @@ class Motions:
         """
         found: list[SteadyState] = []
         orbits: list[FloatArray] = []
-        begin = np.atleast_2d(np.asarray(starts, dtype=float))
+        begin = np.atleast_2d(np.asarray(starts, float))
         kept, runs = self._settled(np.full(len(begin), i), begin, 0)
         good = usable(runs.status) & np.isfinite(kept.section).all(axis=(1, 2))
         for points, number in zip(kept.section[good], runs.period_number[good], strict=True):
@@ -210,7 +210,7 @@ def predict(
     assert best is not None  # `attractors` raises where there is none
     _, one, sections = best
     motion = motions.orbit(0, one, one.period_number or SHOWN)
-    numbers = np.array([item.period_number for item in found], dtype=np.int64)
+    numbers = np.array([item.period_number for item in found], np.int64)
     return Prediction(one.period_number, sections, motion, numbers, one)
 
 
@@ -250,9 +250,9 @@ def from_result(model: Model, phases: list[float]) -> Prediction:
 
 def _phase(result: xr.Dataset) -> FloatArray:
     if "phase" in result:
-        return np.asarray(result["phase"].values, dtype=float)
+        return np.asarray(result["phase"].values, float)
     if "omega" in result.coords:
-        return np.asarray(result["time"].values * float(result["omega"]) / (2 * np.pi), dtype=float)
+        return np.asarray(result["time"].values * float(result["omega"]) / (2 * np.pi), float)
     raise ValueError("the phase of the drive is not known: give `phase` (in forcing periods) over time, or omega")
 
 

@@ -109,12 +109,10 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
         pairs = _pairs(seen, expected)
         rows += [(word, jump, expected[pairs[i]] if i in pairs else nothing) for i, jump in enumerate(seen)]
         rows += [(word, nothing, jump) for j, jump in enumerate(expected) if j not in pairs.values()]
-    (m, half), (t, step) = (np.array([row[k][:2] for row in rows], dtype=float).reshape(-1, 2).T for k in (1, 2))
+    (m, half), (t, step) = (np.array([row[k][:2] for row in rows], float).reshape(-1, 2).T for k in (1, 2))
     over = "jump"
     variables: dict[str, Any] = {
-        "jump_direction": labelled(
-            over, np.array([row[0] for row in rows], dtype=str), "direction in which the jump is met"
-        ),
+        "jump_direction": labelled(over, np.array([row[0] for row in rows], str), "direction in which the jump is met"),
         "measured_jump": labelled(over, m, "measured jump (NaN: none was seen)", unit),
         "theory_jump": labelled(over, t, "predicted jump (NaN: none is predicted)", unit),
         "jump_difference": labelled(over, t - m, "predicted minus measured jump", unit),
@@ -122,7 +120,7 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
     }
     if drawn:
         ends = [_interval(jump.value, word, drawn, level) for word, _, jump in rows]
-        for end, column in zip(("low", "high"), np.array(ends, dtype=float).reshape(-1, 2).T, strict=True):
+        for end, column in zip(("low", "high"), np.array(ends, float).reshape(-1, 2).T, strict=True):
             said = f"{end} end of the interval for drawn parameters"
             variables[f"theory_jump_{end}"] = labelled(over, column, said, unit)
     return variables
@@ -276,7 +274,7 @@ def _given(theory: xr.Dataset, name: str, state: str, directions: list[str]) -> 
     if missing := [word for word in directions if word not in words]:
         raise ValueError(f"runs were made {' and '.join(missing)}, the theory has only: {', '.join(words)}")
     chosen = heights.transpose(name, "direction").isel(direction=[words.index(word) for word in directions])
-    return np.asarray(chosen[name].values, dtype=float), np.asarray(chosen.values, dtype=float)
+    return np.asarray(chosen[name].values, float), np.asarray(chosen.values, float)
 
 
 def _jumps(values: FloatArray, curves: FloatArray, directions: list[str]) -> Jumps:

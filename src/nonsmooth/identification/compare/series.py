@@ -35,7 +35,7 @@ def _period_of(motion: xr.Dataset, points: FloatArray, longest: int) -> int:
 
 def _noise(*motions: xr.Dataset) -> FloatArray:
     """The standard error of most samples in each state."""
-    return np.asarray(np.median(np.concatenate([motion["u_error"].values for motion in motions]), axis=0))
+    return np.median(np.concatenate([motion["u_error"].values for motion in motions]), axis=0)
 
 
 def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], *, settle: int = 4) -> xr.Dataset:
@@ -78,18 +78,18 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
         scatter = float(half.std(ddof=1) / np.sqrt(len(half))) if len(half) > 1 else 0.0
         errors.append(float(np.hypot(scatter, sample / np.sqrt(len(half)))))
     omega = np.array([float(motion["omega"]) for motion in motions])
-    words = np.array(directions, dtype=str)
+    words = np.array(directions, str)
     jumps = jumps_of_runs(omega, np.array(heights), np.array(errors), words)
     met = [word for word, found in jumps.items() for _ in found]
-    steps = np.array([one for found in jumps.values() for one in found], dtype=float).reshape(-1, 4).T * _WHOLE
+    steps = np.array([one for found in jumps.values() for one in found], float).reshape(-1, 4).T * _WHOLE
     return xr.Dataset(
         {
             "amplitude": labelled("run", np.array(heights), "half the range of x", "m"),
             "amplitude_error": labelled("run", np.array(errors), "standard error of it", "m"),
             "omega": labelled("run", omega, "frequency of the drive", "rad/s"),
             "direction": labelled("run", words, "how the run was reached"),
-            "period_number": labelled("run", np.array(periods, dtype=np.int64), _NUMBER),
-            "jump_direction": labelled("jump", np.array(met, dtype=str), "how it was met"),
+            "period_number": labelled("run", np.array(periods, np.int64), _NUMBER),
+            "jump_direction": labelled("jump", np.array(met, str), "how it was met"),
             **{
                 f"jump_{name}": labelled("jump", column, *words_of)
                 for (name, words_of), column in zip(_JUMPS.items(), steps, strict=True)
@@ -172,10 +172,10 @@ def measured_sections(
         {
             "section": labelled((parameter, "iterate", "state"), points, "section points"),
             "section_error": ("state", _noise(*motions)),
-            "period_number": labelled(parameter, np.array(numbers, dtype=np.int64), _NUMBER),
+            "period_number": labelled(parameter, np.array(numbers, np.int64), _NUMBER),
         },
         {
-            parameter: labelled(parameter, np.asarray(values, dtype=float)[order], parameter, unit),
+            parameter: labelled(parameter, np.asarray(values, float)[order], parameter, unit),
             "state": first["state"].values,
             "state_unit": ("state", first["state_unit"].values),
         },

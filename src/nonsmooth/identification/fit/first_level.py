@@ -184,7 +184,7 @@ def settle_first(problem: Windows, theta: FloatArray, length: float, start: Floa
     if not now.pieces:
         raise SolveError("the motion of the first guess ends before any window of the record does")
     rng = np.random.default_rng(len(now.pieces))
-    stage, used = Stage(now, theta, now.starts), np.ones(len(now.pieces), dtype=bool)
+    stage, used = Stage(now, theta, now.starts), np.ones(len(now.pieces), bool)
     for _ in range(_ROUNDS):
         noise = np.maximum(problem.noise, _sizes(stage))
         fitted = _soft(stage, noise, used)
@@ -209,7 +209,7 @@ def settle_first(problem: Windows, theta: FloatArray, length: float, start: Floa
 
 def _bad(stage: Stage) -> BoolArray:
     """Mark the windows that fit much worse than most."""
-    return np.asarray(stage.misfits > _FAR * max(float(np.median(stage.misfits)), 1.0))
+    return stage.misfits > _FAR * max(float(np.median(stage.misfits)), 1.0)
 
 
 def settle_soft(stage: Stage) -> Stage:

@@ -75,7 +75,7 @@ def first_windows(
             until = time[-1] if rest < 1.75 * length else time[first] + 1.25 * length
             # at least two samples, across a gap that is longer than a window
             end = max(int(np.searchsorted(time, until, "right")), first + 2)
-            known = np.append(np.isfinite(told[first]), np.zeros(len(memory), dtype=bool))
+            known = np.append(np.isfinite(told[first]), np.zeros(len(memory), bool))
             set_ = np.where(known, np.append(np.nan_to_num(told[first]), memory), z)
             begin = float(time[first]) - early
             for candidate in [z] if first == 0 and start is not None else [set_, z]:  # beyond a stop: as it was going

@@ -120,7 +120,7 @@ def _starts(grown: Grown, found: Sandwich) -> tuple[dict[str, tuple[float, str]]
         starts |= {f"{states[k][0]}(0){label}": (float(grown.starts[i][k]), states[k][1]) for k in window.free}
         rows.append(follows[window.free])
         own.append((inverse @ inverse.T)[np.ix_(window.free, window.free)] * found.reduced)
-    return starts, rows, np.asarray(block_diag(*own))
+    return starts, rows, block_diag(*own)
 
 
 def _noise(grown: Grown, found: Sandwich) -> dict[str, Estimate]:

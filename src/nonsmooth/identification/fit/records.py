@@ -217,7 +217,7 @@ def _of_dataset(one: Any, time: str) -> dict[str, tuple[FloatArray, FloatArray]]
         raise ValueError(f"the Dataset has no coordinate {time!r}; it has {', '.join(map(str, one.coords)) or 'none'}")
     t = np.asarray(one[time].values)
     again = (t[1:] == t[:-1]) & ("segment" in one)  # of a run: both limits of a crossing stand there
-    kept = ~(np.append(again, False) | np.append(False, again)) if len(t) else np.ones(0, dtype=bool)
+    kept = ~(np.append(again, False) | np.append(False, again)) if len(t) else np.ones(0, bool)
     found = {}
     if "u" in one and one["u"].dims == (time, "state"):
         for k, name in enumerate(one["state"].values):

@@ -164,7 +164,7 @@ def _of_samples(system: System, motion: SampledMotion, marks: Mapping[tuple[str,
     """The place of each sample of a motion: the nearest transition, a graze, else its mode."""
     from sympy import lambdify
 
-    found = np.array([marks["mode", int(m)] for m in motion.mode], dtype=np.int64)
+    found = np.array([marks["mode", int(m)] for m in motion.mode], np.int64)
     if len(motion.time) < 2:
         return found
     near = _NEAR * float(np.median(np.diff(motion.time)))

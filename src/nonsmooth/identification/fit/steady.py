@@ -116,7 +116,7 @@ def of_table(system: System, one: Any, name: str) -> xr.Dataset:
     if {column.shape for column in columns.values()} != {(columns[told[0]].size,)}:
         sizes = ", ".join(f"{key} of {column.size}" for key, column in columns.items())
         raise ValueError(f"run {name!r} must hold one number of each kind for every reading; it has {sizes}")
-    words = {"direction": np.asarray(one["direction"], dtype=str)} if "direction" in one else {}
+    words = {"direction": np.asarray(one["direction"], str)} if "direction" in one else {}
     return xr.Dataset({key: ("run", column) for key, column in {**columns, **words}.items()})
 
 
@@ -189,7 +189,7 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
         y,
         error,
         np.where(np.isnan(error), first, error),
-        np.ones(len(y), dtype=bool),
+        np.ones(len(y), bool),
         left,
     )
 
@@ -217,7 +217,7 @@ def predicted(
     if one.amplitude:
         gain, offset = np.abs(gain), 0.0 * offset
     fitted, of = np.full(len(one.measured), np.nan), np.zeros((len(one.measured), (a + 2) * slopes))
-    periodic, good = np.zeros(len(fitted), dtype=bool), usable(found.status)
+    periodic, good = np.zeros(len(fitted), bool), usable(found.status)
     tables: dict[tuple[int, int, int], FloatArray] = {}
     for run, i in enumerate(one.setting):
         mine = np.flatnonzero(one.run == run)
@@ -261,7 +261,7 @@ def _points(settler: Settler, point: FloatArray, found: Any, job: int, wanted: i
     n = len(settler.system.states)
     first = found.last[job][None, :n]
     if not further:
-        return np.asarray(first)
+        return first
     trace = settler.trace(point[None], found.last[job], int(found.mode[job]), 0, further)
     return np.vstack([first, trace.points, np.full((further - len(trace.points), n), np.nan)])
 
@@ -304,7 +304,7 @@ def _slopes(
         if at is None:
             return none
         table = at[0] + at[1][:, :, None] * k[:, None, None] * of_period
-        return np.asarray(np.where((k > 0)[:, None, None], table, of_start))
+        return np.where((k > 0)[:, None, None], table, of_start)
     grid, hits = np.arange(1, _FINE * number + 3) * (period / _FINE), round_.log.crossing_time
     hits = np.concatenate([hits, hits + length])  # a whole cycle lies within the ends of the grid
     full = motion(np.union1d(grid, hits[(hits > 0.0) & (hits < grid[-1])]), False)
@@ -324,7 +324,7 @@ def _slopes(
     turn = rate - rate_behind
     part = np.where(np.abs(turn) > 0, rate / np.where(turn == 0, 1.0, turn), 0.0)
     ends = before + np.clip(part, 0.0, 1.0)[..., None] * (behind - before)
-    return np.asarray(0.5 * (ends[:, 0] - ends[:, 1])[None])
+    return 0.5 * (ends[:, 0] - ends[:, 1])[None]
 
 
 def _extreme(motion: SampledMotion, k: int, sign: float) -> float:

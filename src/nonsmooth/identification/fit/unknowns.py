@@ -118,7 +118,7 @@ def read_unknowns(
     last = [base.count(n) - 1 for n in local]  # of each
     places = np.array(
         [[base.index(n) + min(run, most) for n, most in zip(local, last, strict=True)] for run in range(len(runs))],
-        dtype=np.intp,
+        np.intp,
     )
     guess = np.array([known[name][0] for name in base])
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)

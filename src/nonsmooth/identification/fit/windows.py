@@ -86,7 +86,7 @@ class Window:
         """Sums of rows over the readings of each instant; the rows of the start are left out."""
         k, _ = self.readings
         begins = np.flatnonzero(np.diff(k, prepend=-1))
-        return np.asarray(np.add.reduceat(rows[: len(k)], begins, axis=0))
+        return np.add.reduceat(rows[: len(k)], begins, axis=0)
 
     def correlation(self, r: FloatArray) -> float:
         """Samples that share one independent error: of the quantity for which they are the most."""
@@ -134,7 +134,7 @@ class Windows:
     @cached_property
     def step(self) -> FloatArray:
         """The shortest of these of each quantity."""
-        return np.asarray(self.steps.min(axis=0, initial=np.inf))
+        return self.steps.min(axis=0, initial=np.inf)
 
     def gaps(self, c: int, time: FloatArray) -> FloatArray:
         """Times between readings of a quantity, in its steps."""
@@ -183,7 +183,7 @@ class Windows:
 
     def acts(self, run: int) -> BoolArray:
         """Marks of the active parameters that are not set in a run."""
-        return np.array([name not in self.runs[run].settings for name in self.unknowns.active], dtype=bool)
+        return np.array([name not in self.runs[run].settings for name in self.unknowns.active], bool)
 
     def phase(self, theta: FloatArray, run: int) -> float:
         return float(theta[self.unknowns.places[run][-1]]) if self.unknowns.phases else 0.0
@@ -280,7 +280,7 @@ class Windows:
         """1 for each reading at the upper limit of its sensor, -1 at the lower one, else 0."""
         k, c = window.readings
         at = np.stack([sensor.limit(window.values[:, j]) for j, sensor in enumerate(self.sensors.values())], axis=1)
-        return np.asarray(at[k, c])
+        return at[k, c]
 
     def shown(self, window: Window, predicted: FloatArray) -> FloatArray:
         """Predicted readings as their sensors show them, which end at their limits."""
@@ -375,7 +375,7 @@ class Windows:
         one, run, u = self.steady[i], len(self.records) + i, self.unknowns
         values, table = self.values(theta, run), np.zeros((len(one.measured), len(theta) * slopes))
         if values is None or not np.isfinite(theta).all():
-            return np.full(len(one.measured), np.nan), np.zeros(len(one.measured), dtype=bool), table
+            return np.full(len(one.measured), np.nan), np.zeros(len(one.measured), bool), table
         sensors = self.sensor_values(theta, run)
         own = [sensors.get(q, Sensor()) for q in one.quantities]
         fitted, periodic, of = predicted(one, self.marcher, values, own, slopes)

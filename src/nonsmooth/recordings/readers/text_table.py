@@ -193,7 +193,7 @@ def read_cells(
     if short:
         reading.say(f"{short} rows have fewer fields than the header, first line {first_short}; taken as blank")
     columns = [
-        np.array(stamps, dtype=object) if stamps is not None and column == stamped else np.asarray(v)
+        np.array(stamps, object) if stamps is not None and column == stamped else np.asarray(v)
         for column, v in zip(wanted, values, strict=True)
     ]
     return Cells(columns, [np.asarray(h) for h in held], np.asarray(lines))

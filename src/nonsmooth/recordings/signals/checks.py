@@ -58,7 +58,7 @@ def signal(
         ``missing="error"``), or there are too few of them.
     """
     name = whose(x)
-    t, values = np.asarray(time, np.float64), np.array(x, np.float64)
+    t, values = np.asarray(time, float), np.array(x, float)
     values[np.ma.getmask(x)] = np.nan
     if t.ndim != 1 or t.shape != values.shape:
         raise ValueError(f"{name}: time and values must be arrays of one length, got {t.shape} and {values.shape}")
@@ -164,7 +164,7 @@ def take(
     if array.size < samples:
         raise ValueError(f"{name}: {array.size} samples are too short to identify anything from; {samples} are needed")
     (axis,) = array.dims
-    total, start, longest = missing_runs(np.asarray(array.values, np.float64))
+    total, start, longest = missing_runs(np.asarray(array.values, float))
     if total and missing == "error":
         raise ValueError(
             f"{name}: {total} of {array.size} values are not finite numbers, the longest run of them {longest} from "

@@ -148,7 +148,7 @@ def _kink(t: FloatArray, x: FloatArray, i: int, low: int, high: int, variance: f
 
 def _squares(A: FloatArray, y: FloatArray) -> float:
     """Sum of squares that a fit leaves."""
-    R = np.asarray(np.linalg.qr(np.column_stack([A, y]), mode="r"))
+    R: Any = np.linalg.qr(np.column_stack([A, y]), mode="r")
     return float(R[-1, -1] ** 2)
 
 

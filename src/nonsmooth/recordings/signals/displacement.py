@@ -89,7 +89,7 @@ def found_resolution(x: Any) -> float:
     ValueError
         If all values are the same, or their differences are no multiples of one step.
     """
-    values = np.asarray(x, np.float64)
+    values = np.asarray(x, float)
     distinct = np.unique(values[np.isfinite(values)])
     spacing = np.diff(distinct)
     if len(distinct):

@@ -76,7 +76,7 @@ class HarmonicFit:
 
     def evaluate(self, time: ArrayLike) -> FloatArray:
         """The fitted signal at these times."""
-        t = np.asarray(time, np.float64)
+        t = np.asarray(time, float)
         j = np.arange(1, len(self.amplitudes) + 1)
         angle = np.multiply.outer(t, j * self.omega / self.subharmonic) - self.phases
         return np.asarray(self.mean + np.cos(angle) @ self.amplitudes)
@@ -178,12 +178,12 @@ def _fitted(tau: FloatArray, values: FloatArray, omega: float, n: int) -> tuple[
     A = np.ones((len(tau), 2 * n + 1))
     A[:, 1::2], A[:, 2::2] = np.cos(angle), np.sin(angle)
     p, *_ = np.linalg.lstsq(A, values, rcond=None)
-    return A, np.asarray(p, np.float64), values - A @ p
+    return A, np.asarray(p, float), values - A @ p
 
 
 def _slope(tau: FloatArray, A: FloatArray, p: FloatArray) -> FloatArray:
     """Derivative of the fitted signal in the frequency."""
-    return np.asarray(tau * ((A[:, 1::2] * p[2::2] - A[:, 2::2] * p[1::2]) @ np.arange(1, len(p) // 2 + 1)))
+    return tau * ((A[:, 1::2] * p[2::2] - A[:, 2::2] * p[1::2]) @ np.arange(1, len(p) // 2 + 1))
 
 
 def _best(tau: FloatArray, values: FloatArray, omega: float, n: int, length: float) -> float:

@@ -54,7 +54,7 @@ class DrivePhase:
 
     def phase(self, time: ArrayLike) -> FloatArray:
         """Unwrapped phase in rad, 0 at ``t_0``; straight between turns, and with the mean frequency beyond them."""
-        return _straight(np.asarray(time, np.float64), self.turn_times, TURN * self.turns, self.omega)
+        return _straight(np.asarray(time, float), self.turn_times, TURN * self.turns, self.omega)
 
     @property
     def coarser(self) -> DrivePhase:
@@ -78,7 +78,7 @@ class DrivePhase:
         low, high = self.span
         first, last = self.phase(np.array([low, high])) / TURN - phase
         wanted = np.arange(math.ceil(first - 1e-12), math.floor(last + 1e-12) + 1) + phase
-        return np.asarray(np.clip(_straight(wanted, self.turns, self.turn_times, self.period), low, high))
+        return np.clip(_straight(wanted, self.turns, self.turn_times, self.period), low, high)
 
 
 def _straight(at: FloatArray, x: Any, y: Any, slope: float) -> FloatArray:
@@ -158,10 +158,10 @@ def drive_phase(
 
 
 def _by_gate(time: Any, resolution: float, span: tuple[float, float] | None) -> DrivePhase:
-    times = np.asarray(time, np.float64)
+    times = np.asarray(time, float)
     # A channel over its own axis: its times are what counts.
     if hasattr(time, "dims") and time.ndim == 1 and "time" in time.coords:
-        times = np.asarray(time["time"], np.float64)
+        times = np.asarray(time["time"], float)
     if times.ndim != 1 or len(times) < 3:
         raise ValueError(f"{whose(time)}: {times.size} turns are too few for a frequency; at least 3 are needed")
     if not np.isfinite(times).all() or (np.diff(times) <= 0).any():

@@ -33,7 +33,7 @@ _COLUMNS = {
 def cube(half_width: float = 1.0) -> FloatArray:
     """The eight corners of a cube about its centre, shape (8, 3)."""
     signs = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0], indexing="ij"))
-    return np.asarray(half_width * signs.reshape(3, -1).T)
+    return half_width * signs.reshape(3, -1).T
 
 
 def corner_heights(position: ArrayLike, orientation: ArrayLike, corners: ArrayLike) -> FloatArray:
@@ -57,8 +57,8 @@ def corner_heights(position: ArrayLike, orientation: ArrayLike, corners: ArrayLi
     ValueError
         If a quaternion is not of length 1 within 1 %: their order may be another, or they are no quaternions.
     """
-    place, turned = np.asarray(position, np.float64), _turns(orientation).as_matrix()
-    return np.asarray(place[:, 2, None] + turned[:, 2, :] @ np.asarray(corners, np.float64).T)
+    place, turned = np.asarray(position, float), _turns(orientation).as_matrix()
+    return np.asarray(place[:, 2, None] + turned[:, 2, :] @ np.asarray(corners, float).T)
 
 
 def corner_restitution(
@@ -104,8 +104,8 @@ def corner_restitution(
     ValueError
         If shapes do not agree or values are missing.
     """
-    t = np.asarray(time, np.float64)
-    place, points = np.asarray(position, np.float64), np.asarray(corners, np.float64)
+    t = np.asarray(time, float)
+    place, points = np.asarray(position, float), np.asarray(corners, float)
     if place.shape != (len(t), 3) or np.shape(orientation) != (len(t), 4) or points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(
             f"{whose(position)}: needs time (N,), position (N, 3), orientation (N, 4) and corners (V, 3); got "
@@ -183,12 +183,12 @@ class _Flight:
         from scipy.spatial.transform import Rotation
 
         turn = Rotation.from_rotvec(self.spin * (when - self.origin)) * self.middle
-        return np.asarray(turn.apply(points))
+        return turn.apply(points)
 
     def heights(self, when: float, points: FloatArray) -> FloatArray:
         """Heights of the corners, extrapolated."""
         s = when - self.origin
-        return np.asarray(self.z + self.v * s + 0.5 * self.fall * s * s + self._arms(when, points)[:, 2])
+        return self.z + self.v * s + 0.5 * self.fall * s * s + self._arms(when, points)[:, 2]
 
     def velocity(self, when: float, point: FloatArray) -> tuple[float, float]:
         """Vertical velocity of a corner and its error."""
@@ -201,7 +201,7 @@ class _Flight:
 def _turns(orientation: ArrayLike) -> Any:
     from scipy.spatial.transform import Rotation
 
-    q = np.asarray(orientation, np.float64)
+    q = np.asarray(orientation, float)
     length = np.linalg.norm(q, axis=-1)
     if not np.all(np.abs(length - 1.0) < 0.01):
         raise ValueError(

@@ -135,7 +135,7 @@ class _Between:
         self.t, position = signal(time, x, least=4, purpose="section points")
         columns: list[FloatArray] = [position]
         for name, given in (("v", v), ("a", a), ("x_error", x_error), ("v_error", v_error)):
-            column = np.full(len(self.t), np.nan) if given is None else np.asarray(given, np.float64)
+            column = np.full(len(self.t), np.nan) if given is None else np.asarray(given, float)
             if column.shape != self.t.shape:
                 raise ValueError(f"{whose(x)}: {name} must have one value per time, got shape {column.shape}")
             if given is not None and not np.isfinite(column).all():
@@ -144,7 +144,7 @@ class _Between:
         self.states = np.column_stack(columns[:2])
         self.errors = np.column_stack(columns[3:])
         self.unit = unit_of(x)
-        hits = np.unique(np.asarray(impacts, np.float64).ravel())
+        hits = np.unique(np.asarray(impacts, float).ravel())
         self.polynomial = _polynomial(self.t, columns[0], columns[1], None if a is None else columns[2], hits)
 
     def at(self, times: FloatArray, derivative: int = 0) -> FloatArray:
@@ -159,7 +159,7 @@ class _Between:
             middle = low + 0.5 * (high - low)
             inside = (middle > low) & (middle < high)
             if not inside.any():
-                return np.asarray(high)
+                return high
             value = self.at(middle)[:, which] - level
             behind = inside & (np.where(before, -value, value) > 0)
             low, high = np.where(behind, middle, low), np.where(inside & ~behind, middle, high)

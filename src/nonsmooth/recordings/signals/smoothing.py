@@ -103,7 +103,7 @@ def smooth(
 
 
 def _places(t: FloatArray, places: ArrayLike, x: Any) -> FloatArray:
-    found = np.unique(np.asarray(places, np.float64).ravel())
+    found = np.unique(np.asarray(places, float).ravel())
     if len(found) and not (t[0] < found[0] and found[-1] < t[-1]):
         raise ValueError(
             f"{whose(x)}: impacts must lie inside the record, {t[0]:.9g} to {t[-1]:.9g} s; "
@@ -115,7 +115,7 @@ def _places(t: FloatArray, places: ArrayLike, x: Any) -> FloatArray:
 def _bounds(contacts: Any, x: Any) -> FloatArray:
     """Begin and end of each contact in turn."""
     pair = (contacts["begin"], contacts["end"]) if hasattr(contacts, "data_vars") else (contacts or ((), ()))
-    begin, end = (np.asarray(side, np.float64) for side in pair)
+    begin, end = (np.asarray(side, float) for side in pair)
     if begin.ndim != 1 or begin.shape != end.shape or not (begin < end).all() or not (end[:-1] <= begin[1:]).all():
         raise ValueError(f"{whose(x)}: contacts must be a begin and an end each, begin before end, one after the other")
     return np.column_stack([begin, end]).ravel()
@@ -175,7 +175,7 @@ class _Nodes:
         return np.array(wide)
 
     def scaled(self, intensity: float | tuple[float, float]) -> FloatArray:
-        given = np.atleast_1d(np.asarray(intensity, np.float64))
+        given = np.atleast_1d(np.asarray(intensity, float))
         if len(given) not in (1, 2) or not np.isfinite(given).all() or (given < 0).any():
             raise ValueError(f"intensity must be a number >= 0, or (outside, inside) of contacts, got {intensity!r}")
         return given[[0, -1]] * self.h ** (2 * self.order - 1) / self.sigma**2
@@ -235,7 +235,7 @@ class _Nodes:
                 "the intensities of the motion outside and inside of contacts were not found in 400 evaluations; give "
                 "intensity=(outside, inside)"
             )
-        return np.asarray(10.0 ** np.clip(both.x, low, high))
+        return 10.0 ** np.clip(both.x, low, high)
 
     def result(self, q: FloatArray, model: str, x: Any) -> xr.Dataset:
         """Filter, smooth, and label."""
@@ -356,7 +356,7 @@ def savitzky_golay(
         raise ValueError(f"{whose(x)}: resolution must be a positive length, got {resolution!r}")
     t, values = signal(time, x, least=window, purpose="Savitzky-Golay smoothing")
     step = 1.0 / even_rate(t, x, "Savitzky-Golay smoothing")
-    hits = np.unique(np.asarray(impacts, np.float64).ravel())
+    hits = np.unique(np.asarray(impacts, float).ravel())
     segment = np.searchsorted(hits, t, side="left")
     states, errors = np.empty((3, len(t))), np.empty((3, len(t)))
     attrs: dict[str, Any] = {"method": "Savitzky-Golay", "window": window, "order": order}

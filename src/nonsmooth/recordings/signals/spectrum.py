@@ -105,7 +105,7 @@ def spectrum(
     if rate is None:
         if not hasattr(x, "dims") or x.ndim != 1 or x.dims[0] not in x.coords:
             raise ValueError("rate is needed: the sample rate in Hz, or a DataArray with its time")
-        times = np.asarray(x[x.dims[0]], np.float64)
+        times = np.asarray(x[x.dims[0]], float)
     elif not (math.isfinite(rate) and rate > 0):
         raise ValueError(f"rate must be a positive number of samples per second, got {rate!r}")
     else:
@@ -217,7 +217,7 @@ def correlation_times(residuals: ArrayLike) -> float:
 
     The sum stops at the first lag that is not positive (Geyer's initial sequence, Statist. Sci. 7 (1992) 473).
     """
-    r = np.asarray(residuals, dtype=np.float64)
+    r = np.asarray(residuals, float)
     r = r - r.mean()
     n = len(r)
     if n < 4 or not r.any():
@@ -247,7 +247,7 @@ class _Shape:
 
         length = self.n * self.padding * FINE
         lines = fft.rfft(weights, length)
-        return np.asarray((lines * np.exp(1j * np.pi * (self.n - 1) * np.arange(len(lines)) / length)).real)
+        return (lines * np.exp(1j * np.pi * (self.n - 1) * np.arange(len(lines)) / length)).real
 
     @cached_property
     def _all(self) -> FloatArray:
@@ -262,7 +262,7 @@ class _Shape:
 
     def at(self, offset: ArrayLike) -> FloatArray:
         """Value at these distances from the peak, up to 3 spacings."""
-        return np.asarray(self._near(np.abs(offset)))
+        return self._near(np.abs(offset))
 
     def image(self, place: float) -> float:
         """Largest modulus within an independent line of the mirror image, 2 ``place`` spacings away."""

@@ -98,7 +98,7 @@ def other_motions(many: xr.Dataset, swept: xr.Dataset) -> xr.DataArray:
     found = many["section"].transpose(parameter, "start", "iterate", "state").values
     scale = np.nanmax(known, axis=(0, 1)) - np.nanmin(known, axis=(0, 1))
     nearest = np.abs(swept[parameter].values[None, :] - many[parameter].values[:, None]).argmin(axis=1)
-    far = np.zeros(found.shape[:2], dtype=bool)
+    far = np.zeros(found.shape[:2], bool)
     for i, at in enumerate(nearest):
         there = known[at][np.isfinite(known[at]).all(axis=1)] / scale
         distance = np.linalg.norm(found[i][:, :, None] / scale - there, axis=-1).min(axis=-1)

@@ -87,7 +87,7 @@ def runs_of(found: Motions, parameter: str) -> xr.Dataset:
             "setting": ("run", nominal, {"long_name": f"{parameter} that was meant"}),
             "value": ("run", values, {"long_name": f"{parameter} as measured"}),
             "period_number": ("run", sections["period_number"].values),
-            "contact": ("run", np.array(touches, dtype=np.int8)),
+            "contact": ("run", np.array(touches, np.int8)),
         },
         {"run": keys},
     )

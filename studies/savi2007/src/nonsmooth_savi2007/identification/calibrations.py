@@ -135,7 +135,7 @@ def crank_force(runs: Sequence[Run], *, gain_limit: float = 0.01, k: Estimate | 
     _enough(length, "crank lengths")
     force, error = np.zeros(len(runs)), np.zeros(len(runs))
     for i, run in enumerate(runs):
-        fitted = harmonics_of(run, np.asarray(run.force["time"].values, dtype=np.float64), run.force)[0]
+        fitted = harmonics_of(run, np.asarray(run.force["time"].values, float), run.force)[0]
         force[i], error[i] = float(fitted.amplitudes[0]), float(fitted.amplitude_errors[0])
     line, scatter = scattered_line(length, force, error)
     type_a, half = float(np.sqrt(line.covariance[0, 0])), gain_limit * line.slope

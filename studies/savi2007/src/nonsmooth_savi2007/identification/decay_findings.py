@@ -328,7 +328,7 @@ def support_damping(runs: Sequence[Run], *, resolution: float, test_mass: Quanti
                 "peak_height": height,
                 "log_height": np.log(height),
                 "log_height_error": error / height,
-                "used": np.ones(len(t), dtype=np.int8),
+                "used": np.ones(len(t), np.int8),
             },
         },
         intercept=intercept,

@@ -55,13 +55,13 @@ class Run:
     @property
     def time(self) -> FloatArray:
         """Times of the position (s)."""
-        times: FloatArray = np.asarray(self.x["time"].values, dtype=np.float64)
+        times: FloatArray = np.asarray(self.x["time"].values, float)
         return times
 
     @property
     def positions(self) -> FloatArray:
         """Position (m), as counted."""
-        values: FloatArray = np.asarray(self.x.values, dtype=np.float64)
+        values: FloatArray = np.asarray(self.x.values, float)
         return values
 
     @property
@@ -205,6 +205,6 @@ def _run(
         found["force"] = take(recording, "Force", name, units=("N",))
     if has("Turn"):
         passages = take(recording, "Turn", name, samples=_PASSAGES)
-        found["turns"] = np.asarray(passages["time"].values, dtype=np.float64)
-        found["backwards"] = bool(np.all(np.diff(np.asarray(passages.values, dtype=np.float64)) < 0))
+        found["turns"] = np.asarray(passages["time"].values, float)
+        found["backwards"] = bool(np.all(np.diff(np.asarray(passages.values, float)) < 0))
     return Run(procedure, name, dict(settings), synthetic=recording.synthetic, **found)

@@ -109,7 +109,7 @@ class DecayFit:
     def fitted(self, which: int) -> FloatArray:
         """Fitted positions of one of the runs (m), in the sensor's count."""
         data = self.fit.residuals
-        return np.asarray(data["fitted"].values[data["run"].values == which], dtype=np.float64)
+        return np.asarray(data["fitted"].values[data["run"].values == which], float)
 
     def begins(self, which: int) -> tuple[float, float]:
         """Position from rest (m) and velocity (m/s) of one of the runs at its first sample."""

@@ -154,4 +154,4 @@ def _scatter(part: Steady) -> FloatArray:
 
     rng = np.random.default_rng(0)
     drawn = np.array([again(rng.integers(0, len(part), size=len(part))) for _ in range(_DRAWS)])
-    return np.asarray(np.nanstd(drawn, axis=0, ddof=1))
+    return np.nanstd(drawn, axis=0, ddof=1)

@@ -135,7 +135,7 @@ def mean_shift(
         for _ in range(3):  # the scatter of the means from what the fit leaves of them
             normal = matrix.T @ matrix / spread**2 + np.diag(known)
             found = np.linalg.solve(normal, matrix.T @ y / spread**2 + known * [zero, alpha, 0.0])
-            covariance: FloatArray = np.asarray(np.linalg.inv(normal), dtype=np.float64)
+            covariance: FloatArray = np.asarray(np.linalg.inv(normal), float)
             left = y - matrix @ found
             spread = max(float(np.sqrt(left @ left / max(len(y) - 2, 1))), 1e-6)
         rest, curved, straight = found.tolist()
@@ -205,7 +205,7 @@ def counted_gap(contacts: ContactFit, reading: float) -> CountedGap | None:
     index = [j for j, keep in zip(index, apart.used, strict=True) if keep]
     block = contacts.covariance[np.ix_(index, index)]
     solved = np.linalg.solve(block, np.ones(len(index)))
-    weight: FloatArray = np.asarray(solved / solved.sum(), dtype=np.float64)
+    weight: FloatArray = np.asarray(solved / solved.sum(), float)
     counted = float(weight @ contacts.values[index])
     off = contacts.values[index] - counted
     chi2 = float(off @ np.linalg.solve(block, off))
@@ -371,4 +371,4 @@ def _cross(adjusted: Adjusted, labels: tuple[str, ...], shared: FloatArray) -> F
     columns = [adjusted.labels.index(label) for label in labels if label in adjusted.labels]
     if len(columns) != len(labels):
         return np.zeros(len(adjusted.names))
-    return np.asarray(adjusted.influence[:, columns] @ shared)
+    return adjusted.influence[:, columns] @ shared

@@ -75,7 +75,7 @@ class Steady:
 
     def only(self, chosen: Any) -> Steady:
         """The rows that are chosen (a mask or indices)."""
-        rows = np.flatnonzero(chosen) if np.asarray(chosen).dtype == bool else np.asarray(chosen, dtype=int)
+        rows = np.flatnonzero(chosen) if np.asarray(chosen).dtype == bool else np.asarray(chosen, int)
         return Steady(tuple(self.runs[i] for i in rows), *(getattr(self, one.name)[rows] for one in fields(self)[1:]))
 
 

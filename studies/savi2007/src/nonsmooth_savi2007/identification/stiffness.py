@@ -141,16 +141,16 @@ def _linear_law(
 
 
 def _columns(run: Run, resolution: float, mass: float, friction: bool) -> tuple[FloatArray, FloatArray]:
-    time, force_time = run.time, np.asarray(run.force["time"].values, dtype=np.float64)
+    time, force_time = run.time, np.asarray(run.force["time"].values, float)
     if len(time) != len(force_time) or np.max(np.abs(time - force_time)) > 1e-6:
         raise ValueError(
             f"{run.label}: channels 'Angle' and 'Force' are not over the same times; record both at one rate"
         )
     smooth = savitzky_golay(time, run.x, resolution=resolution, window=_WINDOW, order=_ORDER)
     v, a = smooth["v"].values, smooth["a"].values
-    force = np.asarray(run.force.values, dtype=np.float64) - mass * a
+    force = np.asarray(run.force.values, float) - mass * a
     parts = [run.positions, v]
-    inside = np.ones(len(time), dtype=bool)
+    inside = np.ones(len(time), bool)
     if friction:
         parts.append(np.sign(v))
         # where the hand turns, the direction is not known

@@ -172,4 +172,4 @@ def _slip(rig: VirtualRig, since: FloatArray, states: FloatArray) -> FloatArray:
     rng = np.random.default_rng([rig.seed, 5])
     begin = float(rng.uniform(0.5, 2.5))
     missed = float(rng.uniform(0.03, 0.3)) * float(np.max(np.abs(states[0]))) * float(rng.choice([-1.0, 1.0]))
-    return np.asarray(missed * np.clip((since - begin) / 0.05, 0.0, 1.0))
+    return missed * np.clip((since - begin) / 0.05, 0.0, 1.0)
