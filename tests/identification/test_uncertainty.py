@@ -68,7 +68,7 @@ def test_parameters_known_mainly_together_keep_the_uncertainty_of_white_residual
         state = Residuals([r], [table], [np.zeros((n, 1))])
         problem = SimpleNamespace(
             pieces=[piece],
-            derivatives=lambda theta, starts, now=state: now,
+            residuals=lambda theta, starts, slopes, now=state: now,
             weights=lambda state: [np.ones(n)],
             unknowns=SimpleNamespace(precision=np.zeros((2, 2))),
         )
@@ -82,14 +82,14 @@ def test_a_fit_whose_minimum_no_step_reaches_is_refused():
     """Derivatives of the wrong sign: the minimum at 1 seems a hundred standard uncertainties away, the other way."""
     piece = SimpleNamespace(which=np.arange(1), n_free=0)
 
-    def state(theta, starts):
+    def state(theta, starts, slopes=False):
         return Residuals([np.full(4, theta[0] - 1.0)], [np.ones((4, 1))], [np.zeros((4, 1))])
 
     unknowns = SimpleNamespace(
         low=np.array([-np.inf]), high=np.array([np.inf]), centre=np.zeros(1), precision=np.zeros((1, 1))
     )
     problem = SimpleNamespace(
-        pieces=[piece], unknowns=unknowns, residuals=state, derivatives=state, weights=lambda state: [np.full(4, 50.0)]
+        pieces=[piece], unknowns=unknowns, residuals=state, weights=lambda state: [np.full(4, 50.0)]
     )
     with pytest.raises(Unsettled, match="no step lowers the sum of squares") as refused:
         settle(problem, np.zeros(1), np.zeros((1, 1)))

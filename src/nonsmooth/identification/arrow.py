@@ -85,8 +85,7 @@ def reduced(
         table[: len(r)] = np.column_stack([s / size, g, r])
         table[range(len(r), len(r) + n), range(n)] = np.sqrt(_RIDGE**2 + damping)
         factor: Any = np.linalg.qr(table, mode="r")
-        inverse = np.linalg.inv(factor[:n, :n]) / size[:, None]
-        back.append((inverse, factor[:n, n : n + m], factor[:n, n + m]))
+        back.append((np.linalg.inv(factor[:n, :n]) / size[:, None], factor[:n, n : n + m], factor[:n, n + m]))
         if used is None or used[i]:
             left, rest = factor[n:, n : n + m], factor[n:, n + m]
             left[:, np.linalg.norm(left, axis=0) < _TOLD * np.linalg.norm(g, axis=0)] = 0.0
@@ -102,8 +101,7 @@ def inverted(matrix: FloatArray, damping: float = 0.0) -> tuple[FloatArray, Floa
     """
     scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     scale[scale == 0.0] = 1.0  # what nothing depends on is a direction of its own
-    shrunk = matrix / np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(shrunk)
+    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
     known = values > _LEAST
     inverse = (vectors[:, known] / (values[known] + damping)) @ vectors[:, known].T / np.outer(scale, scale)
     return inverse, vectors[:, ~known]
@@ -135,7 +133,7 @@ def settle(
     """
     u, damping, iterations = problem.unknowns, 1e-4, 30 if rough else 50
     prior = u.precision if known is None else known
-    state = problem.derivatives(theta, starts)
+    state = problem.residuals(theta, starts, True)
     weights = problem.weights(state)
 
     def cost(now: Residuals, at: FloatArray) -> float:
@@ -193,7 +191,7 @@ def settle(
                     "uncertainties away; look at the records for jumps"
                 )
         theta, starts, gain, best = theta + step, moved, best - found, found
-        state = problem.derivatives(theta, starts)
+        state = problem.residuals(theta, starts, True)
         # by the undamped step: a damped one is short wherever it is taken
         distance, rest = undamped()
         far = float(np.max(distance))
@@ -222,7 +220,7 @@ class Sandwich(NamedTuple):
 def sandwich(problem: Windows, theta: FloatArray, starts: FloatArray) -> Sandwich:
     """Covariance of the parameters at the best fit, never smaller along any than that of white residuals."""
     p, prior = len(theta), problem.unknowns.precision
-    state = problem.derivatives(theta, starts)
+    state = problem.residuals(theta, starts, True)
     weights = problem.weights(state)
     normal, _, back = reduced(problem, state, weights, p)
     J, tau, rows = state.of_alone.reshape(-1, p), [1.0] * (not problem.pieces), len(state.alone)

@@ -135,12 +135,11 @@ def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = Non
     scale = np.linalg.norm(j, axis=0)
     scale[scale == 0] = 1.0
     inverse = np.linalg.pinv((j / scale).T @ (j / scale))
-    white = inverse * float(r @ r) / max(n - p, 1)
+    white = inverse * (r @ r) / max(n - p, 1)
     meat, ends = np.zeros((p, p)), np.cumsum(lengths)[:-1]
     for left, score in zip(np.split(r, ends), np.split(j / scale * r[:, None], ends), strict=True):
         meat += newey_west(score, correlation_times(left))
-    found = not_below(inverse @ meat @ inverse * n / max(n - p, 1), white)
-    return found / np.outer(scale, scale)
+    return not_below(inverse @ meat @ inverse * n / max(n - p, 1), white) / np.outer(scale, scale)
 
 
 @dataclass(frozen=True)

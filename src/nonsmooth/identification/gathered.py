@@ -49,7 +49,7 @@ class Gathered:
     def add(self, result: xr.Dataset) -> None:
         """Keep what a draw gave."""
         same = [name for name in self.plain if name in result and result[name].shape == self.centre[name].shape]
-        row: dict[str, Any] = {name: result[name].values for name in same}
+        row = {name: result[name].values for name in same}
         if self.along:
             row |= _along_sheets(self.centre, result, self.branch, self.along)
         row |= {dim: matched(self.centre, result, dim) for dim in self.lists}
@@ -116,7 +116,7 @@ class Gathered:
             warnings.simplefilter("ignore", RuntimeWarning)  # no draw has a value here
             bands = np.nanquantile(stack, edges, axis=0)
         attrs = {key: value for key, value in array.attrs.items() if isinstance(value, str)}
-        found: dict[str, Any] = {f"{name}_quantiles": (("quantile", *array.dims), bands, attrs)}
+        found = {f"{name}_quantiles": (("quantile", *array.dims), bands, attrs)}
         share = np.isfinite(stack).sum(axis=0) / len(self.rows)
         if (share < 1).any():
             found[f"{name}_share"] = labelled(array.dims, share, f"share of draws that have {name} here")

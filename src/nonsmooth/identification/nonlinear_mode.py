@@ -156,7 +156,7 @@ def interpolation(knots: FloatArray, amplitude: ArrayLike, derivative: int = 0) 
     from scipy.interpolate import CubicSpline
 
     at = np.asarray(amplitude, float)
-    a: Any = np.clip(at, knots[0], knots[-1])
+    a = np.clip(at, knots[0], knots[-1])
     if len(knots) == 1:
         return np.full((*at.shape, 1), float(derivative == 0))
     found = CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")(a, derivative)
@@ -258,10 +258,10 @@ class ResponseFit:
             inverse = np.linalg.pinv(normal, hermitian=True)
             left = self._left(p)
             # Unknowns that the measurement determined: all but what the prior of the shifts did.
-            freedom = max(rows - (count - float(prior @ np.diag(inverse))), 1.0)
+            freedom = max(rows - (count - (prior @ np.diag(inverse))), 1.0)
             before, moved = (sigma, *spread), 0.0
             # Points of a curve that err alike count less.
-            sigma = max(float(np.sqrt(left @ left / freedom * self._alike(left))), 1e-9)
+            sigma = max(np.sqrt(left @ left / freedom * self._alike(left)), 1e-9)
             if self.shifts:
                 own, own_error = p[shift].reshape(2, n), np.diag(inverse)[shift].reshape(2, n)
                 spread = np.sqrt(np.maximum(np.mean(own**2 + own_error, axis=1), 1e-18))
@@ -294,7 +294,7 @@ class ResponseFit:
         lowest, *_ = tops = sorted(tops, key=lambda i: size[i])
         w, h = (v[self.curve == self.curve[lowest]] for v in (self.omega, gain))
         step = float(np.median(np.abs(np.diff(w)))) if len(w) > 1 else 0.01 * w[0]
-        D = max(float(np.ptp(w[h > h.max() / np.sqrt(2.0)])), step)
+        D = max(np.ptp(w[h > h.max() / np.sqrt(2.0)]), step)
         at_top = D * self.omega[lowest]  # displacement times this is force by mass there
         self.unit = 1.0 / float(np.median(1.0 / gain)) if self.residual else 1.0
         p = np.zeros(count)
@@ -310,7 +310,7 @@ class ResponseFit:
         """Number of neighbouring points of a curve that say as much as one."""
         rows, same = left.reshape(-1, len(self.curve)), np.diff(self.curve) == 0
         power = float(left @ left)
-        rho = min(max(float(np.sum((rows[:, 1:] * rows[:, :-1])[:, same])) / power, 0.0), 0.9) if power > 0 else 0.0
+        rho = min(max(np.sum((rows[:, 1:] * rows[:, :-1])[:, same]) / power, 0.0), 0.9) if power > 0 else 0.0
         return (1 + rho) / (1 - rho)
 
     def slopes(self) -> FloatArray:
@@ -325,7 +325,7 @@ class ResponseFit:
         rows = []
         for c, mode in enumerate(self.modes):
             a, w = self.amplitude[self.curve == c], self.omega[self.curve == c]
-            place = a[int(np.argmin(np.abs(np.log(self.mode.square(a) / w**2))))]
+            place = a[np.argmin(np.abs(np.log(self.mode.square(a) / w**2)))]
             rows.append((mode.natural_frequency(place), mode.damping_ratio(place), place))
         frequency, ratio, place = np.array(rows, float).T
         return frequency, ratio, place

@@ -125,7 +125,9 @@ def propagate(
     >>> bool(np.allclose(amplitude, np.quantile(band["drawn_F"], [0.025, 0.5, 0.975]) / np.hypot(3.0, 0.2)))
     True
     """
-    call, edges = _Call(verb, start, args, options), _probabilities(quantiles)
+    call, edges = _Call(verb, start, args, options), [real_number(q, "quantiles") for q in quantiles]
+    if not edges or sorted(set(edges)) != edges or not 0 < edges[0] <= edges[-1] < 1:
+        raise ValueError(f"quantiles = {shortened(quantiles)}: probabilities that rise, between 0 and 1")
     if draws < 2 and not first_order:
         raise ValueError(f"draws = {draws}: a band takes two and more, and some 200 to show its edges")
     known = read_settings(settings, call.system)
@@ -148,13 +150,6 @@ def propagate(
     if systems and len(gathered.failures) == len(systems):
         raise SolveError(f"the verb failed for all {draws} draws: {gathered.failures[0]}", status="no_convergence")
     return gathered.banded(edges, linear_part, drawn, base, seed)
-
-
-def _probabilities(quantiles: Sequence[float]) -> list[float]:
-    edges = [real_number(q, "quantiles") for q in quantiles]
-    if not edges or sorted(set(edges)) != edges or not 0 < edges[0] <= edges[-1] < 1:
-        raise ValueError(f"quantiles = {shortened(quantiles)}: probabilities that rise, between 0 and 1")
-    return edges
 
 
 class _Call:

@@ -152,7 +152,9 @@ class Recording(Answering):
         """
         import xarray as xr
 
-        nodes: dict[str, xr.Dataset] = {"/": xr.Dataset()}
+        from nonsmooth.results.provenance import options_as_data, package_version
+
+        nodes = {"/": xr.Dataset()}
         for run, sensors in runs.items():
             _check_name("run", run)
             nodes[f"/{run}"] = xr.Dataset(attrs=dict((run_attrs or {}).get(run, {})))
@@ -166,7 +168,15 @@ class Recording(Answering):
                 nodes[f"/{run}/{sensor}"] = dataset
         tree = xr.DataTree.from_dict(nodes)
         record = dict(source or {"file": "", "format": "built in memory"})
-        tree.attrs = {ATTRIBUTE: _as_json(record, warnings, synthetic), "synthetic": "yes" if synthetic else "no"}
+        told = {
+            "version": package_version(),
+            "verb": "load_recording",
+            "source": options_as_data(record),
+            "warnings": list(warnings),
+            "synthetic": synthetic,
+        }
+        text = json.dumps(told, ensure_ascii=False, allow_nan=False)
+        tree.attrs = {ATTRIBUTE: text, "synthetic": "yes" if synthetic else "no"}
         return cls(tree, record, tuple(warnings), synthetic)
 
     @property

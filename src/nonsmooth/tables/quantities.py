@@ -42,7 +42,7 @@ def rows_of(result: xr.Dataset, over: str | None = None) -> tuple[str, ...]:
     if over is not None:
         if over not in result.dims:
             raise ValueError(unknown(over, "a dim", "this result", map(str, result.dims)))
-        return _dims(result, [array for array in result.data_vars.values() if over in array.dims], over)
+        return _dims([array for array in result.data_vars.values() if over in array.dims], over)
     for first in _FIRST:
         if first in result.dims:
             return (first,)
@@ -52,12 +52,12 @@ def rows_of(result: xr.Dataset, over: str | None = None) -> tuple[str, ...]:
     if status or "status" in result or ("period_number" in result and not result["period_number"].dims):
         return status  # none of one orbit or one spectrum: a single row
     for array in result.data_vars.values():
-        if dims := _dims(result, [array]):
+        if dims := _dims([array]):
             return dims
     return tuple(str(dim) for dim in list(result.dims)[:1])
 
 
-def _dims(result: xr.Dataset, arrays: list[xr.DataArray], keep: str = "") -> tuple[str, ...]:
+def _dims(arrays: list[xr.DataArray], keep: str = "") -> tuple[str, ...]:
     """The dims of arrays that are rows, those that belong together first; ``keep`` is one of them in any case."""
     found = [tuple(str(d) for d in array.dims if d == keep or d not in _SPREAD) for array in arrays]
     return max(found, key=lambda dims: -len(dims), default=())

@@ -51,7 +51,7 @@ def compare_diagram(
         sections = whole.reshape(-1, *whole.shape[-3:])
         periods = theory["period_number"].transpose(..., name).values.reshape(-1, len(grid))
     over = (name, "direction", "iterate", "state")
-    variables: dict[str, Any] = {
+    variables = {
         f"measured_{name}": labelled("sample", at, f"measured {name}", unit),
         "measured_section": labelled(("sample", "state"), points, "measured section points"),
         "measured_period_number": labelled("sample", numbers, "measured period number (0: none found)"),
@@ -127,7 +127,7 @@ def _flips(
     m, error, read = np.array([measured.get(word, nothing) for word in words], float).reshape(-1, 3).T
     t = np.array([theory.get(word, np.nan) for word in words], float)
     over = "flip"
-    variables: dict[str, Any] = {
+    variables = {
         "flip": labelled(over, np.array(words, str), "period numbers on the two sides of the flip"),
         "measured_flip": labelled(over, m, "measured flip (NaN: none was seen)", unit),
         "measured_flip_error": labelled(over, error, "standard error of it", unit),

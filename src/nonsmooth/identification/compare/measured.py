@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from nonsmooth.recordings.recording import Recording
     from nonsmooth.system.system import System
 
-ANGLES = ("rad", "deg", "rev")
 LONG = 150.0  # s: of a longer record the support and the smoother's intensity are found in its middle
 PIECE = 75.0  # s
 
@@ -227,7 +226,7 @@ def measured_motion(
     from nonsmooth.recordings.signals.phase import drive_phase
 
     name = run if run is not None else recording.runs[0]
-    turned = take(recording, angle, run, units=ANGLES, samples=64)
+    turned = take(recording, angle, run, samples=64)
     gate = take(recording, turn, run, samples=3)
     turns = gate[gate.dims[0]].values
     x = position(turned, distance_per_turn=distance_per_turn, zero=zero)

@@ -10,6 +10,7 @@ import numpy as np
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.orbits import (
+    FEWEST_BLOCKS,
     cloud_distance,
     common_length,
     energy_distance,
@@ -103,7 +104,7 @@ def _clouds(
 
     size = min(len(points) for points in sections)
     at = "section_phase"
-    variables: dict[str, Any] = {
+    variables = {
         "measured_section": labelled(
             (at, "measured_iterate", "state"), np.stack([p[:size] for p in sections]), "measured section points"
         ),
@@ -112,7 +113,7 @@ def _clouds(
     }
     found = [
         cloud_distance(a / scale, b / scale, splits=model.splits, seed=model.seed)
-        if min(len(a), len(b)) >= 40
+        if min(len(a), len(b)) >= 2 * FEWEST_BLOCKS
         else None
         for a, b in zip(sections, blurred, strict=True)
     ]
@@ -198,8 +199,7 @@ def _begun_with_the_measurement(
         return predicted
     at = np.empty(len(motions.places))
     at[motions.places] = whole[0, 0]
-    begun = SteadyState(0, at)
-    return replace(predicted, orbit=motions.orbit(0, begun, len(whole)))
+    return replace(predicted, orbit=motions.orbit(0, SteadyState(0, at), len(whole)))
 
 
 def _shown(folded: FloatArray) -> FloatArray:
@@ -225,7 +225,7 @@ def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, grid:
         a, b = _shown(folded).reshape(-1, folded.shape[2]), predicted.orbit
     over = ("phase", "state")
     names = ("phase", "phase") if closed else ("measured_phase", "theory_phase")
-    variables: dict[str, Any] = {
+    variables = {
         "measured_orbit": labelled((names[0], "state"), a, "measured motion over the phase of the drive"),
         "theory_orbit": labelled((names[1], "state"), b, "predicted motion over the phase of the drive"),
         "orbit_distance": labelled((), distances[0], "normalised distance of the orbits, phase known"),
@@ -237,8 +237,7 @@ def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, grid:
     if scatter is not None:
         variables["measured_scatter"] = labelled(over, scatter, "standard deviation of one pass")
     for name, values in zip(names, (a, b), strict=True):
-        coordinate = np.arange(len(values)) / grid
-        variables[name] = labelled(name, coordinate, "phase of the drive", "forcing periods")
+        variables[name] = labelled(name, np.arange(len(values)) / grid, "phase of the drive", "forcing periods")
     return variables
 
 
@@ -293,7 +292,7 @@ def motion_band(
             motion = np.roll(motion, orbit_distance(closed[1], motion, length).whole_shift * model.grid, axis=0)
             orbits.append(motion)
             to_measured[i] = orbit_distance(closed[0], motion, length).distance
-    variables: dict[str, Any] = {
+    variables = {
         "draw_period_number": labelled("draw", numbers, "period number for drawn parameters"),
         "draw_energy_distance": labelled(
             ("section_phase", "draw"), distances.T, "energy distance of the section clouds for drawn parameters, scaled"

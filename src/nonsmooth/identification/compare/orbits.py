@@ -85,8 +85,7 @@ def fold(phase: ArrayLike, u: ArrayLike, grid: int) -> FloatArray:
 
 def _cubic(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
     """Lagrange's cubic through the four samples about each place."""
-    first = np.clip(np.searchsorted(x, at, side="right") - 2, 0, max(len(x) - 4, 0))
-    nodes = first[:, None] + np.arange(4)
+    nodes = np.clip(np.searchsorted(x, at, side="right") - 2, 0, max(len(x) - 4, 0))[:, None] + np.arange(4)
     away = at[:, None] - x[nodes]
     apart = x[nodes][:, :, None] - x[nodes][:, None, :]
     apart[:, np.arange(4), np.arange(4)] = 1.0
@@ -109,8 +108,6 @@ def mean_orbit(folded: ArrayLike, period_number: int) -> tuple[FloatArray, Float
     """
     values = np.asarray(folded, float)
     passes = len(values) // period_number
-    if not passes:
-        raise ValueError(f"{len(values)} forcing periods do not hold an orbit of period {period_number}")
     stacked = values[: passes * period_number].reshape(passes, period_number * values.shape[1], values.shape[2])
     stacked = stacked[np.isfinite(stacked).all(axis=(1, 2))]
     if not len(stacked):
@@ -143,21 +140,10 @@ class OrbitDistance:
 
 
 def orbit_distance(a: ArrayLike, b: ArrayLike, periods: int) -> OrbitDistance:
-    """Normalised distance of two orbits, each (periods * grid, states) on equal grids of phase.
-
-    Raises
-    ------
-    ValueError
-        Orbits of different shape, or a number of samples that is no multiple of the periods.
-    """
+    """Normalised distance of two orbits, each (periods * grid, states) on equal grids of phase."""
     from scipy.optimize import minimize_scalar
 
     x, y = np.asarray(a, float), np.asarray(b, float)
-    if x.shape != y.shape or x.ndim != 2 or len(x) % periods:
-        raise ValueError(
-            f"two orbits over {periods} forcing periods must have equal shapes (samples, states), the samples a "
-            f"multiple of the periods; got {x.shape} and {y.shape}"
-        )
     size = np.sqrt(0.5 * (x.var(axis=0) + y.var(axis=0)))
     size = np.where(size > 0, size, 1.0)
     n, states = x.shape
@@ -175,17 +161,16 @@ def orbit_distance(a: ArrayLike, b: ArrayLike, periods: int) -> OrbitDistance:
     grid = np.sqrt(np.maximum(power - 2 * np.fft.fft(cross).real, 0.0) / states)
     whole = grid[:: n // periods]
     best = int(np.argmin(whole))
-    near = int(np.argmin(grid)) / n
+    near = np.argmin(grid) / n
     found = minimize_scalar(distance, bounds=(near - 1 / n, near + 1 / n), method="bounded", options={"xatol": 1e-10})
     lead = float(found.x) if found.fun <= grid.min() else near
     shift = (lead * periods + 0.5) % 1.0 - 0.5
-    return OrbitDistance(float(whole[best]), min(float(found.fun), float(grid.min())), best, shift)
+    return OrbitDistance(float(whole[best]), min(float(found.fun), grid.min()), best, shift)
 
 
 def common_length(orbit: ArrayLike, periods: int, length: int) -> FloatArray:
     """An orbit over ``periods`` repeated to ``length`` forcing periods, a multiple of them."""
-    values = np.asarray(orbit, float)
-    return np.tile(values, (length // periods, 1))
+    return np.tile(orbit, (length // periods, 1))
 
 
 FEWEST_BLOCKS = 20
@@ -263,7 +248,7 @@ def block_length(points: ArrayLike) -> int:
     """
     from scipy.spatial.distance import pdist
 
-    cloud = _cloud(points, "points")
+    cloud = np.asarray(points, float)
     n = len(cloud)
     longest = max(1, n // FEWEST_BLOCKS)
     overall = pdist(cloud[:: max(1, n // 1000)]).mean()
@@ -293,21 +278,10 @@ def cloud_distance(
         Of ``numpy.random.default_rng``.
     block : int, optional
         Points that stay together; :func:`block_length` of ``a`` where not given.
-
-    Raises
-    ------
-    ValueError
-        Fewer than 40 points in a cloud: halves of it say nothing.
     """
     from scipy.spatial.distance import cdist
 
     x, y = _two_clouds(a, b)
-    for name, cloud in (("first", x), ("second", y)):
-        if len(cloud) < 2 * FEWEST_BLOCKS:
-            raise ValueError(
-                f"the {name} cloud has {len(cloud)} points; its halves are compared, which takes at least "
-                f"{2 * FEWEST_BLOCKS}: record longer"
-            )
     x, y = x[-MOST:], y[-MOST:]  # thinning would separate successive points
     length = block_length(x) if block is None else block
     rng = np.random.default_rng(seed)
@@ -352,19 +326,11 @@ def _parts(n: int, block: int, size: int, rng: np.random.Generator) -> tuple[Boo
     return one, two
 
 
-def _cloud(points: ArrayLike, name: str) -> FloatArray:
-    cloud = np.asarray(points, float)
-    cloud = cloud[:, None] if cloud.ndim == 1 else cloud
-    if cloud.ndim != 2 or not len(cloud) or not np.isfinite(cloud).all():
-        raise ValueError(f"{name} must be a cloud (points, states) of finite numbers, got shape {cloud.shape}")
-    return cloud
-
-
-def _two_clouds(a: ArrayLike, b: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    x, y = _cloud(a, "a"), _cloud(b, "b")
-    if x.shape[1] != y.shape[1]:
-        raise ValueError(f"the clouds have {x.shape[1]} and {y.shape[1]} states; compare the same ones")
-    return x, y
+def _two_clouds(a: ArrayLike, b: ArrayLike) -> list[FloatArray]:
+    clouds = [np.asarray(cloud, float).reshape(len(np.asarray(cloud)), -1) for cloud in (a, b)]
+    if not all(np.isfinite(cloud).all() for cloud in clouds):
+        raise ValueError("section points must be finite numbers: compare states that all modes have")
+    return clouds
 
 
 def _root(square: Any) -> Any:

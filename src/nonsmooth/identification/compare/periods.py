@@ -230,8 +230,7 @@ def _splitting(at: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArr
         return at[:0], at[:0]
     parity = np.where(np.arange(len(points) - 2) % 2 == 0, 0.25, -0.25)[:, None]
     parted = parity * (points[2:] - 2 * points[1:-1] + points[:-2])
-    along = np.linalg.svd(parted, full_matrices=False)[2][0]
-    size = parted @ along
+    size = parted @ np.linalg.svd(parted, full_matrices=False)[2][0]
     return at[1:-1], size if size.sum() > 0 else -size
 
 
@@ -279,8 +278,7 @@ def _one_fit(
     )
     if not found.success:  # 200 evaluations and not there
         return None
-    freedom = max(len(size) - len(start), 1)
-    variance = max(float(np.sum((model(found.x) - size) ** 2)) / freedom, 0.375)
+    variance = max(np.sum((model(found.x) - size) ** 2) / max(len(size) - len(start), 1), 0.375)
     try:
         covariance = np.linalg.inv(found.jac.T @ found.jac) * variance * ALIKE
     except np.linalg.LinAlgError:

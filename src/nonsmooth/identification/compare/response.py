@@ -63,7 +63,7 @@ def jumps_in_steps(x: FloatArray, heights: FloatArray, error: FloatArray) -> lis
         least = max(LEAST * max(abs(heights[i : i + 2])), CERTAIN * np.hypot(*error[i : i + 2]))
         if abs(step[i]) <= least or any(abs(step[i] - one) < 0.5 * abs(step[i]) for one in carried):
             continue
-        middle, half = 0.5 * float(x[i] + x[i + 1]), 0.5 * float(abs(x[i + 1] - x[i]))
+        middle, half = 0.5 * (x[i] + x[i + 1]), 0.5 * float(abs(x[i + 1] - x[i]))
         found.append(AmplitudeJump(middle, half, float(heights[i]), float(heights[i + 1])))
     return found
 
@@ -111,7 +111,7 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
         rows += [(word, nothing, jump) for j, jump in enumerate(expected) if j not in pairs.values()]
     (m, half), (t, step) = (np.array([row[k][:2] for row in rows], float).reshape(-1, 2).T for k in (1, 2))
     over = "jump"
-    variables: dict[str, Any] = {
+    variables = {
         "jump_direction": labelled(over, np.array([row[0] for row in rows], str), "direction in which the jump is met"),
         "measured_jump": labelled(over, m, "measured jump (NaN: none was seen)", unit),
         "theory_jump": labelled(over, t, "predicted jump (NaN: none is predicted)", unit),
@@ -182,7 +182,7 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: st
     else:
         values = np.linspace(runs["value"].min(), runs["value"].max(), FINE)
         curves, at_runs = _curves(model.system, model, name, state, values, runs, directions)
-    variables: dict[str, Any] = {
+    variables = {
         f"measured_{name}": labelled("run", runs["value"], f"measured {name}", unit),
         "measured_direction": labelled("run", runs["direction"], "direction in which the run was reached"),
         "measured_amplitude": labelled("run", runs["amplitude"], "measured amplitude"),
@@ -283,7 +283,7 @@ def _jumps(values: FloatArray, curves: FloatArray, directions: list[str]) -> Jum
     for d, word in enumerate(directions):
         x, heights = (values, curves[:, d]) if word == "up" else (values[::-1], curves[::-1, d])
         steps = [(x[i : i + 2], heights[i : i + 2].tolist()) for i in jumps_in(heights)]
-        found[word] = [AmplitudeJump(float(at.mean()), 0.5 * float(np.ptp(at)), *both) for at, both in steps]
+        found[word] = [AmplitudeJump(float(at.mean()), 0.5 * np.ptp(at), *both) for at, both in steps]
     return found
 
 

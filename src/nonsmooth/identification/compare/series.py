@@ -124,8 +124,7 @@ def measured_rise(motion: xr.Dataset, parameter: str, first: float, last: float,
     import xarray as xr
 
     time, phase = motion["time"].values, motion["phase"].values
-    columns = np.column_stack([motion["u"].values, time])
-    points = fold(phase, columns, 8)[:, 0]
+    points = fold(phase, np.column_stack([motion["u"].values, time]), 8)[:, 0]
     at = first + (last - first) * (points[:, 2] - time[0]) / (time[-1] - time[0])
     return xr.Dataset(
         {

@@ -225,7 +225,7 @@ def problem_of(
             max(noise(readings), sensor.floor)
             or noise(readings, moving=True)
             or sensor.noise  # of a few readings, which show none
-            or max(ROUGHLY * float(np.nanmax(np.abs(np.concatenate(readings)), initial=0.0)), 1e-300)
+            or max(ROUGHLY * np.nanmax(np.abs(np.concatenate(readings)), initial=0.0), 1e-300)
             if readings
             else np.inf
             for readings, sensor in zip(within, sensors.values(), strict=True)

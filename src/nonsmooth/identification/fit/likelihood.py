@@ -200,7 +200,7 @@ def _drawn(
 ) -> FloatArray:
     """First places of the walkers: from the normal law of the unknowns and the starts about the optimum."""
     problem, u, p = grown.problem, grown.problem.unknowns, len(grown.theta)
-    state = problem.derivatives(grown.theta, grown.starts)
+    state = problem.residuals(grown.theta, grown.starts, True)
     normal, _, back = reduced(problem, state, weights, p)
     covariance = inverted(normal + u.precision)[0]
     if (loose := grown.loose(state)).size:

@@ -103,8 +103,7 @@ class Marcher:
         if not derivatives:
             return plain
         cuts = np.zeros(0) if changes is None else changes.times
-        places = 1 + np.searchsorted(instants, cuts)
-        return self._derived(plain, values, begin, z, mode, course, (cuts, places))
+        return self._derived(plain, values, begin, z, mode, course, (cuts, 1 + np.searchsorted(instants, cuts)))
 
     def _derived(
         self,

@@ -51,7 +51,11 @@ def outcome(
     problem, theta = grown.problem, grown.theta
     u = problem.unknowns
     found = sandwich(problem, theta, grown.starts)
-    loose = _undetermined(grown.loose(found.state))
+    loose = dict[int, set[int]]()  # unknowns that the records leave open, each with those that it may be traded for
+    for direction in concerned(grown.loose(found.state)).T:
+        together = np.flatnonzero(direction).tolist()
+        for i in together:
+            loose.setdefault(i, set()).update(together)
     starts, follow, own = _starts(grown, found)
     noise = _noise(grown, found)
     jacobian = np.vstack([np.eye(len(theta)), *follow])
@@ -137,17 +141,7 @@ def _noise(grown: Grown, found: Sandwich) -> dict[str, Estimate]:
     return rows
 
 
-def _undetermined(directions: FloatArray) -> dict[int, list[int]]:
-    """Places of unknowns that the records leave open, each with those that it may be traded for."""
-    found: dict[int, list[int]] = {}
-    for direction in concerned(directions).T:
-        together = np.flatnonzero(direction).tolist()
-        for i in together:
-            found[i] = sorted({*found.get(i, []), *together})
-    return found
-
-
-def _sentences(grown: Grown, covariance: FloatArray, loose: Mapping[int, list[int]], samples: int) -> dict[str, str]:
+def _sentences(grown: Grown, covariance: FloatArray, loose: Mapping[int, set[int]], samples: int) -> dict[str, str]:
     """A sentence for each unknown: what it rests on, or that the record does not determine it."""
     u, theta = grown.problem.unknowns, grown.theta
     error = np.sqrt(np.diag(covariance))
@@ -156,7 +150,7 @@ def _sentences(grown: Grown, covariance: FloatArray, loose: Mapping[int, list[in
     np.fill_diagonal(correlation, 0.0)
     rows = {}
     for i, name in enumerate(u.names):
-        others = [u.names[k] for k in loose.get(i, []) if k != i]
+        others = [u.names[k] for k in sorted(loose.get(i, ())) if k != i]
         closest = int(np.argmax(np.abs(correlation[i])))
         if i in loose and others:
             text = f"not identifiable: only a combination of it and {', '.join(others)} is; give one its value"

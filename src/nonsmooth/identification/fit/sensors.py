@@ -81,7 +81,7 @@ class Sensor:
     @property
     def floor(self) -> float:
         """Least standard deviation of a reading: that of rounding."""
-        return self.resolution / float(np.sqrt(12.0))
+        return self.resolution / np.sqrt(12.0)
 
 
 def read_sensors(system: System, measured: Any, channels: Sequence[str]) -> dict[str, Sensor]:

@@ -91,7 +91,7 @@ class SteadyReadings:
             mine = (self.quantity == q) & np.isnan(self.error) & periodic
             if (n := int(mine.sum())) and np.isfinite(residual[mine]).all():
                 noise[mine] = np.sqrt(np.sum(residual[mine] ** 2) / max(n - unknowns, 0.1 * n))
-        least = ROUNDING * float(np.max(np.abs(self.measured)))
+        least = ROUNDING * np.max(np.abs(self.measured))
         noise = np.maximum(np.where(np.isnan(noise), self.noise, noise), max(least, 1e-300))
         return replace(self, used=periodic, noise=noise)
 
@@ -174,7 +174,7 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
         raise ValueError(f"run {name!r}: {kind}_error has the negative number {np.nanmin(error):g}; NaN: not known")
     error = np.where(error > 0.0, error, np.nan)
     values, setting = np.unique(np.array(runs), axis=0, return_inverse=True)
-    first = max(ROUGHLY * float(np.max(np.abs(y))), 1e-300)
+    first = max(ROUGHLY * np.max(np.abs(y)), 1e-300)
     return SteadyReadings(
         name,
         tuple(wanted),
@@ -330,7 +330,7 @@ def _slopes(
 def _extreme(motion: SampledMotion, k: int, sign: float) -> float:
     """The instant of the largest (sign 1) or least (-1) value of a state: between samples where it is smooth there."""
     y, t = sign * motion.z[:, k], motion.time
-    i = 1 + int(np.argmax(y[1:-1]))
+    i = 1 + np.argmax(y[1:-1])
     if motion.segment[i - 1] != motion.segment[i + 1]:
         return float(t[i])
     one, other = t[i] - t[i - 1], t[i + 1] - t[i]

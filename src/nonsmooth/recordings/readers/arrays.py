@@ -60,8 +60,7 @@ def read(data: bytes, reading: Reading) -> None:
         notes = {name: _note(v) for name, v in node.items() if _note(v)}
         own = {**node.notes, **{f"note_{name}": text for name, text in notes.items()}}
         reading.run_attrs.setdefault(run, {}).update(own)
-        table = _table(run, path, node, key, reading)
-        reading.traces += traces_of(table, reading)
+        reading.traces += traces_of(_table(run, path, node, key, reading), reading)
         if len(reading.traces) > MAX_COLUMNS:
             raise reading.error("", f"holds more than {MAX_COLUMNS} channels")
 

@@ -50,8 +50,7 @@ def read(data: bytes, reading: Reading) -> None:
         trace = _trace(group, archive, comma, experiment.units, reading)
         if trace is not None:
             traces.append(trace)
-    runs = dict.fromkeys(trace.run for trace in traces)
-    order = sorted(runs, key=lambda run: int(run.removeprefix("Run #")))
+    order = sorted(dict.fromkeys(trace.run for trace in traces), key=lambda run: int(run.removeprefix("Run #")))
     reading.traces = [trace for run in order for trace in traces if trace.run == run]
 
 

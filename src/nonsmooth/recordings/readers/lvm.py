@@ -94,7 +94,7 @@ def _lines(data: bytes, reading: Reading) -> tuple[str, Lines]:
 
 def _keys(lines: Lines, reading: Reading, what: str, first: list[str] | None = None) -> dict[str, list[str]]:
     """Key and values of each line up to the end of a header."""
-    found: dict[str, list[str]] = {first[0].strip(): first[1:]} if first else {}
+    found = {first[0].strip(): first[1:]} if first else {}
     for _, fields in lines:
         if fields[0].startswith(_END):
             return found

@@ -83,10 +83,8 @@ def signal(
                 f"{name}: {sentence}; {purpose} needs all: cut the record there, or smooth it first, which bridges them"
             )
         warn(x, f"{sentence}; they are bridged, with errors that say so")
-    if len(values) - total < least:
-        raise ValueError(
-            f"{name}: too short: {len(values) - total} usable samples, and {purpose} needs {least}; record longer"
-        )
+    if (usable := len(values) - total) < least:
+        raise ValueError(f"{name}: too short: {usable} usable samples, and {purpose} needs {least}; record longer")
     return t, values
 
 

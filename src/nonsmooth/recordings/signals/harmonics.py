@@ -134,14 +134,11 @@ def fit(
     cos, sin = solution[1::2], solution[2::2]
     names = ["mean"] + [f"{f}_{j}" for j in range(1, n + 1) for f in ("cos", "sin")]
     if refine:
-        slope = _slope(tau, A, solution)
-        A = np.column_stack([A, slope / subharmonic])
+        A = np.column_stack([A, _slope(tau, A, solution) / subharmonic])
         names.append("omega")
-    free = max(len(t) - A.shape[1], 1)
-    variance = float(left @ left) / free
+    variance = (left @ left) / max(len(t) - A.shape[1], 1)
     correlation = correlation_times(left)
-    R = np.linalg.qr(A, mode="r")
-    inverse = np.linalg.inv(R)
+    inverse = np.linalg.inv(np.linalg.qr(A, mode="r"))
     C = variance * correlation * inverse @ inverse.T
     # From the record's middle, where frequency and phase are independent, to t = 0.
     angle = np.arange(1, n + 1) * base * centre
@@ -192,7 +189,7 @@ def _best(tau: FloatArray, values: FloatArray, omega: float, n: int, length: flo
     A few are tried, then Gauss-Newton steps change frequency and amplitudes together.
     """
     grid = omega + math.pi / length * np.linspace(-1.0, 1.0, 7)
-    best = float(grid[int(np.argmin([np.linalg.norm(_fitted(tau, values, w, n)[2]) for w in grid]))])
+    best = float(grid[np.argmin([np.linalg.norm(_fitted(tau, values, w, n)[2]) for w in grid])])
     for _ in range(20):
         A, p, left = _fitted(tau, values, best, n)
         change, *_ = np.linalg.lstsq(np.column_stack([A, _slope(tau, A, p)]), left, rcond=None)

@@ -138,8 +138,7 @@ def drive_phase(
             f"{whose(x)}: {t[-1] - t[0]:.4g} s hold fewer than three turns at {omega:.4g} rad/s: record longer"
         )
     found = harmonics.fit(t, x, omega, 3, refine=True)
-    lag = float(found.phases[0])
-    t_0 = t[0] + ((lag - found.omega * t[0]) % TURN) / found.omega
+    t_0 = t[0] + ((float(found.phases[0]) - found.omega * t[0]) % TURN) / found.omega
     turns = np.arange(math.floor((t[-1] - t_0) / found.period) + 1)
     # Phase and frequency are correlated; the error of the phase is least in the middle of the record.
     error = float(found.phase_errors[0]) / found.omega

@@ -114,8 +114,8 @@ def corner_restitution(
     if not (np.isfinite(t).all() and np.isfinite(place).all() and np.isfinite(np.asarray(orientation)).all()):
         raise ValueError(f"{whose(position)}: values are missing; take the intervals of the record that are whole")
     turns, fall = _turns(orientation), float(flights["acceleration"])
-    half_sample = 0.5 * float(np.median(np.diff(t)))
-    reach = near * float(np.max(np.linalg.norm(points, axis=1)))
+    half_sample = 0.5 * np.median(np.diff(t))
+    reach = near * np.max(np.linalg.norm(points, axis=1))
     rows = []
     for k, *sides in single_contacts(t, flights, window, longest):
         before, after = (_Flight(t, place, turns, side, fall) for side in sides)
@@ -129,7 +129,7 @@ def corner_restitution(
         late, early = (-after.velocity(s, point)[0] / before.velocity(s, point)[0] for s in moved)
         v0, e0 = before.velocity(when, point)
         touching = int(np.count_nonzero(heights < heights[corner] + reach))
-        same = corner == int(np.argmin(after.heights(when, points)))
+        same = corner == np.argmin(after.heights(when, points))
         rows.append(
             {
                 "flight": k,
@@ -144,15 +144,14 @@ def corner_restitution(
                 "single": touching == 1 and same and v0 < -3.0 * e0,
             }
         )
-    left_out = max(flights.sizes["flight"] - 1, 0) - len(rows)
-    return impacts_of(rows, _COLUMNS).assign_attrs(left_out=left_out)
+    return impacts_of(rows, _COLUMNS).assign_attrs(left_out=max(flights.sizes["flight"] - 1, 0) - len(rows))
 
 
 def _nearest_zero(t: FloatArray, y: FloatArray) -> float:
     """Zero of y between two of its samples; where there is none, the sample nearest to zero."""
     k = np.flatnonzero(np.sign(y[:-1]) != np.sign(y[1:]))
     if len(k) == 0:
-        return float(t[int(np.argmin(np.abs(y)))])
+        return float(t[np.argmin(np.abs(y))])
     i = int(k[0])
     return float(t[i] + (t[i + 1] - t[i]) * y[i] / (y[i] - y[i + 1]))
 
@@ -193,8 +192,7 @@ class _Flight:
     def velocity(self, when: float, point: FloatArray) -> tuple[float, float]:
         """Vertical velocity of a corner and its error."""
         arm = self._arms(when, point[None, :])[0]
-        turning = float(np.cross(self.spin, arm)[2])
-        velocity = self.v + self.fall * (when - self.origin) + turning
+        velocity = self.v + self.fall * (when - self.origin) + float(np.cross(self.spin, arm)[2])
         return velocity, math.hypot(self.v_error, self.spin_error * math.hypot(arm[0], arm[1]))
 
 

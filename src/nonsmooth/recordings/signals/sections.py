@@ -133,7 +133,7 @@ class _Between:
         impacts: ArrayLike = (),
     ) -> None:
         self.t, position = signal(time, x, least=4, purpose="section points")
-        columns: list[FloatArray] = [position]
+        columns = [position]
         for name, given in (("v", v), ("a", a), ("x_error", x_error), ("v_error", v_error)):
             column = np.full(len(self.t), np.nan) if given is None else np.asarray(given, float)
             if column.shape != self.t.shape:

@@ -98,8 +98,7 @@ def smooth(
         raise ValueError(f"{whose(x)}: noise must be a standard deviation >= 0, got {noise!r}")
     t, values = signal(time, x, least=2 * order, purpose="smoothing", missing="keep")
     nodes = _Nodes(t, values, _places(t, impacts, x), _bounds(contacts, x), order, resolution, noise)
-    q = nodes.likeliest() if intensity is None else nodes.scaled(intensity)
-    return nodes.result(q, model, x)
+    return nodes.result(nodes.likeliest() if intensity is None else nodes.scaled(intensity), model, x)
 
 
 def _places(t: FloatArray, places: ArrayLike, x: Any) -> FloatArray:
@@ -143,7 +142,7 @@ class _Nodes:
         else:
             # A first guess only, which the likelihood corrects: the fourth differences of a smooth signal are noise.
             rough = np.diff(x[good], 4) / math.sqrt(70.0)
-            count, jitter = float(np.sqrt(np.mean(rough**2))) or 1e-9 * float(np.ptp(x[good])) or 1.0, 0.0
+            count, jitter = float(np.sqrt(np.mean(rough**2))) or 1e-9 * np.ptp(x[good]) or 1.0, 0.0
         self.sigma = math.hypot(count, jitter)
         self.offset = float(x[good][0])
         stay, *edges = _stays(t, x, resolution) if resolution is not None else (np.ones(len(t)), *np.zeros((3, 0)))
@@ -159,8 +158,7 @@ class _Nodes:
         self.step = np.concatenate([[0.0], np.diff(when[sort])]) / self.h
         # At the bound of a soft contact the force turns off its course: the jerk jumps.
         self.jump = np.select([self.kind == 2, self.kind == 3], [1, min(3, order)], order).astype(np.int64)
-        middle = when[sort] - 0.5 * self.step * self.h
-        self.inside = np.searchsorted(contacts, middle, side="right") % 2 == 1
+        self.inside = np.searchsorted(contacts, when[sort] - 0.5 * self.step * self.h, side="right") % 2 == 1
         self.wide = self._wide(t[good] / self.h, (x[good] - self.offset) / self.sigma)
         n, count_nodes = order, len(when)
         self.u, self.P = np.zeros((2, count_nodes, n)), np.zeros((2, count_nodes, n, n))  # predicted, filtered
@@ -170,7 +168,7 @@ class _Nodes:
         """Variances far above those of the state: a start, or a derivative that jumps, is not to be guided."""
         level, wide = y, []
         for k in range(self.order):
-            wide.append(1e2 * float(np.max(np.abs(level - (level[0] if k == 0 else 0.0)))) ** 2 + 1e2)
+            wide.append(1e2 * np.max(np.abs(level - (level[0] if k == 0 else 0.0))) ** 2 + 1e2)
             level = np.diff(level) / np.maximum(np.diff(t[: len(level)]), 0.2)
         return np.array(wide)
 
@@ -214,8 +212,7 @@ class _Nodes:
         power = 2 * self.order - 1
         low, high = -power * math.log10(max(len(self.t), 10)) - 2.0, 2.0 * math.log10(np.ptp(self.y) + 1.0) + 3.0
         grid = np.linspace(low, high, max(16, int((high - low) / 1.5)))
-        costs = [self.cost(np.full(2, 10.0**g)) for g in grid]
-        best = int(np.argmin(costs))
+        best = int(np.argmin([self.cost(np.full(2, 10.0**g)) for g in grid]))
         around = (float(grid[max(best - 1, 0)]), float(grid[min(best + 1, len(grid) - 1)]))
         found = minimize_scalar(
             lambda g: self.cost(np.full(2, 10.0**g)), bounds=around, method="bounded", options={"xatol": 0.01}
@@ -359,7 +356,7 @@ def savitzky_golay(
     hits = np.unique(np.asarray(impacts, float).ravel())
     segment = np.searchsorted(hits, t, side="left")
     states, errors = np.empty((3, len(t))), np.empty((3, len(t)))
-    attrs: dict[str, Any] = {"method": "Savitzky-Golay", "window": window, "order": order}
+    attrs = {"method": "Savitzky-Golay", "window": window, "order": order}
     half = window // 2
     for k, name in enumerate("xva"):
         bias = []

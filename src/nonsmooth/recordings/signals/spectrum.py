@@ -121,7 +121,7 @@ def spectrum(
     lines = fft.rfft(values * weights, n * padding)
     frequency = fft.rfftfreq(n * padding, 1.0 / rate)
     amplitude = 2.0 * np.abs(lines) / weights.sum()
-    density = 2.0 * np.abs(lines) ** 2 / (rate * float(weights @ weights))
+    density = 2.0 * np.abs(lines) ** 2 / (rate * (weights @ weights))
     alone = [0] if n * padding % 2 else [0, -1]  # the lines at 0 and at half the sample rate have no mirror image
     for one_sided in (amplitude, density):
         one_sided[alone] *= 0.5
@@ -195,7 +195,10 @@ def peak(
             f"the largest line of the band stands at its edge, {frequency[k]:.4g} Hz: no peak inside; widen the band"
         )
     shape = _Shape(spectrum)
-    three = shape.in_phase(amplitude[k - 1 : k + 2], spectrum.phase.values[k - 1 : k + 2])
+    # three neighbouring lines, referred to the middle of the record, in phase with the middle one
+    turn = np.array([-1.0, 0.0, 1.0]) * np.pi * (shape.n - 1) / (shape.n * shape.padding)
+    phase = spectrum.phase.values
+    three = amplitude[k - 1 : k + 2] * np.cos(phase[k - 1 : k + 2] + turn - phase[k])
     delta, height = shape.interpolate(three, interpolation)
     spacing, step = float(frequency[1]), float(spectrum.attrs["grid_step"])
     if interpolation == "none":
@@ -224,8 +227,7 @@ def correlation_times(residuals: ArrayLike) -> float:
         return 1.0
     rho = np.fft.irfft(np.abs(np.fft.rfft(r, 2 * n)) ** 2, 2 * n)
     rho = rho[1 : 1 + n // 4] / rho[0]
-    ends = np.append(np.flatnonzero(rho <= 0), len(rho))
-    return float(1.0 + 2.0 * rho[: ends[0]].sum())
+    return float(1.0 + 2.0 * rho[: np.append(np.flatnonzero(rho <= 0), len(rho))[0]].sum())
 
 
 class _Shape:
@@ -269,11 +271,6 @@ class _Shape:
         low, high = (round((2.0 * place + side * self.padding) * FINE) for side in (-1, 1))
         return float(np.abs(self._all[max(low, 0) : min(high, len(self._all)) + 1]).max(initial=0.0))
 
-    def in_phase(self, amplitude: FloatArray, phase: FloatArray) -> FloatArray:
-        """Three neighbouring lines, referred to the middle of the record, in phase with the middle one."""
-        turn = 2 * np.pi * np.array([-1.0, 0.0, 1.0]) * 0.5 * (self.n - 1) / (self.n * self.padding)
-        return amplitude * np.cos(phase + turn - phase[1])
-
     def interpolate(self, three: FloatArray, interpolation: str) -> tuple[float, float]:
         """Place of the peak from the middle line, in spacings, and its height."""
         from scipy.optimize import brentq
@@ -312,7 +309,7 @@ class _Shape:
         lag = np.arange(3)
         squares = self._lines(self.weights**2)[::FINE][np.abs(np.subtract.outer(lag, lag))]
         C = 2.0 * variance / self.total**2 * squares
-        return math.sqrt(max(float(slope @ C @ slope), 0.0))
+        return math.sqrt(max(slope @ C @ slope, 0.0))
 
     def bias(self, place: float, interpolation: str) -> float:
         """Bound for a steady sinusoid, in spacings: of the interpolation alone, and by the image at -frequency."""
@@ -341,4 +338,4 @@ def _noise(spectrum: xr.Dataset, k: int) -> float:
     if len(beside) == 0:
         return math.nan
     # The mean of an exponential distribution from its median; half the sample rate is the band.
-    return float(np.median(beside)) / math.log(2.0) * float(spectrum.attrs["rate"]) / 2.0
+    return np.median(beside) / math.log(2.0) * float(spectrum.attrs["rate"]) / 2.0

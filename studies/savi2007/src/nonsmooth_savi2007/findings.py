@@ -7,7 +7,7 @@ import json
 import xarray as xr
 
 from nonsmooth import ParameterSet
-from nonsmooth.identification import Estimate, Finding
+from nonsmooth.identification import Finding
 from nonsmooth.identification.parameter_set import as_record, from_record
 from nonsmooth_savi2007.laboratory import as_result
 
@@ -31,9 +31,3 @@ def kept(finding: Finding) -> xr.Dataset:
 def found_in(data: xr.Dataset) -> Finding:
     """Read back what :func:`kept` put into the dataset."""
     return from_record(json.loads(data.attrs["finding"]))
-
-
-def estimates_of(dataset: xr.Dataset) -> dict[str, Estimate]:
-    """All parameters of a saved ``ParameterSet``."""
-    found = ParameterSet.from_dataset(dataset)
-    return {**found.estimates, **found.extra}

@@ -26,8 +26,7 @@ class Printed:
     @property
     def rounding(self) -> float:
         """Half a unit of the last printed digit."""
-        digits = len(self.text.partition(".")[2])
-        return 0.5 * 10.0**-digits
+        return 0.5 * 10.0 ** -len(self.text.partition(".")[2])
 
     @property
     def resolution(self) -> float:

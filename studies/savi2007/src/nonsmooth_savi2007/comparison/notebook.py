@@ -135,7 +135,7 @@ def gap_reference(
     else:
         notes.append(
             f"no taps of the car (impulse) in {session.folder}: where it rests is taken from the sensor's zero, to "
-            f"±{1e3 * float(np.sqrt(found.covariance[0, 0])):.2g} mm, since a car with dry friction is zeroed where it "
+            f"±{1e3 * np.sqrt(found.covariance[0, 0]):.2g} mm, since a car with dry friction is zeroed where it "
             "sticks. Record a few taps in each session"
         )
     for note in (*notes, *found.notes):

@@ -80,8 +80,7 @@ def _flips(branch: xr.Dataset) -> list[xr.Dataset]:
 
 def at_ends(branch: xr.Dataset) -> np.ndarray:
     """Return whether each special point of a branch is an end of it, and so belongs to the branch that it leaves."""
-    last = branch.sizes["point"] - 1
-    return np.isin(branch["special_point"].values, [0, last])
+    return np.isin(branch["special_point"].values, [0, branch.sizes["point"] - 1])
 
 
 def rows_of(branch: xr.Dataset) -> xr.Dataset:

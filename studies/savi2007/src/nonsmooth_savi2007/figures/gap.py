@@ -194,8 +194,7 @@ def _caption_rig_14(data: Datasets) -> str:
 
 def _measure_16(settings: Settings) -> Datasets:
     bench = settings.bench
-    found = motions(bench, 16, (0.0018,), periods=300 if settings.quick else 1500)
-    measured, set_ = found["0.0018"]
+    measured, set_ = motions(bench, 16, (0.0018,), periods=300 if settings.quick else 1500)["0.0018"]
     return {"attractor": bench.compare(measured, set_, section_phase=list(PHASES.values()))}
 
 

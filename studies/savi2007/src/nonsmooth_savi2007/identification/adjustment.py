@@ -25,8 +25,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from nonsmooth import SolveError
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, uniform
-from nonsmooth_savi2007.arrays import FloatArray
 
 _ROUNDS = 50
 _CONVERGED = 1e-6  # of a standard uncertainty
@@ -172,7 +172,7 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
             break
     else:
         raise SolveError(
-            f"the adjustment has not converged after {_ROUNDS} rounds: {names[int(np.argmax(off))]!r} still changes by "
+            f"the adjustment has not converged after {_ROUNDS} rounds: {names[np.argmax(off)]!r} still changes by "
             f"{np.max(off):.1g} of its standard uncertainty. The observations "
             f"({', '.join(label for label in labels if label != 'gain')}) contradict each other by far: look at the "
             "mass, the wheel and the units, and leave out what is in doubt"

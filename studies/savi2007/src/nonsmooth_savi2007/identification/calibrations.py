@@ -19,9 +19,9 @@ import xarray as xr
 from scipy.optimize import brentq
 from scipy.special import ndtri
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, uniform
 from nonsmooth.recordings.signals.phase import drive_phase
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.steady import harmonics_of
 
@@ -54,7 +54,7 @@ def scattered_line(x: FloatArray, y: FloatArray, error: FloatArray) -> tuple[Str
     line = fitted(0.0)
     if len(y) < 3 or line.reduced <= 1:
         return line, 0.0
-    high = float(np.std(y - np.polyval(np.polyfit(x, y, 1), x))) * np.sqrt(len(y)) + float(error.max())
+    high = np.std(y - np.polyval(np.polyfit(x, y, 1), x)) * np.sqrt(len(y)) + error.max()
     s = float(brentq(lambda s: fitted(s).reduced - 1.0, 0.0, high, xtol=1e-4 * high))
     return fitted(s), s
 
@@ -173,7 +173,7 @@ def _enough(settings: FloatArray, what: str) -> None:
 
 
 def _scatter(scatter: float, error: FloatArray, unit: str) -> list[str]:
-    if scatter <= 2 * float(np.median(error)):
+    if scatter <= 2 * np.median(error):
         return []
     return [
         f"the points scatter by {scatter:.2g} {unit} about the line, more than their own errors of "
@@ -190,8 +190,7 @@ def _data(
     read: tuple[str, str],
     runs: Sequence[Run],
 ) -> xr.Dataset:
-    low = min(float(setting.min()), 0.0)
-    fine = np.linspace(low, float(setting.max()), 200)
+    fine = np.linspace(min(setting.min(), 0.0), setting.max(), 200)
     rows = np.column_stack([fine, np.ones_like(fine)])
     reach = ndtri(0.975) * np.sqrt(np.einsum("ij,jk,ik->i", rows, line.covariance, rows))
     fitted, errors = line.intercept + line.slope * fine, np.sqrt(np.diag(line.covariance))

@@ -9,11 +9,10 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-import scipy.linalg  # noqa: F401  it loads a library of its own, which is to have one thread too
-from threadpoolctl import threadpool_limits
 
 from nonsmooth import ParameterSet, SolveError
 from nonsmooth.identification import Estimate, Finding
+from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.recordings import RecordingWarning, Session
 from nonsmooth.recordings.signals.phase import drive_phase
 from nonsmooth_savi2007.identification.adjustment import Adjusted, Observation, adjust
@@ -54,7 +53,7 @@ _FOUND_BY = {
 }
 
 
-@threadpool_limits.wrap(limits=1, user_api="blas")  # the matrices are small: threads would wait for each other
+@one_blas_thread()
 def identify(
     recordings: Session | str | os.PathLike[str] | Mapping[str, Any],
     model: Any = None,
@@ -236,7 +235,7 @@ class _Chain:
             if unsteady := [size for size, steady in seen if not steady]:
                 self.say(
                     f"{procedure}: the motor wanders in {len(unsteady)} of {len(seen)} runs, by "
-                    f"{100 * float(np.median(unsteady)):.2g} % from turn to turn (standard deviation; up to "
+                    f"{100 * np.median(unsteady):.2g} % from turn to turn (standard deviation; up to "
                     f"{100 * max(unsteady):.2g} %), more than the photogate's steps explain. The crank's angle is "
                     "followed from turn to turn, and what a turn may hide is in the uncertainty of what contacts tell; "
                     "a regulated supply would be better"

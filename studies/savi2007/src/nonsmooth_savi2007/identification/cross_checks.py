@@ -27,9 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as distribution
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, uniform
 from nonsmooth.recordings import Quantity
-from nonsmooth_savi2007.arrays import FloatArray
 
 #: Probability of a chi^2 this large by chance, below which measurements disagree.
 CHANCE = 1e-4
@@ -239,7 +239,7 @@ def cross_checks(
     gap : Estimate, optional
         The gap at rest by contacts at the setting of the screw at which the graze was sought.
     """
-    known: dict[tuple[str, str], Estimate | None] = {
+    known = {
         ("one", ""): Estimate(1.0, 0.0),
         ("one", "within limits"): Estimate(1.0, uniform(gain_limit), half_width=gain_limit) if gain_limit else None,
         ("adjusted", "k"): k,
@@ -279,7 +279,7 @@ def _off(one: Estimate, other: Estimate, common: float) -> float:
         difference = one.value - other.value
         square = one.uncertainty**2 + other.uncertainty**2 - 2 * common**2 * one.value * other.value
     if other.half_width:
-        difference = float(np.sign(difference)) * max(abs(difference) - other.half_width, 0.0)
+        difference = np.sign(difference) * max(abs(difference) - other.half_width, 0.0)
         square = one.uncertainty**2
     if square <= 0:
         return float("inf") * difference if difference else 0.0

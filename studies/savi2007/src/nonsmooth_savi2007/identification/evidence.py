@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from nonsmooth import Recording
+from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import unknown
 from nonsmooth.recordings import PROCEDURES, SETTINGS, Quantity, Session, load_session
 from nonsmooth.recordings.signals.checks import take
 from nonsmooth.recordings.signals.displacement import position
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.directions import oriented
 
 #: Channels that a procedure cannot do without.
@@ -31,7 +31,6 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
     "rise": ("Angle", "Turn"),
     "section": ("Angle", "Turn"),
 }
-_ANGLES = ("rad", "deg", "°", "rev", "turn", "turns", "degrees", "radians", "rotations", "counts")
 _PASSAGES = 3  # of the photogate: fewer give no frequency and no scatter
 
 
@@ -55,14 +54,12 @@ class Run:
     @property
     def time(self) -> FloatArray:
         """Times of the position (s)."""
-        times: FloatArray = np.asarray(self.x["time"].values, float)
-        return times
+        return np.asarray(self.x["time"].values, float)
 
     @property
     def positions(self) -> FloatArray:
         """Position (m), as counted."""
-        values: FloatArray = np.asarray(self.x.values, float)
-        return values
+        return np.asarray(self.x.values, float)
 
     @property
     def passages(self) -> FloatArray:
@@ -160,7 +157,7 @@ def gather(
     for procedure, rows in taken.items():
         if procedure not in PROCEDURES:
             raise ValueError(unknown(procedure, "a procedure", "the experiment", PROCEDURES.keys()))
-        runs[procedure] = tuple(_run(procedure, row[0], row[1], row[2], known) for row in rows)
+        runs[procedure] = tuple(_run(procedure, known, *row) for row in rows)
     runs, direction, notes = oriented(runs)
     synthetic = synthetic or any(run.synthetic for rows in runs.values() for run in rows)
     runs |= {procedure: () for procedure in PROCEDURES if procedure not in runs}
@@ -182,7 +179,7 @@ def _rows(procedure: str, given: Any) -> list[Any]:
 
 
 def _run(
-    procedure: str, recording: Recording, name: str, settings: Mapping[str, Any], known: Mapping[str, Quantity]
+    procedure: str, known: Mapping[str, Quantity], recording: Recording, name: str, settings: Mapping[str, Any]
 ) -> Run:
     if lacking := [key for key in PROCEDURES[procedure] if key not in settings]:
         raise ValueError(f"{procedure}, run {name!r} must state {', '.join(lacking)} in its settings")
@@ -197,7 +194,7 @@ def _run(
     found: dict[str, Any] = {}
     if has("Angle"):
         found["x"] = position(
-            take(recording, "Angle", name, units=_ANGLES),
+            take(recording, "Angle", name),
             distance_per_turn=known["distance_per_turn"].value,
             counts_per_turn=round(known["counts_per_turn"].value),
         )

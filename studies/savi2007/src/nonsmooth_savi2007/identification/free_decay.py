@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
-from nonsmooth_savi2007.arrays import FloatArray
+from nonsmooth.arrays import FloatArray
 from nonsmooth_savi2007.identification.cross_checks import Consistent, consistent
 from nonsmooth_savi2007.identification.evidence import Run
 
@@ -125,15 +125,14 @@ def swing(time: FloatArray, x: FloatArray, *, resolution: float, slowest: float 
     ValueError
         If the record holds no motion, or less than two half swings of that speed.
     """
-    rest = float(np.median(x[-max(10, len(x) // 10) :]))
-    away = x - rest
+    away = x - float(np.median(x[-max(10, len(x) // 10) :]))
     steps = np.diff(x)
     moving = np.flatnonzero(np.abs(steps) > 2.5 * resolution)
     if len(moving) == 0 or np.max(np.abs(away)) < 20 * resolution:
         raise ValueError(f"the car moves by {np.max(np.abs(away)) / resolution:.0f} counts only: tap it harder")
     # before the tap it rests, or is held: the first turning point comes after it has begun to move
     first = int(moving[0])
-    reach, way = 0.5 * float(np.max(np.abs(away[first:]))), 0.0
+    reach, way = 0.5 * np.max(np.abs(away[first:])), 0.0
     begin = first
     for i in range(first, len(steps)):
         if way * steps[i] < 0 and abs(away[i]) > reach and way * away[i] > 0:
@@ -241,12 +240,11 @@ class _Method(NamedTuple):
             away = part.x - (float(np.mean(part.x[-20:])) if len(part.x) > 40 else 0.0)
             turned = np.flatnonzero(np.sign(away[1:]) != np.sign(away[:-1]))
             if len(turned) > 1:
-                periods.append(2 * float(np.mean(np.diff(part.time[turned]))))
+                periods.append(2 * np.mean(np.diff(part.time[turned])))
                 heights = [np.max(np.abs(away[a:b])) for a, b in pairwise(turned)]
                 ratios += [h / g for g, h in pairwise(heights) if g > 0]
         period = float(np.median(periods)) if periods else 1.4
-        ratio = min(float(np.median(ratios)), 0.99) if ratios else 0.7
-        b = -4 * np.log(ratio) / period  # swing to swing: exp(-b T/4)
+        b = -4 * np.log(min(np.median(ratios), 0.99) if ratios else 0.7) / period  # swing to swing: exp(-b T/4)
         return np.array([np.sqrt((2 * np.pi / period) ** 2 + b**2 / 4), b, 0.005, 0.0])
 
     def fit(self, parts: Sequence[Decay], first: FloatArray) -> tuple[FloatArray, FloatArray, ParameterSet]:

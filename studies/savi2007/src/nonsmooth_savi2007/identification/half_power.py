@@ -25,9 +25,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.picture_data import picture_data
 from nonsmooth_savi2007.identification.steady import Steady
 
@@ -54,7 +54,7 @@ def half_power_points(omega: FloatArray, amplitude: FloatArray) -> tuple[float, 
             f"{np.count_nonzero(use)} points stand above a third of the largest amplitude, 8 are needed: step finer"
         )
     squares, middle = omega[use] ** 2, float(np.mean(omega[use] ** 2))
-    width = float(np.ptp(squares)) / 2
+    width = np.ptp(squares) / 2
     # relative errors of the amplitudes are alike: those of 1/A^2 are 2 dA/A of it
     cubic = np.polynomial.Polynomial.fit(
         (squares - middle) / width, amplitude[use] ** -2.0, 3, domain=[-1, 1], w=amplitude[use] ** 2

@@ -33,10 +33,10 @@ import xarray as xr
 from scipy.special import ndtri
 
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth.recordings.signals.phase import DrivePhase, drive_phase
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit
 from nonsmooth_savi2007.identification.picture_data import picture_data
@@ -140,8 +140,7 @@ def known_before(run: Run, decay: DecayFit, mark: float = 0.0, **also: Estimate)
     # the gap as read to 1.5 mm; the crank as set to 0.5 %, a phase of the mark to 0.05 rad, a second harmonic to 3 %
     covariance = np.diag([0.0, 0.0, 0.0, 1.5e-3, 1e-3, 5e-3 * crank, 0.05, 0.03 * crank, 0.03 * crank]) ** 2
     covariance[:3, :3] = decay.covariance[:3, :3] + 1e-12 * np.diag(np.diag(decay.covariance)[:3])
-    errors = np.sqrt(np.diag(covariance))
-    rows = zip((*SHARED[:3], *OWN), values, errors, strict=True)
+    rows = zip((*SHARED[:3], *OWN), values, np.sqrt(np.diag(covariance)), strict=True)
     beside = np.diag([one.uncertainty**2 for one in also.values()])
     return ParameterSet(
         {name: Estimate(float(v), float(e)) for name, v, e in rows} | also,
@@ -252,13 +251,13 @@ def shoot_contacts(
 def _touches(run: Run, rest: float) -> bool:
     """Return whether the car comes near enough to the support: the screw's reading may be off by a millimetre."""
     gap = float(run.settings["gap"])
-    return float(run.positions.max()) > rest + (gap - 1e-3 if gap < 2e-3 else 0.5 * gap)
+    return run.positions.max() > rest + (gap - 1e-3 if gap < 2e-3 else 0.5 * gap)
 
 
 def _span(run: Run) -> tuple[float, float]:
     """Part of a run that is fitted: from where the car is farthest from the support."""
     early = run.time < run.time[0] + _BEGINS
-    begin = float(run.time[int(np.argmin(run.positions[early]))])
+    begin = float(run.time[np.argmin(run.positions[early])])
     return begin, min(float(run.time[-1]), begin + _LONGEST)
 
 

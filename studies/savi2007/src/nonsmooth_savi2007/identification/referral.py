@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, uniform
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.adjustment import Adjusted
 from nonsmooth_savi2007.identification.cross_checks import consistent
 from nonsmooth_savi2007.identification.evidence import Evidence
@@ -135,9 +135,9 @@ def mean_shift(
         for _ in range(3):  # the scatter of the means from what the fit leaves of them
             normal = matrix.T @ matrix / spread**2 + np.diag(known)
             found = np.linalg.solve(normal, matrix.T @ y / spread**2 + known * [zero, alpha, 0.0])
-            covariance: FloatArray = np.asarray(np.linalg.inv(normal), float)
+            covariance = np.asarray(np.linalg.inv(normal), float)
             left = y - matrix @ found
-            spread = max(float(np.sqrt(left @ left / max(len(y) - 2, 1))), 1e-6)
+            spread = max(np.sqrt(left @ left / max(len(y) - 2, 1)), 1e-6)
         rest, curved, straight = found.tolist()
         return MeanShift(rest, curved, straight, covariance, covariance[:, 0] * known[0], len(y), length)
 
@@ -154,7 +154,7 @@ def mean_shift(
     side, note = int(np.sign(free.alpha)), ""
     if not string_length:
         return free._replace(side=side)
-    off = abs(free.alpha - side * size) / float(np.hypot(error, told))
+    off = abs(free.alpha - side * size) / np.hypot(error, told)
     if off > _CLEAR:
         note = (
             f"the mean positions say a string of {1 / (8 * abs(free.alpha)):.3g} m, the notebook {string_length:.3g} "
@@ -205,7 +205,7 @@ def counted_gap(contacts: ContactFit, reading: float) -> CountedGap | None:
     index = [j for j, keep in zip(index, apart.used, strict=True) if keep]
     block = contacts.covariance[np.ix_(index, index)]
     solved = np.linalg.solve(block, np.ones(len(index)))
-    weight: FloatArray = np.asarray(solved / solved.sum(), float)
+    weight = np.asarray(solved / solved.sum(), float)
     counted = float(weight @ contacts.values[index])
     off = contacts.values[index] - counted
     chi2 = float(off @ np.linalg.solve(block, off))

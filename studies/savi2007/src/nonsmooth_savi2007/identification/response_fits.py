@@ -28,9 +28,9 @@ import xarray as xr
 from scipy.optimize import least_squares
 
 from nonsmooth import SolveError
+from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
-from nonsmooth_savi2007.arrays import ComplexArray, FloatArray
 from nonsmooth_savi2007.identification.free_decay import DecayFit
 from nonsmooth_savi2007.identification.picture_data import picture_data
 from nonsmooth_savi2007.identification.steady import Steady
@@ -52,8 +52,7 @@ def grazing_amplitude(omega: Any, crank_length: Any, omega_0: float, b: float, f
     w, a = np.asarray(omega, float), np.asarray(crank_length, float)
     stiff, damp, dry, push = omega_0**2 - w**2, b * w, 4 * f / np.pi, 0.5 * omega_0**2 * a
     square, half = stiff**2 + damp**2, damp * dry
-    inside = half**2 - square * (dry**2 - push**2)
-    size = (-half + np.sqrt(np.maximum(inside, 0.0))) / square
+    size = (-half + np.sqrt(np.maximum(half**2 - square * (dry**2 - push**2), 0.0))) / square
     return np.where(push > dry, np.maximum(size, 0.0), 0.0)
 
 
@@ -330,8 +329,7 @@ def crank_mark(seen: Steady, decay: DecayFit) -> float:
     Angles count from where the crank pulls the car towards the support. A motor on the other side has the same mark at
     half a turn.
     """
-    expected = receptance(seen.omega, seen.crank, *decay.law)
-    return float(np.angle(np.sum(seen.response * np.conj(expected))))
+    return float(np.angle(np.sum(seen.response * np.conj(receptance(seen.omega, seen.crank, *decay.law)))))
 
 
 def _complex_data(seen: Steady, rows: list[Estimate], mass: float) -> xr.Dataset:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth import ParameterSet
+from nonsmooth import ParameterSet, System
 from nonsmooth.errors import unknown
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth_savi2007.identification.adjustment import Adjusted
@@ -103,12 +103,11 @@ def for_model(found: ParameterSet, model: Any) -> ParameterSet:
     ValueError
         If it has none of them, or one of the same name in another unit.
     """
-    units = getattr(model, "parameters", None)
-    if units is None:
+    if not isinstance(model, System):
         raise TypeError(
             f"model must be a System, as nonsmooth.models.discontinuous_support() returns one; got {model!r}"
         )
-    name = getattr(model, "name", "the model")
+    name, units = model.name, model.parameters
     shared = [key for key in found if key in units]
     if not shared:
         raise ValueError(
@@ -116,8 +115,7 @@ def for_model(found: ParameterSet, model: Any) -> ParameterSet:
             "discontinuous support"
         )
     for key in shared:
-        unit = str(getattr(units[key], "unit", ""))
-        if unit not in ("", found.estimates[key].unit):
+        if (unit := units[key].unit) not in ("", found.estimates[key].unit):
             raise ValueError(
                 f"the parameter {key!r} of {name!r} is in {unit}, the one identified in {found.estimates[key].unit}: "
                 "they are not the same quantity"

@@ -22,9 +22,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import block_diag
 
+from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, correlated, uniform
 from nonsmooth.recordings.signals.smoothing import savitzky_golay
-from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.picture_data import picture_data
 
@@ -78,7 +78,7 @@ def stiffness(
     for _ in range(3):
         # the force's own variance is what its residuals leave after the count's, projected by the slope
         projected = float(values[0]) ** 2 * resolution**2 / 12
-        noise = max(float(np.var(left)) - projected, 0.1 * float(np.var(left)))
+        noise = max(np.var(left) - projected, 0.1 * np.var(left))
         values, covariance, left = _linear_law(columns, force, np.full(len(force), noise + projected), lengths)
     slope, error = float(values[0]), float(np.sqrt(covariance[0, 0]))
     half = gain_limit * slope
