@@ -10,16 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.spectrum import correlation_times
 from nonsmooth.results.representation import cut, html_table
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def uniform(half_width: float) -> float:

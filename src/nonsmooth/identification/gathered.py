@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.draws import drawn_variables
 from nonsmooth.identification.compare.response import nearest_alike
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 #: Dims over which results list what they found, however much it was: the value of each and what its rows share.
 LISTS = {

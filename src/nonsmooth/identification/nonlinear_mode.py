@@ -28,16 +28,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.errors import SolveError
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,8 +108,6 @@ class NonlinearMode:
             Over ``point``: ``frequency`` (Hz), ``modal_amplitude`` and ``amplitude`` (m, that of the mode and with the
             residual), ``phase`` (rad), ``stable``. Empty where the force cannot reach the least amplitude.
         """
-        import xarray as xr
-
         least = float(self.knots[0]) if low is None else low
         u = np.sin(np.linspace(0.0, np.pi / 2, points))  # dense near the top, where both sides meet
         top = self._top(force, least)

@@ -6,18 +6,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import Answering
 from nonsmooth.identification.finding import Estimate, Finding, normal_draws
+from nonsmooth.results.provenance import ATTRIBUTE, attribute, package_version, read_provenance, with_short_record
 from nonsmooth.results.representation import cut, html_table, text_table
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 _COLUMNS = ("value", "uncertainty", "half_width", "logarithmic")
 
@@ -177,8 +175,6 @@ class ParameterSet(Answering, Mapping[str, float]):
 
     @staticmethod
     def _labelled(names: list[str], matrix: FloatArray) -> xr.DataArray:
-        import xarray as xr
-
         return xr.DataArray(matrix, coords={"parameter": names, "other": names}, dims=("parameter", "other"))
 
     def estimate(self, name: str) -> Estimate:
@@ -221,10 +217,6 @@ class ParameterSet(Answering, Mapping[str, float]):
 
     def to_dataset(self) -> xr.Dataset:
         """All numbers and texts as a Dataset that ``nonsmooth.save`` takes; the findings' pictures stay behind."""
-        import xarray as xr
-
-        from nonsmooth.results.provenance import attribute, package_version, with_short_record
-
         rows = self._rows
         data = {name: ("parameter", [getattr(row, name) for row in rows.values()]) for name in _COLUMNS}
         record = {
@@ -254,8 +246,6 @@ class ParameterSet(Answering, Mapping[str, float]):
         ValueError
             If the Dataset was not made so.
         """
-        from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
-
         record = read_provenance(dataset) if ATTRIBUTE in dataset.attrs else {}
         if record.get("verb") != "identify":
             raise ValueError("this Dataset was not made by ParameterSet.to_dataset")

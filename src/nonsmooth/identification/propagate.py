@@ -5,9 +5,10 @@ from __future__ import annotations
 import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit
@@ -20,9 +21,6 @@ from nonsmooth.results.progress import progress as watched
 from nonsmooth.system.arguments import checked, declared
 from nonsmooth.system.kinds import at_least, real_number
 from nonsmooth.system.system import System
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 COARSE = 0.02  # the largest step of draws' branches: values between points lie on a cubic
 
@@ -170,8 +168,6 @@ class _Call:
             self.options.setdefault("progress", False)
 
     def __call__(self, system: System, *, coarse: bool) -> xr.Dataset:
-        import xarray as xr
-
         first: Any = system
         if isinstance(self.start, Orbit):
             from nonsmooth.continuation.find import find_orbit

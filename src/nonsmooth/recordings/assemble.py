@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.recordings.reading import MAX_COLUMNS, Reading, Trace
 from nonsmooth.recordings.recording import Recording, examine, missing_runs, mixed_units
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: A sensor with fewer samples says next to nothing of a motion; below this a remark is made.
 SHORT = 32
@@ -77,8 +75,6 @@ def _by_clock(traces: list[Trace]) -> list[list[Trace]]:
 
 
 def _sensor(group: list[Trace], reading: Reading) -> xr.Dataset:
-    import xarray as xr
-
     first, axis = group[0], reading.axis
     where = f"run {first.run!r}, channel {first.name!r}"
     if len(group) > 1:

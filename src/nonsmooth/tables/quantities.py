@@ -8,14 +8,12 @@ and a minimum is an amplitude: ``x_amplitude``, ``contact_force_amplitude``.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.errors import unknown
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: Dims whose entries are columns of a table, not rows.
 _SPREAD = ("state", "indicator", "multiplier", "eigenvalue", "exponent", "harmonic", "memory", "component")
@@ -25,8 +23,6 @@ _INNER = ("layout",)  # what continuation goes on from
 
 def dataset_of(result: Any) -> xr.Dataset:
     """A result as a Dataset; TypeError for what is none."""
-    import xarray as xr
-
     if not isinstance(result, xr.Dataset) and hasattr(result, "to_dataset"):
         result = result.to_dataset()
     if not isinstance(result, xr.Dataset):

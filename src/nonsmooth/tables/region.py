@@ -8,18 +8,16 @@ import re
 from collections.abc import Callable, Mapping
 from functools import reduce
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 import sympy as sp
+import xarray as xr
 
 from nonsmooth.errors import shortened
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.symbolic.expressions import read_expression
 from nonsmooth.tables.quantities import dataset_of, quantities_of, quantity
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _LONGEST = 2000  # characters of a condition
 _COMPARE: dict[Any, Callable[[Any, Any], Any]] = {
@@ -78,8 +76,6 @@ def region(result: Any, condition: Annotated[str, _FORM]) -> xr.DataArray:
     >>> quiet.dims, int(quiet.sum())
     (('omega', 'rho'), 6)
     """
-    import xarray as xr
-
     data = dataset_of(result)
     known = quantities_of(data)
     tree = _parsed(condition)

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.periods import MeasuredFlip, delayed_flips, flips, measured_period, period_numbers
 from nonsmooth.identification.compare.predict import Motions
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 FINE = 201
 KEEP = 64

@@ -5,20 +5,17 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.identification.finding import Estimate
+from nonsmooth.recordings.recording import Recording
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.identification.finding import Estimate
-    from nonsmooth.recordings.recording import Recording
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 LONG = 150.0  # s: of a longer record the support and the smoother's intensity are found in its middle
 PIECE = 75.0  # s
@@ -74,8 +71,6 @@ def motion_of(
 
 def _motion(smoothed: xr.Dataset, phase: FloatArray, states: tuple[str, str] = ("x", "v")) -> xr.Dataset:
     """Position and velocity as the states of a model, over time and the phase of the drive."""
-    import xarray as xr
-
     columns = {name: np.column_stack([smoothed[k + name].values for k in "xv"]) for name in ("", "_error")}
     units = [smoothed[k].attrs["units"] for k in "xv"]
     return xr.Dataset(
@@ -116,8 +111,6 @@ def recorded_motion(
         No recording, several runs, outputs among the quantities, channels whose clocks differ, a system without a
         period.
     """
-    import xarray as xr
-
     from nonsmooth.identification.fit.records import irregularity, read_records
     from nonsmooth.identification.fit.sensors import Sensor
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.draws import Model
@@ -22,11 +23,7 @@ from nonsmooth.identification.compare.orbits import (
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.identification.compare.predict import Motions, Prediction, SteadyState, from_result, predict
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 KEEP = 128  # section points by which a predicted motion is judged
 CLOUD = 2000  # section points of a predicted motion without a period number

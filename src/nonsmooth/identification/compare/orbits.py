@@ -31,6 +31,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import linear_sum_assignment, minimize_scalar
+from scipy.spatial.distance import cdist, pdist
 
 from nonsmooth.arrays import BoolArray, FloatArray
 
@@ -141,8 +143,6 @@ class OrbitDistance:
 
 def orbit_distance(a: ArrayLike, b: ArrayLike, periods: int) -> OrbitDistance:
     """Normalised distance of two orbits, each (periods * grid, states) on equal grids of phase."""
-    from scipy.optimize import minimize_scalar
-
     x, y = np.asarray(a, float), np.asarray(b, float)
     size = np.sqrt(0.5 * (x.var(axis=0) + y.var(axis=0)))
     size = np.where(size > 0, size, 1.0)
@@ -218,8 +218,6 @@ def energy_distance(a: ArrayLike, b: ArrayLike) -> float:
 
     In one dimension it equals ``scipy.stats.energy_distance``. The clouds must be in one common unit.
     """
-    from scipy.spatial.distance import cdist
-
     x, y = _two_clouds(a, b)
     return float(_root(2 * cdist(x, y).mean() - cdist(x, x).mean() - cdist(y, y).mean()))
 
@@ -230,9 +228,6 @@ def wasserstein(a: ArrayLike, b: ArrayLike, seed: int = 0) -> float:
     For equal numbers of points this is SciPy's linear assignment, exactly; seeded parts of at most 500 points are
     taken.
     """
-    from scipy.optimize import linear_sum_assignment
-    from scipy.spatial.distance import cdist
-
     x, y = _two_clouds(a, b)
     size = min(len(x), len(y), ASSIGNED)
     rng = np.random.default_rng(seed)
@@ -246,8 +241,6 @@ def block_length(points: ArrayLike) -> int:
 
     At most a twentieth of the points, so that random halves of blocks can be drawn.
     """
-    from scipy.spatial.distance import pdist
-
     cloud = np.asarray(points, float)
     n = len(cloud)
     longest = max(1, n // FEWEST_BLOCKS)
@@ -279,8 +272,6 @@ def cloud_distance(
     block : int, optional
         Points that stay together; :func:`block_length` of ``a`` where not given.
     """
-    from scipy.spatial.distance import cdist
-
     x, y = _two_clouds(a, b)
     x, y = x[-MOST:], y[-MOST:]  # thinning would separate successive points
     length = block_length(x) if block is None else block

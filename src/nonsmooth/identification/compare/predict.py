@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.attractors.mapper import Mapper
@@ -24,11 +25,7 @@ from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.results.labels import by_code
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 SAME = 1e-6  # orbits whose points are nearer to each other than this part of the motion are one
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
@@ -13,12 +14,7 @@ from nonsmooth.diagrams.response import jumps_in
 from nonsmooth.diagrams.sweep import sweep
 from nonsmooth.identification.compare.draws import Model
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.system.system import System
-
+from nonsmooth.system.system import System
 
 STEEPER = 2.5  # a jump exceeds the steps on both sides by this factor
 LEAST = 0.02  # and this part of the amplitude

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.orbits import fold
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.identification.compare.response import jumps_of_runs
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _JUMPS = {
     "value": ("middle of the step in which the amplitude jumps", "rad/s"),
@@ -59,8 +57,6 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
         :func:`nonsmooth.frequency_response` has them: ``jump_direction``, ``jump_value``, ``jump_step``,
         ``jump_before`` and ``jump_after``.
     """
-    import xarray as xr
-
     if len(motions) != len(directions) or not len(motions):
         raise ValueError(f"{len(motions)} runs and {len(directions)} directions: each run needs its own")
     heights, errors, periods = [], [], []
@@ -121,8 +117,6 @@ def measured_rise(motion: xr.Dataset, parameter: str, first: float, last: float,
     xarray.Dataset
         ``section(iterate, state)`` at phase 0 with the parameter over ``iterate``, and ``section_error(state)``.
     """
-    import xarray as xr
-
     time, phase = motion["time"].values, motion["phase"].values
     points = fold(phase, np.column_stack([motion["u"].values, time]), 8)[:, 0]
     at = first + (last - first) * (points[:, 2] - time[0]) / (time[-1] - time[0])
@@ -158,8 +152,6 @@ def measured_sections(
         shorter run), ``section_error(state)`` and ``period_number(<parameter>)`` (0: none found, -1: too
         few turns).
     """
-    import xarray as xr
-
     order = np.argsort(values, kind="stable")
     clouds = [fold(motions[i]["phase"].values, motions[i]["u"].values, 8)[:, 0] for i in order]
     points = np.full((len(clouds), max(map(len, clouds)), clouds[0].shape[1]), np.nan)

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,9 +28,7 @@ from nonsmooth.identification.arrow import Residuals, settle
 from nonsmooth.identification.fit.first_windows import first_length, first_windows, told_start
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.recordings.recording import runs_of
-
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 
 @dataclass(frozen=True, eq=False)

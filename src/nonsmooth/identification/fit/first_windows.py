@@ -9,15 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.fit.windows import Window, Windows
-
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 _AROUND = 3  # samples on either side, from which value and slope at a sample are taken
 _SWING = 0.15  # of a quantity's range: what counts as a swing

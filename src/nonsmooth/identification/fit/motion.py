@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from nonsmooth.flow.inputs import DelayedInputs, Driven
 from nonsmooth.flow.sensitivity import apart, settled, steps_between
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
-
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 RTOL = 1e-11  # where the flow is not exact: below any noise, and below what a step of a fit changes
 

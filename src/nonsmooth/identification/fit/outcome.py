@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import Sandwich, concerned, sandwich
@@ -19,9 +20,6 @@ from nonsmooth.identification.fit.noise import OUTLYING, robust_size
 from nonsmooth.identification.fit.residuals import by_place, residual_data, steady_data
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.results.progress import Progress
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _TOGETHER = 0.98  # correlation from which two parameters are said to be known only together
 _POOR = 2.0  # residuals over noise, from which the model is said not to be the motion

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, unknown
+from nonsmooth.flow.simulate import simulate
 from nonsmooth.identification.arrow import concerned, inverted, reduced
 from nonsmooth.identification.blas import one_blas_thread
+from nonsmooth.identification.fit.first_windows import first_windows
+from nonsmooth.identification.fit.fit import problem_of
+from nonsmooth.identification.fit.sensors import read_sensors
 from nonsmooth.identification.options import Prior
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.arguments import checked
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 _OF_A_RUN = ("duration", "periods", "samples", "start", "mode", "settings")
 
@@ -96,10 +97,6 @@ def plan_experiment(
     >>> str(plan["order"].values[0])
     'long'
     """
-    import xarray as xr
-
-    from nonsmooth.identification.fit.sensors import read_sensors
-
     if not runs:
         raise TypeError("runs = {}: give the candidates by name, {'slow': {'duration': 20.0, 'samples': 2000}}")
     sensors = {name: replace(one, channel=name) for name, one in read_sensors(system, measured, []).items()}
@@ -161,10 +158,6 @@ def _information(
     known_before: Prior,
 ) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:
     """Names of the unknowns that runs share, what the run tells of them, what is known before, and their values."""
-    from nonsmooth.flow.simulate import simulate
-    from nonsmooth.identification.fit.first_windows import first_windows
-    from nonsmooth.identification.fit.fit import problem_of
-
     settings = dict(run.get("settings", {}))
     there = system.with_parameters(settings)
     motion = simulate(there, **{key: run[key] for key in run if key != "settings"})

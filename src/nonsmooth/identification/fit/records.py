@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,8 @@ from nonsmooth.identification.fit.sensors import Sensor, read_sensors
 from nonsmooth.identification.fit.steady import SteadyReadings, is_steady, read_steady
 from nonsmooth.recordings.recording import Recording
 from nonsmooth.system.kinds import float_array, real_number
+from nonsmooth.system.system import System
 from nonsmooth.system.units import read_unit
-
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
 
 FORMS = (
     "a Recording, a Dataset over time, a DataFrame with a column of time (or time as its index), a mapping of channel "

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import IntArray
 from nonsmooth.identification.fit.growth import Grown
 from nonsmooth.identification.fit.motion import SampledMotion
 from nonsmooth.results.labels import labels_of
 from nonsmooth.system.system import System
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _NEAR = 1.5  # sampling steps from a transition or a graze
 _GRAZING = 0.03  # clearance over the largest size of the indicator, below which a touch is a graze
@@ -112,8 +110,6 @@ def _table(
     words: Mapping[str, str],
 ) -> xr.Dataset:
     """Columns over ``sample`` with their units and words, those of flags, and the record of the fit."""
-    import xarray as xr
-
     from nonsmooth.results.provenance import provenance
 
     data = xr.Dataset({name: ("sample", np.concatenate([part[name] for part in parts])) for name in parts[0]})

@@ -14,21 +14,20 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
+from nonsmooth.attractors.settler import Settler
 from nonsmooth.errors import unknown
 from nonsmooth.flow.starts import start_states
 from nonsmooth.identification.fit.sensors import Sensor
 from nonsmooth.system.kinds import float_array
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.attractors.settler import Settler
-    from nonsmooth.identification.fit.motion import Marcher, SampledMotion
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 KEPT, LONGEST = 33, 16  # section points looked at, and the longest period number looked for
+if TYPE_CHECKING:
+    from nonsmooth.identification.fit.motion import Marcher, SampledMotion
+
 TRANSIENT = 300
 ROUNDING = 1e-13  # of the largest reading: none has less noise
 ROUGHLY = 0.05  # of the largest reading: the noise at first, where none is known
@@ -106,8 +105,6 @@ def is_steady(one: Any) -> bool:
 
 def of_table(system: System, one: Any, name: str) -> xr.Dataset:
     """Readings of steady states of a table, or of a mapping, as a Dataset over ``run``."""
-    import xarray as xr
-
     if isinstance(one, xr.Dataset):
         return one
     one = one.reset_index() if hasattr(one, "reset_index") else one

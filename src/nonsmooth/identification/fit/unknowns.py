@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened, unknown
 from nonsmooth.identification.fit.sensors import OF_A_SENSOR, Sensor
 from nonsmooth.system.kinds import ends, real_number
-
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 _CLOCKS = (0.9, 1.1)  # within which the time of the model over that of the recording lies
 

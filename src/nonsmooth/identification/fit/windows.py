@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,7 @@ from nonsmooth.identification.fit.sensors import Observable, Sensor
 from nonsmooth.identification.fit.steady import SteadyReadings, predicted
 from nonsmooth.identification.fit.unknowns import Unknowns
 from nonsmooth.recordings.signals.spectrum import correlation_times
-
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 
 @dataclass(frozen=True, eq=False)

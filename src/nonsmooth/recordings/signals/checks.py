@@ -7,16 +7,14 @@ Functions that take plain arrays know no names; those of a DataArray are read fr
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.recording import Recording, RecordingWarning, examine, missing_runs
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def whose(x: Any, default: str = "the signal") -> str:

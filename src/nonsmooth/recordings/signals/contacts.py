@@ -7,9 +7,10 @@ a force that the free motion does not have.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import BoolArray, FloatArray
@@ -17,9 +18,6 @@ from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal, unit_of, whose
 from nonsmooth.recordings.signals.smoothing import smooth
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def impacts(
@@ -303,8 +301,6 @@ def intervals(found: xr.Dataset, gap: float) -> tuple[FloatArray, FloatArray, Bo
 
 
 def _labelled(found: xr.Dataset, place: tuple[float, float, float], least: float, x: Any) -> xr.Dataset:
-    import xarray as xr
-
     gap, gap_error, stiffness = place
     t, position = found["time"].values, found["x"].values
     if math.isnan(gap):

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.recordings.signals.checks import unit_of, whose
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: Turns per unit of angle.
 _TURNS = {

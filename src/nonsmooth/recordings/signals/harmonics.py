@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal, whose
 from nonsmooth.recordings.signals.spectrum import correlation_times
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +107,6 @@ def fit(
     ValueError
         If the record is shorter than one period, has too few samples, or too low a rate for the highest harmonic.
     """
-    import xarray as xr
-
     if not (math.isfinite(omega) and omega > 0) or n < 1 or subharmonic < 1:
         raise ValueError(f"omega must be positive, n and subharmonic at least 1; got {omega!r}, {n!r}, {subharmonic!r}")
     t, values = signal(time, x, least=2 * n + 4, purpose=f"a fit of {n} harmonics")

@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.recording import runs_of
 from nonsmooth.recordings.signals.checks import even_rate, signal, whose
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int = 4) -> xr.Dataset:
@@ -50,8 +48,6 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
     ValueError
         If the record is too short, its rate is not even, or it holds no flight.
     """
-    import xarray as xr
-
     t, z = signal(time, height, least=12, purpose="finding flights")
     step = 1.0 / even_rate(t, height, "finding flights")
     bend = np.diff(z, 2) / step**2
@@ -165,7 +161,6 @@ def single_contacts(
 
 def impacts_of(rows: Sequence[Mapping[str, Any]], more: Mapping[str, tuple[type, str]]) -> xr.Dataset:
     """Impacts with their restitution, of rows whose velocities are (value, error); ``more``: other columns."""
-    import xarray as xr
 
     def column(name: str, kind: type, place: int | None = None) -> NDArray[Any]:
         return np.array([row[name] if place is None else row[name][place] for row in rows], kind)

@@ -9,17 +9,16 @@ vertical part before and after gives the restitution, e = -v_after / v_before (N
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import whose
 from nonsmooth.recordings.signals.restitution import impacts_of, single_contacts
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _COLUMNS = {
     "corner": (int, "row of the corner"),
@@ -160,8 +159,6 @@ class _Flight:
     """Centre and orientation on one side of an impact: a parabola of known acceleration, a constant spin."""
 
     def __init__(self, t: FloatArray, place: FloatArray, turns: Any, here: slice, fall: float) -> None:
-        from scipy.spatial.transform import Rotation
-
         self.origin = float(t[here].mean())
         s = t[here] - self.origin
         self.fall, self.spread, n = fall, float(s @ s), len(s)
@@ -179,8 +176,6 @@ class _Flight:
 
     def _arms(self, when: float, points: FloatArray) -> FloatArray:
         """Corners about the centre, in the axes of the room."""
-        from scipy.spatial.transform import Rotation
-
         turn = Rotation.from_rotvec(self.spin * (when - self.origin)) * self.middle
         return turn.apply(points)
 
@@ -197,8 +192,6 @@ class _Flight:
 
 
 def _turns(orientation: ArrayLike) -> Any:
-    from scipy.spatial.transform import Rotation
-
     q = np.asarray(orientation, float)
     length = np.linalg.norm(q, axis=-1)
     if not np.all(np.abs(length - 1.0) < 0.01):

@@ -6,19 +6,16 @@ order 3 or 5. An impact between two samples is not interpolated across: each sid
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import signal, unit_of, whose
+from nonsmooth.recordings.signals.phase import DrivePhase
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.recordings.signals.phase import DrivePhase
 
 
 class Known(TypedDict, total=False):
@@ -197,8 +194,6 @@ def _polynomial(t: FloatArray, x: FloatArray, v: FloatArray, a: FloatArray | Non
 def _points(
     between: _Between, times: FloatArray, instant_error: FloatArray, attrs: dict[str, str], *, along: bool
 ) -> xr.Dataset:
-    import xarray as xr
-
     section = between.at(times)
     error = between.error_at(times)
     moved = np.abs(between.at(times, derivative=1)) * instant_error[:, None]

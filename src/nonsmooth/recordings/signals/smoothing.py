@@ -10,19 +10,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import even_rate, signal, unit_of, whose
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 #: The derivative that is white noise, by the name of the model.
 MODELS = {"white_acceleration": 2, "white_jerk": 3, "white_snap": 4}
@@ -275,8 +272,6 @@ def labelled_motion(
     t: FloatArray, states: Iterable[FloatArray], errors: Iterable[FloatArray], impacts: FloatArray, x: Any
 ) -> xr.Dataset:
     """Position, velocity and acceleration (as many as are given) with their errors, in the unit of ``x``."""
-    import xarray as xr
-
     unit, data = unit_of(x), {}
     names = {"x": ("position", ""), "v": ("velocity", "/s"), "a": ("acceleration", "/s^2")}
     for (name, (long_name, per)), state, error in zip(names.items(), states, errors, strict=False):

@@ -9,17 +9,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import even_rate, signal, unit_of, whose
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: Ways to find a peak between lines.
 INTERPOLATIONS = ("window", "parabola", "none")
@@ -98,7 +96,6 @@ def spectrum(
     ValueError
         If the record is shorter than 16 samples, has missing values, or its rate is not even.
     """
-    import xarray as xr
     from scipy import fft
     from scipy import signal as scipy_signal
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
@@ -20,9 +21,6 @@ from nonsmooth.recordings.signals.checks import signal, unit_of, whose
 from nonsmooth.recordings.signals.harmonics import fit
 from nonsmooth.recordings.signals.spectrum import largest_line, peak, spectrum
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +127,6 @@ def steady_response(
     ValueError
         If the record is shorter than 15 periods, or values are missing.
     """
-    import xarray as xr
-
     t, values = signal(time, x, least=64, purpose="a steady response")
     name = whose(x)
     length = float(t[-1] - t[0])
