@@ -228,7 +228,7 @@ class ParameterSet(Answering, Mapping[str, float]):
             "n_parameters": len(self.estimates),
             "identifiability": dict(self.identifiability),
             "units": [row.unit for row in rows.values()],
-            "findings": [as_record(finding) for finding in self.findings],
+            "findings": [_as_record(finding) for finding in self.findings],
         }
         found = xr.Dataset(
             {**data, "covariance": (("parameter", "other"), self._covariance.copy())},
@@ -259,7 +259,7 @@ class ParameterSet(Answering, Mapping[str, float]):
             {name: rows[name] for name in names[:n]},
             dataset["covariance"].values,
             extra={name: rows[name] for name in names[n:]},
-            findings=[from_record(item) for item in record["findings"]],
+            findings=[_from_record(item) for item in record["findings"]],
             identifiability=record["identifiability"],
             notes=record["notes"],
             anomalies=record.get("anomalies", ()),
@@ -335,15 +335,13 @@ class ParameterSet(Answering, Mapping[str, float]):
         return f"ParameterSet{' (synthetic recordings)' if self.synthetic else ''}"
 
 
-def as_record(finding: Finding) -> dict[str, Any]:
-    """Return a finding as plain lists and texts, without its picture's data."""
+def _as_record(finding: Finding) -> dict[str, Any]:
     plain = {name: getattr(finding, name) for name in ("name", "method", "samples_used", "runs", "notes", "plot")}
     others = {name: list(astuple(other)) for name, other in finding.others.items()}
     return {**plain, "estimate": list(astuple(finding.estimate)), "others": others}
 
 
-def from_record(item: Mapping[str, Any]) -> Finding:
-    """Return the finding of such a record."""
+def _from_record(item: Mapping[str, Any]) -> Finding:
 
     def estimate(row: Sequence[Any]) -> Estimate:
         value, uncertainty, unit, half_width, logarithmic = row

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate
+from nonsmooth_savi2007.arrays import FloatArray
 
 APERIODIC = 0  # no period found up to the longest looked for
 UNSETTLED = -1  # the transient did not decide it
@@ -32,8 +32,7 @@ def motion_word(number: int) -> str:
     return "chaos" if number == APERIODIC else f"period {number}"
 
 
-@dataclass(frozen=True)
-class Interval:
+class Interval(NamedTuple):
     """Something that lies between two neighbouring points of a sweep."""
 
     low: float

@@ -19,14 +19,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from nonsmooth import SolveError
-from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, uniform
+from nonsmooth_savi2007.arrays import FloatArray
 
 _ROUNDS = 50
 _CONVERGED = 1e-6  # of a standard uncertainty
@@ -76,8 +76,7 @@ _FIRST: Sequence[tuple[str, tuple[str, ...], Callable[..., float]]] = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Observation:
+class Observation(NamedTuple):
     """Values measured together: names of `LAWS`, values, covariance."""
 
     names: tuple[str, ...]

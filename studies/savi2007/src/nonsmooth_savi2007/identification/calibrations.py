@@ -19,9 +19,9 @@ import xarray as xr
 from scipy.optimize import brentq
 from scipy.special import ndtri
 
-from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, uniform
 from nonsmooth.recordings.signals.phase import drive_phase
+from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.steady import harmonics_of
 

@@ -40,9 +40,9 @@ import xarray as xr
 from scipy.signal import zoom_fft
 
 from nonsmooth import SolveError
-from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
+from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit, free_decay
 from nonsmooth_savi2007.identification.picture_data import picture_data
@@ -276,7 +276,7 @@ def log_decrement(time: FloatArray, x: FloatArray, rest: float, *, resolution: f
             rows.append((time[i] + at, abs(c0 + c1 * at + c2 * at**2)))
     found = np.array(rows).reshape(-1, 2)
     # a parabola through five samples has 0.7 of one sample's error at its top
-    return found[:, 0], found[:, 1], np.full(len(found), 0.7 * resolution / np.sqrt(12))
+    return *found.T, np.full(len(found), 0.7 * resolution / np.sqrt(12))
 
 
 def decay_rate(t: FloatArray, height: FloatArray, error: FloatArray) -> tuple[float, float, float]:

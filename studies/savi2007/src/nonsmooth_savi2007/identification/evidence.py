@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from nonsmooth import Recording
-from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import unknown
 from nonsmooth.recordings import PROCEDURES, SETTINGS, Quantity, Session, load_session
 from nonsmooth.recordings.signals.checks import take
 from nonsmooth.recordings.signals.displacement import position
+from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.directions import oriented
 
 #: Channels that a procedure cannot do without.

@@ -20,7 +20,6 @@ References: J.P. Den Hartog, Trans. ASME 53 (1931) 107; B.F. Feeny and J.W. Lian
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
@@ -28,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
-from nonsmooth.arrays import FloatArray
+from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.cross_checks import Consistent, consistent
 from nonsmooth_savi2007.identification.evidence import Run
 
@@ -56,8 +55,7 @@ class Decay(NamedTuple):
         return self.run.positions[self.first : self.last]
 
 
-@dataclass(frozen=True, eq=False)
-class DecayFit:
+class DecayFit(NamedTuple):
     r"""Outcome of `free_decay`: :math:`\omega_0`, b = c/m, f = F_C/m, and the place of rest x_e in the sensor's count.
 
     ``values`` and ``covariance`` are in the order ``omega_0, b, f, x_e``; ``fit`` is what :func:`nonsmooth.fit` found.

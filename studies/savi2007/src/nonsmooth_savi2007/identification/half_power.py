@@ -25,9 +25,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
+from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.picture_data import picture_data
 from nonsmooth_savi2007.identification.steady import Steady
 

@@ -24,19 +24,18 @@ A contact is eight samples, and none shows :math:`c_s/k_s`, half a millisecond: 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from scipy.special import ndtri
 
 from nonsmooth import ParameterSet, Sensor, SolveError, System, elements, fit, mechanical
-from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth.recordings import Quantity
 from nonsmooth.recordings.signals.phase import DrivePhase, drive_phase
+from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 from nonsmooth_savi2007.identification.free_decay import DecayFit
 from nonsmooth_savi2007.identification.picture_data import picture_data
@@ -51,8 +50,7 @@ _TRIED = 5  # windows with one contact, of which the median one is shown
 _FAR = 1.5  # times the sensor's noise: residuals of a run that is not of this law
 
 
-@dataclass(frozen=True, eq=False)
-class ContactFit:
+class ContactFit(NamedTuple):
     """Outcome: ``kappa`` = k_s/m, ``gamma`` = c_s/m, and for each run the gap and the place of the swing.
 
     ``values`` and ``covariance``: those that are `SHARED`, then per run its `OWN`; ``fits``: each run alone;
@@ -86,8 +84,12 @@ class ContactFit:
     @property
     def n_contacts(self) -> int:
         """Number of contacts in what is fitted."""
-        above = [one.residuals["fitted"].values > self.values[self.place(i, 0)] for i, one in enumerate(self.fits)]
-        return sum(int(np.count_nonzero(np.diff(each.astype(int)) > 0)) for each in above)
+        return sum(self._met(i, slice(None)) for i in range(len(self.fits)))
+
+    def _met(self, run: int, samples: Any) -> int:
+        """Number of contacts that begin among some samples of a run's fit."""
+        above = self.fits[run].residuals["fitted"].values[samples] > self.values[self.place(run, 0)]
+        return int(np.count_nonzero(~above[:-1] & above[1:]))
 
     def single(self) -> list[tuple[int, float, float]]:
         """Run, first and last time (s) of each window with one contact."""
@@ -96,8 +98,7 @@ class ContactFit:
             data = one.residuals
             for k in np.unique(data["window"].values):
                 mine = data["window"].values == k
-                above = data["fitted"].values[mine] > self.values[self.place(i, 0)]
-                if np.count_nonzero(np.diff(above.astype(int)) > 0) == 1:
+                if self._met(i, mine) == 1:
                     time = data["time"].values[mine]
                     found.append((i, float(time[0]), float(time[-1])))
         return found

@@ -15,13 +15,12 @@ Where the car rests and about which place it swings comes from one function, :fu
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from nonsmooth.arrays import FloatArray
 from nonsmooth.identification import Estimate, Finding, uniform
+from nonsmooth_savi2007.arrays import FloatArray
 from nonsmooth_savi2007.identification.adjustment import Adjusted
 from nonsmooth_savi2007.identification.cross_checks import consistent
 from nonsmooth_savi2007.identification.evidence import Evidence
@@ -220,8 +219,7 @@ def counted_gap(contacts: ContactFit, reading: float) -> CountedGap | None:
     return CountedGap(counted, float(np.sqrt(square)), index, weight, tuple(notes))
 
 
-@dataclass(frozen=True, eq=False)
-class Referred:
+class Referred(NamedTuple):
     """The gap, and how it varies together with what else is identified.
 
     Attributes

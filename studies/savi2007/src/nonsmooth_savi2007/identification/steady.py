@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.recordings.signals.harmonics import HarmonicFit
 from nonsmooth.recordings.signals.harmonics import fit as harmonic_fit
 from nonsmooth.recordings.signals.phase import drive_phase
+from nonsmooth_savi2007.arrays import ComplexArray, FloatArray
 from nonsmooth_savi2007.identification.evidence import Run
 
 HARMONICS = 3

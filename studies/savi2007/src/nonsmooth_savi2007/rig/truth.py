@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -116,7 +117,7 @@ def awkward(seed: int) -> dict[str, float]:
     return {name: float(value) for name, value in found.items()}
 
 
-def switched(truth: Mapping[str, float], given: Mapping[str, float], off: Iterable[str]) -> dict[str, float]:
+def switched(truth: Mapping[str, float], given: Mapping[str, Any], off: Iterable[str]) -> dict[str, float]:
     """The truth with the values of ``given`` put in, and without the features that are off.
 
     Raises
@@ -128,7 +129,9 @@ def switched(truth: Mapping[str, float], given: Mapping[str, float], off: Iterab
     for name, value in given.items():
         if name not in UNITS:
             raise ValueError(unknown(name, "a part of the truth", "a virtual rig", UNITS))
-        result[name] = value
+        if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
+            raise TypeError(f"truth[{name!r}] = {value!r} must be a number")
+        result[name] = float(value)
     for feature in off:
         result |= FEATURES[feature]
     _check(result)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,8 +15,6 @@ import xarray as xr
 from nonsmooth import Recording, System
 from nonsmooth.errors import unknown
 from nonsmooth.recordings import PROCEDURES
-from nonsmooth.system.arguments import checked
-from nonsmooth.system.kinds import at_least
 from nonsmooth_savi2007.rig import driven, figures, hand, motor, sensors
 from nonsmooth_savi2007.rig.live import LiveRig
 from nonsmooth_savi2007.rig.notebook import write_session
@@ -27,7 +25,6 @@ from nonsmooth_savi2007.rig.truth import FEATURES, HOLDING, NOMINAL_GAP, awkward
 IDENTIFICATION = ("springs", "support", "impulse", "response", "drop", "voltage", "crank", "grazing", "contact")
 
 
-@checked
 @dataclass(frozen=True, eq=False)
 class VirtualRig:
     """A rig whose parameters are known, to try on it what is to be done on a real one. All it records is synthetic.
@@ -59,7 +56,7 @@ class VirtualRig:
         reads 1.8 mm.
     """
 
-    seed: Annotated[int, at_least(0)] = 0
+    seed: int = 0
     truth: Mapping[str, float] = field(default_factory=dict)
     ripple: bool = True
     string: bool = True
@@ -72,6 +69,13 @@ class VirtualRig:
     holding: bool = False
 
     def __post_init__(self) -> None:
+        if not isinstance(self.truth, Mapping):
+            raise TypeError(f"truth must map names to numbers, got {self.truth!r}")
+        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
+            raise ValueError(f"seed = {self.seed!r} must be a whole number, zero or more")
+        for name in (*FEATURES, "holding"):
+            if not isinstance(getattr(self, name), bool):
+                raise TypeError(f"{name} = {getattr(self, name)!r}: a feature is on (True) or off (False)")
         held = {"creep_velocity": HOLDING} if self.holding else {}
         truth = switched(drawn(self.seed), {**self.truth, **held}, [name for name in FEATURES if name not in self.on])
         object.__setattr__(self, "truth", MappingProxyType(truth))
