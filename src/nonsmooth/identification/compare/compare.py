@@ -180,8 +180,6 @@ def _settings(theory: Any, parameters: Any, given: Any) -> dict[str, Any]:
     """The settings of a System; a result at hand takes none."""
     if isinstance(theory, System):
         return read_settings(given, theory)
-    if not isinstance(theory, xr.Dataset):
-        raise TypeError(f"theory must be a System or a result, not {type(theory).__name__}")
     if parameters is not None or given:
         raise ValueError("parameters and settings change a System; this theory is a result that is at hand already")
     return {}
