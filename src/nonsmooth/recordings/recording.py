@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -31,8 +31,7 @@ _CHANGE = 0.05  # of the rate, between blocks
 _GAP = 1.5  # steps; a longer one is a gap
 
 
-@dataclass(frozen=True)
-class Sampling:
+class Sampling(NamedTuple):
     """``rate`` in Hz (NaN for fewer than two distinct times); ``gaps`` as (index before, samples missing)."""
 
     rate: float

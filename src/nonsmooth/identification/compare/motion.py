@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -196,7 +195,7 @@ def _begun_with_the_measurement(
         return predicted
     at = np.empty(len(motions.places))
     at[motions.places] = whole[0, 0]
-    return replace(predicted, orbit=motions.orbit(0, SteadyState(0, at), len(whole)))
+    return predicted._replace(orbit=motions.orbit(0, SteadyState(0, at), len(whole)))
 
 
 def _shown(folded: FloatArray) -> FloatArray:

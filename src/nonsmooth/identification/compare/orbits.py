@@ -26,8 +26,7 @@ single points would be closer than two records are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -118,8 +117,7 @@ def mean_orbit(folded: ArrayLike, period_number: int) -> tuple[FloatArray, Float
     return stacked.mean(axis=0), scatter
 
 
-@dataclass(frozen=True)
-class OrbitDistance:
+class OrbitDistance(NamedTuple):
     """Distances of two orbits.
 
     Attributes
@@ -179,8 +177,7 @@ MOST = 3000  # points of one cloud, the last ones: the matrix of distances grows
 ASSIGNED = 500  # points of each cloud in the assignment that gives the Wasserstein distance
 
 
-@dataclass(frozen=True)
-class CloudDistance:
+class CloudDistance(NamedTuple):
     """Energy distances (the root E, in units of ``scale``) and what the clouds' own halves give.
 
     Attributes

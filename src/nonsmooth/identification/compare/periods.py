@@ -25,7 +25,6 @@ drifting.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -37,8 +36,7 @@ BOUND = 2.0  # of r_p: the stated noise may be wrong by as much before a period 
 FEWEST_RETURNS = 4
 
 
-@dataclass(frozen=True)
-class MeasuredPeriod:
+class MeasuredPeriod(NamedTuple):
     """Period number (0: none found) with the scaled returns r_1, r_2, ... it rests on."""
 
     number: int

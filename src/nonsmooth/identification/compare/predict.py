@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -30,8 +29,7 @@ from nonsmooth.system.system import System
 SAME = 1e-6  # orbits whose points are nearer to each other than this part of the motion are one
 
 
-@dataclass(frozen=True)
-class SteadyState:
+class SteadyState(NamedTuple):
     """A steady motion: period number (0: none found), and a section point on it at phase 0."""
 
     period_number: int
@@ -163,8 +161,7 @@ EXACT = 1e-6  # noise of a computed section point, in parts of the motion's size
 SHOWN = 16  # forcing periods of a motion without a period number that are kept for the overlays
 
 
-@dataclass(frozen=True)
-class Prediction:
+class Prediction(NamedTuple):
     """One motion as the theory has it.
 
     Attributes
@@ -183,7 +180,7 @@ class Prediction:
     period_number: int
     sections: list[FloatArray]
     orbit: FloatArray | None
-    coexisting: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    coexisting: IntArray
     attractor: SteadyState | None = None
 
 

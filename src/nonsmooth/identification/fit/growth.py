@@ -239,7 +239,7 @@ def _final(stage: Stage, irregular: FloatArray, rounds: int) -> Grown:
         steady = tuple(
             one.with_noise(*problem.of_steady(theta, i)[:2], len(theta)) for i, one in enumerate(problem.steady)
         )
-        ratios = [one.noise / old.noise for one, old in zip((*steady,), before.steady, strict=True)]
+        ratios = [one.noise / old.noise for one, old in zip(steady, before.steady, strict=True)]
         moves = [np.concatenate([noise / before.noise, *ratios]) - 1.0, colour - before.colour]
         changed = float(np.max(np.abs(np.concatenate(moves)), initial=0.0))
         problem = replace(problem, noise=noise, steady=steady)

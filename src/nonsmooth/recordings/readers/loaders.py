@@ -86,8 +86,8 @@ def _wave(data: bytes, reading: Reading) -> Loaded:
         reading.say(f"SciPy: {warning.message}"[:200])
     kind = samples.dtype
     if kind.kind in "iu":  # as parts of full scale, as audio programs show them
-        half = 128.0 if kind.kind == "u" else float(-np.iinfo(kind).min)
-        samples = (samples - (128.0 if kind.kind == "u" else 0.0)) / half
+        least, half = np.iinfo(kind).min, 0.5 * (np.iinfo(kind).max - np.iinfo(kind).min + 1)
+        samples = (samples - (least + half)) / half
     columns = samples.reshape(len(samples), -1)
     reading.say("values are parts of full scale; multiply by what full scale stands for")
     names = [f"channel {k + 1}" for k in range(columns.shape[1])]

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,8 +48,7 @@ class GapOffset(NamedTuple):
     held: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class GapReference:
+class GapReference(NamedTuple):
     r"""Reference of the screw's reading and of the sensor's count.
 
     Attributes

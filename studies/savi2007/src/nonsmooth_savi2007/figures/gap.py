@@ -204,8 +204,7 @@ def _draw_16(canvas: Canvas, data: Datasets) -> None:
     def cell(ax: Axes, i: int, j: int) -> None:
         points = result[f"{list(SIDES)[i]}_section"].isel(section_phase=j).values
         ax.plot(
-            points[:, 0],
-            points[:, 1],
+            *points.T,
             ".",
             color=COLORS[("first", "section")[i]],
             markersize=1.4,

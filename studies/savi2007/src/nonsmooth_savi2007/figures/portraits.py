@@ -125,4 +125,4 @@ def twins(flow: Flow, system: System, attractor: xr.Dataset) -> xr.Dataset:
     chosen = points[np.linspace(0, len(points) - 1, PAIRS).astype(int)]
     beside = chosen + np.array([APART[flow.key], 0.0])
     options = flow.options if flow is EXACT else {**flow.options, "rtol": 1e-9}
-    return poincare(system, start=[list(map(float, u)) for u in (*chosen, *beside)], n=RETURNS, **options)
+    return poincare(system, start=np.vstack([chosen, beside]).tolist(), n=RETURNS, **options)

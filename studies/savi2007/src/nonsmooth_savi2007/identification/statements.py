@@ -20,8 +20,8 @@ from nonsmooth_savi2007.identification.referral import Referred
 _RESTS_ON = {
     "m": "the notebook's mass",
     "k": "impulse (taps) or springs (pulls)",
-    "c": "impulse (taps)",
     "k_s": "support (pushes), drop or contact",
+    "c": "impulse (taps)",
     "c_s": "drop or contact",
     "g": "contact, impulse, and support or drop",
 }
@@ -140,7 +140,6 @@ def require(found: ParameterSet, names: Iterable[str]) -> None:
             raise ValueError(f"{name!r} was not identified: it needs {_RESTS_ON[name]}; {lacking or 'see the notes'}")
 
 
-_PARAMETERS = ("m", "k", "k_s", "c", "c_s", "g")
 _BESIDE = ("friction", "gain", "omega_0", "gap_at_rest", "mean_shift", "rest_position")
 
 
@@ -175,7 +174,7 @@ def joined(
     if gap is not None:
         matrix[size:, :size], matrix[:size, size:], matrix[size:, size:] = gap.cross, gap.cross.T, gap.covariance
         told |= {name: (one, row) for (name, one), row in zip(gap.estimates.items(), unit[size:], strict=True)}
-    inner, outer = ([name for name in some if name in told] for some in (_PARAMETERS, _BESIDE))
+    inner, outer = ([name for name in some if name in told] for some in (_RESTS_ON, _BESIDE))
     jacobian = np.array([told[name][1] for name in (*inner, *outer)])
     return ParameterSet(
         {name: told[name][0] for name in inner},

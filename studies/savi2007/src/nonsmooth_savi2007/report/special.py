@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -17,8 +17,7 @@ _NAMES = {"fold": "fold", "flip": "flip", "grazing": "grazing", "neimark_sacker"
 _UNITS = {"omega": ("rad/s", 8), "rho": ("N", 8), "g": ("m", 11)}  # decimals: eight digits at least
 
 
-@dataclass(frozen=True)
-class SpecialPoint:
+class SpecialPoint(NamedTuple):
     """One point: its figure and branch, its value, its largest multiplier (at a graze that without the contact).
 
     ``contact``: the largest multiplier with the contact, in the limit; ``closed``: the value in closed form.

@@ -7,8 +7,7 @@ which the car first touches from listening.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -23,8 +22,7 @@ if TYPE_CHECKING:
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
 
-@dataclass(frozen=True)
-class SteadyRun:
+class SteadyRun(NamedTuple):
     """One steady run: voltage (V), crank length and gap at the screw (m; None: no support), and what to note.
 
     ``release`` is where the car is held and let go (m), the motor running; None: it begins at rest.
