@@ -86,7 +86,7 @@ def test_derivatives_are_those_of_differences(system, start, measured, names):
     problem = problem.of(first_windows(problem, theta, np.inf, begin, True))
     (window,), starts = problem.pieces, problem.starts
     assert window.last == len(t)  # one window
-    state = problem.derivatives(theta, starts)
+    state = problem.residuals(theta, starts, True)
     n = len(window.readings[0])
 
     def readings(theta, starts):

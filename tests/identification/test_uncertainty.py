@@ -11,8 +11,6 @@ from nonsmooth.identification.finding import (
     Estimate,
     correlated,
     coverage_factor,
-    factor_interval,
-    interval,
     uniform,
 )
 from nonsmooth.identification.fit.likelihood import limits_of
@@ -22,20 +20,20 @@ from nonsmooth.recordings.signals.spectrum import correlation_times
 def test_uniform_and_normal_limits():
     assert uniform(1.0) == pytest.approx(1 / np.sqrt(3))
     assert coverage_factor(0.95) == pytest.approx(1.959964, abs=1e-6)
-    assert interval(0.0, 1.0)[1] == pytest.approx(1.959964, abs=1e-6)
-    assert interval(0.0, 0.0, 1.0)[1] == pytest.approx(0.95)
+    assert Estimate(0.0, 1.0).interval()[1] == pytest.approx(1.959964, abs=1e-6)
+    assert Estimate(0.0, uniform(1.0), half_width=1.0).interval()[1] == pytest.approx(0.95)
 
 
 def test_uniform_and_normal_together_hold_what_they_say():
     rng = np.random.default_rng(1)
-    low, high = interval(0.0, 0.5, 1.0)
+    low, high = Estimate(0.0, np.hypot(0.5, uniform(1.0)), half_width=1.0).interval()
     drawn = 0.5 * rng.standard_normal(400_000) + rng.uniform(-1, 1, 400_000)
     assert np.mean((drawn > low) & (drawn < high)) == pytest.approx(0.95, abs=0.002)
 
 
 def test_a_factor():
-    low, high, factor = factor_interval(2.0, np.log(2) / 1.959964)
-    assert (low, high, factor) == pytest.approx((1.0, 4.0, 2.0), rel=1e-6)
+    doubled = Estimate(2.0, 2 * np.log(2) / 1.959964, logarithmic=True)
+    assert (*doubled.interval(), doubled.factor) == pytest.approx((1.0, 4.0, 2.0), rel=1e-6)
     assert Estimate(2.0, 0.4, logarithmic=True).factor == pytest.approx(np.exp(1.959964 * 0.2))
     for value in (0.0, -2.0):  # no factor holds it
         own, plain = Estimate(value, 0.4, logarithmic=True), Estimate(value, 0.4)
@@ -70,7 +68,7 @@ def test_parameters_known_mainly_together_keep_the_uncertainty_of_white_residual
         state = Residuals([r], [table], [np.zeros((n, 1))])
         problem = SimpleNamespace(
             pieces=[piece],
-            derivatives=lambda theta, starts, now=state: now,
+            residuals=lambda theta, starts, slopes, now=state: now,
             weights=lambda state: [np.ones(n)],
             unknowns=SimpleNamespace(precision=np.zeros((2, 2))),
         )
@@ -84,14 +82,14 @@ def test_a_fit_whose_minimum_no_step_reaches_is_refused():
     """Derivatives of the wrong sign: the minimum at 1 seems a hundred standard uncertainties away, the other way."""
     piece = SimpleNamespace(which=np.arange(1), n_free=0)
 
-    def state(theta, starts):
+    def state(theta, starts, slopes=False):
         return Residuals([np.full(4, theta[0] - 1.0)], [np.ones((4, 1))], [np.zeros((4, 1))])
 
     unknowns = SimpleNamespace(
         low=np.array([-np.inf]), high=np.array([np.inf]), centre=np.zeros(1), precision=np.zeros((1, 1))
     )
     problem = SimpleNamespace(
-        pieces=[piece], unknowns=unknowns, residuals=state, derivatives=state, weights=lambda state: [np.full(4, 50.0)]
+        pieces=[piece], unknowns=unknowns, residuals=state, weights=lambda state: [np.full(4, 50.0)]
     )
     with pytest.raises(Unsettled, match="no step lowers the sum of squares") as refused:
         settle(problem, np.zeros(1), np.zeros((1, 1)))

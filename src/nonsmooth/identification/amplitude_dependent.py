@@ -21,21 +21,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.blas import one_blas_thread
 from nonsmooth.identification.finding import Estimate, Finding
 from nonsmooth.identification.nonlinear_mode import FEWEST_CURVES, NonlinearMode, ResponseFit, interpolation
+from nonsmooth.recordings.recording import Recording
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.recordings.recording import Recording
 
 _POWERS = {"m": 0, "m/s": 1, "m/s^2": 2, "m/s²": 2}
 _METHOD = "forced responses fitted along their curves by one mode with amplitude-dependent frequency and damping"
@@ -92,11 +89,11 @@ def response_curves(
         (axis,) = size.dims
         if axis != "frequency":
             raise ValueError(f"run {run!r}: stands over {axis!r}; read it with load_recording(..., axis='frequency')")
-        f = np.asarray(size["frequency"].values, dtype=np.float64)
+        f = np.asarray(size["frequency"].values, float)
         beside: list[FloatArray | None] = []
         for name, unit in ((force, "N"), (phase, "rad")):
             at = None if name is None else take(recording, name, run, units=(unit,), samples=3).values
-            beside.append(None if at is None else np.asarray(at, dtype=np.float64))
+            beside.append(None if at is None else np.asarray(at, float))
         power = _POWERS[size.attrs["units"]]
         curves.append(ResponseCurve(run, f, np.asarray(size.values) / (2 * np.pi * f) ** power, *beside))
     return tuple(curves)
@@ -175,8 +172,6 @@ def _data(
     fit: ResponseFit, grid: FloatArray, natural: tuple[FloatArray, FloatArray], damping: tuple[FloatArray, FloatArray]
 ) -> xr.Dataset:
     """Data of the pictures; the backbone as values and errors over the grid."""
-    import xarray as xr
-
     slope, (f, f_error), (zeta, zeta_error), own = fit.slopes(), natural, damping, fit.own()
     rows: dict[str, Any] = {} if fit.force is None else {"force": ("point", fit.force, {"units": "N"})}
     rows |= {

@@ -12,13 +12,16 @@ within a piece.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.finding import newey_west, not_below
+
+if TYPE_CHECKING:
+    from nonsmooth.identification.fit.windows import Windows
 
 _LEAST = 1e-13  # eigenvalue of the scaled normal matrix from which a direction counts as determined
 _SETTLED = 1e-3  # of a standard uncertainty
@@ -46,27 +49,6 @@ class Residuals:
         return sum(each, float(self.alone @ self.alone))
 
 
-class Problem(Protocol):
-    """Problem that the iteration and the covariance take: pieces, each with its start, and their residuals."""
-
-    @property
-    def pieces(self) -> Any:
-        """Each with ``which``, ``n_free``, ``by_instant`` and ``correlation``."""
-
-    @property
-    def unknowns(self) -> Any:
-        """With the bounds ``low`` and ``high``, and the ``precision`` of what is known about ``centre``."""
-
-    def residuals(self, theta: FloatArray, starts: FloatArray) -> Residuals:
-        """Residuals of all pieces."""
-
-    def derivatives(self, theta: FloatArray, starts: FloatArray) -> Residuals:
-        """The same with derivatives in the parameters of each piece and in its start."""
-
-    def weights(self, state: Residuals) -> list[FloatArray]:
-        """One over each residual's standard deviation."""
-
-
 class Unsettled(SolveError):
     """A fit that did not settle; ``distance``: how far its minimum seems, in standard uncertainties.
 
@@ -82,7 +64,7 @@ class Unsettled(SolveError):
 
 
 def reduced(
-    problem: Problem, state: Residuals, weights: list[FloatArray], p: int, used: Any = None, damping: float = 0.0
+    problem: Windows, state: Residuals, weights: list[FloatArray], p: int, used: Any = None, damping: float = 0.0
 ) -> tuple[Any, ...]:
     """Normal equations without the starts, and what gives the starts' steps back; ``damping`` is that of the starts.
 
@@ -102,9 +84,8 @@ def reduced(
         table = np.zeros((len(r) + n, n + m + 1))
         table[: len(r)] = np.column_stack([s / size, g, r])
         table[range(len(r), len(r) + n), range(n)] = np.sqrt(_RIDGE**2 + damping)
-        factor = np.asarray(np.linalg.qr(table, mode="r"))
-        inverse = np.linalg.inv(factor[:n, :n]) / size[:, None]
-        back.append((inverse, factor[:n, n : n + m], factor[:n, n + m]))
+        factor: Any = np.linalg.qr(table, mode="r")
+        back.append((np.linalg.inv(factor[:n, :n]) / size[:, None], factor[:n, n : n + m], factor[:n, n + m]))
         if used is None or used[i]:
             left, rest = factor[n:, n : n + m], factor[n:, n + m]
             left[:, np.linalg.norm(left, axis=0) < _TOLD * np.linalg.norm(g, axis=0)] = 0.0
@@ -120,8 +101,7 @@ def inverted(matrix: FloatArray, damping: float = 0.0) -> tuple[FloatArray, Floa
     """
     scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     scale[scale == 0.0] = 1.0  # what nothing depends on is a direction of its own
-    shrunk = matrix / np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(shrunk)
+    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
     known = values > _LEAST
     inverse = (vectors[:, known] / (values[known] + damping)) @ vectors[:, known].T / np.outer(scale, scale)
     return inverse, vectors[:, ~known]
@@ -133,7 +113,7 @@ def concerned(directions: FloatArray) -> BoolArray:
 
 
 def settle(
-    problem: Problem,
+    problem: Windows,
     theta: FloatArray,
     starts: FloatArray,
     used: Any = None,
@@ -153,7 +133,7 @@ def settle(
     """
     u, damping, iterations = problem.unknowns, 1e-4, 30 if rough else 50
     prior = u.precision if known is None else known
-    state = problem.derivatives(theta, starts)
+    state = problem.residuals(theta, starts, True)
     weights = problem.weights(state)
 
     def cost(now: Residuals, at: FloatArray) -> float:
@@ -211,7 +191,7 @@ def settle(
                     "uncertainties away; look at the records for jumps"
                 )
         theta, starts, gain, best = theta + step, moved, best - found, found
-        state = problem.derivatives(theta, starts)
+        state = problem.residuals(theta, starts, True)
         # by the undamped step: a damped one is short wherever it is taken
         distance, rest = undamped()
         far = float(np.max(distance))
@@ -237,10 +217,10 @@ class Sandwich(NamedTuple):
     back: list[Any]
 
 
-def sandwich(problem: Problem, theta: FloatArray, starts: FloatArray) -> Sandwich:
+def sandwich(problem: Windows, theta: FloatArray, starts: FloatArray) -> Sandwich:
     """Covariance of the parameters at the best fit, never smaller along any than that of white residuals."""
     p, prior = len(theta), problem.unknowns.precision
-    state = problem.derivatives(theta, starts)
+    state = problem.residuals(theta, starts, True)
     weights = problem.weights(state)
     normal, _, back = reduced(problem, state, weights, p)
     J, tau, rows = state.of_alone.reshape(-1, p), [1.0] * (not problem.pieces), len(state.alone)

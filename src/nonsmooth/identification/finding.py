@@ -10,16 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.spectrum import correlation_times
 from nonsmooth.results.representation import cut, html_table
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def uniform(half_width: float) -> float:
@@ -35,7 +33,7 @@ def uniform(half_width: float) -> float:
     return float(half_width) / np.sqrt(3.0)
 
 
-def coverage_factor(level: float = 0.95) -> float:
+def coverage_factor(level: float) -> float:
     """Number of standard uncertainties that hold a normal quantity with this probability: 1.96 for 0.95."""
     from scipy.special import ndtri
 
@@ -44,22 +42,9 @@ def coverage_factor(level: float = 0.95) -> float:
     return float(ndtri(0.5 + level / 2))
 
 
-def interval(value: float, normal: float, half_width: float = 0.0, level: float = 0.95) -> tuple[float, float]:
-    """Symmetric interval of a normal quantity plus an independent uniform one, from their exact convolution.
+def reach_of(normal: float, half_width: float, level: float) -> float:
+    """Half the symmetric interval of a normal quantity plus an independent uniform one, from their exact convolution.
 
-    Parameters
-    ----------
-    value : float
-        The estimate.
-    normal : float
-        Standard uncertainty of the normal part.
-    half_width : float
-        Half width of the uniform part; 0: none.
-    level : float
-        Probability of the interval.
-
-    Notes
-    -----
     With z = r/s, w = a/s: P(|.| < r) = [M(z + w) - M(z - w)] / w - 1 with M(u) = u Phi(u) + phi(u), the integral of
     the normal distribution function.
     """
@@ -67,31 +52,17 @@ def interval(value: float, normal: float, half_width: float = 0.0, level: float 
     from scipy.special import ndtr
 
     if half_width < 1e-6 * normal or half_width == 0:
-        reach = coverage_factor(level) * normal
-    elif normal < 1e-6 * half_width:
-        reach = level * half_width
-    else:
-        w = half_width / normal
+        return coverage_factor(level) * normal
+    if normal < 1e-6 * half_width:
+        return level * half_width
+    w = half_width / normal
 
-        def integral(u: float) -> float:
-            return u * float(ndtr(u)) + float(np.exp(-u * u / 2)) / np.sqrt(2 * np.pi)
+    def excess(z: float) -> float:
+        u = np.array([z + w, z - w])
+        above, below = u * ndtr(u) + np.exp(-u * u / 2) / np.sqrt(2 * np.pi)
+        return float((above - below) / w - 1.0 - level)
 
-        def excess(z: float) -> float:
-            return (integral(z + w) - integral(z - w)) / w - 1.0 - level
-
-        reach = normal * float(brentq(excess, 0.0, w + 10.0, xtol=1e-10))
-    return value - reach, value + reach
-
-
-def factor_interval(value: float, relative: float, level: float = 0.95) -> tuple[float, float, float]:
-    """Interval of a positive quantity whose logarithm is normal: (low, high, factor), low = value / factor.
-
-    ``relative`` is the standard uncertainty of the logarithm.
-    """
-    if value <= 0:
-        raise ValueError(f"value = {value!r}: only a positive quantity can be known to a factor")
-    factor = float(np.exp(coverage_factor(level) * relative))
-    return value / factor, value * factor, factor
+    return normal * float(brentq(excess, 0.0, w + 10.0, xtol=1e-10))
 
 
 def normal_draws(mean: Any, covariance: FloatArray, n: int, seed: Any, logarithmic: Any = False) -> FloatArray:
@@ -162,13 +133,11 @@ def correlated(jacobian: Any, residuals: Any, pieces: Sequence[int] | None = Non
     scale = np.linalg.norm(j, axis=0)
     scale[scale == 0] = 1.0
     inverse = np.linalg.pinv((j / scale).T @ (j / scale))
-    white = inverse * float(r @ r) / max(n - p, 1)
+    white = inverse * (r @ r) / max(n - p, 1)
     meat, ends = np.zeros((p, p)), np.cumsum(lengths)[:-1]
     for left, score in zip(np.split(r, ends), np.split(j / scale * r[:, None], ends), strict=True):
         meat += newey_west(score, correlation_times(left))
-    found = not_below(inverse @ meat @ inverse * n / max(n - p, 1), white)
-    result: FloatArray = found / np.outer(scale, scale)
-    return result
+    return not_below(inverse @ meat @ inverse * n / max(n - p, 1), white) / np.outer(scale, scale)
 
 
 @dataclass(frozen=True)
@@ -226,22 +195,26 @@ class Estimate:
     @property
     def factor(self) -> float:
         """The factor by which the value is uncertain at 95 %."""
-        return factor_interval(self.value, self.relative)[2]
+        return self._factor(0.95)
+
+    def _factor(self, level: float) -> float:
+        return float(np.exp(coverage_factor(level) * self.relative))
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """The interval that holds the quantity with this probability."""
         if self.logarithmic and self.value > 0:
-            return factor_interval(self.value, self.relative, level)[:2]
+            factor = self._factor(level)
+            return self.value / factor, self.value * factor
         normal = np.sqrt(max(self.uncertainty**2 - self.half_width**2 / 3, 0.0))
-        return interval(self.value, float(normal), self.half_width, level)
+        reach = reach_of(float(normal), self.half_width, level)
+        return self.value - reach, self.value + reach
 
     def __str__(self) -> str:
         unit = f" {self.unit}" if self.unit else ""
         if self.logarithmic and self.value > 0:
             return f"{self.value:.4g}{unit} within a factor {self.factor:.4g} (95 %)"
-        if not 0 < self.uncertainty < np.inf:
-            return f"{self.value:.6g} ± {self.uncertainty:.2g}{unit}"
-        digits = max(0, 1 - int(np.floor(np.log10(self.uncertainty))))
+        known = 0 < self.uncertainty < np.inf
+        digits = max(0, 1 - int(np.floor(np.log10(self.uncertainty)))) if known else 10
         if digits > 9 or abs(self.value) >= 1e6:
             return f"{self.value:.6g} ± {self.uncertainty:.2g}{unit}"
         return f"{self.value:.{digits}f} ± {self.uncertainty:.{digits}f}{unit}"

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.draws import drawn_variables
 from nonsmooth.identification.compare.response import nearest_alike
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 #: Dims over which results list what they found, however much it was: the value of each and what its rows share.
 LISTS = {
@@ -49,7 +46,7 @@ class Gathered:
     def add(self, result: xr.Dataset) -> None:
         """Keep what a draw gave."""
         same = [name for name in self.plain if name in result and result[name].shape == self.centre[name].shape]
-        row: dict[str, Any] = {name: result[name].values for name in same}
+        row = {name: result[name].values for name in same}
         if self.along:
             row |= _along_sheets(self.centre, result, self.branch, self.along)
         row |= {dim: matched(self.centre, result, dim) for dim in self.lists}
@@ -116,7 +113,7 @@ class Gathered:
             warnings.simplefilter("ignore", RuntimeWarning)  # no draw has a value here
             bands = np.nanquantile(stack, edges, axis=0)
         attrs = {key: value for key, value in array.attrs.items() if isinstance(value, str)}
-        found: dict[str, Any] = {f"{name}_quantiles": (("quantile", *array.dims), bands, attrs)}
+        found = {f"{name}_quantiles": (("quantile", *array.dims), bands, attrs)}
         share = np.isfinite(stack).sum(axis=0) / len(self.rows)
         if (share < 1).any():
             found[f"{name}_share"] = labelled(array.dims, share, f"share of draws that have {name} here")
@@ -178,7 +175,7 @@ def _finer(length: FloatArray) -> Callable[[FloatArray], FloatArray]:
             flat = values.reshape(len(values), -1)
             dense = np.stack([np.interp(fine, length, column) for column in flat.T], axis=-1)
             return dense.reshape(-1, *values.shape[1:])
-        return np.asarray(PchipInterpolator(length, values, axis=0)(fine))
+        return PchipInterpolator(length, values, axis=0)(fine)
 
     return finer
 

@@ -28,16 +28,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import ComplexArray, FloatArray
 from nonsmooth.errors import SolveError
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,12 +80,12 @@ class NonlinearMode:
 
     def stiffness(self, amplitude: ArrayLike, omega: ArrayLike) -> ComplexArray:
         """Force by displacement, m (omega_n^2 - Omega^2 + i D Omega), N/m."""
-        w = np.asarray(omega, dtype=np.float64)
+        w = np.asarray(omega, float)
         return np.asarray(self.mass * (self.square(amplitude) - w**2 + 1j * self.damping(amplitude) * w))
 
     def slope(self, amplitude: ArrayLike, omega: ArrayLike) -> FloatArray:
         r"""d ln F / d ln a at a fixed frequency: 1 if linear, 0 at a fold, negative on the unstable middle part."""
-        a, w = np.asarray(amplitude, dtype=np.float64), np.asarray(omega, dtype=np.float64)
+        a, w = np.asarray(amplitude, float), np.asarray(omega, float)
         G, D, change = self.square(a), self.damping(a), interpolation(self.knots, a, 1)
         turn = change @ self.squares + 1j * w * D * (change @ self.log_damping)
         return np.asarray(1.0 + np.real(a * turn / (G - w**2 + 1j * w * D)))
@@ -110,8 +108,6 @@ class NonlinearMode:
             Over ``point``: ``frequency`` (Hz), ``modal_amplitude`` and ``amplitude`` (m, that of the mode and with the
             residual), ``phase`` (rad), ``stable``. Empty where the force cannot reach the least amplitude.
         """
-        import xarray as xr
-
         least = float(self.knots[0]) if low is None else low
         u = np.sin(np.linspace(0.0, np.pi / 2, points))  # dense near the top, where both sides meet
         top = self._top(force, least)
@@ -155,11 +151,11 @@ def interpolation(knots: FloatArray, amplitude: ArrayLike, derivative: int = 0) 
     """
     from scipy.interpolate import CubicSpline
 
-    at = np.asarray(amplitude, dtype=np.float64)
-    a: Any = np.clip(at, knots[0], knots[-1])
+    at = np.asarray(amplitude, float)
+    a = np.clip(at, knots[0], knots[-1])
     if len(knots) == 1:
         return np.full((*at.shape, 1), float(derivative == 0))
-    found = np.asarray(CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")(a, derivative))
+    found = CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")(a, derivative)
     return np.where((a == at)[..., None], found, 0.0) if derivative else found
 
 
@@ -217,7 +213,7 @@ class ResponseFit:
 
     def _own(self, R: complex) -> ComplexArray:
         """Displacement of the mode alone at each point."""
-        return np.asarray(self.measured if self.force is None else self.measured - R * self.force)
+        return self.measured if self.force is None else self.measured - R * self.force
 
     def _left(self, p: FloatArray) -> FloatArray:
         """ln of force over what the mode needs (and its phase), for all points."""
@@ -229,7 +225,7 @@ class ResponseFit:
         loss = np.exp(damping + by_damping) * self.omega
         needed = (square * np.exp(by_square) - self.omega**2 + 1j * loss) * own
         size = load - np.log(np.abs(needed))
-        return np.concatenate([size, -np.angle(needed)]) if self.phased else np.asarray(size)
+        return np.concatenate([size, -np.angle(needed)]) if self.phased else size
 
     def _fit(self) -> None:
         from scipy.optimize import least_squares
@@ -258,10 +254,10 @@ class ResponseFit:
             inverse = np.linalg.pinv(normal, hermitian=True)
             left = self._left(p)
             # Unknowns that the measurement determined: all but what the prior of the shifts did.
-            freedom = max(rows - (count - float(prior @ np.diag(inverse))), 1.0)
+            freedom = max(rows - (count - (prior @ np.diag(inverse))), 1.0)
             before, moved = (sigma, *spread), 0.0
             # Points of a curve that err alike count less.
-            sigma = max(float(np.sqrt(left @ left / freedom * self._alike(left))), 1e-9)
+            sigma = max(np.sqrt(left @ left / freedom * self._alike(left)), 1e-9)
             if self.shifts:
                 own, own_error = p[shift].reshape(2, n), np.diag(inverse)[shift].reshape(2, n)
                 spread = np.sqrt(np.maximum(np.mean(own**2 + own_error, axis=1), 1e-18))
@@ -294,7 +290,7 @@ class ResponseFit:
         lowest, *_ = tops = sorted(tops, key=lambda i: size[i])
         w, h = (v[self.curve == self.curve[lowest]] for v in (self.omega, gain))
         step = float(np.median(np.abs(np.diff(w)))) if len(w) > 1 else 0.01 * w[0]
-        D = max(float(np.ptp(w[h > h.max() / np.sqrt(2.0)])), step)
+        D = max(np.ptp(w[h > h.max() / np.sqrt(2.0)]), step)
         at_top = D * self.omega[lowest]  # displacement times this is force by mass there
         self.unit = 1.0 / float(np.median(1.0 / gain)) if self.residual else 1.0
         p = np.zeros(count)
@@ -310,7 +306,7 @@ class ResponseFit:
         """Number of neighbouring points of a curve that say as much as one."""
         rows, same = left.reshape(-1, len(self.curve)), np.diff(self.curve) == 0
         power = float(left @ left)
-        rho = min(max(float(np.sum((rows[:, 1:] * rows[:, :-1])[:, same])) / power, 0.0), 0.9) if power > 0 else 0.0
+        rho = min(max(np.sum((rows[:, 1:] * rows[:, :-1])[:, same]) / power, 0.0), 0.9) if power > 0 else 0.0
         return (1 + rho) / (1 - rho)
 
     def slopes(self) -> FloatArray:
@@ -325,9 +321,9 @@ class ResponseFit:
         rows = []
         for c, mode in enumerate(self.modes):
             a, w = self.amplitude[self.curve == c], self.omega[self.curve == c]
-            place = a[int(np.argmin(np.abs(np.log(self.mode.square(a) / w**2))))]
+            place = a[np.argmin(np.abs(np.log(self.mode.square(a) / w**2)))]
             rows.append((mode.natural_frequency(place), mode.damping_ratio(place), place))
-        frequency, ratio, place = np.array(rows, dtype=np.float64).T
+        frequency, ratio, place = np.array(rows, float).T
         return frequency, ratio, place
 
 
@@ -344,7 +340,7 @@ def _knots(knots: int | ArrayLike, size: FloatArray) -> FloatArray:
         if knots < 1:
             raise ValueError(f"knots must be at least 1, got {knots}")
         return np.linspace(size.min(), size.max(), knots) if knots > 1 else np.array([float(np.median(size))])
-    given = np.asarray(knots, dtype=np.float64)
+    given = np.asarray(knots, float)
     if given.ndim != 1 or len(given) < 1 or not (given > 0).all() or not (np.diff(given) > 0).all():
         raise ValueError(f"knots must be positive, increasing amplitudes (m), got {given!r}")
     return given

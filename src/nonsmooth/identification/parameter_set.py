@@ -6,18 +6,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import Answering
 from nonsmooth.identification.finding import Estimate, Finding, normal_draws
+from nonsmooth.results.provenance import ATTRIBUTE, attribute, package_version, read_provenance, with_short_record
 from nonsmooth.results.representation import cut, html_table, text_table
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 _COLUMNS = ("value", "uncertainty", "half_width", "logarithmic")
 
@@ -66,7 +64,7 @@ class ParameterSet(Answering, Mapping[str, float]):
         anomalies: Sequence[str] = (),
         synthetic: bool = False,
     ) -> None:
-        matrix, n = np.array(covariance, dtype=np.float64), len(estimates) + len(extra or {})
+        matrix, n = np.array(covariance, float), len(estimates) + len(extra or {})
         if matrix.shape != (n, n):
             raise ValueError(f"covariance must be ({n}, {n}): parameters, then extra; got {matrix.shape}")
         matrix.flags.writeable = False
@@ -177,8 +175,6 @@ class ParameterSet(Answering, Mapping[str, float]):
 
     @staticmethod
     def _labelled(names: list[str], matrix: FloatArray) -> xr.DataArray:
-        import xarray as xr
-
         return xr.DataArray(matrix, coords={"parameter": names, "other": names}, dims=("parameter", "other"))
 
     def estimate(self, name: str) -> Estimate:
@@ -221,10 +217,6 @@ class ParameterSet(Answering, Mapping[str, float]):
 
     def to_dataset(self) -> xr.Dataset:
         """All numbers and texts as a Dataset that ``nonsmooth.save`` takes; the findings' pictures stay behind."""
-        import xarray as xr
-
-        from nonsmooth.results.provenance import attribute, package_version, with_short_record
-
         rows = self._rows
         data = {name: ("parameter", [getattr(row, name) for row in rows.values()]) for name in _COLUMNS}
         record = {
@@ -254,8 +246,6 @@ class ParameterSet(Answering, Mapping[str, float]):
         ValueError
             If the Dataset was not made so.
         """
-        from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
-
         record = read_provenance(dataset) if ATTRIBUTE in dataset.attrs else {}
         if record.get("verb") != "identify":
             raise ValueError("this Dataset was not made by ParameterSet.to_dataset")
@@ -297,33 +287,35 @@ class ParameterSet(Answering, Mapping[str, float]):
         >>> ns.ParameterSet({"k": Estimate(8.5, 0.1, "N/m")}, [[0.01]]).to_dataframe().loc["k", "unit"]
         'N/m'
         """
-        import xarray as xr
+        import pandas as pd
 
-        rows = self._rows
-        low, high = zip(*(row.interval(level) for row in rows.values()), strict=True) if rows else ((), ())
-        columns: dict[str, Any] = {
-            "value": [row.value for row in rows.values()],
-            "uncertainty": [row.uncertainty for row in rows.values()],
-            "low": list(low),
-            "high": list(high),
-            "unit": np.array([row.unit for row in rows.values()], dtype=object),
-            "parameter_of_the_model": [name in self.estimates for name in rows],
-            "identifiability": np.array([self.identifiability.get(name, "") for name in rows], dtype=object),
-        }
-        names = np.array(list(rows), dtype=object)
-        return xr.Dataset({key: ("name", values) for key, values in columns.items()}, {"name": names}).to_dataframe()
+        table = [
+            (
+                row.value,
+                row.uncertainty,
+                *row.interval(level),
+                row.unit,
+                name in self.estimates,
+                self.identifiability.get(name, ""),
+            )
+            for name, row in self._rows.items()
+        ]
+        names = ["value", "uncertainty", "low", "high", "unit", "parameter_of_the_model", "identifiability"]
+        return pd.DataFrame(table, pd.Index([*self._rows], name="name"), names)
+
+    @property
+    def _shown(self) -> list[tuple[str, str]]:
+        """Name and value of each row; those of ``extra`` in brackets."""
+        rows = [(name, f"= {estimate}") for name, estimate in self.estimates.items()]
+        return rows + [(f"({name}", f"= {estimate})") for name, estimate in self.extra.items()]
 
     def __str__(self) -> str:
-        lines = [self._title()]
-        lines += [f"  {name} = {estimate}" for name, estimate in self.estimates.items()]
-        lines += [f"  ({name} = {estimate})" for name, estimate in self.extra.items()]
+        lines = [self._title(), *(f"  {name} {value}" for name, value in self._shown)]
         lines += [f"  {note}" for note in self.notes]
         return "\n".join(lines + [f"  ANOMALY: {sentence}" for sentence in self.anomalies])
 
     def __repr__(self) -> str:
-        rows = [(name, f"= {estimate}") for name, estimate in self.estimates.items()]
-        rows += [(f"({name}", f"= {estimate})") for name, estimate in self.extra.items()]
-        lines = [text_table(self._title(), rows, whole=False)]
+        lines = [text_table(self._title(), self._shown, whole=False)]
         lines += [f"  ANOMALY: {cut(sentence)}" for sentence in self.anomalies]
         counts = {"findings": len(self.findings), "notes": len(self.notes)}
         if any(counts.values()):
@@ -350,6 +342,7 @@ def _as_record(finding: Finding) -> dict[str, Any]:
 
 
 def _from_record(item: Mapping[str, Any]) -> Finding:
+
     def estimate(row: Sequence[Any]) -> Estimate:
         value, uncertainty, unit, half_width, logarithmic = row
         return Estimate(float(value), float(uncertainty), unit, float(half_width), logarithmic)  # "inf" is a text there

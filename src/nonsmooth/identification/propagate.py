@@ -5,9 +5,10 @@ from __future__ import annotations
 import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.continuation.branches.orbit import Orbit
@@ -20,9 +21,6 @@ from nonsmooth.results.progress import progress as watched
 from nonsmooth.system.arguments import checked, declared
 from nonsmooth.system.kinds import at_least, real_number
 from nonsmooth.system.system import System
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 COARSE = 0.02  # the largest step of draws' branches: values between points lie on a cubic
 
@@ -125,7 +123,9 @@ def propagate(
     >>> bool(np.allclose(amplitude, np.quantile(band["drawn_F"], [0.025, 0.5, 0.975]) / np.hypot(3.0, 0.2)))
     True
     """
-    call, edges = _Call(verb, start, args, options), _probabilities(quantiles)
+    call, edges = _Call(verb, start, args, options), [real_number(q, "quantiles") for q in quantiles]
+    if not edges or sorted(set(edges)) != edges or not 0 < edges[0] <= edges[-1] < 1:
+        raise ValueError(f"quantiles = {shortened(quantiles)}: probabilities that rise, between 0 and 1")
     if draws < 2 and not first_order:
         raise ValueError(f"draws = {draws}: a band takes two and more, and some 200 to show its edges")
     known = read_settings(settings, call.system)
@@ -150,13 +150,6 @@ def propagate(
     return gathered.banded(edges, linear_part, drawn, base, seed)
 
 
-def _probabilities(quantiles: Sequence[float]) -> list[float]:
-    edges = [real_number(q, "quantiles") for q in quantiles]
-    if not edges or sorted(set(edges)) != edges or not 0 < edges[0] <= edges[-1] < 1:
-        raise ValueError(f"quantiles = {shortened(quantiles)}: probabilities that rise, between 0 and 1")
-    return edges
-
-
 class _Call:
     """The verb with its arguments, for one system after another."""
 
@@ -175,8 +168,6 @@ class _Call:
             self.options.setdefault("progress", False)
 
     def __call__(self, system: System, *, coarse: bool) -> xr.Dataset:
-        import xarray as xr
-
         first: Any = system
         if isinstance(self.start, Orbit):
             from nonsmooth.continuation.find import find_orbit

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from nonsmooth.identification.finding import Estimate
 from nonsmooth.identification.parameter_set import ParameterSet
 
 
@@ -21,7 +20,8 @@ def report(found: ParameterSet, title: str = "Identified parameters") -> str:
         for name, estimate in group.items():
             said = found.identifiability.get(name, "" if name in found.estimates else "beside the model's parameters")
             low, high = estimate.interval()
-            lines.append(f"| {name} | {_value(estimate)} | {low:.6g} to {high:.6g} | {estimate.unit} | {said} |")
+            value = str(estimate).removesuffix(f" {estimate.unit}")
+            lines.append(f"| {name} | {value} | {low:.6g} to {high:.6g} | {estimate.unit} | {said} |")
     lines += ["", *(f"- {note}" for note in found.notes), "", "## Correlations", "", *_correlations(found)]
     lines += ["", "## Findings"]
     for finding in found.findings:
@@ -31,11 +31,6 @@ def report(found: ParameterSet, title: str = "Identified parameters") -> str:
         lines += ["", *(f"- {name} = {other}" for name, other in finding.others.items())]
         lines += [f"- {note}" for note in finding.notes]
     return "\n".join(lines) + "\n"
-
-
-def _value(estimate: Estimate) -> str:
-    text = str(estimate)
-    return text.removesuffix(f" {estimate.unit}") if estimate.unit else text
 
 
 def _correlations(found: ParameterSet) -> list[str]:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.recordings.reading import MAX_COLUMNS, Reading, Trace
 from nonsmooth.recordings.recording import Recording, examine, missing_runs, mixed_units
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: A sensor with fewer samples says next to nothing of a motion; below this a remark is made.
 SHORT = 32
@@ -43,8 +41,7 @@ def assemble(reading: Reading) -> Recording:
     for run, node in names.items():
         sensors: dict[str, xr.Dataset] = {}
         for group in _by_clock([trace for trace in traces if trace.run == run]):
-            label = _fit(group[0].name or "sensor", sensors)
-            sensors[label] = _sensor(group, reading)
+            sensors[_fit(group[0].name or "sensor", sensors)] = _sensor(group, reading)
         runs[node] = sensors
     record = {
         "file": reading.name,
@@ -61,26 +58,23 @@ def assemble(reading: Reading) -> Recording:
 
 def _by_clock(traces: list[Trace]) -> list[list[Trace]]:
     """Traces sampled at the same instants, in the order in which their first one appears."""
-    groups: dict[tuple[int, float, float, str], list[list[Trace]]] = {}
+    groups: dict[tuple[int, bytes, str], list[list[Trace]]] = {}
     ordered: list[list[Trace]] = []
     for trace in traces:
-        first, last = float(trace.axis[0]), float(trace.axis[-1])
-        # NaN is not equal to itself and would never be found again; such times are refused later.
-        key = (len(trace.axis), first if first == first else 0.0, last if last == last else 0.0, trace.axis_unit)
-        same = groups.setdefault(key, [])
+        axis = trace.axis
+        same = groups.setdefault((len(axis), axis[[0, -1]].tobytes(), trace.axis_unit), [])
         for group in same:
-            if group[0].axis is trace.axis or np.array_equal(group[0].axis, trace.axis, equal_nan=True):
-                group.append(trace)
+            if group[0].axis is axis or np.array_equal(group[0].axis, axis, equal_nan=True):
                 break
         else:
-            same.append([trace])
-            ordered.append(same[-1])
+            group = []
+            same.append(group)
+            ordered.append(group)
+        group.append(trace)
     return ordered
 
 
 def _sensor(group: list[Trace], reading: Reading) -> xr.Dataset:
-    import xarray as xr
-
     first, axis = group[0], reading.axis
     where = f"run {first.run!r}, channel {first.name!r}"
     if len(group) > 1:
@@ -93,7 +87,7 @@ def _sensor(group: list[Trace], reading: Reading) -> xr.Dataset:
         for trace in group:
             reading.of(trace.run, trace.name, sentence)
 
-    attrs: dict[str, Any] = _clock(first, where, reading, note) if axis == "time" else {}
+    attrs = _clock(first, where, reading, note) if axis == "time" else {}
     if axis == "time" and len(first.values) < SHORT and any(trace.name != EVENTS for trace in group):
         note(f"only {len(first.values)} samples; too short to identify anything from")
     variables: dict[str, Any] = {}
@@ -179,11 +173,7 @@ def _clean(name: str) -> str:
 
 def _fit(name: str, taken: Any) -> str:
     """``name`` cleaned, numbered if it is taken."""
-    base = _clean(name)
-    held = set(taken)
-    if base not in held:
-        return base
-    k = 2
-    while f"{base} ({k})" in held:
+    base, held, k = _clean(name), set(taken), 1
+    while (found := f"{base} ({k})" if k > 1 else base) in held:
         k += 1
-    return f"{base} ({k})"
+    return found

@@ -10,7 +10,6 @@ import re
 import stat
 import warnings
 import zlib
-from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -145,8 +144,7 @@ def parse_recording(data: bytes, name: str, options: Options | None = None, *, f
     if data.startswith(b"\x1f\x8b"):
         data = _unpacked(data, reading)
     reading.format = format if format is not None else _detect(data, reading)
-    reader = import_module(f"nonsmooth.recordings.readers.{FORMATS[reading.format]}")
-    read: Callable[[bytes, Reading], None] = reader.read
+    read = import_module(f"nonsmooth.recordings.readers.{FORMATS[reading.format]}").read
     # Numbers from elsewhere may lie at both ends of the range of doubles; what is not finite is judged by assemble.
     with np.errstate(all="ignore"):
         read(data, reading)
@@ -176,7 +174,8 @@ def content_of(file: Path) -> bytes:
         If it cannot be opened, is empty, too large, or no file: a pipe would wait for who writes into it.
     """
     try:
-        with open(file, "rb", opener=_without_waiting) as opened:
+        waiting = getattr(os, "O_NONBLOCK", 0)  # for the other end of a pipe
+        with open(file, "rb", opener=lambda path, flags: os.open(path, flags | waiting)) as opened:
             state = os.fstat(opened.fileno())
             if not stat.S_ISREG(state.st_mode):
                 raise DataFileError(f"{file}: is a pipe, a socket or a device, no file; copy what it gives into a file")
@@ -189,10 +188,6 @@ def content_of(file: Path) -> bytes:
     if not data:
         raise DataFileError(f"{file}: is empty")
     return data
-
-
-def _without_waiting(path: str, flags: int) -> int:
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _detect(data: bytes, reading: Reading) -> str:

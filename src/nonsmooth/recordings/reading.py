@@ -105,6 +105,7 @@ TIME_WORDS = frozenset(
 
 #: Time units and their length in seconds. The empty unit is taken for seconds, with a remark.
 TIME_SCALES = {
+    "": 1.0,
     "s": 1.0,
     "sec": 1.0,
     "seconds": 1.0,
@@ -197,8 +198,7 @@ class Reading(Options, Remarks):
     @property
     def asked(self) -> dict[str, Any]:
         """The options that differ from their defaults."""
-        given = {one.name: (getattr(self, one.name), one.default) for one in fields(Options)}
-        return {name: value for name, (value, default) in given.items() if value != default}
+        return {one.name: said for one in fields(Options) if (said := getattr(self, one.name)) != one.default}
 
     def error(self, place: str, message: str) -> DataFileError:
         """The exception for something wrong at ``place`` (a line, a record, a member; may be empty)."""
@@ -216,10 +216,8 @@ def is_axis_name(name: str, axis: str) -> bool:
 
 def scaled_time(values: FloatArray, unit: str) -> FloatArray | None:
     """Times in seconds; None if ``unit`` is no unit of time."""
-    scale = 1.0 if unit == "" else TIME_SCALES.get(unit.partition(" since ")[0].strip())
-    if scale is None:
-        return None
-    return values if scale == 1.0 else values * scale
+    scale = TIME_SCALES.get(unit.partition(" since ")[0].strip())
+    return None if scale is None else values * scale
 
 
 def names_of(candidates: Sequence[str], most: int = 12) -> str:

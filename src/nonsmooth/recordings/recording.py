@@ -9,26 +9,29 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import BoolArray, FloatArray
 from nonsmooth.errors import Answering
-from nonsmooth.results.provenance import ATTRIBUTE, COORDINATE
+from nonsmooth.results.provenance import (
+    ATTRIBUTE,
+    COORDINATE,
+    options_as_data,
+    package_version,
+    read_provenance,
+    with_short_record,
+)
 from nonsmooth.results.representation import cut, html_table
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 _BLOCK = 16  # steps per block; means over a block see a change of rate through jitter and rounding of the times
 _CHANGE = 0.05  # of the rate, between blocks
 _GAP = 1.5  # steps; a longer one is a gap
 
 
-@dataclass(frozen=True)
-class Sampling:
+class Sampling(NamedTuple):
     """``rate`` in Hz (NaN for fewer than two distinct times); ``gaps`` as (index before, samples missing)."""
 
     rate: float
@@ -150,9 +153,7 @@ class Recording(Answering):
         ValueError
             If a Dataset has not exactly one dim with a coordinate, or a name is empty, twice there, or holds ``/``.
         """
-        import xarray as xr
-
-        nodes: dict[str, xr.Dataset] = {"/": xr.Dataset()}
+        nodes = {"/": xr.Dataset()}
         for run, sensors in runs.items():
             _check_name("run", run)
             nodes[f"/{run}"] = xr.Dataset(attrs=dict((run_attrs or {}).get(run, {})))
@@ -166,7 +167,15 @@ class Recording(Answering):
                 nodes[f"/{run}/{sensor}"] = dataset
         tree = xr.DataTree.from_dict(nodes)
         record = dict(source or {"file": "", "format": "built in memory"})
-        tree.attrs = {ATTRIBUTE: _as_json(record, warnings, synthetic), "synthetic": "yes" if synthetic else "no"}
+        told = {
+            "version": package_version(),
+            "verb": "load_recording",
+            "source": options_as_data(record),
+            "warnings": list(warnings),
+            "synthetic": synthetic,
+        }
+        text = json.dumps(told, ensure_ascii=False, allow_nan=False)
+        tree.attrs = {ATTRIBUTE: text, "synthetic": "yes" if synthetic else "no"}
         return cls(tree, record, tuple(warnings), synthetic)
 
     @property
@@ -236,10 +245,6 @@ class Recording(Answering):
         Sensor ``i`` has the dim ``sample_i``; its axis is ``axis_i``, its channels are ``channel_i_k``, and their
         names, runs and sensors stand in their attributes.
         """
-        import xarray as xr
-
-        from nonsmooth.results.provenance import with_short_record
-
         variables: dict[str, Any] = {}
         coords: dict[str, Any] = {}
         for i, (run, sensor, ds) in enumerate(self._sensors(), 1):
@@ -257,10 +262,6 @@ class Recording(Answering):
     @classmethod
     def from_dataset(cls, dataset: xr.Dataset) -> Recording:
         """The recording that :meth:`to_dataset` made the Dataset from; ValueError for any other Dataset."""
-        import xarray as xr
-
-        from nonsmooth.results.provenance import read_provenance
-
         if "run_attributes" not in dataset.attrs or ATTRIBUTE not in dataset.attrs:
             raise ValueError("this Dataset was not made by Recording.to_dataset")
         run_attrs = json.loads(dataset.attrs["run_attributes"])
@@ -336,16 +337,3 @@ def mixed_units(runs_by_unit: Mapping[str, str]) -> str:
 def _check_name(kind: str, name: str) -> None:
     if not name.strip() or "/" in name or name in (".", ".."):
         raise ValueError(f"{name!r} cannot be the name of a {kind}: it must not be empty, '.' or '..', nor hold '/'")
-
-
-def _as_json(source: Mapping[str, Any], warnings: tuple[str, ...], synthetic: bool) -> str:
-    from nonsmooth.results.provenance import options_as_data, package_version
-
-    record = {
-        "version": package_version(),
-        "verb": "load_recording",
-        "source": options_as_data(source),
-        "warnings": list(warnings),
-        "synthetic": synthetic,
-    }
-    return json.dumps(record, ensure_ascii=False, allow_nan=False)

@@ -82,8 +82,7 @@ class Quantity:
         return self.value
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """One ``[[recording]]`` of the notebook."""
 
     file: str

@@ -251,7 +251,8 @@ def in_words(what: Any) -> str:
         Any: "",
     }
     kind = origin or what
-    return known.get(kind, f"ns.{kind.__name__}(...)")
+    package = kind.__module__.partition(".")[0].replace("nonsmooth", "ns")
+    return known.get(kind, f"{package}.{kind.__name__}(...)")
 
 
 def ends(pair: Any, name: str) -> tuple[float, float]:

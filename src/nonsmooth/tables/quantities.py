@@ -8,14 +8,12 @@ and a minimum is an amplitude: ``x_amplitude``, ``contact_force_amplitude``.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.errors import unknown
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: Dims whose entries are columns of a table, not rows.
 _SPREAD = ("state", "indicator", "multiplier", "eigenvalue", "exponent", "harmonic", "memory", "component")
@@ -25,8 +23,6 @@ _INNER = ("layout",)  # what continuation goes on from
 
 def dataset_of(result: Any) -> xr.Dataset:
     """A result as a Dataset; TypeError for what is none."""
-    import xarray as xr
-
     if not isinstance(result, xr.Dataset) and hasattr(result, "to_dataset"):
         result = result.to_dataset()
     if not isinstance(result, xr.Dataset):
@@ -42,7 +38,7 @@ def rows_of(result: xr.Dataset, over: str | None = None) -> tuple[str, ...]:
     if over is not None:
         if over not in result.dims:
             raise ValueError(unknown(over, "a dim", "this result", map(str, result.dims)))
-        return _dims(result, [array for array in result.data_vars.values() if over in array.dims], over)
+        return _dims([array for array in result.data_vars.values() if over in array.dims], over)
     for first in _FIRST:
         if first in result.dims:
             return (first,)
@@ -52,12 +48,12 @@ def rows_of(result: xr.Dataset, over: str | None = None) -> tuple[str, ...]:
     if status or "status" in result or ("period_number" in result and not result["period_number"].dims):
         return status  # none of one orbit or one spectrum: a single row
     for array in result.data_vars.values():
-        if dims := _dims(result, [array]):
+        if dims := _dims([array]):
             return dims
     return tuple(str(dim) for dim in list(result.dims)[:1])
 
 
-def _dims(result: xr.Dataset, arrays: list[xr.DataArray], keep: str = "") -> tuple[str, ...]:
+def _dims(arrays: list[xr.DataArray], keep: str = "") -> tuple[str, ...]:
     """The dims of arrays that are rows, those that belong together first; ``keep`` is one of them in any case."""
     found = [tuple(str(d) for d in array.dims if d == keep or d not in _SPREAD) for array in arrays]
     return max(found, key=lambda dims: -len(dims), default=())

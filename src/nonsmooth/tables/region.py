@@ -6,19 +6,18 @@ import ast
 import operator
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any
+from functools import reduce
+from itertools import chain
+from typing import Annotated, Any
 
 import numpy as np
 import sympy as sp
+import xarray as xr
 
 from nonsmooth.errors import shortened
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.symbolic.expressions import read_expression
 from nonsmooth.tables.quantities import dataset_of, quantities_of, quantity
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _LONGEST = 2000  # characters of a condition
 _COMPARE: dict[Any, Callable[[Any, Any], Any]] = {
@@ -77,8 +76,6 @@ def region(result: Any, condition: Annotated[str, _FORM]) -> xr.DataArray:
     >>> quiet.dims, int(quiet.sum())
     (('omega', 'rho'), 6)
     """
-    import xarray as xr
-
     data = dataset_of(result)
     known = quantities_of(data)
     tree = _parsed(condition)
@@ -88,29 +85,23 @@ def region(result: Any, condition: Annotated[str, _FORM]) -> xr.DataArray:
     symbols = {name: sp.Symbol(name, real=True) for name in names}
     read = read_expression(ast.unparse(tree), symbols)
     held = {symbols[name]: _held(data, name, known) for name in names}
-    whole: Any = xr.DataArray(True)
-    for one in held.values():
-        for end in one.ends:
-            whole = whole & end.notnull()
+    whole = xr.DataArray(True)
+    for end in chain.from_iterable(held.values()):
+        whole = whole & end.notnull()
     inside = whole & _holds(read, held, condition)
     kept = [dim for dim in data.dims if dim in inside.dims]
     inside, whole = (array.transpose(*kept).astype(bool) for array in (inside, whole & xr.ones_like(inside)))
-    missing = int(inside.size - whole.sum())
-    inside.attrs = {"long_name": " ".join(condition.split()), "unknown": missing}
+    inside.attrs = {"long_name": " ".join(condition.split()), "unknown": int(inside.size - whole.sum())}
     return inside.rename("region")
 
 
-@dataclass(frozen=True)
-class _Range:
-    """A quantity by the least and the largest value that it takes; of one value both are the same."""
-
-    ends: tuple[xr.DataArray, ...]
-    ranges: bool = field(default=False)
+#: A quantity by the values that it takes: its one value, or the least and the largest.
+_Ends = tuple[Any, ...]
 
 
-def _held(data: xr.Dataset, name: str, known: Mapping[str, xr.DataArray]) -> _Range:
+def _held(data: xr.Dataset, name: str, known: Mapping[str, xr.DataArray]) -> _Ends:
     if name in known or name in data.coords:
-        return _Range((quantity(data, name, known),))
+        return (quantity(data, name, known),)
     stems = [name] if f"{name}_maximum" in known else []
     if not stems and name in _OF_ELEMENTS:
         found = (re.fullmatch(rf"(.+_{name})(?:_maximum)?", key) for key in known)
@@ -118,16 +109,10 @@ def _held(data: xr.Dataset, name: str, known: Mapping[str, xr.DataArray]) -> _Ra
         stems = [stem for stem in dict.fromkeys(stems) if name != "force" or not stem.endswith("friction_force")]
     lower = [known[f"{stem}_minimum"] for stem in stems if f"{stem}_minimum" in known]
     upper = [known.get(f"{stem}_maximum", known.get(stem)) for stem in stems]
-    every = [one for one in [*lower, *upper] if one is not None]
+    every: list[Any] = [one for one in [*lower, *upper] if one is not None]
     if not every:
-        return _Range((quantity(data, name, known),))  # which says what there is
-    if len(every) == 1:
-        return _Range((every[0],))
-    least: Any = every[0]
-    most: Any = every[0]
-    for one in every[1:]:
-        least, most = np.minimum(least, one), np.maximum(most, one)
-    return _Range((least, most), ranges=True)
+        return (quantity(data, name, known),)  # which says what there is
+    return (every[0],) if len(every) == 1 else (reduce(np.minimum, every), reduce(np.maximum, every))
 
 
 def _parsed(condition: str) -> ast.expr:
@@ -164,34 +149,28 @@ class _Chains(ast.NodeTransformer):
         return ast.BoolOp(ast.And(), [ast.Compare(left, [op], [right]) for left, op, right in pairs])
 
 
-def _holds(read: Any, held: Mapping[sp.Symbol, _Range], condition: str) -> Any:
+def _holds(read: Any, held: Mapping[sp.Symbol, _Ends], condition: str) -> Any:
     """The condition over the points."""
     if read in (sp.true, sp.false):
         return bool(read)
     if isinstance(read, sp.And | sp.Or):
         parts = [_holds(part, held, condition) for part in read.args]
-        join = operator.and_ if isinstance(read, sp.And) else operator.or_
-        found = parts[0]
-        for part in parts[1:]:
-            found = join(found, part)
-        return found
+        return reduce(operator.and_ if isinstance(read, sp.And) else operator.or_, parts)
     if isinstance(read, sp.Ne):  # of a range both ends may differ from what lies between them
         return operator.or_(*(_holds(one(*read.args, evaluate=False), held, condition) for one in (sp.Lt, sp.Gt)))
     if type(read) not in _COMPARE:
         raise ValueError(f"{shortened(condition)} is no condition: write {_FORM}")
     left, right = read.args
-    found = True
-    for values in _cases(left - right, held, condition):
-        found = found & _COMPARE[type(read)](_value(left, values), _value(right, values))
-    return found
+    cases = _cases(left - right, held, condition)
+    return reduce(operator.and_, (_COMPARE[type(read)](_value(left, one), _value(right, one)) for one in cases))
 
 
-def _cases(difference: sp.Expr, held: Mapping[sp.Symbol, _Range], condition: str) -> list[dict[sp.Symbol, Any]]:
+def _cases(difference: sp.Expr, held: Mapping[sp.Symbol, _Ends], condition: str) -> list[dict[sp.Symbol, Any]]:
     """Values of the symbols at which a comparison is asked: where a quantity takes many, at the ends of its range, or
     of the range of its absolute value. What is linear in it holds between them too."""
     here = difference.free_symbols
-    values = {symbol: one.ends[0] for symbol, one in held.items() if symbol in here and not one.ranges}
-    wide = [symbol for symbol in here if held[symbol].ranges]
+    values = {symbol: ends[0] for symbol, ends in held.items() if symbol in here and len(ends) == 1}
+    wide = [symbol for symbol in here if len(held[symbol]) > 1]
     if not wide:
         return [values]
     symbol = wide[0]
@@ -205,9 +184,7 @@ def _cases(difference: sp.Expr, held: Mapping[sp.Symbol, _Range], condition: str
             f"name, alone, times a number, or in abs(); for more of them together give the system an output, or take "
             f"{symbol}_maximum, {symbol}_minimum"
         )
-    lower: Any
-    upper: Any
-    lower, upper = held[symbol].ends
+    lower, upper = held[symbol]
     if along is size:
         crossed = (lower <= 0) & (upper >= 0)
         lower, upper = abs(lower), abs(upper)

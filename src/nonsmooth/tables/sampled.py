@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from nonsmooth.flow.simulate import simulate
 from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
 from nonsmooth.system.kinds import float_array, real_number, whole_number
 from nonsmooth.system.origin import recorded_system
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _SAME = 1e-6  # of the largest value of a state: the motion computed anew is that of the run
 

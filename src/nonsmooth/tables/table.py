@@ -6,9 +6,11 @@ import os
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
+import xarray as xr
 
 from nonsmooth.results.labels import in_words
 from nonsmooth.results.provenance import ATTRIBUTE, read_provenance
@@ -16,10 +18,6 @@ from nonsmooth.results.whole import placed
 from nonsmooth.system.arguments import checked
 from nonsmooth.tables.quantities import coordinates_of, dataset_of, quantities_of, quantity, rows_of
 from nonsmooth.tables.sampled import once, sampled
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
 
 _WRITERS = {".csv": "", ".xlsx": "openpyxl", ".parquet": "pyarrow"}
 _BESIDE = ("segment", "start_state", "provenance")
@@ -80,8 +78,6 @@ def table(
     >>> ns.table(run, ["x", "contact_force"], step=0.5).columns.tolist()
     ['time (s)', 'x (m)', 'contact_force (N)']
     """
-    import pandas as pd
-
     data = dataset_of(result)
     target = None if file is None else _target(file)
     rows = rows_of(data, over)
@@ -113,8 +109,6 @@ def _columns(
     data: xr.Dataset, rows: tuple[str, ...], found: dict[str, xr.DataArray], units: bool
 ) -> dict[str, np.ndarray]:
     """Flat columns over all rows, headers as keys."""
-    import xarray as xr
-
     numbered = [dim for dim in rows if dim not in found and len(rows) > 1]
     every = {dim: xr.DataArray(np.arange(data.sizes[dim]), dims=dim) for dim in numbered} | found
     flat: dict[str, np.ndarray] = {}
@@ -161,8 +155,6 @@ def _target(file: str | os.PathLike[str]) -> Path:
 
 
 def _write(frame: pd.DataFrame, path: Path) -> None:
-    import pandas as pd
-
     if path.suffix == ".csv":
         frame.to_csv(path, index=False)
     elif path.suffix == ".parquet":

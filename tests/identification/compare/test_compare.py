@@ -191,7 +191,7 @@ def test_what_cannot_be_compared_is_refused() -> None:
         compare("recording.csv", MODEL)
     with pytest.raises(TypeError, match="a recording is laid over a System.*motion_of.*measured_motion"):
         compare({"x": ([0.0], [0.0])}, motion)
-    with pytest.raises(TypeError, match="System or a result"):
+    with pytest.raises(TypeError, match="theory must be ns.System.* or xarray.Dataset.*, not 3"):
         compare(motion, 3)
     with pytest.raises(ValueError, match="standard error of the measured states is not known"):
         compare(motion.drop_vars("u_error"), MODEL)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import Any, Literal, Unpack
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.errors import unknown
 from nonsmooth.flow.options import solver_of
@@ -14,14 +15,10 @@ from nonsmooth.identification.compare.draws import Model, check_parameter, nomin
 from nonsmooth.identification.compare.measured import recorded_motion
 from nonsmooth.identification.fit.steady import is_steady, of_table
 from nonsmooth.identification.options import Comparing
-from nonsmooth.results.labels import labelled
+from nonsmooth.results.labels import labelled, labels_of
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import real_number
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 DRAWS = 60
 FORMS = (
@@ -131,10 +128,6 @@ def compare(
     at the distance of the measured cloud's own halves. The energy distance is the root,
     :math:`\sqrt{2 E|X-Y| - E|X-X'| - E|Y-Y'|}`, as SciPy defines it.
     """
-    import xarray as xr
-
-    from nonsmooth.system.system import System
-
     set_ = _settings(theory, parameters, settings)
     options["draws"] = _draws(options["draws"], theory, parameters, set_)
     if not 0 < options["level"] < 1:
@@ -185,14 +178,8 @@ def compare(
 
 def _settings(theory: Any, parameters: Any, given: Any) -> dict[str, Any]:
     """The settings of a System; a result at hand takes none."""
-    import xarray as xr
-
-    from nonsmooth.system.system import System
-
     if isinstance(theory, System):
         return read_settings(given, theory)
-    if not isinstance(theory, xr.Dataset):
-        raise TypeError(f"theory must be a System or a result, not {type(theory).__name__}")
     if parameters is not None or given:
         raise ValueError("parameters and settings change a System; this theory is a result that is at hand already")
     return {}
@@ -248,7 +235,7 @@ def _noise(measured: xr.Dataset, noise: Any, states: list[str]) -> np.ndarray:
         for name in ("section_error", "u_error"):
             if name in measured:
                 others = [dim for dim in measured[name].dims if dim != "state"]
-                return np.asarray(measured[name].median(others).values, dtype=float)
+                return np.asarray(measured[name].median(others).values, float)
         raise ValueError(
             f"the standard error of the measured states is not known: give "
             f"noise={{{', '.join(map(repr, states))}: ...}}, or `u_error` or `section_error` in the measured Dataset"
@@ -276,9 +263,6 @@ def _swept(measured: xr.Dataset) -> str:
 def _dataset(
     variables: dict[str, Any], measured: xr.Dataset, model: Model, kind: str, given: dict[str, Any]
 ) -> xr.Dataset:
-    import xarray as xr
-
-    from nonsmooth.results.labels import labels_of
     from nonsmooth.results.provenance import (
         ATTRIBUTE,
         attribute,

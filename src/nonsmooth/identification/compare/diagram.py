@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.periods import MeasuredFlip, delayed_flips, flips, measured_period, period_numbers
 from nonsmooth.identification.compare.predict import Motions
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 FINE = 201
 KEEP = 64
@@ -35,7 +32,7 @@ def compare_diagram(
     """The variables of the comparison, ``{name: (dims, values, attributes)}``; see :func:`compare` for each."""
     at, points, numbers = _measured(measured, name, model)
     unit = measured[name].attrs.get("units", "1")
-    grid = np.linspace(at.min(), at.max(), FINE) if values is None else np.asarray(values, dtype=float)
+    grid = np.linspace(at.min(), at.max(), FINE) if values is None else np.asarray(values, float)
     words = ["up", "down"] if direction == "both" else [direction]
 
     def diagram(system: System) -> tuple[FloatArray, IntArray]:
@@ -45,13 +42,13 @@ def compare_diagram(
     if model.system is not None:
         sections, periods = diagram(model.system)
     else:
-        grid = np.asarray(theory[name].values, dtype=float)
+        grid = np.asarray(theory[name].values, float)
         words = np.atleast_1d(theory["direction"].values).astype(str).tolist()
         whole = theory["section"].sel(state=model.states).transpose(..., name, "iterate", "state").values
         sections = whole.reshape(-1, *whole.shape[-3:])
         periods = theory["period_number"].transpose(..., name).values.reshape(-1, len(grid))
     over = (name, "direction", "iterate", "state")
-    variables: dict[str, Any] = {
+    variables = {
         f"measured_{name}": labelled("sample", at, f"measured {name}", unit),
         "measured_section": labelled(("sample", "state"), points, "measured section points"),
         "measured_period_number": labelled("sample", numbers, "measured period number (0: none found)"),
@@ -110,13 +107,13 @@ def _measured(measured: xr.Dataset, name: str, model: Model) -> tuple[FloatArray
         points, found = stacked.reshape(-1, stacked.shape[2]), np.repeat(numbers, stacked.shape[1])
     else:
         points = section.transpose("iterate", "state").values
-        at = np.asarray(measured[name].values, dtype=float)
+        at = np.asarray(measured[name].values, float)
         if at.shape != points.shape[:1]:
             raise ValueError(f"{name} must be given for each of the {len(points)} section points; got {at.shape}")
         good = np.isfinite(points).all(axis=1)
         return at[good], points[good], period_numbers(points[good], model.noise, max_period=min(model.max_period, 8))
     good = np.isfinite(points).all(axis=1)
-    return at[good], points[good], np.asarray(found, dtype=np.int64)[good]
+    return at[good], points[good], np.asarray(found, np.int64)[good]
 
 
 def _flips(
@@ -124,11 +121,11 @@ def _flips(
 ) -> dict[str, Any]:
     words = sorted({*measured, *theory})
     nothing = MeasuredFlip(np.nan, np.nan, np.nan)
-    m, error, read = np.array([measured.get(word, nothing) for word in words], dtype=float).reshape(-1, 3).T
-    t = np.array([theory.get(word, np.nan) for word in words], dtype=float)
+    m, error, read = np.array([measured.get(word, nothing) for word in words], float).reshape(-1, 3).T
+    t = np.array([theory.get(word, np.nan) for word in words], float)
     over = "flip"
-    variables: dict[str, Any] = {
-        "flip": labelled(over, np.array(words, dtype=str), "period numbers on the two sides of the flip"),
+    variables = {
+        "flip": labelled(over, np.array(words, str), "period numbers on the two sides of the flip"),
         "measured_flip": labelled(over, m, "measured flip (NaN: none was seen)", unit),
         "measured_flip_error": labelled(over, error, "standard error of it", unit),
         "measured_flip_read": labelled(
@@ -138,7 +135,7 @@ def _flips(
         "flip_relative_difference": labelled(over, t / m - 1, "predicted over measured flip, minus 1"),
     }
     if drawn:
-        table = np.array([[one.get(word, np.nan) for word in words] for one in drawn], dtype=float)
+        table = np.array([[one.get(word, np.nan) for word in words] for one in drawn], float)
         table[:, np.isfinite(table).sum(axis=0) * 2 < len(drawn)] = np.nan  # too few draws have it
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,7 @@ from nonsmooth.errors import SystemDefinitionError, unknown
 from nonsmooth.identification.finding import normal_draws
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.kinds import ends, real_number
-
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 Rule = Callable[[Mapping[str, float]], float]
 
@@ -180,7 +178,7 @@ def _identified(parameters: Any, count: int, seed: int) -> dict[str, np.ndarray]
     if callable(own):
         drawn = own(count, seed)
         names = list(getattr(drawn, "data_vars", drawn))
-        return {str(name): np.asarray(drawn[name], dtype=float) for name in names if name in parameters}
+        return {str(name): np.asarray(drawn[name], float) for name in names if name in parameters}
     if not hasattr(parameters, "covariance"):
         return {name: np.full(count, float(parameters[name])) for name in parameters}
     names, matrix = known_together(parameters, parameters)

@@ -5,22 +5,18 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
+from nonsmooth.identification.finding import Estimate
+from nonsmooth.recordings.recording import Recording
 from nonsmooth.results.labels import labelled
+from nonsmooth.system.system import System
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.identification.finding import Estimate
-    from nonsmooth.recordings.recording import Recording
-    from nonsmooth.system.system import System
-
-ANGLES = ("rad", "deg", "rev")
 LONG = 150.0  # s: of a longer record the support and the smoother's intensity are found in its middle
 PIECE = 75.0  # s
 
@@ -64,7 +60,7 @@ def motion_of(
     from nonsmooth.recordings.signals.smoothing import smooth
 
     smoothed = smooth(time, x, resolution=resolution, **smoothing)
-    turns = np.asarray(phase, dtype=np.float64)
+    turns = np.asarray(phase, float)
     if turns.shape != (smoothed.sizes["time"],) or not np.isfinite(turns).all():
         raise ValueError(
             f"{whose(x)}: phase must be one finite number for each of {smoothed.sizes['time']} samples (omega t / 2 pi "
@@ -75,8 +71,6 @@ def motion_of(
 
 def _motion(smoothed: xr.Dataset, phase: FloatArray, states: tuple[str, str] = ("x", "v")) -> xr.Dataset:
     """Position and velocity as the states of a model, over time and the phase of the drive."""
-    import xarray as xr
-
     columns = {name: np.column_stack([smoothed[k + name].values for k in "xv"]) for name in ("", "_error")}
     units = [smoothed[k].attrs["units"] for k in "xv"]
     return xr.Dataset(
@@ -117,8 +111,6 @@ def recorded_motion(
         No recording, several runs, outputs among the quantities, channels whose clocks differ, a system without a
         period.
     """
-    import xarray as xr
-
     from nonsmooth.identification.fit.records import irregularity, read_records
     from nonsmooth.identification.fit.sensors import Sensor
 
@@ -227,7 +219,7 @@ def measured_motion(
     from nonsmooth.recordings.signals.phase import drive_phase
 
     name = run if run is not None else recording.runs[0]
-    turned = take(recording, angle, run, units=ANGLES, samples=64)
+    turned = take(recording, angle, run, samples=64)
     gate = take(recording, turn, run, samples=3)
     turns = gate[gate.dims[0]].values
     x = position(turned, distance_per_turn=distance_per_turn, zero=zero)

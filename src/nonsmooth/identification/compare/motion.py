@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.draws import Model
 from nonsmooth.identification.compare.orbits import (
+    FEWEST_BLOCKS,
     cloud_distance,
     common_length,
     energy_distance,
@@ -21,11 +22,7 @@ from nonsmooth.identification.compare.orbits import (
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.identification.compare.predict import Motions, Prediction, SteadyState, from_result, predict
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 KEEP = 128  # section points by which a predicted motion is judged
 CLOUD = 2000  # section points of a predicted motion without a period number
@@ -72,8 +69,8 @@ def compare_motion(
 
 def _measured(measured: xr.Dataset, phases: list[float], grid: int) -> tuple[FloatArray | None, list[FloatArray]]:
     if "u" not in measured:
-        return None, [np.asarray(measured["section"].values, dtype=float)]
-    turns, u = np.asarray(measured["phase"].values, dtype=float), np.asarray(measured["u"].values, dtype=float)
+        return None, [np.asarray(measured["section"].values, float)]
+    turns, u = np.asarray(measured["phase"].values, float), np.asarray(measured["u"].values, float)
     return fold(turns, u, grid), [fold(turns - phase, u, 8)[:, 0] for phase in phases]
 
 
@@ -83,7 +80,7 @@ def _starts(points: FloatArray | None, folded: FloatArray | None, model: Model, 
     States that were not measured begin at 0.
     """
     if start is not None:
-        return np.atleast_2d(np.asarray(start, dtype=float))
+        return np.atleast_2d(np.asarray(start, float))
     at_zero = points if folded is None else folded[np.isfinite(folded[:, 0]).all(axis=1), 0]
     count = 0 if at_zero is None else min(MEASURED_STARTS, len(at_zero))
     starts = np.zeros((1 + count, len(model.theory.states)))
@@ -103,7 +100,7 @@ def _clouds(
 
     size = min(len(points) for points in sections)
     at = "section_phase"
-    variables: dict[str, Any] = {
+    variables = {
         "measured_section": labelled(
             (at, "measured_iterate", "state"), np.stack([p[:size] for p in sections]), "measured section points"
         ),
@@ -112,7 +109,7 @@ def _clouds(
     }
     found = [
         cloud_distance(a / scale, b / scale, splits=model.splits, seed=model.seed)
-        if min(len(a), len(b)) >= 40
+        if min(len(a), len(b)) >= 2 * FEWEST_BLOCKS
         else None
         for a, b in zip(sections, blurred, strict=True)
     ]
@@ -156,7 +153,7 @@ def _periods(
     if low > 0 and high == 2 * low and (apart := _doubled(single, doubled, scale, low)) is not None:
         by = ", ".join(f"{far:.2g} in {name}" for far, name in zip(apart, states, strict=True))
         words = f"on either side of a flip: the {whose} motion is doubled, its section points part by {by}"
-    coexisting = np.asarray(predicted.coexisting, dtype=np.int64)
+    coexisting = np.asarray(predicted.coexisting, np.int64)
     return {
         "measured_period_number": labelled((), np.int64(number), "measured period number (0: none found)"),
         "theory_period_number": labelled(
@@ -198,8 +195,7 @@ def _begun_with_the_measurement(
         return predicted
     at = np.empty(len(motions.places))
     at[motions.places] = whole[0, 0]
-    begun = SteadyState(0, at)
-    return replace(predicted, orbit=motions.orbit(0, begun, len(whole)))
+    return predicted._replace(orbit=motions.orbit(0, SteadyState(0, at), len(whole)))
 
 
 def _shown(folded: FloatArray) -> FloatArray:
@@ -225,7 +221,7 @@ def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, grid:
         a, b = _shown(folded).reshape(-1, folded.shape[2]), predicted.orbit
     over = ("phase", "state")
     names = ("phase", "phase") if closed else ("measured_phase", "theory_phase")
-    variables: dict[str, Any] = {
+    variables = {
         "measured_orbit": labelled((names[0], "state"), a, "measured motion over the phase of the drive"),
         "theory_orbit": labelled((names[1], "state"), b, "predicted motion over the phase of the drive"),
         "orbit_distance": labelled((), distances[0], "normalised distance of the orbits, phase known"),
@@ -237,8 +233,7 @@ def _orbits(folded: FloatArray | None, number: int, predicted: Prediction, grid:
     if scatter is not None:
         variables["measured_scatter"] = labelled(over, scatter, "standard deviation of one pass")
     for name, values in zip(names, (a, b), strict=True):
-        coordinate = np.arange(len(values)) / grid
-        variables[name] = labelled(name, coordinate, "phase of the drive", "forcing periods")
+        variables[name] = labelled(name, np.arange(len(values)) / grid, "phase of the drive", "forcing periods")
     return variables
 
 
@@ -275,7 +270,7 @@ def motion_band(
     """
     rng = np.random.default_rng(model.seed)
     draws = len(systems)
-    numbers = np.zeros(draws, dtype=np.int64)
+    numbers = np.zeros(draws, np.int64)
     distances = np.full((draws, len(phases)), np.nan)
     to_measured = np.full(draws, np.nan)
     orbits: list[FloatArray] = []
@@ -293,7 +288,7 @@ def motion_band(
             motion = np.roll(motion, orbit_distance(closed[1], motion, length).whole_shift * model.grid, axis=0)
             orbits.append(motion)
             to_measured[i] = orbit_distance(closed[0], motion, length).distance
-    variables: dict[str, Any] = {
+    variables = {
         "draw_period_number": labelled("draw", numbers, "period number for drawn parameters"),
         "draw_energy_distance": labelled(
             ("section_phase", "draw"), distances.T, "energy distance of the section clouds for drawn parameters, scaled"

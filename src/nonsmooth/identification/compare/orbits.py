@@ -26,11 +26,12 @@ single points would be closer than two records are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import linear_sum_assignment, minimize_scalar
+from scipy.spatial.distance import cdist, pdist
 
 from nonsmooth.arrays import BoolArray, FloatArray
 
@@ -55,7 +56,7 @@ def fold(phase: ArrayLike, u: ArrayLike, grid: int) -> FloatArray:
     ValueError
         A phase that does not rise, no whole period, or fewer than eight samples in one.
     """
-    turns, values = np.asarray(phase, dtype=float), np.asarray(u, dtype=float)
+    turns, values = np.asarray(phase, float), np.asarray(u, float)
     rises = np.diff(turns)
     if (rises < 0).any():
         i = int(np.argmax(rises < 0))
@@ -85,8 +86,7 @@ def fold(phase: ArrayLike, u: ArrayLike, grid: int) -> FloatArray:
 
 def _cubic(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
     """Lagrange's cubic through the four samples about each place."""
-    first = np.clip(np.searchsorted(x, at, side="right") - 2, 0, max(len(x) - 4, 0))
-    nodes = first[:, None] + np.arange(4)
+    nodes = np.clip(np.searchsorted(x, at, side="right") - 2, 0, max(len(x) - 4, 0))[:, None] + np.arange(4)
     away = at[:, None] - x[nodes]
     apart = x[nodes][:, :, None] - x[nodes][:, None, :]
     apart[:, np.arange(4), np.arange(4)] = 1.0
@@ -107,10 +107,8 @@ def mean_orbit(folded: ArrayLike, period_number: int) -> tuple[FloatArray, Float
     orbit, scatter : array (period_number * grid, states)
         Mean, and standard deviation of one pass about it (NaN from a single pass).
     """
-    values = np.asarray(folded, dtype=float)
+    values = np.asarray(folded, float)
     passes = len(values) // period_number
-    if not passes:
-        raise ValueError(f"{len(values)} forcing periods do not hold an orbit of period {period_number}")
     stacked = values[: passes * period_number].reshape(passes, period_number * values.shape[1], values.shape[2])
     stacked = stacked[np.isfinite(stacked).all(axis=(1, 2))]
     if not len(stacked):
@@ -119,8 +117,7 @@ def mean_orbit(folded: ArrayLike, period_number: int) -> tuple[FloatArray, Float
     return stacked.mean(axis=0), scatter
 
 
-@dataclass(frozen=True)
-class OrbitDistance:
+class OrbitDistance(NamedTuple):
     """Distances of two orbits.
 
     Attributes
@@ -143,21 +140,8 @@ class OrbitDistance:
 
 
 def orbit_distance(a: ArrayLike, b: ArrayLike, periods: int) -> OrbitDistance:
-    """Normalised distance of two orbits, each (periods * grid, states) on equal grids of phase.
-
-    Raises
-    ------
-    ValueError
-        Orbits of different shape, or a number of samples that is no multiple of the periods.
-    """
-    from scipy.optimize import minimize_scalar
-
-    x, y = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
-    if x.shape != y.shape or x.ndim != 2 or len(x) % periods:
-        raise ValueError(
-            f"two orbits over {periods} forcing periods must have equal shapes (samples, states), the samples a "
-            f"multiple of the periods; got {x.shape} and {y.shape}"
-        )
+    """Normalised distance of two orbits, each (periods * grid, states) on equal grids of phase."""
+    x, y = np.asarray(a, float), np.asarray(b, float)
     size = np.sqrt(0.5 * (x.var(axis=0) + y.var(axis=0)))
     size = np.where(size > 0, size, 1.0)
     n, states = x.shape
@@ -175,17 +159,16 @@ def orbit_distance(a: ArrayLike, b: ArrayLike, periods: int) -> OrbitDistance:
     grid = np.sqrt(np.maximum(power - 2 * np.fft.fft(cross).real, 0.0) / states)
     whole = grid[:: n // periods]
     best = int(np.argmin(whole))
-    near = int(np.argmin(grid)) / n
+    near = np.argmin(grid) / n
     found = minimize_scalar(distance, bounds=(near - 1 / n, near + 1 / n), method="bounded", options={"xatol": 1e-10})
     lead = float(found.x) if found.fun <= grid.min() else near
     shift = (lead * periods + 0.5) % 1.0 - 0.5
-    return OrbitDistance(float(whole[best]), min(float(found.fun), float(grid.min())), best, shift)
+    return OrbitDistance(float(whole[best]), min(float(found.fun), grid.min()), best, shift)
 
 
 def common_length(orbit: ArrayLike, periods: int, length: int) -> FloatArray:
     """An orbit over ``periods`` repeated to ``length`` forcing periods, a multiple of them."""
-    values = np.asarray(orbit, dtype=float)
-    return np.tile(values, (length // periods, 1))
+    return np.tile(orbit, (length // periods, 1))
 
 
 FEWEST_BLOCKS = 20
@@ -194,8 +177,7 @@ MOST = 3000  # points of one cloud, the last ones: the matrix of distances grows
 ASSIGNED = 500  # points of each cloud in the assignment that gives the Wasserstein distance
 
 
-@dataclass(frozen=True)
-class CloudDistance:
+class CloudDistance(NamedTuple):
     """Energy distances (the root E, in units of ``scale``) and what the clouds' own halves give.
 
     Attributes
@@ -233,8 +215,6 @@ def energy_distance(a: ArrayLike, b: ArrayLike) -> float:
 
     In one dimension it equals ``scipy.stats.energy_distance``. The clouds must be in one common unit.
     """
-    from scipy.spatial.distance import cdist
-
     x, y = _two_clouds(a, b)
     return float(_root(2 * cdist(x, y).mean() - cdist(x, x).mean() - cdist(y, y).mean()))
 
@@ -245,9 +225,6 @@ def wasserstein(a: ArrayLike, b: ArrayLike, seed: int = 0) -> float:
     For equal numbers of points this is SciPy's linear assignment, exactly; seeded parts of at most 500 points are
     taken.
     """
-    from scipy.optimize import linear_sum_assignment
-    from scipy.spatial.distance import cdist
-
     x, y = _two_clouds(a, b)
     size = min(len(x), len(y), ASSIGNED)
     rng = np.random.default_rng(seed)
@@ -261,9 +238,7 @@ def block_length(points: ArrayLike) -> int:
 
     At most a twentieth of the points, so that random halves of blocks can be drawn.
     """
-    from scipy.spatial.distance import pdist
-
-    cloud = _cloud(points, "points")
+    cloud = np.asarray(points, float)
     n = len(cloud)
     longest = max(1, n // FEWEST_BLOCKS)
     overall = pdist(cloud[:: max(1, n // 1000)]).mean()
@@ -293,21 +268,8 @@ def cloud_distance(
         Of ``numpy.random.default_rng``.
     block : int, optional
         Points that stay together; :func:`block_length` of ``a`` where not given.
-
-    Raises
-    ------
-    ValueError
-        Fewer than 40 points in a cloud: halves of it say nothing.
     """
-    from scipy.spatial.distance import cdist
-
     x, y = _two_clouds(a, b)
-    for name, cloud in (("first", x), ("second", y)):
-        if len(cloud) < 2 * FEWEST_BLOCKS:
-            raise ValueError(
-                f"the {name} cloud has {len(cloud)} points; its halves are compared, which takes at least "
-                f"{2 * FEWEST_BLOCKS}: record longer"
-            )
     x, y = x[-MOST:], y[-MOST:]  # thinning would separate successive points
     length = block_length(x) if block is None else block
     rng = np.random.default_rng(seed)
@@ -315,7 +277,7 @@ def cloud_distance(
     pairs = [_halves(len(x), length, rng) for _ in range(splits)]
     size = int(pairs[0][0].sum())
     others = [_parts(len(y), length, size, rng) for _ in range(splits)]
-    (left, right), (first, second) = (np.array(rows, dtype=float).transpose(1, 2, 0) for rows in (pairs, others))
+    (left, right), (first, second) = (np.array(rows, float).transpose(1, 2, 0) for rows in (pairs, others))
     to_left, to_right, to_first, to_second = xx @ left, xx @ right, yy @ first, yy @ second
     within, beyond = _mean(left, to_left, left), _mean(first, to_first, first)
     halves = _root(2 * _mean(left, to_right, right) - within - _mean(right, to_right, right))
@@ -328,7 +290,7 @@ def cloud_distance(
 def _mean(part: FloatArray, product: FloatArray, other: FloatArray) -> FloatArray:
     """Mean distance between two parts, for many pairs at once: columns say which points are in, ``product`` is the
     matrix of distances times ``other``."""
-    return np.asarray(np.einsum("ij,ij->j", part, product) / (part.sum(axis=0) * other.sum(axis=0)))
+    return np.einsum("ij,ij->j", part, product) / (part.sum(axis=0) * other.sum(axis=0))
 
 
 def _halves(n: int, block: int, rng: np.random.Generator) -> tuple[BoolArray, BoolArray]:
@@ -336,7 +298,7 @@ def _halves(n: int, block: int, rng: np.random.Generator) -> tuple[BoolArray, Bo
     count = n // (2 * block)
     first = int(rng.integers(0, n - 2 * count * block + 1))
     owner = np.repeat(rng.permutation(np.arange(2 * count) % 2), block)
-    halves = np.zeros((2, n), dtype=bool)
+    halves = np.zeros((2, n), bool)
     halves[owner, np.arange(first, first + len(owner))] = True
     return halves[0], halves[1]
 
@@ -352,19 +314,11 @@ def _parts(n: int, block: int, size: int, rng: np.random.Generator) -> tuple[Boo
     return one, two
 
 
-def _cloud(points: ArrayLike, name: str) -> FloatArray:
-    cloud = np.asarray(points, dtype=float)
-    cloud = cloud[:, None] if cloud.ndim == 1 else cloud
-    if cloud.ndim != 2 or not len(cloud) or not np.isfinite(cloud).all():
-        raise ValueError(f"{name} must be a cloud (points, states) of finite numbers, got shape {cloud.shape}")
-    return cloud
-
-
-def _two_clouds(a: ArrayLike, b: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    x, y = _cloud(a, "a"), _cloud(b, "b")
-    if x.shape[1] != y.shape[1]:
-        raise ValueError(f"the clouds have {x.shape[1]} and {y.shape[1]} states; compare the same ones")
-    return x, y
+def _two_clouds(a: ArrayLike, b: ArrayLike) -> list[FloatArray]:
+    clouds = [np.asarray(cloud, float).reshape(len(np.asarray(cloud)), -1) for cloud in (a, b)]
+    if not all(np.isfinite(cloud).all() for cloud in clouds):
+        raise ValueError("section points must be finite numbers: compare states that all modes have")
+    return clouds
 
 
 def _root(square: Any) -> Any:

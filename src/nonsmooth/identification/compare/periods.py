@@ -25,7 +25,6 @@ drifting.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -37,8 +36,7 @@ BOUND = 2.0  # of r_p: the stated noise may be wrong by as much before a period 
 FEWEST_RETURNS = 4
 
 
-@dataclass(frozen=True)
-class MeasuredPeriod:
+class MeasuredPeriod(NamedTuple):
     """Period number (0: none found) with the scaled returns r_1, r_2, ... it rests on."""
 
     number: int
@@ -67,7 +65,7 @@ def measured_period(
     ValueError
         Too few points for any period, or a noise that is not positive.
     """
-    cloud, sigma = np.asarray(points, dtype=float), np.asarray(noise, dtype=float)
+    cloud, sigma = np.asarray(points, float), np.asarray(noise, float)
     if not (np.isfinite(sigma).all() and (sigma > 0).all()):
         raise ValueError(f"noise must be a positive standard error for each state, got {sigma.tolist()}")
     order = 2 if drifting else 1
@@ -94,7 +92,7 @@ def period_numbers(points: ArrayLike, noise: ArrayLike, *, window: int = 24, max
     The points of an orbit drift with the parameter: an even drift within the window is no return's fault.
     Points within half a window of an end have that of the first and last whole window.
     """
-    cloud = np.asarray(points, dtype=float)
+    cloud = np.asarray(points, float)
     if len(cloud) < window:
         raise ValueError(f"{len(cloud)} section points are fewer than one window of {window}")
     count = len(cloud) - window + 1
@@ -123,8 +121,8 @@ def flips(values: ArrayLike, numbers: ArrayLike) -> dict[str, float]:
     it with a delay when the parameter moves); the value given is the one that separates the two numbers with the fewest
     points on the wrong side.
     """
-    order = np.argsort(np.asarray(values, dtype=float), kind="stable")
-    x, n = np.asarray(values, dtype=float)[order], np.asarray(numbers)[order]
+    order = np.argsort(np.asarray(values, float), kind="stable")
+    x, n = np.asarray(values, float)[order], np.asarray(numbers)[order]
     found = {}
     for p in (1, 2):
         is_single, is_double = n == p, n == 2 * p
@@ -230,8 +228,7 @@ def _splitting(at: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArr
         return at[:0], at[:0]
     parity = np.where(np.arange(len(points) - 2) % 2 == 0, 0.25, -0.25)[:, None]
     parted = parity * (points[2:] - 2 * points[1:-1] + points[:-2])
-    along = np.linalg.svd(parted, full_matrices=False)[2][0]
-    size = parted @ along
+    size = parted @ np.linalg.svd(parted, full_matrices=False)[2][0]
     return at[1:-1], size if size.sum() > 0 else -size
 
 
@@ -279,8 +276,7 @@ def _one_fit(
     )
     if not found.success:  # 200 evaluations and not there
         return None
-    freedom = max(len(size) - len(start), 1)
-    variance = max(float(np.sum((model(found.x) - size) ** 2)) / freedom, 0.375)
+    variance = max(np.sum((model(found.x) - size) ** 2) / max(len(size) - len(start), 1), 0.375)
     try:
         covariance = np.linalg.inv(found.jac.T @ found.jac) * variance * ALIKE
     except np.linalg.LinAlgError:
@@ -317,4 +313,4 @@ def _amplitude(growth: FloatArray, gain: float, first: float) -> FloatArray:
     for i in range(len(growth)):
         found[i] = w
         w = min(max(w * decay[i] + fed[i], 1e-250), 1e250)
-    return np.asarray(found**-0.5)
+    return found**-0.5

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray, IntArray
 from nonsmooth.attractors.mapper import Mapper
@@ -24,17 +24,12 @@ from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.kernels.hybrid import codes
 from nonsmooth.kernels.hybrid.kept import Kept, Section
 from nonsmooth.results.labels import by_code
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 SAME = 1e-6  # orbits whose points are nearer to each other than this part of the motion are one
 
 
-@dataclass(frozen=True)
-class SteadyState:
+class SteadyState(NamedTuple):
     """A steady motion: period number (0: none found), and a section point on it at phase 0."""
 
     period_number: int
@@ -90,7 +85,7 @@ class Motions:
 
     def carried(self, order: Iterable[int]) -> tuple[FloatArray, IntArray]:
         """Section points and period numbers of all systems, the state carried from one to the next, from rest."""
-        rows, periods = np.array([*order], dtype=np.int64), np.zeros(len(self.periods), dtype=np.int64)
+        rows, periods = np.array([*order], np.int64), np.zeros(len(self.periods), np.int64)
         sections = self.engine.kept(len(periods), self.settler.keep).section
         kept, found = self._settled(rows, np.zeros((len(rows), sections.shape[2])), 2)
         periods[rows], good = found.period_number, usable(found.status)
@@ -116,7 +111,7 @@ class Motions:
         """
         found: list[SteadyState] = []
         orbits: list[FloatArray] = []
-        begin = np.atleast_2d(np.asarray(starts, dtype=float))
+        begin = np.atleast_2d(np.asarray(starts, float))
         kept, runs = self._settled(np.full(len(begin), i), begin, 0)
         good = usable(runs.status) & np.isfinite(kept.section).all(axis=(1, 2))
         for points, number in zip(kept.section[good], runs.period_number[good], strict=True):
@@ -166,8 +161,7 @@ EXACT = 1e-6  # noise of a computed section point, in parts of the motion's size
 SHOWN = 16  # forcing periods of a motion without a period number that are kept for the overlays
 
 
-@dataclass(frozen=True)
-class Prediction:
+class Prediction(NamedTuple):
     """One motion as the theory has it.
 
     Attributes
@@ -186,7 +180,7 @@ class Prediction:
     period_number: int
     sections: list[FloatArray]
     orbit: FloatArray | None
-    coexisting: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    coexisting: IntArray
     attractor: SteadyState | None = None
 
 
@@ -210,7 +204,7 @@ def predict(
     assert best is not None  # `attractors` raises where there is none
     _, one, sections = best
     motion = motions.orbit(0, one, one.period_number or SHOWN)
-    numbers = np.array([item.period_number for item in found], dtype=np.int64)
+    numbers = np.array([item.period_number for item in found], np.int64)
     return Prediction(one.period_number, sections, motion, numbers, one)
 
 
@@ -250,9 +244,9 @@ def from_result(model: Model, phases: list[float]) -> Prediction:
 
 def _phase(result: xr.Dataset) -> FloatArray:
     if "phase" in result:
-        return np.asarray(result["phase"].values, dtype=float)
+        return np.asarray(result["phase"].values, float)
     if "omega" in result.coords:
-        return np.asarray(result["time"].values * float(result["omega"]) / (2 * np.pi), dtype=float)
+        return np.asarray(result["time"].values * float(result["omega"]) / (2 * np.pi), float)
     raise ValueError("the phase of the drive is not known: give `phase` (in forcing periods) over time, or omega")
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from nonsmooth.arrays import FloatArray
@@ -13,12 +14,7 @@ from nonsmooth.diagrams.response import jumps_in
 from nonsmooth.diagrams.sweep import sweep
 from nonsmooth.identification.compare.draws import Model
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.system.system import System
-
+from nonsmooth.system.system import System
 
 STEEPER = 2.5  # a jump exceeds the steps on both sides by this factor
 LEAST = 0.02  # and this part of the amplitude
@@ -63,7 +59,7 @@ def jumps_in_steps(x: FloatArray, heights: FloatArray, error: FloatArray) -> lis
         least = max(LEAST * max(abs(heights[i : i + 2])), CERTAIN * np.hypot(*error[i : i + 2]))
         if abs(step[i]) <= least or any(abs(step[i] - one) < 0.5 * abs(step[i]) for one in carried):
             continue
-        middle, half = 0.5 * float(x[i] + x[i + 1]), 0.5 * float(abs(x[i + 1] - x[i]))
+        middle, half = 0.5 * (x[i] + x[i + 1]), 0.5 * float(abs(x[i + 1] - x[i]))
         found.append(AmplitudeJump(middle, half, float(heights[i]), float(heights[i + 1])))
     return found
 
@@ -109,12 +105,10 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
         pairs = _pairs(seen, expected)
         rows += [(word, jump, expected[pairs[i]] if i in pairs else nothing) for i, jump in enumerate(seen)]
         rows += [(word, nothing, jump) for j, jump in enumerate(expected) if j not in pairs.values()]
-    (m, half), (t, step) = (np.array([row[k][:2] for row in rows], dtype=float).reshape(-1, 2).T for k in (1, 2))
+    (m, half), (t, step) = (np.array([row[k][:2] for row in rows], float).reshape(-1, 2).T for k in (1, 2))
     over = "jump"
-    variables: dict[str, Any] = {
-        "jump_direction": labelled(
-            over, np.array([row[0] for row in rows], dtype=str), "direction in which the jump is met"
-        ),
+    variables = {
+        "jump_direction": labelled(over, np.array([row[0] for row in rows], str), "direction in which the jump is met"),
         "measured_jump": labelled(over, m, "measured jump (NaN: none was seen)", unit),
         "theory_jump": labelled(over, t, "predicted jump (NaN: none is predicted)", unit),
         "jump_difference": labelled(over, t - m, "predicted minus measured jump", unit),
@@ -122,7 +116,7 @@ def match_jumps(measured: Jumps, theory: Jumps, drawn: Sequence[Jumps], unit: st
     }
     if drawn:
         ends = [_interval(jump.value, word, drawn, level) for word, _, jump in rows]
-        for end, column in zip(("low", "high"), np.array(ends, dtype=float).reshape(-1, 2).T, strict=True):
+        for end, column in zip(("low", "high"), np.array(ends, float).reshape(-1, 2).T, strict=True):
             said = f"{end} end of the interval for drawn parameters"
             variables[f"theory_jump_{end}"] = labelled(over, column, said, unit)
     return variables
@@ -184,7 +178,7 @@ def compare_response(measured: xr.Dataset, model: Model, *, name: str, state: st
     else:
         values = np.linspace(runs["value"].min(), runs["value"].max(), FINE)
         curves, at_runs = _curves(model.system, model, name, state, values, runs, directions)
-    variables: dict[str, Any] = {
+    variables = {
         f"measured_{name}": labelled("run", runs["value"], f"measured {name}", unit),
         "measured_direction": labelled("run", runs["direction"], "direction in which the run was reached"),
         "measured_amplitude": labelled("run", runs["amplitude"], "measured amplitude"),
@@ -276,7 +270,7 @@ def _given(theory: xr.Dataset, name: str, state: str, directions: list[str]) -> 
     if missing := [word for word in directions if word not in words]:
         raise ValueError(f"runs were made {' and '.join(missing)}, the theory has only: {', '.join(words)}")
     chosen = heights.transpose(name, "direction").isel(direction=[words.index(word) for word in directions])
-    return np.asarray(chosen[name].values, dtype=float), np.asarray(chosen.values, dtype=float)
+    return np.asarray(chosen[name].values, float), np.asarray(chosen.values, float)
 
 
 def _jumps(values: FloatArray, curves: FloatArray, directions: list[str]) -> Jumps:
@@ -285,7 +279,7 @@ def _jumps(values: FloatArray, curves: FloatArray, directions: list[str]) -> Jum
     for d, word in enumerate(directions):
         x, heights = (values, curves[:, d]) if word == "up" else (values[::-1], curves[::-1, d])
         steps = [(x[i : i + 2], heights[i : i + 2].tolist()) for i in jumps_in(heights)]
-        found[word] = [AmplitudeJump(float(at.mean()), 0.5 * float(np.ptp(at)), *both) for at, both in steps]
+        found[word] = [AmplitudeJump(float(at.mean()), 0.5 * np.ptp(at), *both) for at, both in steps]
     return found
 
 

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.compare.orbits import fold
 from nonsmooth.identification.compare.periods import measured_period
 from nonsmooth.identification.compare.response import jumps_of_runs
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _JUMPS = {
     "value": ("middle of the step in which the amplitude jumps", "rad/s"),
@@ -35,7 +33,7 @@ def _period_of(motion: xr.Dataset, points: FloatArray, longest: int) -> int:
 
 def _noise(*motions: xr.Dataset) -> FloatArray:
     """The standard error of most samples in each state."""
-    return np.asarray(np.median(np.concatenate([motion["u_error"].values for motion in motions]), axis=0))
+    return np.median(np.concatenate([motion["u_error"].values for motion in motions]), axis=0)
 
 
 def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], *, settle: int = 4) -> xr.Dataset:
@@ -59,8 +57,6 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
         :func:`nonsmooth.frequency_response` has them: ``jump_direction``, ``jump_value``, ``jump_step``,
         ``jump_before`` and ``jump_after``.
     """
-    import xarray as xr
-
     if len(motions) != len(directions) or not len(motions):
         raise ValueError(f"{len(motions)} runs and {len(directions)} directions: each run needs its own")
     heights, errors, periods = [], [], []
@@ -78,18 +74,18 @@ def measured_response(motions: Sequence[xr.Dataset], directions: Sequence[str], 
         scatter = float(half.std(ddof=1) / np.sqrt(len(half))) if len(half) > 1 else 0.0
         errors.append(float(np.hypot(scatter, sample / np.sqrt(len(half)))))
     omega = np.array([float(motion["omega"]) for motion in motions])
-    words = np.array(directions, dtype=str)
+    words = np.array(directions, str)
     jumps = jumps_of_runs(omega, np.array(heights), np.array(errors), words)
     met = [word for word, found in jumps.items() for _ in found]
-    steps = np.array([one for found in jumps.values() for one in found], dtype=float).reshape(-1, 4).T * _WHOLE
+    steps = np.array([one for found in jumps.values() for one in found], float).reshape(-1, 4).T * _WHOLE
     return xr.Dataset(
         {
             "amplitude": labelled("run", np.array(heights), "half the range of x", "m"),
             "amplitude_error": labelled("run", np.array(errors), "standard error of it", "m"),
             "omega": labelled("run", omega, "frequency of the drive", "rad/s"),
             "direction": labelled("run", words, "how the run was reached"),
-            "period_number": labelled("run", np.array(periods, dtype=np.int64), _NUMBER),
-            "jump_direction": labelled("jump", np.array(met, dtype=str), "how it was met"),
+            "period_number": labelled("run", np.array(periods, np.int64), _NUMBER),
+            "jump_direction": labelled("jump", np.array(met, str), "how it was met"),
             **{
                 f"jump_{name}": labelled("jump", column, *words_of)
                 for (name, words_of), column in zip(_JUMPS.items(), steps, strict=True)
@@ -121,11 +117,8 @@ def measured_rise(motion: xr.Dataset, parameter: str, first: float, last: float,
     xarray.Dataset
         ``section(iterate, state)`` at phase 0 with the parameter over ``iterate``, and ``section_error(state)``.
     """
-    import xarray as xr
-
     time, phase = motion["time"].values, motion["phase"].values
-    columns = np.column_stack([motion["u"].values, time])
-    points = fold(phase, columns, 8)[:, 0]
+    points = fold(phase, np.column_stack([motion["u"].values, time]), 8)[:, 0]
     at = first + (last - first) * (points[:, 2] - time[0]) / (time[-1] - time[0])
     return xr.Dataset(
         {
@@ -159,8 +152,6 @@ def measured_sections(
         shorter run), ``section_error(state)`` and ``period_number(<parameter>)`` (0: none found, -1: too
         few turns).
     """
-    import xarray as xr
-
     order = np.argsort(values, kind="stable")
     clouds = [fold(motions[i]["phase"].values, motions[i]["u"].values, 8)[:, 0] for i in order]
     points = np.full((len(clouds), max(map(len, clouds)), clouds[0].shape[1]), np.nan)
@@ -172,10 +163,10 @@ def measured_sections(
         {
             "section": labelled((parameter, "iterate", "state"), points, "section points"),
             "section_error": ("state", _noise(*motions)),
-            "period_number": labelled(parameter, np.array(numbers, dtype=np.int64), _NUMBER),
+            "period_number": labelled(parameter, np.array(numbers, np.int64), _NUMBER),
         },
         {
-            parameter: labelled(parameter, np.asarray(values, dtype=float)[order], parameter, unit),
+            parameter: labelled(parameter, np.asarray(values, float)[order], parameter, unit),
             "state": first["state"].values,
             "state_unit": ("state", first["state_unit"].values),
         },

@@ -84,7 +84,7 @@ def _cut(problem: Windows, windows: list[Window], length: float) -> Windows:
     """The problem with one window at the beginning of each record."""
     pieces = []
     for window, record in zip(windows, problem.records, strict=True):
-        last = max(int(np.searchsorted(record.time, record.time[0] + length, "right")), window.last)
+        last = max(np.searchsorted(record.time, record.time[0] + length, "right"), window.last)
         pieces.append(window.cut(record, last))
     return problem.of(pieces)
 

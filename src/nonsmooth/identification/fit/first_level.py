@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,9 +28,7 @@ from nonsmooth.identification.arrow import Residuals, settle
 from nonsmooth.identification.fit.first_windows import first_length, first_windows, told_start
 from nonsmooth.identification.fit.windows import Window, Windows
 from nonsmooth.recordings.recording import runs_of
-
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,14 +182,19 @@ def settle_first(problem: Windows, theta: FloatArray, length: float, start: Floa
     if not now.pieces:
         raise SolveError("the motion of the first guess ends before any window of the record does")
     rng = np.random.default_rng(len(now.pieces))
-    stage, used = Stage(now, theta, now.starts), np.ones(len(now.pieces), dtype=bool)
+    stage, used = Stage(now, theta, now.starts), np.ones(len(now.pieces), bool)
     for _ in range(_ROUNDS):
         noise = np.maximum(problem.noise, _sizes(stage))
         fitted = _soft(stage, noise, used)
         bad = _bad(fitted)
         changed = not np.array_equal(bad, ~used)
         begun = rechosen(fitted)
-        stage = _mended(begun, np.flatnonzero(bad).tolist(), rng) if np.mean(bad) <= 0.5 else begun
+        others: dict[int, tuple[Window, FloatArray]] = {}
+        for i in np.flatnonzero(bad).tolist() if np.mean(bad) <= 0.5 else ():  # with other starts, and modes
+            best = alone(begun, _others(begun.with_others(others), i, rng), 3)
+            if best and best[0][0] < 0.7 * begun.misfits[i]:
+                others[i] = best[0][1:]
+        stage = begun.with_others(others)
         if stage is not begun:
             bad = _bad(stage)
         used = ~bad
@@ -203,13 +206,13 @@ def settle_first(problem: Windows, theta: FloatArray, length: float, start: Floa
         raise SolveError("no window of the record can be simulated at the parameters that fit it best")
     if not all(moves):
         now = stage.problem.of([w for w, whole in zip(stage.problem.pieces, moves, strict=True) if whole])
-        stage = Stage(now, stage.theta, stage.starts[moves], now.derivatives(stage.theta, stage.starts[moves]))
+        stage = Stage(now, stage.theta, stage.starts[moves], now.residuals(stage.theta, stage.starts[moves], True))
     return stage
 
 
 def _bad(stage: Stage) -> BoolArray:
     """Mark the windows that fit much worse than most."""
-    return np.asarray(stage.misfits > _FAR * max(float(np.median(stage.misfits)), 1.0))
+    return stage.misfits > _FAR * max(np.median(stage.misfits), 1.0)
 
 
 def settle_soft(stage: Stage) -> Stage:
@@ -250,23 +253,13 @@ def _soft(stage: Stage, noise: FloatArray, used: Any = None) -> Stage:
     return replace(level(replace(stage, problem=soft), used), problem=problem)
 
 
-def _mended(stage: Stage, bad: list[int], rng: np.random.Generator) -> Stage:
-    """The stage with other starts (and modes) of the bad windows, where such were found."""
-    found: dict[int, tuple[Window, FloatArray]] = {}
-    for i in bad:
-        best = alone(stage, _others(stage.with_others(found), i, rng), 3)
-        if best and best[0][0] < 0.7 * stage.misfits[i]:
-            found[i] = best[0][1:]
-    return stage.with_others(found)
-
-
 def _others(stage: Stage, i: int, rng: np.random.Generator) -> list[tuple[Window, FloatArray]]:
     """Other starts of a window: as the window before it ends, as the samples tell, and drawn about these."""
     problem, theta, window = stage.problem, stage.theta, stage.problem.pieces[i]
     told, run = told_start(problem, theta, window), window.record
     found = [(window, stage.starts[i])]
     if i and problem.pieces[i - 1].record == run:
-        before, begin = problem.pieces[i - 1], np.array([problem.clock(theta, run) * window.begin])
+        before, begin = problem.pieces[i - 1], np.array([problem.at(theta, run).clock * window.begin])
         motion = problem.march(theta, run, before.begin, begin, stage.starts[i - 1], before.mode)
         if motion is not None:
             found.append((replace(window, mode=int(motion.mode[0])), motion.z[0]))
@@ -292,7 +285,7 @@ def without_disagreeing(problem: Windows, theta: FloatArray) -> tuple[Windows, l
     """
     stage = settle_first(problem, theta, first_length(problem), None, True)
     now, each = stage.problem, stage.misfits
-    usual = max(float(np.median(each)), 1.0)
+    usual = max(np.median(each), 1.0)
     bad = each > _DISAGREES * usual
     if not bad.any() or np.mean(bad) > _TOO_MANY:
         many = f"{np.mean(bad):.0%} of short windows disagree with the rest: too many, and none was left out"

@@ -9,15 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.fit.windows import Window, Windows
-
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 _AROUND = 3  # samples on either side, from which value and slope at a sample are taken
 _SWING = 0.15  # of a quantity's range: what counts as a swing
@@ -31,8 +28,7 @@ def first_length(problem: Windows) -> float:
     n = problem.marcher.flow.n
     for record in problem.records:
         columns = [y[np.isfinite(y)] for y in record.values.T]
-        swings = [turns_of(y) for y in columns if len(y)]
-        longest = _OF_A_SWING * 2.0 * record.duration / max(min(swings), 4)
+        longest = _OF_A_SWING * 2.0 * record.duration / max(min([turns_of(y) for y in columns if len(y)]), 4)
         found.append(max(longest, (3 * n + 6) * record.duration / (len(record.time) - 1)))
     return float(np.median(found))
 
@@ -65,21 +61,21 @@ def first_windows(
         early = _lead(problem, theta, i)
         told = states_from_samples(problem, theta, i, slice(None))
         z = np.concatenate([np.zeros(n_u) if start is None else start[i], memory])
-        if problem.values(theta, i) is None:
+        if (there := problem.at(theta, i)).values is None:
             continue
-        which, clock = problem.unknowns.places[i], problem.clock(theta, i)
+        which = problem.unknowns.places[i]
         sizes = np.max(np.abs(np.nan_to_num(told)), axis=0)
         time, mode, first, windows = record.time, problem.modes[i][0], 0, []
         while first < len(time) - 1:
             rest = time[-1] - time[first]
             until = time[-1] if rest < 1.75 * length else time[first] + 1.25 * length
             # at least two samples, across a gap that is longer than a window
-            end = max(int(np.searchsorted(time, until, "right")), first + 2)
-            known = np.append(np.isfinite(told[first]), np.zeros(len(memory), dtype=bool))
+            end = max(np.searchsorted(time, until, "right"), first + 2)
+            known = np.append(np.isfinite(told[first]), np.zeros(len(memory), bool))
             set_ = np.where(known, np.append(np.nan_to_num(told[first]), memory), z)
             begin = float(time[first]) - early
             for candidate in [z] if first == 0 and start is not None else [set_, z]:  # beyond a stop: as it was going
-                motion = problem.march(theta, i, begin, clock * (time[first:end] - early), candidate, mode)
+                motion = problem.march(theta, i, begin, there.clock * (time[first:end] - early), candidate, mode)
                 if motion is not None:
                     break
             if motion is None:  # the samples of this window come back when windows are joined
@@ -103,7 +99,7 @@ def first_windows(
 
 def _lead(problem: Windows, theta: FloatArray, run: int) -> float:
     """Time by which a window begins before its first sample: the longest delay that the fit may try."""
-    lead, u = float(max(problem.delays(theta, run).max(), 0.0)), problem.unknowns
+    lead, u = float(max(problem.at(theta, run).delays.max(), 0.0)), problem.unknowns
     for k, (_, what) in zip(u.places[run][len(u.active) :], u.sensors, strict=False):
         if what == "delay":
             most, step = float(u.high[k]), float(np.median(np.diff(problem.records[run].time)))
@@ -119,10 +115,7 @@ def _quiet(time: FloatArray, crossings: FloatArray, length: float) -> int:
         return len(time) - 1
     if not len(crossings):
         return int(near[len(near) // 2])
-    at = np.searchsorted(crossings, time[near])
-    before = np.where(at > 0, time[near] - crossings[np.maximum(at - 1, 0)], np.inf)
-    behind = np.where(at < len(crossings), crossings[np.minimum(at, len(crossings) - 1)] - time[near], np.inf)
-    return int(near[np.argmax(np.minimum(before, behind))])
+    return int(near[np.argmax(np.abs(np.subtract.outer(time[near], crossings)).min(axis=1))])
 
 
 def told_start(problem: Windows, theta: FloatArray, window: Window) -> FloatArray:
@@ -134,9 +127,8 @@ def told_start(problem: Windows, theta: FloatArray, window: Window) -> FloatArra
 def states_from_samples(problem: Windows, theta: FloatArray, run: int, which: slice) -> FloatArray:
     """States (N, n_u) that the samples tell: those measured, and those that are the rate of one; NaN elsewhere."""
     record = problem.records[run]
-    at, held = record.time[which], np.isfinite(record.values)
-    sensors = problem.sensor_values(theta, run).items()
-    measured = {q: (sensor, c) for c, (q, sensor) in enumerate(sensors) if held[:, c].any()}
+    at, held, sensors = record.time[which], np.isfinite(record.values), problem.at(theta, run).sensors
+    measured = {q: (sensor, c) for c, (q, sensor) in enumerate(sensors.items()) if held[:, c].any()}
     system, names = problem.system, list(problem.system.states)
     told = np.full((len(at), len(names)), np.nan)
     known = rates(system)
@@ -167,8 +159,7 @@ def rates(system: System) -> Mapping[int, int]:
 def _local(t: FloatArray, y: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Value and slope at each instant, of the parabola through the nearest samples."""
     width = min(2 * _AROUND + 1, len(t))
-    first = np.clip(np.searchsorted(t, at) - _AROUND, 0, len(t) - width)
-    rows = first[:, None] + np.arange(width)
+    rows = np.clip(np.searchsorted(t, at) - _AROUND, 0, len(t) - width)[:, None] + np.arange(width)
     s = t[rows] - at[:, None]
     size = np.maximum(np.abs(s).max(axis=1), 1e-300)
     table = np.stack([np.ones_like(s), s / size[:, None], (s / size[:, None]) ** 2], axis=2)

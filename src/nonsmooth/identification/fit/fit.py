@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
+from typing import Annotated, Any, Literal, Unpack
 
 import numpy as np
 
@@ -13,16 +13,23 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, unknown
 from nonsmooth.flow.starts import is_one_start, start_states
 from nonsmooth.identification.blas import one_blas_thread
+from nonsmooth.identification.fit.beginnings import beginnings, drawn
+from nonsmooth.identification.fit.first_level import Stage, level, read_modes, without_disagreeing
+from nonsmooth.identification.fit.first_windows import first_length, first_windows, states_from_samples
+from nonsmooth.identification.fit.growth import Grown, grow, with_steady
+from nonsmooth.identification.fit.likelihood import posterior_of
+from nonsmooth.identification.fit.motion import Marcher
+from nonsmooth.identification.fit.outcome import outcome
+from nonsmooth.identification.fit.records import irregularity, read_records
+from nonsmooth.identification.fit.steady import ROUGHLY
+from nonsmooth.identification.fit.unknowns import read_unknowns
+from nonsmooth.identification.fit.windows import Windows
 from nonsmooth.identification.options import Fitting
+from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.results.progress import Progress, progress
 from nonsmooth.system.arguments import check_system, checked
 from nonsmooth.system.kinds import above, at_least
-
-if TYPE_CHECKING:
-    from nonsmooth.identification.fit.growth import Grown
-    from nonsmooth.identification.fit.windows import Windows
-    from nonsmooth.identification.parameter_set import ParameterSet
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 _PHASES = 8  # first guesses of an unknown phase
 _LONGER = 3.3  # the other length of first windows, in every second try
@@ -143,10 +150,6 @@ def fit(
     >>> round(found["k"], 6) == system.values["k"]
     True
     """
-    from nonsmooth.identification.fit.first_level import without_disagreeing
-    from nonsmooth.identification.fit.likelihood import posterior_of
-    from nonsmooth.identification.fit.outcome import outcome
-
     problem = problem_of(system, recording, parameters, options, mode, loss, per_run, inputs)
     free, tries, seed, progress = options["free_start"], options["tries"], options["seed"], options["progress"]
     begin = _begun(problem, start, free, leave_out)
@@ -197,13 +200,6 @@ def problem_of(
     """The problem, without windows; the noise is the records' own irregularity. ``options``: those of `Fitting`."""
     check_system(system, "fit", inputs=True)
     system = system.written_out()  # any mode may be the first, and a force that is fitted needs its formula
-    from nonsmooth.identification.fit.first_level import read_modes
-    from nonsmooth.identification.fit.motion import Marcher
-    from nonsmooth.identification.fit.records import irregularity, read_records
-    from nonsmooth.identification.fit.steady import ROUGHLY
-    from nonsmooth.identification.fit.unknowns import read_unknowns
-    from nonsmooth.identification.fit.windows import Windows
-
     if system.is_map:
         raise ValueError(f"{system.name!r} is a map, whose time is a count: fit takes systems with vector fields")
     sensors, records, steady = read_records(system, recording, options, inputs)
@@ -225,7 +221,7 @@ def problem_of(
             max(noise(readings), sensor.floor)
             or noise(readings, moving=True)
             or sensor.noise  # of a few readings, which show none
-            or max(ROUGHLY * float(np.nanmax(np.abs(np.concatenate(readings)), initial=0.0)), 1e-300)
+            or max(ROUGHLY * np.nanmax(np.abs(np.concatenate(readings)), initial=0.0), 1e-300)
             if readings
             else np.inf
             for readings, sensor in zip(within, sensors.values(), strict=True)
@@ -249,9 +245,6 @@ def best_of(
     problem: Windows, start: FloatArray | None, free: bool, longest: float, tries: int, seed: int, watched: Progress
 ) -> Grown:
     """The fit from the first guess that leads to one, else the best of all."""
-    from nonsmooth.identification.fit.first_windows import first_length
-    from nonsmooth.identification.fit.growth import grow, with_steady
-
     if not problem.records:
         return _of_steady(problem, tries, seed, watched)
     both, problem = problem, replace(problem, steady=())
@@ -286,10 +279,6 @@ def best_of(
 
 def _of_steady(problem: Windows, tries: int, seed: int, watched: Progress) -> Grown:
     """The fit to readings of steady states alone: from the first guess that leads near, else from the best."""
-    from nonsmooth.identification.fit.beginnings import drawn
-    from nonsmooth.identification.fit.first_level import Stage, level
-    from nonsmooth.identification.fit.growth import with_steady
-
     now, rng, rough, why = problem.of([]), np.random.default_rng(seed), list[tuple[float, FloatArray]](), ""
 
     def far(theta: FloatArray) -> float:
@@ -328,9 +317,6 @@ def _guesses(
     Of those the nearest first: whose first windows fit best before any step. Longer windows hold what hidden states do;
     where there are such, every second guess comes from the beginnings of the records.
     """
-    from nonsmooth.identification.fit.beginnings import beginnings, drawn
-    from nonsmooth.identification.fit.first_windows import first_windows, states_from_samples
-
     u = problem.unknowns
 
     def far(guess: FloatArray) -> FloatArray:

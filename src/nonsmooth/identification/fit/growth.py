@@ -148,8 +148,7 @@ def grow(
             stuck = _spreads(stage) < _REGULAR
             break
     rounds = 2 if poor else _ROUNDS
-    final = _begun(_final(stage, problem.noise, rounds), problem.noise, rounds)
-    return replace(final, stuck=stuck)
+    return replace(_begun(_final(stage, problem.noise, rounds), problem.noise, rounds), stuck=stuck)
 
 
 def _at_once(problem: Windows, theta: FloatArray, start: FloatArray | None, free: bool, longest: float) -> Grown | None:
@@ -192,7 +191,7 @@ def _spreads(stage: Stage) -> float:
         rows = np.abs(slopes[: len(window.readings[0])]) * sizes
         for c in np.unique(window.readings[1]):
             size = float(np.ptp(window.values[np.isfinite(window.values[:, c]), c])) or 1.0
-            found = max(found, float(np.max(rows[window.readings[1] == c])) / size)
+            found = max(found, np.max(rows[window.readings[1] == c]) / size)
     return found
 
 
@@ -240,7 +239,7 @@ def _final(stage: Stage, irregular: FloatArray, rounds: int) -> Grown:
         steady = tuple(
             one.with_noise(*problem.of_steady(theta, i)[:2], len(theta)) for i, one in enumerate(problem.steady)
         )
-        ratios = [one.noise / old.noise for one, old in zip((*steady,), before.steady, strict=True)]
+        ratios = [one.noise / old.noise for one, old in zip(steady, before.steady, strict=True)]
         moves = [np.concatenate([noise / before.noise, *ratios]) - 1.0, colour - before.colour]
         changed = float(np.max(np.abs(np.concatenate(moves)), initial=0.0))
         problem = replace(problem, noise=noise, steady=steady)
@@ -301,5 +300,5 @@ def _noise(problem: Windows, state: Residuals) -> FloatArray:
             size = robust_size(r) if np.isfinite(problem.loss) else float(np.sqrt(np.mean(r**2))) if len(r) else 0.0
             values = [record.values[:, c] for record in problem.records]
             largest = max((float(np.nanmax(np.abs(y), initial=0.0)) for y in values), default=0.0)
-            found[c] = max(size * float(np.sqrt(grow)), 0.5 * sensor.floor, ROUNDING * largest, 1e-300)
+            found[c] = max(size * np.sqrt(grow), 0.5 * sensor.floor, ROUNDING * largest, 1e-300)
     return found

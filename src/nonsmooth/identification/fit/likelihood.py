@@ -9,6 +9,7 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, not_installed
@@ -62,8 +63,6 @@ def profiled(
     covariance : array (p, p)
         That of the fit, by which the rise of chi^2 is scaled.
     """
-    import xarray as xr
-
     u, white, found = grown.problem.unknowns, np.diag(inverted(normal)[0]), []
     with progress(2 * len(names), "profiles", watched) as advance:
         for name in names:
@@ -136,8 +135,6 @@ def posterior_of(grown: Grown, steps: int, seed: int, watched: Progress) -> Find
     SolveError
         Windows so many that an ensemble does not move, or a direction that nothing determines.
     """
-    import xarray as xr
-
     try:
         import emcee
     except ImportError as error:
@@ -200,7 +197,7 @@ def _drawn(
 ) -> FloatArray:
     """First places of the walkers: from the normal law of the unknowns and the starts about the optimum."""
     problem, u, p = grown.problem, grown.problem.unknowns, len(grown.theta)
-    state = problem.derivatives(grown.theta, grown.starts)
+    state = problem.residuals(grown.theta, grown.starts, True)
     normal, _, back = reduced(problem, state, weights, p)
     covariance = inverted(normal + u.precision)[0]
     if (loose := grown.loose(state)).size:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from nonsmooth.flow.inputs import DelayedInputs, Driven
 from nonsmooth.flow.sensitivity import apart, settled, steps_between
 from nonsmooth.flow.variational import VariationalFlow
 from nonsmooth.kernels.hybrid import codes
-
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 RTOL = 1e-11  # where the flow is not exact: below any noise, and below what a step of a fit changes
 
@@ -103,8 +101,7 @@ class Marcher:
         if not derivatives:
             return plain
         cuts = np.zeros(0) if changes is None else changes.times
-        places = 1 + np.searchsorted(instants, cuts)
-        return self._derived(plain, values, begin, z, mode, course, (cuts, places))
+        return self._derived(plain, values, begin, z, mode, course, (cuts, 1 + np.searchsorted(instants, cuts)))
 
     def _derived(
         self,

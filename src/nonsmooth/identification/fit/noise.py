@@ -27,11 +27,6 @@ def robust_size(r: FloatArray) -> float:
     return float(1.4826 * np.median(np.abs(r))) if len(r) else 0.0
 
 
-def _as_irregular(rho: FloatArray) -> float:
-    """Standard deviation of such noise over that of white noise of the same third differences, over all runs."""
-    return float(np.sqrt(20.0 / np.mean(20.0 - 30.0 * rho + 12.0 * rho**2 - 2.0 * rho**3)))
-
-
 def colours(problem: Windows, state: Residuals) -> FloatArray:
     """Correlation of residuals of each quantity over its step, 0 where it is none; ``state``: not whitened."""
     return np.array([_colour(problem, c, _timed(problem, state, c)) for c in range(len(problem.sensors))])
@@ -47,7 +42,7 @@ def _colour(problem: Windows, c: int, rows: list[tuple[FloatArray, FloatArray]])
     if not cuts or not every.any():
         return 0.0
     gaps, before, here = (np.concatenate(one) for one in zip(*((gap, r[:-1], r[1:]) for gap, r in cuts), strict=True))
-    power = max(float(np.mean(np.clip(every, -cut, cut) ** 2)), 1e-300)
+    power = max(np.mean(np.clip(every, -cut, cut) ** 2), 1e-300)
 
     def unlikely(rho: float) -> float:
         """Minus twice the logarithm of the likelihood."""
@@ -71,8 +66,11 @@ def strange(problem: Windows, plain: Residuals, white: Residuals, irregular: Flo
         if len(r) < 16:
             continue
         # outliers raise the one, readings that are rounded the other
-        size = min(robust_size(r), float(np.sqrt(np.mean(r**2)))) / irregular[c]
-        worst = max(worst, size / _as_irregular(problem.colour[c] ** (problem.steps[:, c] / problem.step[c])))
+        size = min(robust_size(r), np.sqrt(np.mean(r**2))) / irregular[c]
+        rho = problem.colour[c] ** (problem.steps[:, c] / problem.step[c])
+        # noise of this correlation over white noise of the same third differences, over all runs
+        irregularity = np.sqrt(20.0 / np.mean(20.0 - 30.0 * rho + 12.0 * rho**2 - 2.0 * rho**3))
+        worst = max(worst, size / irregularity)
         missing = missing or (size > _LARGE and _has_structure(r, e))
     return worst, missing
 

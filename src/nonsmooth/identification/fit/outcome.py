@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.identification.arrow import Sandwich, concerned, sandwich
@@ -19,9 +20,6 @@ from nonsmooth.identification.fit.noise import OUTLYING, robust_size
 from nonsmooth.identification.fit.residuals import by_place, residual_data, steady_data
 from nonsmooth.identification.parameter_set import ParameterSet
 from nonsmooth.results.progress import Progress
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _TOGETHER = 0.98  # correlation from which two parameters are said to be known only together
 _POOR = 2.0  # residuals over noise, from which the model is said not to be the motion
@@ -51,7 +49,11 @@ def outcome(
     problem, theta = grown.problem, grown.theta
     u = problem.unknowns
     found = sandwich(problem, theta, grown.starts)
-    loose = _undetermined(grown.loose(found.state))
+    loose = dict[int, set[int]]()  # unknowns that the records leave open, each with those that it may be traded for
+    for direction in concerned(grown.loose(found.state)).T:
+        together = np.flatnonzero(direction).tolist()
+        for i in together:
+            loose.setdefault(i, set()).update(together)
     starts, follow, own = _starts(grown, found)
     noise = _noise(grown, found)
     jacobian = np.vstack([np.eye(len(theta)), *follow])
@@ -120,7 +122,7 @@ def _starts(grown: Grown, found: Sandwich) -> tuple[dict[str, tuple[float, str]]
         starts |= {f"{states[k][0]}(0){label}": (float(grown.starts[i][k]), states[k][1]) for k in window.free}
         rows.append(follows[window.free])
         own.append((inverse @ inverse.T)[np.ix_(window.free, window.free)] * found.reduced)
-    return starts, rows, np.asarray(block_diag(*own))
+    return starts, rows, block_diag(*own)
 
 
 def _noise(grown: Grown, found: Sandwich) -> dict[str, Estimate]:
@@ -137,17 +139,7 @@ def _noise(grown: Grown, found: Sandwich) -> dict[str, Estimate]:
     return rows
 
 
-def _undetermined(directions: FloatArray) -> dict[int, list[int]]:
-    """Places of unknowns that the records leave open, each with those that it may be traded for."""
-    found: dict[int, list[int]] = {}
-    for direction in concerned(directions).T:
-        together = np.flatnonzero(direction).tolist()
-        for i in together:
-            found[i] = sorted({*found.get(i, []), *together})
-    return found
-
-
-def _sentences(grown: Grown, covariance: FloatArray, loose: Mapping[int, list[int]], samples: int) -> dict[str, str]:
+def _sentences(grown: Grown, covariance: FloatArray, loose: Mapping[int, set[int]], samples: int) -> dict[str, str]:
     """A sentence for each unknown: what it rests on, or that the record does not determine it."""
     u, theta = grown.problem.unknowns, grown.theta
     error = np.sqrt(np.diag(covariance))
@@ -156,7 +148,7 @@ def _sentences(grown: Grown, covariance: FloatArray, loose: Mapping[int, list[in
     np.fill_diagonal(correlation, 0.0)
     rows = {}
     for i, name in enumerate(u.names):
-        others = [u.names[k] for k in loose.get(i, []) if k != i]
+        others = [u.names[k] for k in sorted(loose.get(i, ())) if k != i]
         closest = int(np.argmax(np.abs(correlation[i])))
         if i in loose and others:
             text = f"not identifiable: only a combination of it and {', '.join(others)} is; give one its value"

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError, unknown
+from nonsmooth.flow.simulate import simulate
 from nonsmooth.identification.arrow import concerned, inverted, reduced
 from nonsmooth.identification.blas import one_blas_thread
+from nonsmooth.identification.fit.first_windows import first_windows
+from nonsmooth.identification.fit.fit import problem_of
+from nonsmooth.identification.fit.sensors import read_sensors
 from nonsmooth.identification.options import Prior
 from nonsmooth.results.labels import labelled
 from nonsmooth.system.arguments import checked
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 _OF_A_RUN = ("duration", "periods", "samples", "start", "mode", "settings")
 
@@ -96,10 +97,6 @@ def plan_experiment(
     >>> str(plan["order"].values[0])
     'long'
     """
-    import xarray as xr
-
-    from nonsmooth.identification.fit.sensors import read_sensors
-
     if not runs:
         raise TypeError("runs = {}: give the candidates by name, {'slow': {'duration': 20.0, 'samples': 2000}}")
     sensors = {name: replace(one, channel=name) for name, one in read_sensors(system, measured, []).items()}
@@ -115,7 +112,10 @@ def plan_experiment(
     found = [told for _, told, *_ in rows]
     alone = np.array([_uncertainties(one + precision) for one in found])
     size = np.where(theta != 0, np.abs(theta), 1.0)
-    order, totals = _ordered(found, precision, size)
+    order, totals, known = list[int](), list[FloatArray](), precision
+    while left := [i for i in range(len(found)) if i not in order]:  # each time the run that adds most
+        order.append(max(left, key=lambda i: _gain(known + found[i], size)))
+        totals.append(known := known + found[order[-1]])
     units = [system.parameters[name].unit if name in system.parameters else "" for name in names]
     labels = np.array([*map(str, runs)])
     return xr.Dataset(
@@ -158,10 +158,6 @@ def _information(
     known_before: Prior,
 ) -> tuple[list[str], FloatArray, FloatArray, FloatArray]:
     """Names of the unknowns that runs share, what the run tells of them, what is known before, and their values."""
-    from nonsmooth.flow.simulate import simulate
-    from nonsmooth.identification.fit.first_windows import first_windows
-    from nonsmooth.identification.fit.fit import problem_of
-
     settings = dict(run.get("settings", {}))
     there = system.with_parameters(settings)
     motion = simulate(there, **{key: run[key] for key in run if key != "settings"})
@@ -180,7 +176,7 @@ def _information(
         if course is None:
             raise refusal
         window.values[window.readings] = whole.shown(window, whole.readings(theta, window, course, False)[0])
-    state = whole.derivatives(theta, whole.starts)
+    state = whole.residuals(theta, whole.starts, True)
     normal = reduced(whole, state, whole.weights(None, starts=False), len(theta))[0]
     shared = len(theta) - problem.unknowns.phases
     own = np.linalg.pinv(normal[shared:, shared:], hermitian=True)
@@ -190,16 +186,6 @@ def _information(
         eliminated[i] = eliminated[:, i] = 0.0
         theta[i] = system.values[names[i]]
     return names, eliminated, known, theta[:shared]
-
-
-def _ordered(found: list[FloatArray], known: FloatArray, size: FloatArray) -> tuple[list[int], list[FloatArray]]:
-    """The runs, each the one that adds most to the determinant, and the information with each and those before."""
-    order: list[int] = []
-    totals: list[FloatArray] = []
-    while left := [i for i in range(len(found)) if i not in order]:
-        order.append(max(left, key=lambda i: _gain(known + found[i], size)))
-        totals.append(known := known + found[order[-1]])
-    return order, totals
 
 
 def _uncertainties(information: FloatArray) -> FloatArray:
@@ -219,4 +205,4 @@ def _log_det(information: FloatArray, size: FloatArray) -> float:
 def _gain(information: FloatArray, size: FloatArray) -> float:
     """The determinant with a little known of every direction, so that runs can be compared that leave one open."""
     scaled = information * np.outer(size, size)
-    return float(np.linalg.slogdet(scaled + 1e-9 * max(float(np.trace(scaled)), 1e-300) * np.eye(len(size)))[1])
+    return float(np.linalg.slogdet(scaled + 1e-9 * max(np.trace(scaled), 1e-300) * np.eye(len(size)))[1])

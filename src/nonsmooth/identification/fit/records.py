@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,8 @@ from nonsmooth.identification.fit.sensors import Sensor, read_sensors
 from nonsmooth.identification.fit.steady import SteadyReadings, is_steady, read_steady
 from nonsmooth.recordings.recording import Recording
 from nonsmooth.system.kinds import float_array, real_number
+from nonsmooth.system.system import System
 from nonsmooth.system.units import read_unit
-
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
 
 FORMS = (
     "a Recording, a Dataset over time, a DataFrame with a column of time (or time as its index), a mapping of channel "
@@ -217,7 +215,7 @@ def _of_dataset(one: Any, time: str) -> dict[str, tuple[FloatArray, FloatArray]]
         raise ValueError(f"the Dataset has no coordinate {time!r}; it has {', '.join(map(str, one.coords)) or 'none'}")
     t = np.asarray(one[time].values)
     again = (t[1:] == t[:-1]) & ("segment" in one)  # of a run: both limits of a crossing stand there
-    kept = ~(np.append(again, False) | np.append(False, again)) if len(t) else np.ones(0, dtype=bool)
+    kept = ~(np.append(again, False) | np.append(False, again)) if len(t) else np.ones(0, bool)
     found = {}
     if "u" in one and one["u"].dims == (time, "state"):
         for k, name in enumerate(one["state"].values):

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import IntArray
 from nonsmooth.identification.fit.growth import Grown
 from nonsmooth.identification.fit.motion import SampledMotion
 from nonsmooth.results.labels import labels_of
 from nonsmooth.system.system import System
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _NEAR = 1.5  # sampling steps from a transition or a graze
 _GRAZING = 0.03  # clearance over the largest size of the indicator, below which a touch is a graze
@@ -32,10 +30,9 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
         predicted, _ = problem.readings(theta, window, motion, False)
         k, c = window.readings
         shift = motion.time[0] - problem.instants(theta, window)[0]
-        clock, delays = problem.clock(theta, window.record), problem.delays(theta, window.record)
-        here = np.minimum(
-            np.searchsorted(motion.time, clock * window.time[k] + shift - delays[c]), len(motion.time) - 1
-        )
+        at = problem.at(theta, window.record)
+        here = np.searchsorted(motion.time, at.clock * window.time[k] + shift - at.delays[c])
+        here = np.minimum(here, len(motion.time) - 1)
         shown = problem.shown(window, predicted)
         parts.append(
             {
@@ -49,25 +46,20 @@ def residual_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
                 "fitted": shown,
                 "beyond": predicted - shown,
                 "noise": problem.noise[c],
+                "residual": (window.values[k, c] - shown) / problem.noise[c],
             }
         )
     quantities = list(problem.sensors)
-    units = {**system.states, **system.outputs}
-    unit = " ".join(units[q] for q in quantities) if len(quantities) == 1 else "that of the quantity"
     flags = {
         "run": [record.name for record in problem.records],
         "quantity": quantities,
         "mode": list(system.modes),
         "place": labels,
     }
-    data = _table(parts)
-    data["residual"] = (data["measured"] - data["fitted"]) / data["noise"]
-    for name in ("measured", "fitted", "beyond", "noise"):
-        data[name].attrs["units"] = unit
-    data["beyond"].attrs["long_name"] = "how far the motion goes beyond the limits of the sensor"
-    data["residual"].attrs = {"long_name": "residual over its standard deviation", "units": "1"}
-    data["time"].attrs = {"long_name": "time", "units": labels_of(system).time_unit}
-    return _told(data.set_coords("time"), grown, system, options, flags)
+    units = dict.fromkeys(("measured", "fitted", "beyond", "noise"), _unit(system, quantities))
+    words = {"beyond": "how far the motion goes beyond the limits of the sensor", "time": "time"}
+    told = units | {"time": labels_of(system).time_unit}
+    return _table(parts, grown, system, options, flags, told, words).set_coords("time")
 
 
 def steady_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
@@ -95,35 +87,39 @@ def steady_data(grown: Grown, options: Mapping[str, Any]) -> xr.Dataset:
                 **{names[place]: at[:, place] for place in set_},
             }
         )
-    data = _table(parts)
-    units = {**system.states, **{name: parameter.unit for name, parameter in system.parameters.items()}}
-    for name in (names[place] for place in set_):
-        data[name].attrs["units"] = units[name]
-    for name in ("measured", "fitted", "measured_error"):
-        data[name].attrs["units"] = units[quantities[0]] if len(quantities) == 1 else "that of the quantity"
+    units = {names[place]: system.parameters[names[place]].unit for place in set_}
+    units |= dict.fromkeys(("measured", "fitted", "measured_error"), _unit(system, quantities))
     kinds = {one.amplitude for one in problem.steady}
-    data["measured"].attrs["long_name"] = "reading" if len(kinds) > 1 else "amplitude" if True in kinds else "section"
-    data["residual"].attrs = {"long_name": "residual over its standard deviation", "units": "1"}
+    words = {"measured": "reading" if len(kinds) > 1 else "amplitude" if True in kinds else "section"}
     flags = {"run": [one.name for one in problem.steady], "quantity": quantities}
-    return _told(data, grown, system, options, flags)
+    return _table(parts, grown, system, options, flags, units, words)
 
 
-def _table(parts: list[dict[str, Any]]) -> xr.Dataset:
-    """Columns over ``sample`` from those of each part."""
-    import xarray as xr
-
-    return xr.Dataset({name: ("sample", np.concatenate([part[name] for part in parts])) for name in parts[0]})
+def _unit(system: System, quantities: list[str]) -> str:
+    units = {**system.states, **system.outputs}
+    return units[quantities[0]] if len(quantities) == 1 else "that of the quantity"
 
 
-def _told(
-    data: xr.Dataset, grown: Grown, system: System, options: Mapping[str, Any], flags: Mapping[str, list[str]]
+def _table(
+    parts: list[dict[str, Any]],
+    grown: Grown,
+    system: System,
+    options: Mapping[str, Any],
+    flags: Mapping[str, list[str]],
+    units: Mapping[str, str],
+    words: Mapping[str, str],
 ) -> xr.Dataset:
-    """The data with the words of its flags and the record of the fit."""
+    """Columns over ``sample`` with their units and words, those of flags, and the record of the fit."""
     from nonsmooth.results.provenance import provenance
 
-    for name, words in flags.items():
-        meanings = " ".join(word.replace(" ", "_") for word in words)
-        data[name].attrs = {"flag_values": np.arange(len(words)), "flag_meanings": meanings}
+    data = xr.Dataset({name: ("sample", np.concatenate([part[name] for part in parts])) for name in parts[0]})
+    for name, text in {**words, "residual": "residual over its standard deviation"}.items():
+        data[name].attrs["long_name"] = text
+    for name, text in {**units, "residual": "1"}.items():
+        data[name].attrs["units"] = text
+    for name, meant in flags.items():
+        meanings = " ".join(word.replace(" ", "_") for word in meant)
+        data[name].attrs = {"flag_values": np.arange(len(meant)), "flag_meanings": meanings}
     method = grown.problem.marcher.engine.name
     return data.assign_attrs(provenance(labels_of(system), "fit", dict(options), method=method))
 
@@ -164,10 +160,10 @@ def _of_samples(system: System, motion: SampledMotion, marks: Mapping[tuple[str,
     """The place of each sample of a motion: the nearest transition, a graze, else its mode."""
     from sympy import lambdify
 
-    found = np.array([marks["mode", int(m)] for m in motion.mode], dtype=np.int64)
+    found = np.array([marks["mode", int(m)] for m in motion.mode], np.int64)
     if len(motion.time) < 2:
         return found
-    near = _NEAR * float(np.median(np.diff(motion.time)))
+    near = _NEAR * np.median(np.diff(motion.time))
     log, traced = motion.log, system.traced
     values = system.parameter_vector()
     for i in np.unique(log.touch_indicator):

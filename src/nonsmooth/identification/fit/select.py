@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, Unpack
+from typing import Annotated, Any, Unpack
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
 from nonsmooth.errors import SolveError
 from nonsmooth.identification.blas import one_blas_thread
+from nonsmooth.identification.fit.first_windows import first_length
+from nonsmooth.identification.fit.fit import best_of, problem_of
+from nonsmooth.identification.fit.growth import Grown
+from nonsmooth.identification.fit.windows import Windows
 from nonsmooth.identification.options import Recorded
 from nonsmooth.results.progress import progress as watched
 from nonsmooth.system.arguments import check_system, checked
 from nonsmooth.system.kinds import at_least
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.identification.fit.growth import Grown
-    from nonsmooth.identification.fit.windows import Windows
 
 _BLOCK = 2.0  # first windows: the length of a part that is held out
 
@@ -73,10 +72,6 @@ def select_model(
     ----------
     P. Burman, E. Chow, D. Nolan, Biometrika 81 (1994) 351-358 (cross-validation of dependent data).
     """
-    import xarray as xr
-
-    from nonsmooth.identification.fit.fit import problem_of
-
     if len(models) < 2:
         raise ValueError(
             "models must name at least two systems, each with what is to be found of it: "
@@ -112,8 +107,6 @@ def select_model(
 
 def _held_out(problem: Windows, folds: int) -> list[IntArray]:
     """The fold in which each instant of a record (-1: never, at its beginning), or each steady reading, is held out."""
-    from nonsmooth.identification.fit.first_windows import first_length
-
     length, block, found = _BLOCK * first_length(problem) if problem.records else 0.0, 0, list[IntArray]()
     for record in problem.records:
         number = np.floor((record.time - record.time[0]) / length).astype(np.int64)
@@ -130,8 +123,6 @@ def _held_out(problem: Windows, folds: int) -> list[IntArray]:
 
 def _error(problem: Windows, held: list[BoolArray], tries: int, seed: int) -> float:
     """Mean squared error at the readings held out, over the noise."""
-    from nonsmooth.identification.fit.fit import best_of
-
     records = [
         replace(record, values=np.where(part[:, None], np.nan, record.values))
         for record, part in zip(problem.records, held, strict=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -13,10 +13,8 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened, unknown
 from nonsmooth.system.arguments import checked
 from nonsmooth.system.kinds import above, at_least
-
-if TYPE_CHECKING:
-    from nonsmooth.system.symbolic.traced import Traced
-    from nonsmooth.system.system import System
+from nonsmooth.system.symbolic.traced import Traced
+from nonsmooth.system.system import System
 
 #: What a fit may find of a sensor, as ``"x.offset"``.
 OF_A_SENSOR = ("gain", "offset", "delay")
@@ -81,7 +79,7 @@ class Sensor:
     @property
     def floor(self) -> float:
         """Least standard deviation of a reading: that of rounding."""
-        return self.resolution / float(np.sqrt(12.0))
+        return self.resolution / np.sqrt(12.0)
 
 
 def read_sensors(system: System, measured: Any, channels: Sequence[str]) -> dict[str, Sensor]:

@@ -14,21 +14,20 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import BoolArray, FloatArray, IntArray
+from nonsmooth.attractors.settler import Settler
 from nonsmooth.errors import unknown
 from nonsmooth.flow.starts import start_states
 from nonsmooth.identification.fit.sensors import Sensor
 from nonsmooth.system.kinds import float_array
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.attractors.settler import Settler
-    from nonsmooth.identification.fit.motion import Marcher, SampledMotion
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 KEPT, LONGEST = 33, 16  # section points looked at, and the longest period number looked for
+if TYPE_CHECKING:
+    from nonsmooth.identification.fit.motion import Marcher, SampledMotion
+
 TRANSIENT = 300
 ROUNDING = 1e-13  # of the largest reading: none has less noise
 ROUGHLY = 0.05  # of the largest reading: the noise at first, where none is known
@@ -91,7 +90,7 @@ class SteadyReadings:
             mine = (self.quantity == q) & np.isnan(self.error) & periodic
             if (n := int(mine.sum())) and np.isfinite(residual[mine]).all():
                 noise[mine] = np.sqrt(np.sum(residual[mine] ** 2) / max(n - unknowns, 0.1 * n))
-        least = ROUNDING * float(np.max(np.abs(self.measured)))
+        least = ROUNDING * np.max(np.abs(self.measured))
         noise = np.maximum(np.where(np.isnan(noise), self.noise, noise), max(least, 1e-300))
         return replace(self, used=periodic, noise=noise)
 
@@ -106,8 +105,6 @@ def is_steady(one: Any) -> bool:
 
 def of_table(system: System, one: Any, name: str) -> xr.Dataset:
     """Readings of steady states of a table, or of a mapping, as a Dataset over ``run``."""
-    import xarray as xr
-
     if isinstance(one, xr.Dataset):
         return one
     one = one.reset_index() if hasattr(one, "reset_index") else one
@@ -116,7 +113,7 @@ def of_table(system: System, one: Any, name: str) -> xr.Dataset:
     if {column.shape for column in columns.values()} != {(columns[told[0]].size,)}:
         sizes = ", ".join(f"{key} of {column.size}" for key, column in columns.items())
         raise ValueError(f"run {name!r} must hold one number of each kind for every reading; it has {sizes}")
-    words = {"direction": np.asarray(one["direction"], dtype=str)} if "direction" in one else {}
+    words = {"direction": np.asarray(one["direction"], str)} if "direction" in one else {}
     return xr.Dataset({key: ("run", column) for key, column in {**columns, **words}.items()})
 
 
@@ -174,7 +171,7 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
         raise ValueError(f"run {name!r}: {kind}_error has the negative number {np.nanmin(error):g}; NaN: not known")
     error = np.where(error > 0.0, error, np.nan)
     values, setting = np.unique(np.array(runs), axis=0, return_inverse=True)
-    first = max(ROUGHLY * float(np.max(np.abs(y))), 1e-300)
+    first = max(ROUGHLY * np.max(np.abs(y)), 1e-300)
     return SteadyReadings(
         name,
         tuple(wanted),
@@ -189,7 +186,7 @@ def read_steady(system: System, one: Any, name: str, measured: Any, settings: Ma
         y,
         error,
         np.where(np.isnan(error), first, error),
-        np.ones(len(y), dtype=bool),
+        np.ones(len(y), bool),
         left,
     )
 
@@ -217,7 +214,7 @@ def predicted(
     if one.amplitude:
         gain, offset = np.abs(gain), 0.0 * offset
     fitted, of = np.full(len(one.measured), np.nan), np.zeros((len(one.measured), (a + 2) * slopes))
-    periodic, good = np.zeros(len(fitted), dtype=bool), usable(found.status)
+    periodic, good = np.zeros(len(fitted), bool), usable(found.status)
     tables: dict[tuple[int, int, int], FloatArray] = {}
     for run, i in enumerate(one.setting):
         mine = np.flatnonzero(one.run == run)
@@ -261,7 +258,7 @@ def _points(settler: Settler, point: FloatArray, found: Any, job: int, wanted: i
     n = len(settler.system.states)
     first = found.last[job][None, :n]
     if not further:
-        return np.asarray(first)
+        return first
     trace = settler.trace(point[None], found.last[job], int(found.mode[job]), 0, further)
     return np.vstack([first, trace.points, np.full((further - len(trace.points), n), np.nan)])
 
@@ -304,7 +301,7 @@ def _slopes(
         if at is None:
             return none
         table = at[0] + at[1][:, :, None] * k[:, None, None] * of_period
-        return np.asarray(np.where((k > 0)[:, None, None], table, of_start))
+        return np.where((k > 0)[:, None, None], table, of_start)
     grid, hits = np.arange(1, _FINE * number + 3) * (period / _FINE), round_.log.crossing_time
     hits = np.concatenate([hits, hits + length])  # a whole cycle lies within the ends of the grid
     full = motion(np.union1d(grid, hits[(hits > 0.0) & (hits < grid[-1])]), False)
@@ -324,13 +321,13 @@ def _slopes(
     turn = rate - rate_behind
     part = np.where(np.abs(turn) > 0, rate / np.where(turn == 0, 1.0, turn), 0.0)
     ends = before + np.clip(part, 0.0, 1.0)[..., None] * (behind - before)
-    return np.asarray(0.5 * (ends[:, 0] - ends[:, 1])[None])
+    return 0.5 * (ends[:, 0] - ends[:, 1])[None]
 
 
 def _extreme(motion: SampledMotion, k: int, sign: float) -> float:
     """The instant of the largest (sign 1) or least (-1) value of a state: between samples where it is smooth there."""
     y, t = sign * motion.z[:, k], motion.time
-    i = 1 + int(np.argmax(y[1:-1]))
+    i = 1 + np.argmax(y[1:-1])
     if motion.segment[i - 1] != motion.segment[i + 1]:
         return float(t[i])
     one, other = t[i] - t[i - 1], t[i + 1] - t[i]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,7 @@ from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import shortened, unknown
 from nonsmooth.identification.fit.sensors import OF_A_SENSOR, Sensor
 from nonsmooth.system.kinds import ends, real_number
-
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 _CLOCKS = (0.9, 1.1)  # within which the time of the model over that of the recording lies
 
@@ -118,7 +116,7 @@ def read_unknowns(
     last = [base.count(n) - 1 for n in local]  # of each
     places = np.array(
         [[base.index(n) + min(run, most) for n, most in zip(local, last, strict=True)] for run in range(len(runs))],
-        dtype=np.intp,
+        np.intp,
     )
     guess = np.array([known[name][0] for name in base])
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)

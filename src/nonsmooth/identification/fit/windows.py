@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,7 @@ from nonsmooth.identification.fit.sensors import Observable, Sensor
 from nonsmooth.identification.fit.steady import SteadyReadings, predicted
 from nonsmooth.identification.fit.unknowns import Unknowns
 from nonsmooth.recordings.signals.spectrum import correlation_times
-
-if TYPE_CHECKING:
-    from nonsmooth.system.system import System
+from nonsmooth.system.system import System
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +83,27 @@ class Window:
     def by_instant(self, rows: FloatArray) -> FloatArray:
         """Sums of rows over the readings of each instant; the rows of the start are left out."""
         k, _ = self.readings
-        begins = np.flatnonzero(np.diff(k, prepend=-1))
-        return np.asarray(np.add.reduceat(rows[: len(k)], begins, axis=0))
+        return np.add.reduceat(rows[: len(k)], np.flatnonzero(np.diff(k, prepend=-1)), axis=0)
 
     def correlation(self, r: FloatArray) -> float:
         """Samples that share one independent error: of the quantity for which they are the most."""
         _, c = self.readings
         return max(correlation_times(r[: len(c)][c == one]) for one in np.unique(c))
+
+
+class There(NamedTuple):
+    """A run at some unknowns: the system's parameters (None where its equations do not allow them), its sensors, the
+    system's time over that of the recording, and the phase."""
+
+    values: FloatArray | None
+    sensors: dict[str, Sensor]
+    clock: float
+    phase: float
+
+    @property
+    def delays(self) -> FloatArray:
+        """Delay of each sensor."""
+        return np.array([sensor.delay for sensor in self.sensors.values()])
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +146,7 @@ class Windows:
     @cached_property
     def step(self) -> FloatArray:
         """The shortest of these of each quantity."""
-        return np.asarray(self.steps.min(axis=0, initial=np.inf))
+        return self.steps.min(axis=0, initial=np.inf)
 
     def gaps(self, c: int, time: FloatArray) -> FloatArray:
         """Times between readings of a quantity, in its steps."""
@@ -149,32 +161,26 @@ class Windows:
         """Starts of the windows as they are set (windows, n)."""
         return np.array([window.start for window in self.pieces]).reshape(-1, self.marcher.flow.n)
 
-    def sensor_values(self, theta: FloatArray, run: int) -> dict[str, Sensor]:
-        """The sensors in a run at these values of the unknowns."""
-        return self._at(theta, run)[1]
-
-    def values(self, theta: FloatArray, run: int) -> FloatArray | None:
-        """The system's parameters in a run; None where its equations do not allow them."""
-        return self._at(theta, run)[0]
-
-    def _at(self, theta: FloatArray, run: int) -> tuple[FloatArray | None, dict[str, Sensor]]:
-        """The system's parameters and the sensors in a run; kept, since many windows ask at the same unknowns."""
-        u, key = self.unknowns, theta.tobytes()
+    def at(self, theta: FloatArray, run: int) -> There:
+        """A run at these values of the unknowns; kept, since many windows ask at the same unknowns."""
+        u, key, places = self.unknowns, theta.tobytes(), self.unknowns.places[run]
         if run in self._kept and self._kept[run][0] == key:
-            return self._kept[run][1:]
+            return self._kept[run][1]
         sensors = dict(self.sensors)
-        for i, (quantity, what) in zip(u.places[run][len(u.active) :], u.sensors, strict=False):
+        for i, (quantity, what) in zip(places[len(u.active) :], u.sensors, strict=False):
             value: Any = float(theta[i]) or (1e-300 if what == "gain" else 0.0)
             sensors[quantity] = replace(sensors[quantity], **{what: value})
-        own = dict(zip(u.active, map(float, theta[u.places[run]]), strict=False))
+        own = dict(zip(u.active, map(float, theta[places]), strict=False))
         values: FloatArray | None = None
         with suppress(SystemDefinitionError, ValueError):
             values = self.system.with_parameters({**own, **self.runs[run].settings}).parameter_vector()
-        self._kept[run] = key, values, sensors
-        return values, sensors
+        clock = float(theta[u.clock_place(run)]) if u.clock else 1.0
+        there = There(values, sensors, clock, float(theta[places[-1]]) if u.phases else 0.0)
+        self._kept[run] = key, there
+        return there
 
     @cached_property
-    def _kept(self) -> dict[int, tuple[bytes, FloatArray | None, dict[str, Sensor]]]:
+    def _kept(self) -> dict[int, tuple[bytes, There]]:
         return {}
 
     @property
@@ -183,14 +189,7 @@ class Windows:
 
     def acts(self, run: int) -> BoolArray:
         """Marks of the active parameters that are not set in a run."""
-        return np.array([name not in self.runs[run].settings for name in self.unknowns.active], dtype=bool)
-
-    def phase(self, theta: FloatArray, run: int) -> float:
-        return float(theta[self.unknowns.places[run][-1]]) if self.unknowns.phases else 0.0
-
-    def clock(self, theta: FloatArray, run: int) -> float:
-        """The system's time over that of the recording."""
-        return float(theta[self.unknowns.clock_place(run)]) if self.unknowns.clock else 1.0
+        return np.array([name not in self.runs[run].settings for name in self.unknowns.active], bool)
 
     def motion(
         self, theta: FloatArray, window: Window, start: FloatArray, derivatives: bool = False
@@ -210,37 +209,31 @@ class Windows:
         derivatives: bool = False,
     ) -> SampledMotion | None:
         """A motion from an instant of a run to times of its corrected clock; None where it does not come to its end."""
-        values, begin = self.values(theta, run), self.clock(theta, run) * begin
+        values, _, clock, phase = self.at(theta, run)
+        begin *= clock
         if values is None or not np.isfinite(theta).all() or not np.isfinite(start).all():
             return None
         if times[0] < begin:  # a delay beyond what its bounds allow
             return None
         period = self.system.period_at(values)
-        shift = 0.0 if period is None else self.phase(theta, run) * period
+        shift = 0.0 if period is None else phase * period
         return self.marcher.run(values, begin + shift, times + shift, start, mode, derivatives, self.records[run].drive)
-
-    def delays(self, theta: FloatArray, run: int) -> FloatArray:
-        return np.array([sensor.delay for sensor in self.sensor_values(theta, run).values()])
 
     def instants(self, theta: FloatArray, window: Window) -> FloatArray:
         """Times on the record's corrected clock at which the motion is needed."""
-        delays, time = np.unique(self.delays(theta, window.record)), self.clock(theta, window.record) * window.time
-        if len(delays) == 1:
-            return time - delays[0]
-        return np.unique((time[:, None] - delays).ravel())
+        there = self.at(theta, window.record)
+        delays, time = np.unique(there.delays), there.clock * window.time
+        return time - delays[0] if len(delays) == 1 else np.unique(time[:, None] - delays)
 
     def readings(
         self, theta: FloatArray, window: Window, motion: SampledMotion, slopes: bool
     ) -> tuple[FloatArray, FloatArray]:
         """Predicted readings (R,), and their derivatives (R, unknowns of the window + n) where asked for."""
-        values = self.values(theta, window.record)
+        values, sensors, clock, phase = self.at(theta, window.record)
         assert values is not None
-        sensors, u = self.sensor_values(theta, window.record), self.unknowns
-        clock = self.clock(theta, window.record)
-        k, c = window.readings
+        u, (k, c) = self.unknowns, window.readings
         n, a, p = self.marcher.flow.n, len(u.active), len(window.which)
         period, of_period = self.marcher.flow.period(values)
-        phase = self.phase(theta, window.record)
         predicted, table = np.empty(len(k)), np.zeros((len(k) if slopes else 0, p + n))
         offset = 0.0 if not np.isfinite(period) else phase * period
         for j, (name, sensor) in enumerate(sensors.items()):
@@ -280,7 +273,7 @@ class Windows:
         """1 for each reading at the upper limit of its sensor, -1 at the lower one, else 0."""
         k, c = window.readings
         at = np.stack([sensor.limit(window.values[:, j]) for j, sensor in enumerate(self.sensors.values())], axis=1)
-        return np.asarray(at[k, c])
+        return at[k, c]
 
     def shown(self, window: Window, predicted: FloatArray) -> FloatArray:
         """Predicted readings as their sensors show them, which end at their limits."""
@@ -328,15 +321,8 @@ class Windows:
         weights = self.weights(state) if weights is None else weights
         return state.chi2(weights) + float(away @ self.unknowns.precision @ away)
 
-    def residuals(self, theta: FloatArray, starts: FloatArray) -> Residuals:
-        """Residuals of all windows; not finite where a motion does not come to its end."""
-        return self._state(theta, starts, False)
-
-    def derivatives(self, theta: FloatArray, starts: FloatArray) -> Residuals:
-        """The same with derivatives."""
-        return self._state(theta, starts, True)
-
-    def _state(self, theta: FloatArray, starts: FloatArray, slopes: bool) -> Residuals:
+    def residuals(self, theta: FloatArray, starts: FloatArray, slopes: bool = False) -> Residuals:
+        """Residuals of all windows, not finite where a motion does not come to its end; with derivatives on request."""
         state = Residuals([], [], [])
         for window, start in zip(self.pieces, starts, strict=True):
             motion = self.motion(theta, window, start, slopes)
@@ -373,10 +359,10 @@ class Windows:
         """Predictions of steady readings (NaN: none), where they are periodic, and their derivatives in all
         unknowns."""
         one, run, u = self.steady[i], len(self.records) + i, self.unknowns
-        values, table = self.values(theta, run), np.zeros((len(one.measured), len(theta) * slopes))
+        values, sensors, *_ = self.at(theta, run)
+        table = np.zeros((len(one.measured), len(theta) * slopes))
         if values is None or not np.isfinite(theta).all():
-            return np.full(len(one.measured), np.nan), np.zeros(len(one.measured), dtype=bool), table
-        sensors = self.sensor_values(theta, run)
+            return np.full(len(one.measured), np.nan), np.zeros(len(one.measured), bool), table
         own = [sensors.get(q, Sensor()) for q in one.quantities]
         fitted, periodic, of = predicted(one, self.marcher, values, own, slopes)
         if slopes:

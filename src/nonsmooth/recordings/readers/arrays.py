@@ -57,11 +57,9 @@ def read(data: bytes, reading: Reading) -> None:
             reading.say(f"{path or 'the file itself'}: holds vectors, but no {reading.axis!r}; left out")
     for path, node, key in found:
         run = node.run or path or _TOP
-        notes = {name: _note(v) for name, v in node.items() if _note(v)}
-        own = {**node.notes, **{f"note_{name}": text for name, text in notes.items()}}
-        reading.run_attrs.setdefault(run, {}).update(own)
-        table = _table(run, path, node, key, reading)
-        reading.traces += traces_of(table, reading)
+        notes = {f"note_{name}": text for name, v in node.items() if (text := _note(v))}
+        reading.run_attrs.setdefault(run, {}).update(node.notes | notes)
+        reading.traces += traces_of(_table(run, path, node, key, reading), reading)
         if len(reading.traces) > MAX_COLUMNS:
             raise reading.error("", f"holds more than {MAX_COLUMNS} channels")
 
@@ -116,8 +114,8 @@ def _table(run: str, path: str, node: Group, key: str | None, reading: Reading) 
         said, unit = label(name)
         columns = _columns(value, n)
         if columns is None:
-            wanted = f"{n} of {reading.axis}"
-            reading.of(run, name, f"has the shape {value.shape}, which does not fit the {wanted}; left out")
+            misfit = f"has the shape {value.shape}, which does not fit the {n} of {reading.axis}; left out"
+            reading.of(run, name, misfit)
         elif value.dtype.kind not in "biufc" and name != key:
             reading.of(run, name, f"holds {value.dtype} values, no numbers; left out")
         else:
@@ -170,8 +168,7 @@ def _chosen(variables: Mapping[str, Any], reading: Reading) -> FieldTable:
     rate = reading.rate or next((rate for *_, rate in found if rate), None)
     axis = next((field for field in fields if field.name == reading.axis), None)
     if axis is None and rate is None:
-        wanted = f"columns names no {reading.axis!r}; add it, or give the sample rate in Hz, rate=..."
-        raise reading.error("", wanted)
+        raise reading.error("", f"columns names no {reading.axis!r}; add it, or give the sample rate in Hz, rate=...")
     n = len((axis or fields[0]).values)
     for field in fields:
         if len(field.values) != n:

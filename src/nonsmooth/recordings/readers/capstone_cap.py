@@ -50,8 +50,7 @@ def read(data: bytes, reading: Reading) -> None:
         trace = _trace(group, archive, comma, experiment.units, reading)
         if trace is not None:
             traces.append(trace)
-    runs = dict.fromkeys(trace.run for trace in traces)
-    order = sorted(runs, key=lambda run: int(run.removeprefix("Run #")))
+    order = sorted(dict.fromkeys(trace.run for trace in traces), key=lambda run: int(run.removeprefix("Run #")))
     reading.traces = [trace for run in order for trace in traces if trace.run == run]
 
 
@@ -95,14 +94,13 @@ def _trace(
     name = f"{first.measurement}, Ch {port}" if port else first.measurement
     attrs = {"measurement": first.measurement} | ({"port": port} if port else {})
     origin = ", ".join(segment.values for segment in group[:4]) + (", ..." if len(group) > 4 else "")
-    axis, column = (np.concatenate(times), np.concatenate(values)) if len(values) > 1 else (times[0], values[0])
     unit = first.unit.strip()
     if unit.isdigit():  # the number of a unit, not a unit
         remedy = f"say it with units={{{name!r}: ...}}"
         unit = units.get(unit, "")
         if not unit:
             reading.of(run, name, f"its unit is number {first.unit} of a table that is not in the file; {remedy}")
-    return Trace(run, name, unit, axis, column, origin, attrs=attrs)
+    return Trace(run, name, unit, np.concatenate(times), np.concatenate(values), origin, attrs=attrs)
 
 
 def _stretch(
@@ -114,8 +112,10 @@ def _stretch(
         raise reading.error(place, f"DataCacheDataSize is {segment.size[:40]!r}, expected a number of records")
     size = int(segment.size)
     values = _records(segment.values, size, archive, reading)
-    if values is None or size == 0:
-        return None if values is None else (values, values, 0)
+    if values is None:
+        return None
+    if size == 0:
+        return values, values, 0
     if segment.times:
         times = _records(segment.times, size, archive, reading)
         if times is None or len(times) != len(values):

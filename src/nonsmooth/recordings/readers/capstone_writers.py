@@ -11,18 +11,15 @@ import os
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.readers import capstone_cap, capstone_csv
 from nonsmooth.recordings.recording import Recording
 from nonsmooth.results.whole import placed
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _PAGE = 256  # records; Capstone's members are longer than what was measured
 

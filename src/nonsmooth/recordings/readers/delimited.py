@@ -24,8 +24,7 @@ _SEARCHED = 60  # lines searched for the first of numbers, where a table cannot 
 
 def read(data: bytes, reading: Reading) -> None:
     """Read a table."""
-    stream = decoded(data, reading)
-    read_lines(stream, "Run #1", reading, ends=data.endswith((b"\n", b"\r")))
+    read_lines(decoded(data, reading), "Run #1", reading, ends=data.endswith((b"\n", b"\r")))
 
 
 def read_lines(
@@ -53,8 +52,7 @@ def read_lines(
         lines: Iterator[str] = itertools.chain([first], kept)
         if _ARROW.match(first):
             lines = (_ARROW.sub(rf"\1{delimiter}", text) for text in lines)
-        table = rows(lines, delimiter, reading, at)
-        reading.traces += _table(table, run, delimiter, reading, ends)
+        reading.traces += _table(rows(lines, delimiter, reading, at), run, delimiter, reading, ends)
     except DataFileError as error:
         advice = "" if reading.header else _advice([*top, *itertools.islice(stream, max(0, _SEARCHED - len(top)))])
         raise DataFileError(f"{error}{advice}") from error

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +33,7 @@ class Field:
     attrs: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, eq=False)
-class FieldTable:
+class FieldTable(NamedTuple):
     """Fields over the same rows; ``rate`` where the file itself says how often they were taken."""
 
     run: str
@@ -161,7 +160,7 @@ def _unwrapped(field: Field, reading: Reading) -> Field:
     period = (reading.wraps or {}).get(field.name)
     if period is None or field.values.dtype.kind not in "iuf":
         return field
-    values = np.array(field.values, np.float64)
+    values = np.array(field.values, float)
     good = np.isfinite(values)
     values[good] = np.unwrap(values[good], period=period)
     return replace(field, values=values)
@@ -178,7 +177,7 @@ def _along(axis: Field, table: FieldTable, reading: Reading) -> tuple[FloatArray
             reading.run_attrs.setdefault(table.run, {})["started"] = begun
         period = (reading.wraps or {}).get("time")
         return (seconds if period is None else np.unwrap(seconds, period=period)), "s"
-    values = np.asarray(axis.values, np.float64)
+    values = np.asarray(axis.values, float)
     scaled = scaled_time(values, axis.unit)
     if scaled is None:
         raise reading.error(
@@ -199,7 +198,7 @@ def _runs(table: FieldTable, numbers: Field | None, reading: Reading) -> list[tu
     if numbers.rows is not None and len(numbers.rows) != table.rows:
         missing = int(np.setdiff1d(np.arange(table.rows), numbers.rows)[0])
         raise reading.error(row_of(missing, table.lines), "the column that numbers the runs is blank")
-    values = np.asarray(numbers.values, np.float64)
+    values = np.asarray(numbers.values, float)
     if not np.isfinite(values).all():
         bad = int(np.flatnonzero(~np.isfinite(values))[0])
         raise reading.error(row_of(bad, table.lines), f"the number of the run is {values[bad]}")
@@ -242,7 +241,7 @@ def seconds_of(axis: Field, lines: IntArray | None, reading: Reading) -> tuple[F
         raise _unread(texts, int(np.flatnonzero(read.isna())[0]), axis, lines, reading)
     if not len(read):
         return np.empty(0), ""
-    return np.asarray((read - read[0]).total_seconds(), np.float64), str(read[0].isoformat())
+    return np.asarray((read - read[0]).total_seconds(), float), str(read[0].isoformat())
 
 
 def _unread(texts: list[str], place: int, axis: Field, lines: IntArray | None, reading: Reading) -> Exception:

@@ -86,8 +86,8 @@ def _wave(data: bytes, reading: Reading) -> Loaded:
         reading.say(f"SciPy: {warning.message}"[:200])
     kind = samples.dtype
     if kind.kind in "iu":  # as parts of full scale, as audio programs show them
-        half = 128.0 if kind.kind == "u" else float(-np.iinfo(kind).min)
-        samples = (samples - (128.0 if kind.kind == "u" else 0.0)) / half
+        least, half = np.iinfo(kind).min, 0.5 * (np.iinfo(kind).max - np.iinfo(kind).min + 1)
+        samples = (samples - (least + half)) / half
     columns = samples.reshape(len(samples), -1)
     reading.say("values are parts of full scale; multiply by what full scale stands for")
     names = [f"channel {k + 1}" for k in range(columns.shape[1])]
@@ -109,7 +109,7 @@ def _universal(data: bytes, reading: Reading) -> Loaded:
         axis = {17: "time", 18: "frequency"}.get(int(one.get("abscissa_spec_data_type", 0)), "abscissa")
         group = next((g for g in groups if axis in g and np.array_equal(g[axis], one["x"])), None)
         if group is None:
-            group = Group({axis: np.asarray(one["x"], np.float64)})
+            group = Group({axis: np.asarray(one["x"], float)})
             group.units[axis] = _unit(one, "abscissa") or {"time": "s", "frequency": "Hz"}.get(axis, "")
             groups.append(group)
         name = f"{one.get('rsp_node', k)}{_direction(one.get('rsp_dir', 0))}"
@@ -142,7 +142,7 @@ def _measured(data: bytes, reading: Reading) -> Loaded:
                 signal = opened.get(group=k, index=i)
                 if i != opened.masters_db.get(k):
                     group[signal.name], group.units[signal.name] = np.asarray(signal.samples), signal.unit or ""
-                    group["time"], group.units["time"] = np.asarray(signal.timestamps, np.float64), "s"
+                    group["time"], group.units["time"] = np.asarray(signal.timestamps, float), "s"
             groups[f"group {k + 1}"] = group
     return groups, {"version": str(opened.version)}
 

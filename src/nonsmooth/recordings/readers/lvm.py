@@ -94,7 +94,7 @@ def _lines(data: bytes, reading: Reading) -> tuple[str, Lines]:
 
 def _keys(lines: Lines, reading: Reading, what: str, first: list[str] | None = None) -> dict[str, list[str]]:
     """Key and values of each line up to the end of a header."""
-    found: dict[str, list[str]] = {first[0].strip(): first[1:]} if first else {}
+    found = {first[0].strip(): first[1:]} if first else {}
     for _, fields in lines:
         if fields[0].startswith(_END):
             return found
@@ -124,8 +124,9 @@ def _segments(lines: Lines, clocks: str, numerals: Numerals, reading: Reading, e
         header, names = _begin(line, fields, lines, clocks, reading)
         channels += len(names)
         if channels > MAX_COLUMNS:
-            held = f"its {count} segments hold {channels} channels so far"
-            raise reading.error(f"line {line}", f"{held}; at most {MAX_COLUMNS} are read")
+            raise reading.error(
+                f"line {line}", f"its {count} segments hold {channels} channels so far; at most {MAX_COLUMNS} are read"
+            )
         labels = (
             [text for name in names for text in (f"X_Value of {name}", name)]
             if clocks == "Multi"
@@ -211,11 +212,9 @@ def _traces(run: str, segment: _Segment, clocks: str, decimal: str, reading: Rea
         if said[k] < len(values):
             reading.of(run, name, f"Samples says {said[k]:g} (its first write), {len(values)} were read")
         elif said[k] > len(values):
-            said_more = f"Samples says {said[k]:g}, only {len(values)} follow; the file may be cut short"
-            reading.of(run, name, said_more)
+            reading.of(run, name, f"Samples says {said[k]:g}, only {len(values)} follow; the file may be cut short")
         if k and start[k] != start[0]:
-            begins = f"its clock begins at X0 = {start[k]:g}, that of the first channel at {start[0]:g}"
-            reading.of(run, name, begins)
+            reading.of(run, name, f"its clock begins at X0 = {start[k]:g}, that of the first channel at {start[0]:g}")
         begun, origin = f"{dates[k]} {times[k]}".strip(), f"column {k + 2} from line {segment.line} on"
         clock = Field(reading.axis, unit, axis, f"X_Value of {name}", held)
         channel = Field(name, units[k], values, origin, rows, {"started": begun} if begun else {})

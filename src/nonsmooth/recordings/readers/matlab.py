@@ -210,17 +210,15 @@ class _GroupReader:
             raise self._reading.error(
                 place, f"says it holds {item.shape} values, more than a file of {self._reading.size} bytes warrants"
             )
-        values = item[()]
+        values = np.asarray(item[()])
         if refers:
-            flat = np.asarray(values).ravel()
             members = [
                 self._value(self._file[ref], f"{place}({k})", depth + 1) if ref else None
-                for k, ref in enumerate(flat, 1)
+                for k, ref in enumerate(values.ravel(), 1)
             ]
             if depth > MAX_DEPTH:
                 raise self._reading.error(place, f"is nested deeper than {MAX_DEPTH}")
             return members if kind == "cell" else _Column(members)
-        values = np.asarray(values)
         if compound and not self._matlab:
             return Group({name: values[name] for name in values.dtype.names or ()}, rate=_rate(item))
         if compound:
@@ -229,8 +227,7 @@ class _GroupReader:
                 return None
             values = values["real"] + 1j * values["imag"]
         if kind == "char":
-            codes = values.T.ravel(order="F")
-            return codes.astype("<u2").tobytes().decode("utf-16-le", errors="replace")
+            return values.T.ravel(order="F").astype("<u2").tobytes().decode("utf-16-le", errors="replace")
         return values.T if self._matlab else values  # MATLAB's order
 
 

@@ -11,7 +11,6 @@ import itertools
 import re
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -119,8 +118,7 @@ class Numerals(NamedTuple):
         return text in self.na or any(number(text, d, self.thousands) is not None for d in (self.decimal or ".,"))
 
 
-@dataclass(frozen=True, eq=False)
-class Cells:
+class Cells(NamedTuple):
     """The columns of a table: values, and the rows (from 0) in which each has one; the line of every row."""
 
     values: list[NDArray[Any]]
@@ -193,7 +191,7 @@ def read_cells(
     if short:
         reading.say(f"{short} rows have fewer fields than the header, first line {first_short}; taken as blank")
     columns = [
-        np.array(stamps, dtype=object) if stamps is not None and column == stamped else np.asarray(v)
+        np.array(stamps, object) if stamps is not None and column == stamped else np.asarray(v)
         for column, v in zip(wanted, values, strict=True)
     ]
     return Cells(columns, [np.asarray(h) for h in held], np.asarray(lines))

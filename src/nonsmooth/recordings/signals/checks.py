@@ -7,16 +7,14 @@ Functions that take plain arrays know no names; those of a DataArray are read fr
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.recording import Recording, RecordingWarning, examine, missing_runs
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def whose(x: Any, default: str = "the signal") -> str:
@@ -58,7 +56,7 @@ def signal(
         ``missing="error"``), or there are too few of them.
     """
     name = whose(x)
-    t, values = np.asarray(time, np.float64), np.array(x, np.float64)
+    t, values = np.asarray(time, float), np.array(x, float)
     values[np.ma.getmask(x)] = np.nan
     if t.ndim != 1 or t.shape != values.shape:
         raise ValueError(f"{name}: time and values must be arrays of one length, got {t.shape} and {values.shape}")
@@ -83,10 +81,8 @@ def signal(
                 f"{name}: {sentence}; {purpose} needs all: cut the record there, or smooth it first, which bridges them"
             )
         warn(x, f"{sentence}; they are bridged, with errors that say so")
-    if len(values) - total < least:
-        raise ValueError(
-            f"{name}: too short: {len(values) - total} usable samples, and {purpose} needs {least}; record longer"
-        )
+    if (usable := len(values) - total) < least:
+        raise ValueError(f"{name}: too short: {usable} usable samples, and {purpose} needs {least}; record longer")
     return t, values
 
 
@@ -164,7 +160,7 @@ def take(
     if array.size < samples:
         raise ValueError(f"{name}: {array.size} samples are too short to identify anything from; {samples} are needed")
     (axis,) = array.dims
-    total, start, longest = missing_runs(np.asarray(array.values, np.float64))
+    total, start, longest = missing_runs(np.asarray(array.values, float))
     if total and missing == "error":
         raise ValueError(
             f"{name}: {total} of {array.size} values are not finite numbers, the longest run of them {longest} from "

@@ -7,9 +7,10 @@ a force that the free motion does not have.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import BoolArray, FloatArray
@@ -17,9 +18,6 @@ from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal, unit_of, whose
 from nonsmooth.recordings.signals.smoothing import smooth
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def impacts(
@@ -67,8 +65,8 @@ def impacts(
     t, values = signal(time, x, least=2 * window, purpose="finding impacts")
     if resolution is None:
         # Fourth differences of a smooth motion are noise; a few kinks do not move their median.
-        variance = (1.4826 * float(np.median(np.abs(np.diff(values, 4))))) ** 2 / 70.0
-        variance = max(variance, (1e-9 * float(np.ptp(values))) ** 2)
+        variance = (1.4826 * np.median(np.abs(np.diff(values, 4)))) ** 2 / 70.0
+        variance = max(variance, (1e-9 * np.ptp(values)) ** 2)
     else:
         variance = resolution**2 / 12.0 + noise**2
     taken = _forward(t, values, variance, significance, window)
@@ -133,8 +131,7 @@ def _kink(t: FloatArray, x: FloatArray, i: int, low: int, high: int, variance: f
         return _squares(np.column_stack([A, np.maximum(s - tau, 0.0)]), y)
 
     grid = h * np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-    values = [squares(tau) for tau in grid]
-    k = int(np.argmin(values))
+    k = int(np.argmin([squares(tau) for tau in grid]))
     bounds = (grid[max(k - 1, 0)], grid[min(k + 1, 4)])
     found = minimize_scalar(squares, bounds=bounds, method="bounded", options={"xatol": 1e-3 * h, "maxiter": 40})
     if not found.success:
@@ -148,7 +145,7 @@ def _kink(t: FloatArray, x: FloatArray, i: int, low: int, high: int, variance: f
 
 def _squares(A: FloatArray, y: FloatArray) -> float:
     """Sum of squares that a fit leaves."""
-    R = np.asarray(np.linalg.qr(np.column_stack([A, y]), mode="r"))
+    R: Any = np.linalg.qr(np.column_stack([A, y]), mode="r")
     return float(R[-1, -1] ** 2)
 
 
@@ -256,9 +253,8 @@ def _beside_the_free_motion(found: xr.Dataset, omega: float | None, free: BoolAr
             return np.zeros(0), free
         p, *_ = np.linalg.lstsq(A[free], a[free], rcond=None)
         left = a - A @ p
-        spread = 1.4826 * float(np.median(np.abs(left[free] - np.median(left[free]))))
-        level = max(4.0 * spread, 3.0 * float(np.median(found["a_error"].values)))
-        again = left > -level
+        spread = 1.4826 * np.median(np.abs(left[free] - np.median(left[free])))
+        again = left > -max(4.0 * spread, 3.0 * np.median(found["a_error"].values))
         changed, free = int(np.count_nonzero(again != free)), again
         if not changed:
             break
@@ -277,12 +273,11 @@ def _drive(t: FloatArray, left: FloatArray, free: BoolArray) -> float | None:
 
     n = len(t)
     held = np.where(free, left - left[free].mean(), 0.0)
-    even = np.interp(np.linspace(t[0], t[-1], n), t, held)
-    lines = np.abs(fft.rfft(even, 8 * n)) ** 2
+    lines = np.abs(fft.rfft(np.interp(np.linspace(t[0], t[-1], n), t, held), 8 * n)) ** 2
     low, high = 16, 2 * n  # two periods in the record; half of what the sample rate shows
-    best = low + int(np.argmax(lines[low:high]))
+    best = low + np.argmax(lines[low:high])
     # The share of the variance that the line explains; white noise does not reach it.
-    share = 2.0 * lines[best] / (np.count_nonzero(free) * float(held @ held)) if held.any() else 0.0
+    share = 2.0 * lines[best] / (np.count_nonzero(free) * (held @ held)) if held.any() else 0.0
     if share < 0.05 or best in (low, high - 1):
         return None
     a, b, c = lines[best - 1 : best + 2]
@@ -306,8 +301,6 @@ def intervals(found: xr.Dataset, gap: float) -> tuple[FloatArray, FloatArray, Bo
 
 
 def _labelled(found: xr.Dataset, place: tuple[float, float, float], least: float, x: Any) -> xr.Dataset:
-    import xarray as xr
-
     gap, gap_error, stiffness = place
     t, position = found["time"].values, found["x"].values
     if math.isnan(gap):

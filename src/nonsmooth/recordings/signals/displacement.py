@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from nonsmooth.recordings.signals.checks import unit_of, whose
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: Turns per unit of angle.
 _TURNS = {
@@ -89,7 +87,7 @@ def found_resolution(x: Any) -> float:
     ValueError
         If all values are the same, or their differences are no multiples of one step.
     """
-    values = np.asarray(x, np.float64)
+    values = np.asarray(x, float)
     distinct = np.unique(values[np.isfinite(values)])
     spacing = np.diff(distinct)
     if len(distinct):

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import signal, whose
 from nonsmooth.recordings.signals.spectrum import correlation_times
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +74,7 @@ class HarmonicFit:
 
     def evaluate(self, time: ArrayLike) -> FloatArray:
         """The fitted signal at these times."""
-        t = np.asarray(time, np.float64)
+        t = np.asarray(time, float)
         j = np.arange(1, len(self.amplitudes) + 1)
         angle = np.multiply.outer(t, j * self.omega / self.subharmonic) - self.phases
         return np.asarray(self.mean + np.cos(angle) @ self.amplitudes)
@@ -109,8 +107,6 @@ def fit(
     ValueError
         If the record is shorter than one period, has too few samples, or too low a rate for the highest harmonic.
     """
-    import xarray as xr
-
     if not (math.isfinite(omega) and omega > 0) or n < 1 or subharmonic < 1:
         raise ValueError(f"omega must be positive, n and subharmonic at least 1; got {omega!r}, {n!r}, {subharmonic!r}")
     t, values = signal(time, x, least=2 * n + 4, purpose=f"a fit of {n} harmonics")
@@ -134,14 +130,11 @@ def fit(
     cos, sin = solution[1::2], solution[2::2]
     names = ["mean"] + [f"{f}_{j}" for j in range(1, n + 1) for f in ("cos", "sin")]
     if refine:
-        slope = _slope(tau, A, solution)
-        A = np.column_stack([A, slope / subharmonic])
+        A = np.column_stack([A, _slope(tau, A, solution) / subharmonic])
         names.append("omega")
-    free = max(len(t) - A.shape[1], 1)
-    variance = float(left @ left) / free
+    variance = (left @ left) / max(len(t) - A.shape[1], 1)
     correlation = correlation_times(left)
-    R = np.linalg.qr(A, mode="r")
-    inverse = np.linalg.inv(R)
+    inverse = np.linalg.inv(np.linalg.qr(A, mode="r"))
     C = variance * correlation * inverse @ inverse.T
     # From the record's middle, where frequency and phase are independent, to t = 0.
     angle = np.arange(1, n + 1) * base * centre
@@ -178,12 +171,12 @@ def _fitted(tau: FloatArray, values: FloatArray, omega: float, n: int) -> tuple[
     A = np.ones((len(tau), 2 * n + 1))
     A[:, 1::2], A[:, 2::2] = np.cos(angle), np.sin(angle)
     p, *_ = np.linalg.lstsq(A, values, rcond=None)
-    return A, np.asarray(p, np.float64), values - A @ p
+    return A, np.asarray(p, float), values - A @ p
 
 
 def _slope(tau: FloatArray, A: FloatArray, p: FloatArray) -> FloatArray:
     """Derivative of the fitted signal in the frequency."""
-    return np.asarray(tau * ((A[:, 1::2] * p[2::2] - A[:, 2::2] * p[1::2]) @ np.arange(1, len(p) // 2 + 1)))
+    return tau * ((A[:, 1::2] * p[2::2] - A[:, 2::2] * p[1::2]) @ np.arange(1, len(p) // 2 + 1))
 
 
 def _best(tau: FloatArray, values: FloatArray, omega: float, n: int, length: float) -> float:
@@ -192,7 +185,7 @@ def _best(tau: FloatArray, values: FloatArray, omega: float, n: int, length: flo
     A few are tried, then Gauss-Newton steps change frequency and amplitudes together.
     """
     grid = omega + math.pi / length * np.linspace(-1.0, 1.0, 7)
-    best = float(grid[int(np.argmin([np.linalg.norm(_fitted(tau, values, w, n)[2]) for w in grid]))])
+    best = float(grid[np.argmin([np.linalg.norm(_fitted(tau, values, w, n)[2]) for w in grid])])
     for _ in range(20):
         A, p, left = _fitted(tau, values, best, n)
         change, *_ = np.linalg.lstsq(np.column_stack([A, _slope(tau, A, p)]), left, rcond=None)

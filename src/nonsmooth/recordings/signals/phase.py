@@ -54,7 +54,7 @@ class DrivePhase:
 
     def phase(self, time: ArrayLike) -> FloatArray:
         """Unwrapped phase in rad, 0 at ``t_0``; straight between turns, and with the mean frequency beyond them."""
-        return _straight(np.asarray(time, np.float64), self.turn_times, TURN * self.turns, self.omega)
+        return _straight(np.asarray(time, float), self.turn_times, TURN * self.turns, self.omega)
 
     @property
     def coarser(self) -> DrivePhase:
@@ -78,7 +78,7 @@ class DrivePhase:
         low, high = self.span
         first, last = self.phase(np.array([low, high])) / TURN - phase
         wanted = np.arange(math.ceil(first - 1e-12), math.floor(last + 1e-12) + 1) + phase
-        return np.asarray(np.clip(_straight(wanted, self.turns, self.turn_times, self.period), low, high))
+        return np.clip(_straight(wanted, self.turns, self.turn_times, self.period), low, high)
 
 
 def _straight(at: FloatArray, x: Any, y: Any, slope: float) -> FloatArray:
@@ -138,8 +138,7 @@ def drive_phase(
             f"{whose(x)}: {t[-1] - t[0]:.4g} s hold fewer than three turns at {omega:.4g} rad/s: record longer"
         )
     found = harmonics.fit(t, x, omega, 3, refine=True)
-    lag = float(found.phases[0])
-    t_0 = t[0] + ((lag - found.omega * t[0]) % TURN) / found.omega
+    t_0 = t[0] + ((float(found.phases[0]) - found.omega * t[0]) % TURN) / found.omega
     turns = np.arange(math.floor((t[-1] - t_0) / found.period) + 1)
     # Phase and frequency are correlated; the error of the phase is least in the middle of the record.
     error = float(found.phase_errors[0]) / found.omega
@@ -158,10 +157,10 @@ def drive_phase(
 
 
 def _by_gate(time: Any, resolution: float, span: tuple[float, float] | None) -> DrivePhase:
-    times = np.asarray(time, np.float64)
+    times = np.asarray(time, float)
     # A channel over its own axis: its times are what counts.
     if hasattr(time, "dims") and time.ndim == 1 and "time" in time.coords:
-        times = np.asarray(time["time"], np.float64)
+        times = np.asarray(time["time"], float)
     if times.ndim != 1 or len(times) < 3:
         raise ValueError(f"{whose(time)}: {times.size} turns are too few for a frequency; at least 3 are needed")
     if not np.isfinite(times).all() or (np.diff(times) <= 0).any():

@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.recording import runs_of
 from nonsmooth.recordings.signals.checks import even_rate, signal, whose
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int = 4) -> xr.Dataset:
@@ -50,15 +48,18 @@ def flights(time: ArrayLike, height: Any, *, threshold: float = 6.0, least: int 
     ValueError
         If the record is too short, its rate is not even, or it holds no flight.
     """
-    import xarray as xr
-
     t, z = signal(time, height, least=12, purpose="finding flights")
     step = 1.0 / even_rate(t, height, "finding flights")
     bend = np.diff(z, 2) / step**2
     tail = float(np.quantile(bend, 0.1))
     falling = bend[(bend < 0.5 * tail) & (bend > 1.5 * tail)]
-    fall, spread = _densest(falling) if len(falling) >= least else (0.0, 0.0)
-    spread = max(spread, 1e-9 * float(np.ptp(bend)))
+    fall = spread = 0.0
+    if len(falling) >= least:  # the shortest interval that holds half of the values
+        ordered, half = np.sort(falling), max(len(falling) // 2, 1)
+        width = ordered[half:] - ordered[:-half]
+        k = int(np.argmin(width))
+        fall, spread = float(np.median(ordered[k : k + half + 1])), float(width[k]) / (2 * 0.6745)
+    spread = max(spread, 1e-9 * np.ptp(bend))
     tolerance = min(threshold * spread, 0.4 * abs(fall))  # at rest is never in flight, however great the noise
     free = np.concatenate([[True], np.abs(bend - fall) < tolerance, [True]])
     # The middle of a second difference is free where it is; a stretch of free ones is a flight.
@@ -125,7 +126,10 @@ def restitution(
             continue
         i, j = before.stop - 1, after.start
         left, right = _Side(t[before], z[before], t[i]), _Side(t[after], z[after], t[i])
-        when = _meeting(left.p - right.p, float(t[j] - t[i]))
+        length, roots = float(t[j] - t[i]), np.roots(left.p - right.p)
+        real = np.real(roots[np.abs(np.imag(roots)) < 1e-9])
+        inside = real[(real >= 0.0) & (real <= length)]
+        when = float(inside[0]) if len(inside) == 1 else 0.5 * length  # where the two parabolas meet
         found.append((k, t[i] + when, t[j] - t[i], np.polyval(left.p, when), when))
         sides.append((left, right))
     freedom = sum(side.freedom for pair in sides for side in pair)
@@ -148,7 +152,7 @@ def single_contacts(
     t: FloatArray, flights: xr.Dataset, window: int, longest: float | None
 ) -> Iterator[tuple[int, slice, slice]]:
     """Each flight that a short contact ends: its number, its last samples and the first of the flight behind it."""
-    longest = 4.5 * float(np.median(np.diff(t))) if longest is None else longest
+    longest = 4.5 * np.median(np.diff(t)) if longest is None else longest
     first, last = flights["first"].values.tolist(), flights["last"].values.tolist()
     for k, (i, j) in enumerate(zip(last[:-1], first[1:], strict=True)):
         if t[j] - t[i] <= longest:
@@ -157,7 +161,6 @@ def single_contacts(
 
 def impacts_of(rows: Sequence[Mapping[str, Any]], more: Mapping[str, tuple[type, str]]) -> xr.Dataset:
     """Impacts with their restitution, of rows whose velocities are (value, error); ``more``: other columns."""
-    import xarray as xr
 
     def column(name: str, kind: type, place: int | None = None) -> NDArray[Any]:
         return np.array([row[name] if place is None else row[name][place] for row in rows], kind)
@@ -179,26 +182,16 @@ def impacts_of(rows: Sequence[Mapping[str, Any]], more: Mapping[str, tuple[type,
     return xr.Dataset(data)
 
 
-def _densest(values: FloatArray) -> tuple[float, float]:
-    """Median of the shortest interval that holds half of the values, and the standard deviation that its width says."""
-    ordered = np.sort(values)
-    half = max(len(ordered) // 2, 1)
-    width = ordered[half:] - ordered[:-half]
-    k = int(np.argmin(width))
-    return float(np.median(ordered[k : k + half + 1])), float(width[k]) / (2 * 0.6745)
-
-
 def _common_fall(t: FloatArray, z: FloatArray, rows: list[tuple[int, int]]) -> tuple[float, float, float]:
     """Acceleration common to all flights, its error, and the noise: each flight's line is taken out first."""
     top = bottom = squares = 0.0
     parts, freedom = [], -1
     for a, b in rows:
         s = t[a : b + 1] - t[a]
-        line = np.column_stack([np.ones_like(s), s])
-        Q, _ = np.linalg.qr(line)
+        Q, _ = np.linalg.qr(np.column_stack([np.ones_like(s), s]))
         q, y = 0.5 * s * s, z[a : b + 1]
         q, y = q - Q @ (Q.T @ q), y - Q @ (Q.T @ y)
-        top, bottom = top + float(q @ y), bottom + float(q @ q)
+        top, bottom = top + (q @ y), bottom + (q @ q)
         parts.append((q, y))
         freedom += len(s) - 2
     fall = top / bottom
@@ -219,11 +212,3 @@ class _Side:
         """The velocity and its error."""
         along = np.array([2.0 * s, 1.0, 0.0])
         return float(self.p @ along), noise * math.sqrt(float(along @ self.C @ along))
-
-
-def _meeting(d: FloatArray, length: float) -> float:
-    """Zero of the difference of two parabolas within (0, length); the middle if there is none."""
-    roots = np.roots(d)
-    real = np.real(roots[np.abs(np.imag(roots)) < 1e-9])
-    inside = real[(real >= 0.0) & (real <= length)]
-    return float(inside[0]) if len(inside) == 1 else 0.5 * length

@@ -9,17 +9,16 @@ vertical part before and after gives the restitution, e = -v_after / v_before (N
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import whose
 from nonsmooth.recordings.signals.restitution import impacts_of, single_contacts
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _COLUMNS = {
     "corner": (int, "row of the corner"),
@@ -33,7 +32,7 @@ _COLUMNS = {
 def cube(half_width: float = 1.0) -> FloatArray:
     """The eight corners of a cube about its centre, shape (8, 3)."""
     signs = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0], indexing="ij"))
-    return np.asarray(half_width * signs.reshape(3, -1).T)
+    return half_width * signs.reshape(3, -1).T
 
 
 def corner_heights(position: ArrayLike, orientation: ArrayLike, corners: ArrayLike) -> FloatArray:
@@ -57,8 +56,8 @@ def corner_heights(position: ArrayLike, orientation: ArrayLike, corners: ArrayLi
     ValueError
         If a quaternion is not of length 1 within 1 %: their order may be another, or they are no quaternions.
     """
-    place, turned = np.asarray(position, np.float64), _turns(orientation).as_matrix()
-    return np.asarray(place[:, 2, None] + turned[:, 2, :] @ np.asarray(corners, np.float64).T)
+    place, turned = np.asarray(position, float), _turns(orientation).as_matrix()
+    return np.asarray(place[:, 2, None] + turned[:, 2, :] @ np.asarray(corners, float).T)
 
 
 def corner_restitution(
@@ -104,8 +103,8 @@ def corner_restitution(
     ValueError
         If shapes do not agree or values are missing.
     """
-    t = np.asarray(time, np.float64)
-    place, points = np.asarray(position, np.float64), np.asarray(corners, np.float64)
+    t = np.asarray(time, float)
+    place, points = np.asarray(position, float), np.asarray(corners, float)
     if place.shape != (len(t), 3) or np.shape(orientation) != (len(t), 4) or points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(
             f"{whose(position)}: needs time (N,), position (N, 3), orientation (N, 4) and corners (V, 3); got "
@@ -114,8 +113,8 @@ def corner_restitution(
     if not (np.isfinite(t).all() and np.isfinite(place).all() and np.isfinite(np.asarray(orientation)).all()):
         raise ValueError(f"{whose(position)}: values are missing; take the intervals of the record that are whole")
     turns, fall = _turns(orientation), float(flights["acceleration"])
-    half_sample = 0.5 * float(np.median(np.diff(t)))
-    reach = near * float(np.max(np.linalg.norm(points, axis=1)))
+    half_sample = 0.5 * np.median(np.diff(t))
+    reach = near * np.max(np.linalg.norm(points, axis=1))
     rows = []
     for k, *sides in single_contacts(t, flights, window, longest):
         before, after = (_Flight(t, place, turns, side, fall) for side in sides)
@@ -129,7 +128,7 @@ def corner_restitution(
         late, early = (-after.velocity(s, point)[0] / before.velocity(s, point)[0] for s in moved)
         v0, e0 = before.velocity(when, point)
         touching = int(np.count_nonzero(heights < heights[corner] + reach))
-        same = corner == int(np.argmin(after.heights(when, points)))
+        same = corner == np.argmin(after.heights(when, points))
         rows.append(
             {
                 "flight": k,
@@ -144,15 +143,14 @@ def corner_restitution(
                 "single": touching == 1 and same and v0 < -3.0 * e0,
             }
         )
-    left_out = max(flights.sizes["flight"] - 1, 0) - len(rows)
-    return impacts_of(rows, _COLUMNS).assign_attrs(left_out=left_out)
+    return impacts_of(rows, _COLUMNS).assign_attrs(left_out=max(flights.sizes["flight"] - 1, 0) - len(rows))
 
 
 def _nearest_zero(t: FloatArray, y: FloatArray) -> float:
     """Zero of y between two of its samples; where there is none, the sample nearest to zero."""
     k = np.flatnonzero(np.sign(y[:-1]) != np.sign(y[1:]))
     if len(k) == 0:
-        return float(t[int(np.argmin(np.abs(y)))])
+        return float(t[np.argmin(np.abs(y))])
     i = int(k[0])
     return float(t[i] + (t[i + 1] - t[i]) * y[i] / (y[i] - y[i + 1]))
 
@@ -161,8 +159,6 @@ class _Flight:
     """Centre and orientation on one side of an impact: a parabola of known acceleration, a constant spin."""
 
     def __init__(self, t: FloatArray, place: FloatArray, turns: Any, here: slice, fall: float) -> None:
-        from scipy.spatial.transform import Rotation
-
         self.origin = float(t[here].mean())
         s = t[here] - self.origin
         self.fall, self.spread, n = fall, float(s @ s), len(s)
@@ -180,28 +176,23 @@ class _Flight:
 
     def _arms(self, when: float, points: FloatArray) -> FloatArray:
         """Corners about the centre, in the axes of the room."""
-        from scipy.spatial.transform import Rotation
-
         turn = Rotation.from_rotvec(self.spin * (when - self.origin)) * self.middle
-        return np.asarray(turn.apply(points))
+        return turn.apply(points)
 
     def heights(self, when: float, points: FloatArray) -> FloatArray:
         """Heights of the corners, extrapolated."""
         s = when - self.origin
-        return np.asarray(self.z + self.v * s + 0.5 * self.fall * s * s + self._arms(when, points)[:, 2])
+        return self.z + self.v * s + 0.5 * self.fall * s * s + self._arms(when, points)[:, 2]
 
     def velocity(self, when: float, point: FloatArray) -> tuple[float, float]:
         """Vertical velocity of a corner and its error."""
         arm = self._arms(when, point[None, :])[0]
-        turning = float(np.cross(self.spin, arm)[2])
-        velocity = self.v + self.fall * (when - self.origin) + turning
+        velocity = self.v + self.fall * (when - self.origin) + float(np.cross(self.spin, arm)[2])
         return velocity, math.hypot(self.v_error, self.spin_error * math.hypot(arm[0], arm[1]))
 
 
 def _turns(orientation: ArrayLike) -> Any:
-    from scipy.spatial.transform import Rotation
-
-    q = np.asarray(orientation, np.float64)
+    q = np.asarray(orientation, float)
     length = np.linalg.norm(q, axis=-1)
     if not np.all(np.abs(length - 1.0) < 0.01):
         raise ValueError(

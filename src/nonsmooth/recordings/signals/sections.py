@@ -6,19 +6,16 @@ order 3 or 5. An impact between two samples is not interpolated across: each sid
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import signal, unit_of, whose
+from nonsmooth.recordings.signals.phase import DrivePhase
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from nonsmooth.recordings.signals.phase import DrivePhase
 
 
 class Known(TypedDict, total=False):
@@ -133,9 +130,9 @@ class _Between:
         impacts: ArrayLike = (),
     ) -> None:
         self.t, position = signal(time, x, least=4, purpose="section points")
-        columns: list[FloatArray] = [position]
+        columns = [position]
         for name, given in (("v", v), ("a", a), ("x_error", x_error), ("v_error", v_error)):
-            column = np.full(len(self.t), np.nan) if given is None else np.asarray(given, np.float64)
+            column = np.full(len(self.t), np.nan) if given is None else np.asarray(given, float)
             if column.shape != self.t.shape:
                 raise ValueError(f"{whose(x)}: {name} must have one value per time, got shape {column.shape}")
             if given is not None and not np.isfinite(column).all():
@@ -144,7 +141,7 @@ class _Between:
         self.states = np.column_stack(columns[:2])
         self.errors = np.column_stack(columns[3:])
         self.unit = unit_of(x)
-        hits = np.unique(np.asarray(impacts, np.float64).ravel())
+        hits = np.unique(np.asarray(impacts, float).ravel())
         self.polynomial = _polynomial(self.t, columns[0], columns[1], None if a is None else columns[2], hits)
 
     def at(self, times: FloatArray, derivative: int = 0) -> FloatArray:
@@ -159,7 +156,7 @@ class _Between:
             middle = low + 0.5 * (high - low)
             inside = (middle > low) & (middle < high)
             if not inside.any():
-                return np.asarray(high)
+                return high
             value = self.at(middle)[:, which] - level
             behind = inside & (np.where(before, -value, value) > 0)
             low, high = np.where(behind, middle, low), np.where(inside & ~behind, middle, high)
@@ -197,8 +194,6 @@ def _polynomial(t: FloatArray, x: FloatArray, v: FloatArray, a: FloatArray | Non
 def _points(
     between: _Between, times: FloatArray, instant_error: FloatArray, attrs: dict[str, str], *, along: bool
 ) -> xr.Dataset:
-    import xarray as xr
-
     section = between.at(times)
     error = between.error_at(times)
     moved = np.abs(between.at(times, derivative=1)) * instant_error[:, None]

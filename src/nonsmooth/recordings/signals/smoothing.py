@@ -10,19 +10,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.errors import SolveError
 from nonsmooth.recordings.signals.checks import even_rate, signal, unit_of, whose
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 #: The derivative that is white noise, by the name of the model.
 MODELS = {"white_acceleration": 2, "white_jerk": 3, "white_snap": 4}
@@ -98,12 +95,11 @@ def smooth(
         raise ValueError(f"{whose(x)}: noise must be a standard deviation >= 0, got {noise!r}")
     t, values = signal(time, x, least=2 * order, purpose="smoothing", missing="keep")
     nodes = _Nodes(t, values, _places(t, impacts, x), _bounds(contacts, x), order, resolution, noise)
-    q = nodes.likeliest() if intensity is None else nodes.scaled(intensity)
-    return nodes.result(q, model, x)
+    return nodes.result(nodes.likeliest() if intensity is None else nodes.scaled(intensity), model, x)
 
 
 def _places(t: FloatArray, places: ArrayLike, x: Any) -> FloatArray:
-    found = np.unique(np.asarray(places, np.float64).ravel())
+    found = np.unique(np.asarray(places, float).ravel())
     if len(found) and not (t[0] < found[0] and found[-1] < t[-1]):
         raise ValueError(
             f"{whose(x)}: impacts must lie inside the record, {t[0]:.9g} to {t[-1]:.9g} s; "
@@ -115,7 +111,7 @@ def _places(t: FloatArray, places: ArrayLike, x: Any) -> FloatArray:
 def _bounds(contacts: Any, x: Any) -> FloatArray:
     """Begin and end of each contact in turn."""
     pair = (contacts["begin"], contacts["end"]) if hasattr(contacts, "data_vars") else (contacts or ((), ()))
-    begin, end = (np.asarray(side, np.float64) for side in pair)
+    begin, end = (np.asarray(side, float) for side in pair)
     if begin.ndim != 1 or begin.shape != end.shape or not (begin < end).all() or not (end[:-1] <= begin[1:]).all():
         raise ValueError(f"{whose(x)}: contacts must be a begin and an end each, begin before end, one after the other")
     return np.column_stack([begin, end]).ravel()
@@ -143,7 +139,7 @@ class _Nodes:
         else:
             # A first guess only, which the likelihood corrects: the fourth differences of a smooth signal are noise.
             rough = np.diff(x[good], 4) / math.sqrt(70.0)
-            count, jitter = float(np.sqrt(np.mean(rough**2))) or 1e-9 * float(np.ptp(x[good])) or 1.0, 0.0
+            count, jitter = float(np.sqrt(np.mean(rough**2))) or 1e-9 * np.ptp(x[good]) or 1.0, 0.0
         self.sigma = math.hypot(count, jitter)
         self.offset = float(x[good][0])
         stay, *edges = _stays(t, x, resolution) if resolution is not None else (np.ones(len(t)), *np.zeros((3, 0)))
@@ -159,8 +155,7 @@ class _Nodes:
         self.step = np.concatenate([[0.0], np.diff(when[sort])]) / self.h
         # At the bound of a soft contact the force turns off its course: the jerk jumps.
         self.jump = np.select([self.kind == 2, self.kind == 3], [1, min(3, order)], order).astype(np.int64)
-        middle = when[sort] - 0.5 * self.step * self.h
-        self.inside = np.searchsorted(contacts, middle, side="right") % 2 == 1
+        self.inside = np.searchsorted(contacts, when[sort] - 0.5 * self.step * self.h, side="right") % 2 == 1
         self.wide = self._wide(t[good] / self.h, (x[good] - self.offset) / self.sigma)
         n, count_nodes = order, len(when)
         self.u, self.P = np.zeros((2, count_nodes, n)), np.zeros((2, count_nodes, n, n))  # predicted, filtered
@@ -170,12 +165,12 @@ class _Nodes:
         """Variances far above those of the state: a start, or a derivative that jumps, is not to be guided."""
         level, wide = y, []
         for k in range(self.order):
-            wide.append(1e2 * float(np.max(np.abs(level - (level[0] if k == 0 else 0.0)))) ** 2 + 1e2)
+            wide.append(1e2 * np.max(np.abs(level - (level[0] if k == 0 else 0.0))) ** 2 + 1e2)
             level = np.diff(level) / np.maximum(np.diff(t[: len(level)]), 0.2)
         return np.array(wide)
 
     def scaled(self, intensity: float | tuple[float, float]) -> FloatArray:
-        given = np.atleast_1d(np.asarray(intensity, np.float64))
+        given = np.atleast_1d(np.asarray(intensity, float))
         if len(given) not in (1, 2) or not np.isfinite(given).all() or (given < 0).any():
             raise ValueError(f"intensity must be a number >= 0, or (outside, inside) of contacts, got {intensity!r}")
         return given[[0, -1]] * self.h ** (2 * self.order - 1) / self.sigma**2
@@ -214,8 +209,7 @@ class _Nodes:
         power = 2 * self.order - 1
         low, high = -power * math.log10(max(len(self.t), 10)) - 2.0, 2.0 * math.log10(np.ptp(self.y) + 1.0) + 3.0
         grid = np.linspace(low, high, max(16, int((high - low) / 1.5)))
-        costs = [self.cost(np.full(2, 10.0**g)) for g in grid]
-        best = int(np.argmin(costs))
+        best = int(np.argmin([self.cost(np.full(2, 10.0**g)) for g in grid]))
         around = (float(grid[max(best - 1, 0)]), float(grid[min(best + 1, len(grid) - 1)]))
         found = minimize_scalar(
             lambda g: self.cost(np.full(2, 10.0**g)), bounds=around, method="bounded", options={"xatol": 0.01}
@@ -235,7 +229,7 @@ class _Nodes:
                 "the intensities of the motion outside and inside of contacts were not found in 400 evaluations; give "
                 "intensity=(outside, inside)"
             )
-        return np.asarray(10.0 ** np.clip(both.x, low, high))
+        return 10.0 ** np.clip(both.x, low, high)
 
     def result(self, q: FloatArray, model: str, x: Any) -> xr.Dataset:
         """Filter, smooth, and label."""
@@ -278,8 +272,6 @@ def labelled_motion(
     t: FloatArray, states: Iterable[FloatArray], errors: Iterable[FloatArray], impacts: FloatArray, x: Any
 ) -> xr.Dataset:
     """Position, velocity and acceleration (as many as are given) with their errors, in the unit of ``x``."""
-    import xarray as xr
-
     unit, data = unit_of(x), {}
     names = {"x": ("position", ""), "v": ("velocity", "/s"), "a": ("acceleration", "/s^2")}
     for (name, (long_name, per)), state, error in zip(names.items(), states, errors, strict=False):
@@ -356,10 +348,10 @@ def savitzky_golay(
         raise ValueError(f"{whose(x)}: resolution must be a positive length, got {resolution!r}")
     t, values = signal(time, x, least=window, purpose="Savitzky-Golay smoothing")
     step = 1.0 / even_rate(t, x, "Savitzky-Golay smoothing")
-    hits = np.unique(np.asarray(impacts, np.float64).ravel())
+    hits = np.unique(np.asarray(impacts, float).ravel())
     segment = np.searchsorted(hits, t, side="left")
     states, errors = np.empty((3, len(t))), np.empty((3, len(t)))
-    attrs: dict[str, Any] = {"method": "Savitzky-Golay", "window": window, "order": order}
+    attrs = {"method": "Savitzky-Golay", "window": window, "order": order}
     half = window // 2
     for k, name in enumerate("xva"):
         bias = []

@@ -9,17 +9,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
 from nonsmooth.recordings.signals.checks import even_rate, signal, unit_of, whose
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 #: Ways to find a peak between lines.
 INTERPOLATIONS = ("window", "parabola", "none")
@@ -98,14 +96,13 @@ def spectrum(
     ValueError
         If the record is shorter than 16 samples, has missing values, or its rate is not even.
     """
-    import xarray as xr
     from scipy import fft
     from scipy import signal as scipy_signal
 
     if rate is None:
         if not hasattr(x, "dims") or x.ndim != 1 or x.dims[0] not in x.coords:
             raise ValueError("rate is needed: the sample rate in Hz, or a DataArray with its time")
-        times = np.asarray(x[x.dims[0]], np.float64)
+        times = np.asarray(x[x.dims[0]], float)
     elif not (math.isfinite(rate) and rate > 0):
         raise ValueError(f"rate must be a positive number of samples per second, got {rate!r}")
     else:
@@ -121,7 +118,7 @@ def spectrum(
     lines = fft.rfft(values * weights, n * padding)
     frequency = fft.rfftfreq(n * padding, 1.0 / rate)
     amplitude = 2.0 * np.abs(lines) / weights.sum()
-    density = 2.0 * np.abs(lines) ** 2 / (rate * float(weights @ weights))
+    density = 2.0 * np.abs(lines) ** 2 / (rate * (weights @ weights))
     alone = [0] if n * padding % 2 else [0, -1]  # the lines at 0 and at half the sample rate have no mirror image
     for one_sided in (amplitude, density):
         one_sided[alone] *= 0.5
@@ -195,7 +192,10 @@ def peak(
             f"the largest line of the band stands at its edge, {frequency[k]:.4g} Hz: no peak inside; widen the band"
         )
     shape = _Shape(spectrum)
-    three = shape.in_phase(amplitude[k - 1 : k + 2], spectrum.phase.values[k - 1 : k + 2])
+    # three neighbouring lines, referred to the middle of the record, in phase with the middle one
+    turn = np.array([-1.0, 0.0, 1.0]) * np.pi * (shape.n - 1) / (shape.n * shape.padding)
+    phase = spectrum.phase.values
+    three = amplitude[k - 1 : k + 2] * np.cos(phase[k - 1 : k + 2] + turn - phase[k])
     delta, height = shape.interpolate(three, interpolation)
     spacing, step = float(frequency[1]), float(spectrum.attrs["grid_step"])
     if interpolation == "none":
@@ -217,15 +217,14 @@ def correlation_times(residuals: ArrayLike) -> float:
 
     The sum stops at the first lag that is not positive (Geyer's initial sequence, Statist. Sci. 7 (1992) 473).
     """
-    r = np.asarray(residuals, dtype=np.float64)
+    r = np.asarray(residuals, float)
     r = r - r.mean()
     n = len(r)
     if n < 4 or not r.any():
         return 1.0
     rho = np.fft.irfft(np.abs(np.fft.rfft(r, 2 * n)) ** 2, 2 * n)
     rho = rho[1 : 1 + n // 4] / rho[0]
-    ends = np.append(np.flatnonzero(rho <= 0), len(rho))
-    return float(1.0 + 2.0 * rho[: ends[0]].sum())
+    return float(1.0 + 2.0 * rho[: np.append(np.flatnonzero(rho <= 0), len(rho))[0]].sum())
 
 
 class _Shape:
@@ -247,7 +246,7 @@ class _Shape:
 
         length = self.n * self.padding * FINE
         lines = fft.rfft(weights, length)
-        return np.asarray((lines * np.exp(1j * np.pi * (self.n - 1) * np.arange(len(lines)) / length)).real)
+        return (lines * np.exp(1j * np.pi * (self.n - 1) * np.arange(len(lines)) / length)).real
 
     @cached_property
     def _all(self) -> FloatArray:
@@ -262,17 +261,12 @@ class _Shape:
 
     def at(self, offset: ArrayLike) -> FloatArray:
         """Value at these distances from the peak, up to 3 spacings."""
-        return np.asarray(self._near(np.abs(offset)))
+        return self._near(np.abs(offset))
 
     def image(self, place: float) -> float:
         """Largest modulus within an independent line of the mirror image, 2 ``place`` spacings away."""
         low, high = (round((2.0 * place + side * self.padding) * FINE) for side in (-1, 1))
         return float(np.abs(self._all[max(low, 0) : min(high, len(self._all)) + 1]).max(initial=0.0))
-
-    def in_phase(self, amplitude: FloatArray, phase: FloatArray) -> FloatArray:
-        """Three neighbouring lines, referred to the middle of the record, in phase with the middle one."""
-        turn = 2 * np.pi * np.array([-1.0, 0.0, 1.0]) * 0.5 * (self.n - 1) / (self.n * self.padding)
-        return amplitude * np.cos(phase + turn - phase[1])
 
     def interpolate(self, three: FloatArray, interpolation: str) -> tuple[float, float]:
         """Place of the peak from the middle line, in spacings, and its height."""
@@ -312,7 +306,7 @@ class _Shape:
         lag = np.arange(3)
         squares = self._lines(self.weights**2)[::FINE][np.abs(np.subtract.outer(lag, lag))]
         C = 2.0 * variance / self.total**2 * squares
-        return math.sqrt(max(float(slope @ C @ slope), 0.0))
+        return math.sqrt(max(slope @ C @ slope, 0.0))
 
     def bias(self, place: float, interpolation: str) -> float:
         """Bound for a steady sinusoid, in spacings: of the interpolation alone, and by the image at -frequency."""
@@ -341,4 +335,4 @@ def _noise(spectrum: xr.Dataset, k: int) -> float:
     if len(beside) == 0:
         return math.nan
     # The mean of an exponential distribution from its median; half the sample rate is the band.
-    return float(np.median(beside)) / math.log(2.0) * float(spectrum.attrs["rate"]) / 2.0
+    return np.median(beside) / math.log(2.0) * float(spectrum.attrs["rate"]) / 2.0

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from nonsmooth.arrays import FloatArray
@@ -20,9 +21,6 @@ from nonsmooth.recordings.signals.checks import signal, unit_of, whose
 from nonsmooth.recordings.signals.harmonics import fit
 from nonsmooth.recordings.signals.spectrum import largest_line, peak, spectrum
 from nonsmooth.results.labels import labelled
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +127,6 @@ def steady_response(
     ValueError
         If the record is shorter than 15 periods, or values are missing.
     """
-    import xarray as xr
-
     t, values = signal(time, x, least=64, purpose="a steady response")
     name = whose(x)
     length = float(t[-1] - t[0])
@@ -205,5 +201,5 @@ def _slope(t: FloatArray, y: FloatArray, errors: FloatArray) -> tuple[float, flo
     # Neighbouring blocks that err alike say less.
     alike = max(float(left[1:] @ left[:-1]) / power, 0.0) if power > 0 else 0.0
     inflation = (1.0 + alike) / (1.0 - min(alike, 0.8))
-    variance = max(power / (len(t) - 2) * inflation, float(np.mean(errors**2)))
+    variance = max(power / (len(t) - 2) * inflation, np.mean(errors**2))
     return float(line[0]), math.sqrt(variance * covariance[0, 0])

@@ -34,9 +34,3 @@ def found_in(data: xr.Dataset) -> Finding:
     record = json.loads(data.attrs["finding"])
     others = {name: Estimate(**one) for name, one in record["others"].items()}
     return Finding(**record | {"estimate": Estimate(**record["estimate"]), "others": others})
-
-
-def estimates_of(dataset: xr.Dataset) -> dict[str, Estimate]:
-    """All parameters of a saved ``ParameterSet``."""
-    found = ParameterSet.from_dataset(dataset)
-    return {**found.estimates, **found.extra}

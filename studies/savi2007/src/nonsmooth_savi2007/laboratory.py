@@ -98,7 +98,7 @@ class Laboratory:
         steps = np.diff(angle["time"].values)
         turning = max(float(np.abs(np.diff(tap.values) / np.diff(tap["time"].values)).max()) for tap in taps)
         values = {
-            "rate": (1 / float(np.median(steps)), "Hz", "sample rate"),
+            "rate": (1 / np.median(steps), "Hz", "sample rate"),
             "angle_step": (float(np.degrees(found_resolution(angle))), "deg", "step of the rotary sensor"),
             "force_step": (float(found_resolution(force)), "N", "step of the force sensor"),
             "force_used": (max(float(np.abs(one.values).max()) for one in pushed), "N", "largest force recorded"),

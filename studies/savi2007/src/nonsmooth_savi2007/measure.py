@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from nonsmooth.identification import Estimate
 from nonsmooth_savi2007.arrays import FloatArray
 
 APERIODIC = 0  # no period found up to the longest looked for
@@ -31,8 +32,7 @@ def motion_word(number: int) -> str:
     return "chaos" if number == APERIODIC else f"period {number}"
 
 
-@dataclass(frozen=True)
-class Interval:
+class Interval(NamedTuple):
     """Something that lies between two neighbouring points of a sweep."""
 
     low: float
@@ -59,16 +59,18 @@ class Interval:
 
 def with_uncertainty(value: float, uncertainty: float) -> str:
     """``a ± u`` with u the standard uncertainty (GUM), two digits of it; an exact number without."""
-    if not uncertainty > 0:
-        return f"{value:.6g}"
-    digits = max(0, 1 - int(np.floor(np.log10(uncertainty))))
-    return f"{value:.{digits}f} ± {uncertainty:.{digits}f}"
+    return f"{Estimate(value, uncertainty)}" if uncertainty > 0 else f"{value:.6g}"
+
+
+def parameter_of(swept: xr.Dataset) -> str:
+    """The parameter along which a result was swept."""
+    return str(swept["maximum"].dims[0])
 
 
 def regimes(swept: xr.Dataset, direction: str | None = None) -> tuple[FloatArray, NDArray[np.int64]]:
     """Parameter values, rising, and the regime at each: the period number, APERIODIC or UNSETTLED."""
     one = swept if direction is None or "direction" not in swept.dims else swept.sel(direction=direction)
-    values = one[str(one["maximum"].dims[0])].values
+    values = one[parameter_of(one)].values
     order = np.argsort(values)
     return values[order], _regime(one)[order]
 
@@ -156,8 +158,7 @@ def measured_periods(runs: xr.Dataset, direction: str | None = None) -> tuple[Fl
 
 def periods_reached(survey: xr.Dataset, value: float) -> dict[int, int]:
     """Number of starts of a ``survey`` (a sweep from several starts) that end in each regime at one parameter value."""
-    one = survey.sel({str(survey["maximum"].dims[0]): value}, method="nearest")
-    regime = _regime(one)
+    regime = _regime(survey.sel({parameter_of(survey): value}, method="nearest"))
     return {int(r): int((regime == r).sum()) for r in np.unique(regime)}
 
 

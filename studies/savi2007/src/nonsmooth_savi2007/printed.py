@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class Printed:
+class Printed(NamedTuple):
     """A number as printed: ``text`` keeps its digits, ``place`` says where it stands.
 
     ``read_to``: how finely it could be read, where that is coarser than its digits.
@@ -26,8 +25,7 @@ class Printed:
     @property
     def rounding(self) -> float:
         """Half a unit of the last printed digit."""
-        digits = len(self.text.partition(".")[2])
-        return 0.5 * 10.0**-digits
+        return 0.5 * 10.0 ** -len(self.text.partition(".")[2])
 
     @property
     def resolution(self) -> float:

@@ -63,7 +63,7 @@ def test_the_motors_side_is_read_off_the_runs_and_not_off_the_string(side):
 @pytest.mark.parametrize("side", [1, -1])
 def test_where_no_run_tells_the_side_the_shift_is_uncertain_by_it_and_that_is_said(side):
     for seen, words in (
-        (moved(0.7, 0, 0).only([]), "no run without the support tells"),
+        (moved(0.7, 0, 0).only(False), "no run without the support tells"),
         (moved(side * 0.7, 1e-3, 0, cranks=(0.02,)), "the 6 runs without the support do not tell"),
     ):
         found = mean_shift(seen, 0.0, 1e-6, string_length=0.7, string_error=0.005)

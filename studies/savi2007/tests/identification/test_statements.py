@@ -37,15 +37,17 @@ def found():
     )
 
 
-class Model:
-    name = "spring"
-
-    def __init__(self, **units):
-        self.parameters = {key: type("P", (), {"unit": unit})() for key, unit in units.items()}
+def spring(**units):
+    return ns.System(
+        name="spring",
+        states={"q": "m", "w": "m/s"},
+        parameters={name: (1.0, unit) for name, unit in units.items()},
+        modes={"free": lambda t, u, p: (u.w, -u.q)},
+    )
 
 
 def test_a_model_gets_its_own_parameters_and_nothing_is_lost():
-    kept = for_model(found(), Model(k="N/m", rho="N"))
+    kept = for_model(found(), spring(k="N/m", rho="N"))
     assert list(kept) == ["k"] and list(kept.extra) == ["g", "omega_0"]
     assert "'spring' has no parameter g" in kept.notes[-1]
     names, matrix = kept.full_covariance["parameter"].values.tolist(), kept.full_covariance.values
@@ -57,8 +59,8 @@ def test_a_model_gets_its_own_parameters_and_nothing_is_lost():
 @pytest.mark.parametrize(
     ("model", "error", "said"),
     [
-        (Model(x="m"), ValueError, "'spring' has none of the parameters k, g"),
-        (Model(k="N/mm"), ValueError, r"'k' of 'spring' is in N/mm, the one identified in N/m"),
+        (spring(x="m"), ValueError, "'spring' has none of the parameters k, g"),
+        (spring(k="N/mm"), ValueError, r"'k' of 'spring' is in N/mm, the one identified in N/m"),
         ("discontinuous_support", TypeError, "model must be a System"),
     ],
 )

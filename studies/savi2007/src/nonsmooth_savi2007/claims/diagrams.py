@@ -33,6 +33,7 @@ from nonsmooth_savi2007.measure import (
     highest,
     lowest,
     motion_word,
+    parameter_of,
     period_word,
     period_words,
     periods_reached,
@@ -174,7 +175,7 @@ def f13(data: Data) -> Iterator[Statement]:
 
 def _coexisting(many: xr.Dataset) -> str:
     """Ranges in which several starts reach more than one regime."""
-    values = many[str(many["maximum"].dims[0])].values
+    values = many[parameter_of(many)].values
     at = [value for value in values if len(periods_reached(many, value).keys() - {UNSETTLED}) > 1]
     if not at:
         return "none found"
@@ -192,7 +193,7 @@ def f15(data: Data) -> Iterator[Statement]:
         )
         size = exact.max(axis=0) - exact.min(axis=0)
         distance, _ = cKDTree(exact / size).query(smoothed / size)
-        worst = max(worst, float(np.quantile(distance, 0.99)))
+        worst = max(worst, np.quantile(distance, 0.99))
     yield of_both(
         "F15",
         "Fig. 15",

@@ -22,6 +22,7 @@ from nonsmooth_savi2007.figures.portraits import chosen_start, words_of
 from nonsmooth_savi2007.measure import (
     APERIODIC,
     motion_word,
+    parameter_of,
     period_words,
     periods_reached,
     separation_rate,
@@ -91,11 +92,11 @@ def _apart(data: Mapping[str, xr.Dataset], shown: Mapping[float, int]) -> str:
         points = []
         for flow in FLOWS:
             survey = data[flow]
-            parameter = str(survey["maximum"].dims[0])
-            one = survey.sel({parameter: value}, method="nearest").isel(start=chosen_start(survey, value, wanted))
+            one = survey.sel({parameter_of(survey): value}, method="nearest").isel(
+                start=chosen_start(survey, value, wanted)
+            )
             points.append(one["section"].transpose("iterate", "state").values[-wanted:])
-        distance = np.abs(points[0][:, None, :] - points[1][None, :, :])
-        worst = max(worst, float(distance[..., 0].min(axis=1).max()))
+        worst = max(worst, np.abs(points[0][:, None, :] - points[1][None, :, :])[..., 0].min(axis=1).max())
     return f"section points of both flows within {1e6 * worst:.2g} micrometres"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import xarray as xr
 
@@ -131,8 +131,7 @@ class Beside:
 Data: TypeAlias = Mapping[str, dict[str, xr.Dataset]]
 
 
-@dataclass(frozen=True)
-class Cell:
+class Cell(NamedTuple):
     """Outcome of the virtual rig for a statement, and its relation to the paper; without a verdict it is not asked.
 
     ``why`` is added to the row's own; ``beside``: the number, where one was printed.

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,8 +48,7 @@ class GapOffset(NamedTuple):
     held: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class GapReference:
+class GapReference(NamedTuple):
     r"""Reference of the screw's reading and of the sensor's count.
 
     Attributes
@@ -135,7 +133,7 @@ def gap_reference(
     else:
         notes.append(
             f"no taps of the car (impulse) in {session.folder}: where it rests is taken from the sensor's zero, to "
-            f"±{1e3 * float(np.sqrt(found.covariance[0, 0])):.2g} mm, since a car with dry friction is zeroed where it "
+            f"±{1e3 * np.sqrt(found.covariance[0, 0]):.2g} mm, since a car with dry friction is zeroed where it "
             "sticks. Record a few taps in each session"
         )
     for note in (*notes, *found.notes):

@@ -7,7 +7,7 @@ are switched to; from the first flip on the cascade is followed further, flip by
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -21,8 +21,7 @@ _CLOSED = 1e-6  # of the orbit's size
 _SAME = 1e-8  # of the value of a flip
 
 
-@dataclass(frozen=True)
-class Beginning:
+class Beginning(NamedTuple):
     """Beginning of a figure's branches: a stable period-1 orbit at ``at``; ``longest``: the last period number."""
 
     parameters: Mapping[str, float]
@@ -80,8 +79,7 @@ def _flips(branch: xr.Dataset) -> list[xr.Dataset]:
 
 def at_ends(branch: xr.Dataset) -> np.ndarray:
     """Return whether each special point of a branch is an end of it, and so belongs to the branch that it leaves."""
-    last = branch.sizes["point"] - 1
-    return np.isin(branch["special_point"].values, [0, last])
+    return np.isin(branch["special_point"].values, [0, branch.sizes["point"] - 1])
 
 
 def rows_of(branch: xr.Dataset) -> xr.Dataset:

@@ -7,8 +7,8 @@ curves of folds, flips and grazing that pass through the special points of these
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -24,8 +24,7 @@ _FULL, _QUICK = 1000, 24  # points along each parameter
 _FOLLOWED = ("fold", "flip", "neimark_sacker", "grazing")
 
 
-@dataclass(frozen=True)
-class Plane:
+class Plane(NamedTuple):
     """A chart: the figure whose branches its curves begin on, its parameters and the ranges of the two others.
 
     ``further``: periods and values of the figure's parameter at which further branches begin, from rest.
@@ -71,7 +70,7 @@ def curves(plane: Plane) -> list[xr.Dataset]:
     lines = list(branches(plane.figure).values())
     for period, value in plane.further.items():
         orbit = find_orbit(
-            EXACT.system(**begin.parameters).with_parameters({begin.parameter: value}),
+            EXACT.system(**{**begin.parameters, begin.parameter: value}),
             period_number=period,
             progress=False,
         )
@@ -91,9 +90,7 @@ def curves(plane: Plane) -> list[xr.Dataset]:
 
 def _on(curve: xr.Dataset, row: xr.Dataset, parameter: str) -> bool:
     """Return whether a special point lies on a known curve: of its kind and period, and through its two values."""
-    if str(curve["kind"].values) != str(row["kind"].values):
-        return False
-    if int(curve["period_number"]) != int(row["period_number"]):
+    if any(curve[name].values != row[name].values for name in ("kind", "period_number")):
         return False
     names = [str(name) for name, values in curve.coords.items() if values.dims == ("point",)]
     other = next(name for name in names if name != parameter)

@@ -14,6 +14,7 @@ from nonsmooth.plot import annotate, shared_legend
 from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches, branches_of
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, only_outer
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Flow, Settings, starts
+from nonsmooth_savi2007.measure import parameter_of
 
 _OTHER, _SHARE = 0.05, 0.25  # another motion: a quarter of its points so far off, in parts of the diagram's range
 
@@ -93,12 +94,12 @@ def draw_both(canvas: Canvas, data: Datasets, *, values: Mapping[float, str], wo
 
 def other_motions(many: xr.Dataset, swept: xr.Dataset) -> xr.DataArray:
     """Of each value and start, whether it leads to section points that the sweeps at this value have not."""
-    parameter = str(swept["maximum"].dims[0])
+    parameter = parameter_of(swept)
     known = swept["section"].stack(point=("direction", "iterate")).transpose(parameter, "point", "state").values
     found = many["section"].transpose(parameter, "start", "iterate", "state").values
     scale = np.nanmax(known, axis=(0, 1)) - np.nanmin(known, axis=(0, 1))
     nearest = np.abs(swept[parameter].values[None, :] - many[parameter].values[:, None]).argmin(axis=1)
-    far = np.zeros(found.shape[:2], dtype=bool)
+    far = np.zeros(found.shape[:2], bool)
     for i, at in enumerate(nearest):
         there = known[at][np.isfinite(known[at]).all(axis=1)] / scale
         distance = np.linalg.norm(found[i][:, :, None] / scale - there, axis=-1).min(axis=-1)
@@ -147,7 +148,7 @@ def how(data: Datasets) -> str:
     words = []
     for flow in FLOWS:
         swept, many = data[flow.key], data[f"{flow.key}_starts"]
-        parameter = str(swept["maximum"].dims[0])
+        parameter = parameter_of(swept)
         words.append(
             f"{flow.key}: {swept.sizes[parameter]} values up and down, {swept.sizes['iterate']} section points each "
             f"after {swept.attrs['transient']} periods; {many.sizes['start']} starts at {many.sizes[parameter]} "

@@ -146,8 +146,7 @@ def _caption_18(data: Datasets) -> str:
 def _measure_17(settings: Settings) -> Datasets:
 
     bench = settings.bench
-    steps = [omega for omega, _, _ in SECTIONS[17]]
-    found = motions(bench, 17, steps, periods=40 if settings.quick else 60)
+    found = motions(bench, 17, [omega for omega, _, _ in SECTIONS[17]], periods=40 if settings.quick else 60)
     measured, set_ = diagram_of(found, "omega")
     values = np.linspace(*BEGINNINGS["fig17"].range, 101 if settings.quick else 401)
     result = bench.compare(measured, set_, parameter="omega", direction="both", values=values)
@@ -163,8 +162,7 @@ def _draw_rig_17(canvas: Canvas, data: Datasets) -> None:
 
 
 def _caption_rig_17(data: Datasets) -> str:
-    result = data["compared"]
-    steps = np.unique(result["measured_omega"].values)
+    steps = np.unique(data["compared"]["measured_omega"].values)
     return (
         f"Displacement and velocity at the section over the forcing frequency: the virtual rig (synthetic) at "
         f"{len(steps)} steps of rising frequency, over the model's diagram with the parameters identified, swept up "

@@ -194,8 +194,7 @@ def _caption_rig_14(data: Datasets) -> str:
 
 def _measure_16(settings: Settings) -> Datasets:
     bench = settings.bench
-    found = motions(bench, 16, (0.0018,), periods=300 if settings.quick else 1500)
-    measured, set_ = found["0.0018"]
+    measured, set_ = motions(bench, 16, (0.0018,), periods=300 if settings.quick else 1500)["0.0018"]
     return {"attractor": bench.compare(measured, set_, section_phase=list(PHASES.values()))}
 
 
@@ -205,8 +204,7 @@ def _draw_16(canvas: Canvas, data: Datasets) -> None:
     def cell(ax: Axes, i: int, j: int) -> None:
         points = result[f"{list(SIDES)[i]}_section"].isel(section_phase=j).values
         ax.plot(
-            points[:, 0],
-            points[:, 1],
+            *points.T,
             ".",
             color=COLORS[("first", "section")[i]],
             markersize=1.4,

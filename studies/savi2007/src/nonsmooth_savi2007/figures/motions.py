@@ -87,7 +87,7 @@ def runs_of(found: Motions, parameter: str) -> xr.Dataset:
             "setting": ("run", nominal, {"long_name": f"{parameter} that was meant"}),
             "value": ("run", values, {"long_name": f"{parameter} as measured"}),
             "period_number": ("run", sections["period_number"].values),
-            "contact": ("run", np.array(touches, dtype=np.int8)),
+            "contact": ("run", np.array(touches, np.int8)),
         },
         {"run": keys},
     )
@@ -146,11 +146,10 @@ def _portrait(ax: Axes, result: xr.Dataset, side: str) -> None:
     closed = "phase" in result.coords
     orbit = result[f"{side}_orbit"].values
     orbit = np.vstack([orbit, orbit[:1]]) if closed else orbit
-    ax.plot(orbit[:, 0], orbit[:, 1], color=color, linewidth=0.7 if closed else 0.35, label=word)
+    ax.plot(*orbit.T, color=color, linewidth=0.7 if closed else 0.35, label=word)
     points = result[f"{side}_section"].values.reshape(-1, 2)
     ax.plot(
-        points[:, 0],
-        points[:, 1],
+        *points.T,
         "o",
         color=plot.COLORS["second"],
         markersize=3.0 if closed else 1.4,
@@ -163,8 +162,7 @@ def _portrait(ax: Axes, result: xr.Dataset, side: str) -> None:
     if n and side == "measured":
         expected = result["theory_section"].values.reshape(-1, 2)[:n]
         ax.plot(
-            expected[:, 0],
-            expected[:, 1],
+            *expected.T,
             "x",
             color=plot.COLORS["first"],
             markersize=7,

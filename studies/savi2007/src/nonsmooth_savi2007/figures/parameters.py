@@ -10,11 +10,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from nonsmooth import plot
+from nonsmooth import ParameterSet, plot
 from nonsmooth.identification import Estimate
 from nonsmooth.plot import identification as pictures
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, Figure
-from nonsmooth_savi2007.findings import estimates_of, found_in, kept, the_finding
+from nonsmooth_savi2007.findings import found_in, kept, the_finding
 from nonsmooth_savi2007.flows import Settings
 from nonsmooth_savi2007.laboratory import TRUTH, as_result
 from nonsmooth_savi2007.measure import with_uncertainty
@@ -131,7 +131,8 @@ def _compute_table(settings: Settings) -> Datasets:
 
 def table_rows(data: Datasets) -> dict[str, tuple[str, Estimate, float]]:
     """Of each quantity of ``NAMES``: as the paper prints it ("" where it does not), as identified, and the truth."""
-    found, truth = estimates_of(data["identified"]), data["truth"]
+    identified, truth = ParameterSet.from_dataset(data["identified"]), data["truth"]
+    found = {**identified.estimates, **identified.extra}
     rows = {}
     for name in NAMES:
         if name in found:

@@ -12,7 +12,7 @@ from nonsmooth import System, plot, poincare, simulate, sweep
 from nonsmooth.plot import prefixed, shared_legend
 from nonsmooth_savi2007.figures.figure import Canvas, Datasets, two_rows
 from nonsmooth_savi2007.flows import EXACT, FLOWS, Flow, Settings, starts
-from nonsmooth_savi2007.measure import APERIODIC, period_word, periods_reached
+from nonsmooth_savi2007.measure import APERIODIC, parameter_of, period_word, periods_reached
 
 #: Units and symbols of what the figures vary.
 QUANTITIES = {"g": ("m", "g"), "omega": ("rad/s", r"\omega"), "rho": ("N", r"\rho")}
@@ -58,7 +58,7 @@ def portraits(
 
 def chosen_start(survey: xr.Dataset, value: float, wanted: int) -> int:
     """The first start that ends in the wanted regime; the first of all where none does."""
-    one = survey.sel({_parameter(survey): value}, method="nearest")
+    one = survey.sel({parameter_of(survey): value}, method="nearest")
     at = np.flatnonzero(one["period_number"].values == wanted)
     return int(at[0]) if len(at) else 0
 
@@ -98,7 +98,7 @@ def draw_portraits(canvas: Canvas, data: Datasets, *, parameter: str, shown: Map
 def describe(data: Datasets, shown: Mapping[float, int]) -> str:
     """Regimes that the starts reached at each value, by the exact flow."""
     survey = data["exact"]
-    name = _parameter(survey)
+    name = parameter_of(survey)
     words = [
         f"{name} = {' '.join(prefixed(value, QUANTITIES[name][0]))}: {words_of(periods_reached(survey, value))}"
         for value in shown
@@ -109,10 +109,6 @@ def describe(data: Datasets, shown: Mapping[float, int]) -> str:
 def words_of(reached: Mapping[int, int]) -> str:
     """``period 3 (8 starts), period 4 (8 starts)``."""
     return ", ".join(f"{period_word(p)} ({n})" for p, n in reached.items())
-
-
-def _parameter(survey: xr.Dataset) -> str:
-    return str(survey["maximum"].dims[0])
 
 
 PAIRS = 400
@@ -129,4 +125,4 @@ def twins(flow: Flow, system: System, attractor: xr.Dataset) -> xr.Dataset:
     chosen = points[np.linspace(0, len(points) - 1, PAIRS).astype(int)]
     beside = chosen + np.array([APART[flow.key], 0.0])
     options = flow.options if flow is EXACT else {**flow.options, "rtol": 1e-9}
-    return poincare(system, start=[list(map(float, u)) for u in (*chosen, *beside)], n=RETURNS, **options)
+    return poincare(system, start=np.vstack([chosen, beside]).tolist(), n=RETURNS, **options)

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -76,8 +76,7 @@ _FIRST: Sequence[tuple[str, tuple[str, ...], Callable[..., float]]] = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Observation:
+class Observation(NamedTuple):
     """Values measured together: names of `LAWS`, values, covariance."""
 
     names: tuple[str, ...]
@@ -172,7 +171,7 @@ def adjust(observations: list[Observation], *, gain_limit: float) -> Adjusted:
             break
     else:
         raise SolveError(
-            f"the adjustment has not converged after {_ROUNDS} rounds: {names[int(np.argmax(off))]!r} still changes by "
+            f"the adjustment has not converged after {_ROUNDS} rounds: {names[np.argmax(off)]!r} still changes by "
             f"{np.max(off):.1g} of its standard uncertainty. The observations "
             f"({', '.join(label for label in labels if label != 'gain')}) contradict each other by far: look at the "
             "mass, the wheel and the units, and leave out what is in doubt"

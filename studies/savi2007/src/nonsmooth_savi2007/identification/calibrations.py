@@ -54,7 +54,7 @@ def scattered_line(x: FloatArray, y: FloatArray, error: FloatArray) -> tuple[Str
     line = fitted(0.0)
     if len(y) < 3 or line.reduced <= 1:
         return line, 0.0
-    high = float(np.std(y - np.polyval(np.polyfit(x, y, 1), x))) * np.sqrt(len(y)) + float(error.max())
+    high = np.std(y - np.polyval(np.polyfit(x, y, 1), x)) * np.sqrt(len(y)) + error.max()
     s = float(brentq(lambda s: fitted(s).reduced - 1.0, 0.0, high, xtol=1e-4 * high))
     return fitted(s), s
 
@@ -135,7 +135,7 @@ def crank_force(runs: Sequence[Run], *, gain_limit: float = 0.01, k: Estimate | 
     _enough(length, "crank lengths")
     force, error = np.zeros(len(runs)), np.zeros(len(runs))
     for i, run in enumerate(runs):
-        fitted = harmonics_of(run, np.asarray(run.force["time"].values, dtype=np.float64), run.force)[0]
+        fitted = harmonics_of(run, np.asarray(run.force["time"].values, float), run.force)[0]
         force[i], error[i] = float(fitted.amplitudes[0]), float(fitted.amplitude_errors[0])
     line, scatter = scattered_line(length, force, error)
     type_a, half = float(np.sqrt(line.covariance[0, 0])), gain_limit * line.slope
@@ -173,7 +173,7 @@ def _enough(settings: FloatArray, what: str) -> None:
 
 
 def _scatter(scatter: float, error: FloatArray, unit: str) -> list[str]:
-    if scatter <= 2 * float(np.median(error)):
+    if scatter <= 2 * np.median(error):
         return []
     return [
         f"the points scatter by {scatter:.2g} {unit} about the line, more than their own errors of "
@@ -190,8 +190,7 @@ def _data(
     read: tuple[str, str],
     runs: Sequence[Run],
 ) -> xr.Dataset:
-    low = min(float(setting.min()), 0.0)
-    fine = np.linspace(low, float(setting.max()), 200)
+    fine = np.linspace(min(setting.min(), 0.0), setting.max(), 200)
     rows = np.column_stack([fine, np.ones_like(fine)])
     reach = ndtri(0.975) * np.sqrt(np.einsum("ij,jk,ik->i", rows, line.covariance, rows))
     fitted, errors = line.intercept + line.slope * fine, np.sqrt(np.diag(line.covariance))

@@ -236,7 +236,7 @@ class _Chain:
             if unsteady := [size for size, steady in seen if not steady]:
                 self.say(
                     f"{procedure}: the motor wanders in {len(unsteady)} of {len(seen)} runs, by "
-                    f"{100 * float(np.median(unsteady)):.2g} % from turn to turn (standard deviation; up to "
+                    f"{100 * np.median(unsteady):.2g} % from turn to turn (standard deviation; up to "
                     f"{100 * max(unsteady):.2g} %), more than the photogate's steps explain. The crank's angle is "
                     "followed from turn to turn, and what a turn may hide is in the uncertainty of what contacts tell; "
                     "a regulated supply would be better"

@@ -62,7 +62,7 @@ class Consistent(NamedTuple):
 
     def off(self, value: Any, covariance: Any) -> FloatArray:
         """Distance of another measurement from the mean, in the combined standard uncertainties, one per quantity."""
-        return np.asarray((value - self.mean) / np.sqrt(np.diag(np.asarray(covariance) + self.covariance)))
+        return (value - self.mean) / np.sqrt(np.diag(np.asarray(covariance) + self.covariance))
 
 
 def birge_ratio(chi2: float, freedom: int) -> tuple[float, bool]:
@@ -88,8 +88,8 @@ def consistent(values: Any, covariances: Any) -> Consistent:
     >>> found.used
     array([ True,  True,  True, False])
     """
-    given = np.asarray(values, dtype=np.float64)
-    known = np.asarray(covariances, dtype=np.float64)
+    given = np.asarray(values, float)
+    known = np.asarray(covariances, float)
     size = np.sqrt(np.mean(np.diagonal(known, axis1=1, axis2=2), axis=0))
     scaled, weights = given / size, np.linalg.inv(known / np.outer(size, size))
     n, p = given.shape
@@ -112,7 +112,7 @@ def consistent(values: Any, covariances: Any) -> Consistent:
             birge = birge_ratio(total, (n - 1) * p)[0]
             break
         rows = min(([i for i in rows if i != out] for out in rows), key=lambda kept: chi2(kept)[0])
-    used = np.zeros(n, dtype=bool)
+    used = np.zeros(n, bool)
     used[rows] = True
     share = 1.0 / np.trace(np.linalg.inv(weights[rows]), axis1=1, axis2=2)
     off = scaled[rows] - mean
@@ -239,7 +239,7 @@ def cross_checks(
     gap : Estimate, optional
         The gap at rest by contacts at the setting of the screw at which the graze was sought.
     """
-    known: dict[tuple[str, str], Estimate | None] = {
+    known = {
         ("one", ""): Estimate(1.0, 0.0),
         ("one", "within limits"): Estimate(1.0, uniform(gain_limit), half_width=gain_limit) if gain_limit else None,
         ("adjusted", "k"): k,
@@ -279,7 +279,7 @@ def _off(one: Estimate, other: Estimate, common: float) -> float:
         difference = one.value - other.value
         square = one.uncertainty**2 + other.uncertainty**2 - 2 * common**2 * one.value * other.value
     if other.half_width:
-        difference = float(np.sign(difference)) * max(abs(difference) - other.half_width, 0.0)
+        difference = np.sign(difference) * max(abs(difference) - other.half_width, 0.0)
         square = one.uncertainty**2
     if square <= 0:
         return float("inf") * difference if difference else 0.0

@@ -33,6 +33,7 @@ that one count makes of it, and beside it the whole decay in the time domain, wh
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -76,17 +77,16 @@ def spectral_peak(time: FloatArray, x: FloatArray, about: float, step: float, no
     at = 0.5 * (low + high)
     wave = np.exp(-2j * np.pi * at * time)
     value, first, second = (np.sum((-2j * np.pi * time) ** n * x * wave) for n in range(3))
-    bend = 2 * float((np.conj(value) * second).real + abs(first) ** 2)
+    bend = 2 * ((np.conj(value) * second).real + abs(first) ** 2)
     delay = float((1j * first / value).real) / (2 * np.pi)
-    own = 2 * np.pi * noise * float(np.sqrt(np.sum((time - delay) ** 2)))
+    own = 2 * np.pi * noise * np.sqrt(np.sum((time - delay) ** 2))
     return at, float(np.sqrt(2) * abs(value) * own / abs(bend))
 
 
 def _between(time: FloatArray, x: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray]:
     """Frequencies between two (Hz), and the modulus of the sum of the samples there."""
 
-    rate = (len(time) - 1) / float(time[-1] - time[0])
-    lines = zoom_fft(x, [low, high], m=FINE, fs=rate, endpoint=True)
+    lines = zoom_fft(x, [low, high], m=FINE, fs=(len(time) - 1) / (time[-1] - time[0]), endpoint=True)
     return np.linspace(low, high, FINE), np.abs(lines)
 
 
@@ -107,7 +107,7 @@ def natural_frequency(decay: DecayFit) -> Finding:
     largest = max(range(len(decay.parts)), key=lambda i: float(np.ptp(decay.parts[i].run.positions)))
     run, begin, end = decay.parts[largest]
     time, x = run.time, run.positions - decay.rest
-    rate = (len(time) - 1) / float(time[-1] - time[0])
+    rate = (len(time) - 1) / (time[-1] - time[0])
     magnitude = np.abs(np.fft.rfft(x, GRID)) / rate
     frequency = np.fft.rfftfreq(GRID, 1 / rate)
     grid_step = rate / GRID
@@ -199,9 +199,7 @@ def decay_damping(decay: DecayFit, mass: Quantity, *, resolution: float) -> Find
             f"no tap has three turning points that stand {resolution:g} m apart, so its decrement is not known: a "
             "motion that does not decay, or a length on the pulley that is wrong"
         )
-    slopes, _, variances = np.transpose(lines)
-    rate = Estimate(-2 * float(np.average(slopes, weights=1 / variances)), 2 / float(np.sqrt(np.sum(1 / variances))))
-    plain = rate.times(mass.value, mass.uncertainty, "N s/m")
+    plain = _damping(lines, mass)
     own = mass.value**2 * decay.covariance[1:3, 1:3]
     covariance = own + mass.uncertainty**2 * np.outer(decay.values[1:3], decay.values[1:3])
     c, friction = (
@@ -278,13 +276,21 @@ def log_decrement(time: FloatArray, x: FloatArray, rest: float, *, resolution: f
             rows.append((time[i] + at, abs(c0 + c1 * at + c2 * at**2)))
     found = np.array(rows).reshape(-1, 2)
     # a parabola through five samples has 0.7 of one sample's error at its top
-    return found[:, 0], found[:, 1], np.full(len(found), 0.7 * resolution / np.sqrt(12))
+    return *found.T, np.full(len(found), 0.7 * resolution / np.sqrt(12))
 
 
 def decay_rate(t: FloatArray, height: FloatArray, error: FloatArray) -> tuple[float, float, float]:
     """Slope (1/s) and intercept of the line through the logarithms of the heights, and the slope's variance."""
     line, covariance = np.polyfit(t, np.log(height), 1, w=height / error, cov=True)
     return float(line[0]), float(line[1]), float(covariance[0, 0])
+
+
+def _damping(lines: Sequence[tuple[float, float, float]], mass: Quantity, spread: float = 0.0) -> Estimate:
+    """Damping constant by lines through the logarithms of heights; its rate is known no better than to ``spread``."""
+    slopes, _, variances = np.transpose(lines)
+    error = max(2 / float(np.sqrt(np.sum(1 / variances))), spread)
+    rate = Estimate(-2 * float(np.average(slopes, weights=1 / variances)), error)
+    return rate.times(mass.value, mass.uncertainty, "N s/m")
 
 
 def support_damping(runs: Sequence[Run], *, resolution: float, test_mass: Quantity) -> tuple[Finding, DecayFit]:
@@ -311,13 +317,10 @@ def support_damping(runs: Sequence[Run], *, resolution: float, test_mass: Quanti
             lines.append((part.run, peaks, decay_rate(*peaks)))
     if not lines:
         raise ValueError("no drop has four turning points above ten counts: drop it from higher, or record longer")
-    slopes, _, variances = np.transpose([line for _, _, line in lines])
-    rate = float(np.average(slopes, weights=1 / variances))
-    spread = float(np.std(slopes, ddof=1) / np.sqrt(len(slopes))) if len(slopes) > 1 else 0.0
-    rate_error = max(float(1 / np.sqrt(np.sum(1 / variances))), spread)
     mass, natural = test_mass.value, decay.law[0]
-    value = -2 * mass * rate
-    error_total = abs(value) * float(np.hypot(rate_error / rate, test_mass.uncertainty / mass))
+    rates = [line for _, _, line in lines]
+    spread = 2 * float(np.std([slope for slope, *_ in rates], ddof=1) / np.sqrt(len(rates))) if len(rates) > 1 else 0.0
+    c_s, ratio = _damping(rates, test_mass, spread), _damping(rates, Quantity(0.5 / natural), spread)
     run, (t, height, error), (slope, intercept, variance) = lines[0]
     data = picture_data(
         [run],
@@ -328,7 +331,7 @@ def support_damping(runs: Sequence[Run], *, resolution: float, test_mass: Quanti
                 "peak_height": height,
                 "log_height": np.log(height),
                 "log_height_error": error / height,
-                "used": np.ones(len(t), dtype=np.int8),
+                "used": np.ones(len(t), np.int8),
             },
         },
         intercept=intercept,
@@ -337,7 +340,7 @@ def support_damping(runs: Sequence[Run], *, resolution: float, test_mass: Quanti
     )
     finding = Finding(
         "c_s_drop",
-        Estimate(value, error_total, "N s/m", logarithmic=value > 0),
+        replace(c_s, logarithmic=c_s.value > 0),
         "logarithmic decrement, regression over all turning points (Fig. 7)",
         decay.samples,
         decay.runs,
@@ -345,7 +348,7 @@ def support_damping(runs: Sequence[Run], *, resolution: float, test_mass: Quanti
         others={
             "c_s_fit": Estimate(decay.law[1], decay.error("b")).times(mass, test_mass.uncertainty, "N s/m"),
             "omega_s": Estimate(natural, decay.error("omega_0"), "rad/s"),
-            "damping_ratio": Estimate(-rate / natural, rate_error / natural),
+            "damping_ratio": replace(ratio, unit=""),
         },
         data=data,
         plot="drop_decay",

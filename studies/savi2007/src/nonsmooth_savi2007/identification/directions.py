@@ -89,11 +89,10 @@ def towards_support(runs: Sequence[Run]) -> tuple[int, str]:
 def _vote(run: Run) -> int:
     """1 where the largest accelerations point towards falling positions, -1 towards growing ones, 0 where neither."""
     time, x = run.time, run.positions
-    lag = max(1, round(_LAG / float(np.median(np.diff(time))))) if len(time) > 1 else 1
+    lag = max(1, round(_LAG / np.median(np.diff(time)))) if len(time) > 1 else 1
     if len(x) < 20 * lag:
         return 0
-    bend = x[2 * lag :] - 2 * x[lag:-lag] + x[: -2 * lag]
-    low, high = np.quantile(bend, (_SHARE, 1 - _SHARE))
+    low, high = np.quantile(x[2 * lag :] - 2 * x[lag:-lag] + x[: -2 * lag], (_SHARE, 1 - _SHARE))
     if -low > _HARDER * high:
         return 1
     return -1 if high > -_HARDER * low else 0
@@ -114,10 +113,10 @@ def _slope(run: Run) -> float:
     """Force over displacement (N/m) by least squares; 0 where the force does not follow the displacement."""
     if run.x is None or run.force is None or run.x.size != run.force.size or run.x.size < 3:
         return 0.0
-    x, force = run.positions, np.asarray(run.force.values, dtype=np.float64)
+    x, force = run.positions, np.asarray(run.force.values, float)
     x, force = x - x.mean(), force - force.mean()
     spread, common = float(x @ x), float(x @ force)
-    if abs(common) <= _FOLLOWS * np.sqrt(spread * float(force @ force)):
+    if abs(common) <= _FOLLOWS * np.sqrt(spread * (force @ force)):
         return 0.0
     return common / spread
 

@@ -31,7 +31,6 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
     "rise": ("Angle", "Turn"),
     "section": ("Angle", "Turn"),
 }
-_ANGLES = ("rad", "deg", "°", "rev", "turn", "turns", "degrees", "radians", "rotations", "counts")
 _PASSAGES = 3  # of the photogate: fewer give no frequency and no scatter
 
 
@@ -55,14 +54,12 @@ class Run:
     @property
     def time(self) -> FloatArray:
         """Times of the position (s)."""
-        times: FloatArray = np.asarray(self.x["time"].values, dtype=np.float64)
-        return times
+        return np.asarray(self.x["time"].values, float)
 
     @property
     def positions(self) -> FloatArray:
         """Position (m), as counted."""
-        values: FloatArray = np.asarray(self.x.values, dtype=np.float64)
-        return values
+        return np.asarray(self.x.values, float)
 
     @property
     def passages(self) -> FloatArray:
@@ -160,7 +157,7 @@ def gather(
     for procedure, rows in taken.items():
         if procedure not in PROCEDURES:
             raise ValueError(unknown(procedure, "a procedure", "the experiment", PROCEDURES.keys()))
-        runs[procedure] = tuple(_run(procedure, row[0], row[1], row[2], known) for row in rows)
+        runs[procedure] = tuple(_run(procedure, known, *row) for row in rows)
     runs, direction, notes = oriented(runs)
     synthetic = synthetic or any(run.synthetic for rows in runs.values() for run in rows)
     runs |= {procedure: () for procedure in PROCEDURES if procedure not in runs}
@@ -182,7 +179,7 @@ def _rows(procedure: str, given: Any) -> list[Any]:
 
 
 def _run(
-    procedure: str, recording: Recording, name: str, settings: Mapping[str, Any], known: Mapping[str, Quantity]
+    procedure: str, known: Mapping[str, Quantity], recording: Recording, name: str, settings: Mapping[str, Any]
 ) -> Run:
     if lacking := [key for key in PROCEDURES[procedure] if key not in settings]:
         raise ValueError(f"{procedure}, run {name!r} must state {', '.join(lacking)} in its settings")
@@ -197,7 +194,7 @@ def _run(
     found: dict[str, Any] = {}
     if has("Angle"):
         found["x"] = position(
-            take(recording, "Angle", name, units=_ANGLES),
+            take(recording, "Angle", name),
             distance_per_turn=known["distance_per_turn"].value,
             counts_per_turn=round(known["counts_per_turn"].value),
         )
@@ -205,6 +202,6 @@ def _run(
         found["force"] = take(recording, "Force", name, units=("N",))
     if has("Turn"):
         passages = take(recording, "Turn", name, samples=_PASSAGES)
-        found["turns"] = np.asarray(passages["time"].values, dtype=np.float64)
-        found["backwards"] = bool(np.all(np.diff(np.asarray(passages.values, dtype=np.float64)) < 0))
+        found["turns"] = np.asarray(passages["time"].values, float)
+        found["backwards"] = bool(np.all(np.diff(np.asarray(passages.values, float)) < 0))
     return Run(procedure, name, dict(settings), synthetic=recording.synthetic, **found)

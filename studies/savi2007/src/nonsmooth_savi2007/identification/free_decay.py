@@ -20,7 +20,6 @@ References: J.P. Den Hartog, Trans. ASME 53 (1931) 107; B.F. Feeny and J.W. Lian
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
@@ -56,8 +55,7 @@ class Decay(NamedTuple):
         return self.run.positions[self.first : self.last]
 
 
-@dataclass(frozen=True, eq=False)
-class DecayFit:
+class DecayFit(NamedTuple):
     r"""Outcome of `free_decay`: :math:`\omega_0`, b = c/m, f = F_C/m, and the place of rest x_e in the sensor's count.
 
     ``values`` and ``covariance`` are in the order ``omega_0, b, f, x_e``; ``fit`` is what :func:`nonsmooth.fit` found.
@@ -109,7 +107,7 @@ class DecayFit:
     def fitted(self, which: int) -> FloatArray:
         """Fitted positions of one of the runs (m), in the sensor's count."""
         data = self.fit.residuals
-        return np.asarray(data["fitted"].values[data["run"].values == which], dtype=np.float64)
+        return np.asarray(data["fitted"].values[data["run"].values == which], float)
 
     def begins(self, which: int) -> tuple[float, float]:
         """Position from rest (m) and velocity (m/s) of one of the runs at its first sample."""
@@ -125,15 +123,14 @@ def swing(time: FloatArray, x: FloatArray, *, resolution: float, slowest: float 
     ValueError
         If the record holds no motion, or less than two half swings of that speed.
     """
-    rest = float(np.median(x[-max(10, len(x) // 10) :]))
-    away = x - rest
+    away = x - float(np.median(x[-max(10, len(x) // 10) :]))
     steps = np.diff(x)
     moving = np.flatnonzero(np.abs(steps) > 2.5 * resolution)
     if len(moving) == 0 or np.max(np.abs(away)) < 20 * resolution:
         raise ValueError(f"the car moves by {np.max(np.abs(away)) / resolution:.0f} counts only: tap it harder")
     # before the tap it rests, or is held: the first turning point comes after it has begun to move
     first = int(moving[0])
-    reach, way = 0.5 * float(np.max(np.abs(away[first:]))), 0.0
+    reach, way = 0.5 * np.max(np.abs(away[first:])), 0.0
     begin = first
     for i in range(first, len(steps)):
         if way * steps[i] < 0 and abs(away[i]) > reach and way * away[i] > 0:
@@ -241,12 +238,11 @@ class _Method(NamedTuple):
             away = part.x - (float(np.mean(part.x[-20:])) if len(part.x) > 40 else 0.0)
             turned = np.flatnonzero(np.sign(away[1:]) != np.sign(away[:-1]))
             if len(turned) > 1:
-                periods.append(2 * float(np.mean(np.diff(part.time[turned]))))
+                periods.append(2 * np.mean(np.diff(part.time[turned])))
                 heights = [np.max(np.abs(away[a:b])) for a, b in pairwise(turned)]
                 ratios += [h / g for g, h in pairwise(heights) if g > 0]
         period = float(np.median(periods)) if periods else 1.4
-        ratio = min(float(np.median(ratios)), 0.99) if ratios else 0.7
-        b = -4 * np.log(ratio) / period  # swing to swing: exp(-b T/4)
+        b = -4 * np.log(min(np.median(ratios), 0.99) if ratios else 0.7) / period  # swing to swing: exp(-b T/4)
         return np.array([np.sqrt((2 * np.pi / period) ** 2 + b**2 / 4), b, 0.005, 0.0])
 
     def fit(self, parts: Sequence[Decay], first: FloatArray) -> tuple[FloatArray, FloatArray, ParameterSet]:

@@ -167,7 +167,7 @@ def _touching(seen: Steady, resolution: float) -> tuple[int, float]:
     turn = np.sign(np.diff(seen.omega))
     if not np.all(turn == turn[0]):
         raise ValueError("the frequency does not go one way from run to run: give the steps of one direction")
-    if float(np.std(seen.mean[:_FIRST], ddof=1)) > _STEADY * resolution:
+    if np.std(seen.mean[:_FIRST], ddof=1) > _STEADY * resolution:
         raise ValueError(
             f"the mean position moves among the first {_FIRST} runs: they touch already, or are not steady; begin "
             "farther away from resonance, in free motion (where contact ends is not where it begins)"
@@ -176,7 +176,7 @@ def _touching(seen: Steady, resolution: float) -> tuple[int, float]:
     for _ in range(len(seen.mean)):  # the scatter of the means from the free runs, the free runs from the scatter
         free = seen.mean[:begun]
         limit = max(_SIGMAS * float(np.std(free, ddof=1)), _COUNTS * resolution)
-        near = np.flatnonzero(np.abs(seen.mean - float(np.mean(free))) <= limit)
+        near = np.flatnonzero(np.abs(seen.mean - np.mean(free)) <= limit)
         before, begun = begun, max(int(near[-1]) + 1 if len(near) else 0, _FIRST)
         if begun == before:
             break
@@ -209,19 +209,19 @@ def _by_push(
     turn = np.floor((run.time - run.time[0]) / period).astype(int)
     tops = np.array([run.positions[turn == i].max() for i in range(turn.max())]) - place
     # dry friction moves the mean of a motion that goes longer one way
-    shift = place - float(seen.mean[first]) - f / natural**2 * float(seen.lean[first] - np.mean(seen.lean[: last + 1]))
+    shift = place - float(seen.mean[first]) - f / natural**2 * (seen.lean[first] - np.mean(seen.lean[: last + 1]))
     stiff, impulse = float(np.sqrt(kappa)), natural**2 * period * max(shift, 0.0)
-    if float(np.ptp(tops)) > _ALIKE * resolution:
+    if np.ptp(tops) > _ALIKE * resolution:
         return 0.0, float(tops.max()), float("inf")
 
     def depth(q: float) -> float:
         def excess(p: float) -> float:
             theta = float(np.arccos(q / (p + q)))
-            return 2 * stiff * ((p + q) * float(np.sin(theta)) - q * theta) - impulse
+            return 2 * stiff * ((p + q) * np.sin(theta) - q * theta) - impulse
 
         return float(brentq(excess, 0.0, impulse / (2 * stiff) + 10 * (impulse**2 * q / stiff**2) ** (1 / 3) + 1e-9))
 
-    held = float(seen.omega[last] ** 2 * seen.amplitude[last]) / kappa
+    held = (seen.omega[last] ** 2 * seen.amplitude[last]) / kappa
     most, least = depth(held), depth(1e-6 * held)
     own = 0.5 * resolution + _PUSHED * most  # a top lies between samples, too
     return float(tops.mean()) - most - own, float(tops.mean()) - least + own, most

@@ -54,7 +54,7 @@ def half_power_points(omega: FloatArray, amplitude: FloatArray) -> tuple[float, 
             f"{np.count_nonzero(use)} points stand above a third of the largest amplitude, 8 are needed: step finer"
         )
     squares, middle = omega[use] ** 2, float(np.mean(omega[use] ** 2))
-    width = float(np.ptp(squares)) / 2
+    width = np.ptp(squares) / 2
     # relative errors of the amplitudes are alike: those of 1/A^2 are 2 dA/A of it
     cubic = np.polynomial.Polynomial.fit(
         (squares - middle) / width, amplitude[use] ** -2.0, 3, domain=[-1, 1], w=amplitude[use] ** 2
@@ -154,4 +154,4 @@ def _scatter(part: Steady) -> FloatArray:
 
     rng = np.random.default_rng(0)
     drawn = np.array([again(rng.integers(0, len(part), size=len(part))) for _ in range(_DRAWS)])
-    return np.asarray(np.nanstd(drawn, axis=0, ddof=1))
+    return np.nanstd(drawn, axis=0, ddof=1)

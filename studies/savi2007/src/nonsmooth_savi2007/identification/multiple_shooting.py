@@ -24,9 +24,8 @@ A contact is eight samples, and none shows :math:`c_s/k_s`, half a millisecond: 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -51,8 +50,7 @@ _TRIED = 5  # windows with one contact, of which the median one is shown
 _FAR = 1.5  # times the sensor's noise: residuals of a run that is not of this law
 
 
-@dataclass(frozen=True, eq=False)
-class ContactFit:
+class ContactFit(NamedTuple):
     """Outcome: ``kappa`` = k_s/m, ``gamma`` = c_s/m, and for each run the gap and the place of the swing.
 
     ``values`` and ``covariance``: those that are `SHARED`, then per run its `OWN`; ``fits``: each run alone;
@@ -86,8 +84,12 @@ class ContactFit:
     @property
     def n_contacts(self) -> int:
         """Number of contacts in what is fitted."""
-        above = [one.residuals["fitted"].values > self.values[self.place(i, 0)] for i, one in enumerate(self.fits)]
-        return sum(int(np.count_nonzero(np.diff(each.astype(int)) > 0)) for each in above)
+        return sum(self._met(i, slice(None)) for i in range(len(self.fits)))
+
+    def _met(self, run: int, samples: Any) -> int:
+        """Number of contacts that begin among some samples of a run's fit."""
+        above = self.fits[run].residuals["fitted"].values[samples] > self.values[self.place(run, 0)]
+        return int(np.count_nonzero(~above[:-1] & above[1:]))
 
     def single(self) -> list[tuple[int, float, float]]:
         """Run, first and last time (s) of each window with one contact."""
@@ -96,8 +98,7 @@ class ContactFit:
             data = one.residuals
             for k in np.unique(data["window"].values):
                 mine = data["window"].values == k
-                above = data["fitted"].values[mine] > self.values[self.place(i, 0)]
-                if np.count_nonzero(np.diff(above.astype(int)) > 0) == 1:
+                if self._met(i, mine) == 1:
                     time = data["time"].values[mine]
                     found.append((i, float(time[0]), float(time[-1])))
         return found
@@ -140,8 +141,7 @@ def known_before(run: Run, decay: DecayFit, mark: float = 0.0, **also: Estimate)
     # the gap as read to 1.5 mm; the crank as set to 0.5 %, a phase of the mark to 0.05 rad, a second harmonic to 3 %
     covariance = np.diag([0.0, 0.0, 0.0, 1.5e-3, 1e-3, 5e-3 * crank, 0.05, 0.03 * crank, 0.03 * crank]) ** 2
     covariance[:3, :3] = decay.covariance[:3, :3] + 1e-12 * np.diag(np.diag(decay.covariance)[:3])
-    errors = np.sqrt(np.diag(covariance))
-    rows = zip((*SHARED[:3], *OWN), values, errors, strict=True)
+    rows = zip((*SHARED[:3], *OWN), values, np.sqrt(np.diag(covariance)), strict=True)
     beside = np.diag([one.uncertainty**2 for one in also.values()])
     return ParameterSet(
         {name: Estimate(float(v), float(e)) for name, v, e in rows} | also,
@@ -252,13 +252,13 @@ def shoot_contacts(
 def _touches(run: Run, rest: float) -> bool:
     """Return whether the car comes near enough to the support: the screw's reading may be off by a millimetre."""
     gap = float(run.settings["gap"])
-    return float(run.positions.max()) > rest + (gap - 1e-3 if gap < 2e-3 else 0.5 * gap)
+    return run.positions.max() > rest + (gap - 1e-3 if gap < 2e-3 else 0.5 * gap)
 
 
 def _span(run: Run) -> tuple[float, float]:
     """Part of a run that is fitted: from where the car is farthest from the support."""
     early = run.time < run.time[0] + _BEGINS
-    begin = float(run.time[int(np.argmin(run.positions[early]))])
+    begin = float(run.time[np.argmin(run.positions[early])])
     return begin, min(float(run.time[-1]), begin + _LONGEST)
 
 

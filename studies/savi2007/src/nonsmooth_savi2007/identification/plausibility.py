@@ -58,15 +58,15 @@ def _constant(runs: Sequence[Run], count: float) -> Iterator[str]:
 
 def _clocks(runs: Sequence[Run], apparatus: Mapping[str, Quantity]) -> Iterator[str]:
     moving = [run for run in runs if run.x is not None and len(run.time) > 1]
-    rates = np.array([1.0 / float(np.median(np.diff(run.time))) for run in moving])
+    rates = np.array([1.0 / np.median(np.diff(run.time)) for run in moving])
     if len(rates) and rates.max() > RATES * rates.min():
-        low, high = moving[int(rates.argmin())], moving[int(rates.argmax())]
+        low, high = moving[rates.argmin()], moving[rates.argmax()]
         yield (
             f"channel 'Angle' has {rates.min():.4g} samples per second in {low.label} and {rates.max():.4g} in "
             f"{high.label}: the time of one of them is labelled in another unit than it is in (s, ms)"
         )
     elif len(rates) and (stated := apparatus.get("sample_rate")) is not None:
-        off = float(np.median(rates)) / stated.value
+        off = np.median(rates) / stated.value
         if not 1 / STATED < off < STATED:
             yield (
                 f"channel 'Angle' has {np.median(rates):.4g} samples per second, the notebook says sample_rate = "
@@ -84,7 +84,7 @@ def _clocks(runs: Sequence[Run], apparatus: Mapping[str, Quantity]) -> Iterator[
 def _speed(run: Run) -> float:
     """Root of the mean square velocity (m/s) over a tenth of a second or five samples: the larger hides steps."""
     time, x = run.time, run.positions
-    lag = min(max(5, round(0.1 / max(float(np.median(np.diff(time))), 1e-12))), len(x) - 1)
+    lag = min(max(5, round(0.1 / max(np.median(np.diff(time)), 1e-12))), len(x) - 1)
     lag = min(lag, max(5, len(x) // 20))
     if lag < 1:
         return 0.0
@@ -111,7 +111,7 @@ def _cranks(runs: Mapping[str, Sequence[Run]]) -> Iterator[str]:
 def _gaps(runs: Mapping[str, Sequence[Run]]) -> Iterator[str]:
     far = []
     for run in (run for rows in runs.values() for run in rows if "gap" in run.settings and run.x is not None):
-        reach = max(float(np.nanmax(np.abs(run.positions))), _travel(run))
+        reach = max(np.nanmax(np.abs(run.positions)), _travel(run))
         if abs(float(run.settings["gap"])) > REACH * reach:
             far.append((run, reach))
     if far:
@@ -154,7 +154,7 @@ def slipped_late(decay: DecayFit, resolution: float) -> Iterator[str]:
     """A sentence for each tap that ends farther from rest than friction can hold a car: the string slipped later."""
     held = decay.held + 2 * resolution
     for run in (part.run for part in decay.parts):
-        off = float(np.median(run.positions[-max(10, len(run.time) // 20) :])) - decay.rest
+        off = np.median(run.positions[-max(10, len(run.time) // 20) :]) - decay.rest
         if abs(off) > held:
             yield (
                 f"impulse: run {run.name!r}, channel 'Angle': ends {1e3 * off:+.2f} mm from where the car rests, and "

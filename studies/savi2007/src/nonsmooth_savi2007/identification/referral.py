@@ -15,7 +15,6 @@ Where the car rests and about which place it swings comes from one function, :fu
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -135,9 +134,9 @@ def mean_shift(
         for _ in range(3):  # the scatter of the means from what the fit leaves of them
             normal = matrix.T @ matrix / spread**2 + np.diag(known)
             found = np.linalg.solve(normal, matrix.T @ y / spread**2 + known * [zero, alpha, 0.0])
-            covariance: FloatArray = np.asarray(np.linalg.inv(normal), dtype=np.float64)
+            covariance = np.asarray(np.linalg.inv(normal), float)
             left = y - matrix @ found
-            spread = max(float(np.sqrt(left @ left / max(len(y) - 2, 1))), 1e-6)
+            spread = max(np.sqrt(left @ left / max(len(y) - 2, 1)), 1e-6)
         rest, curved, straight = found.tolist()
         return MeanShift(rest, curved, straight, covariance, covariance[:, 0] * known[0], len(y), length)
 
@@ -154,7 +153,7 @@ def mean_shift(
     side, note = int(np.sign(free.alpha)), ""
     if not string_length:
         return free._replace(side=side)
-    off = abs(free.alpha - side * size) / float(np.hypot(error, told))
+    off = abs(free.alpha - side * size) / np.hypot(error, told)
     if off > _CLEAR:
         note = (
             f"the mean positions say a string of {1 / (8 * abs(free.alpha)):.3g} m, the notebook {string_length:.3g} "
@@ -205,7 +204,7 @@ def counted_gap(contacts: ContactFit, reading: float) -> CountedGap | None:
     index = [j for j, keep in zip(index, apart.used, strict=True) if keep]
     block = contacts.covariance[np.ix_(index, index)]
     solved = np.linalg.solve(block, np.ones(len(index)))
-    weight: FloatArray = np.asarray(solved / solved.sum(), dtype=np.float64)
+    weight = np.asarray(solved / solved.sum(), float)
     counted = float(weight @ contacts.values[index])
     off = contacts.values[index] - counted
     chi2 = float(off @ np.linalg.solve(block, off))
@@ -220,8 +219,7 @@ def counted_gap(contacts: ContactFit, reading: float) -> CountedGap | None:
     return CountedGap(counted, float(np.sqrt(square)), index, weight, tuple(notes))
 
 
-@dataclass(frozen=True, eq=False)
-class Referred:
+class Referred(NamedTuple):
     """The gap, and how it varies together with what else is identified.
 
     Attributes
@@ -371,4 +369,4 @@ def _cross(adjusted: Adjusted, labels: tuple[str, ...], shared: FloatArray) -> F
     columns = [adjusted.labels.index(label) for label in labels if label in adjusted.labels]
     if len(columns) != len(labels):
         return np.zeros(len(adjusted.names))
-    return np.asarray(adjusted.influence[:, columns] @ shared)
+    return adjusted.influence[:, columns] @ shared

@@ -49,11 +49,10 @@ def grazing_amplitude(omega: Any, crank_length: Any, omega_0: float, b: float, f
 
     Where it reaches the gap, the car grazes. Zero where friction holds the car.
     """
-    w, a = np.asarray(omega, dtype=np.float64), np.asarray(crank_length, dtype=np.float64)
+    w, a = np.asarray(omega, float), np.asarray(crank_length, float)
     stiff, damp, dry, push = omega_0**2 - w**2, b * w, 4 * f / np.pi, 0.5 * omega_0**2 * a
     square, half = stiff**2 + damp**2, damp * dry
-    inside = half**2 - square * (dry**2 - push**2)
-    size = (-half + np.sqrt(np.maximum(inside, 0.0))) / square
+    size = (-half + np.sqrt(np.maximum(half**2 - square * (dry**2 - push**2), 0.0))) / square
     return np.where(push > dry, np.maximum(size, 0.0), 0.0)
 
 
@@ -161,7 +160,7 @@ def viscous_bias(omega_0: float, b: float, f: float, crank_length: float, omega:
     -----
     The amplitudes are those of the harmonic balance of friction, without noise; every one has the same relative weight.
     """
-    at = np.asarray([r * omega_0 for r in RANGE] if omega is None else omega, dtype=np.float64)
+    at = np.asarray([r * omega_0 for r in RANGE] if omega is None else omega, float)
     amplitude = grazing_amplitude(at, crank_length, omega_0, b, f)
     moving = amplitude > 0
     if not moving.any():
@@ -199,11 +198,11 @@ def receptance(
     scale, mark : float
         Of the drive, and the crank's angle at the photogate (rad).
     """
-    w = np.asarray(omega, dtype=np.float64)
-    size = grazing_amplitude(w, scale * np.asarray(crank_length, dtype=np.float64), omega_0, b, f)
+    w = np.asarray(omega, float)
+    size = grazing_amplitude(w, scale * np.asarray(crank_length, float), omega_0, b, f)
     # in phase with -x the springs and the inertia, in phase with -v the losses
     lag = np.arctan2(b * w * size + 4 * f / np.pi, (omega_0**2 - w**2) * size)
-    return np.asarray(size * np.exp(1j * (mark - lag)))
+    return size * np.exp(1j * (mark - lag))
 
 
 def receptance_fit(seen: Steady, decay: DecayFit, mass: Quantity) -> Finding:
@@ -301,7 +300,7 @@ def nonlinear_fit(
         None where the iteration does not converge. Variances are infinite where the data do not tell the parameters
         apart.
     """
-    begin = np.asarray(start, dtype=np.float64)
+    begin = np.asarray(start, float)
     size = np.where(begin != 0, np.abs(begin), 1.0)  # the steps of its differences are relative to numbers of order 1
     found = least_squares(
         lambda scaled: residual(scaled * size),
@@ -330,8 +329,7 @@ def crank_mark(seen: Steady, decay: DecayFit) -> float:
     Angles count from where the crank pulls the car towards the support. A motor on the other side has the same mark at
     half a turn.
     """
-    expected = receptance(seen.omega, seen.crank, *decay.law)
-    return float(np.angle(np.sum(seen.response * np.conj(expected))))
+    return float(np.angle(np.sum(seen.response * np.conj(receptance(seen.omega, seen.crank, *decay.law)))))
 
 
 def _complex_data(seen: Steady, rows: list[Estimate], mass: float) -> xr.Dataset:

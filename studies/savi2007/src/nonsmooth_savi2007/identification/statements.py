@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from nonsmooth import ParameterSet
+from nonsmooth import ParameterSet, System
 from nonsmooth.errors import unknown
 from nonsmooth.identification import Estimate, Finding
 from nonsmooth_savi2007.identification.adjustment import Adjusted
@@ -20,8 +20,8 @@ from nonsmooth_savi2007.identification.referral import Referred
 _RESTS_ON = {
     "m": "the notebook's mass",
     "k": "impulse (taps) or springs (pulls)",
-    "c": "impulse (taps)",
     "k_s": "support (pushes), drop or contact",
+    "c": "impulse (taps)",
     "c_s": "drop or contact",
     "g": "contact, impulse, and support or drop",
 }
@@ -103,12 +103,11 @@ def for_model(found: ParameterSet, model: Any) -> ParameterSet:
     ValueError
         If it has none of them, or one of the same name in another unit.
     """
-    units = getattr(model, "parameters", None)
-    if units is None:
+    if not isinstance(model, System):
         raise TypeError(
             f"model must be a System, as nonsmooth.models.discontinuous_support() returns one; got {model!r}"
         )
-    name = getattr(model, "name", "the model")
+    name, units = model.name, model.parameters
     shared = [key for key in found if key in units]
     if not shared:
         raise ValueError(
@@ -116,8 +115,7 @@ def for_model(found: ParameterSet, model: Any) -> ParameterSet:
             "discontinuous support"
         )
     for key in shared:
-        unit = str(getattr(units[key], "unit", ""))
-        if unit not in ("", found.estimates[key].unit):
+        if (unit := units[key].unit) not in ("", found.estimates[key].unit):
             raise ValueError(
                 f"the parameter {key!r} of {name!r} is in {unit}, the one identified in {found.estimates[key].unit}: "
                 "they are not the same quantity"
@@ -142,7 +140,6 @@ def require(found: ParameterSet, names: Iterable[str]) -> None:
             raise ValueError(f"{name!r} was not identified: it needs {_RESTS_ON[name]}; {lacking or 'see the notes'}")
 
 
-_PARAMETERS = ("m", "k", "k_s", "c", "c_s", "g")
 _BESIDE = ("friction", "gain", "omega_0", "gap_at_rest", "mean_shift", "rest_position")
 
 
@@ -177,7 +174,7 @@ def joined(
     if gap is not None:
         matrix[size:, :size], matrix[:size, size:], matrix[size:, size:] = gap.cross, gap.cross.T, gap.covariance
         told |= {name: (one, row) for (name, one), row in zip(gap.estimates.items(), unit[size:], strict=True)}
-    inner, outer = ([name for name in some if name in told] for some in (_PARAMETERS, _BESIDE))
+    inner, outer = ([name for name in some if name in told] for some in (_RESTS_ON, _BESIDE))
     jacobian = np.array([told[name][1] for name in (*inner, *outer)])
     return ParameterSet(
         {name: told[name][0] for name in inner},

@@ -74,8 +74,8 @@ class Steady:
         return tuple(run.name for run in self.runs)
 
     def only(self, chosen: Any) -> Steady:
-        """The rows that are chosen (a mask or indices)."""
-        rows = np.flatnonzero(chosen) if np.asarray(chosen).dtype == bool else np.asarray(chosen, dtype=int)
+        """The rows that a mask chooses."""
+        rows = np.flatnonzero(chosen)
         return Steady(tuple(self.runs[i] for i in rows), *(getattr(self, one.name)[rows] for one in fields(self)[1:]))
 
 
@@ -90,8 +90,7 @@ def harmonics_of(run: Run, time: FloatArray, values: Any) -> tuple[HarmonicFit, 
     inside = time <= time[0] + whole * drive.period
     fitted = harmonic_fit(time[inside], values[inside], drive.omega, HARMONICS)
     # the gate's times to 0.1 ms each: all of them together tell the phase
-    mark = float(np.mean(drive.turn_times - drive.period * drive.turns))
-    return fitted, drive.omega, drive.omega_error, mark
+    return fitted, drive.omega, drive.omega_error, float(np.mean(drive.turn_times - drive.period * drive.turns))
 
 
 def steady(runs: Sequence[Run]) -> Steady:
@@ -117,7 +116,7 @@ def steady(runs: Sequence[Run]) -> Steady:
                 amplitude * np.exp(1j * (omega * mark - float(fitted.phases[0]))),
                 fitted.mean,
                 fitted.mean_error,
-                fitted.mean + float((np.cos(shape) @ fitted.amplitudes).max()),
+                fitted.mean + (np.cos(shape) @ fitted.amplitudes).max(),
                 fitted.residual,
                 _lean(fitted),
             )

@@ -78,7 +78,7 @@ def stiffness(
     for _ in range(3):
         # the force's own variance is what its residuals leave after the count's, projected by the slope
         projected = float(values[0]) ** 2 * resolution**2 / 12
-        noise = max(float(np.var(left)) - projected, 0.1 * float(np.var(left)))
+        noise = max(np.var(left) - projected, 0.1 * np.var(left))
         values, covariance, left = _linear_law(columns, force, np.full(len(force), noise + projected), lengths)
     slope, error = float(values[0]), float(np.sqrt(covariance[0, 0]))
     half = gain_limit * slope
@@ -141,16 +141,16 @@ def _linear_law(
 
 
 def _columns(run: Run, resolution: float, mass: float, friction: bool) -> tuple[FloatArray, FloatArray]:
-    time, force_time = run.time, np.asarray(run.force["time"].values, dtype=np.float64)
+    time, force_time = run.time, np.asarray(run.force["time"].values, float)
     if len(time) != len(force_time) or np.max(np.abs(time - force_time)) > 1e-6:
         raise ValueError(
             f"{run.label}: channels 'Angle' and 'Force' are not over the same times; record both at one rate"
         )
     smooth = savitzky_golay(time, run.x, resolution=resolution, window=_WINDOW, order=_ORDER)
     v, a = smooth["v"].values, smooth["a"].values
-    force = np.asarray(run.force.values, dtype=np.float64) - mass * a
+    force = np.asarray(run.force.values, float) - mass * a
     parts = [run.positions, v]
-    inside = np.ones(len(time), dtype=bool)
+    inside = np.ones(len(time), bool)
     if friction:
         parts.append(np.sign(v))
         # where the hand turns, the direction is not known

@@ -66,7 +66,7 @@ def write_report(
 def _blocks(
     folder: Path, figures: Sequence[Figure], data: Data, rows: Sequence[Statement], settings: Settings, complete: bool
 ) -> list[Written]:
-    blocks: list[Written] = [heading(TITLE, 1), paragraph(_PAPER)]
+    blocks = [heading(TITLE, 1), paragraph(_PAPER)]
     if settings.quick:
         blocks.append(notice("A quick run: coarse grids and short transients. Verdicts are provisional."))
     if not complete:

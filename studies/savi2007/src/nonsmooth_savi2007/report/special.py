@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from nonsmooth_savi2007.claims.verdicts import Data
 from nonsmooth_savi2007.figures.branches import BEGINNINGS, branches_of, rows_of
-from nonsmooth_savi2007.grazing import grazing_frequencies
+from nonsmooth_savi2007.figures.resonance import grazing_of
 from nonsmooth_savi2007.report.pages import Written, table
 
 _NAMES = {"fold": "fold", "flip": "flip", "grazing": "grazing", "neimark_sacker": "Neimark-Sacker"}
 _UNITS = {"omega": ("rad/s", 8), "rho": ("N", 8), "g": ("m", 11)}  # decimals: eight digits at least
 
 
-@dataclass(frozen=True)
-class SpecialPoint:
+class SpecialPoint(NamedTuple):
     """One point: its figure and branch, its value, its largest multiplier (at a graze that without the contact).
 
     ``contact``: the largest multiplier with the contact, in the limit; ``closed``: the value in closed form.
@@ -58,7 +57,7 @@ def _points(figure: str, branch: xr.Dataset) -> list[SpecialPoint]:
             contact = _largest(row["contact_multipliers"].values) if bool(row["bounded"]) else None
             free = contacts[max(at - 1, 0) : at + 2].min() == 0  # on one side there is no contact at all
             if free and parameter == "omega" and int(branch["period_number"]) == 1:
-                closed = _closed(branch, value)
+                closed = min(grazing_of(branch), key=lambda omega: abs(omega - value))
         found.append(
             SpecialPoint(
                 figure,
@@ -77,12 +76,6 @@ def _points(figure: str, branch: xr.Dataset) -> list[SpecialPoint]:
 def _largest(multipliers: np.ndarray) -> complex:
     known = multipliers[~np.isnan(multipliers)]
     return complex(known[np.argmax(np.abs(known))])
-
-
-def _closed(branch: xr.Dataset, value: float) -> float:
-    """The grazing frequency in closed form that is nearest to the one found."""
-    parameters = {name: float(branch[name]) for name in ("m", "k", "c", "rho", "g")}
-    return min(grazing_frequencies(parameters), key=lambda omega: abs(omega - value))
 
 
 def special_table(points: Sequence[SpecialPoint]) -> Written:
@@ -131,8 +124,7 @@ def ratios(points: Sequence[SpecialPoint]) -> Mapping[str, list[float]]:
         first: dict[int, float] = {}
         for one in flips:  # the first flip along each branch is where the cascade goes on
             first.setdefault(one.period, one.value)
-        values = [first[period] for period in (1, 2, 4, 8) if period in first]
-        steps = np.diff(values)
+        steps = np.diff([first[period] for period in (1, 2, 4, 8) if period in first])
         if len(steps) > 1:
             found[figure] = [float(ratio) for ratio in steps[:-1] / steps[1:]]
     return found

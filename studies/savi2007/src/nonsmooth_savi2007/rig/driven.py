@@ -7,8 +7,7 @@ which the car first touches from listening.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -23,8 +22,7 @@ if TYPE_CHECKING:
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
 
-@dataclass(frozen=True)
-class SteadyRun:
+class SteadyRun(NamedTuple):
     """One steady run: voltage (V), crank length and gap at the screw (m; None: no support), and what to note.
 
     ``release`` is where the car is held and let go (m), the motor running; None: it begins at rest.
@@ -77,7 +75,7 @@ def _steady(
     recorded = int(np.ceil(phase + (setting.duration + 1 / sensors.RATE) / period))
     time, at = sensors.instants(rig, rng, setting.duration)
     begin = (before + phase) * period
-    start = _at_rest(gap, setting.release or 0.0) if last is None else last
+    start = at_rest(gap, setting.release or 0.0) if last is None else last
     (x, v), result = simulated(
         system,
         name,
@@ -90,64 +88,13 @@ def _steady(
     return rig.channels(rng, name, time, x, v, crossed=crossed), result
 
 
-def rise(
-    rig: VirtualRig,
-    *,
-    voltage: float,
-    crank_length: tuple[float, float],
-    gap: float,
-    duration: float,
-    settle: float = 30.0,
-) -> Recording:
-    """The forcing rises slowly: the crank grows evenly from one length to the other (m) in ``duration`` seconds."""
-    rng, name = rig.generator("rise", 0), "Run #1"
-    omega = frequency(rig, voltage)
-    period = 2 * np.pi / omega
-    first, last = crank_length
-    rate = (last - first) / duration
-    wander = rig.wander("rise", 0, omega)
-    set_to = rig.parameters(rising=True, omega=omega, g=rig.true_gap(gap)) | named(wander)
-    system = rig.system(rising=True).with_parameters(set_to)
-    whole = int(np.ceil(settle / period))
-    start: Any = {**_at_rest(rig.true_gap(gap)), "a": first}
-    side = rig.truth["motor_side"]
-    _, settled = simulated(
-        system,
-        name,
-        instants=np.array([0.0]),
-        turns=(0, whole),
-        start=start,
-        side=side,
-    )
-    time, at = sensors.instants(rig, rng, duration)
-    x, v = simulated(
-        system.with_parameters(crank_rate=rate),
-        name,
-        instants=at,
-        duration=duration + 1 / sensors.RATE,
-        start=settled,
-        side=side,
-    )[0]
-    channels = rig.channels(rng, name, time, x, v, crossed=passages(rig, omega, 0.0, duration, wander))
-    note = f"crank grows evenly, {rate:.3e} m/s, {rate * period:.3e} m per turn"
-    stated = {
-        "crank_length": first,
-        "crank_length_end": last,
-        "voltage": voltage,
-        "gap": gap,
-        "figure": 11,
-        "note": note,
-    }
-    return rig.recording("rise", [(name, channels, stated)])
-
-
 def named(wander: Wander) -> dict[str, float]:
     """The slow terms of the motor's angle as parameters of the system."""
     words = ("wander", "wander_rate", "wander_phase")
     return {f"{word}_{j}": term[i] for j, term in enumerate(wander, 1) for i, word in enumerate(words)}
 
 
-def _at_rest(gap: float, place: float = 0.0) -> dict[str, float]:
+def at_rest(gap: float, place: float = 0.0) -> dict[str, float]:
     """Held still at ``place``, the rest position where not given, or just clear of a support that reaches beyond."""
     return {"x": min(place, gap)}
 

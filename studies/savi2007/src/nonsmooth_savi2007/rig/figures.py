@@ -13,27 +13,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nonsmooth import Recording
-from nonsmooth_savi2007.rig import driven
-from nonsmooth_savi2007.rig.driven import SteadyRun, records
-from nonsmooth_savi2007.rig.motor import mean_position, voltage_for
+from nonsmooth_savi2007.printed import FIGURE_12, FIGURE_14, FIGURE_18
+from nonsmooth_savi2007.rig import sensors
+from nonsmooth_savi2007.rig.driven import SteadyRun, at_rest, named, records
+from nonsmooth_savi2007.rig.motor import frequency, mean_position, passages, voltage_for
+from nonsmooth_savi2007.rig.physics import simulated
 
 if TYPE_CHECKING:
     from nonsmooth_savi2007.rig.virtual_rig import VirtualRig
 
 #: Settings of the sections: frequency (rad/s), forcing (N), gap (m).
 SECTIONS: dict[int, tuple[tuple[float, float, float], ...]] = {
-    12: tuple((3.69, rho, -0.0045) for rho in (0.29, 0.39, 0.42, 0.46)),
-    13: tuple((11.15, 0.33, g) for g in (-0.0012, 0.0009, 0.0014, 0.0018)),
-    14: tuple((11.15, 0.33, g) for g in (-0.0012, 0.0009, 0.0014, 0.0018)),
-    15: ((11.15, 0.33, 0.0018),),
-    16: ((11.15, 0.33, 0.0018),),
+    12: tuple((3.69, rho, -0.0045) for rho in FIGURE_12),
+    **dict.fromkeys((13, 14), tuple((11.15, 0.33, g) for g in FIGURE_14)),
+    **dict.fromkeys((15, 16), ((11.15, 0.33, 0.0018),)),
     17: tuple((omega, 0.23, 0.0036) for omega in np.round(np.arange(8.4, 10.21, 0.05), 2).tolist()),
-    18: tuple((omega, 0.23, 0.0036) for omega in (8.64, 9.55, 9.88)),
+    18: tuple((omega, 0.23, 0.0036) for omega in FIGURE_18),
 }
 _PERIODS = {15: 1500, 16: 1500, 17: 60}
 #: Where else the car is let go at each setting (m): of motions that coexist, the start at rest shows one.
 RELEASES: dict[int, tuple[float, ...]] = {14: (-0.01, -0.02, -0.03, -0.04)}
 _RISE = (3.69, 0.2, 0.5, -0.0045)  # rad/s, N, N, m
+_SETTLE = 30.0  # s, before a rise begins
 _RESPONSES = {9: (0.14, 0.02), 10: (0.16, 0.0145)}
 _STEPS = {9: (3.0, 6.6), 10: (2.4, 7.4)}  # rad/s
 #: What each figure needs. Those with the support mounted also need a few runs without it, in ``response``, and taps:
@@ -103,12 +104,32 @@ def rise(
     gap: float | None = None,
     duration: float = 900.0,
 ) -> Recording:
-    """The slow rise of the forcing of Fig. 11, in ``duration`` seconds; the gap is the screw's reading."""
-    omega, low, high, at_rest = _RISE
-    lengths = (crank_for(rig, low), crank_for(rig, high)) if crank_length is None else crank_length
-    knob = voltage_for(rig, omega) if voltage is None else voltage
-    screw = screw_for(rig, at_rest, 0.0) if gap is None else gap
-    return driven.rise(rig, voltage=knob, crank_length=lengths, gap=screw, duration=duration)
+    """The slow rise of the forcing of Fig. 11: the crank grows evenly from one length to the other (m) in ``duration``
+    seconds; the gap is the screw's reading."""
+    wanted, low, high, at_zero = _RISE
+    first, last = (crank_for(rig, low), crank_for(rig, high)) if crank_length is None else crank_length
+    knob = voltage_for(rig, wanted) if voltage is None else voltage
+    screw = screw_for(rig, at_zero, 0.0) if gap is None else gap
+    rng, name, true = rig.generator("rise", 0), "Run #1", rig.true_gap(screw)
+    omega, rate = frequency(rig, knob), (last - first) / duration
+    wander, period, side = rig.wander("rise", 0, omega), 2 * np.pi / omega, rig.truth["motor_side"]
+    set_to = rig.parameters(rising=True, omega=omega, g=true) | named(wander)
+    system, start = rig.system(rising=True).with_parameters(set_to), {**at_rest(true), "a": first}
+    turns = 0, int(np.ceil(_SETTLE / period))
+    _, settled = simulated(system, name, instants=np.array([0.0]), turns=turns, start=start, side=side)
+    time, at = sensors.instants(rig, rng, duration)
+    rising, length = system.with_parameters(crank_rate=rate), duration + 1 / sensors.RATE
+    (x, v), _ = simulated(rising, name, instants=at, duration=length, start=settled, side=side)
+    channels = rig.channels(rng, name, time, x, v, crossed=passages(rig, omega, 0.0, duration, wander))
+    stated = {
+        "crank_length": first,
+        "crank_length_end": last,
+        "voltage": knob,
+        "gap": screw,
+        "figure": 11,
+        "note": f"crank grows evenly, {rate:.3e} m/s, {rate * period:.3e} m per turn",
+    }
+    return rig.recording("rise", [(name, channels, stated)])
 
 
 def without_support(rig: VirtualRig, number: int) -> list[SteadyRun]:
@@ -144,7 +165,7 @@ def figure(rig: VirtualRig, number: int, **options: Any) -> dict[str, Recording]
     if number in _RESPONSES:
         rho, gap = _RESPONSES[number]
         length = crank_for(rig, rho)
-        steps: Sequence[float] = np.arange(*_STEPS[number], 0.05).tolist()
+        steps = np.arange(*_STEPS[number], 0.05).tolist()
         options = {
             "crank_lengths": (length,),
             "gap": screw_for(rig, gap, length),

@@ -160,7 +160,7 @@ def _decay(
     )
     held = np.zeros((2, len(at)))
     held[0] = start.get("x", 0.0)  # held there until it is let go
-    motion: FloatArray = held
+    motion = held
     motion[:, moving] = states
     if slips:
         motion[0] -= _slip(rig, at - begin, states)
@@ -171,5 +171,5 @@ def _slip(rig: VirtualRig, since: FloatArray, states: FloatArray) -> FloatArray:
     """Travel (m) that the sensor misses: within 50 ms the string slips on its wheel, in one of the first swings."""
     rng = np.random.default_rng([rig.seed, 5])
     begin = float(rng.uniform(0.5, 2.5))
-    missed = float(rng.uniform(0.03, 0.3)) * float(np.max(np.abs(states[0]))) * float(rng.choice([-1.0, 1.0]))
-    return np.asarray(missed * np.clip((since - begin) / 0.05, 0.0, 1.0))
+    missed = float(rng.uniform(0.03, 0.3)) * np.max(np.abs(states[0])) * float(rng.choice([-1.0, 1.0]))
+    return missed * np.clip((since - begin) / 0.05, 0.0, 1.0)

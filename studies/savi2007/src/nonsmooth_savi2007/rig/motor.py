@@ -68,7 +68,7 @@ def passages(rig: VirtualRig, omega: float, begin: float, end: float, wander: Wa
         at = at - off / omega
         if np.max(np.abs(off), initial=0.0) < 1e-12:
             break
-    return np.asarray(at)
+    return at
 
 
 def voltage(rig: VirtualRig, *, voltages: Sequence[float] = range(2, 13), turns: int = 40) -> Recording:

@@ -144,8 +144,7 @@ def car(*, relaxing: bool = True, rising: bool = False, wandering: bool = False,
         """The car under its friction and these forces; ``beside`` is the rate of a further state."""
 
         def rates(t: Any, u: Any, p: Any) -> Any:
-            total = sum(sign * force(t, u, p) for sign, force in forces)
-            rate = (u.v, (total - friction(u.v, p)) / p.m)
+            rate = (u.v, (sum(sign * force(t, u, p) for sign, force in forces) - friction(u.v, p)) / p.m)
             rate += () if beside is None else (beside(u, p),)
             return (*rate, p.crank_rate) if rising else rate
 
@@ -156,7 +155,7 @@ def car(*, relaxing: bool = True, rising: bool = False, wandering: bool = False,
 
     on_car = ["x", "v", "a"] if rising else ["x", "v"]
     both, support = ((side, driven), (-side, fixed)), (1, from_support)
-    modes: dict[str, Any] = {
+    modes = {
         "free": Mode(field(*both), states=on_car),
         "contact": Mode(field(*both, support), states=on_car),
         "slack_driven": Mode(field((-side, fixed)), states=on_car),
@@ -251,8 +250,7 @@ def simulated(
     if with_strings:
         _check_strings(system, run, result, side)
     # Crossings stand twice in the result's time; each instant that was asked for is there exactly.
-    rows = np.searchsorted(result["time"].values, instants)
-    u = result["u"].values[rows]
+    u = result["u"].values[np.searchsorted(result["time"].values, instants)]
     return np.ascontiguousarray(u[:, :2].T), result
 
 

@@ -10,8 +10,7 @@ The instants of sampling jitter; the file gives the even clock of the interface,
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -51,7 +50,7 @@ def angle(rig: VirtualRig, run: str, time: FloatArray, x: FloatArray, v: FloatAr
     ValueError
         If the wheel turns faster than the sensor counts.
     """
-    fastest = float(np.max(np.abs(v), initial=0.0)) / DISTANCE_PER_TURN
+    fastest = np.max(np.abs(v), initial=0.0) / DISTANCE_PER_TURN
     if fastest > MAX_TURNS_PER_SECOND:
         raise ValueError(
             f"{run}: the wheel of the rotary sensor would turn {fastest:.1f} times per second; it counts up to "
@@ -88,7 +87,7 @@ def turns(rig: VirtualRig, crossed: FloatArray) -> xr.Dataset:
 
 
 def _sensor(time: FloatArray, name: str, unit: str, values: FloatArray) -> xr.Dataset:
-    attrs: Mapping[str, Any] = {"long_name": name, "measurement": name, "units": unit}
+    attrs = {"long_name": name, "measurement": name, "units": unit}
     rate = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else float("nan")
     sampling = "irregular" if name == "Turn" else "regular"
     coordinate = ("time", time, {"long_name": "time", "units": "s"})

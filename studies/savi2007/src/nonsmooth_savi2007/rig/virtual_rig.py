@@ -198,8 +198,7 @@ class VirtualRig:
         """Make the recording of a procedure by its name; the options are those of the method of that name."""
         if procedure not in PROCEDURES:
             raise ValueError(unknown(procedure, "a procedure", "a virtual rig", PROCEDURES.keys()))
-        made: Recording = getattr(self, procedure)(**options)
-        return made
+        return getattr(self, procedure)(**options)
 
     springs = hand.springs
     support = hand.support
